@@ -1,0 +1,22 @@
+/// Everything a deck can name, by family. Each family's file registers its own keywords.
+#pragma once
+
+#include "model/registry.h"
+
+namespace mbcosim {
+
+void register_bodies(Registry& registry);      ///< body, gravity, inertia, automatic structural
+void register_joints(Registry& registry);
+void register_beams(Registry& registry);
+void register_forces(Registry& registry);      ///< forces and couples
+void register_genels(Registry& registry);      ///< genels and electric elements
+void register_hydraulics(Registry& registry);  ///< elements and fluids
+void register_modal(Registry& registry);       ///< modal joint, modal force
+void register_drives(Registry& registry);      ///< drives and scalar functions (src/model/drives)
+void register_laws(Registry& registry);        ///< constitutive laws (src/model/laws)
+void register_unsupported(Registry& registry);  ///< words of the language that are refused by name
+
+/// All of the above, once.
+const Registry& full_registry();
+
+}  // namespace mbcosim

@@ -1,0 +1,82 @@
+/// Drives: scalar functions of one argument (usually the time) that also see the model's state.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "math/dual.h"
+#include "math/types.h"
+#include "model/fwd.h"
+
+namespace mbcosim {
+
+/// A scalar function. Immutable: what a drive remembers (sample and hold, random seeds, filters) lives in `State::memory`
+/// at an offset that it got from `ModelBuilder::allocate_memory`; it advances in `advance`, once a step.
+class Drive {
+ public:
+  virtual ~Drive() = default;
+  /// Value for the argument `t`; throws EvaluationError. `context.time` is the time of the step's end.
+  virtual double value(const EvalContext& context, double t) const = 0;
+  virtual bool has_derivative() const { return false; }
+  /// Derivative with respect to the argument; only when `has_derivative()`.
+  virtual double derivative(const EvalContext& context, double t) const;
+
+  /// Value in time, i.e. for t = context.time.
+  double value(const EvalContext& context) const;
+  /// Value in time as any scalar: a TimeDual carries the derivative when there is one, else zero.
+  template <class T>
+  T value_as(const EvalContext& context) const;
+};
+
+/// Called once at the start of each step, after time was set to the step's end and before the prediction; also once with
+/// `initial` at the start of the run. Registered with ModelBuilder::on_step.
+class StepListener {
+ public:
+  virtual ~StepListener() = default;
+  virtual void advance(const EvalContext& context, State& state, bool initial) const = 0;
+};
+
+/// A vector- or matrix-valued function: Σ entityₖ·driveₖ or one drive per component. Spec 03 section 2.
+template <int R, int C>
+class TplDrive {
+ public:
+  using Value = Eigen::Matrix<double, R, C>;
+  virtual ~TplDrive() = default;
+  virtual Value value(const EvalContext& context) const = 0;
+  virtual bool has_derivative() const { return false; }
+  virtual Value derivative(const EvalContext& context) const = 0;  ///< d/dt; zero when there is none
+
+  /// Value in time as any scalar type (3-vectors); a TimeDual carries the time derivative.
+  template <class T>
+  Eigen::Matrix<T, R, C> value_as(const EvalContext& context) const;
+};
+
+/// drive.derivative at t = context.time.
+double derivative_in_time(const Drive& drive, const EvalContext& context);
+
+template <class T>
+T Drive::value_as(const EvalContext& context) const {
+  T r(value(context));
+  if constexpr (std::is_same_v<T, TimeDual>) {
+    if (has_derivative()) r.d[0] = derivative_in_time(*this, context);
+  }
+  return r;
+}
+
+template <int R, int C>
+template <class T>
+Eigen::Matrix<T, R, C> TplDrive<R, C>::value_as(const EvalContext& context) const {
+  const Value v = value(context);
+  Eigen::Matrix<T, R, C> r;
+  for (int i = 0; i < R * C; ++i) r(i) = T(v(i));
+  if constexpr (std::is_same_v<T, TimeDual>) {
+    const Value d = derivative(context);
+    for (int i = 0; i < R * C; ++i) r(i).d[0] = d(i);
+  }
+  return r;
+}
+
+DrivePtr make_constant_drive(double value);
+Vec3DrivePtr make_constant_vec3_drive(const Vec3& value);
+
+}  // namespace mbcosim

@@ -1,0 +1,133 @@
+/// The face that one contiguous set of elements of a type shows to the model and the solver.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "math/types.h"
+#include "model/context.h"
+#include "model/diagnostic.h"
+#include "model/fwd.h"
+#include "model/state.h"
+
+namespace mbcosim {
+
+class OutputRow;
+
+/// Families that share a label space, in the order in which their unknowns are numbered (spec 02 section 1.1).
+enum class Family {
+  joint, joint_regularization, plate, genel, induced_velocity, aerodynamic, aeromodal, electric, thermal, hydraulic, loadable,
+  // families without unknowns of their own
+  body, beam, force, gravity, inertia, automatic_structural, air_properties, bulk, output_element, count
+};
+const char* family_name(Family family);  ///< "joint", "hydraulic", ... as in private data and messages
+
+/// What every element has, whatever it is.
+struct ElementInfo {
+  Family family = Family::joint;
+  int label = 0;
+  std::string type;  ///< "revolute hinge"
+  std::string name;
+  SourceSpan where;
+  bool output = true;
+  DrivePtr driven;       ///< active while non-zero; null: always active
+  int active_memory = -1;  ///< offset of the activity flag in State::memory when driven
+  int order = 0;         ///< declaration order over all elements
+  std::vector<std::string> hints;  ///< of `driven`
+};
+
+/// How dependences of a node's kinematics on its Newton increments enter Jacobians: δx = c δ, δv = δ for the position
+/// unknowns; δθ = A δ, δw = B δ for the rotation unknowns (spec 02 section 6.2).
+struct NodeSeeds {
+  Mat3 A;  ///< c G(g)
+  Mat3 B;  ///< ∂w/∂δ
+};
+
+/// Collects which rows meet which columns; the answer is where each entry of a dense block lies in the sparse values.
+class PatternSink {
+ public:
+  virtual ~PatternSink() = default;
+  /// Announces a dense block (rows × columns). Negative rows and columns are skipped.
+  virtual void block(const int* rows, int row_count, const int* columns, int column_count) = 0;
+};
+class PositionSource {
+ public:
+  virtual ~PositionSource() = default;
+  /// Position of entry (row, column) in the value array; -1 when row or column is negative.
+  virtual int position(int row, int column) const = 0;
+};
+
+/// Mass properties about a node's origin, global frame.
+struct Inertia {
+  double m = 0;             ///< [kg]
+  Vec3 S = Vec3::Zero();    ///< first moment [kg·m]
+  Mat3 J = Mat3::Zero();    ///< second moment [kg·m²]
+};
+
+enum class AssemblyRole {
+  none,       ///< takes no part
+  holonomic,  ///< rows are position constraints; rates by differentiation in time
+  elastic,    ///< its loads enter the position rows only
+  custom      ///< writes both levels itself
+};
+
+class ElementSet {
+ public:
+  virtual ~ElementSet() = default;
+
+  virtual int size() const = 0;
+  virtual const ElementInfo& info(int i) const = 0;
+  virtual ElementInfo& info(int i) = 0;
+
+  // --- unknowns and structure, while the model is being finished
+  virtual int unknowns(int i) const = 0;                              ///< number of own unknowns of element i
+  virtual bool is_differential(int i, int k) const = 0;               ///< kind of own unknown k
+  virtual std::string row_name(int i, int k) const = 0;               ///< meaning of own row k
+  virtual void bind(const Model& model, int i, int first_own) = 0;    ///< own unknowns start at first_own
+  virtual void collect_pattern(PatternSink& sink) const = 0;
+  virtual void set_positions(const PositionSource& positions) = 0;
+
+  // --- evaluation
+  virtual void start(const EvalContext& context, State& state) const = 0;  ///< initial values of own unknowns and memory
+  virtual void residual(const EvalContext& context, double* r) const = 0;  ///< adds to r (n)
+  /// Adds −∂r/∂δ to the sparse values; seeds by structural node index.
+  virtual void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const = 0;
+  virtual void after_predict(const EvalContext& context, State& state) const = 0;
+  virtual void after_convergence(const EvalContext& context, State& state) const = 0;
+
+  // --- initial assembly: state.y, yp hold positions and rates, multipliers λ and λ′ (spec 02 section 9)
+  virtual AssemblyRole assembly_role(int i) const = 0;
+  /// Adds to position-level rows r (n) and rate-level rows r_rate (n), both in the model's row numbering.
+  virtual void assembly_residual(const EvalContext& context, int i, double* r, double* r_rate) const = 0;
+  /// Appends −∂(r, r_rate)/∂(y, yp) of element i: row and column numbers ≥ n mean the rate level.
+  struct Triplet {
+    int row, column;
+    double value;
+  };
+  virtual void assembly_jacobian(const EvalContext& context, int i, int n, std::vector<Triplet>& out) const = 0;
+
+  // --- results
+  virtual void output(const EvalContext& context, int i, OutputRow& row) const = 0;
+  virtual std::string log_line(const Model& model, int i) const = 0;  ///< line of .log without newline; may be empty
+  virtual int private_datum(int i, std::string_view name) const = 0;  ///< index, or -1
+  virtual std::vector<std::string> private_data(int i) const = 0;     ///< names, for describe
+  virtual double private_value(const EvalContext& context, int i, int datum) const = 0;
+  /// Adds the inertia that element i attaches to structural node `node` (global frame, about the node).
+  virtual void add_inertia(const EvalContext& context, int i, int node, Inertia& inertia) const = 0;
+  /// Adds the momentum of element i to the initial momentum of its nodes.
+  virtual void add_momentum(const EvalContext& context, int i, State& state) const = 0;
+
+  bool is_active(const State& state, int i) const {
+    const int m = info(i).active_memory;
+    return m < 0 || state.memory[m] != 0;
+  }
+};
+
+/// Position of an element in the model.
+struct ElementRef {
+  ElementSet* set = nullptr;
+  int index = -1;
+};
+
+}  // namespace mbcosim

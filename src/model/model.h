@@ -1,0 +1,176 @@
+/// Model: everything that is fixed once a deck is read. Immutable and shared between sessions and threads.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "model/context.h"
+#include "model/diagnostic.h"
+#include "model/drive.h"
+#include "model/element_set.h"
+#include "model/fwd.h"
+#include "model/node.h"
+#include "model/settings.h"
+#include "model/state.h"
+
+namespace mbcosim {
+
+/// A run-time function of the state that is evaluated at every use, bound to a name in run-time strings (plugin variables).
+struct NamedDrive {
+  int label = 0;
+  std::string name;
+  DrivePtr drive;
+  bool output_value = false, output_derivative = false;
+};
+
+/// Gravity field: uniform (vector drive) or central.
+struct Gravity {
+  Vec3DrivePtr uniform;            ///< acceleration, global [m/s²]; null for central gravity
+  Vec3 origin = Vec3::Zero();      ///< central: centre [m]
+  double mass_g = 0;               ///< central: M·G [m³/s²]
+  bool output = false;
+  int label = 0;
+};
+
+/// `rigid body kinematics`: motion of the relative frame in which the model is written. Null drives are zero.
+struct FrameMotion {
+  Vec3DrivePtr position, orientation, velocity, angular_velocity, acceleration, angular_acceleration;
+};
+
+/// A `reference` card, kept for `.rfm` output.
+struct ReferenceFrame {
+  int label = 0;
+  std::string name;
+  SourceSpan where;
+  Vec3 x = Vec3::Zero();
+  Mat3 R = Mat3::Identity();
+  Vec3 v = Vec3::Zero(), w = Vec3::Zero();
+};
+
+enum class UnknownKind : std::uint8_t { differential, algebraic };
+
+class Model {
+ public:
+  std::string title;
+  std::uint64_t digest = 0;  ///< hash of the deck and everything it read
+  InitialValueSettings initial_value;
+  ControlSettings control;
+
+  std::vector<StructuralNode> structural;
+  std::vector<ScalarNode> scalars;  ///< electric, thermal, abstract, hydraulic, parameter nodes in declaration order
+  std::vector<std::unique_ptr<ElementSet>> sets;
+  std::vector<ElementRef> elements;  ///< in declaration order
+  std::vector<NamedDrive> drives;    ///< `drive caller` cards
+  std::vector<std::shared_ptr<const StepListener>> step_listeners;
+  std::vector<ReferenceFrame> frames;
+  std::optional<Gravity> gravity;
+  std::optional<FrameMotion> frame_motion;
+  std::vector<double> initial_memory;     ///< State::memory at the start
+  std::vector<double> initial_variables;  ///< State::variables at the start
+  std::vector<std::string> log_lines;     ///< extra lines of .log, e.g. of `inertia`
+  /// (name, printed value) of the deck's variables, sorted; for .log.
+  std::vector<std::pair<std::string, std::string>> symbols;
+
+  /// A value copied each step into a parameter node (`bind`), or any other work on the state after it was updated.
+  struct Binding {
+    int memory = -1;  ///< parameter node's value
+    DrivePtr value;
+  };
+  std::vector<Binding> bindings;
+
+  // --- numbering, set by ModelBuilder::finish
+  int unknowns = 0;                     ///< n
+  std::vector<UnknownKind> kinds;       ///< (n)
+  std::vector<double> row_scale;        ///< (n) scale of the owner, for `tolerance ..., scale`
+  std::vector<std::uint8_t> is_constraint_row;  ///< (n)
+  // sparse matrix, compressed columns (n)
+  std::vector<int> column_start, row_index;
+  std::vector<int> diagonal;  ///< position of each diagonal entry, -1 if absent (n)
+  /// Positions of the entries of dynamic nodes' own inertia rows; see node_equations.cpp.
+  std::vector<int> node_positions;
+
+  // --- kinematics
+  NodeState node_state(const EvalContext& context, int node) const;  ///< any structural node, also dummy ones
+  /// Acceleration of dynamic, modal and dummy nodes (spec 02 section 6.5); zero for others.
+  NodeAcceleration node_acceleration(const EvalContext& context, int node) const;
+  Vec3 gravity_at(const EvalContext& context, const Vec3& x) const;  ///< [m/s²], zero without gravity
+  /// Value (order 0), rate (1) or second derivative (2) of a node's degree of freedom.
+  double dof_value(const EvalContext& context, const NodeDof& dof) const;
+
+  // --- lookup
+  int find_structural(int label) const;  ///< index or -1
+  int find_scalar(ScalarKind kind, int label) const;
+  ElementRef find_element(Family family, int label) const;  ///< set == nullptr when absent
+  /// Private datum of a node: index or -1. Structural names: spec 01 section 11.2; scalar nodes "x", "xP".
+  int structural_datum(int node, std::string_view name) const;
+  double structural_datum_value(const EvalContext& context, int node, int datum) const;
+  static std::vector<std::string> structural_data_names(const StructuralNode& node);
+
+  // --- diagnosis
+  std::string node_text(int node) const;     ///< "structural node 7"
+  std::string element_text(ElementRef e) const;  ///< "joint 7 (revolute hinge)"
+  /// Owner and meaning of a row, e.g. ("joint 7 (revolute hinge)", "constraint 2").
+  std::pair<std::string, std::string> row_text(int row) const;
+
+  // label -> index maps
+  std::unordered_map<int, int> structural_index;
+  std::unordered_map<int, int> scalar_index[5];
+  std::unordered_map<int, ElementRef> element_index[static_cast<int>(Family::count)];
+  std::unordered_map<int, int> drive_index;
+};
+
+using ModelPtr = std::shared_ptr<const Model>;
+
+/// Fills a Model while a deck is read. Duplicate labels are refused by the card readers, which know the places.
+class ModelBuilder {
+ public:
+  ModelBuilder();
+  Model& model() { return *model_; }
+  const Model& model() const { return *model_; }
+
+  int add_structural(StructuralNode node);  ///< returns its index
+  int add_scalar(ScalarNode node);
+  /// Adds a set of a new element type; `add_element` in elements/element.h does this.
+  template <class Set>
+  Set& set() {
+    auto& slot = sets_[&type_tag<Set>];
+    if (!slot) {
+      auto owned = std::make_unique<Set>();
+      slot = owned.get();
+      model_->sets.push_back(std::move(owned));
+    }
+    return static_cast<Set&>(*slot);
+  }
+  /// Records the last element of `set` in declaration order and in the label index.
+  ElementRef register_element(ElementSet& set);
+
+  int allocate_memory(int count, double initial = 0);  ///< offset in State::memory
+  void set_memory(int offset, double value) { model_->initial_memory[offset] = value; }
+  void on_step(std::shared_ptr<const StepListener> listener) { model_->step_listeners.push_back(std::move(listener)); }
+
+  /// A context for evaluations while the deck is read: input configuration, initial time.
+  const EvalContext& input_context();
+
+  /// Numbers unknowns, builds the sparsity pattern, freezes. The builder is empty afterwards.
+  Result<ModelPtr> finish();
+
+ private:
+  template <class Set>
+  static inline char type_tag = 0;
+  std::unique_ptr<Model> model_;
+  std::map<const void*, ElementSet*> sets_;
+  State input_state_;
+  EvalContext input_context_;
+};
+
+/// Initial State: input configuration of nodes, initial values of elements and memory. Rates of node positions are the
+/// velocities; multipliers zero unless an element says otherwise.
+State make_initial_state(const Model& model);
+
+}  // namespace mbcosim

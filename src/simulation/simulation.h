@@ -1,0 +1,142 @@
+/// Simulation: the one class that users of the library touch. See design promises in src/simulation/README.md.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "input/sources.h"
+#include "model/diagnostic.h"
+#include "model/model.h"
+#include "model/state.h"
+
+namespace mbcosim {
+
+/// Limits against hostile or runaway decks and models; exceeding one is ErrorKind::limit with its name.
+struct Limits {
+  std::int64_t deck_bytes = 256 << 20;   ///< total bytes read for one deck
+  int include_depth = 100;
+  int include_count = 100000;
+  std::int64_t statements = 20'000'000;
+  std::int64_t loop_iterations = 1'000'000;
+  int expression_depth = 200;
+  int nesting_depth = 100;
+  std::int64_t unknowns = 50'000'000;
+};
+
+/// A deck read: the model (null when there are errors) and everything that was found.
+struct LoadReport {
+  ModelPtr model;
+  std::vector<Diagnostic> diagnostics;
+  std::string printed;  ///< what `remark`, `print symbol table` printed
+  bool ok() const { return model != nullptr; }
+};
+
+/// Reads a deck. Never throws; `report.model` is null when any diagnostic is an error. A deck without blocks gives an
+/// empty model.
+LoadReport load_deck(const FileSource& files, const std::string& main_file, const Limits& limits = {});
+
+enum class Causality { input, output, parameter, state };
+
+/// One readable value of the model. Handles are indices into Simulation::variables().
+struct Variable {
+  std::string name;    ///< "node.structural.3.X", "joint.7.F", "abstract.11.x"
+  int size = 1;        ///< number of doubles
+  std::vector<int> shape;  ///< {} scalar, {3}, {3,3}
+  std::string unit;    ///< SI: "m", "rad", "N"; empty: no unit
+  std::string frame;   ///< "global", "node", or empty
+  Causality causality = Causality::output;
+  std::string description;
+  std::string owner;   ///< "structural node 3 (tip)"
+};
+
+enum class StepOutcome { accepted, finished, not_converged, interrupted, peer_lost, limit };
+
+/// What a step (or several) did.
+struct StepReport {
+  StepOutcome outcome = StepOutcome::accepted;
+  std::int64_t steps_done = 0;
+  std::int64_t step = 0;       ///< number of the last accepted step
+  double time = 0;             ///< its time [s]
+  double step_size = 0;        ///< [s]
+  int iterations = 0;          ///< linear solves of the last step
+  double residual_error = 0;   ///< test value at the end of the last step
+  double solution_error = 0;
+  std::int64_t total_iterations = 0;
+  double solver_seconds = 0;   ///< wall time inside the solver
+  std::optional<Error> error;  ///< set unless accepted or finished
+};
+
+/// Tells a running step to stop between Newton iterations.
+class CancelToken {
+ public:
+  void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
+  void set_deadline(std::chrono::steady_clock::time_point t) { deadline_ = t; }
+  bool cancelled() const {
+    return cancelled_.load(std::memory_order_relaxed) || (deadline_ && std::chrono::steady_clock::now() > *deadline_);
+  }
+
+ private:
+  std::atomic<bool> cancelled_{false};
+  std::optional<std::chrono::steady_clock::time_point> deadline_;
+};
+
+/// External loads on one structural node, applied during the next steps: force at the node's origin and moment about it,
+/// global components [N, N·m].
+struct NodeLoad {
+  Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
+};
+
+/// Writes results while the simulation runs. Implementations: output/text_writer.h, output/netcdf_writer.h.
+class ResultWriter;
+
+class Simulation {
+ public:
+  /// Prepares a run: initial values, initial assembly, derivatives phase, dummy steps. With `writer`, results go there.
+  static Result<std::unique_ptr<Simulation>> create(ModelPtr model, const CancelToken* cancel = nullptr,
+                                                    std::shared_ptr<ResultWriter> writer = nullptr);
+  ~Simulation();
+
+  const Model& model() const;
+  const State& state() const;
+  std::int64_t step_number() const;  ///< of the last accepted step; 0 after create
+  double time() const;               ///< of the last accepted step [s]
+  double next_step_size() const;     ///< [s]
+  bool finished() const;             ///< the deck's final time is reached
+
+  /// One step. On failure the state is that of the last accepted step and `report.error` says why.
+  StepReport step(const CancelToken* cancel = nullptr);
+  StepReport step_many(std::int64_t count, const CancelToken* cancel = nullptr);
+  /// Steps until `time` (within half a step) or the deck's final time.
+  StepReport run_until(double time, const CancelToken* cancel = nullptr);
+
+  const std::vector<Variable>& variables() const;
+  int find_variable(const std::string& name) const;  ///< handle or -1
+  /// Appends the values of a variable to `out`.
+  void get(int handle, std::vector<double>& out) const;
+  /// Sets an input variable (parameter nodes, attached loads). ErrorKind::argument when it is not writable or of the wrong size.
+  Status set(int handle, std::span<const double> values);
+
+  State snapshot() const { return state(); }
+  /// ErrorKind::precondition when `state` has another model's layout.
+  Status restore(const State& state);
+  /// Versioned bytes with the model's digest and a checksum.
+  std::string export_state() const;
+  /// ErrorKind::data_loss for damaged bytes, ErrorKind::precondition for another model's.
+  Status import_state(std::string_view bytes);
+  /// A new simulation at the same state, sharing the model. Without a writer.
+  std::unique_ptr<Simulation> fork() const;
+
+ private:
+  struct Impl;
+  explicit Simulation(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace mbcosim
