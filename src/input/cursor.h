@@ -1,0 +1,54 @@
+/// Reads the arguments of one raw statement: keywords, expressions, strings. Spec 01 sections 1 to 5.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "input/value.h"
+#include "model/diagnostic.h"
+
+namespace mbcosim {
+
+class Session;  // everything that outlives a statement: files, symbols, diagnostics, limits (input/session.h)
+
+/// One statement as raw text with positions, split off before its meaning is known (section 1.7).
+struct Statement {
+  std::string_view text;   ///< from the first character of the card word to before the `;`
+  int file = 0;            ///< index in Session::files
+  std::size_t offset = 0;  ///< of text in its file
+  std::string word;        ///< normalized card word ("controldata" for `control data`)
+  bool has_arguments = false;  ///< a `:` follows the word
+  int trail = -1;          ///< include and loop context, for messages (index in Session)
+};
+
+class Cursor {
+ public:
+  Cursor(Session& session, const Statement& statement);  ///< stands before the first argument
+
+  bool more();       ///< are there more arguments?
+  bool at_string();  ///< is the next argument a quoted string?
+  bool at_empty();   ///< is the next argument empty?
+  /// The next argument as a normalized word, when it is one as a whole; empty otherwise. Consumes nothing.
+  std::string peek_word();
+  void skip();                            ///< consumes the next argument unread
+  std::string word(std::string_view what);  ///< consumes the next argument as a word, normalized
+  /// Evaluates the next argument as one expression statement. An empty argument is an error here: check `at_empty` first.
+  Value expression(std::string_view what);
+  std::string quoted(std::string_view what);  ///< a quoted argument, escapes decoded (section 1.6)
+  /// For `driven`: the rest of the statement from the next argument on, as a statement of its own.
+  Statement rest_as_statement();
+  SourceSpan next();  ///< span of the next argument
+  SourceSpan last();  ///< span of the argument consumed last
+  [[noreturn]] void fail(SourceSpan where, std::string message, std::string hint = "");
+  void warn(SourceSpan where, std::string message, std::string hint = "");
+  Session& session();
+
+ private:
+  Session& session_;
+  Statement statement_;
+  std::size_t position_ = 0;
+  bool done_ = false;
+  SourceSpan last_;
+};
+
+}  // namespace mbcosim

@@ -1,0 +1,19 @@
+/// Values of the deck's expressions. Spec 01 section 5.2.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+
+namespace mbcosim {
+
+enum class ValueType { boolean, integer, real, string };
+
+/// bool, 32-bit integer, real or string.
+using Value = std::variant<bool, std::int32_t, double, std::string>;
+
+ValueType type_of(const Value& v);
+const char* type_name(ValueType t);           ///< "bool", "integer", "real", "string"
+std::string printed(const Value& v);          ///< as `remark` prints it (section 5.11)
+
+}  // namespace mbcosim
