@@ -67,8 +67,9 @@ class Card {
   virtual OrientationDescription orientation_description() = 0;
 
   // ------------------------------------------------------------------ in frames (spec 01 section 7); `node`: structural node index
-  virtual Vec3 absolute_position(std::string_view what) = 0;
-  virtual Mat3 absolute_orientation(std::string_view what) = 0;
+  /// `context`: structural node that `reference, node` and `reference, local` mean; -1: the global frame.
+  virtual Vec3 absolute_position(std::string_view what, int context = -1) = 0;
+  virtual Mat3 absolute_orientation(std::string_view what, int context = -1) = 0;
   virtual Vec3 absolute_velocity(std::string_view what, const Vec3& at) = 0;
   virtual Vec3 absolute_angular_velocity(std::string_view what) = 0;
   virtual Vec3 absolute_vector(std::string_view what) = 0;
@@ -96,6 +97,8 @@ class Card {
   }
   virtual ScalarFunctionPtr scalar_function(std::string_view what = "scalar function") = 0;
   virtual FluidPtr fluid() = 0;
+  /// A file driver of the `drivers` block, by label.
+  virtual FileDriverPtr file_driver() = 0;
   /// A quoted expression as a function of time, compiled once. `names` are extra variables of the text that are arguments
   /// ("eps" of a symbolic law); their values are passed at evaluation. Unknown names are reported at the end of the deck.
   virtual DrivePtr string_expression(const std::string& text) = 0;

@@ -15,6 +15,7 @@ class Registry;
 class Drive;
 class ScalarFunction;
 class Fluid;
+class FileDriver;
 template <int N>
 class Law;
 template <int R, int C>
@@ -23,6 +24,7 @@ class TplDrive;
 using DrivePtr = std::shared_ptr<const Drive>;
 using ScalarFunctionPtr = std::shared_ptr<const ScalarFunction>;
 using FluidPtr = std::shared_ptr<const Fluid>;
+using FileDriverPtr = std::shared_ptr<const FileDriver>;  ///< model/drives/file_driver.h
 template <int N>
 using LawPtr = std::shared_ptr<const Law<N>>;
 template <int R, int C = 1>

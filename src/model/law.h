@@ -30,6 +30,8 @@ class Law {
   virtual void after_predict(const EvalContext&, State&, const V& /*strain*/, const V& /*rate*/) const {}
   virtual void after_convergence(const EvalContext&, State&, const V& /*strain*/, const V& /*rate*/) const {}
   virtual bool has_memory() const { return false; }
+  /// An independent copy with its own memory, for `reference, <label>`; null when the law can be shared.
+  virtual LawPtr<N> copy(ModelBuilder&) const { return nullptr; }
 
   /// Data a law adds to its element's output line (the shock absorber's p, A, Fe, Fv); at most 8.
   virtual int output_size() const { return 0; }

@@ -23,6 +23,8 @@ class Registry {
   using LawReader = std::function<LawPtr<N>(Card&)>;
   using FunctionReader = std::function<ScalarFunctionPtr(Card&)>;
   using FluidReader = std::function<FluidPtr(Card&)>;
+  /// Reads what follows the type word of a `file` card of the drivers block.
+  using FileDriverReader = std::function<FileDriverPtr(Card&)>;
 
   /// A statement head of the elements block: `body`, `beam3`, `gravity`, or a family with types: `joint`, `force`.
   struct Head {
@@ -51,6 +53,7 @@ class Registry {
   std::map<std::string, LawReader<6>> laws6;
   std::map<std::string, FunctionReader> functions;
   std::map<std::string, FluidReader> fluids;
+  std::map<std::string, FileDriverReader> file_drivers;  ///< "fixedstep", "variablestep", ...
   /// context ("elements", "joint", "force", "drive", "law", ...) -> normalized word -> what it is.
   std::map<std::string, std::map<std::string, std::string>> not_supported;
   /// normalized word -> words as written in documentation, for messages and the editor grammar.
