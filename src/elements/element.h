@@ -319,6 +319,11 @@ class ElementSetOf final : public ElementSet {
     if constexpr (detail::HasRowName<E>) return slots_[i].element.row_name(k);
     else return detail::default_row_name(k);
   }
+  std::vector<int> nodes(int i) const override {
+    const Connection& c = slots_[i].connection;
+    return std::vector<int>(c.node, c.node + c.node_count);
+  }
+  int first_own(int i) const override { return slots_[i].connection.own; }
 
   void bind(const Model& model, int i, int first_own) override {
     Slot& s = slots_[i];

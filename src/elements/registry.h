@@ -12,8 +12,8 @@ void register_forces(Registry& registry);      ///< forces and couples
 void register_genels(Registry& registry);      ///< genels and electric elements
 void register_hydraulics(Registry& registry);  ///< elements and fluids
 void register_modal(Registry& registry);       ///< modal joint, modal force
-void register_drives(Registry& registry);      ///< drives and scalar functions (src/model/drives)
-void register_laws(Registry& registry);        ///< constitutive laws (src/model/laws)
+
+
 void register_unsupported(Registry& registry);  ///< words of the language that are refused by name
 
 /// All of the above, once.

@@ -13,6 +13,7 @@
 #include "math/rotation.h"
 #include "math/types.h"
 #include "model/diagnostic.h"
+#include "model/element_set.h"
 #include "model/fwd.h"
 #include "model/node.h"
 

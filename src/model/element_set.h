@@ -84,6 +84,8 @@ class ElementSet {
   virtual int unknowns(int i) const = 0;                              ///< number of own unknowns of element i
   virtual bool is_differential(int i, int k) const = 0;               ///< kind of own unknown k
   virtual std::string row_name(int i, int k) const = 0;               ///< meaning of own row k
+  virtual std::vector<int> nodes(int i) const = 0;                    ///< structural nodes it is attached to (indices)
+  virtual int first_own(int i) const = 0;                             ///< first own unknown, as given to bind
   virtual void bind(const Model& model, int i, int first_own) = 0;    ///< own unknowns start at first_own
   virtual void collect_pattern(PatternSink& sink) const = 0;
   virtual void set_positions(const PositionSource& positions) = 0;

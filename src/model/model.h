@@ -16,6 +16,7 @@
 #include "model/element_set.h"
 #include "model/fwd.h"
 #include "model/node.h"
+#include "model/node_equations.h"
 #include "model/settings.h"
 #include "model/state.h"
 
@@ -92,14 +93,16 @@ class Model {
   // sparse matrix, compressed columns (n)
   std::vector<int> column_start, row_index;
   std::vector<int> diagonal;  ///< position of each diagonal entry, -1 if absent (n)
-  /// Positions of the entries of dynamic nodes' own inertia rows; see node_equations.cpp.
-  std::vector<int> node_positions;
+  NodeEquations node_equations;  ///< rows that nodes contribute themselves
+  std::vector<std::vector<ElementRef>> node_bodies;  ///< bodies attached to each structural node
 
   // --- kinematics
   NodeState node_state(const EvalContext& context, int node) const;  ///< any structural node, also dummy ones
   /// Acceleration of dynamic, modal and dummy nodes (spec 02 section 6.5); zero for others.
   NodeAcceleration node_acceleration(const EvalContext& context, int node) const;
   Vec3 gravity_at(const EvalContext& context, const Vec3& x) const;  ///< [m/s²], zero without gravity
+  /// A context for `state` as it stands; evaluates a uniform gravity field once.
+  EvalContext context(const State& state, Phase phase, double c = 1, double c_algebraic = 1) const;
   /// Value (order 0), rate (1) or second derivative (2) of a node's degree of freedom.
   double dof_value(const EvalContext& context, const NodeDof& dof) const;
 

@@ -61,3 +61,10 @@ class Registry {
 };
 
 }  // namespace mbcosim
+
+namespace mbcosim {
+
+void register_drives(Registry& registry);  ///< drives and scalar functions (model/drives, model/functions)
+void register_laws(Registry& registry);    ///< constitutive laws (model/laws)
+
+}  // namespace mbcosim

@@ -1,0 +1,1 @@
+set(SOURCES element.cpp registry.cpp unsupported.cpp)

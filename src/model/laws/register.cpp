@@ -1,0 +1,7 @@
+#include "model/registry.h"
+
+namespace mbcosim {
+
+void register_laws(Registry&) {}
+
+}  // namespace mbcosim

@@ -1,0 +1,232 @@
+#include "model/model.h"
+
+#include "model/output_row.h"
+
+namespace mbcosim {
+
+namespace {
+
+Vec3 at(const std::vector<double>& y, int i) { return Vec3(y[i], y[i + 1], y[i + 2]); }
+
+/// Position and motion of a `relative frame` dummy: `n` seen from frame (r, f, H). Spec 02 section 6.4.
+NodeState relative_state(const NodeState& n, const NodeState& r, const Vec3& f, const Mat3& h) {
+  const Mat3 t = h.transpose() * r.R.transpose();
+  NodeState s;
+  s.x = t * (n.x - r.x) - h.transpose() * f;
+  s.R = t * n.R;
+  s.v = t * (n.v - r.v - r.w.cross(n.x - r.x));
+  s.w = t * (n.w - r.w);
+  return s;
+}
+
+/// A frame (r) displaced by f and turned by h, both in r's axes, moving rigidly with it.
+NodeState attached_state(const NodeState& r, const Vec3& f, const Mat3& h) {
+  const Vec3 arm = r.R * f;
+  return {r.x + arm, r.R * h, r.v + r.w.cross(arm), r.w};
+}
+
+}  // namespace
+
+const char* family_name(Family family) {
+  static constexpr const char* kNames[] = {"joint", "joint regularization", "plate", "genel", "induced velocity element",
+                                           "aerodynamic element", "aeromodal", "electric element", "thermal element",
+                                           "hydraulic element", "user defined element", "body", "beam", "force", "gravity",
+                                           "inertia", "automatic structural", "air properties", "bulk element", "output element"};
+  return kNames[static_cast<int>(family)];
+}
+
+NodeState Model::node_state(const EvalContext& context, int node) const {
+  const StructuralNode& n = structural[node];
+  if (n.is_dummy()) {
+    const NodeState base = node_state(context, n.base);
+    if (n.kind == StructuralKind::dummy_offset) return attached_state(base, n.offset, n.orientation);
+    NodeState s = relative_state(base, node_state(context, n.reference), n.offset, n.orientation);
+    if (n.pivot < 0) return s;
+    const NodeState p = attached_state(node_state(context, n.pivot), n.pivot_offset, n.pivot_orientation);
+    NodeState r = attached_state(p, s.x, s.R);
+    r.v += p.R * s.v;
+    r.w += p.R * s.w;
+    return r;
+  }
+  if (context.phase == Phase::input) return {n.x, n.R, n.v, n.w};
+  const State& state = *context.state;
+  NodeState s;
+  s.x = at(state.y, n.first);
+  s.v = at(state.yp, n.first);
+  if (n.has_rotation()) {
+    s.R = state.rotation[node].R;
+    s.w = state.rotation[node].w;
+  }
+  return s;
+}
+
+NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) const {
+  const StructuralNode& n = structural[node];
+  NodeAcceleration r;
+  if (n.kind == StructuralKind::dummy_offset) {
+    const NodeAcceleration base = node_acceleration(context, n.base);
+    const NodeState s = node_state(context, n.base);
+    const Vec3 arm = s.R * n.offset;
+    return {base.a + base.wp.cross(arm) + s.w.cross(s.w.cross(arm)), base.wp};
+  }
+  if (context.phase == Phase::input || n.is_dummy()) return r;
+  const std::vector<double>& yp = context.state->yp;
+  if (n.kind == StructuralKind::modal) return {at(yp, n.first + 6), at(yp, n.first + 9)};
+  if (!n.has_momentum()) return r;
+  Inertia inertia;
+  for (const ElementRef& body : node_bodies[node]) body.set->add_inertia(context, body.index, node, inertia);
+  if (inertia.m <= 0) return r;
+  if (n.is_displacement()) {
+    r.a = at(yp, n.first + 3) / inertia.m;
+    return r;
+  }
+  const NodeState s = node_state(context, node);
+  const Vec3 b = at(context.state->y, n.first + 6), bp = at(yp, n.first + 6), gp = at(yp, n.first + 9);
+  const Vec3 x = inertia.S / inertia.m;
+  const Mat3 jc = inertia.J + cross<double>(x) * cross<double>(inertia.S);
+  const Vec3 torque = gp - x.cross(bp) - s.w.cross(jc * s.w) + s.v.cross(b);
+  if (std::abs(jc.determinant()) > 0) r.wp = jc.inverse() * torque;
+  r.a = (bp - r.wp.cross(inertia.S) - s.w.cross(s.w.cross(inertia.S))) / inertia.m;
+  return r;
+}
+
+Vec3 Model::gravity_at(const EvalContext& context, const Vec3& x) const {
+  if (!gravity) return Vec3::Zero();
+  if (gravity->uniform) return context.uniform_gravity;
+  const Vec3 d = gravity->origin - x;
+  const double r = d.norm();
+  if (!(r > 0)) throw EvaluationError("central gravity: a body is at the centre of attraction");
+  return d * (gravity->mass_g / (r * r * r));
+}
+
+EvalContext Model::context(const State& state, Phase phase, double c, double c_algebraic) const {
+  EvalContext r;
+  r.model = this;
+  r.state = &state;
+  r.time = state.time;
+  r.h = state.h;
+  r.c = c;
+  r.c_algebraic = c_algebraic;
+  r.phase = phase;
+  if (gravity && gravity->uniform) r.uniform_gravity = gravity->uniform->value(r);
+  return r;
+}
+
+double Model::dof_value(const EvalContext& context, const NodeDof& dof) const {
+  if (!dof.structural) {
+    const ScalarNode& n = scalars[dof.node];
+    if (n.kind == ScalarKind::parameter) return context.state->memory[n.memory];
+    if (context.phase == Phase::input) return dof.order == 0 ? n.value : n.rate;
+    return dof.order == 0 ? context.state->y[n.unknown] : context.state->yp[n.unknown];
+  }
+  const StructuralNode& n = structural[dof.node];
+  if (dof.order == 2) {
+    const NodeAcceleration a = node_acceleration(context, dof.node);
+    return dof.component < 3 ? a.a(dof.component) : a.wp(dof.component - 3);
+  }
+  if (dof.component >= 6) {  // modal nodes: v and w are unknowns of their own
+    if (context.phase == Phase::input) return dof.component < 9 ? n.v(dof.component - 6) : n.w(dof.component - 9);
+    return dof.order == 0 ? context.state->y[n.first + dof.component] : context.state->yp[n.first + dof.component];
+  }
+  const NodeState s = node_state(context, dof.node);
+  if (dof.component < 3) return dof.order == 0 ? s.x(dof.component) : s.v(dof.component);
+  if (dof.order == 0)
+    throw EvaluationError(node_text(dof.node) + ": the value of a rotation degree of freedom is not defined; use its derivative");
+  return s.w(dof.component - 3);
+}
+
+int Model::find_structural(int label) const {
+  const auto it = structural_index.find(label);
+  return it == structural_index.end() ? -1 : it->second;
+}
+
+int Model::find_scalar(ScalarKind kind, int label) const {
+  const auto& index = scalar_index[static_cast<int>(kind)];
+  const auto it = index.find(label);
+  return it == index.end() ? -1 : it->second;
+}
+
+ElementRef Model::find_element(Family family, int label) const {
+  const auto& index = element_index[static_cast<int>(family)];
+  const auto it = index.find(label);
+  return it == index.end() ? ElementRef{} : it->second;
+}
+
+std::string Model::node_text(int node) const {
+  const StructuralNode& n = structural[node];
+  return "structural node " + std::to_string(n.label) + (n.name.empty() ? "" : " (" + n.name + ")");
+}
+
+std::string Model::element_text(ElementRef e) const {
+  const ElementInfo& i = e.set->info(e.index);
+  std::string r = std::string(family_name(i.family)) + " " + std::to_string(i.label);
+  if (!i.type.empty() && i.type != family_name(i.family)) r += " (" + i.type + ")";
+  return r;
+}
+
+std::pair<std::string, std::string> Model::row_text(int row) const {
+  static constexpr const char* kAxis[] = {"x", "y", "z"};
+  for (std::size_t k = 0; k < structural.size(); ++k) {
+    const StructuralNode& n = structural[k];
+    if (n.first < 0 || row < n.first || row >= n.first + n.unknowns()) continue;
+    const int i = row - n.first;
+    const bool definition = n.equilibrium > n.first && row < n.equilibrium;
+    const int j = definition ? i : row - n.equilibrium;
+    const std::string axis = kAxis[j % 3];
+    if (definition) {
+      if (n.kind == StructuralKind::modal) return {node_text(static_cast<int>(k)), "velocity definition " + std::to_string(j + 1)};
+      return {node_text(static_cast<int>(k)), (j < 3 ? "momentum definition " : "momenta moment definition ") + axis};
+    }
+    return {node_text(static_cast<int>(k)), (j < 3 ? "force balance " : "moment balance ") + axis};
+  }
+  static constexpr const char* kScalar[] = {"abstract", "electric", "hydraulic", "thermal", "parameter"};
+  for (const ScalarNode& n : scalars)
+    if (n.unknown == row)
+      return {std::string(kScalar[static_cast<int>(n.kind)]) + " node " + std::to_string(n.label), "balance"};
+  for (const ElementRef& e : elements) {
+    const int first = e.set->first_own(e.index);
+    if (first >= 0 && row >= first && row < first + e.set->unknowns(e.index))
+      return {element_text(e), e.set->row_name(e.index, row - first)};
+  }
+  return {"row " + std::to_string(row), ""};
+}
+
+State make_initial_state(const Model& model) {
+  State state;
+  const std::size_t n = static_cast<std::size_t>(model.unknowns);
+  state.time = model.initial_value.initial_time;
+  state.y.assign(n, 0.0);
+  state.yp.assign(n, 0.0);
+  state.memory = model.initial_memory;
+  state.variables = model.initial_variables;
+  state.rotation.resize(model.structural.size());
+  const auto put = [](std::vector<double>& y, int i, const Vec3& v) {
+    for (int k = 0; k < 3; ++k) y[i + k] = v(k);
+  };
+  for (std::size_t k = 0; k < model.structural.size(); ++k) {
+    const StructuralNode& node = model.structural[k];
+    state.rotation[k] = {node.R, node.R, node.R, node.R, node.w, node.w, node.w, node.w};
+    if (node.is_dummy()) continue;
+    put(state.y, node.first, node.x);
+    put(state.yp, node.first, node.v);
+    if (node.has_rotation()) put(state.yp, node.first + 3, node.w);
+    if (node.kind == StructuralKind::modal) {
+      put(state.y, node.first + 6, node.v);
+      put(state.y, node.first + 9, node.w);
+    } else if (node.has_momentum()) {
+      const int p = node.position_unknowns();
+      put(state.yp, node.first + p, node.b_rate);
+      if (p == 6) put(state.yp, node.first + 9, node.g_rate);
+    }
+  }
+  for (const ScalarNode& node : model.scalars) {
+    if (node.kind == ScalarKind::parameter || node.unknown < 0) continue;
+    state.y[node.unknown] = node.value;
+    state.yp[node.unknown] = node.rate;
+  }
+  EvalContext context = model.context(state, Phase::step);
+  for (const auto& set : model.sets) set->start(context, state);
+  return state;
+}
+
+}  // namespace mbcosim

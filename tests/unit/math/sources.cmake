@@ -1,0 +1,1 @@
+set(SOURCES rotation_test.cpp)
