@@ -100,9 +100,10 @@ class Card {
   virtual FluidPtr fluid() = 0;
   /// A file driver of the `drivers` block, by label.
   virtual FileDriverPtr file_driver() = 0;
-  /// A quoted expression as a function of time, compiled once. `names` are extra variables of the text that are arguments
-  /// ("eps" of a symbolic law); their values are passed at evaluation. Unknown names are reported at the end of the deck.
+  /// A quoted expression as a function of time, compiled once. Unknown names are reported at the end of the deck.
   virtual DrivePtr string_expression(const std::string& text) = 0;
+  /// A quoted expression with further variables `names` ("eps" of a symbolic law), whose values are passed at evaluation.
+  virtual ExpressionPtr expression_of(const std::string& text, const std::vector<std::string>& names) = 0;
   /// Sets a symbol that `model::current("L")` sees until the end of this card.
   virtual void set_current(const std::string& name, double value) = 0;
 

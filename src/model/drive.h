@@ -21,8 +21,8 @@ class Drive {
   /// Derivative with respect to the argument; only when `has_derivative()`.
   virtual double derivative(const EvalContext& context, double t) const;
 
-  /// Value in time, i.e. for t = context.time.
-  double value(const EvalContext& context) const;
+  /// Value in time: for t = context.time, unless the drive tells an argument from the time (run-time strings: `Var` is 0).
+  virtual double value(const EvalContext& context) const;
   /// Value in time as any scalar: a TimeDual carries the derivative when there is one, else zero.
   template <class T>
   T value_as(const EvalContext& context) const;

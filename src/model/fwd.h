@@ -14,6 +14,7 @@ class Card;
 class Registry;
 class Drive;
 class ScalarFunction;
+class Expression;
 class Fluid;
 class FileDriver;
 template <int N>
@@ -23,6 +24,7 @@ class TplDrive;
 
 using DrivePtr = std::shared_ptr<const Drive>;
 using ScalarFunctionPtr = std::shared_ptr<const ScalarFunction>;
+using ExpressionPtr = std::shared_ptr<const Expression>;
 using FluidPtr = std::shared_ptr<const Fluid>;
 using FileDriverPtr = std::shared_ptr<const FileDriver>;  ///< model/drives/file_driver.h
 template <int N>

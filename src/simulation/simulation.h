@@ -13,22 +13,11 @@
 
 #include "input/sources.h"
 #include "model/diagnostic.h"
+#include "model/limits.h"
 #include "model/model.h"
 #include "model/state.h"
 
 namespace mbcosim {
-
-/// Limits against hostile or runaway decks and models; exceeding one is ErrorKind::limit with its name.
-struct Limits {
-  std::int64_t deck_bytes = 256 << 20;   ///< total bytes read for one deck
-  int include_depth = 100;
-  int include_count = 100000;
-  std::int64_t statements = 20'000'000;
-  std::int64_t loop_iterations = 1'000'000;
-  int expression_depth = 200;
-  int nesting_depth = 100;
-  std::int64_t unknowns = 50'000'000;
-};
 
 /// A deck read: the model (null when there are errors) and everything that was found.
 struct LoadReport {

@@ -1,0 +1,142 @@
+/// Everything that outlives a statement while a deck is read: files, symbols, diagnostics, limits,
+/// the model being built.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "input/sources.h"
+#include "input/symbols.h"
+#include "model/context.h"
+#include "model/diagnostic.h"
+#include "model/fwd.h"
+#include "model/limits.h"
+
+namespace mbcosim {
+
+class PendingString;
+
+/// A file of the deck, kept until reading ends: statements are views into its text.
+struct DeckFile {
+  std::string name;  ///< as messages show it, relative to the deck's root
+  std::string text;
+  std::vector<std::size_t> line_starts;  ///< offsets; filled at the first use
+};
+
+/// Where a statement comes from, besides its file: an `include` card or a pass of a loop.
+struct Trail {
+  int parent = -1;
+  bool loop = false;
+  int file = 0;  ///< of the `include` or `for` card
+  int line = 0;
+  std::string name;  ///< loop variable
+  std::int32_t value = 0;
+};
+
+struct ReaderOptions {
+  bool strict = false;    ///< `for` and `if` are unknown cards, absent counts mean 0
+  bool redefine = false;  ///< declarations of known variables assign (MBDyn's switch -r)
+};
+
+class Session {
+ public:
+  /// `builder` may be null: a deck used as a calculator.
+  Session(const FileSource& source, Limits limits, ModelBuilder* builder = nullptr,
+          ReaderOptions options = {});
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  // ------------------------------------------------------------------ files
+  const DeckFile& file(int index) const { return files_[index]; }
+  int file_count() const { return static_cast<int>(files_.size()); }
+  /// Reads a file of the deck by its name relative to the root; its index. Counts against
+  /// `deck_bytes`.
+  Result<int> open_file(const std::string& name);
+  /// Adds a text that is no file (tests).
+  int add_text(std::string name, std::string text);
+  /// Name relative to the root of a file named in file `from`: its folder is put in front, `.` and
+  /// `..` are resolved, `$NAME` is replaced by what `setenv` defined.
+  Result<std::string> resolve(std::string_view name, int from) const;
+  /// Text of a data file named in file `from` (`Card::file_contents`). Counts against `deck_bytes`.
+  Result<std::string> read_data(std::string_view name, int from);
+  SourceSpan span(int file, std::size_t offset, std::size_t length) const;
+  std::size_t offset_of(SourceSpan where) const;  ///< inverse of `span`
+  std::string place(SourceSpan where) const;      ///< "a.mbd:3"
+
+  // ------------------------------------------------------------------ diagnostics
+  Diagnostic diagnostic(Severity severity, std::string code, SourceSpan where, std::string message,
+                        std::string hint = "") const;
+  void report(Diagnostic d);
+  void warn(SourceSpan where, std::string message, std::string hint = "");
+  [[noreturn]] void fail(SourceSpan where, std::string message, std::string hint = "",
+                         std::string code = "error") const;
+  /// Refuses with code `limit-<name>`.
+  [[noreturn]] void fail_limit(SourceSpan where, std::string_view name, std::string message) const;
+  const std::vector<Diagnostic>& diagnostics() const { return diagnostics_; }
+  std::vector<Diagnostic> take_diagnostics() { return std::move(diagnostics_); }
+  int errors() const { return errors_; }
+  bool full() const { return errors_ >= limits.errors || stopped_; }  ///< no use in reading on
+  void stop() { stopped_ = true; }  ///< after a limit: nothing more is read
+  bool stopped() const { return stopped_; }
+  /// Errors of the present statement are consequences of an earlier one and are not reported.
+  void set_damaged(bool damaged) { damaged_ = damaged; }
+
+  int add_trail(Trail t);
+  void set_trail(int trail) { trail_ = trail; }
+  int trail() const { return trail_; }
+  const Trail& trail_at(int index) const { return trails_[index]; }
+
+  // ------------------------------------------------------------------ model
+  ModelBuilder* builder() const { return builder_; }
+  /// Input configuration at the initial time; an empty context without a builder.
+  const EvalContext& context();
+  /// At the end of the `initial value` block: `Time`, `TimeStep`, `Step`, `Var` and the namespace
+  /// `model` exist from here on.
+  void start_run_variables(double initial_time);
+  bool model_available() const { return model_available_; }
+
+  /// At the end of the deck: binds the names in run-time strings, reports the unknown ones, and
+  /// registers what strings assign.
+  void bind_strings();
+  void add_pending(std::shared_ptr<PendingString> s);
+
+  const Limits limits;
+  const ReaderOptions options;
+  SymbolTable symbols;
+  std::map<std::string, ScalarFunctionPtr, std::less<>>
+      functions;  ///< `scalar function` cards, for model::sf::NAME
+  std::map<std::string, double, std::less<>>
+      currents;  ///< model::current("L"), set while a card is read
+  std::map<std::string, std::string, std::less<>> environment;  ///< what `setenv` defined
+  std::string printed;  ///< what `remark`, `print symbol table` and `print()` printed
+  bool exited = false;  ///< `exit;` or stop(1, 0): the deck ends here with success
+
+  std::int32_t random();  ///< next of rand(): 0..2147483647
+  void seed(std::uint32_t value);
+
+ private:
+  Result<std::string> read_counted(const std::string& name);
+
+  const FileSource& source_;
+  ModelBuilder* builder_;
+  mutable std::deque<DeckFile> files_;
+  std::int64_t bytes_ = 0;
+  std::vector<Diagnostic> diagnostics_;
+  int errors_ = 0;
+  bool stopped_ = false, damaged_ = false, model_available_ = false;
+  std::deque<Trail> trails_;
+  int trail_ = -1;
+  std::unique_ptr<EvalContext> empty_context_;
+  std::vector<std::shared_ptr<PendingString>> pending_;
+  std::uint32_t random_[31] = {};
+  int random_position_ = 0;
+};
+
+}  // namespace mbcosim
