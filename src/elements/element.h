@@ -351,16 +351,14 @@ class ElementSetOf final : public ElementSet {
     }
   }
 
-  void start(const EvalContext& context, State& state) const override {
+  void start(const EvalContext& context, State& state, int i) const override {
     if constexpr (detail::HasStart<E>) {
       Local<double> u;
-      for (const Slot& s : slots_) {
-        gather(context, s, u);
-        Start st{u, state};
-        s.element.start(st);
-      }
+      gather(context, slots_[i], u);
+      Start st{u, state};
+      slots_[i].element.start(st);
     } else {
-      (void)context, (void)state;
+      (void)context, (void)state, (void)i;
     }
   }
 

@@ -1,1 +1,1 @@
-set(SOURCES element.cpp registry.cpp unsupported.cpp)
+set(SOURCES element.cpp log_text.cpp registry.cpp unsupported.cpp)

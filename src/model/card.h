@@ -127,7 +127,7 @@ class Card {
   /// Span of the next argument.
   virtual SourceSpan next() = 0;
   /// Refuses the card: `message` without position; `hint` says how to mend it.
-  [[noreturn]] void fail(const std::string& message, const std::string& hint = "") { fail_at(last(), message, hint); }
+  [[noreturn]] void fail(const std::string& message, const std::string& hint = "");
   [[noreturn]] virtual void fail_at(SourceSpan where, const std::string& message, const std::string& hint = "") = 0;
   virtual void warn(const std::string& message, const std::string& hint = "") = 0;
   virtual void warn_at(SourceSpan where, const std::string& message, const std::string& hint = "") = 0;

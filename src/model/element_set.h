@@ -91,7 +91,10 @@ class ElementSet {
   virtual void set_positions(const PositionSource& positions) = 0;
 
   // --- evaluation
-  virtual void start(const EvalContext& context, State& state) const = 0;  ///< initial values of own unknowns and memory
+  /// Initial values of own unknowns and memory of element i; also when a `driven` element becomes active.
+  virtual void start(const EvalContext& context, State& state, int i) const = 0;
+  /// After an initial assembly that moved something: multipliers restart from zero, the rest from `start`.
+  virtual void after_assembly(const EvalContext& context, State& state, int i) const;
   virtual void residual(const EvalContext& context, double* r) const = 0;  ///< adds to r (n)
   /// Adds −∂r/∂δ to the sparse values; seeds by structural node index.
   virtual void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const = 0;

@@ -99,6 +99,13 @@ Vec3 Model::gravity_at(const EvalContext& context, const Vec3& x) const {
   return d * (gravity->mass_g / (r * r * r));
 }
 
+Mat3 Model::gravity_gradient(const EvalContext&, const Vec3& x) const {
+  if (!gravity || gravity->uniform) return Mat3::Zero();
+  const Vec3 d = gravity->origin - x;
+  const double r2 = d.squaredNorm();
+  return gravity->mass_g / (r2 * std::sqrt(r2)) * (3 / r2 * d * d.transpose() - Mat3::Identity());
+}
+
 EvalContext Model::context(const State& state, Phase phase, double c, double c_algebraic) const {
   EvalContext r;
   r.model = this;
@@ -224,8 +231,9 @@ State make_initial_state(const Model& model) {
     state.y[node.unknown] = node.value;
     state.yp[node.unknown] = node.rate;
   }
-  EvalContext context = model.context(state, Phase::step);
-  for (const auto& set : model.sets) set->start(context, state);
+  const EvalContext context = model.context(state, Phase::assembly);
+  for (const auto& set : model.sets)
+    for (int i = 0; i < set->size(); ++i) set->start(context, state, i);
   return state;
 }
 

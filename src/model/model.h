@@ -101,6 +101,7 @@ class Model {
   /// Acceleration of dynamic, modal and dummy nodes (spec 02 section 6.5); zero for others.
   NodeAcceleration node_acceleration(const EvalContext& context, int node) const;
   Vec3 gravity_at(const EvalContext& context, const Vec3& x) const;  ///< [m/s²], zero without gravity
+  Mat3 gravity_gradient(const EvalContext& context, const Vec3& x) const;  ///< ∂a/∂x [1/s²]
   /// A context for `state` as it stands; evaluates a uniform gravity field once.
   EvalContext context(const State& state, Phase phase, double c = 1, double c_algebraic = 1) const;
   /// Value (order 0), rate (1) or second derivative (2) of a node's degree of freedom.

@@ -1,7 +1,80 @@
+#include "elements/bodies/body.h"
 #include "elements/registry.h"
+#include "model/card.h"
 
 namespace mbcosim {
 
-void register_bodies(Registry&) {}
+namespace {
+
+constexpr double kGravitationalConstant = 6.67384e-11;  ///< `G, si` [m³/(kg s²)], MBDyn's value
+
+/// mass, centre of mass, inertia about it [, inertial, orientation]: one part of a (condensed) body.
+void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
+  const double m = card.real("mass");
+  if (m < 0 && !negative_allowed)
+    card.fail("mass must not be negative, got " + std::to_string(m), "write `allow negative mass` before the mass if it is meant");
+  const Vec3 x = card.relative_position("centre of mass", node);
+  Mat3 j = card.relative_tensor("inertia", node);
+  if ((j - j.transpose()).norm() > 1e-9 * j.norm()) card.warn("the inertia matrix is not symmetric");
+  if (card.keyword("inertial") && !card.keyword("node")) {
+    const Mat3 r = card.relative_orientation("inertial axes", node);
+    j = r * j * r.transpose();
+  }
+  const Mat3 xx = cross<double>(x);
+  body.m += m;
+  body.S0 += m * x;
+  body.J0 += j - m * xx * xx;
+}
+
+void read_body(Card& card, ElementInfo& info) {
+  const int node = card.structural_node(Card::NodeNeed::not_dummy);
+  const StructuralNode& n = card.model().structural[node];
+  if (n.kind == StructuralKind::static_displacement || (n.kind == StructuralKind::static_ && !card.model().control.is_static))
+    card.fail("structural node " + std::to_string(n.label) + " is static; a body needs a dynamic node");
+  if (n.is_displacement()) {
+    const double m = card.real("mass");
+    if (!(m > 0)) card.fail("mass must be positive");
+    add_element(card.builder(), info, PointMass{node, m});
+    return;
+  }
+  int parts = 1;
+  if (card.keyword("condense")) {
+    parts = card.integer("number of condensed masses");
+    if (parts < 1) card.fail("the number of condensed masses must be at least 1, got " + std::to_string(parts));
+  }
+  const bool negative = card.keyword("allow negative mass");
+  Body body;
+  body.node = node;
+  for (int i = 0; i < parts; ++i) read_body_part(card, node, negative, body);
+  if (std::abs(body.m) < 2.2204460492503131e-16 && !negative) card.fail("the mass is zero");
+  add_element(card.builder(), info, std::move(body));
+}
+
+void read_gravity(Card& card, ElementInfo& info) {
+  if (card.model().gravity) card.fail_at(info.where, "gravity is defined twice; at most one `gravity` card is allowed");
+  Gravity g;
+  if (card.keyword("central")) {
+    if (card.keyword("origin")) g.origin = card.absolute_position("origin");
+    if (!card.keyword("mass")) card.fail_at(card.next(), "gravity: `mass` expected");
+    const double mass = card.real("mass");
+    if (!(mass > 0)) card.fail("gravity: the mass must be positive");
+    if (!card.keyword("G")) card.fail_at(card.next(), "gravity: `G` expected");
+    const double big_g = card.keyword("si") ? kGravitationalConstant : card.real("G");
+    if (!(big_g > 0)) card.fail("gravity: G must be positive");
+    g.mass_g = mass * big_g;
+  } else {
+    if (!card.keyword("uniform")) card.warn_at(card.next(), "gravity: type missing, `uniform` assumed");
+    g.uniform = card.vec3_drive("acceleration of gravity");
+  }
+  if (card.keyword("output")) g.output = card.yes_no("output");
+  card.model().gravity = std::move(g);
+}
+
+}  // namespace
+
+void register_bodies(Registry& registry) {
+  registry.element("body", Family::body, read_body);
+  registry.element("gravity", Family::gravity, read_gravity, false);
+}
 
 }  // namespace mbcosim

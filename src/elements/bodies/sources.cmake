@@ -1,1 +1,1 @@
-set(SOURCES register.cpp)
+set(SOURCES body.cpp register.cpp)
