@@ -1,0 +1,267 @@
+/// Elements whose size is known only when the deck is read (state spaces, modal joints): one
+/// virtual object per element.
+///
+///   class Filter : public GeneralElement {
+///     void connect(GeneralConnection& c) override { input_ = c.scalar(node); state_ =
+///     c.differential(n); } void residual(const GeneralView& u, GeneralResidual& r) const override
+///     { r.add(state_, …); } void jacobian(const GeneralView& u, GeneralJacobian& j) const override
+///     { j.value(state_, input_, …); }
+///   };
+///   add_general_element(card.builder(), info, std::make_unique<Filter>(…));
+///
+/// Local rows and columns share one numbering, in the order of the calls in `connect`: 6 for a
+/// structural node (equilibrium rows; x and rotation columns), all of its unknowns for a whole
+/// node, 1 for a scalar node, 1 for an own unknown. `connect` and its like return the first local
+/// number. Elements of fixed small size use elements/element.h.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "model/context.h"
+#include "model/element_set.h"
+#include "model/model.h"
+#include "model/output_row.h"
+
+namespace mbcosim {
+
+/// Where a general element is attached.
+class GeneralConnection {
+ public:
+  explicit GeneralConnection(ModelBuilder& builder) : builder_(&builder) {}
+  /// Six equilibrium rows and six position columns (displacement nodes: the last three do not
+  /// exist).
+  int node(int structural_node) { return add_node(structural_node, false); }
+  /// All rows and columns of a node in the order of its unknowns, e.g. the twelve of a modal node.
+  int whole_node(int structural_node) { return add_node(structural_node, true); }
+  int scalar(int scalar_node);
+  /// A scalar dof of any node: its local row and column (position components only for structural
+  /// nodes).
+  int dof(const NodeDof& dof);
+  int algebraic(int count) { return own(count, false); }
+  int differential(int count) { return own(count, true); }
+  int memory(int count, double initial = 0);  ///< offset from the element's first memory slot
+
+ private:
+  friend class GeneralElementSet;
+  friend class GeneralView;
+  friend class GeneralJacobian;
+  struct Entry {
+    enum Kind { node, whole_node, scalar, own } kind;
+    int index;  ///< structural or scalar node, or number of the own unknown
+    int first;  ///< local number
+  };
+  int add_node(int structural_node, bool whole);
+  int own(int count, bool differential);
+
+  ModelBuilder* builder_;
+  std::vector<Entry> entries_;
+  std::vector<char> own_differential_;
+  int size_ = 0;  ///< local rows = local columns
+  int first_own_ = -1, memory_ = -1, memory_count_ = 0;
+  std::vector<int> rows_, columns_;  ///< model's numbers by local number, -1: none; filled by bind
+  std::vector<int> parameter_;  ///< parameter nodes: offset of the value in State::memory, else -1
+};
+
+/// Announces which local rows meet which local columns.
+class GeneralPattern {
+ public:
+  GeneralPattern(PatternSink& sink, const std::vector<int>& rows, const std::vector<int>& columns)
+      : sink_(sink), rows_(rows), columns_(columns) {}
+  void block(int row, int rows, int column, int columns) {
+    sink_.block(&rows_[row], rows, &columns_[column], columns);
+  }
+  void dense() {
+    if (!rows_.empty())
+      block(0, static_cast<int>(rows_.size()), 0, static_cast<int>(columns_.size()));
+  }
+
+ private:
+  PatternSink& sink_;
+  const std::vector<int>& rows_;
+  const std::vector<int>& columns_;
+};
+
+/// What a general element sees of the state. Local numbers as returned by GeneralConnection.
+class GeneralView {
+ public:
+  GeneralView(const EvalContext& c, const GeneralConnection& connection, const ElementInfo& i)
+      : context(c), info(i), connection_(connection) {}
+  const Model& model() const { return *context.model; }
+  const State& state() const { return *context.state; }
+  NodeState node(int structural_node) const { return model().node_state(context, structural_node); }
+  /// Rotation parameters of the step and their rates.
+  Vec3 g(int structural_node) const;
+  Vec3 gp(int structural_node) const;
+  double value(int local) const;  ///< of a scalar dof or own unknown
+  double rate(int local) const;
+  double dof(const NodeDof& d) const { return model().dof_value(context, d); }
+  double drive(const DrivePtr& d) const { return d->value(context); }
+  double memory(int i) const { return state().memory[connection_.memory_ + i]; }
+  int memory_offset() const { return connection_.memory_; }
+  /// Unknown (model's number) behind a local column; -1 when there is none.
+  int unknown(int local) const { return connection_.columns_[local]; }
+  double c() const { return context.c; }
+  double time() const { return context.time; }
+  int label() const { return info.label; }
+
+  const EvalContext& context;
+  const ElementInfo& info;
+
+ private:
+  const GeneralConnection& connection_;
+};
+
+/// Adds to the model's residual by local row.
+class GeneralResidual {
+ public:
+  GeneralResidual(const std::vector<int>& rows, double* r) : rows_(rows), r_(r) {}
+  void add(int row, double value) {
+    if (rows_[row] >= 0) r_[rows_[row]] += value;
+  }
+  void add3(int row, const Vec3& value) {
+    for (int i = 0; i < 3; ++i) add(row + i, value(i));
+  }
+  /// Force [N] and moment about the node [N·m] on the equilibrium rows that start at `row`.
+  void load(int row, const Vec3& f, const Vec3& m) {
+    add3(row, f);
+    add3(row + 3, m);
+  }
+
+ private:
+  const std::vector<int>& rows_;
+  double* r_;
+};
+
+/// Adds −∂r/∂δ to the sparse matrix by local row and column.
+class GeneralJacobian {
+ public:
+  GeneralJacobian(const EvalContext& context, const GeneralConnection& connection,
+                  const NodeSeeds* seeds, const std::vector<int>& positions, double* values)
+      : context_(context),
+        connection_(connection),
+        seeds_(seeds),
+        positions_(positions),
+        values_(values) {}
+  /// An entry of −∂r/∂δ as it is.
+  void add(int row, int column, double value) {
+    const int p = positions_[column * connection_.size_ + row];
+    if (p >= 0) values_[p] += value;
+  }
+  /// Given ∂r/∂(value) and ∂r/∂(rate) of a scalar dof, own unknown or position component.
+  void value(int row, int column, double dr) { add(row, column, -dr * value_factor(column)); }
+  void rate(int row, int column, double dr) { add(row, column, -dr * rate_factor(column)); }
+  /// Rows row..row+2, columns column..column+2 of the x (or v of a whole node): given ∂r/∂x, ∂r/∂v.
+  void translation(int row, int column, const Mat3& dx, const Mat3& dv) {
+    add3(row, column, -(dx * context_.c + dv));
+  }
+  /// Columns of the rotation of `structural_node` starting at `column`: given ∂r/∂θ, ∂r/∂w (global
+  /// components).
+  void rotation(int row, int column, int structural_node, const Mat3& dtheta, const Mat3& dw) {
+    add3(row, column, -(dtheta * seeds_[structural_node].A + dw * seeds_[structural_node].B));
+  }
+  void add3(int row, int column, const Mat3& m) {
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 3; ++i) add(row + i, column + j, m(i, j));
+  }
+  double value_factor(int column) const;  ///< ∂(value)/∂δ: c, or 1 for algebraic unknowns
+  double rate_factor(int column) const;   ///< ∂(rate)/∂δ: 1, or 0 for algebraic unknowns
+
+ private:
+  const EvalContext& context_;
+  const GeneralConnection& connection_;
+  const NodeSeeds* seeds_;
+  const std::vector<int>& positions_;
+  double* values_;
+};
+
+/// Interface of one general element; the meaning of each member as in ElementSet.
+class GeneralElement {
+ public:
+  virtual ~GeneralElement() = default;
+  virtual void connect(GeneralConnection& c) = 0;
+  virtual void pattern(GeneralPattern& p) const { p.dense(); }
+  virtual void residual(const GeneralView& u, GeneralResidual& r) const = 0;
+  virtual void jacobian(const GeneralView& u, GeneralJacobian& j) const = 0;
+
+  virtual void start(const GeneralView&, State&) const {}
+  virtual void after_predict(const GeneralView&, State&) const {}
+  virtual void after_convergence(const GeneralView&, State&) const {}
+  virtual std::string row_name(int own) const { return "equation " + std::to_string(own + 1); }
+
+  virtual AssemblyRole assembly_role() const { return AssemblyRole::none; }
+  /// Position-level rows and rate-level rows; its Jacobian is taken by central differences.
+  virtual void assembly_residual(const GeneralView&, GeneralResidual& /*r*/,
+                                 GeneralResidual& /*r_rate*/) const {}
+
+  virtual void output(const GeneralView&, OutputRow&) const {}
+  virtual std::string log(const Model&, int /*label*/) const { return {}; }
+  virtual int private_datum(std::string_view) const { return -1; }
+  virtual std::vector<std::string> private_data() const { return {}; }
+  virtual double private_value(const GeneralView&, int /*datum*/) const { return 0; }
+  virtual void add_inertia(const GeneralView&, int /*node*/, Inertia&) const {}
+  virtual void add_momentum(const GeneralView&, State&) const {}
+};
+
+/// All general elements of a model.
+class GeneralElementSet final : public ElementSet {
+ public:
+  void add(ModelBuilder& builder, ElementInfo info, std::unique_ptr<GeneralElement> element);
+  const GeneralElement& element(int i) const { return *slots_[i].element; }
+
+  int size() const override { return static_cast<int>(slots_.size()); }
+  const ElementInfo& info(int i) const override { return slots_[i].info; }
+  ElementInfo& info(int i) override { return slots_[i].info; }
+  int unknowns(int i) const override {
+    return static_cast<int>(slots_[i].connection.own_differential_.size());
+  }
+  bool is_differential(int i, int k) const override {
+    return slots_[i].connection.own_differential_[k] != 0;
+  }
+  std::string row_name(int i, int k) const override { return slots_[i].element->row_name(k); }
+  std::vector<int> nodes(int i) const override;
+  int first_own(int i) const override { return slots_[i].connection.first_own_; }
+  void bind(const Model& model, int i, int first_own) override;
+  void collect_pattern(PatternSink& sink) const override;
+  void set_positions(const PositionSource& positions) override;
+  void start(const EvalContext& context, State& state, int i) const override;
+  void residual(const EvalContext& context, double* r) const override;
+  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const override;
+  void after_predict(const EvalContext& context, State& state) const override;
+  void after_convergence(const EvalContext& context, State& state) const override;
+  AssemblyRole assembly_role(int i) const override { return slots_[i].element->assembly_role(); }
+  void assembly_residual(const EvalContext& context, int i, double* r,
+                         double* r_rate) const override;
+  void assembly_jacobian(const EvalContext& context, int i, int n,
+                         std::vector<Triplet>& out) const override;
+  void output(const EvalContext& context, int i, OutputRow& row) const override;
+  std::string log_line(const Model& model, int i) const override;
+  int private_datum(int i, std::string_view name) const override {
+    return slots_[i].element->private_datum(name);
+  }
+  std::vector<std::string> private_data(int i) const override {
+    return slots_[i].element->private_data();
+  }
+  double private_value(const EvalContext& context, int i, int datum) const override;
+  void add_inertia(const EvalContext& context, int i, int node, Inertia& inertia) const override;
+  void add_momentum(const EvalContext& context, int i, State& state) const override;
+
+ private:
+  struct Slot {
+    std::unique_ptr<GeneralElement> element;
+    ElementInfo info;
+    GeneralConnection connection;
+    std::vector<int> positions;  ///< (size × size), column-major
+  };
+  GeneralView view(const EvalContext& context, int i) const {
+    return GeneralView(context, slots_[i].connection, slots_[i].info);
+  }
+  std::vector<Slot> slots_;
+};
+
+ElementRef add_general_element(ModelBuilder& builder, ElementInfo info,
+                               std::unique_ptr<GeneralElement> element);
+
+}  // namespace mbcosim
