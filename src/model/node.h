@@ -13,6 +13,13 @@ namespace mbcosim {
 
 enum class StructuralKind { static_, dynamic, modal, static_displacement, dynamic_displacement, dummy_offset, dummy_relative };
 
+/// As the deck writes it: "dynamic", "static displacement", ...
+constexpr const char* kind_name(StructuralKind kind) {
+  constexpr const char* kNames[] = {"static", "dynamic", "modal", "static displacement", "dynamic displacement",
+                                    "dummy offset", "dummy relative frame"};
+  return kNames[static_cast<int>(kind)];
+}
+
 /// Structural node. Unknowns (spec 02 section 1.1), from `first`: x(3), g(3) [not for displacement nodes], then b, g_m
 /// (dynamic) or v, w (modal). Equilibrium rows start at `equilibrium`.
 struct StructuralNode {
@@ -59,6 +66,12 @@ struct StructuralNode {
 };
 
 enum class ScalarKind { abstract, electric, hydraulic, thermal, parameter };
+
+/// As the deck writes it: "abstract", "hydraulic", ...
+constexpr const char* kind_name(ScalarKind kind) {
+  constexpr const char* kNames[] = {"abstract", "electric", "hydraulic", "thermal", "parameter"};
+  return kNames[static_cast<int>(kind)];
+}
 
 /// Node with one scalar degree of freedom. Parameter nodes have a value (in State::memory) but no unknown.
 struct ScalarNode {
