@@ -1,0 +1,51 @@
+#pragma once
+
+#include "elements/joints/joint_common.h"
+
+namespace mbcosim {
+
+/// Distance: two points stay D(t) apart.
+///
+///   unknowns    u: unit vector from point 1 to point 2 (3), a: force [N], traction positive;  T =
+///   a u loads       node 1 (T, f₁ × T), node 2 (−T, −f₂ × T) rows        x₁ + f₁ − x₂ − f₂ + D u
+///   [m],  1 − |u|     (not divided by c)
+struct Distance : TwoAttachments, NamedData<Distance> {
+  DrivePtr length;  ///< D [m]
+  bool offsets = false;
+
+  static constexpr int width = 16;
+  static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  static constexpr std::array<std::string_view, 1> data_names = {"d"};
+
+  void connect(Connector& c) const {
+    TwoAttachments::connect(c);
+    c.algebraic(4);
+  }
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    using std::sqrt;
+    const Vec<T> f1 = arm_a(u), f2 = arm_b(u), axis = u.own3(0);
+    const Vec<T> tension = axis * u.own(3);
+    r.load(0, tension, f1.cross(tension));
+    r.load(1, -tension, -f2.cross(tension));
+    r.own3(0, u.x(0) + f1 - u.x(1) - f2 + axis * u.drive(length));
+    r.own(3, T(1.0) - sqrt(axis.dot(axis)));
+  }
+  /// Without offsets the rate level is b u on the velocities and (v₁ − v₂)·u = 0, with u′ = u as a
+  /// placeholder.
+  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;
+  void start(Start& s) const;
+  void output(const Local<double>& u, OutputRow& row) const;
+  std::string log(const Model& model, int label) const {
+    return LogLine("distance", label).point(model, a).point(model, b).str();
+  }
+  std::string row_name(int k) const {
+    return k < 3 ? constraint_name(k, 3) : "unit length of the direction";
+  }
+  double private_value(const Local<double>& u, int) const { return u.drive(length); }
+};
+
+void read_distance(Card& card, ElementInfo& info);
+void read_distance_with_offset(Card& card, ElementInfo& info);
+
+}  // namespace mbcosim

@@ -1,0 +1,149 @@
+/// What the joints share: attachments to nodes, their readers, names of private data, lines of
+/// .log, unwrapped angles.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "elements/element.h"
+#include "model/card.h"
+
+namespace mbcosim {
+
+/// A point and a frame fixed to a node.
+struct Attachment {
+  int node = -1;               ///< structural node index
+  Vec3 f = Vec3::Zero();       ///< offset of the point, in the node frame [m]
+  Mat3 Rh = Mat3::Identity();  ///< orientation of the frame, relative to the node
+
+  OtherNode as_other() const { return {node, f, Rh}; }
+};
+
+/// Point of an attachment in the input configuration, global [m].
+Vec3 input_point(const Model& model, const Attachment& a);
+
+// ------------------------------------------------------------------ readers
+/// `<node>`; displacement nodes only when `displacement_too`.
+Attachment read_attachment(Card& card, bool displacement_too = false);
+/// `[ position , ] <f>`.
+void read_offset(Card& card, Attachment& a, const Attachment* other = nullptr);
+/// `[ position , <f> ]`.
+void read_optional_offset(Card& card, Attachment& a, const Attachment* other = nullptr);
+/// `[ { hinge | orientation } , <Rh> ]`.
+void read_optional_hinge(Card& card, Attachment& a, const Attachment* other = nullptr);
+/// `<node> , [position,] <f> [ , { hinge | orientation } , <Rh> ]`.
+Attachment read_point_and_hinge(Card& card, const Attachment* other = nullptr);
+/// `[ orientation description , <od> ]`; the default of the deck when absent.
+OrientationDescription read_description(Card& card);
+/// Refuses hinge frames in which the axes that the joint keeps at right angles are parallel.
+void require_not_parallel(Card& card, const Vec3& a, const Vec3& b, const char* joint);
+
+// ------------------------------------------------------------------ private data
+template <std::size_t N>
+int index_of(const std::array<std::string_view, N>& names, std::string_view name) {
+  for (std::size_t i = 0; i < N; ++i)
+    if (names[i] == name) return static_cast<int>(i);
+  return -1;
+}
+
+/// Base of joints with a fixed list of private data, `Joint::data_names`.
+template <class Joint>
+struct NamedData {
+  int private_datum(std::string_view name) const { return index_of(Joint::data_names, name); }
+  std::vector<std::string> private_data() const {
+    return std::vector<std::string>(Joint::data_names.begin(), Joint::data_names.end());
+  }
+};
+
+/// Base of joints between two nodes with one attachment each.
+struct TwoAttachments {
+  Attachment a, b;
+  void connect(Connector& c) const {
+    c.distinct_node(a.node);
+    c.distinct_node(b.node);
+  }
+  template <class T>
+  Mat<T> hinge_a(const Local<T>& u) const {
+    return u.R(0) * a.Rh.cast<T>();
+  }
+  template <class T>
+  Mat<T> hinge_b(const Local<T>& u) const {
+    return u.R(1) * b.Rh.cast<T>();
+  }
+  template <class T>
+  Vec<T> arm_a(const Local<T>& u) const {
+    return u.R(0) * a.f.cast<T>();
+  }
+  template <class T>
+  Vec<T> arm_b(const Local<T>& u) const {
+    return u.R(1) * b.f.cast<T>();
+  }
+  /// H1ᵀ H2.
+  template <class T>
+  Mat<T> relative_rotation(const Local<T>& u) const {
+    return hinge_a(u).transpose() * hinge_b(u);
+  }
+};
+
+// ------------------------------------------------------------------ .log
+/// A line of .log: general notation with six digits.
+class LogLine {
+ public:
+  LogLine(const char* type, int label) { text_ << type << ": " << label; }
+  LogLine& node(const Model& model, int index) {
+    text_ << ' ' << model.structural[index].label;
+    return *this;
+  }
+  LogLine& add(const Vec3& v) { return numbers(v.data(), 3); }
+  LogLine& add(const Mat3& m) {
+    const Mat3 by_rows = m.transpose();
+    return numbers(by_rows.data(), 9);
+  }
+  LogLine& add(int value) {
+    text_ << ' ' << value;
+    return *this;
+  }
+  /// node, offset, orientation.
+  LogLine& add(const Model& model, const Attachment& a) {
+    return node(model, a.node).add(a.f).add(a.Rh);
+  }
+  /// node, offset.
+  LogLine& point(const Model& model, const Attachment& a) { return node(model, a.node).add(a.f); }
+  std::string str() const { return text_.str(); }
+
+ private:
+  LogLine& numbers(const double* data, int count) {
+    for (int i = 0; i < count; ++i) text_ << ' ' << data[i] + 0.0;
+    return *this;
+  }
+  std::ostringstream text_;
+};
+
+// ------------------------------------------------------------------ angles and constraints
+/// Angle about axis 3 that counts turns. Memory: the angle in (−π, π] at the last accepted step,
+/// the turns done.
+struct UnwrappedAngle {
+  static constexpr int memory = 2;
+  static double turns(double angle, double previous, double turns) {
+    if (angle - previous < -kPi) return turns + 1;
+    if (angle - previous > kPi) return turns - 1;
+    return turns;
+  }
+  static double value(const Local<double>& u, int offset, double angle) {
+    return angle + 2 * kPi * turns(angle, u.memory(offset), u.memory(offset + 1));
+  }
+  static void accept(const Local<double>& u, State& state, int offset, double angle) {
+    double* memory = &state.memory[u.memory_offset() + offset];
+    memory[1] = turns(angle, memory[0], memory[1]);
+    memory[0] = angle;
+  }
+};
+
+/// Name of constraint row k for joints whose first `positions` rows concern positions.
+std::string constraint_name(int k, int positions);
+
+}  // namespace mbcosim

@@ -1,0 +1,207 @@
+#include "elements/joints/revolute.h"
+
+namespace mbcosim {
+
+namespace {
+
+double turns_of(double initial, double angle) { return std::round((initial - angle) / (2 * kPi)); }
+
+void start_turns(Start& s, double angle, double initial_turns) {
+  s.memory(0) = angle;
+  s.memory(1) = initial_turns;
+}
+
+/// `[ , initial theta , <θ> ]`: the turns already done.
+double read_initial_turns(Card& card, double angle) {
+  if (!card.keyword("initial theta")) return 0;
+  return turns_of(card.real("initial theta"), angle);
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------ revolute pin
+
+void RevolutePin::start(Start& s) const { start_turns(s, angle(s.u), initial_turns); }
+
+void RevolutePin::output(const Local<double>& u, OutputRow& row) const {
+  const Mat3 Q = u.R(0) * a.Rh;
+  const Vec3 F = u.own3(0), m(u.own(3), u.own(4), 0);
+  row.begin(OutputFile::jnt, u.label());
+  row.reactions(Q.transpose() * F, m, F, Q * m);
+  row.orientation("E", R0.transpose() * Q, OrientationDescription::euler123);
+  row.vec3("Omega", "rad/s", Q.transpose() * u.w(0));
+  row.end();
+}
+
+std::string RevolutePin::log(const Model& model, int label) const {
+  const StructuralNode& node = model.structural[a.node];
+  const Mat3 Rt = node.R.transpose();
+  LogLine line("revolutepin", label);
+  line.add(model, a).node(model, a.node).add(Vec3(Rt * (X0 - node.x))).add(Mat3(R0 * Rt));
+  return line.str();
+}
+
+double RevolutePin::private_value(const Local<double>& u, int datum) const {
+  const Mat3 Q = u.R(0) * a.Rh;
+  if (datum == 0) return UnwrappedAngle::value(u, 0, angle(u));
+  if (datum == 1) return (Q.transpose() * u.w(0))(2);
+  if (datum < 5) return (Q.transpose() * u.own3(0))(datum - 2);
+  return datum < 7 ? u.own(datum - 2) : 0.0;
+}
+
+void read_revolute_pin(Card& card, ElementInfo& info) {
+  RevolutePin e;
+  e.a = read_point_and_hinge(card);
+  card.keyword("position");
+  e.X0 = card.absolute_position("pin position", e.a.node);
+  if (card.one_of({"hinge", "orientation"}) >= 0)
+    e.R0 = card.absolute_orientation("pin orientation", e.a.node);
+  const Mat3 Q = card.model().structural[e.a.node].R * e.a.Rh;
+  require_not_parallel(card, e.R0.col(2), Q.col(0), "revolute pin");
+  require_not_parallel(card, e.R0.col(2), Q.col(1), "revolute pin");
+  e.initial_turns = read_initial_turns(card, vector_of_rotation<double>(e.R0.transpose() * Q)(2));
+  add_element(card.builder(), info, e);
+}
+
+// ------------------------------------------------------------------ revolute axes
+
+void RevoluteAxes::start_angle(Start& s) const { start_turns(s, angle(s.u), initial_turns); }
+
+namespace {
+
+void check_axes(Card& card, const RevoluteAxes& e, const char* joint) {
+  const Model& model = card.model();
+  const Vec3 e3 = (model.structural[e.a.node].R * e.a.Rh).col(2);
+  const Mat3 H2 = model.structural[e.b.node].R * e.b.Rh;
+  require_not_parallel(card, e3, H2.col(0), joint);
+  require_not_parallel(card, e3, H2.col(1), joint);
+}
+
+double input_angle(const Model& model, const RevoluteAxes& e) {
+  const Mat3 H1 = model.structural[e.a.node].R * e.a.Rh, H2 = model.structural[e.b.node].R * e.b.Rh;
+  return vector_of_rotation<double>(H1.transpose() * H2)(2);
+}
+
+/// `[ , orientation description , <od> ] [ , initial theta , <θ> ]`.
+void read_options(Card& card, RevoluteAxes& e) {
+  e.description = read_description(card);
+  e.initial_turns = read_initial_turns(card, input_angle(card.model(), e));
+}
+
+void output_hinge(const RevoluteAxes& e, const Local<double>& u, OutputRow& row, const Vec3& F,
+                  const Vec3& m) {
+  const Mat3 H2 = e.hinge_b(u);
+  row.begin(OutputFile::jnt, u.label());
+  row.reactions(H2.transpose() * F, m, F, H2 * m);
+  row.orientation("E", e.relative_rotation(u), e.description);
+}
+
+double hinge_datum(const RevoluteAxes& e, const Local<double>& u, int datum) {
+  if (datum == 0) return e.unwrapped_angle(u);
+  if (datum == 1) return e.relative_velocity(u)(2);
+  return (e.hinge_b(u).transpose() * u.own3(0))(datum - 2);
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------ revolute hinge
+
+void RevoluteHinge::start(Start& s) const {
+  start_angle(s);
+  for (int i = 0; i < 3; ++i) s.own(i) = F0(i);
+  for (int i = 0; i < 2; ++i) s.own(3 + i) = M0(i);
+}
+
+void RevoluteHinge::output(const Local<double>& u, OutputRow& row) const {
+  output_hinge(*this, u, row, u.own3(0), Vec3(u.own(3), u.own(4), 0));
+  row.vec3("Omega", "rad/s", relative_velocity(u));
+  row.end();
+}
+
+double RevoluteHinge::private_value(const Local<double>& u, int datum) const {
+  if (datum < 5) return hinge_datum(*this, u, datum);
+  return datum < 7 ? u.own(datum - 2) : 0.0;
+}
+
+void read_revolute_hinge(Card& card, ElementInfo& info) {
+  RevoluteHinge e;
+  e.a = read_point_and_hinge(card);
+  e.b = read_point_and_hinge(card, &e.a);
+  check_axes(card, e, "revolute hinge");
+  read_options(card, e);
+  if (card.keyword("initial state")) {
+    e.F0 = card.vec3("initial force");
+    for (int i = 0; i < 2; ++i) e.M0(i) = card.real("initial moment");
+  }
+  add_element(card.builder(), info, e);
+}
+
+// ------------------------------------------------------------------ revolute rotation
+
+void RevoluteRotation::output(const Local<double>& u, OutputRow& row) const {
+  output_hinge(*this, u, row, Vec3::Zero(), Vec3(u.own(0), u.own(1), 0));
+  row.vec3("Omega", "rad/s", relative_velocity(u));
+  row.end();
+}
+
+std::string RevoluteRotation::log(const Model& model, int label) const {
+  LogLine line("revoluterotation", label);
+  line.node(model, a.node).add(Vec3(Vec3::Zero())).add(a.Rh);
+  line.node(model, b.node).add(Vec3(Vec3::Zero())).add(b.Rh);
+  return line.str();
+}
+
+double RevoluteRotation::private_value(const Local<double>& u, int datum) const {
+  if (datum < 2) return hinge_datum(*this, u, datum);
+  return datum < 4 ? u.own(datum - 2) : 0.0;
+}
+
+void read_revolute_rotation(Card& card, ElementInfo& info) {
+  RevoluteRotation e;
+  e.a = read_attachment(card);
+  read_optional_offset(card, e.a);
+  read_optional_hinge(card, e.a);
+  e.b = read_attachment(card);
+  read_optional_offset(card, e.b, &e.a);
+  read_optional_hinge(card, e.b, &e.a);
+  check_axes(card, e, "revolute rotation");
+  read_options(card, e);
+  add_element(card.builder(), info, e);
+}
+
+// ------------------------------------------------------------------ axial rotation
+
+void AxialRotation::assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const {
+  hinge(u, r);
+  const Vec<TimeDual> e3 = hinge_a(u).col(2);
+  const Vec3 axis = value_of(e3), w = value_of(u.w(1)) - value_of(u.w(0));
+  Vec<TimeDual> M;
+  for (int i = 0; i < 3; ++i) M(i) = TimeDual::variable(0, 0, axis(i) * u.own(5).d[0]);
+  r.moment(0, -M);
+  r.moment(1, M);
+  r.own(5, TimeDual::variable(-u.own(5).v, 0, u.drive(omega).v - axis.dot(w)));
+}
+
+void AxialRotation::output(const Local<double>& u, OutputRow& row) const {
+  output_hinge(*this, u, row, u.own3(0), u.own3(3));
+  row.scalar("Omega0", "rad/s", u.drive(omega));
+  row.vec3("Omega", "rad/s", relative_velocity(u));
+  row.end();
+}
+
+double AxialRotation::private_value(const Local<double>& u, int datum) const {
+  if (datum == 1) return u.drive(omega);
+  return datum < 5 ? hinge_datum(*this, u, datum) : u.own(datum - 2);
+}
+
+void read_axial_rotation(Card& card, ElementInfo& info) {
+  AxialRotation e;
+  e.a = read_point_and_hinge(card);
+  e.b = read_point_and_hinge(card, &e.a);
+  check_axes(card, e, "axial rotation");
+  e.omega = card.drive("relative angular velocity");
+  e.description = read_description(card);
+  add_element(card.builder(), info, e);
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,1 @@
+set(SOURCES joint_conformance_test.cpp)
