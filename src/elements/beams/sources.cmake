@@ -1,1 +1,1 @@
-set(SOURCES register.cpp)
+set(SOURCES beam.cpp beam_output.cpp register.cpp)

@@ -1,1 +1,1 @@
-set(SOURCES register.cpp)
+set(SOURCES linear.cpp register.cpp)

@@ -1,0 +1,117 @@
+// Results of beams: the line of .act, the line of .log and private data.
+#include <sstream>
+
+#include "elements/beams/beam.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// Groups of private data at an evaluation point, three components each.
+enum Group {
+  kStrain,
+  kCurvature,
+  kForce,
+  kMoment,
+  kPosition,
+  kOrientation,
+  kAngularVelocity,
+  kStrainRate,
+  kCurvatureRate,
+  kGroups
+};
+constexpr const char* kGroupNames[kGroups] = {"e", "k", "F", "M", "X", "Phi", "Omega", "eP", "kP"};
+constexpr const char* kPointPrefix[2] = {"pI.", "pII."};
+
+template <int Nodes>
+std::string prefix(int a) {
+  return Nodes == 2 ? "" : kPointPrefix[a];
+}
+
+}  // namespace
+
+template <int Nodes>
+void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
+  constexpr const char* force_names[2] = {Nodes == 2 ? "F" : "F_I", "F_II"};
+  constexpr const char* moment_names[2] = {Nodes == 2 ? "M" : "M_I", "M_II"};
+  row.begin(OutputFile::act, u.label());
+  for (int a = 0; a < points; ++a) {
+    const Vec6 f = is_unloaded(u) ? Vec6(Vec6::Zero()) : internal_force(u, a, section(u, a));
+    row.vec3(force_names[a], "N", f.head<3>());
+    row.vec3(moment_names[a], "N m", f.tail<3>());
+  }
+  row.end();
+}
+
+template <int Nodes>
+std::string Beam<Nodes>::log(const Model& model, int label) const {
+  std::ostringstream out;
+  out << "beam" << Nodes << ": " << label;
+  for (int k = 0; k < Nodes; ++k)
+    out << ' ' << model.structural[node[k]].label << ' ' << offset[k](0) << ' ' << offset[k](1)
+        << ' ' << offset[k](2);
+  return out.str();
+}
+
+template <int Nodes>
+std::vector<std::string> Beam<Nodes>::private_data() const {
+  std::vector<std::string> names;
+  for (int a = 0; a < points; ++a)
+    for (const char* group : kGroupNames)
+      for (const char axis : {'x', 'y', 'z'}) names.push_back(prefix<Nodes>(a) + group + axis);
+  return names;
+}
+
+template <int Nodes>
+int Beam<Nodes>::private_datum(std::string_view name) const {
+  for (int a = 0; a < points; ++a) {
+    const std::string start = prefix<Nodes>(a);
+    if (!name.starts_with(start)) continue;
+    const std::string_view rest = name.substr(start.size());
+    for (int group = 0; group < kGroups; ++group) {
+      const std::string_view word = kGroupNames[group];
+      if (rest.size() != word.size() + 1 || !rest.starts_with(word)) continue;
+      const int axis = rest.back() - 'x';
+      if (axis >= 0 && axis < 3) return (a * kGroups + group) * 3 + axis;
+    }
+  }
+  return -1;
+}
+
+template <int Nodes>
+double Beam<Nodes>::private_value(const Local<double>& u, int datum) const {
+  const int axis = datum % 3, group = datum / 3 % kGroups, a = datum / 3 / kGroups;
+  const Section<double> s = section(u, a);
+  switch (group) {
+    case kStrain:
+      return s.strain(axis);
+    case kCurvature:
+      return s.strain(3 + axis);
+    case kForce:
+    case kMoment:
+      return is_unloaded(u) ? 0 : internal_force(u, a, s)(group == kForce ? axis : 3 + axis);
+    case kPosition:
+      return s.p(axis);
+    case kOrientation:
+      return vector_of_rotation(s.R)(axis);
+    case kAngularVelocity:
+      return s.w(axis);
+    case kStrainRate:
+      return s.rate(axis);
+    default:
+      return s.rate(3 + axis);
+  }
+}
+
+template void Beam<2>::output(const Local<double>&, OutputRow&) const;
+template std::string Beam<2>::log(const Model&, int) const;
+template std::vector<std::string> Beam<2>::private_data() const;
+template int Beam<2>::private_datum(std::string_view) const;
+template double Beam<2>::private_value(const Local<double>&, int) const;
+template void Beam<3>::output(const Local<double>&, OutputRow&) const;
+template std::string Beam<3>::log(const Model&, int) const;
+template std::vector<std::string> Beam<3>::private_data() const;
+template int Beam<3>::private_datum(std::string_view) const;
+template double Beam<3>::private_value(const Local<double>&, int) const;
+
+}  // namespace mbcosim
