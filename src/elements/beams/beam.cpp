@@ -155,7 +155,7 @@ void Beam<Nodes>::restart(const Local<double>& u, State& state) const {
   for (int a = 0; a < points; ++a) {
     const double m = point[a].metric;
     const auto g = [&](int k) { return total_parameters(u, k); };
-    const auto w = [&](int k) -> Vec3 { return u.w(k) - cgr_g(u.g(k)) * u.gp(k); };
+    const auto w = [&](int k) { return u.w(k); };
     const Vec3 r = interpolate(Shape::n[a], g), dr = m * interpolate(Shape::dn[a], g);
     SectionHistory<double> h(&state.memory[u.memory_offset() + a * kSectionHistory]);
     const Vec3 bend = cgr_g(r) * dr;
@@ -169,6 +169,7 @@ void Beam<Nodes>::restart(const Local<double>& u, State& state) const {
 template <int Nodes>
 void Beam<Nodes>::start(Start& s) const {
   restart(s.u, s.state);
+  s.memory(kMemory - 1) = s.u.context->phase == Phase::step;  // switched on by its drive
 }
 
 template <int Nodes>

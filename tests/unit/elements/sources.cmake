@@ -1,1 +1,1 @@
-set(SOURCES joint_conformance_test.cpp)
+set(SOURCES beam_test.cpp joint_conformance_test.cpp)
