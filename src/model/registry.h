@@ -66,5 +66,6 @@ namespace mbcosim {
 
 void register_drives(Registry& registry);  ///< drives and scalar functions (model/drives, model/functions)
 void register_laws(Registry& registry);    ///< constitutive laws (model/laws)
+void register_fluids(Registry& registry);  ///< hydraulic fluids (model/fluids)
 
 }  // namespace mbcosim

@@ -1,0 +1,1 @@
+set(SOURCES fluids.cpp register.cpp)
