@@ -49,9 +49,10 @@ T turbulent_flow(double coefficient_area, const T& rho, const T& dp) {
 /// the stroke.
 ///
 ///   lower, s ≤ lo:  c_s (s − lo) + [ṡ < 0] c_v ṡ + [v̇ < 0] c_a v̇
-///   upper, s ≥ hi:  c_s (s − hi) + [ṡ > 0] c_v ṡ + [v̇ > 0] c_a v̇
+///   upper, s ≥ hi:  c_s (s − hi) + [ṡ > 0] c_v ṡ + [v̇ < 0] c_a v̇
 ///
-/// With c_a ≠ 0 the law is discontinuous in v̇ and Newton may not converge.
+/// Both have v̇ < 0, as MBDyn has it. With c_a ≠ 0 the law is discontinuous in v̇ and Newton may not
+/// converge.
 struct EndStops {
   double cs = 0, cv = 0, ca = 0;  ///< [N/m], [N·s/m], [kg]
   double lo = 0, hi = 0;          ///< [m]
@@ -68,7 +69,7 @@ struct EndStops {
     if (s > hi || (inclusive && s == hi)) {
       f += cs * (s - hi);
       if (sdot > 0) f += cv * sdot;
-      if (vdot > 0) f += ca * vdot;
+      if (vdot < 0) f += ca * vdot;
     }
     return f;
   }
