@@ -86,6 +86,7 @@ class Model {
   std::vector<Binding> bindings;
 
   // --- numbering, set by ModelBuilder::finish
+  bool has_driven = false;  ///< is any element `driven`?
   int unknowns = 0;                     ///< n
   std::vector<UnknownKind> kinds;       ///< (n)
   std::vector<double> row_scale;        ///< (n) scale of the owner, for `tolerance ..., scale`

@@ -25,7 +25,10 @@ ElementRef ModelBuilder::register_element(ElementSet& set) {
   const ElementRef ref{&set, set.size() - 1};
   ElementInfo& info = set.info(ref.index);
   info.order = static_cast<int>(model_->elements.size());
-  if (info.driven) info.active_memory = allocate_memory(1, 1);
+  if (info.driven) {
+    info.active_memory = allocate_memory(1, 1);
+    model_->has_driven = true;
+  }
   model_->elements.push_back(ref);
   model_->element_index[static_cast<int>(info.family)].emplace(info.label, ref);
   return ref;

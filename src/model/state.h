@@ -32,6 +32,9 @@ struct State {
   std::vector<double> memory;          ///< what elements, laws and drives remember
   std::vector<double> variables;       ///< variables of the deck that run-time strings read or assign
   std::vector<double> control;         ///< step control and integrator flags (solver)
+  /// Loads that external codes apply to structural nodes: force [N] and moment about the node [N·m], global components
+  /// (6 × structural nodes), or empty when there are none.
+  std::vector<double> external_loads;
 };
 
 }  // namespace mbcosim

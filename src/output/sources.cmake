@@ -1,0 +1,1 @@
+set(SOURCES model_log.cpp record.cpp text_writer.cpp)

@@ -1,0 +1,189 @@
+#include "output/text_writer.h"
+
+#include <array>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+
+#include "output/model_log.h"
+#include "output/record.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// A file that collects text and writes it in large pieces; created with the first byte.
+class TextFile {
+ public:
+  static constexpr std::size_t kBuffer = 1 << 16;
+
+  void open(std::string path) { path_ = std::move(path); }
+  ~TextFile() {
+    if (file_) std::fclose(file_);
+  }
+  /// Room for `count` more bytes at the end; `commit` tells how far it was used.
+  char* room(std::size_t count) {
+    if (text_.empty()) text_.resize(kBuffer);
+    if (used_ + count > text_.size()) flush();
+    if (count > text_.size()) text_.resize(2 * count);
+    return text_.data() + used_;
+  }
+  void commit(char* end) { used_ = static_cast<std::size_t>(end - text_.data()); }
+  void text(std::string_view s) {
+    char* p = room(s.size());
+    std::memcpy(p, s.data(), s.size());
+    commit(p + s.size());
+  }
+  bool flush() {
+    if (used_ == 0) return !failed_;
+    if (!file_ && !failed_) file_ = std::fopen(path_.c_str(), "wb");
+    if (!file_ || std::fwrite(text_.data(), 1, used_, file_) != used_) failed_ = true;
+    used_ = 0;
+    return !failed_;
+  }
+  void create() {
+    if (!file_ && !failed_) file_ = std::fopen(path_.c_str(), "wb");
+    if (!file_) failed_ = true;
+  }
+  bool finish() {
+    flush();
+    if (file_ && std::fflush(file_) != 0) failed_ = true;
+    return !failed_;
+  }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  std::string text_;
+  std::size_t used_ = 0;
+  std::FILE* file_ = nullptr;
+  bool failed_ = false;
+};
+
+class TextWriter : public ResultWriter, private OutputRow {
+ public:
+  explicit TextWriter(const std::string& prefix) {
+    for (std::size_t k = 0; k < files_.size(); ++k) files_[k].open(prefix + "." + extension(static_cast<OutputFile>(k)));
+    out_.open(prefix + ".out");
+    log_.open(prefix + ".log");
+  }
+
+  void begin(const Model& model) override {
+    model_ = &model;
+    precision_ = model.control.output_precision;
+    out_.create();
+    log_.create();
+    log_.text(model_log(model));
+    if (model.control.output_reference_frames) write_reference_frames(model, *this);
+  }
+  void derivatives(double time, int iterations, double error) override {
+    out_.text("# Derivatives solution step at time " + general(time) + " performed in " + std::to_string(iterations) +
+              " iterations with " + general(error) + " error\n");
+    if (model_->initial_value.dummy_steps == 0) header();
+  }
+  void dummy_steps(double time, int iterations, double error) override {
+    out_.text("# Initial solution after dummy steps at time " + general(time) + " performed in " + std::to_string(iterations) +
+              " iterations with " + general(error) + " error\n");
+    header();
+  }
+  void step(const StepLine& s) override {
+    char* p = out_.room(256);
+    const auto put = [&](std::string_view t) {
+      std::memcpy(p, t.data(), t.size());
+      p += t.size();
+    };
+    const auto number = [&](double v) {
+      *p++ = ' ';
+      p = std::to_chars(p, p + 40, v, std::chars_format::general, precision_).ptr;
+    };
+    put("Step ");
+    p = std::to_chars(p, p + 24, s.step).ptr;
+    number(s.time);
+    number(s.h);
+    *p++ = ' ';
+    p = std::to_chars(p, p + 24, s.iterations).ptr;
+    number(s.residual_error);
+    number(s.solution_error);
+    put(s.by_solution ? " 1" : " 0");
+    put(s.recorded ? " 1\n" : " 0\n");
+    out_.commit(p);
+  }
+  void note(const std::string& text) override { out_.text(text); }
+  void record(const EvalContext& context) override {
+    if (context.model->control.text) write_record(context, *this);
+  }
+  Status finish() override {
+    bool fine = out_.finish() && log_.finish();
+    for (TextFile& f : files_) fine = f.finish() && fine;
+    if (fine) return ok();
+    Error e;
+    e.kind = ErrorKind::io;
+    e.reason = "OUTPUT_NOT_WRITTEN";
+    e.message = "cannot write the result files " + out_.path().substr(0, out_.path().size() - 4) + ".*";
+    return e;
+  }
+
+ private:
+  static constexpr std::size_t kField = 48;  ///< bytes of one field, with margin for the largest precision used
+
+  void header() {
+    out_.text("# Key for lines starting with \"Step\":\n# Step Time TStep NIter ResErr SolErr SolConv Out\n");
+  }
+  std::string general(double v) const {
+    char buffer[64];
+    return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, v, std::chars_format::general, precision_).ptr);
+  }
+
+  // OutputRow
+  void begin(OutputFile file, int label) override {
+    current_ = &files_[static_cast<std::size_t>(file)];
+    char digits[16];
+    const auto end = std::to_chars(digits, digits + sizeof digits, label).ptr;
+    const int count = static_cast<int>(end - digits);
+    char* p = current_->room(32);
+    if (file != OutputFile::frc)
+      for (int k = count; k < 8; ++k) *p++ = ' ';
+    std::memcpy(p, digits, count);
+    current_->commit(p + count);
+  }
+  void begin_text(OutputFile file, std::string_view label) override {
+    current_ = &files_[static_cast<std::size_t>(file)];
+    current_->text(label);
+  }
+  void integer(int value) override {
+    char* p = current_->room(16);
+    *p++ = ' ';
+    current_->commit(std::to_chars(p, p + 15, value).ptr);
+  }
+  void number(double value) {
+    char* p = current_->room(kField + precision_);
+    *p++ = ' ';
+    current_->commit(std::to_chars(p, p + kField + precision_ - 1, value, std::chars_format::scientific, precision_).ptr);
+  }
+  void scalar(const char*, const char*, double value) override { number(value); }
+  void vec3(const char*, const char*, const Vec3& v) override {
+    number(v(0));
+    number(v(1));
+    number(v(2));
+  }
+  void values(const char*, const char*, const double* data, int count) override {
+    for (int k = 0; k < count; ++k) number(data[k]);
+  }
+  void end() override {
+    char* p = current_->room(1);
+    *p = '\n';
+    current_->commit(p + 1);
+  }
+
+  const Model* model_ = nullptr;
+  int precision_ = 6;
+  std::array<TextFile, static_cast<std::size_t>(OutputFile::count)> files_;
+  TextFile out_, log_;
+  TextFile* current_ = nullptr;
+};
+
+}  // namespace
+
+std::shared_ptr<ResultWriter> make_text_writer(const std::string& prefix) { return std::make_shared<TextWriter>(prefix); }
+
+}  // namespace mbcosim

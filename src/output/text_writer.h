@@ -1,0 +1,14 @@
+/// MBDyn's text result files: PREFIX.out, .log, .mov, .jnt, ... Spec 02 section 11.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "output/result_writer.h"
+
+namespace mbcosim {
+
+/// Files are created when their first line is written, except .out and .log.
+std::shared_ptr<ResultWriter> make_text_writer(const std::string& prefix);
+
+}  // namespace mbcosim

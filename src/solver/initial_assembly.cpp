@@ -1,0 +1,220 @@
+#include "solver/initial_assembly.h"
+
+#include <Eigen/Sparse>
+#include <Eigen/SparseLU>
+
+#include "solver/newton.h"
+
+namespace mbcosim {
+
+namespace {
+
+class Assembly {
+ public:
+  Assembly(const Model& model, State& state) : model_(model), state_(state), start_(state), n_(model.unknowns), to_local_(2 * n_, -1) {
+    for (const ElementRef& e : model.elements)
+      if (takes_part(e)) elements_.push_back(e);
+    number();
+  }
+  bool needed() const { return !elements_.empty(); }
+
+  Result<AssemblyReport> run() {
+    AssemblyReport report;
+    for (;; ++report.iterations) {
+      compute_residual();
+      report.error = error();
+      if (report.error <= model_.control.assembly_tolerance) break;
+      if (report.iterations >= model_.control.assembly_max_iterations || !std::isfinite(report.error))
+        return failure(ErrorKind::not_converged, report);
+      if (!correct()) return failure(ErrorKind::singular, report);
+      report.moved = true;
+    }
+    return report;
+  }
+
+ private:
+  bool takes_part(const ElementRef& e) const {
+    if (e.set->assembly_role(e.index) == AssemblyRole::none || !e.set->is_active(state_, e.index)) return false;
+    switch (e.set->info(e.index).family) {
+      case Family::body: return model_.control.assemble_bodies;
+      case Family::force: return model_.control.assemble_forces;
+      case Family::beam: return model_.control.assemble_beams;
+      default: return true;
+    }
+  }
+
+  /// Local numbering: position level first, then the rate level. Node rows are the equilibrium rows, columns x and g.
+  void number() {
+    for (const StructuralNode& node : model_.structural)
+      for (int i = 0; i < node.position_unknowns(); ++i) {
+        rows_.push_back(node.equilibrium + i);
+        columns_.push_back(node.first + i);
+      }
+    for (const ElementRef& e : elements_)
+      for (int k = 0; k < e.set->unknowns(e.index); ++k) {
+        rows_.push_back(e.set->first_own(e.index) + k);
+        columns_.push_back(rows_.back());
+      }
+    size_ = static_cast<int>(rows_.size());
+    row_of_.assign(2 * n_, -1);
+    for (int a = 0; a < size_; ++a) {
+      to_local_[columns_[a]] = a;
+      to_local_[n_ + columns_[a]] = size_ + a;
+      row_of_[rows_[a]] = a;
+      row_of_[n_ + rows_[a]] = size_ + a;
+    }
+    r_.assign(n_, 0);
+    r_rate_.assign(n_, 0);
+  }
+
+  EvalContext context() const { return model_.context(state_, Phase::assembly); }
+
+  Vec3 rotation_parameters(std::size_t k) const { return cgr_parameters<double>(state_.rotation[k].R * start_.rotation[k].R.transpose()); }
+
+  void compute_residual() {
+    std::fill(r_.begin(), r_.end(), 0.0);
+    std::fill(r_rate_.begin(), r_rate_.end(), 0.0);
+    const EvalContext c = context();
+    for (std::size_t k = 0; k < model_.structural.size(); ++k) {
+      const StructuralNode& node = model_.structural[k];
+      if (node.is_dummy()) continue;
+      const double kp = node.assembly_position_stiffness, kv = node.assembly_velocity_stiffness;
+      for (int i = 0; i < 3; ++i) {
+        r_[node.equilibrium + i] += kp * (start_.y[node.first + i] - state_.y[node.first + i]);
+        r_rate_[node.equilibrium + i] += kv * (start_.yp[node.first + i] - state_.yp[node.first + i]);
+      }
+      if (!node.has_rotation()) continue;
+      const Vec3 g = rotation_parameters(k);
+      const NodeRotation& q = state_.rotation[k];
+      const Vec3 w0 = node.omega_rotates ? Vec3(start_.rotation[k].R * q.R.transpose() * start_.rotation[k].w) : start_.rotation[k].w;
+      for (int i = 0; i < 3; ++i) {
+        r_[node.equilibrium + 3 + i] -= kp * g(i);
+        r_rate_[node.equilibrium + 3 + i] += kv * (w0(i) - q.w(i));
+      }
+    }
+    for (const ElementRef& e : elements_) e.set->assembly_residual(c, e.index, r_.data(), r_rate_.data());
+  }
+
+  double error() const {
+    double r2 = 0, x2 = 1;
+    for (int a = 0; a < size_; ++a) {
+      r2 += r_[rows_[a]] * r_[rows_[a]] + r_rate_[rows_[a]] * r_rate_[rows_[a]];
+      const double x = state_.y[columns_[a]], v = state_.yp[columns_[a]];
+      x2 += x * x + v * v;
+    }
+    return std::sqrt(r2 / x2);
+  }
+
+  bool correct() {
+    std::vector<ElementSet::Triplet> entries;
+    add_springs(entries);
+    const EvalContext c = context();
+    for (const ElementRef& e : elements_) e.set->assembly_jacobian(c, e.index, n_, entries);
+    std::vector<Eigen::Triplet<double>> triplets;
+    for (const auto& t : entries) {
+      const int row = row_of_[t.row], column = to_local_[t.column];
+      if (row >= 0 && column >= 0) triplets.emplace_back(row, column, t.value);
+    }
+    Eigen::SparseMatrix<double> matrix(2 * size_, 2 * size_);
+    matrix.setFromTriplets(triplets.begin(), triplets.end());
+    Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix);
+    if (lu.info() != Eigen::Success) return false;
+    VecX rhs(2 * size_);
+    for (int a = 0; a < size_; ++a) {
+      rhs(a) = r_[rows_[a]];
+      rhs(size_ + a) = r_rate_[rows_[a]];
+    }
+    const VecX delta = lu.solve(rhs) * model_.control.assembly_epsilon;
+    if (!delta.allFinite()) return false;
+    apply(delta);
+    return true;
+  }
+
+  void add_springs(std::vector<ElementSet::Triplet>& entries) const {
+    for (std::size_t k = 0; k < model_.structural.size(); ++k) {
+      const StructuralNode& node = model_.structural[k];
+      if (node.is_dummy()) continue;
+      const double kp = node.assembly_position_stiffness, kv = node.assembly_velocity_stiffness;
+      for (int i = 0; i < 3; ++i) {
+        entries.push_back({node.equilibrium + i, node.first + i, kp});
+        entries.push_back({n_ + node.equilibrium + i, n_ + node.first + i, kv});
+      }
+      if (!node.has_rotation()) continue;
+      const Mat3 g_inverse = cgr_g_inverse(rotation_parameters(k));
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) entries.push_back({node.equilibrium + 3 + i, node.first + 3 + j, kp * g_inverse(i, j)});
+        entries.push_back({n_ + node.equilibrium + 3 + i, n_ + node.first + 3 + i, kv});
+      }
+    }
+  }
+
+  void apply(const VecX& delta) {
+    for (std::size_t k = 0; k < model_.structural.size(); ++k) {
+      const StructuralNode& node = model_.structural[k];
+      if (!node.has_rotation()) continue;
+      const int a = to_local_[node.first + 3];
+      NodeRotation& q = state_.rotation[k];
+      q.R = rotation_of_vector<double>(delta.segment<3>(a)) * q.R;
+      q.w += delta.segment<3>(size_ + a);
+    }
+    for (int a = 0; a < size_; ++a) {
+      state_.y[columns_[a]] += delta(a);
+      state_.yp[columns_[a]] += delta(size_ + a);
+    }
+  }
+
+  Error failure(ErrorKind kind, const AssemblyReport& report) const {
+    Error e;
+    e.kind = kind;
+    e.reason = kind == ErrorKind::singular ? "ASSEMBLY_SINGULAR" : "ASSEMBLY_NOT_CONVERGED";
+    std::vector<double> worst(n_);
+    for (int i = 0; i < n_; ++i) worst[i] = std::max(std::abs(r_[i]), std::abs(r_rate_[i]));
+    e.failure.time = state_.time;
+    e.failure.iteration = report.iterations;
+    e.failure.residual_history = {report.error};
+    e.failure.worst = worst_equations(model_, worst);
+    e.message = kind == ErrorKind::singular
+                    ? "initial assembly: the matrix is singular; constraints are redundant or nothing determines a node"
+                    : "initial assembly: error " + std::to_string(report.error) + " after " + std::to_string(report.iterations) +
+                          " iterations, tolerance " + std::to_string(model_.control.assembly_tolerance);
+    for (const WorstEquation& w : e.failure.worst)
+      if (w.residual != 0) e.message += "\n  " + w.owner + ", " + w.equation + ": " + std::to_string(w.residual);
+    return e;
+  }
+
+  const Model& model_;
+  State& state_;
+  const State start_;
+  int n_;
+  int size_ = 0;
+  std::vector<ElementRef> elements_;
+  std::vector<int> rows_, columns_;            ///< local index -> model row, column
+  std::vector<int> to_local_, row_of_;         ///< model column, row (rate level: + n) -> local index
+  std::vector<double> r_, r_rate_;             ///< by model row (n)
+};
+
+}  // namespace
+
+Result<AssemblyReport> assemble_initially(const Model& model, State& state) {
+  if (model.control.skip_assembly) return AssemblyReport{};
+  const State input = state;
+  Assembly assembly(model, state);
+  if (!assembly.needed()) return AssemblyReport{};
+  auto report = assembly.run();
+  if (!report || !report->moved) {
+    state = input;  // untouched to the last bit
+    return report;
+  }
+  for (NodeRotation& q : state.rotation) {
+    q.R_ref = q.R1 = q.R2 = q.R;
+    q.w_ref = q.w1 = q.w2 = q.w;
+  }
+  for (const StructuralNode& node : model.structural)
+    if (node.has_rotation())
+      for (int i = 0; i < 3; ++i) state.y[node.first + 3 + i] = 0;
+  const EvalContext context = model.context(state, Phase::assembly);
+  for (const ElementRef& e : model.elements) e.set->after_assembly(context, state, e.index);
+  return report;
+}
+
+}  // namespace mbcosim

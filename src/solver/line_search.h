@@ -1,0 +1,14 @@
+/// Backtracking along the Newton direction. Dennis and Schnabel, "Numerical Methods for Unconstrained Optimization and
+/// Nonlinear Equations", algorithm A6.3.1; parameters as in MBDyn's input manual, "line search".
+#pragma once
+
+#include "model/model.h"
+#include "solver/workspace.h"
+
+namespace mbcosim {
+
+/// Moves `state` along workspace.delta (scaled in place to the accepted step) so that ½ rᵀr decreases.
+void search_along(const Model& model, Phase phase, double c, double c_algebraic, const LineSearchSettings& settings, State& state,
+                  Workspace& workspace);
+
+}  // namespace mbcosim

@@ -1,0 +1,77 @@
+#include "solver/linear_solver.h"
+
+#include <klu.h>
+
+namespace mbcosim {
+
+struct LinearSolver::Klu {
+  klu_common common;
+  klu_symbolic* symbolic = nullptr;
+  klu_numeric* kept = nullptr;   ///< with the kept pivots
+  klu_numeric* fresh = nullptr;  ///< of the last matrix, when the kept pivots were poor
+  klu_numeric* current = nullptr;
+
+  Klu() {
+    klu_defaults(&common);
+    common.tol = 0.1;  // threshold pivoting: prefer the diagonal unless it is ten times smaller
+    common.halt_if_singular = 1;
+  }
+  ~Klu() {
+    klu_free_numeric(&kept, &common);
+    klu_free_numeric(&fresh, &common);
+    klu_free_symbolic(&symbolic, &common);
+  }
+};
+
+namespace {
+
+constexpr double kPoorGrowth = 1e-9;  ///< reciprocal pivot growth below which the kept pivots are given up
+
+}  // namespace
+
+LinearSolver::LinearSolver(int n, const std::vector<int>& column_start, const std::vector<int>& row_index)
+    : klu_(std::make_unique<Klu>()), n_(n), column_start_(column_start), row_index_(row_index) {
+  if (n > 0) klu_->symbolic = klu_analyze(n, column_start_.data(), row_index_.data(), &klu_->common);
+}
+
+LinearSolver::~LinearSolver() = default;
+
+LinearSolver::Outcome LinearSolver::analyze(double* values) {
+  if (n_ == 0) return Outcome::ok;
+  singular_column_ = -1;
+  if (!klu_->symbolic) return klu_->common.status == KLU_SINGULAR ? Outcome::singular : Outcome::failed;
+  klu_free_numeric(&klu_->kept, &klu_->common);
+  klu_->kept = klu_factor(column_start_.data(), row_index_.data(), values, klu_->symbolic, &klu_->common);
+  klu_->current = klu_->kept;
+  if (klu_->kept) return Outcome::ok;
+  if (klu_->common.status != KLU_SINGULAR) return Outcome::failed;
+  singular_column_ = klu_->common.singular_col < n_ ? klu_->common.singular_col : -1;
+  return Outcome::singular;
+}
+
+LinearSolver::Outcome LinearSolver::factor(double* values) {
+  if (n_ == 0) return Outcome::ok;
+  if (!klu_->kept) return analyze(values);
+  klu_common* common = &klu_->common;
+  if (klu_refactor(column_start_.data(), row_index_.data(), values, klu_->symbolic, klu_->kept, common) &&
+      common->status == KLU_OK &&
+      klu_rgrowth(column_start_.data(), row_index_.data(), values, klu_->symbolic, klu_->kept, common) &&
+      common->rgrowth > kPoorGrowth) {
+    klu_->current = klu_->kept;
+    return Outcome::ok;
+  }
+  singular_column_ = -1;
+  klu_free_numeric(&klu_->fresh, common);
+  klu_->fresh = klu_factor(column_start_.data(), row_index_.data(), values, klu_->symbolic, common);
+  klu_->current = klu_->fresh;
+  if (klu_->fresh) return Outcome::ok;
+  if (common->status != KLU_SINGULAR) return Outcome::failed;
+  singular_column_ = common->singular_col < n_ ? common->singular_col : -1;
+  return Outcome::singular;
+}
+
+void LinearSolver::solve(double* rhs) {
+  if (n_ > 0) klu_solve(klu_->symbolic, klu_->current, n_, 1, rhs, &klu_->common);
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,53 @@
+/// Newton iteration on one instant. Spec 02 section 4.
+#pragma once
+
+#include <vector>
+
+#include "model/model.h"
+#include "solver/workspace.h"
+
+namespace mbcosim {
+
+/// What decides when an iteration has converged and when it gives up.
+struct NewtonSettings {
+  double tolerance = 1e-6, solution_tolerance = 0;
+  ResidualTest residual_test = ResidualTest::norm, solution_test = ResidualTest::none;
+  bool scale = false, modify_residual_test = false;
+  int max_iterations = 1;
+  bool at_most = false;
+  int jacobian_every = 1;  ///< > 1: modified Newton
+  const LineSearchSettings* line_search = nullptr;
+  double max_residual = 0, max_residual_differential = 0;  ///< 0: none
+  double constraint_factor = 1;  ///< `enforce constraint equations: constraint violations`
+};
+
+enum class NewtonOutcome { converged, not_converged, singular, cancelled };
+
+struct NewtonReport {
+  NewtonOutcome outcome = NewtonOutcome::converged;
+  int iterations = 0;  ///< linear solves
+  double residual_error = 0;
+  double solution_error = 0;
+  bool by_solution = false;  ///< accepted by the solution test
+  int singular_column = -1;
+};
+
+/// What the phase that iterates adds.
+class NewtonHooks {
+ public:
+  virtual ~NewtonHooks() = default;
+  /// After each correction was added to the state (the derivatives phase puts nodes back).
+  virtual void after_correction(State&) const {}
+  /// Asked before each correction; true stops with `cancelled`.
+  virtual bool cancelled() const { return false; }
+};
+
+/// Iterates from the state as it stands with the coefficients c, c_a. The state is left at the last iterate. Throws
+/// EvaluationError when a drive or law cannot be evaluated.
+NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic, const NewtonSettings& settings,
+                          const NewtonHooks& hooks, State& state, Workspace& workspace);
+
+/// The rows with the largest residuals, by owner and meaning.
+std::vector<WorstEquation> worst_equations(const Model& model, const std::vector<double>& residual, int count = 5);
+
+}  // namespace mbcosim

@@ -1,0 +1,367 @@
+#include "solver/stepper.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "solver/initial_assembly.h"
+#include "solver/system.h"
+
+namespace mbcosim {
+
+namespace {
+
+Vec3 at(const std::vector<double>& y, int i) { return Vec3(y[i], y[i + 1], y[i + 2]); }
+void put(std::vector<double>& y, int i, const Vec3& v) {
+  for (int k = 0; k < 3; ++k) y[i + k] = v(k);
+}
+
+NewtonSettings regular_settings(const InitialValueSettings& s) {
+  NewtonSettings n;
+  n.tolerance = s.tolerance;
+  n.solution_tolerance = s.solution_tolerance;
+  n.residual_test = s.residual_test;
+  n.solution_test = s.solution_test;
+  n.scale = s.scale_residual;
+  n.modify_residual_test = s.modify_residual_test;
+  n.max_iterations = s.max_iterations;
+  n.at_most = s.at_most;
+  n.jacobian_every = s.modified_newton ? std::max(1, s.jacobian_every) : 1;
+  n.line_search = s.line_search ? &*s.line_search : nullptr;
+  n.max_residual = s.max_residual;
+  n.max_residual_differential = s.max_residual_differential;
+  return n;
+}
+
+/// The phases before the first step: residual test of the deck's kind, their own tolerance and limit.
+NewtonSettings start_settings(const InitialValueSettings& s, double tolerance, int max_iterations) {
+  NewtonSettings n = regular_settings(s);
+  n.tolerance = tolerance;
+  n.solution_tolerance = 0;
+  n.solution_test = ResidualTest::none;
+  if (n.residual_test == ResidualTest::none) n.residual_test = ResidualTest::norm;
+  n.max_iterations = max_iterations;
+  n.at_most = false;
+  n.max_residual = n.max_residual_differential = 0;
+  return n;
+}
+
+double drive_or(const DrivePtr& drive, const EvalContext& context, double otherwise) {
+  return drive ? drive->value(context) : otherwise;
+}
+
+}  // namespace
+
+/// Regular steps only ask whether to go on.
+class Stepper::StepHooks : public NewtonHooks {
+ public:
+  explicit StepHooks(const std::function<bool()>& cancelled) : cancelled_(cancelled) {}
+  bool cancelled() const override { return cancelled_ && cancelled_(); }
+
+ private:
+  const std::function<bool()>& cancelled_;
+};
+
+/// The derivatives phase holds the kinematics: after each correction positions, orientations and velocities of nodes are
+/// put back to the given values; momenta, multipliers and the rest keep their corrections.
+class Stepper::DerivativesHooks : public NewtonHooks {
+ public:
+  DerivativesHooks(const Model& model, const State& start, const std::function<bool()>& cancelled)
+      : model_(model), start_(start), cancelled_(cancelled) {}
+  void after_correction(State& state) const override {
+    for (const StructuralNode& n : model_.structural)
+      for (int i = 0; i < n.position_unknowns(); ++i) {
+        state.y[n.first + i] = start_.y[n.first + i];
+        state.yp[n.first + i] = start_.yp[n.first + i];
+      }
+    state.rotation = start_.rotation;
+  }
+  bool cancelled() const override { return cancelled_ && cancelled_(); }
+
+ private:
+  const Model& model_;
+  const State& start_;
+  const std::function<bool()>& cancelled_;
+};
+
+Stepper::Stepper(const Model& model)
+    : model_(model), workspace_(model), regular_(regular_settings(model.initial_value)),
+      derivatives_(start_settings(model.initial_value, model.initial_value.derivatives_tolerance,
+                                  model.initial_value.derivatives_max_iterations)),
+      dummy_(start_settings(model.initial_value, model.initial_value.dummy_tolerance, model.initial_value.dummy_max_iterations)),
+      derivatives_coefficient_(model.initial_value.derivatives_coefficient) {}
+
+Status Stepper::assemble(State& state) {
+  state.control.assign(control::kCount, 0.0);
+  state.h = state.h_previous = model_.initial_value.time_step;
+  for (const auto& listener : model_.step_listeners) listener->advance(model_.context(state, Phase::assembly), state, true);
+  update_activity(model_.context(state, Phase::assembly), state, false);
+  auto report = assemble_initially(model_, state);
+  if (!report) return report.error();
+  const EvalContext context = model_.context(state, Phase::derivatives);
+  for (const ElementRef& e : model_.elements) e.set->add_momentum(context, e.index, state);
+  for (const StructuralNode& n : model_.structural)
+    if (n.has_rotation()) put(state.yp, n.first + 3, Vec3::Zero());  // ġ relative to w_ref = w
+  return ok();
+}
+
+PhaseReport Stepper::solve_derivatives(State& state) {
+  const State start = state;
+  const DerivativesHooks hooks(model_, start, cancelled_);
+  const InitialValueSettings& s = model_.initial_value;
+  PhaseReport report;
+  const auto attempt_with = [&](double coefficient, double tolerance) {
+    const double c = coefficient * s.time_step;
+    NewtonSettings settings = derivatives_;
+    settings.tolerance = tolerance;
+    state = start;
+    const EvalContext context = model_.context(state, Phase::derivatives, c, c);
+    compute_jacobian(context, workspace_);
+    workspace_.solver.analyze(workspace_.values.data());
+    report.newton = solve_newton(model_, Phase::derivatives, c, c, settings, hooks, state, workspace_);
+    if (report.newton.outcome == NewtonOutcome::converged) after_convergence(state, Phase::derivatives, c, c);
+    return report.newton.outcome == NewtonOutcome::converged;
+  };
+  bool done = attempt_with(derivatives_coefficient_, derivatives_.tolerance);
+  if (!done && s.derivatives_auto && report.newton.outcome != NewtonOutcome::cancelled) {
+    double best = derivatives_coefficient_, best_error = report.newton.residual_error;
+    for (int direction = 0; direction < 2 && !done; ++direction) {
+      double trial = derivatives_coefficient_;
+      for (int k = 0; k < s.derivatives_auto_iterations && !done; ++k) {
+        trial *= direction == 0 ? s.derivatives_auto_factor : 1 / s.derivatives_auto_factor;
+        done = attempt_with(trial, derivatives_.tolerance);
+        if (!done && report.newton.residual_error < best_error) {
+          best = trial;
+          best_error = report.newton.residual_error;
+        }
+      }
+    }
+    if (!done) done = attempt_with(best, 1.01 * best_error);
+  }
+  if (!done) {
+    report.error = failure(report.newton, state, "derivatives phase");
+    if (report.newton.outcome == NewtonOutcome::not_converged)
+      report.error->message += "\n  hint: change `derivatives coefficient`, `derivatives tolerance` or `derivatives max iterations`";
+  }
+  return report;
+}
+
+PhaseReport Stepper::run_dummy_steps(State& state) {
+  PhaseReport report;
+  const InitialValueSettings& s = model_.initial_value;
+  MethodSettings method;
+  if (s.dummy_method) method = *s.dummy_method;
+  for (int k = 0; k < s.dummy_steps; ++k) {
+    report = attempt(state, s.dummy_ratio * s.time_step, method, k == 0, dummy_);
+    if (report.error) return report;
+  }
+  state.h = s.time_step;
+  state.h_previous = s.time_step;
+  return report;
+}
+
+StepFormula Stepper::formula(State& state, double h, const MethodSettings& method, bool first) const {
+  if (first) return step_formula(Method::crank_nicolson, h, h, 0, 0, false);
+  const EvalContext context = model_.context(state, Phase::step);
+  const double rho = drive_or(method.rho, context, 0);
+  const double rho_algebraic = drive_or(method.rho_algebraic ? method.rho_algebraic : method.rho, context, 0);
+  bool odd = false;
+  if (method.method == Method::hope) {
+    odd = state.control[control::kHopeOdd] == 0;
+    state.control[control::kHopeOdd] = odd ? 1 : 0;
+  }
+  return step_formula(method.method, h, state.h_previous, rho, rho_algebraic, odd);
+}
+
+/// Values at the last two accepted steps -> prediction at the new time. Rotation unknowns are first rewritten relative to the
+/// last accepted orientation.
+void Stepper::predict(State& state, const StepFormula& f) const {
+  for (std::size_t k = 0; k < model_.structural.size(); ++k) {
+    const StructuralNode& n = model_.structural[k];
+    if (!n.has_rotation()) continue;
+    NodeRotation& q = state.rotation[k];
+    q.R2 = q.R1;
+    q.w2 = q.w1;
+    q.R1 = q.R;
+    q.w1 = q.w;
+    const Mat3 step = q.R2 * q.R1.transpose();
+    if (is_half_turn(step)) throw EvaluationError(model_.node_text(static_cast<int>(k)) + " turned by half a revolution in one step; use a shorter step");
+    const Vec3 g = cgr_parameters(step);
+    put(state.y1, n.first + 3, Vec3::Zero());
+    put(state.yp1, n.first + 3, q.w1);
+    put(state.y2, n.first + 3, g);
+    put(state.yp2, n.first + 3, cgr_g_inverse(g) * q.w2);
+  }
+  const std::vector<double>&y1 = state.y1, &v1 = state.yp1, &y2 = state.y2, &v2 = state.yp2;
+  for (int i = 0; i < model_.unknowns; ++i) {
+    if (model_.kinds[i] == UnknownKind::differential) {
+      const double v = f.m0 * y1[i] + f.m1 * y2[i] + f.n0 * v1[i] + f.n1 * v2[i];
+      state.yp[i] = v;
+      state.y[i] = f.a1 * y1[i] + f.a2 * y2[i] + f.b0 * v + f.b1 * v1[i] + f.b2 * v2[i];
+    } else {
+      const double y = f.n0 * y1[i] + f.n1 * y2[i] - f.m1 * v1[i];
+      state.y[i] = y;
+      state.yp[i] = f.i0 * y + f.i1 * y1[i] + f.i2 * y2[i] + f.j1 * v1[i];
+    }
+  }
+}
+
+/// The predicted rotation becomes the reference; increments restart from zero.
+void Stepper::finish_prediction(State& state) const {
+  for (std::size_t k = 0; k < model_.structural.size(); ++k) {
+    const StructuralNode& n = model_.structural[k];
+    if (!n.has_rotation()) continue;
+    NodeRotation& q = state.rotation[k];
+    const Vec3 g = at(state.y, n.first + 3), gp = at(state.yp, n.first + 3);
+    q.R_ref = q.R = cgr_rotation(g) * q.R1;
+    q.w_ref = q.w = cgr_g(g) * gp;
+    put(state.y, n.first + 3, Vec3::Zero());
+    put(state.yp, n.first + 3, Vec3::Zero());
+  }
+}
+
+void Stepper::after_convergence(State& state, Phase phase, double c, double ca) const {
+  const EvalContext context = model_.context(state, phase, c, ca);
+  for (const auto& set : model_.sets) set->after_convergence(context, state);
+}
+
+PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& method, bool first, const NewtonSettings& settings) {
+  PhaseReport report;
+  backup_ = state;
+  try {
+    std::swap(state.y2, state.y1);
+    std::swap(state.yp2, state.yp1);
+    state.y1 = state.y;
+    state.yp1 = state.yp;
+    if (state.y2.empty()) {
+      state.y2 = state.y1;
+      state.yp2 = state.yp1;
+    }
+    state.h_previous = first ? h : state.h;
+    state.h = h;
+    state.time += h;
+    ++state.step;
+    const StepFormula f = formula(state, h, method, first);
+    for (const auto& listener : model_.step_listeners)
+      listener->advance(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, false);
+    predict(state, f);
+    finish_prediction(state);
+    update_activity(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, true);
+    const EvalContext context = model_.context(state, Phase::step, f.c(), f.c_algebraic());
+    for (const auto& set : model_.sets) set->after_predict(context, state);
+    report.newton = solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, StepHooks(cancelled_), state, workspace_);
+    if (report.newton.outcome == NewtonOutcome::converged) {
+      after_convergence(state, Phase::step, f.c(), f.c_algebraic());
+      return report;
+    }
+    report.error = failure(report.newton, state, "step");
+  } catch (const EvaluationError& e) {
+    Error error;
+    error.kind = ErrorKind::evaluation;
+    error.reason = "EVALUATION_FAILED";
+    error.message = "t = " + std::to_string(state.time) + ": " + e.what();
+    error.failure.time = state.time;
+    error.failure.step = static_cast<long>(state.step);
+    report.error = std::move(error);
+  }
+  state = backup_;
+  return report;
+}
+
+PhaseReport Stepper::step(State& state, double h) {
+  NewtonSettings settings = regular_;
+  if (model_.initial_value.constraint_violations) {
+    const double scale = model_.initial_value.constraint_scale;
+    settings.constraint_factor = 0.5 * h * (scale > 0 ? scale : 1 / model_.initial_value.time_step);
+  }
+  const bool first = state.control[control::kRegularSteps] == 0;
+  PhaseReport report = attempt(state, h, model_.initial_value.method, first, settings);
+  if (!report.error) {
+    state.control[control::kRegularSteps] += 1;
+    state.control[control::kLastIterations] = report.newton.iterations;
+    state.control[control::kLastChance] = 0;
+  }
+  return report;
+}
+
+double Stepper::next_step_size(State& state) {
+  const InitialValueSettings& s = model_.initial_value;
+  const double h = state.control[control::kRegularSteps] == 0 ? s.time_step : state.h;
+  if (s.strategy == StepStrategy::no_change || state.control[control::kRegularSteps] < 2) return h;
+  const EvalContext context = model_.context(state, Phase::step);
+  const double largest = s.max_time_step ? s.max_time_step->value(context) : HUGE_VAL;
+  const double limit = largest > 0 ? largest : HUGE_VAL;
+  if (s.strategy == StepStrategy::change) return std::max(std::min(s.strategy_change->value(context), limit), s.min_time_step);
+  double& since_reduction = state.control[control::kSinceReduction];
+  double& since_raise = state.control[control::kSinceRaise];
+  since_reduction += 1;
+  since_raise += 1;
+  const double iterations = state.control[control::kLastIterations];
+  if (iterations > s.max_iterations_factor && since_reduction > s.steps_before_reduction) {
+    since_reduction = 0;
+    return std::max(std::min(h * s.reduction, limit), s.min_time_step);
+  }
+  if (iterations <= s.min_iterations && since_reduction > s.steps_before_reduction && since_raise > s.steps_before_raise && h < limit) {
+    since_raise = 0;
+    return std::min(h * s.raise, limit);
+  }
+  return h;
+}
+
+double Stepper::retry_step_size(State& state, double h) {
+  const InitialValueSettings& s = model_.initial_value;
+  if (s.strategy == StepStrategy::change) {
+    const double other = std::max(s.strategy_change->value(model_.context(state, Phase::step)), s.min_time_step);
+    return other < h && other >= s.min_time_step ? other : 0;
+  }
+  if (s.strategy != StepStrategy::factor || h <= s.min_time_step) return 0;
+  if (h * s.reduction > s.min_time_step) {
+    state.control[control::kSinceReduction] = 0;
+    return h * s.reduction;
+  }
+  if (state.control[control::kLastChance] != 0 || s.min_time_step <= 0) return 0;
+  state.control[control::kLastChance] = 1;
+  return s.min_time_step;
+}
+
+Error Stepper::failure(const NewtonReport& report, const State& state, const char* phase) const {
+  Error e;
+  e.failure.time = state.time;
+  e.failure.step = static_cast<long>(state.step);
+  e.failure.iteration = report.iterations;
+  e.failure.residual_history = workspace_.residual_history;
+  char where[96];
+  std::snprintf(where, sizeof where, "%s at t = %.9g (step %lld)", phase, state.time, static_cast<long long>(state.step));
+  switch (report.outcome) {
+    case NewtonOutcome::cancelled:
+      e.kind = ErrorKind::cancelled;
+      e.reason = "CANCELLED";
+      e.message = std::string(where) + ": interrupted between iterations";
+      return e;
+    case NewtonOutcome::singular: {
+      e.kind = ErrorKind::singular;
+      e.reason = "SINGULAR_MATRIX";
+      e.message = std::string(where) + ": the matrix is singular";
+      if (report.singular_column >= 0) {
+        const auto [owner, equation] = model_.row_text(report.singular_column);
+        e.failure.worst.push_back({owner, equation, 0});
+        e.message += "; nothing determines " + owner + ", " + equation;
+      }
+      return e;
+    }
+    default: break;
+  }
+  e.kind = ErrorKind::not_converged;
+  e.reason = "NOT_CONVERGED";
+  e.failure.worst = worst_equations(model_, workspace_.residual);
+  char text[160];
+  std::snprintf(text, sizeof text, ": no convergence in %d iterations, residual %.6g, tolerance %.6g", report.iterations,
+                report.residual_error, model_.initial_value.tolerance);
+  e.message = where + std::string(text);
+  for (const WorstEquation& w : e.failure.worst) {
+    std::snprintf(text, sizeof text, "%.6g", w.residual);
+    e.message += "\n  " + w.owner + ", " + w.equation + ": residual " + text;
+  }
+  return e;
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,66 @@
+/// Time stepping: the phases of a run and one attempt at a step. Spec 02 sections 2 to 6.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "model/model.h"
+#include "solver/integrator.h"
+#include "solver/newton.h"
+#include "solver/workspace.h"
+
+namespace mbcosim {
+
+/// Slots of State::control.
+namespace control {
+enum Slot { kRegularSteps, kHopeOdd, kSinceReduction, kSinceRaise, kLastIterations, kLastChange, kLastChance, kNextStep, kCount };
+}
+
+/// Result of a phase or step that was solved (or not).
+struct PhaseReport {
+  NewtonReport newton;
+  std::optional<Error> error;  ///< set when it failed
+};
+
+class Stepper {
+ public:
+  explicit Stepper(const Model& model);
+
+  /// `cancelled` is asked between iterations; may be empty.
+  void set_cancelled(std::function<bool()> cancelled) { cancelled_ = std::move(cancelled); }
+
+  /// Initial assembly, momenta. The state comes from make_initial_state.
+  Status assemble(State& state);
+  /// Accelerations and multipliers at the initial time.
+  PhaseReport solve_derivatives(State& state);
+  /// `dummy steps`: short steps before the first regular one.
+  PhaseReport run_dummy_steps(State& state);
+
+  /// Length of the next step by the deck's strategy.
+  double next_step_size(State& state);
+  /// Tries one step of length h from the accepted `state`. On failure `state` is as it was.
+  PhaseReport step(State& state, double h);
+  /// A shorter step after a failure, or 0 when the strategy has none.
+  double retry_step_size(State& state, double h);
+
+  Workspace& workspace() { return workspace_; }
+
+ private:
+  class StepHooks;
+  class DerivativesHooks;
+  PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first, const NewtonSettings& settings);
+  StepFormula formula(State& state, double h, const MethodSettings& method, bool first) const;
+  void predict(State& state, const StepFormula& f) const;
+  void finish_prediction(State& state) const;
+  void after_convergence(State& state, Phase phase, double c, double ca) const;
+  Error failure(const NewtonReport& report, const State& state, const char* phase) const;
+
+  const Model& model_;
+  Workspace workspace_;
+  State backup_;
+  std::function<bool()> cancelled_;
+  NewtonSettings regular_, derivatives_, dummy_;
+  double derivatives_coefficient_ = 0;
+};
+
+}  // namespace mbcosim

@@ -1,0 +1,99 @@
+#include "solver/system.h"
+
+#include <algorithm>
+
+namespace mbcosim {
+
+namespace {
+
+void add_external_loads(const EvalContext& context, std::vector<double>& r) {
+  const std::vector<double>& loads = context.state->external_loads;
+  if (loads.empty()) return;
+  for (std::size_t k = 0; k < context.model->structural.size(); ++k) {
+    const StructuralNode& n = context.model->structural[k];
+    for (int i = 0; i < n.position_unknowns(); ++i) r[n.equilibrium + i] += loads[6 * k + i];
+  }
+}
+
+}  // namespace
+
+void compute_residual(const EvalContext& context, std::vector<double>& r) {
+  std::fill(r.begin(), r.end(), 0.0);
+  context.model->node_equations.residual(context, r.data());
+  for (const auto& set : context.model->sets) set->residual(context, r.data());
+  add_external_loads(context, r);
+}
+
+NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c) {
+  if (g.isZero(0) && gp.isZero(0)) return {c * Mat3::Identity(), Mat3::Identity() - c * cross<double>(w_ref)};
+  using D = Dual<3>;
+  Vec<D> gd, gpd;
+  for (int i = 0; i < 3; ++i) {
+    gd(i) = D::variable(g(i), i, c);
+    gpd(i) = D::variable(gp(i), i, 1);
+  }
+  const Vec<D> w = cgr_g(gd) * gpd + cgr_rotation(gd) * w_ref.cast<D>();
+  NodeSeeds s;
+  s.A = c * cgr_g(g);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) s.B(i, j) = w(i).d[j];
+  return s;
+}
+
+void compute_jacobian(const EvalContext& context, Workspace& workspace) {
+  const Model& model = *context.model;
+  const State& state = *context.state;
+  for (std::size_t k = 0; k < model.structural.size(); ++k) {
+    const StructuralNode& n = model.structural[k];
+    if (!n.has_rotation()) {
+      workspace.seeds[k] = {Mat3::Zero(), Mat3::Zero()};
+      continue;
+    }
+    const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
+    workspace.seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]), state.rotation[k].w_ref, context.c);
+  }
+  std::fill(workspace.values.begin(), workspace.values.end(), 0.0);
+  model.node_equations.jacobian(context, workspace.values.data());
+  for (const auto& set : model.sets) set->jacobian(context, workspace.seeds.data(), workspace.values.data());
+}
+
+void update_rotations(const Model& model, State& state) {
+  for (std::size_t k = 0; k < model.structural.size(); ++k) {
+    const StructuralNode& n = model.structural[k];
+    if (!n.has_rotation()) continue;
+    NodeRotation& q = state.rotation[k];
+    const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
+    const Vec3 g(y[0], y[1], y[2]), gp(yp[0], yp[1], yp[2]);
+    const Mat3 r = cgr_rotation(g);
+    q.R = r * q.R_ref;
+    q.w = cgr_g(g) * gp + r * q.w_ref;
+  }
+}
+
+void apply_correction(const Model& model, const std::vector<double>& delta, double c, double c_algebraic, State& state) {
+  for (int i = 0; i < model.unknowns; ++i) {
+    const double d = delta[i];
+    if (model.kinds[i] == UnknownKind::differential) {
+      state.yp[i] += d;
+      state.y[i] += c * d;
+    } else {
+      state.y[i] += d;
+      state.yp[i] += c_algebraic * d;
+    }
+  }
+  update_rotations(model, state);
+}
+
+void update_activity(const EvalContext& context, State& state, bool restart) {
+  if (!context.model->has_driven) return;
+  for (const ElementRef& e : context.model->elements) {
+    const ElementInfo& info = e.set->info(e.index);
+    if (!info.driven) continue;
+    const bool active = info.driven->value(context) != 0;
+    double& flag = state.memory[info.active_memory];
+    if (restart && active && flag == 0) e.set->start(context, state, e.index);
+    flag = active ? 1 : 0;
+  }
+}
+
+}  // namespace mbcosim

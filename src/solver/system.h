@@ -1,0 +1,27 @@
+/// The assembled system F(y, ẏ, t) = 0: residual, Jacobian, and the update of states by a Newton correction.
+#pragma once
+
+#include "model/model.h"
+#include "solver/workspace.h"
+
+namespace mbcosim {
+
+/// r = −F at the state in `context` (n).
+void compute_residual(const EvalContext& context, std::vector<double>& r);
+
+/// J = −∂r/∂δ into workspace.values; also computes the node seeds.
+void compute_jacobian(const EvalContext& context, Workspace& workspace);
+
+/// How node rotations depend on the Newton increments: A = c G(g), B = ∂w/∂δ. Spec 02 section 6.2.
+NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c);
+
+/// Refreshes R and w of every node from g, ġ and the references.
+void update_rotations(const Model& model, State& state);
+
+/// Adds δ: differential ẏ += δ, y += c δ; algebraic y += δ, ẏ += c_a δ; then the rotations.
+void apply_correction(const Model& model, const std::vector<double>& delta, double c, double c_algebraic, State& state);
+
+/// Evaluates the drives of `driven` elements; with `restart`, elements that become active get their start values.
+void update_activity(const EvalContext& context, State& state, bool restart);
+
+}  // namespace mbcosim
