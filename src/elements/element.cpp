@@ -39,7 +39,7 @@ void gather(const EvalContext& context, const Connection& c, const ElementInfo& 
   for (int i = 0; i < c.scalar_count; ++i) {
     const ScalarNode& node = model.scalars[c.scalar[i]];
     if (node.kind == ScalarKind::parameter) {
-      u.scalar_values[i] = state.memory[node.memory];
+      u.scalar_values[i] = node.binding ? node.binding->value(context, context.time) : state.memory[node.memory];
       u.scalar_rates[i] = 0;
     } else if (input) {
       u.scalar_values[i] = node.value;

@@ -122,7 +122,8 @@ EvalContext Model::context(const State& state, Phase phase, double c, double c_a
 double Model::dof_value(const EvalContext& context, const NodeDof& dof) const {
   if (!dof.structural) {
     const ScalarNode& n = scalars[dof.node];
-    if (n.kind == ScalarKind::parameter) return context.state->memory[n.memory];
+    if (n.kind == ScalarKind::parameter)
+      return n.binding ? n.binding->value(context, context.time) : context.state->memory[n.memory];
     if (context.phase == Phase::input) return dof.order == 0 ? n.value : n.rate;
     return dof.order == 0 ? context.state->y[n.unknown] : context.state->yp[n.unknown];
   }

@@ -78,13 +78,6 @@ class Model {
   /// (name, printed value) of the deck's variables, sorted; for .log.
   std::vector<std::pair<std::string, std::string>> symbols;
 
-  /// A value copied each step into a parameter node (`bind`), or any other work on the state after it was updated.
-  struct Binding {
-    int memory = -1;  ///< parameter node's value
-    DrivePtr value;
-  };
-  std::vector<Binding> bindings;
-
   // --- numbering, set by ModelBuilder::finish
   bool has_driven = false;  ///< is any element `driven`?
   int unknowns = 0;                     ///< n

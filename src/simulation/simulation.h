@@ -16,6 +16,8 @@
 #include "model/limits.h"
 #include "model/model.h"
 #include "model/state.h"
+#include "simulation/variable.h"
+#include "solver/cancel.h"
 
 namespace mbcosim {
 
@@ -30,20 +32,6 @@ struct LoadReport {
 /// Reads a deck. Never throws; `report.model` is null when any diagnostic is an error. A deck without blocks gives an
 /// empty model.
 LoadReport load_deck(const FileSource& files, const std::string& main_file, const Limits& limits = {});
-
-enum class Causality { input, output, parameter, state };
-
-/// One readable value of the model. Handles are indices into Simulation::variables().
-struct Variable {
-  std::string name;    ///< "node.structural.3.X", "joint.7.F", "abstract.11.x"
-  int size = 1;        ///< number of doubles
-  std::vector<int> shape;  ///< {} scalar, {3}, {3,3}
-  std::string unit;    ///< SI: "m", "rad", "N"; empty: no unit
-  std::string frame;   ///< "global", "node", or empty
-  Causality causality = Causality::output;
-  std::string description;
-  std::string owner;   ///< "structural node 3 (tip)"
-};
 
 enum class StepOutcome { accepted, finished, not_converged, interrupted, peer_lost, limit };
 
@@ -60,26 +48,6 @@ struct StepReport {
   std::int64_t total_iterations = 0;
   double solver_seconds = 0;   ///< wall time inside the solver
   std::optional<Error> error;  ///< set unless accepted or finished
-};
-
-/// Tells a running step to stop between Newton iterations.
-class CancelToken {
- public:
-  void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
-  void set_deadline(std::chrono::steady_clock::time_point t) { deadline_ = t; }
-  bool cancelled() const {
-    return cancelled_.load(std::memory_order_relaxed) || (deadline_ && std::chrono::steady_clock::now() > *deadline_);
-  }
-
- private:
-  std::atomic<bool> cancelled_{false};
-  std::optional<std::chrono::steady_clock::time_point> deadline_;
-};
-
-/// External loads on one structural node, applied during the next steps: force at the node's origin and moment about it,
-/// global components [N, N·m].
-struct NodeLoad {
-  Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
 };
 
 /// Writes results while the simulation runs. Implementations: output/text_writer.h, output/netcdf_writer.h.

@@ -1,1 +1,1 @@
-set(SOURCES)
+set(SOURCES simulation.cpp state_bytes.cpp variables.cpp)

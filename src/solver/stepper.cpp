@@ -54,19 +54,18 @@ double drive_or(const DrivePtr& drive, const EvalContext& context, double otherw
 /// Regular steps only ask whether to go on.
 class Stepper::StepHooks : public NewtonHooks {
  public:
-  explicit StepHooks(const std::function<bool()>& cancelled) : cancelled_(cancelled) {}
-  bool cancelled() const override { return cancelled_ && cancelled_(); }
+  explicit StepHooks(const CancelToken* cancel) : cancel_(cancel) {}
+  bool cancelled() const override { return cancel_ && cancel_->cancelled(); }
 
  private:
-  const std::function<bool()>& cancelled_;
+  const CancelToken* cancel_;
 };
 
 /// The derivatives phase holds the kinematics: after each correction positions, orientations and velocities of nodes are
 /// put back to the given values; momenta, multipliers and the rest keep their corrections.
 class Stepper::DerivativesHooks : public NewtonHooks {
  public:
-  DerivativesHooks(const Model& model, const State& start, const std::function<bool()>& cancelled)
-      : model_(model), start_(start), cancelled_(cancelled) {}
+  DerivativesHooks(const Model& model, const State& start, const CancelToken* cancel) : model_(model), start_(start), cancel_(cancel) {}
   void after_correction(State& state) const override {
     for (const StructuralNode& n : model_.structural)
       for (int i = 0; i < n.position_unknowns(); ++i) {
@@ -75,12 +74,12 @@ class Stepper::DerivativesHooks : public NewtonHooks {
       }
     state.rotation = start_.rotation;
   }
-  bool cancelled() const override { return cancelled_ && cancelled_(); }
+  bool cancelled() const override { return cancel_ && cancel_->cancelled(); }
 
  private:
   const Model& model_;
   const State& start_;
-  const std::function<bool()>& cancelled_;
+  const CancelToken* cancel_;
 };
 
 Stepper::Stepper(const Model& model)
@@ -106,7 +105,7 @@ Status Stepper::assemble(State& state) {
 
 PhaseReport Stepper::solve_derivatives(State& state) {
   const State start = state;
-  const DerivativesHooks hooks(model_, start, cancelled_);
+  const DerivativesHooks hooks(model_, start, cancel_);
   const InitialValueSettings& s = model_.initial_value;
   PhaseReport report;
   const auto attempt_with = [&](double coefficient, double tolerance) {
@@ -141,8 +140,16 @@ PhaseReport Stepper::solve_derivatives(State& state) {
     report.error = failure(report.newton, state, "derivatives phase");
     if (report.newton.outcome == NewtonOutcome::not_converged)
       report.error->message += "\n  hint: change `derivatives coefficient`, `derivatives tolerance` or `derivatives max iterations`";
+    return report;
   }
+  choose_pivots(state);
   return report;
+}
+
+void Stepper::choose_pivots(const State& state) {
+  const double c = 0.5 * model_.initial_value.time_step;
+  compute_jacobian(model_.context(state, Phase::step, c, c), workspace_);
+  workspace_.solver.analyze(workspace_.values.data());
 }
 
 PhaseReport Stepper::run_dummy_steps(State& state) {
@@ -248,7 +255,7 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     update_activity(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, true);
     const EvalContext context = model_.context(state, Phase::step, f.c(), f.c_algebraic());
     for (const auto& set : model_.sets) set->after_predict(context, state);
-    report.newton = solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, StepHooks(cancelled_), state, workspace_);
+    report.newton = solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, StepHooks(cancel_), state, workspace_);
     if (report.newton.outcome == NewtonOutcome::converged) {
       after_convergence(state, Phase::step, f.c(), f.c_algebraic());
       return report;

@@ -1,12 +1,12 @@
 /// Time stepping: the phases of a run and one attempt at a step. Spec 02 sections 2 to 6.
 #pragma once
 
-#include <functional>
 #include <optional>
 
 #include "model/model.h"
 #include "solver/integrator.h"
 #include "solver/newton.h"
+#include "solver/cancel.h"
 #include "solver/workspace.h"
 
 namespace mbcosim {
@@ -26,8 +26,8 @@ class Stepper {
  public:
   explicit Stepper(const Model& model);
 
-  /// `cancelled` is asked between iterations; may be empty.
-  void set_cancelled(std::function<bool()> cancelled) { cancelled_ = std::move(cancelled); }
+  /// `cancel` is asked between iterations; may be null.
+  void set_cancelled(const CancelToken* cancel) { cancel_ = cancel; }
 
   /// Initial assembly, momenta. The state comes from make_initial_state.
   Status assemble(State& state);
@@ -46,6 +46,8 @@ class Stepper {
   Workspace& workspace() { return workspace_; }
 
  private:
+  /// Pivots for all regular steps, from the matrix at the initial state: the same in every simulation of a model.
+  void choose_pivots(const State& state);
   class StepHooks;
   class DerivativesHooks;
   PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first, const NewtonSettings& settings);
@@ -58,7 +60,7 @@ class Stepper {
   const Model& model_;
   Workspace workspace_;
   State backup_;
-  std::function<bool()> cancelled_;
+  const CancelToken* cancel_ = nullptr;
   NewtonSettings regular_, derivatives_, dummy_;
   double derivatives_coefficient_ = 0;
 };

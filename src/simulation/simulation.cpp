@@ -1,0 +1,239 @@
+#include "simulation/simulation.h"
+
+#include <cmath>
+#include <mutex>
+
+#include "output/result_writer.h"
+#include "simulation/state_bytes.h"
+#include "simulation/variables.h"
+#include "solver/stepper.h"
+
+namespace mbcosim {
+
+namespace {
+
+Error make_error(ErrorKind kind, std::string reason, std::string message) {
+  Error e;
+  e.kind = kind;
+  e.reason = std::move(reason);
+  e.message = std::move(message);
+  return e;
+}
+
+bool same_layout(const State& a, const State& b) {
+  return a.y.size() == b.y.size() && a.rotation.size() == b.rotation.size() && a.memory.size() == b.memory.size() &&
+         a.variables.size() == b.variables.size() && a.control.size() == b.control.size();
+}
+
+}  // namespace
+
+struct Simulation::Impl {
+  explicit Impl(ModelPtr m) : model(std::move(m)), stepper(*model) {}
+
+  ModelPtr model;
+  State state;
+  Stepper stepper;
+  std::shared_ptr<ResultWriter> writer;
+  mutable std::once_flag variables_once;
+  mutable std::unique_ptr<Variables> variables;
+
+  const Variables& all_variables() const {
+    std::call_once(variables_once, [this] { variables = std::make_unique<Variables>(*model); });
+    return *variables;
+  }
+
+  /// After a step: positions are read with the step's context.
+  EvalContext context() const { return model->context(state, state.step == 0 ? Phase::derivatives : Phase::step); }
+
+  bool meter() const {
+    const ControlSettings& c = model->control;
+    if (c.output_meter) return c.output_meter->value(context()) != 0;
+    return state.step % c.output_frequency == 0;
+  }
+
+  bool record() {
+    if (!writer || !meter()) return false;
+    writer->record(context());
+    return true;
+  }
+
+  Status start();
+  StepReport step(const CancelToken* cancel);
+};
+
+/// Phases before the first step: assembly, derivatives, dummy steps, record of step 0.
+Status Simulation::Impl::start() {
+  const InitialValueSettings& s = model->initial_value;
+  using AbortAfter = InitialValueSettings::AbortAfter;
+  state = make_initial_state(*model);
+  if (writer) writer->begin(*model);
+  if (s.abort_after == AbortAfter::input) return ok();
+  if (auto status = stepper.assemble(state); !status) return status;
+  if (s.abort_after == AbortAfter::assembly || s.final_time < s.initial_time) {
+    record();
+    return ok();
+  }
+  PhaseReport report = stepper.solve_derivatives(state);
+  if (report.error) {
+    record();
+    return *report.error;
+  }
+  if (writer) writer->derivatives(state.time, report.newton.iterations, report.newton.residual_error);
+  NewtonReport last = report.newton;
+  if (s.dummy_steps > 0 && s.abort_after != AbortAfter::derivatives) {
+    report = stepper.run_dummy_steps(state);
+    if (report.error) return *report.error;
+    if (writer) writer->dummy_steps(state.time, report.newton.iterations, report.newton.residual_error);
+    last = report.newton;
+    state.step = 0;
+  }
+  StepLine line;
+  line.time = state.time;
+  line.iterations = last.iterations;
+  line.residual_error = last.residual_error;
+  line.recorded = record();
+  if (writer) writer->step(line);
+  return ok();
+}
+
+StepReport Simulation::Impl::step(const CancelToken* cancel) {
+  StepReport report;
+  const auto begin = std::chrono::steady_clock::now();
+  stepper.set_cancelled(cancel);
+  double h = stepper.next_step_size(state);
+  PhaseReport phase = stepper.step(state, h);
+  while (phase.error && phase.error->kind != ErrorKind::cancelled && phase.error->kind != ErrorKind::evaluation) {
+    h = stepper.retry_step_size(state, h);
+    if (h <= 0) break;
+    phase = stepper.step(state, h);
+  }
+  report.solver_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.step = state.step;
+  report.time = state.time;
+  report.step_size = state.h;
+  report.iterations = phase.newton.iterations;
+  report.total_iterations = phase.newton.iterations;
+  report.residual_error = phase.newton.residual_error;
+  report.solution_error = phase.newton.solution_error;
+  if (phase.error) {
+    report.outcome = phase.error->kind == ErrorKind::cancelled ? StepOutcome::interrupted : StepOutcome::not_converged;
+    report.error = std::move(phase.error);
+    return report;
+  }
+  report.steps_done = 1;
+  if (writer) {
+    StepLine line{state.step, state.time, state.h, phase.newton.iterations, phase.newton.residual_error, phase.newton.solution_error,
+                  phase.newton.by_solution, false};
+    line.recorded = record();
+    writer->step(line);
+  }
+  if (!(state.time < model->initial_value.final_time)) report.outcome = StepOutcome::finished;
+  return report;
+}
+
+Simulation::Simulation(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Simulation::~Simulation() = default;
+
+Result<std::unique_ptr<Simulation>> Simulation::create(ModelPtr model, const CancelToken* cancel, std::shared_ptr<ResultWriter> writer) {
+  auto impl = std::make_unique<Impl>(std::move(model));
+  impl->writer = std::move(writer);
+  impl->stepper.set_cancelled(cancel);
+  Status status = ok();
+  try {
+    status = impl->start();
+  } catch (const EvaluationError& e) {
+    status = make_error(ErrorKind::evaluation, "EVALUATION_FAILED", std::string("before the first step: ") + e.what());
+  }
+  if (!status) {
+    if (impl->writer) (void)impl->writer->finish();
+    return status.error();
+  }
+  return std::unique_ptr<Simulation>(new Simulation(std::move(impl)));
+}
+
+const Model& Simulation::model() const { return *impl_->model; }
+const State& Simulation::state() const { return impl_->state; }
+std::int64_t Simulation::step_number() const { return impl_->state.step; }
+double Simulation::time() const { return impl_->state.time; }
+
+double Simulation::next_step_size() const {
+  State copy = impl_->state;
+  return impl_->stepper.next_step_size(copy);
+}
+
+bool Simulation::finished() const {
+  const InitialValueSettings& s = impl_->model->initial_value;
+  return s.abort_after != InitialValueSettings::AbortAfter::never || !(impl_->state.time < s.final_time);
+}
+
+StepReport Simulation::step(const CancelToken* cancel) { return step_many(1, cancel); }
+
+StepReport Simulation::step_many(std::int64_t count, const CancelToken* cancel) {
+  StepReport total;
+  total.step = step_number();
+  total.time = time();
+  total.step_size = impl_->state.h;
+  if (finished()) total.outcome = StepOutcome::finished;
+  for (std::int64_t k = 0; k < count && !finished(); ++k) {
+    StepReport one = impl_->step(cancel);
+    one.steps_done += total.steps_done;
+    one.total_iterations += total.total_iterations;
+    one.solver_seconds += total.solver_seconds;
+    total = std::move(one);
+    if (total.error) break;
+  }
+  return total;
+}
+
+StepReport Simulation::run_until(double end, const CancelToken* cancel) {
+  StepReport total;
+  total.step = step_number();
+  total.time = time();
+  total.step_size = impl_->state.h;
+  if (finished()) total.outcome = StepOutcome::finished;
+  while (!finished() && time() + 0.5 * impl_->state.h < end) {
+    StepReport one = impl_->step(cancel);
+    one.steps_done += total.steps_done;
+    one.total_iterations += total.total_iterations;
+    one.solver_seconds += total.solver_seconds;
+    total = std::move(one);
+    if (total.error) break;
+  }
+  return total;
+}
+
+const std::vector<Variable>& Simulation::variables() const { return impl_->all_variables().list(); }
+int Simulation::find_variable(const std::string& name) const { return impl_->all_variables().find(name); }
+void Simulation::get(int handle, std::vector<double>& out) const { impl_->all_variables().get(impl_->context(), handle, out); }
+Status Simulation::set(int handle, std::span<const double> values) {
+  const Variables& all = impl_->all_variables();
+  if (handle < 0 || handle >= static_cast<int>(all.list().size()))
+    return make_error(ErrorKind::argument, "UNKNOWN_HANDLE", "no variable has the handle " + std::to_string(handle));
+  return all.set(*impl_->model, impl_->state, handle, values);
+}
+
+Status Simulation::restore(const State& state) {
+  if (!same_layout(state, impl_->state))
+    return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL", "the state belongs to another model: its layout differs");
+  impl_->state = state;
+  return ok();
+}
+
+std::string Simulation::export_state() const { return state_to_bytes(impl_->state, impl_->model->digest); }
+
+Status Simulation::import_state(std::string_view bytes) {
+  auto state = state_from_bytes(bytes, impl_->model->digest);
+  if (!state) return state.error();
+  return restore(*state);
+}
+
+std::unique_ptr<Simulation> Simulation::fork() const {
+  auto impl = std::make_unique<Impl>(impl_->model);
+  impl->state = impl_->state;
+  // The pivots are chosen on the matrix of the derivatives phase, as in every simulation of this model.
+  State start = make_initial_state(*impl->model);
+  if (impl->stepper.assemble(start)) (void)impl->stepper.solve_derivatives(start);
+  return std::unique_ptr<Simulation>(new Simulation(std::move(impl)));
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,140 @@
+#include "simulation/state_bytes.h"
+
+#include <cstdio>
+#include <cstring>
+
+namespace mbcosim {
+
+namespace {
+
+constexpr char kMagic[8] = {'m', 'b', 'c', 's', 't', 'a', 't', 'e'};
+constexpr std::uint32_t kVersion = 1;
+
+Error bad(ErrorKind kind, std::string reason, std::string message) {
+  Error e;
+  e.kind = kind;
+  e.reason = std::move(reason);
+  e.message = std::move(message);
+  return e;
+}
+
+/// Writes or measures plain values one after another, little-endian as on every machine this runs on.
+class Out {
+ public:
+  template <class T>
+  void value(const T& v) {
+    bytes.append(reinterpret_cast<const char*>(&v), sizeof v);
+  }
+  void array(const std::vector<double>& v) {
+    value(static_cast<std::uint64_t>(v.size()));
+    bytes.append(reinterpret_cast<const char*>(v.data()), v.size() * sizeof(double));
+  }
+  std::string bytes;
+};
+
+class In {
+ public:
+  explicit In(std::string_view b) : bytes_(b) {}
+  template <class T>
+  bool value(T& v) {
+    if (bytes_.size() < sizeof v) return false;
+    std::memcpy(&v, bytes_.data(), sizeof v);
+    bytes_.remove_prefix(sizeof v);
+    return true;
+  }
+  bool array(std::vector<double>& v) {
+    std::uint64_t n = 0;
+    if (!value(n) || n > bytes_.size() / sizeof(double)) return false;
+    v.resize(n);
+    if (n > 0) std::memcpy(v.data(), bytes_.data(), n * sizeof(double));
+    bytes_.remove_prefix(n * sizeof(double));
+    return true;
+  }
+  bool empty() const { return bytes_.empty(); }
+
+ private:
+  std::string_view bytes_;
+};
+
+constexpr std::size_t kRotationDoubles = 4 * 9 + 4 * 3;
+
+template <class Rotation, class Action>
+void each_part(Rotation& q, Action action) {
+  for (auto* m : {&q.R, &q.R_ref, &q.R1, &q.R2}) action(m->data(), 9);
+  for (auto* v : {&q.w, &q.w_ref, &q.w1, &q.w2}) action(v->data(), 3);
+}
+
+std::vector<double> flat_rotations(const State& state) {
+  std::vector<double> r;
+  r.reserve(state.rotation.size() * kRotationDoubles);
+  for (const NodeRotation& q : state.rotation) each_part(q, [&](const double* d, int n) { r.insert(r.end(), d, d + n); });
+  return r;
+}
+
+void unflatten_rotations(const std::vector<double>& r, State& state) {
+  state.rotation.resize(r.size() / kRotationDoubles);
+  const double* p = r.data();
+  for (NodeRotation& q : state.rotation)
+    each_part(q, [&](double* d, int n) {
+      std::memcpy(d, p, n * sizeof(double));
+      p += n;
+    });
+}
+
+template <class StateType, class Visit>
+void each_array(StateType& s, Visit visit) {
+  for (auto* v : {&s.y, &s.yp, &s.y1, &s.yp1, &s.y2, &s.yp2, &s.memory, &s.variables, &s.control, &s.external_loads}) visit(*v);
+}
+
+}  // namespace
+
+std::uint64_t fnv1a(std::string_view bytes, std::uint64_t seed) {
+  std::uint64_t h = seed;
+  for (const char c : bytes) h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return h;
+}
+
+std::string state_to_bytes(const State& state, std::uint64_t model_digest) {
+  Out out;
+  out.bytes.append(kMagic, sizeof kMagic);
+  out.value(kVersion);
+  out.value(model_digest);
+  out.value(state.time);
+  out.value(state.h);
+  out.value(state.h_previous);
+  out.value(state.step);
+  each_array(state, [&](const std::vector<double>& v) { out.array(v); });
+  out.array(flat_rotations(state));
+  out.value(fnv1a(out.bytes));
+  return std::move(out.bytes);
+}
+
+Result<State> state_from_bytes(std::string_view bytes, std::uint64_t model_digest) {
+  const Error damaged = bad(ErrorKind::data_loss, "STATE_DAMAGED", "the state's bytes are damaged or cut short");
+  std::uint64_t checksum = 0, digest = 0;
+  if (bytes.size() < sizeof kMagic + sizeof kVersion + sizeof checksum || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0) return damaged;
+  std::memcpy(&checksum, bytes.data() + bytes.size() - sizeof checksum, sizeof checksum);
+  bytes.remove_suffix(sizeof checksum);
+  if (fnv1a(bytes) != checksum) return damaged;
+  In in(bytes.substr(sizeof kMagic));
+  std::uint32_t version = 0;
+  if (!in.value(version) || !in.value(digest)) return damaged;
+  if (version != kVersion)
+    return bad(ErrorKind::precondition, "STATE_VERSION", "the state has format version " + std::to_string(version) + "; this program reads " + std::to_string(kVersion));
+  if (digest != model_digest) {
+    char text[160];
+    std::snprintf(text, sizeof text, "the state belongs to the model with digest %016llx, this model has %016llx",
+                  static_cast<unsigned long long>(digest), static_cast<unsigned long long>(model_digest));
+    return bad(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL", text);
+  }
+  State state;
+  bool fine = in.value(state.time) && in.value(state.h) && in.value(state.h_previous) && in.value(state.step);
+  each_array(state, [&](std::vector<double>& v) { fine = fine && in.array(v); });
+  std::vector<double> rotations;
+  fine = fine && in.array(rotations) && rotations.size() % kRotationDoubles == 0 && in.empty();
+  if (!fine) return damaged;
+  unflatten_rotations(rotations, state);
+  return state;
+}
+
+}  // namespace mbcosim

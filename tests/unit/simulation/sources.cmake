@@ -1,0 +1,1 @@
+set(SOURCES rigid_body_test.cpp)
