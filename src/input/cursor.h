@@ -18,8 +18,13 @@ struct Statement {
   std::size_t offset = 0;  ///< of text in its file
   std::string word;        ///< normalized card word ("controldata" for `control data`)
   bool has_arguments = false;  ///< a `:` follows the word
+  std::size_t arguments = 0;   ///< offset in text of what follows the `:`
   int trail = -1;          ///< include and loop context, for messages (index in Session)
 };
+
+/// Sets word, has_arguments and arguments from the text, which starts with a letter. Returns npos, or the end of the word when
+/// neither `:` nor the end of the statement follows it.
+std::size_t read_head(Statement* statement);
 
 class Cursor {
  public:
@@ -44,11 +49,17 @@ class Cursor {
   Session& session();
 
  private:
+  void finish_argument(std::size_t begin, std::size_t end);
+  [[noreturn]] void fail_after(std::size_t begin, std::size_t end, std::string_view what);
+  bool plain_number(std::size_t begin, Value* value);
+
   Session& session_;
   Statement statement_;
-  std::size_t position_ = 0;
+  std::size_t position_ = 0;  // of the next argument in statement_.text
   bool done_ = false;
-  SourceSpan last_;
+  std::size_t last_begin_ = 0, last_end_ = 0;
+  std::size_t peeked_ = std::string::npos;  // position of the argument that peeked_word_ belongs to
+  std::string peeked_word_;
 };
 
 }  // namespace mbcosim

@@ -21,6 +21,7 @@
 namespace mbcosim {
 
 class PendingString;
+struct ExpressionScratch;
 
 /// A file of the deck, kept until reading ends: statements are views into its text.
 struct DeckFile {
@@ -79,16 +80,24 @@ class Session {
                          std::string code = "error") const;
   /// Refuses with code `limit-<name>`.
   [[noreturn]] void fail_limit(SourceSpan where, std::string_view name, std::string message) const;
+  /// Refuses a file named in file `from` that could not be read.
+  [[noreturn]] void fail_read(SourceSpan where, const Error& error, int from) const;
   const std::vector<Diagnostic>& diagnostics() const { return diagnostics_; }
   std::vector<Diagnostic> take_diagnostics() { return std::move(diagnostics_); }
   int errors() const { return errors_; }
   bool full() const { return errors_ >= limits.errors || stopped_; }  ///< no use in reading on
   void stop() { stopped_ = true; }  ///< after a limit: nothing more is read
   bool stopped() const { return stopped_; }
+  /// A warning about a piece of the expression that is being evaluated.
+  void warn_in_expression(std::size_t where, std::size_t length, std::string message);
+  void set_expression_place(int file, std::size_t offset);
+  SourceSpan expression_span(std::size_t where, std::size_t length) const;
   /// Errors of the present statement are consequences of an earlier one and are not reported.
   void set_damaged(bool damaged) { damaged_ = damaged; }
 
   int add_trail(Trail t);
+  /// Frees the trail and those after it, unless a run-time string was read since then.
+  void forget_trail(int trail);
   void set_trail(int trail) { trail_ = trail; }
   int trail() const { return trail_; }
   const Trail& trail_at(int index) const { return trails_[index]; }
@@ -118,23 +127,33 @@ class Session {
   std::string printed;  ///< what `remark`, `print symbol table` and `print()` printed
   bool exited = false;  ///< `exit;` or stop(1, 0): the deck ends here with success
 
+  ExpressionScratch& scratch() { return *scratch_; }  ///< buffers for evaluating one expression at a time
+
   std::int32_t random();  ///< next of rand(): 0..2147483647
   void seed(std::uint32_t value);
 
  private:
+  static constexpr int kMostWarnings = 1000;
+
   Result<std::string> read_counted(const std::string& name);
+  Result<std::string> expand_environment(std::string_view name) const;
 
   const FileSource& source_;
   ModelBuilder* builder_;
   mutable std::deque<DeckFile> files_;
+  std::map<std::string, int> file_index_;
   std::int64_t bytes_ = 0;
   std::vector<Diagnostic> diagnostics_;
-  int errors_ = 0;
+  int errors_ = 0, warnings_ = 0;
   bool stopped_ = false, damaged_ = false, model_available_ = false;
+  int expression_file_ = -1;
+  std::size_t expression_offset_ = 0;
   std::deque<Trail> trails_;
   int trail_ = -1;
   std::unique_ptr<EvalContext> empty_context_;
+  std::unique_ptr<ExpressionScratch> scratch_;
   std::vector<std::shared_ptr<PendingString>> pending_;
+  int kept_trails_ = 0;  // trails that pending strings may refer to
   std::uint32_t random_[31] = {};
   int random_position_ = 0;
 };

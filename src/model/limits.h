@@ -12,7 +12,7 @@ struct Limits {
   int include_depth = 100;
   int include_count = 100000;
   std::int64_t statements = 20'000'000;
-  std::int64_t loop_iterations = 1'000'000;  ///< passes of all loops together
+  std::int64_t loop_iterations = 1'000'000;  ///< passes of one loop
   int expression_depth = 200;                ///< nested parentheses and functions of one expression
   int nesting_depth = 100;                   ///< nested `for`, `if` and brackets of one statement
   std::int64_t unknowns = 50'000'000;

@@ -1,0 +1,66 @@
+/// A run-time string between its card and the end of the deck, and during the run.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "input/binder.h"
+#include "input/program.h"
+#include "input/syntax.h"
+#include "model/diagnostic.h"
+
+namespace mbcosim {
+
+class PendingString {
+ public:
+  /// Parses; throws DeckError.
+  PendingString(Session& session, std::string text, SourceSpan where,
+                std::vector<std::string> arguments = {});
+
+  /// Binds names for good; false when something is wrong, which was reported then.
+  bool bind(Session& session);
+  /// The reader is gone.
+  void detach() { session_ = nullptr; }
+  /// Marks the deck's variables that this string assigns with indices from `*count` on.
+  void claim_variables(Session& session, int* count);
+  bool assigns() const { return assigns_; }
+  SourceSpan where() const { return where_; }
+
+  double value(const EvalContext& context, double var) const;
+  /// Runs the string and stores what it assigns as this step's values.
+  void commit(const EvalContext& context, std::vector<double>* variables) const;
+  const Program& program() const { return program_; }
+  /// Value and derivatives with respect to the arguments.
+  double value(const EvalContext& context, const double* arguments) const;
+  double value_and_gradient(const EvalContext& context, const double* arguments,
+                            double* gradient) const;
+  int arguments() const { return static_cast<int>(arguments_.size()); }
+
+ private:
+  template <class T>
+  T evaluate(const EvalContext& context, const T* arguments, double var) const;
+  template <class T>
+  double gradient(const EvalContext& context, const double* arguments, double* gradient) const;
+  template <class T>
+  T result(const Program& program, const Slot<T>& slot) const;
+  void bind_to(Session& session, Program* program) const;
+  void capture(const Session& session);
+  [[noreturn]] void fail(Session& session, const ExpressionError& e) const;
+  [[noreturn]] void fail_run(const ExpressionError& e) const;
+
+  Session* session_;
+  std::string text_;
+  SourceSpan where_;
+  std::string place_;  ///< "a.mbd:3:12", for messages during the run
+  int trail_ = -1;
+  std::vector<std::string> arguments_;
+  Syntax syntax_;
+  CapturedNames captured_;
+  std::map<std::string, double, std::less<>> currents_;
+  Program program_;
+  bool assigns_ = false;
+  std::uint64_t random_key_ = 0;
+};
+
+}  // namespace mbcosim

@@ -1,0 +1,20 @@
+set(SOURCES
+  binder.cpp
+  cursor.cpp
+  evaluate.cpp
+  function_values.cpp
+  functions.cpp
+  lexer.cpp
+  machine.cpp
+  model_functions.cpp
+  nearest.cpp
+  parser.cpp
+  plugin.cpp
+  run_strings.cpp
+  session.cpp
+  sources.cpp
+  splitter.cpp
+  statements.cpp
+  symbols.cpp
+  value.cpp
+)

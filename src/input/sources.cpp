@@ -1,0 +1,82 @@
+#include "input/sources.h"
+
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+
+namespace mbcosim {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+Error io_error(std::string message) {
+  Error e;
+  e.kind = ErrorKind::io;
+  e.message = std::move(message);
+  e.reason = "FILE";
+  return e;
+}
+
+std::string quote(const std::string& name) { return '"' + name + '"'; }
+
+bool leads_out(const fs::path& name) {
+  if (name.is_absolute() || name.has_root_name()) return true;
+  int depth = 0;
+  for (const fs::path& part : name) {
+    if (part == "..")
+      --depth;
+    else if (part != "." && !part.empty())
+      ++depth;
+    if (depth < 0) return true;
+  }
+  return false;
+}
+
+/// Is `path` (canonical) below `folder` (canonical)?
+bool is_below(const fs::path& path, const fs::path& folder) {
+  auto p = path.begin();
+  for (const fs::path& part : folder) {
+    if (part.empty()) continue;
+    if (p == path.end() || *p != part) return false;
+    ++p;
+  }
+  return true;
+}
+
+}  // namespace
+
+FolderSource::FolderSource(std::string folder, bool unrestricted)
+    : folder_(std::move(folder)), unrestricted_(unrestricted) {}
+
+Result<std::string> FolderSource::read(const std::string& name) const {
+  if (name.empty() || name.find('\0') != std::string::npos)
+    return io_error("cannot open " + quote(name));
+  if (!unrestricted_ && leads_out(name))
+    return io_error(quote(name) + " is outside the allowed folder");
+  std::error_code ec;
+  const fs::path folder = fs::canonical(folder_.empty() ? "." : folder_, ec);
+  if (ec) return io_error("cannot open " + quote(name));
+  const fs::path path = fs::canonical(folder / name, ec);
+  if (ec) return io_error("cannot open " + quote(name));
+  if (!unrestricted_ && !is_below(path, folder))
+    return io_error(quote(name) + " is outside the allowed folder");
+  if (!fs::is_regular_file(path, ec)) return io_error(quote(name) + " is not a regular file");
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return io_error("cannot open " + quote(name));
+  std::string text;
+  const auto size = fs::file_size(path, ec);
+  if (!ec) text.resize(size);
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+Result<std::string> BundleSource::read(const std::string& name) const {
+  const auto it = files_.find(name);
+  if (it != files_.end()) return it->second;
+  if (leads_out(name)) return io_error(quote(name) + " is outside the allowed folder");
+  return io_error("cannot open " + quote(name));
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,1 @@
+set(SOURCES calculator_test.cpp)
