@@ -1,0 +1,1 @@
+set(SOURCES register.cpp scalar_functions.cpp)
