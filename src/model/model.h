@@ -54,6 +54,16 @@ struct ReferenceFrame {
   Vec3 v = Vec3::Zero(), w = Vec3::Zero();
 };
 
+/// Values that a coupled peer feeds into the model: a `stream` file driver.
+struct StreamInput {
+  std::string name;
+  int channels = 0;
+  int memory = -1;            ///< offset of the values in State::memory (channels)
+  int every = 1;              ///< steps between two exchanges
+  bool receive_first = true;  ///< exchange at the initial time, too
+  SourceSpan where;
+};
+
 enum class UnknownKind : std::uint8_t { differential, algebraic };
 
 class Model {
@@ -77,6 +87,8 @@ class Model {
   std::vector<std::string> log_lines;     ///< extra lines of .log, e.g. of `inertia`
   /// (name, printed value) of the deck's variables, sorted; for .log.
   std::vector<std::pair<std::string, std::string>> symbols;
+
+  std::vector<StreamInput> stream_inputs;
 
   // --- numbering, set by ModelBuilder::finish
   bool has_driven = false;  ///< is any element `driven`?

@@ -48,6 +48,10 @@ void Registry::function(std::initializer_list<std::string_view> words, FunctionR
 }
 void Registry::fluid(std::initializer_list<std::string_view> words, FluidReader reader) { enter(display, fluids, words, reader); }
 
+void Registry::file_driver(std::initializer_list<std::string_view> words, FileDriverReader reader) {
+  enter(display, file_drivers, words, reader);
+}
+
 void Registry::unsupported(std::string_view context, std::string_view word, std::string_view what) {
   not_supported[std::string(context)][normalized(word)] = std::string(what);
   display[normalized(word)] = std::string(word);

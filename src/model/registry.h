@@ -43,6 +43,7 @@ class Registry {
   void law6(std::initializer_list<std::string_view> words, LawReader<6> reader);
   void function(std::initializer_list<std::string_view> words, FunctionReader reader);
   void fluid(std::initializer_list<std::string_view> words, FluidReader reader);
+  void file_driver(std::initializer_list<std::string_view> words, FileDriverReader reader);
   /// A keyword of the language that this program does not serve; refused by name: "`rotor` (aerodynamic element) ...".
   void unsupported(std::string_view context, std::string_view word, std::string_view what);
 

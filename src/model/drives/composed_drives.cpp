@@ -1,0 +1,115 @@
+#include "model/drives/composed_drives.h"
+
+#include <cmath>
+
+#include "model/model.h"
+
+namespace mbcosim {
+
+double ProductDrive::value(const EvalContext& context, double t) const {
+  return f_->value(context, t) * g_->value(context, t);
+}
+double ProductDrive::value(const EvalContext& context) const {
+  return f_->value(context) * g_->value(context);
+}
+double ProductDrive::derivative(const EvalContext& context, double t) const {
+  return f_->derivative(context, t) * g_->value(context, t) +
+         f_->value(context, t) * g_->derivative(context, t);
+}
+
+double SumDrive::value(const EvalContext& context, double t) const {
+  double sum = 0;
+  for (const DrivePtr& f : parts_) sum += f->value(context, t);
+  return sum;
+}
+double SumDrive::value(const EvalContext& context) const {
+  double sum = 0;
+  for (const DrivePtr& f : parts_) sum += f->value(context);
+  return sum;
+}
+bool SumDrive::has_derivative() const {
+  for (const DrivePtr& f : parts_)
+    if (!f->has_derivative()) return false;
+  return true;
+}
+double SumDrive::derivative(const EvalContext& context, double t) const {
+  double sum = 0;
+  for (const DrivePtr& f : parts_) sum += f->derivative(context, t);
+  return sum;
+}
+
+double ChainDrive::value(const EvalContext& context, double t) const {
+  return f_->value(context, g_->value(context, t));
+}
+double ChainDrive::value(const EvalContext& context) const {
+  return f_->value(context, g_->value(context));
+}
+double ChainDrive::derivative(const EvalContext& context, double t) const {
+  return f_->derivative(context, g_->value(context, t)) * g_->derivative(context, t);
+}
+
+double PeriodicDrive::value(const EvalContext& context, double t) const {
+  return t < t0_ ? 0 : f_->value(context, std::fmod(t - t0_, period_));
+}
+double PeriodicDrive::derivative(const EvalContext& context, double t) const {
+  return t < t0_ ? 0 : f_->derivative(context, std::fmod(t - t0_, period_));
+}
+
+namespace {
+
+/// Postponed drives can refer to each other in a circle; nothing else can.
+class Depth {
+ public:
+  Depth() {
+    if (++depth() > kMost) {
+      --depth();
+      throw EvaluationError("postponed drives refer to each other in a circle");
+    }
+  }
+  ~Depth() { --depth(); }
+  Depth(const Depth&) = delete;
+  Depth& operator=(const Depth&) = delete;
+
+ private:
+  static constexpr int kMost = 100;
+  static int& depth() {
+    thread_local int depth = 0;
+    return depth;
+  }
+};
+
+}  // namespace
+
+const Drive& PostponedDrive::target(const EvalContext& context) const {
+  const auto it = context.model->drive_index.find(label_);
+  if (it == context.model->drive_index.end())
+    throw EvaluationError("postponed drive: there is no drive caller " + std::to_string(label_));
+  return *context.model->drives[it->second].drive;
+}
+double PostponedDrive::value(const EvalContext& context, double t) const {
+  const Depth depth;
+  return target(context).value(context, t);
+}
+double PostponedDrive::value(const EvalContext& context) const {
+  const Depth depth;
+  return target(context).value(context);
+}
+double PostponedDrive::derivative(const EvalContext& context, double t) const {
+  const Depth depth;
+  const Drive& drive = target(context);
+  return drive.has_derivative() ? drive.derivative(context, t) : 0;
+}
+
+double DofDrive::value(const EvalContext& context, double) const {
+  return f_->value(context, context.model->dof_value(context, dof_));
+}
+
+double NodeDrive::value(const EvalContext& context, double) const {
+  return f_->value(context, context.model->structural_datum_value(context, node_, datum_));
+}
+
+double ElementDrive::value(const EvalContext& context, double) const {
+  return f_->value(context, element_.set->private_value(context, element_.index, datum_));
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,202 @@
+#include <charconv>
+
+#include "model/drives/file_driver.h"
+#include "model/drives/readers.h"
+#include "model/model.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// [interpolation, {linear|const},] [pad zeroes, {yes|no}, | bailout, {none|upper|lower|any},]
+TableOptions read_table_options(Card& card) {
+  TableOptions o;
+  if (card.keyword("interpolation"))
+    o.linear = card.required("interpolation", {"linear", "const"}) == 0;
+  if (card.one_of({"pad zeroes", "pad zeros"}) >= 0) {
+    o.pad_zeros = card.yes_no("pad zeroes");
+  } else if (card.keyword("bailout")) {
+    const int side = card.required("bailout", {"none", "upper", "lower", "any"});
+    o.bail_upper = side == 1 || side == 3;
+    o.bail_lower = side == 2 || side == 3;
+  }
+  return o;
+}
+
+/// Reads the samples of a file: `columns` numbers a row.
+SampleText read_samples(Card& card, int columns) {
+  std::string name;
+  const std::string text = card.file_contents("file of samples", &name);
+  SampleText samples = parse_samples(text, columns);
+  if (!samples.error.empty()) card.fail("file driver: \"" + name + "\", " + samples.error);
+  if (samples.rows == 0) card.fail("file driver: \"" + name + "\" has no samples");
+  return samples;
+}
+
+/// `from file` or a number.
+struct HeaderNumber {
+  bool from_file = false;
+  double value = 0;
+};
+HeaderNumber read_header_number(Card& card, const char* word) {
+  if (!card.keyword(word))
+    card.warn_at(card.next(), std::string("`") + word + "` is missing before its value");
+  HeaderNumber n;
+  n.from_file = card.keyword("from file");
+  if (!n.from_file) n.value = card.real(word);
+  return n;
+}
+
+double resolved(Card& card, const HeaderNumber& n, const std::string& text, const char* word) {
+  if (!n.from_file) return n.value;
+  double v = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);
+  if (error != std::errc() || end != text.data() + text.size())
+    card.fail(std::string("the file does not give the ") + word,
+              std::string("its comments need a line `# ") + word + ": <number>`");
+  return v;
+}
+
+FileDriverPtr read_fixed_step(Card& card) {
+  const int rows = card.keyword("count") ? -1 : read_count(card, "number of steps");
+  SampleTable table;
+  table.channels = read_count(card, "number of channels");
+  const HeaderNumber t0 = read_header_number(card, "initial time");
+  const HeaderNumber dt = read_header_number(card, "time step");
+  const TableOptions options = read_table_options(card);
+  SampleText samples = read_samples(card, table.channels);
+  if (rows >= 0) {
+    if (samples.rows < rows)
+      card.fail("the file has " + std::to_string(samples.rows) + " rows, " + std::to_string(rows) +
+                    " were announced",
+                "write `count` to take what there is");
+    samples.values.resize(static_cast<std::size_t>(rows) * table.channels);
+  }
+  table.values = std::move(samples.values);
+  table.t0 = resolved(card, t0, samples.initial_time, "initial time");
+  table.dt = resolved(card, dt, samples.time_step, "time step");
+  if (!(table.dt > 0))
+    card.fail("the time step of the file driver must be positive, got " + std::to_string(table.dt));
+  return std::make_shared<TableDriver>(std::move(table), options);
+}
+
+FileDriverPtr read_variable_step(Card& card) {
+  SampleTable table;
+  table.channels = read_count(card, "number of channels");
+  const TableOptions options = read_table_options(card);
+  const SampleText samples = read_samples(card, table.channels + 1);
+  const int columns = table.channels + 1;
+  for (int row = 0; row < samples.rows; ++row) {
+    const double* v = &samples.values[static_cast<std::size_t>(row) * columns];
+    if (row > 0 && !(v[0] > table.times.back()))
+      card.fail("the times of the file driver must increase; row " + std::to_string(row + 1) +
+                " has " + std::to_string(v[0]));
+    table.times.push_back(v[0]);
+    table.values.insert(table.values.end(), v + 1, v + columns);
+  }
+  return std::make_shared<TableDriver>(std::move(table), options);
+}
+
+/// Channels of a driver whose values come from a peer, not from the deck.
+int read_stream_channels(Card& card) {
+  constexpr int kMost = 65536;
+  const int n = read_count(card, "number of columns");
+  if (n > kMost)
+    card.fail("at most " + std::to_string(kMost) + " columns are allowed, got " +
+              std::to_string(n));
+  return n;
+}
+
+/// Gives the channels of a driver fed by a peer a place in State::memory.
+FileDriverPtr add_stream(Card& card, StreamInput stream, const std::vector<double>& initial) {
+  stream.memory = card.builder().allocate_memory(stream.channels);
+  for (std::size_t k = 0; k < initial.size(); ++k)
+    card.builder().set_memory(stream.memory + static_cast<int>(k), initial[k]);
+  auto driver = std::make_shared<StreamDriver>(stream.channels, stream.memory);
+  card.model().stream_inputs.push_back(std::move(stream));
+  return driver;
+}
+
+std::vector<double> read_initial_values(Card& card, int channels) {
+  std::vector<double> values;
+  if (!card.keyword("initial values")) return values;
+  for (int k = 0; k < channels; ++k) values.push_back(card.real("initial value"));
+  return values;
+}
+
+/// Where the peer would be: kept by the reference solver's sockets; here peers attach to the port
+/// by its name.
+void skip_address(Card& card) {
+  if (card.keyword("grpc")) return;
+  if (card.one_of({"local", "path"}) >= 0) {
+    card.quoted("path");
+  } else {
+    if (card.keyword("port")) card.integer("port");
+    if (card.keyword("host")) card.quoted("host");
+  }
+}
+
+void skip_flags(Card& card) {
+  for (;;) {
+    if (card.one_of({"signal", "no signal", "blocking", "non blocking"}) >= 0) continue;
+    return;
+  }
+}
+
+/// modifier, { copy | copy cast, ... }: the layout of messages on a socket, of no meaning here.
+void read_modifier(Card& card) {
+  if (!card.keyword("modifier")) return;
+  if (card.required("modifier", {"copy", "copy cast"}) == 1)
+    card.fail("stream: `copy cast` is not supported",
+              "messages of the service carry real numbers; leave the modifier out");
+}
+
+FileDriverPtr read_stream(Card& card) {
+  StreamInput stream;
+  stream.where = card.next();
+  if (card.one_of({"name", "stream drive name"}) < 0)
+    card.fail_at(card.next(), "stream: `name` expected");
+  stream.name = card.quoted("name");
+  if (card.keyword("create")) card.yes_no("create");
+  skip_address(card);
+  if (card.keyword("socket type")) card.required("socket type", {"tcp", "udp"});
+  skip_flags(card);
+  if (card.keyword("input every")) stream.every = read_count(card, "steps between two inputs");
+  if (card.keyword("receive first")) stream.receive_first = card.yes_no("receive first");
+  if (card.keyword("timeout")) card.real("timeout");
+  if (card.keyword("echo"))
+    card.fail("stream: `echo` is not supported",
+              "leave it out; the service's telemetry records what is received");
+  stream.channels = read_stream_channels(card);
+  const std::vector<double> initial = read_initial_values(card, stream.channels);
+  read_modifier(card);
+  return add_stream(card, std::move(stream), initial);
+}
+
+FileDriverPtr read_socket(Card& card) {
+  StreamInput stream;
+  stream.where = card.next();
+  stream.channels = read_stream_channels(card);
+  stream.name = "socket" + std::to_string(card.model().stream_inputs.size() + 1);
+  const std::vector<double> initial = read_initial_values(card, stream.channels);
+  skip_address(card);
+  while (card.more()) {  // authentication: the daemon has its own
+    if (card.at_string())
+      card.quoted("authentication");
+    else
+      card.word("authentication");
+  }
+  return add_stream(card, std::move(stream), initial);
+}
+
+}  // namespace
+
+void register_file_drivers(Registry& registry) {
+  registry.file_driver({"fixed step"}, read_fixed_step);
+  registry.file_driver({"variable step"}, read_variable_step);
+  registry.file_driver({"stream"}, read_stream);
+  registry.file_driver({"socket"}, read_socket);
+  registry.unsupported("file driver", "RTAI input", "real-time mailbox input");
+}
+
+}  // namespace mbcosim

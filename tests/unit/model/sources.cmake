@@ -1,0 +1,1 @@
+set(SOURCES drives_test.cpp scalar_functions_test.cpp)
