@@ -191,6 +191,8 @@ double Beam<Nodes>::set_geometry(const Model& model) {
 
 template struct Beam<2>;
 template struct Beam<3>;
+template Beam<2>::Increment<double> Beam<2>::increment(const Local<double>&, int) const;
+template Beam<3>::Increment<double> Beam<3>::increment(const Local<double>&, int) const;
 template Section<double> Beam<2>::section(const Local<double>&, int) const;
 template Section<double> Beam<3>::section(const Local<double>&, int) const;
 template Section<TimeDual> Beam<2>::section(const Local<TimeDual>&, int) const;

@@ -132,6 +132,7 @@ struct Beam {
   template <class T>
   Eigen::Matrix<T, 6, 1> internal_force(const Local<T>& u, int a, const Section<T>& s) const;
 
+  void tangent(const Local<double>& u, Tangent& t) const;
   void start(Start& s) const;
   void after_predict(const Local<double>& u, State& state) const;
   void after_convergence(const Local<double>& u, State& state) const;
@@ -159,6 +160,11 @@ struct Beam {
   static Vec<T> total_parameters(const Local<T>& u, int k);
   Increment<double> predicted_increment(const Local<double>& u, const State& state, int a) const;
   void restart(const Local<double>& u, State& state) const;
+
+  struct PointTangent;
+  PointTangent point_tangent(const Local<double>& u, int a) const;
+  Mat6 force_by_node(const Local<double>& u, const Tangent& t, const PointTangent& p, int a,
+                     int k) const;
 
   static constexpr int kMemory =
       points * kSectionHistory + 1;  ///< the last one: has the beam been loaded?
