@@ -37,12 +37,13 @@ T signed_square(const T& x) {
   return value_of(x) < 0 ? T(-x * x) : T(x * x);
 }
 
-/// Mass flow [kg/s] through the area A [m²] with a coefficient: C A √(2/ρ) ρ ssq(Δp). Throws
-/// nothing; NaN where ρ < 0.
-template <class T>
-T turbulent_flow(double coefficient_area, const T& rho, const T& dp) {
+/// Mass flow [kg/s] through a restriction: C A ρ sgn(Δp) √(2 |Δp|/ρ), with C A [m²] in one
+/// argument. NaN where ρ < 0.
+template <class Area, class Rho, class T>
+T turbulent_flow(const Area& coefficient_area, const Rho& rho, const T& dp) {
   using std::sqrt;
-  return coefficient_area * sqrt(2.0 * rho) * signed_root(dp);
+  const Rho root = sqrt(2.0 * rho);
+  return coefficient_area * root * signed_root(dp);
 }
 
 /// End stops of a moving part: a penalty spring (c_s), damper (c_v) and mass (c_a) at each end of

@@ -39,6 +39,16 @@ void warn_repeated_nodes(Card& card, const int* index, int count) {
       }
 }
 
+EndStops read_end_stops(Card& card, double lo, double hi) {
+  EndStops stops;
+  stops.cs = card.real("stiffness of the end stops");
+  stops.cv = card.real("damping of the end stops");
+  stops.ca = card.real("mass of the end stops");
+  stops.lo = lo;
+  stops.hi = hi;
+  return stops;
+}
+
 double declared_pressure(Card& card, int node) { return card.model().scalars[node].value; }
 
 }  // namespace mbcosim::hydraulic

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "elements/hydraulic/hydraulic_laws.h"
 #include "model/card.h"
 
 namespace mbcosim::hydraulic {
@@ -25,6 +26,8 @@ Nodes<count> read_nodes(Card& card) {
   warn_repeated_nodes(card, nodes.index, count);
   return nodes;
 }
+/// `<cs>, <cv>, <ca>` of stops at both ends of the stroke lo..hi.
+EndStops read_end_stops(Card& card, double lo, double hi);
 /// Pressure written on the node's card [Pa]. Clamps do not change it.
 double declared_pressure(Card& card, int node);
 
