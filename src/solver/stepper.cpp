@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "solver/initial_assembly.h"
+#include "solver/singularity.h"
 #include "solver/system.h"
 
 namespace mbcosim {
@@ -347,12 +348,9 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
     case NewtonOutcome::singular: {
       e.kind = ErrorKind::singular;
       e.reason = "SINGULAR_MATRIX";
-      e.message = std::string(where) + ": the matrix is singular";
-      if (report.singular_column >= 0) {
-        const auto [owner, equation] = model_.row_text(report.singular_column);
-        e.failure.worst.push_back({owner, equation, 0});
-        e.message += "; nothing determines " + owner + ", " + equation;
-      }
+      const Singularity cause = find_singularity(model_, workspace_.values, report.singular_column);
+      e.failure.worst = cause.undetermined;
+      e.message = std::string(where) + ": " + cause.text();
       return e;
     }
     default: break;

@@ -1,0 +1,7 @@
+#include "source_dir.h"
+
+namespace mbcosim {
+
+std::string source_dir() { return MBCOSIM_SOURCE_DIR; }
+
+}  // namespace mbcosim
