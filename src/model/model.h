@@ -1,6 +1,7 @@
 /// Model: everything that is fixed once a deck is read. Immutable and shared between sessions and threads.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -89,6 +90,12 @@ class Model {
   std::vector<std::pair<std::string, std::string>> symbols;
 
   std::vector<StreamInput> stream_inputs;
+  /// `default scale` of the rows that each family of elements owns.
+  std::array<double, static_cast<int>(Family::count)> family_scale = [] {
+    std::array<double, static_cast<int>(Family::count)> a;
+    a.fill(1);
+    return a;
+  }();
 
   // --- numbering, set by ModelBuilder::finish
   bool has_driven = false;  ///< is any element `driven`?

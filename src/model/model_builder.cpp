@@ -125,7 +125,7 @@ void number_unknowns(Model& model) {
       const int own = e.set->unknowns(e.index);
       for (int k = 0; k < own; ++k) {
         const bool differential = e.set->is_differential(e.index, k);
-        take(1, differential ? UnknownKind::differential : UnknownKind::algebraic, 1);
+        take(1, differential ? UnknownKind::differential : UnknownKind::algebraic, model.family_scale[family]);
         model.is_constraint_row.back() = !differential;
       }
       e.set->bind(model, e.index, n - own);
