@@ -243,7 +243,7 @@ SourceSpan Cursor::next() {
                        std::max<std::size_t>(end - begin, 1));
 }
 
-SourceSpan Cursor::last() {
+SourceSpan Cursor::last() const {
   return session_.span(statement_.file, statement_.offset + last_begin_,
                        std::max<std::size_t>(last_end_ - last_begin_, 1));
 }

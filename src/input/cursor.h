@@ -43,7 +43,7 @@ class Cursor {
   /// For `driven`: the rest of the statement from the next argument on, as a statement of its own.
   Statement rest_as_statement();
   SourceSpan next();  ///< span of the next argument
-  SourceSpan last();  ///< span of the argument consumed last
+  SourceSpan last() const;  ///< span of the argument consumed last
   [[noreturn]] void fail(SourceSpan where, std::string message, std::string hint = "");
   void warn(SourceSpan where, std::string message, std::string hint = "");
   Session& session();

@@ -1,20 +1,36 @@
 set(SOURCES
+  anywhere_cards.cpp
   binder.cpp
+  cards.cpp
+  control_block.cpp
+  counts.cpp
   cursor.cpp
+  deck.cpp
+  deck_card.cpp
+  deck_reader.cpp
+  elements_block.cpp
   evaluate.cpp
+  frames.cpp
   function_values.cpp
   functions.cpp
+  initial_value_block.cpp
   lexer.cpp
   machine.cpp
   model_functions.cpp
   nearest.cpp
+  node_references.cpp
+  nodes_block.cpp
   parser.cpp
   plugin.cpp
   run_strings.cpp
   session.cpp
+  shared_objects.cpp
   sources.cpp
   splitter.cpp
   statements.cpp
+  structural_node_card.cpp
+  structured_values.cpp
+  suggest.cpp
   symbols.cpp
   value.cpp
 )

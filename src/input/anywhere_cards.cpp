@@ -1,0 +1,221 @@
+/// Named objects that a deck may define in any block: frames, drives, laws, functions, fluids.
+#include <Eigen/Geometry>
+#include <map>
+
+#include "input/cards.h"
+#include "input/deck.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// Label of a new object of `kind`, refused when `map` has it.
+template <class Map>
+int new_label(DeckCard& card, const Map& map, const char* kind) {
+  card.set_defining(kind);
+  const int label = card.label(std::string(kind) + " label");
+  card.set_defining(kind, label);
+  const auto found = map.find(label);
+  if (found != map.end()) card.deck().redefined(card, kind, label, found->second.where);
+  card.set_subject(std::string(kind) + " " + std::to_string(label));
+  return label;
+}
+
+// ------------------------------------------------------------------------------------------------
+// reference
+
+void read_denavit_hartenberg(DeckCard& card, ReferenceFrame& f) {
+  ReferenceFrame base;
+  if (card.keyword("reference") && !card.keyword("global")) {
+    const int l = card.label("reference frame label");
+    const auto found = card.deck().frames.find(l);
+    if (found == card.deck().frames.end()) card.deck().undefined(card, "reference frame", l);
+    base = card.model().frames[found->second];
+  }
+  const double d = card.real("d"), theta = card.real("theta"), a = card.real("a"),
+               alpha = card.real("alpha");
+  const Mat3 turn = rotation_z(theta);
+  f.x = base.x + base.R * (Vec3(0, 0, d) + turn * Vec3(a, 0, 0));
+  f.R = base.R * turn * rotation_x(alpha);
+  f.v = base.v + base.w.cross(f.x - base.x);
+  f.w = base.w;
+}
+
+void read_reference(DeckCard& card) {
+  Deck& deck = card.deck();
+  card.set_defining("reference frame");
+  ReferenceFrame f;
+  f.label = card.label("reference frame label");
+  card.set_defining("reference frame", f.label);
+  if (const auto found = deck.frames.find(f.label); found != deck.frames.end())
+    deck.redefined(card, "reference frame", f.label, card.model().frames[found->second].where);
+  card.set_subject("reference frame " + std::to_string(f.label));
+  f.where = card.head();
+  f.name = card.optional_name();
+  if (card.keyword("denavit hartenberg")) {
+    read_denavit_hartenberg(card, f);
+  } else {
+    card.keyword("position");
+    f.x = card.absolute_position("position");
+    card.keyword("orientation");
+    f.R = card.absolute_orientation("orientation");
+    if (card.more()) {
+      card.keyword("velocity");
+      f.v = card.absolute_velocity("velocity", f.x);
+    }
+    if (card.more()) {
+      card.keyword("angular velocity");
+      f.w = card.absolute_angular_velocity("angular velocity");
+    }
+  }
+  card.expect_end();
+  deck.frames[f.label] = card.model().frames.size();
+  card.model().frames.push_back(std::move(f));
+}
+
+// ------------------------------------------------------------------------------------------------
+// drives
+
+void read_drive_output(DeckCard& card, NamedDrive& d) {
+  while (card.keyword("output")) {
+    do {
+      switch (card.one_of({"value", "derivative"})) {
+        case 0:
+          d.output_value = card.yes_no("output of the value");
+          break;
+        case 1:
+          d.output_derivative = card.yes_no("output of the derivative");
+          break;
+        default:
+          d.output_value = card.yes_no("output");
+      }
+    } while (card.more() && card.peek_word() != "output");
+  }
+}
+
+void read_drive_caller(DeckCard& card) {
+  Deck& deck = card.deck();
+  NamedDrive d;
+  d.label = new_label(card, deck.drives, "drive caller");
+  d.name = card.optional_name();
+  card.keyword("deferred");
+  d.drive = card.drive();
+  if (card.peek_word() != "output")
+    deck.drives_without_output.push_back(static_cast<int>(card.model().drives.size()));
+  read_drive_output(card, d);
+  if (d.output_derivative && !d.drive->has_derivative()) {
+    card.warn("this drive has no derivative to write");
+    d.output_derivative = false;
+  }
+  card.expect_end();
+  deck.drives[d.label] = {d.drive, card.head()};
+  card.model().drive_index[d.label] = static_cast<int>(card.model().drives.size());
+  card.model().drives.push_back(std::move(d));
+}
+
+void read_template_drive_caller(DeckCard& card) {
+  Deck& deck = card.deck();
+  card.set_defining("template drive caller");
+  const int label = card.label("template drive caller label");
+  card.set_defining("template drive caller", label);
+  card.set_subject("template drive caller " + std::to_string(label));
+  card.optional_name();
+  const std::string_view text = card.next_text();
+  std::string shape(text == "3x3" || text == "6x6" ? text : "");
+  if (!shape.empty())
+    card.skip();
+  else
+    shape = card.at_string() ? card.quoted("dimension") : std::to_string(card.integer("dimension"));
+  const auto store = [&](auto& map, auto read) {
+    if (const auto found = map.find(label); found != map.end())
+      deck.redefined(card, "template drive caller", label, found->second.where);
+    auto drive = read();
+    card.expect_end();
+    map[label] = {std::move(drive), card.head()};
+  };
+  if (shape == "1")
+    store(deck.drives1, [&] { return card.scalar_template_drive(); });
+  else if (shape == "3")
+    store(deck.drives3, [&] { return card.vec3_drive(); });
+  else if (shape == "6")
+    store(deck.drives6, [&] { return card.vec6_drive(); });
+  else if (shape == "3x3")
+    store(deck.drives33, [&] { return card.mat3_drive("matrix drive"); });
+  else if (shape == "6x6")
+    store(deck.drives66, [&] { return card.mat6_drive("matrix drive"); });
+  else
+    card.fail("unknown dimension \"" + shape + "\"; accepted: 1, 3, 6, \"3x3\", \"6x6\"");
+}
+
+// ------------------------------------------------------------------------------------------------
+// laws, functions, fluids
+
+void read_constitutive_law(DeckCard& card) {
+  Deck& deck = card.deck();
+  card.set_defining("constitutive law");
+  const int label = card.label("constitutive law label");
+  card.set_defining("constitutive law", label);
+  card.set_subject("constitutive law " + std::to_string(label));
+  card.optional_name();
+  const int dimension = card.integer("dimension");
+  const auto store = [&](auto& map, auto read) {
+    if (const auto found = map.find(label); found != map.end())
+      deck.redefined(card, "constitutive law", label, found->second.where);
+    auto law = read();
+    card.expect_end();
+    map[label] = {std::move(law), card.head()};
+  };
+  if (dimension == 1)
+    store(deck.laws1, [&] { return card.law1(); });
+  else if (dimension == 3)
+    store(deck.laws3, [&] { return card.law3(); });
+  else if (dimension == 6)
+    store(deck.laws6, [&] { return card.law6(); });
+  else
+    card.fail("dimension " + std::to_string(dimension) + " is not accepted; accepted: 1, 3, 6");
+}
+
+void read_scalar_function(DeckCard& card) {
+  card.read_function_definition();
+  card.expect_end();
+}
+
+void read_hydraulic_fluid(DeckCard& card) {
+  Deck& deck = card.deck();
+  const int label = new_label(card, deck.fluids, "hydraulic fluid");
+  card.optional_name();
+  if (card.peek_word() == "reference")
+    card.fail_at(card.next(), "a hydraulic fluid cannot refer to another one");
+  FluidPtr fluid = card.fluid();
+  card.expect_end();
+  deck.fluids[label] = {std::move(fluid), card.head()};
+}
+
+void read_c81_data(DeckCard& card) {
+  card.fail_at(card.head(), "\"c81 data\" (aerodynamic data) is not supported yet");
+}
+void read_module_load(DeckCard& card) {
+  card.fail_at(card.head(),
+               "\"module load\" (run-time loaded module) is not supported: decks load no code");
+}
+
+}  // namespace
+
+bool read_anywhere_card(DeckCard& card) {
+  static const std::map<std::string, void (*)(DeckCard&), std::less<>> kCards = {
+      {"reference", read_reference},
+      {"drivecaller", read_drive_caller},
+      {"templatedrivecaller", read_template_drive_caller},
+      {"constitutivelaw", read_constitutive_law},
+      {"scalarfunction", read_scalar_function},
+      {"hydraulicfluid", read_hydraulic_fluid},
+      {"c81data", read_c81_data},
+      {"moduleload", read_module_load},
+  };
+  const auto found = kCards.find(card.statement().word);
+  if (found == kCards.end()) return false;
+  found->second(card);
+  return true;
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,50 @@
+/// The cards of the blocks and those that may stand anywhere. Each function reads one statement;
+/// errors are thrown.
+#pragma once
+
+#include "input/deck_card.h"
+#include "model/node.h"
+#include "model/settings.h"
+
+namespace mbcosim {
+
+/// Reads a card that may stand in any block; false (nothing read) when the word is none of them.
+bool read_anywhere_card(DeckCard& card);
+void read_data_card(DeckCard& card);
+void read_initial_value_card(DeckCard& card);
+void read_control_card(DeckCard& card);
+void read_node_card(DeckCard& card);
+void read_driver_card(DeckCard& card);
+void read_element_card(DeckCard& card);
+
+/// Kinds of nodes as cards name them.
+void read_structural_node(DeckCard& card, int label, StructuralNode node);
+void read_scalar_node(DeckCard& card, ScalarKind kind, ScalarNode node);
+
+/// Refuses the card itself: `unknown card "mx iterations"`, with the nearest of `accepted`.
+[[noreturn]] void fail_unknown_card(DeckCard& card, const std::vector<std::string>& accepted);
+/// Skips the rest of a statement that is accepted and has no effect here.
+void ignore_rest(DeckCard& card, const std::string& why);
+/// `output, { yes | no | default | <bool> }`, when it is there.
+void read_output_option(DeckCard& card, bool default_value, bool& output);
+/// The labels of an `output` card: calls `one(label)` for single labels and range members.
+template <class One>
+void read_output_labels(DeckCard& card, One one) {
+  do {
+    if (card.keyword("range")) {
+      const int first = card.label("first label"), last = card.label("last label");
+      if (last < first) card.fail("range: the last label is less than the first");
+      one(first, last);
+    } else {
+      const int label = card.label("label");
+      one(label, label);
+    }
+  } while (card.more());
+}
+
+/// A method of time integration, as in `method` and `dummy steps method`.
+MethodSettings read_method(DeckCard& card);
+/// The arguments of `linear solver`, checked and without effect.
+void read_linear_solver(DeckCard& card);
+
+}  // namespace mbcosim

@@ -1,0 +1,354 @@
+/// Cards of the `control data` block (MBDyn input manual, "Control data").
+#include <map>
+
+#include "input/cards.h"
+#include "input/deck.h"
+#include "input/suggest.h"
+
+namespace mbcosim {
+
+namespace {
+
+ControlSettings& control(DeckCard& card) { return card.model().control; }
+
+// ------------------------------------------------------------------------------------------------
+// assembly
+
+void read_skip_assembly(DeckCard& card) { control(card).skip_assembly = true; }
+
+void read_use(DeckCard& card) {
+  ControlSettings& c = control(card);
+  bool closed = false;
+  while (card.more() && !closed) {
+    switch (card.required("kind of element",
+                          {"rigid bodies", "gravity", "forces", "beams", "plates",
+                           "aerodynamic elements", "loadable elements", "in assembly"})) {
+      case 0:
+        c.assemble_bodies = true;
+        break;
+      case 1:
+        c.assemble_gravity = true;
+        break;
+      case 2:
+        c.assemble_forces = true;
+        break;
+      case 3:
+        c.assemble_beams = true;
+        break;
+      case 7:
+        closed = true;
+        break;
+      default:
+        break;
+    }
+  }
+  if (!closed) card.fail("\"in assembly\" missing at the end of the card");
+}
+
+void read_initial_stiffness(DeckCard& card) {
+  ControlSettings& c = control(card);
+  c.position_stiffness = c.velocity_stiffness = 1;
+  if (!card.more()) return;
+  c.position_stiffness = c.velocity_stiffness = card.real("position stiffness", 1);
+  if (card.more()) c.velocity_stiffness = card.real("velocity stiffness", 1);
+  if (c.position_stiffness < 0 || c.velocity_stiffness < 0)
+    card.fail("initial stiffness must not be negative");
+}
+
+void read_omega_rotates(DeckCard& card) {
+  control(card).omega_rotates = card.required("omega rotates", {"yes", "no"}) == 0;
+}
+
+void read_assembly_tolerance(DeckCard& card) {
+  control(card).assembly_tolerance = card.real("tolerance", 1e-6);
+  if (!(control(card).assembly_tolerance > 0))
+    card.fail("the tolerance of the initial assembly must be greater than 0");
+}
+
+void read_assembly_iterations(DeckCard& card) {
+  const int n = card.integer("max iterations", 1);
+  if (n < 1) card.warn("max iterations is less than 1, 1 is used");
+  control(card).assembly_max_iterations = std::max(1, n);
+}
+
+void read_epsilon(DeckCard& card) {
+  control(card).assembly_epsilon = card.real_above("epsilon", 0, false);
+}
+
+// ------------------------------------------------------------------------------------------------
+// output
+
+/// Words of `default output`: the count names of nodes and elements that have a file of their own.
+void set_default_output(OutputDefaults& o, bool on) {
+  const bool accelerations = o.accelerations;
+  o = OutputDefaults();
+  o.structural = on;
+  o.scalar.fill(on);
+  o.family.fill(on);
+  o.accelerations = accelerations;
+}
+
+bool has_default_output(Kind kind) {
+  if (kind == Kind::parameter_node || kind == Kind::file_driver) return false;
+  return kind != kind_of(Family::bulk) && kind != kind_of(Family::output_element) &&
+         kind != kind_of(Family::inertia) && kind != kind_of(Family::automatic_structural);
+}
+
+void switch_on(OutputDefaults& o, Kind kind) {
+  if (kind == Kind::structural_node)
+    o.structural = true;
+  else if (kind < Kind::file_driver)
+    o.scalar[static_cast<int>(kind) - 1] = true;
+  else
+    o.family[static_cast<int>(kind) - static_cast<int>(Kind::family0)] = true;
+}
+
+void read_default_output(DeckCard& card) {
+  Deck& deck = card.deck();
+  while (card.more()) {
+    switch (card.one_of({"all", "none", "reference frames", "accelerations", "drive callers"})) {
+      case 0:
+        set_default_output(deck.output, true);
+        continue;
+      case 1:
+        set_default_output(deck.output, false);
+        continue;
+      case 2:
+        control(card).output_reference_frames = true;
+        continue;
+      case 3:
+        deck.output.accelerations = true;
+        continue;
+      case 4:
+        control(card).output_drives = true;
+        continue;
+      default:
+        break;
+    }
+    const std::string word = card.word("output item");
+    const std::optional<Kind> kind = kind_of_count_card(word);
+    if (kind && has_default_output(*kind)) {
+      switch_on(deck.output, *kind);
+      continue;
+    }
+    std::vector<std::string> known = {"all", "none", "reference frames", "accelerations",
+                                      "drive callers"};
+    for (int k = 0; k < kKinds; ++k) known.emplace_back(kind_names(static_cast<Kind>(k)).card);
+    card.warn("unknown item \"" + word + "\" ignored", suggestion(word, known));
+  }
+}
+
+void read_output_frequency(DeckCard& card) {
+  Deck& deck = card.deck();
+  if (deck.output_rate_set)
+    card.fail_at(card.head(), "output frequency or output meter is given twice");
+  deck.output_rate_set = true;
+  control(card).output_frequency = card.integer_at_least("output frequency", 1);
+}
+
+void read_output_meter(DeckCard& card) {
+  Deck& deck = card.deck();
+  if (deck.output_rate_set)
+    card.fail_at(card.head(), "output frequency or output meter is given twice");
+  deck.output_rate_set = true;
+  control(card).output_meter = card.drive("output meter");
+}
+
+void read_output_precision(DeckCard& card) {
+  const int n = card.integer_at_least("output precision", 1);
+  if (n > 17) card.warn("more than 17 digits mean nothing, 17 are written");
+  control(card).output_precision = std::min(n, 17);
+}
+
+void read_default_orientation(DeckCard& card) {
+  control(card).orientation = card.orientation_description();
+}
+
+void read_output_flags(DeckCard& card) {
+  std::set<std::string> seen;
+  while (card.more()) {
+    const std::string flag = card.word("output flag");
+    if (!seen.insert(flag).second) card.fail("flag \"" + flag + "\" is given twice");
+  }
+}
+
+void read_output_results(DeckCard& card) {
+  ControlSettings& c = control(card);
+  if (card.required("result format", {"netcdf", "text"}) == 1) return;
+  c.netcdf = true;
+  while (card.more()) {
+    if (card.required("option", {"sync", "no text", "classic", "netcdf4"}) == 1) c.text = false;
+  }
+}
+
+void read_title(DeckCard& card) { card.model().title = card.quoted("title"); }
+
+void read_print(DeckCard& card) {
+  while (card.more())
+    card.required(
+        "item", {"dof stats", "dof description", "equation description", "description",
+                 "element connection", "node connection", "connection", "all", "none", "to file"});
+}
+
+void read_select_timeout(DeckCard& card) {
+  if (!card.keyword("forever")) card.integer_at_least("select timeout", 0);
+}
+
+// ------------------------------------------------------------------------------------------------
+// other
+
+void read_default_scale(DeckCard& card) {
+  Deck& deck = card.deck();
+  std::vector<std::string> known = {"all"};
+  for (int k = 0; k < kKinds; ++k) known.emplace_back(kind_names(static_cast<Kind>(k)).card);
+  while (card.more()) {
+    const std::string owner = card.word("owner of degrees of freedom");
+    const double s = card.real("scale", 1);
+    const bool all = owner == "all";
+    const std::optional<Kind> kind = kind_of_count_card(owner);
+    if (!all && !kind) {
+      card.warn("unknown owner \"" + owner + "\" ignored", suggestion(owner, known));
+      continue;
+    }
+    if (all || *kind == Kind::structural_node) deck.structural_scale = s;
+    for (int k = 0; k < 5; ++k)
+      if (all || *kind == kind_of(static_cast<ScalarKind>(k))) deck.scalar_scale[k] = s;
+    for (int f = 0; f < static_cast<int>(Family::count); ++f)
+      if (all || *kind == kind_of(static_cast<Family>(f))) card.model().family_scale[f] = s;
+  }
+}
+
+void read_model(DeckCard& card) {
+  card.required("model", {"static"});
+  control(card).is_static = true;
+}
+
+void read_frame_motion(DeckCard& card) {
+  FrameMotion m;
+  const bool constant = card.required("kind of rigid body kinematics", {"const", "drive"}) == 0;
+  bool any = false;
+  const auto vector = [&](const char* word, Vec3DrivePtr& drive) {
+    if (!card.keyword(word)) return;
+    any = true;
+    drive = constant ? make_constant_vec3_drive(card.absolute_vector(word)) : card.vec3_drive(word);
+  };
+  vector("position", m.position);
+  if (card.keyword("orientation")) {
+    any = true;
+    m.orientation =
+        constant
+            ? make_constant_vec3_drive(vector_of_rotation(card.absolute_orientation("orientation")))
+            : card.vec3_drive("orientation");
+  }
+  vector("velocity", m.velocity);
+  vector("angular velocity", m.angular_velocity);
+  vector("acceleration", m.acceleration);
+  vector("angular acceleration", m.angular_acceleration);
+  card.expect_end();
+  if (any)
+    card.model().frame_motion = std::move(m);
+  else
+    card.warn_at(card.head(), "rigid body kinematics: no data, the card is ignored");
+}
+
+void read_gravity_flag(DeckCard& card) {
+  card.deck().counts[static_cast<int>(kind_of(Family::gravity))].declared = 1;
+}
+void read_air_flag(DeckCard& card) {
+  card.deck().counts[static_cast<int>(kind_of(Family::air_properties))].declared = 1;
+}
+
+void read_restart(DeckCard& card) {
+  ignore_rest(card, "restart files are not written; use checkpoints");
+}
+void ignored(DeckCard& card) { ignore_rest(card, "this card has no effect"); }
+void read_solution_array(DeckCard& card) {
+  card.fail_at(card.head(), "\"read solution array\" is not supported; use checkpoints");
+}
+void read_output_file_name(DeckCard& card) {
+  card.fail_at(card.head(), "\"output file name\" is obsolete",
+               "give the name on the command line: -o PREFIX");
+}
+void read_refused_count(DeckCard& card) {
+  card.fail_at(card.head(), "\"" + card.card_name() + "\" is not accepted");
+}
+
+using Reader = void (*)(DeckCard&);
+const std::vector<std::pair<const char*, Reader>>& control_cards() {
+  static const std::vector<std::pair<const char*, Reader>> kCards = {
+      {"skip initial joint assembly", read_skip_assembly},
+      {"use", read_use},
+      {"initial stiffness", read_initial_stiffness},
+      {"stiffness", read_initial_stiffness},
+      {"omega rotates", read_omega_rotates},
+      {"tolerance", read_assembly_tolerance},
+      {"initial tolerance", read_assembly_tolerance},
+      {"max iterations", read_assembly_iterations},
+      {"max initial iterations", read_assembly_iterations},
+      {"epsilon", read_epsilon},
+      {"linear solver", read_linear_solver},
+      {"solver", read_linear_solver},
+      {"default output", read_default_output},
+      {"output frequency", read_output_frequency},
+      {"output meter", read_output_meter},
+      {"output precision", read_output_precision},
+      {"default orientation", read_default_orientation},
+      {"default beam output", read_output_flags},
+      {"default aerodynamic output", read_output_flags},
+      {"output results", read_output_results},
+      {"title", read_title},
+      {"print", read_print},
+      {"make restart file", read_restart},
+      {"select timeout", read_select_timeout},
+      {"default scale", read_default_scale},
+      {"model", read_model},
+      {"rigid body kinematics", read_frame_motion},
+      {"loadable path", ignored},
+      {"finite difference jacobian meter", ignored},
+      {"read solution array", read_solution_array},
+      {"output file name", read_output_file_name},
+      {"gravity", read_gravity_flag},
+      {"air properties", read_air_flag},
+      {"automatic structural elements", ignored},
+      {"driven elements", read_refused_count},
+      {"electric bulk elements", read_refused_count},
+  };
+  return kCards;
+}
+
+/// Reads a count card; false when the word is none.
+bool read_count(DeckCard& card) {
+  const std::optional<Kind> kind = kind_of_count_card(card.statement().word);
+  if (!kind || *kind == kind_of(Family::gravity) || *kind == kind_of(Family::air_properties))
+    return false;
+  if (card.statement().word == "rotors" || card.statement().word == "rtaioutput")
+    card.warn_at(card.head(),
+                 "old name of the card \"" + std::string(kind_names(*kind).card) + "\"");
+  card.deck().counts[static_cast<int>(*kind)].declared = card.more() ? card.count("count") : 0;
+  return true;
+}
+
+}  // namespace
+
+void read_control_card(DeckCard& card) {
+  if (read_count(card)) {
+    card.expect_end();
+    return;
+  }
+  static const std::map<std::string, Reader, std::less<>> kReaders = [] {
+    std::map<std::string, Reader, std::less<>> m;
+    for (const auto& c : control_cards()) m[normalized(c.first)] = c.second;
+    return m;
+  }();
+  const auto found = kReaders.find(card.statement().word);
+  if (found == kReaders.end()) {
+    std::vector<std::string> words;
+    for (const auto& c : control_cards()) words.emplace_back(c.first);
+    for (int k = 0; k < kKinds; ++k) words.emplace_back(kind_names(static_cast<Kind>(k)).card);
+    fail_unknown_card(card, words);
+  }
+  found->second(card);
+  card.expect_end();
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,39 @@
+#include "input/deck.h"
+
+#include "input/deck_card.h"
+
+namespace mbcosim {
+
+void Deck::damage(const std::string& kind, int label) {
+  if (label < 0)
+    damaged_kinds.insert(kind);
+  else
+    damaged[kind].insert(label);
+}
+
+void Deck::undefined(DeckCard& card, std::string_view kind, int label) {
+  const auto found = damaged.find(kind);
+  if (damaged_kinds.count(kind) || (found != damaged.end() && found->second.count(label)))
+    session.set_damaged(true);
+  card.fail(std::string(kind) + " " + std::to_string(label) + " is not defined");
+}
+
+void Deck::redefined(DeckCard& card, std::string_view kind, int label, SourceSpan before) {
+  card.fail(std::string(kind) + " " + std::to_string(label) + " already defined at " +
+            session.place(before));
+}
+
+void Deck::take(DeckCard& card, Kind kind, int label) {
+  Count& count = counts[static_cast<int>(kind)];
+  ++count.found;
+  const int declared = count.declared ? *count.declared : session.options.strict ? 0 : count.found;
+  if (count.found <= declared) return;
+  const KindNames& names = kind_names(kind);
+  const std::string number = std::to_string(declared);
+  card.set_subject("");
+  card.fail(std::string(names.singular) + " " + std::to_string(label) +
+                " exceeds the declared number (" + number + ")",
+            std::string("see the card \"") + names.card + "\" of the control data");
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,292 @@
+/// Words, numbers and errors of a card.
+#include "input/deck_card.h"
+
+#include <cctype>
+#include <cmath>
+#include <limits>
+
+#include "input/deck.h"
+#include "input/suggest.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// Is the normalized `found` the keyword that the source writes as `word`?
+bool same_word(std::string_view found, std::string_view word) {
+  std::size_t i = 0;
+  for (const char c : word) {
+    if (c == ' ') continue;
+    if (i == found.size() || found[i] != std::tolower(static_cast<unsigned char>(c))) return false;
+    ++i;
+  }
+  return i == found.size();
+}
+
+std::string text_of(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.12g", x);
+  return text;
+}
+
+}  // namespace
+
+DeckCard::DeckCard(Deck& deck, const Statement& statement)
+    : deck_(deck), statement_(statement), cursor_(deck.session, statement_) {}
+
+SourceSpan DeckCard::head() const {
+  std::size_t length = statement_.text.find_first_of(":;,");
+  if (length == std::string_view::npos) length = statement_.text.size();
+  while (length > 1 && std::isspace(static_cast<unsigned char>(statement_.text[length - 1])))
+    --length;
+  return deck_.session.span(statement_.file, statement_.offset, length);
+}
+
+void DeckCard::set_subject(std::string subject, std::string type) {
+  subject_ = std::move(subject);
+  type_ = std::move(type);
+}
+
+void DeckCard::set_defining(std::string kind, int label) {
+  defined_kind_ = std::move(kind);
+  defined_label_ = label;
+}
+
+std::string_view DeckCard::next_text() {
+  if (!cursor_.more()) return {};
+  const SourceSpan where = next();
+  const std::size_t start = deck_.session.offset_of(where) - statement_.offset;
+  return statement_.text.substr(std::min(start, statement_.text.size()), where.length);
+}
+
+void DeckCard::skip() {
+  cursor_.skip();
+  consumed();
+}
+
+void DeckCard::consumed() {
+  has_peeked_ = false;
+}
+
+// ----------------------------------------------------------------------------------------------
+// words
+
+std::string DeckCard::peek_word() {
+  if (!has_peeked_) {
+    peeked_ = cursor_.more() ? cursor_.peek_word() : std::string();
+    has_peeked_ = true;
+  }
+  return peeked_;
+}
+
+bool DeckCard::keyword(std::string_view word) {
+  if (!has_peeked_) peek_word();
+  if (peeked_.empty() || !same_word(peeked_, word)) return false;
+  skip();
+  return true;
+}
+
+int DeckCard::one_of(std::initializer_list<std::string_view> words) {
+  if (!has_peeked_) peek_word();
+  if (peeked_.empty()) return -1;
+  int index = 0;
+  for (const std::string_view word : words) {
+    if (same_word(peeked_, word)) {
+      skip();
+      return index;
+    }
+    ++index;
+  }
+  return -1;
+}
+
+int DeckCard::required(std::string_view what, std::initializer_list<std::string_view> words) {
+  const int k = one_of(words);
+  if (k >= 0) return k;
+  const std::vector<std::string> accepted(words.begin(), words.end());
+  std::string list;
+  for (const std::string& w : accepted) list += (list.empty() ? "" : ", ") + w;
+  const std::string expected = std::string(what) + " expected (" + list + ")";
+  if (!more()) fail(expected + ", end of the card found");
+  const std::string found = peek_word();
+  if (found.empty()) fail_at(next(), expected);
+  fail_at(next(), expected + ", \"" + found + "\" found", suggestion(found, accepted));
+}
+
+std::string DeckCard::word(std::string_view what) {
+  need_argument(what);
+  std::string w = cursor_.word(what);
+  consumed();
+  return w;
+}
+
+bool DeckCard::more() { return cursor_.more(); }
+bool DeckCard::at_string() { return cursor_.more() && cursor_.at_string(); }
+
+// ----------------------------------------------------------------------------------------------
+// numbers
+
+void DeckCard::need_argument(std::string_view what) {
+  if (!cursor_.more()) fail(std::string(what) + " missing");
+}
+
+void DeckCard::refuse_word(std::string_view what) {
+  const std::string w = peek_word();
+  if (w.empty()) return;
+  static const std::set<std::string, std::less<>> kWords = {
+      "null",   "eye",       "default",  "reference",       "position", "orientation", "hinge",
+      "diag",   "matr",      "sym",      "output",          "scale",    "name",        "node",
+      "same",   "fromnodes", "euler",    "euler123",        "euler313", "euler321",    "const",
+      "single", "array",     "velocity", "angularvelocity", "yes",      "no",          "guess",
+      "forever"};
+  if (!kWords.count(w)) return;
+  if (deck_.session.symbols.find(next_text())) return;
+  const SourceSpan where = next();
+  fail_at(where, std::string(what) + " expected, keyword \"" + w + "\" found");
+}
+
+Value DeckCard::value(std::string_view what) {
+  need_argument(what);
+  refuse_word(what);
+  if (cursor_.at_string()) fail_at(next(), std::string(what) + ": number expected, string found");
+  Value v = cursor_.expression(what);
+  consumed();
+  return v;
+}
+
+double DeckCard::real(std::string_view what, double fallback) {
+  need_argument(what);
+  if (cursor_.at_empty()) {
+    skip();
+    return fallback;
+  }
+  const Value v = value(what);
+  if (const double* x = std::get_if<double>(&v)) return *x;
+  if (const std::int32_t* i = std::get_if<std::int32_t>(&v)) return *i;
+  if (const bool* b = std::get_if<bool>(&v)) return *b ? 1 : 0;
+  fail(std::string(what) + ": number expected, string found");
+}
+
+int DeckCard::integer(std::string_view what, int fallback) {
+  const double x = real(what, fallback);
+  if (!(x > -2147483649.0 && x < 2147483648.0))
+    fail(std::string(what) + ": integer out of range: " + text_of(x));
+  const double whole = std::trunc(x);
+  if (whole != x) warn(std::string(what) + " " + text_of(x) + " truncated to " + text_of(whole));
+  return static_cast<int>(whole);
+}
+
+int DeckCard::label(std::string_view what) {
+  const double x = real(what);
+  if (!(x >= 0 && x < 2147483648.0))
+    fail(std::string(what) + " must be between 0 and 2147483647, got " + text_of(x));
+  const double whole = std::trunc(x);
+  if (whole != x) warn(std::string(what) + " " + text_of(x) + " truncated to " + text_of(whole));
+  return static_cast<int>(whole);
+}
+
+int DeckCard::count(std::string_view what) {
+  const int n = integer(what);
+  if (n < 0) fail("count must not be negative, got " + std::to_string(n));
+  return n;
+}
+
+double DeckCard::real_above(std::string_view what, double bound, bool inclusive) {
+  const double x = real(what);
+  if (!(inclusive ? x >= bound : x > bound))
+    fail(std::string(what) + " must be " + (inclusive ? "at least " : "greater than ") +
+         text_of(bound) + ", got " + text_of(x));
+  return x;
+}
+
+int DeckCard::integer_at_least(std::string_view what, int least) {
+  const int n = integer(what);
+  if (n < least)
+    fail(std::string(what) + " must be at least " + std::to_string(least) + ", got " +
+         std::to_string(n));
+  return n;
+}
+
+bool DeckCard::yes_no(std::string_view what) {
+  switch (one_of({"yes", "no"})) {
+    case 0:
+      return true;
+    case 1:
+      return false;
+    default:
+      return real(std::string(what) + " (yes, no or a number)") != 0;
+  }
+}
+
+std::string DeckCard::quoted(std::string_view what) {
+  need_argument(what);
+  std::string text = cursor_.quoted(what);
+  consumed();
+  return text;
+}
+
+std::string DeckCard::file_contents(std::string_view what, std::string* name) {
+  const std::string written = quoted(what);
+  if (name) *name = written;
+  Result<std::string> text = deck_.session.read_data(written, statement_.file);
+  if (!text) deck_.session.fail_read(last(), text.error(), statement_.file);
+  deck_.data_files.add(written);
+  deck_.data_files.add(*text);
+  return std::move(*text);
+}
+
+std::string DeckCard::optional_name() { return keyword("name") ? quoted("name") : std::string(); }
+
+// ----------------------------------------------------------------------------------------------
+// errors and context
+
+void DeckCard::fail_at(SourceSpan where, const std::string& message, const std::string& hint) {
+  std::string text = message;
+  if (!type_.empty() && text.starts_with(type_ + ": ")) text.erase(0, type_.size() + 2);
+  if (!subject_.empty()) text = subject_ + ": " + text;
+  deck_.session.fail(where, std::move(text), hint);
+}
+
+void DeckCard::warn_at(SourceSpan where, const std::string& message, const std::string& hint) {
+  deck_.session.warn(where, subject_.empty() ? message : subject_ + ": " + message, hint);
+}
+
+void DeckCard::warn(const std::string& message, const std::string& hint) {
+  warn_at(last(), message, hint);
+}
+
+void DeckCard::note(const std::string& message) {
+  deck_.session.report(
+      deck_.session.diagnostic(Severity::note, "note", head(), card_name() + ": " + message));
+}
+
+std::string DeckCard::card_name() const {
+  std::string name;
+  for (const char c : statement_.text.substr(0, statement_.text.find_first_of(":;,"))) {
+    const bool blank = std::isspace(static_cast<unsigned char>(c));
+    if (!blank)
+      name += c;
+    else if (!name.empty() && name.back() != ' ')
+      name += ' ';
+  }
+  while (!name.empty() && name.back() == ' ') name.pop_back();
+  return name;
+}
+
+void DeckCard::expect_end() {
+  if (!more()) return;
+  if (subject_.empty()) subject_ = card_name();
+  const SourceSpan where = next();
+  const std::string_view text = next_text().substr(0, 40);
+  const std::string w = peek_word();
+  if (w == "scale") fail_at(where, "\"scale\" must precede \"output\"");
+  fail_at(where, "unexpected argument \"" + std::string(text) + "\"");
+}
+
+void DeckCard::set_current(const std::string& name, double value) {
+  deck_.session.currents[name] = value;
+}
+const Registry& DeckCard::registry() const { return deck_.registry; }
+ModelBuilder& DeckCard::builder() { return deck_.builder; }
+
+}  // namespace mbcosim

@@ -1,0 +1,193 @@
+/// The arguments of one statement as the readers of cards see them: `Card` over a cursor and the
+/// deck read so far.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "input/cursor.h"
+#include "model/card.h"
+
+namespace mbcosim {
+
+struct Deck;
+
+class DeckCard final : public Card {
+ public:
+  DeckCard(Deck& deck, const Statement& statement);
+
+  bool keyword(std::string_view word) override;
+  int one_of(std::initializer_list<std::string_view> words) override;
+  int required(std::string_view what, std::initializer_list<std::string_view> words) override;
+  std::string peek_word() override;
+  std::string word(std::string_view what) override;
+  bool more() override;
+  bool at_string() override;
+
+  double real(std::string_view what, double fallback = 0) override;
+  int integer(std::string_view what, int fallback = 0) override;
+  int label(std::string_view what) override;
+  bool yes_no(std::string_view what) override;
+  std::string quoted(std::string_view what) override;
+  std::string file_contents(std::string_view what, std::string* name) override;
+
+  Vec3 vec3(std::string_view what) override;
+  Vec6 vec6(std::string_view what) override;
+  Mat3 mat3(std::string_view what) override;
+  Mat6 mat6(std::string_view what) override;
+  MatX mat6xn(std::string_view what, int columns) override;
+  MatX numbers(std::string_view what, int rows, int columns) override;
+  Mat3 orientation(std::string_view what) override;
+  OrientationDescription orientation_description() override;
+
+  Vec3 absolute_position(std::string_view what, int context = -1) override;
+  Mat3 absolute_orientation(std::string_view what, int context = -1) override;
+  Vec3 absolute_velocity(std::string_view what, const Vec3& at) override;
+  Vec3 absolute_angular_velocity(std::string_view what) override;
+  Vec3 absolute_vector(std::string_view what) override;
+  Vec3 relative_position(std::string_view what, int node,
+                         const OtherNode* other = nullptr) override;
+  Mat3 relative_orientation(std::string_view what, int node,
+                            const OtherNode* other = nullptr) override;
+  Vec3 relative_vector(std::string_view what, int node) override;
+  Vec3 relative_unit_vector(std::string_view what, int node) override;
+  Vec3 absolute_unit_vector(std::string_view what) override;
+  Mat3 relative_tensor(std::string_view what, int node) override;
+
+  DrivePtr drive(std::string_view what = "drive") override;
+  Vec3DrivePtr vec3_drive(std::string_view what = "vector drive", int node = -1) override;
+  TplDrivePtr<6> vec6_drive(std::string_view what = "vector drive") override;
+  LawPtr<1> law1() override;
+  LawPtr<3> law3() override;
+  LawPtr<6> law6() override;
+  ScalarFunctionPtr scalar_function(std::string_view what = "scalar function") override;
+  FluidPtr fluid() override;
+  FileDriverPtr file_driver() override;
+  DrivePtr string_expression(const std::string& text) override;
+  ExpressionPtr expression_of(const std::string& text,
+                              const std::vector<std::string>& names) override;
+  void set_current(const std::string& name, double value) override;
+
+  int structural_node(NodeNeed need = NodeNeed::six_dof) override;
+  int scalar_node(ScalarKind kind) override;
+  NodeDof node_dof(bool with_order) override;
+  ElementRef element(Family family) override;
+  Family element_family(std::string_view what) override;
+
+  const Registry& registry() const override;
+  ModelBuilder& builder() override;
+  SourceSpan last() const override { return cursor_.last(); }
+  SourceSpan next() override { return cursor_.next(); }
+  [[noreturn]] void fail_at(SourceSpan where, const std::string& message,
+                            const std::string& hint = "") override;
+  void warn_at(SourceSpan where, const std::string& message, const std::string& hint = "") override;
+  void warn(const std::string& message, const std::string& hint = "") override;
+
+  // ---- for the readers of blocks
+  void note(const std::string& message);  ///< of the whole card, not of an argument
+  std::string card_name() const;          ///< as it is written: "max iterations"
+  Deck& deck() { return deck_; }
+  const Statement& statement() const { return statement_; }
+  /// The whole card word, for messages about the statement.
+  SourceSpan head() const;
+  /// What messages begin with: "joint 3 (revolute hinge)".
+  void set_subject(std::string subject, std::string type = "");
+  const std::string& subject() const { return subject_; }
+  bool at_empty() { return more() && cursor_.at_empty(); }
+  /// The entity that this statement defines; when it is refused, errors that follow from that are
+  /// not reported.
+  void set_defining(std::string kind, int label = -1);
+  const std::string& defined_kind() const { return defined_kind_; }
+  int defined_label() const { return defined_label_; }
+  std::string_view next_text();            ///< the next argument as it is written
+  void skip();                             ///< the next argument
+  FileDriverPtr file_driver_definition();  ///< `<type>, ...` of a `file` card
+  void read_function_definition();         ///< `"<name>", <definition>` of a `scalar function` card
+  /// Refuses arguments that nobody read.
+  void expect_end();
+  /// For `driven`: what follows, as a statement of its own.
+  Statement rest_as_statement() { return cursor_.rest_as_statement(); }
+  /// A count: an integer >= 0, 0 when empty.
+  int count(std::string_view what);
+  /// An integer or real > 0 (or >= `least`).
+  double real_above(std::string_view what, double bound, bool inclusive);
+  int integer_at_least(std::string_view what, int least);
+  /// `name, "<text>"` when it is there.
+  std::string optional_name();
+  /// Vector, orientation or number for a `template drive caller`; see template_drive_reader.cpp.
+  TplDrivePtr<1> scalar_template_drive();
+  TplDrivePtr<3, 3> mat3_drive(std::string_view what);
+  TplDrivePtr<6, 6> mat6_drive(std::string_view what);
+  Value value(std::string_view what);
+
+ private:
+  /// A frame in which an entity is given: axes, origin and motion, all global.
+  struct Frame {
+    Vec3 x = Vec3::Zero();
+    Mat3 R = Mat3::Identity();
+    Vec3 v = Vec3::Zero(), w = Vec3::Zero();
+  };
+  enum class Entity { position, orientation, other };
+  enum class Prefix {
+    none,
+    node,
+    global,
+    local,
+    frame,
+    other_node,
+    other_position,
+    other_orientation
+  };
+  /// `reference, ...` before an entity, with its frame.
+  struct Reference {
+    Prefix prefix = Prefix::none;
+    Frame frame;  ///< of `<label>`
+    Mat3 local = Mat3::Identity();
+  };
+
+  void need_argument(std::string_view what);
+  void consumed();
+  /// The next argument is a word of the language but no variable: refused where a number is
+  /// expected.
+  void refuse_word(std::string_view what);
+  double component(std::string_view what, int index);
+  template <class V>
+  V vector(std::string_view what);
+  template <class M>
+  void matrix_body(std::string_view what, bool allow_skew, M& m);
+  void scale(std::string_view what, double& factor);
+  Mat3 two_vectors(std::string_view what);
+  Mat3 matrix_orientation(std::string_view what);
+  Vec3 angles(std::string_view what);
+
+  Frame node_frame(int node) const;
+  Frame frame_of_label();
+  Reference reference_prefix(Entity entity, const OtherNode* other);
+  Vec3 free_vector(std::string_view what, int context, bool relative);
+  Vec3 unit(std::string_view what, const Vec3& v);
+
+  DrivePtr constant_drive(std::string_view what);
+  template <int N>
+  LawPtr<N> law_of();
+  ScalarFunctionPtr function_definition(const std::string& name, SourceSpan where);
+  template <int R, int C, class ReadEntity>
+  TplDrivePtr<R, C> template_drive(std::string_view what, ReadEntity read);
+  template <int R, int C>
+  TplDrivePtr<R, C> component_drive(std::string_view what);
+  template <class Table>
+  [[noreturn]] void fail_word(std::string_view what, const std::string& word, const Table& table,
+                              const std::string& context);
+
+  NodeDof structural_dof(int label, SourceSpan where);
+  void read_order(NodeDof& dof, bool dynamic);
+
+  Deck& deck_;
+  Statement statement_;
+  Cursor cursor_;
+  std::string subject_, type_, defined_kind_;
+  int defined_label_ = -1;
+  std::string peeked_;
+  bool has_peeked_ = false;
+};
+
+}  // namespace mbcosim

@@ -1,0 +1,252 @@
+#include "input/deck_reader.h"
+
+#include "input/cards.h"
+#include "input/suggest.h"
+
+namespace mbcosim {
+
+namespace {
+
+constexpr const char* kBlockNames[] = {"",      "data",    "initial value", "control data",
+                                       "nodes", "drivers", "elements",      ""};
+
+/// Is there anything but blanks and comments in `text`, other than a `parallel` block?
+bool has_content(std::string_view text) {
+  std::size_t i = 0;
+  while (i < text.size()) {
+    if (std::isspace(static_cast<unsigned char>(text[i]))) {
+      ++i;
+    } else if (text[i] == '#') {
+      i = std::min(text.find('\n', i), text.size());
+    } else if (text.substr(i, 2) == "/*") {
+      const std::size_t end = text.find("*/", i + 2);
+      if (end == std::string_view::npos) return true;
+      i = end + 2;
+    } else {
+      return !normalized(text.substr(i, 40)).starts_with("begin:parallel;");
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+void DeckReader::record(const DeckError& error, const DeckCard& card) {
+  deck_.session.report(error.diagnostic);
+  if (!card.defined_kind().empty()) deck_.damage(card.defined_kind(), card.defined_label());
+}
+
+void DeckReader::read() {
+  Session& session = deck_.session;
+  while (!done_ && !session.full() && !session.exited && !deck_.inverse_dynamics) {
+    const std::optional<Statement> statement = statements_.next();
+    if (!statement) break;
+    session.set_trail(statement->trail);
+    read_statement(*statement);
+    if (done_) warn_about_rest(*statement);
+  }
+  session.set_trail(-1);
+  if (!session.full() && !session.exited && !deck_.inverse_dynamics) finish();
+}
+
+void DeckReader::read_statement(const Statement& statement) {
+  Session& session = deck_.session;
+  DeckCard card(deck_, statement);
+  try {
+    dispatch(card);
+  } catch (const DeckError& error) {
+    record(error, card);
+  } catch (const std::exception& error) {
+    record(DeckError(session.diagnostic(
+               Severity::error, "error", card.last(),
+               card.subject().empty() ? error.what() : card.subject() + ": " + error.what())),
+           card);
+  }
+  session.set_damaged(false);
+  session.currents.clear();
+}
+
+void DeckReader::dispatch(DeckCard& card) {
+  const std::string& word = card.statement().word;
+  if (word == "begin") return begin(card);
+  if (word == "end") return end(card);
+  if (block_ == Block::foreign) return;
+  if (read_anywhere_card(card)) return;
+  switch (block_) {
+    case Block::data:
+      return read_data_card(card);
+    case Block::initial_value:
+      return read_initial_value_card(card);
+    case Block::control_data:
+      return read_control_card(card);
+    case Block::nodes:
+      return read_node_card(card);
+    case Block::drivers:
+      return read_driver_card(card);
+    case Block::elements:
+      return read_element_card(card);
+    default:
+      break;
+  }
+  fail_unknown_card(
+      card, {"begin", "set", "include", "remark", "reference", "scalar function", "drive caller",
+             "constitutive law", "hydraulic fluid", "template drive caller", "print symbol table"});
+}
+
+// ------------------------------------------------------------------------------------------------
+// blocks
+
+void DeckReader::open(Block block, const std::string& name, SourceSpan where) {
+  block_ = latest_ = block;
+  name_ = name;
+  begun_ = where;
+}
+
+void DeckReader::close() {
+  if (block_ == Block::initial_value)
+    deck_.session.start_run_variables(deck_.builder.model().initial_value.initial_time);
+  if (block_ == Block::elements) done_ = true;
+  block_ = Block::none;
+}
+
+/// Blocks that must stand before `block` and were not met.
+void DeckReader::check_order(DeckCard& card, Block block) {
+  if (block <= latest_) {
+    card.fail(
+        block == latest_
+            ? "block \"" + std::string(kBlockNames[static_cast<int>(block)]) + "\" occurs twice"
+            : "block \"" + std::string(kBlockNames[static_cast<int>(block)]) +
+                  "\" must stand before block \"" + kBlockNames[static_cast<int>(latest_)] + "\"");
+  }
+  const Block last_required = std::min(block, Block::nodes);
+  for (int b = static_cast<int>(latest_) + 1; b < static_cast<int>(last_required); ++b) {
+    deck_.session.report(
+        deck_.session.diagnostic(Severity::error, "block-order", card.last(),
+                                 std::string("block \"") + kBlockNames[b] + "\" expected"));
+    return;
+  }
+}
+
+void DeckReader::begin(DeckCard& card) {
+  Session& session = deck_.session;
+  if (!card.more()) card.fail("name of the block missing");
+  const SourceSpan where = card.next();
+  const std::string name = card.word("block");
+  if (block_ != Block::none) {
+    session.report(session.diagnostic(
+        Severity::error, "block", card.head(),
+        "block \"" + name_ + "\" begun at line " + std::to_string(begun_.line) + " is not closed"));
+    close();
+    done_ = false;
+  }
+  const std::string word = name == "multistep" ? "initialvalue" : name;
+  Block block = Block::foreign;
+  for (int b = 1; b <= static_cast<int>(Block::elements); ++b)
+    if (normalized(kBlockNames[b]) == word) block = static_cast<Block>(b);
+  if (block == Block::foreign) {
+    const Block latest = latest_;
+    open(block, name, card.head());
+    latest_ = latest;
+    card.fail_at(where, "unknown block \"" + name + "\"",
+                 suggestion(name, {"data", "initial value", "control data", "nodes", "drivers",
+                                   "elements"}));
+  }
+  const std::string written = kBlockNames[static_cast<int>(block)];
+  const Block latest = latest_;
+  try {
+    check_order(card, block);
+  } catch (const DeckError&) {
+    open(block, written, card.head());
+    latest_ = std::max(latest, block);
+    throw;
+  }
+  open(block, written, card.head());
+  if (card.more()) card.fail_at(card.next(), "unexpected argument after \"" + written + "\"");
+}
+
+void DeckReader::end(DeckCard& card) {
+  if (!card.more()) card.fail("name of the block missing");
+  const std::string name = card.word("block");
+  if (block_ == Block::none) card.fail("\"end: " + name + "\" without its \"begin\"");
+  const std::string open_name = name_, line = std::to_string(begun_.line);
+  const bool same =
+      normalized(name_) == name || (block_ == Block::initial_value && name == "multistep");
+  const SourceSpan where = card.head();
+  close();
+  if (!same) {
+    done_ = false;
+    card.fail_at(where, "block \"" + open_name + "\" (begun at line " + line +
+                            ") closed by \"end: " + name + "\"");
+  }
+  if (card.more()) card.fail_at(card.next(), "unexpected argument after \"" + open_name + "\"");
+}
+
+void DeckReader::warn_about_rest(const Statement& last) {
+  Session& session = deck_.session;
+  if (last.file != 0) return;
+  const std::string& text = session.file(0).text;
+  const std::size_t after = std::min(text.find(';', last.offset + last.text.size()), text.size());
+  if (after < text.size() && has_content(std::string_view(text).substr(after + 1)))
+    session.warn(session.span(0, last.offset, last.text.size()),
+                 "text after the last block is ignored");
+}
+
+// ------------------------------------------------------------------------------------------------
+// end of the deck
+
+void DeckReader::check_counts() {
+  Session& session = deck_.session;
+  std::string missing;
+  for (int k = 0; k < kKinds; ++k) {
+    const Count& count = deck_.counts[k];
+    const int lack = count.declared ? *count.declared - count.found : 0;
+    if (lack <= 0) continue;
+    const KindNames& names = kind_names(static_cast<Kind>(k));
+    missing += (missing.empty() ? "" : ", ") + std::to_string(lack) + " " +
+               (lack == 1 ? names.singular : names.plural);
+  }
+  if (!missing.empty())
+    session.report(session.diagnostic(Severity::error, "missing-entities", begun_,
+                                      "end of the deck: " + missing + " missing",
+                                      "see the counts of the control data"));
+}
+
+void DeckReader::check_parameters() {
+  Session& session = deck_.session;
+  const std::vector<ScalarNode>& scalars = deck_.builder.model().scalars;
+  for (std::size_t i = 0; i < scalars.size(); ++i)
+    if (scalars[i].bound_to_element && !deck_.bound_parameters.count(static_cast<int>(i)))
+      session.report(session.diagnostic(
+          Severity::error, "unbound-parameter", scalars[i].where,
+          "parameter node " + std::to_string(scalars[i].label) + " is bound to no element",
+          "add a \"bind\" card to the elements"));
+}
+
+void DeckReader::finish() {
+  Session& session = deck_.session;
+  if (block_ != Block::none) {
+    session.report(session.diagnostic(
+        Severity::error, "end-of-file", begun_,
+        "end of file in block \"" + name_ + "\" begun at line " + std::to_string(begun_.line)));
+    return;
+  }
+  if (latest_ == Block::none) return;  // a deck without blocks: a calculator
+  if (latest_ < Block::control_data) {
+    session.report(session.diagnostic(Severity::error, "block-order", begun_,
+                                      std::string("block \"") +
+                                          kBlockNames[static_cast<int>(latest_) + 1] +
+                                          "\" expected, end of file found"));
+    return;
+  }
+  check_counts();
+  check_parameters();
+  Model& model = deck_.builder.model();
+  const InitialValueSettings& iv = model.initial_value;
+  if (iv.final_time < iv.initial_time && deck_.final_time_where.file >= 0)
+    session.warn(deck_.final_time_where,
+                 "final time is before the initial time: there is nothing to integrate");
+  if (model.control.output_drives)
+    for (const int d : deck_.drives_without_output) model.drives[d].output_value = true;
+}
+
+}  // namespace mbcosim

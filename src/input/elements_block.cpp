@@ -1,0 +1,352 @@
+/// Cards of the `elements` block: any element by its head, `driven`, `bind`, `output`.
+#include <map>
+
+#include "input/cards.h"
+#include "input/deck.h"
+#include "input/suggest.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// Every statement head that MBDyn counts as an element, served here or not.
+const std::map<std::string, Family, std::less<>>& families_by_head() {
+  static const std::map<std::string, Family, std::less<>> kHeads = {
+      {"body", Family::body},
+      {"joint", Family::joint},
+      {"jointregularization", Family::joint_regularization},
+      {"beam", Family::beam},
+      {"beam2", Family::beam},
+      {"beam3", Family::beam},
+      {"hbeam", Family::beam},
+      {"membrane4eas", Family::plate},
+      {"shell4eas", Family::plate},
+      {"shell4easans", Family::plate},
+      {"force", Family::force},
+      {"couple", Family::force},
+      {"genel", Family::genel},
+      {"hydraulic", Family::hydraulic},
+      {"electric", Family::electric},
+      {"thermal", Family::thermal},
+      {"bulk", Family::bulk},
+      {"gravity", Family::gravity},
+      {"airproperties", Family::air_properties},
+      {"aerodynamicbody", Family::aerodynamic},
+      {"aerodynamicbeam", Family::aerodynamic},
+      {"aerodynamicbeam2", Family::aerodynamic},
+      {"aerodynamicbeam3", Family::aerodynamic},
+      {"aircraftinstruments", Family::aerodynamic},
+      {"genericaerodynamicforce", Family::aerodynamic},
+      {"inducedvelocity", Family::induced_velocity},
+      {"rotor", Family::induced_velocity},
+      {"aeromodal", Family::aeromodal},
+      {"userdefined", Family::loadable},
+      {"loadable", Family::loadable},
+      {"outputelement", Family::output_element},
+      {"streamoutput", Family::output_element},
+      {"streammotionoutput", Family::output_element},
+      {"rtaioutput", Family::output_element},
+      {"inertia", Family::inertia},
+      {"automaticstructural", Family::automatic_structural},
+  };
+  return kHeads;
+}
+
+/// What `driven` gives to its inner element.
+struct Driven {
+  DrivePtr drive;
+  std::vector<std::string> hints;
+  int label = -1;
+};
+
+std::string quoted_display(const Registry& registry, const std::string& word) {
+  const auto shown = registry.display.find(word);
+  return "\"" + (shown == registry.display.end() ? word : shown->second) + "\"";
+}
+
+[[noreturn]] void fail_unknown_head(DeckCard& card) {
+  const Registry& registry = card.registry();
+  std::vector<std::string> accepted = {"driven", "bind", "output"};
+  for (const auto& head : registry.heads) accepted.push_back(registry.display.at(head.first));
+  const auto group = registry.not_supported.find("elements");
+  if (group != registry.not_supported.end()) {
+    const std::string& word = card.statement().word;
+    if (const auto entry = group->second.find(word); entry != group->second.end())
+      card.fail_at(card.head(), quoted_display(registry, word) + " (" + entry->second +
+                                    ") is not supported yet");
+  }
+  fail_unknown_card(card, accepted);
+}
+
+/// The reader of a head with types: consumes the type word.
+const Registry::ElementReader& typed_reader(DeckCard& card, const Registry::Head& head,
+                                            ElementInfo& info) {
+  const Registry& registry = card.registry();
+  const std::string& word = card.statement().word;
+  const std::string what = word + " type";
+  if (!card.more()) card.fail(what + " missing");
+  const SourceSpan where = card.next();
+  const std::string type = card.peek_word();
+  const auto reader = head.types.find(type);
+  if (reader != head.types.end()) {
+    card.skip();
+    info.type = registry.display.at(type);
+    return reader->second;
+  }
+  if (type.empty()) card.fail_at(where, what + " expected");
+  if (const auto group = registry.not_supported.find(word); group != registry.not_supported.end())
+    if (group->second.count(type))
+      card.fail_at(where, quoted_display(registry, type) + " (" + group->second.at(type) +
+                              ") is not supported yet");
+  std::vector<std::string> accepted;
+  for (const auto& t : head.types) accepted.push_back(registry.display.at(t.first));
+  card.fail_at(where, "unknown " + what + " \"" + type + "\"", suggestion(type, accepted));
+}
+
+/// Label, duplicates, count and name: what all elements begin with.
+void read_element_head(DeckCard& card, Family family, bool has_label, const Driven* driven,
+                       ElementInfo& info) {
+  const char* name = family_name(family);
+  info.family = family;
+  info.where = card.head();
+  info.output = card.deck().output.family[static_cast<int>(family)];
+  card.set_defining(name);
+  card.set_subject(name);
+  if (has_label) {
+    info.label = card.label("label");
+    card.set_defining(name, info.label);
+    if (driven && info.label != driven->label) {
+      card.set_subject("");
+      card.fail("inner label " + std::to_string(info.label) + " differs from driven label " +
+                std::to_string(driven->label));
+    }
+    if (const ElementRef before = card.model().find_element(family, info.label); before.set) {
+      card.set_subject("");
+      card.deck().redefined(card, name, info.label, before.set->info(before.index).where);
+    }
+    card.set_subject(std::string(name) + " " + std::to_string(info.label));
+  }
+  if (driven) {
+    info.driven = driven->drive;
+    info.hints = driven->hints;
+  }
+}
+
+/// The trailing `output` option applies to what the reader added (after `before` elements).
+void read_trailing_output(DeckCard& card, Family family, std::size_t before) {
+  Model& model = card.model();
+  if (card.peek_word() != "output") return;
+  const bool fallback = card.deck().output.family[static_cast<int>(family)];
+  bool output = fallback;
+  read_output_option(card, fallback, output);
+  for (std::size_t i = before; i < model.elements.size(); ++i)
+    model.elements[i].set->info(model.elements[i].index).output = output;
+}
+
+void read_element(DeckCard& card, const Driven* driven = nullptr) {
+  const Registry& registry = card.registry();
+  const std::string word = card.statement().word;
+  const auto family = families_by_head().find(word);
+  const auto head = registry.heads.find(word);
+  if (head == registry.heads.end() && family == families_by_head().end()) fail_unknown_head(card);
+  const Family f = head != registry.heads.end() ? head->second.family : family->second;
+  const bool has_label =
+      head != registry.heads.end() ? head->second.has_label : f != Family::air_properties;
+  ElementInfo info;
+  read_element_head(card, f, has_label, driven, info);
+  const bool counted_later = f == Family::inertia;  // counts only with `output, always`
+  const std::string subject = card.subject();
+  if (!counted_later) card.deck().take(card, kind_of(f), info.label);
+  card.set_subject(subject);
+  if (head == registry.heads.end()) fail_unknown_head(card);
+  info.name = card.optional_name();
+  const Registry::ElementReader& reader =
+      head->second.types.empty() ? head->second.reader : typed_reader(card, head->second, info);
+  if (info.type.empty()) info.type = registry.display.at(word);
+  if (!head->second.types.empty()) card.set_subject(subject + " (" + info.type + ")", info.type);
+  const std::size_t before = card.model().elements.size();
+  reader(card, info);
+  read_trailing_output(card, f, before);
+  card.expect_end();
+  if (counted_later && card.model().elements.size() > before)
+    card.deck().take(card, kind_of(f), info.label);
+}
+
+// ------------------------------------------------------------------------------------------------
+// driven
+
+void drive_existing(DeckCard& card, const Driven& driven) {
+  const Family family = card.element_family("element type");
+  const int label = card.label("label");
+  if (label != driven.label)
+    card.fail("inner label " + std::to_string(label) + " differs from driven label " +
+              std::to_string(driven.label));
+  const ElementRef e = card.model().find_element(family, label);
+  if (!e.set) card.deck().undefined(card, family_name(family), label);
+  ElementInfo& info = e.set->info(e.index);
+  if (info.driven)
+    card.fail(std::string(family_name(family)) + " " + std::to_string(label) +
+              " is driven already");
+  read_output_option(card, info.output, info.output);
+  card.expect_end();
+  info.driven = driven.drive;
+  info.hints = driven.hints;
+  info.active_memory = card.builder().allocate_memory(1, 1);
+  card.model().has_driven = true;
+}
+
+void read_driven(DeckCard& card) {
+  Driven driven;
+  card.set_subject("driven");
+  driven.label = card.label("label");
+  card.set_subject("driven " + std::to_string(driven.label));
+  driven.drive = card.drive();
+  while (card.keyword("hint")) {
+    do driven.hints.push_back(card.quoted("hint"));
+    while (card.at_string());
+  }
+  if (!card.more())
+    card.fail("inner element missing", "e.g. driven: 1, <drive>, joint: 1, clamp, ...");
+  DeckCard inner(card.deck(), card.rest_as_statement());
+  if (inner.statement().word == "existing") {
+    drive_existing(inner, driven);
+    return;
+  }
+  if (const auto family = families_by_head().find(inner.statement().word);
+      family != families_by_head().end())
+    card.set_defining(family_name(family->second), driven.label);
+  read_element(inner, &driven);
+}
+
+// ------------------------------------------------------------------------------------------------
+// bind
+
+/// A private datum of an element as a drive.
+class ElementDatum final : public Drive {
+ public:
+  ElementDatum(ElementRef element, int datum) : element_(element), datum_(datum) {}
+  double value(const EvalContext& context, double) const override {
+    return element_.set->private_value(context, element_.index, datum_);
+  }
+
+ private:
+  ElementRef element_;
+  int datum_;
+};
+
+/// Strain of a gage on a beam section: ε₁ + z κ₂ − y κ₃.
+class BeamGage final : public Drive {
+ public:
+  BeamGage(ElementRef beam, const int (&data)[3], double y, double z) : beam_(beam), y_(y), z_(z) {
+    std::copy(data, data + 3, data_);
+  }
+  double value(const EvalContext& context, double) const override {
+    const auto datum = [&](int k) {
+      return beam_.set->private_value(context, beam_.index, data_[k]);
+    };
+    return datum(0) + z_ * datum(1) - y_ * datum(2);
+  }
+
+ private:
+  ElementRef beam_;
+  int data_[3];  ///< of ε₁, κ₂, κ₃
+  double y_, z_;
+};
+
+std::string element_name(DeckCard& card, ElementRef e) { return card.model().element_text(e); }
+
+DrivePtr gage_drive(DeckCard& card, ElementRef e, const ScalarNode& node,
+                    const std::string& prefix) {
+  int data[3];
+  const char* names[] = {"ex", "ky", "kz"};
+  for (int k = 0; k < 3; ++k) {
+    data[k] = e.set->private_datum(e.index, prefix + names[k]);
+    if (data[k] < 0)
+      card.fail(element_name(card, e) + " has no private datum \"" + prefix + names[k] + "\"");
+  }
+  return std::make_shared<BeamGage>(e, data, node.gage_y, node.gage_z);
+}
+
+DrivePtr read_datum(DeckCard& card, ElementRef e, const ScalarNode& node) {
+  if (card.one_of({"string", "name"}) >= 0) {
+    const std::string name = card.quoted("private datum");
+    if (node.gage) return gage_drive(card, e, node, name);
+    const int datum = e.set->private_datum(e.index, name);
+    if (datum < 0)
+      card.fail(element_name(card, e) + " has no private datum \"" + name + "\"",
+                suggestion(name, e.set->private_data(e.index)));
+    return std::make_shared<ElementDatum>(e, datum);
+  }
+  card.keyword("index");
+  const int n = card.integer("index of the private datum");
+  if (node.gage)
+    return gage_drive(card, e, node,
+                      e.set->private_datum(e.index, "ex") >= 0 ? ""
+                      : n == 1                                 ? "pI."
+                                                               : "pII.");
+  const std::vector<std::string> names = e.set->private_data(e.index);
+  if (n < 1 || n > static_cast<int>(names.size()))
+    card.fail(element_name(card, e) + " has " + std::to_string(names.size()) +
+              " private data; index " + std::to_string(n));
+  return std::make_shared<ElementDatum>(e, e.set->private_datum(e.index, names[n - 1]));
+}
+
+void read_bind(DeckCard& card) {
+  card.set_subject("bind");
+  if (card.peek_word() == "airproperties")
+    card.fail_at(card.next(), "\"air properties\" (aerodynamics) is not supported yet");
+  const int label = card.label("element label");
+  const Family family = card.element_family("element type");
+  const ElementRef e = card.model().find_element(family, label);
+  if (!e.set) card.deck().undefined(card, family_name(family), label);
+  const int index = card.scalar_node(ScalarKind::parameter);
+  ScalarNode& node = card.model().scalars[index];
+  if (!node.bound_to_element)
+    card.fail("parameter node " + std::to_string(node.label) + " is not of kind \"element\"",
+              "declare it as: parameter: " + std::to_string(node.label) + ", element");
+  if (!card.deck().bound_parameters.insert(index).second)
+    card.fail("parameter node " + std::to_string(node.label) + " is bound already");
+  DrivePtr value = read_datum(card, e, node);
+  card.expect_end();
+  node.binding = std::move(value);
+}
+
+// ------------------------------------------------------------------------------------------------
+// output
+
+void read_output_card(DeckCard& card) {
+  const Family family = card.element_family("element type");
+  Model& model = card.model();
+  read_output_labels(card, [&](int first, int last) {
+    if (first == last) {
+      const ElementRef e = model.find_element(family, first);
+      if (e.set)
+        e.set->info(e.index).output = true;
+      else
+        card.warn(std::string(family_name(family)) + " " + std::to_string(first) +
+                  " is not defined");
+      return;
+    }
+    for (const ElementRef& e : model.elements) {
+      ElementInfo& info = e.set->info(e.index);
+      if (info.family == family && info.label >= first && info.label <= last) info.output = true;
+    }
+  });
+  card.expect_end();
+}
+
+}  // namespace
+
+void read_element_card(DeckCard& card) {
+  const std::string& word = card.statement().word;
+  if (word == "driven")
+    read_driven(card);
+  else if (word == "bind")
+    read_bind(card);
+  else if (word == "output")
+    read_output_card(card);
+  else
+    read_element(card);
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,204 @@
+/// Cards of the `nodes` block: scalar nodes, the `output` card.
+#include <cmath>
+
+#include "input/cards.h"
+#include "input/deck.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// Copies a degree of freedom into a parameter node every `period` seconds and holds it in between.
+class SampleAndHold final : public StepListener {
+ public:
+  SampleAndHold(NodeDof dof, double period, int value, int next)
+      : dof_(dof), period_(period), value_(value), next_(next) {}
+  void advance(const EvalContext& context, State& state, bool initial) const override {
+    double& next = state.memory[next_];
+    if (initial) next = context.time;
+    if (context.time < next - 1e-9 * period_) return;
+    state.memory[value_] = context.model->dof_value(context, dof_);
+    next += period_ * std::max(1.0, std::floor((context.time - next) / period_ + 1 + 1e-9));
+  }
+
+ private:
+  NodeDof dof_;
+  double period_;  ///< [s]
+  int value_;      ///< memory slot of the node's value
+  int next_;       ///< memory slot of the next sampling time
+};
+
+/// `[ value , ] x [ , derivative , xp ]`; nothing at all is 0.
+void read_initial_value(DeckCard& card, ScalarNode& node, bool derivative) {
+  const std::string w = card.peek_word();
+  if (!card.more() || w == "output" || w == "scale") return;
+  card.keyword("value");
+  node.value = card.real("value");
+  if (!card.keyword("derivative")) return;
+  if (!derivative) card.fail("only a differential node has a derivative");
+  node.rate = card.real("derivative");
+}
+
+struct Sampling {
+  NodeDof dof;
+  double period = 0;  ///< 0: none
+};
+
+Sampling read_parameter(DeckCard& card, ScalarNode& node) {
+  Sampling sampling;
+  node.differential = false;
+  switch (card.one_of({"element", "sample and hold", "beam strain gage"})) {
+    case 0:
+      node.bound_to_element = true;
+      break;
+    case 1:
+      sampling.dof = card.node_dof(false);
+      sampling.period = card.real_above("period", 0, false);
+      break;
+    case 2:
+      node.bound_to_element = true;
+      node.gage = 1;
+      node.gage_y = card.real("y");
+      node.gage_z = card.real("z");
+      break;
+    default:
+      read_initial_value(card, node, false);
+  }
+  return sampling;
+}
+
+void read_output_card(DeckCard& card) {
+  const int type = card.required(
+      "node type", {"structural", "abstract", "electric", "hydraulic", "thermal", "parameter"});
+  Model& model = card.model();
+  const bool accelerations = type == 0 && card.keyword("accelerations");
+  const auto mark_structural = [&](StructuralNode& node) {
+    node.output = true;
+    node.accelerations |= accelerations;
+  };
+  read_output_labels(card, [&](int first, int last) {
+    if (first == last) {
+      const int index = type == 0 ? model.find_structural(first)
+                                  : model.find_scalar(static_cast<ScalarKind>(type - 1), first);
+      if (index < 0)
+        card.warn(
+            std::string(type == 0 ? "structural" : kind_name(static_cast<ScalarKind>(type - 1))) +
+            " node " + std::to_string(first) + " is not defined");
+      else if (type == 0)
+        mark_structural(model.structural[index]);
+      else
+        model.scalars[index].output = true;
+      return;
+    }
+    const auto in_range = [&](int label) { return label >= first && label <= last; };
+    if (type == 0) {
+      for (StructuralNode& node : model.structural)
+        if (in_range(node.label)) mark_structural(node);
+    } else {
+      for (ScalarNode& node : model.scalars)
+        if (node.kind == static_cast<ScalarKind>(type - 1) && in_range(node.label))
+          node.output = true;
+    }
+  });
+  card.expect_end();
+}
+
+template <class Node>
+int begin_node(DeckCard& card, Kind kind, Node& node, int existing(const Model&, int),
+               SourceSpan where(const Model&, int)) {
+  const char* name = kind_names(kind).singular;
+  card.set_defining(name);
+  card.set_subject(name);
+  const int label = card.label("label");
+  card.set_defining(name, label);
+  card.set_subject("");
+  if (const int index = existing(card.model(), label); index >= 0)
+    card.deck().redefined(card, name, label, where(card.model(), index));
+  card.deck().take(card, kind, label);
+  card.set_subject(std::string(name) + " " + std::to_string(label));
+  node.where = card.head();
+  node.name = card.optional_name();
+  return label;
+}
+
+template <ScalarKind kind>
+void read_scalar_card(DeckCard& card) {
+  ScalarNode node;
+  node.kind = kind;
+  node.label = begin_node(
+      card, kind_of(kind), node, [](const Model& m, int l) { return m.find_scalar(kind, l); },
+      [](const Model& m, int i) { return m.scalars[i].where; });
+  read_scalar_node(card, kind, std::move(node));
+}
+
+}  // namespace
+
+void read_scalar_node(DeckCard& card, ScalarKind kind, ScalarNode node) {
+  Deck& deck = card.deck();
+  const int k = static_cast<int>(kind);
+  node.output = deck.output.scalar[k];
+  node.scale = deck.scalar_scale[k];
+  Sampling sampling;
+  if (kind == ScalarKind::parameter) {
+    sampling = read_parameter(card, node);
+  } else {
+    node.differential = kind != ScalarKind::hydraulic;
+    if (kind == ScalarKind::abstract)
+      node.differential = card.one_of({"differential", "algebraic"}) != 1;
+    read_initial_value(card, node, node.differential);
+    if (card.keyword("scale"))
+      node.scale = card.keyword("default") ? deck.scalar_scale[k] : card.real("scale", 1);
+  }
+  read_output_option(card, deck.output.scalar[k], node.output);
+  card.expect_end();
+  const int index = card.builder().add_scalar(std::move(node));
+  if (sampling.period > 0)
+    card.builder().on_step(std::make_shared<SampleAndHold>(sampling.dof, sampling.period,
+                                                           card.model().scalars[index].memory,
+                                                           card.builder().allocate_memory(1)));
+}
+
+void read_node_card(DeckCard& card) {
+  const std::string& word = card.statement().word;
+  if (word == "structural") {
+    StructuralNode node;
+    const int label = begin_node(
+        card, Kind::structural_node, node,
+        [](const Model& m, int l) { return m.find_structural(l); },
+        [](const Model& m, int i) { return m.structural[i].where; });
+    read_structural_node(card, label, std::move(node));
+  } else if (word == "abstract") {
+    read_scalar_card<ScalarKind::abstract>(card);
+  } else if (word == "electric") {
+    read_scalar_card<ScalarKind::electric>(card);
+  } else if (word == "hydraulic") {
+    read_scalar_card<ScalarKind::hydraulic>(card);
+  } else if (word == "thermal") {
+    read_scalar_card<ScalarKind::thermal>(card);
+  } else if (word == "parameter") {
+    read_scalar_card<ScalarKind::parameter>(card);
+  } else if (word == "output") {
+    read_output_card(card);
+  } else {
+    fail_unknown_card(card, {"structural", "abstract", "electric", "hydraulic", "thermal",
+                             "parameter", "output"});
+  }
+}
+
+void read_driver_card(DeckCard& card) {
+  Deck& deck = card.deck();
+  if (card.statement().word != "file") fail_unknown_card(card, {"file"});
+  card.set_defining("file driver");
+  const int label = card.label("file driver label");
+  card.set_defining("file driver", label);
+  if (const auto found = deck.file_drivers.find(label); found != deck.file_drivers.end())
+    deck.redefined(card, "file driver", label, found->second.where);
+  deck.take(card, Kind::file_driver, label);
+  card.set_subject("file driver " + std::to_string(label));
+  card.optional_name();
+  FileDriverPtr driver = card.file_driver_definition();
+  card.expect_end();
+  deck.file_drivers[label] = {std::move(driver), card.head()};
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,329 @@
+/// Drives, template drives, constitutive laws, functions, fluids: defined in place or referred to
+/// by label.
+#include <cctype>
+
+#include "input/deck.h"
+#include "input/deck_card.h"
+#include "input/run_strings.h"
+#include "input/suggest.h"
+#include "model/drives/template_drives.h"
+#include "model/law.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// Does an expression mention what changes during the run?
+bool mentions_run_variables(std::string_view text) {
+  const auto is_name = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
+  };
+  for (std::size_t i = 0; i < text.size();) {
+    if (!is_name(text[i])) {
+      ++i;
+      continue;
+    }
+    std::size_t n = i;
+    while (n < text.size() && is_name(text[n])) ++n;
+    const std::string_view name = text.substr(i, n - i);
+    if (name == "Time" || name == "TimeStep" || name == "Step" || name == "Var") return true;
+    if (name == "model" && text.substr(n, 2) == "::") return true;
+    i = n;
+  }
+  return false;
+}
+
+template <class Map>
+std::vector<std::string> written_words(const Map& table, const Registry& registry) {
+  std::vector<std::string> words;
+  for (const auto& entry : table) {
+    const auto shown = registry.display.find(entry.first);
+    words.push_back(shown == registry.display.end() ? entry.first : shown->second);
+  }
+  return words;
+}
+
+template <class T>
+const T& labelled(DeckCard& card, const LabelMap<T>& map, std::string_view kind) {
+  const int label = card.label(std::string(kind) + " label");
+  const auto found = map.find(label);
+  if (found == map.end()) card.deck().undefined(card, kind, label);
+  return found->second.object;
+}
+
+}  // namespace
+
+template <class Table>
+void DeckCard::fail_word(std::string_view what, const std::string& word, const Table& table,
+                         const std::string& context) {
+  const SourceSpan where = next();
+  const auto group = registry().not_supported.find(context);
+  if (group != registry().not_supported.end()) {
+    const auto entry = group->second.find(word);
+    if (entry != group->second.end()) {
+      const auto shown = registry().display.find(word);
+      fail_at(where, "\"" + (shown == registry().display.end() ? word : shown->second) + "\" (" +
+                         entry->second + ") is not supported yet");
+    }
+  }
+  fail_at(where, "unknown " + std::string(what) + " \"" + word + "\"",
+          suggestion(word, written_words(table, registry())));
+}
+
+// ----------------------------------------------------------------------------------------------
+// drives
+
+DrivePtr DeckCard::constant_drive(std::string_view what) {
+  const std::string w = peek_word();
+  const SourceSpan where = next();
+  const std::string_view text = next_text();
+  // A lone word that is neither a drive nor a variable is most likely a mistyped keyword.
+  if (!w.empty() && !deck_.session.symbols.find(text))
+    fail_word("drive or variable", w, registry().drives, "drive");
+  if (mentions_run_variables(text))
+    warn_at(where, std::string(what) + ": value frozen at input time; use a string drive");
+  return make_constant_drive(real(what));
+}
+
+DrivePtr DeckCard::drive(std::string_view what) {
+  need_argument(what);
+  if (cursor_.at_empty()) {
+    skip();
+    return make_constant_drive(0);
+  }
+  if (at_string())
+    fail_at(next(), std::string(what) + ": drive expected, string found",
+            "write: string, \"<expression>\"");
+  if (keyword("reference")) return labelled(*this, deck_.drives, "drive caller");
+  keyword("function");
+  const auto reader = registry().drives.find(peek_word());
+  if (reader == registry().drives.end()) return constant_drive(what);
+  skip();
+  return reader->second(*this);
+}
+
+DrivePtr DeckCard::string_expression(const std::string& text) {
+  return compile_string(deck_.session, text, last());
+}
+
+ExpressionPtr DeckCard::expression_of(const std::string& text,
+                                      const std::vector<std::string>& names) {
+  return compile_expression(deck_.session, text, names, last());
+}
+
+// ----------------------------------------------------------------------------------------------
+// template drives
+
+namespace {
+
+template <int R, int C>
+LabelMap<TplDrivePtr<R, C>>& template_drives(Deck& deck) {
+  if constexpr (C == 6)
+    return deck.drives66;
+  else if constexpr (C == 3)
+    return deck.drives33;
+  else if constexpr (R == 1)
+    return deck.drives1;
+  else if constexpr (R == 3)
+    return deck.drives3;
+  else
+    return deck.drives6;
+}
+
+}  // namespace
+
+template <int R, int C>
+TplDrivePtr<R, C> DeckCard::component_drive(std::string_view what) {
+  std::vector<DrivePtr> drives(R * C);
+  const auto one = [&](int i, int j) {
+    if (keyword("inactive")) return DrivePtr();
+    return drive(std::string(what) + (C > 1 ? ", component (" + std::to_string(i + 1) + "," +
+                                                  std::to_string(j + 1) + ")"
+                                            : ", component " + std::to_string(i + 1)));
+  };
+  const int form = C > 1 ? one_of({"sym", "diag"}) : -1;
+  for (int i = 0; i < R; ++i)
+    for (int j = 0; j < C; ++j) {
+      if ((form == 0 && j < i) || (form == 1 && j != i)) continue;
+      drives[j * R + i] = one(i, j);
+      if (form == 0) drives[i * R + j] = drives[j * R + i];
+    }
+  return std::make_shared<ComponentTplDrive<R, C>>(std::move(drives));
+}
+
+template <int R, int C, class ReadEntity>
+TplDrivePtr<R, C> DeckCard::template_drive(std::string_view what, ReadEntity read) {
+  using Sum = SumTplDrive<R, C>;
+  need_argument(what);
+  std::vector<typename Sum::Term> terms;
+  const auto term = [&] {
+    const typename Sum::Value entity = read();
+    terms.push_back({entity, drive(std::string(what) + ": drive")});
+  };
+  switch (one_of({"null", "component", "array", "reference", "single"})) {
+    case 0:
+      break;
+    case 1:
+      return component_drive<R, C>(what);
+    case 2: {
+      const int n = integer_at_least("number of drives in the array", 1);
+      for (int i = 0; i < n; ++i) term();
+      break;
+    }
+    case 3:
+      return labelled(*this, template_drives<R, C>(deck_), "template drive caller");
+    default:
+      term();
+  }
+  return std::make_shared<Sum>(std::move(terms));
+}
+
+Vec3DrivePtr DeckCard::vec3_drive(std::string_view what, int node) {
+  return template_drive<3, 1>(
+      what, [&] { return node < 0 ? absolute_vector(what) : relative_vector(what, node); });
+}
+TplDrivePtr<6> DeckCard::vec6_drive(std::string_view what) {
+  return template_drive<6, 1>(what, [&] { return vec6(what); });
+}
+TplDrivePtr<3, 3> DeckCard::mat3_drive(std::string_view what) {
+  return template_drive<3, 3>(what, [&] { return mat3(what); });
+}
+TplDrivePtr<6, 6> DeckCard::mat6_drive(std::string_view what) {
+  return template_drive<6, 6>(what, [&] { return mat6(what); });
+}
+TplDrivePtr<1> DeckCard::scalar_template_drive() {
+  std::vector<SumTplDrive<1>::Term> terms;
+  terms.push_back({VecN<1>(1.0), drive("template drive")});
+  return std::make_shared<SumTplDrive<1>>(std::move(terms));
+}
+
+// ----------------------------------------------------------------------------------------------
+// laws
+
+namespace {
+
+template <int N>
+const auto& law_readers(const Registry& r) {
+  if constexpr (N == 1)
+    return r.laws1;
+  else if constexpr (N == 3)
+    return r.laws3;
+  else
+    return r.laws6;
+}
+template <int N>
+const LabelMap<LawPtr<N>>& laws(const Deck& d) {
+  if constexpr (N == 1)
+    return d.laws1;
+  else if constexpr (N == 3)
+    return d.laws3;
+  else
+    return d.laws6;
+}
+
+}  // namespace
+
+template <int N>
+LawPtr<N> DeckCard::law_of() {
+  need_argument("constitutive law");
+  if (keyword("reference")) {
+    const LawPtr<N>& law = labelled(*this, laws<N>(deck_), "constitutive law");
+    const LawPtr<N> copy = law->copy(builder());
+    return copy ? copy : law;
+  }
+  const auto& readers = law_readers<N>(registry());
+  const std::string w = peek_word();
+  const auto reader = readers.find(w);
+  if (reader != readers.end()) {
+    skip();
+    return reader->second(*this);
+  }
+  const auto linear = readers.find("linearelastic");
+  if (N == 1 && linear != readers.end() && (w.empty() || deck_.session.symbols.find(next_text())))
+    return linear->second(*this);
+  if (w.empty())
+    fail_at(next(), "constitutive law expected, e.g. " +
+                        std::string(N == 1 ? "linear elastic" : "linear elastic generic"));
+  fail_word("constitutive law", w, readers, "law");
+}
+
+LawPtr<1> DeckCard::law1() { return law_of<1>(); }
+LawPtr<3> DeckCard::law3() { return law_of<3>(); }
+LawPtr<6> DeckCard::law6() { return law_of<6>(); }
+
+// ----------------------------------------------------------------------------------------------
+// functions and fluids
+
+ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceSpan where) {
+  if (const auto known = deck_.function_places.find(name); known != deck_.function_places.end())
+    fail_at(where, "scalar function \"" + name + "\" already defined at " +
+                       deck_.session.place(known->second));
+  const std::string w = peek_word();
+  const auto reader = registry().functions.find(w);
+  if (reader == registry().functions.end()) {
+    if (!more()) fail("scalar function type missing");
+    if (w.empty())
+      fail_at(next(),
+              "scalar function type expected, e.g. const, linear, multilinear, cubic spline");
+    fail_word("scalar function", w, registry().functions, "function");
+  }
+  skip();
+  ScalarFunctionPtr f = reader->second(*this);
+  deck_.session.functions[name] = f;
+  deck_.function_places[name] = where;
+  return f;
+}
+
+void DeckCard::read_function_definition() {
+  const std::string name = quoted("scalar function name");
+  set_defining("scalar function \"" + name + "\"");
+  set_subject("scalar function \"" + name + "\"");
+  function_definition(name, last());
+}
+
+ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
+  const std::string name = quoted(std::string(what) + " name");
+  const SourceSpan where = last();
+  if (registry().functions.count(peek_word())) return function_definition(name, where);
+  const auto known = deck_.session.functions.find(name);
+  if (known != deck_.session.functions.end()) return known->second;
+  if (deck_.damaged_kinds.count("scalar function \"" + name + "\""))
+    deck_.session.set_damaged(true);
+  std::vector<std::string> names;
+  for (const auto& f : deck_.session.functions) names.push_back(f.first);
+  fail_at(where, "scalar function \"" + name + "\" is not defined", suggestion(name, names));
+}
+
+FluidPtr DeckCard::fluid() {
+  need_argument("hydraulic fluid");
+  one_of({"hydraulic fluid", "fluid"});
+  if (keyword("reference")) return labelled(*this, deck_.fluids, "hydraulic fluid");
+  const std::string w = peek_word();
+  const auto reader = registry().fluids.find(w);
+  if (reader == registry().fluids.end()) {
+    const auto plain = registry().fluids.find("incompressible");
+    if (plain != registry().fluids.end() && (w == "density" || w == "viscosity"))
+      return plain->second(*this);
+    if (w.empty())
+      fail_at(
+          next(),
+          "hydraulic fluid expected: \"reference, <label>\" or a type such as linear compressible");
+    fail_word("hydraulic fluid", w, registry().fluids, "fluid");
+  }
+  skip();
+  return reader->second(*this);
+}
+
+FileDriverPtr DeckCard::file_driver() { return labelled(*this, deck_.file_drivers, "file driver"); }
+
+FileDriverPtr DeckCard::file_driver_definition() {
+  need_argument("file driver type");
+  const std::string w = peek_word();
+  const auto reader = registry().file_drivers.find(w);
+  if (reader == registry().file_drivers.end())
+    fail_word("file driver type", w, registry().file_drivers, "file driver");
+  skip();
+  return reader->second(*this);
+}
+
+}  // namespace mbcosim
