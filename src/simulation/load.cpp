@@ -1,0 +1,86 @@
+/// load_deck: text to model.
+#include "elements/registry.h"
+#include "input/deck_reader.h"
+#include "simulation/simulation.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// Of all files read: the deck, what it includes, data files in the order of reading.
+std::uint64_t digest(const Session& session, Digest data) {
+  for (int i = 0; i < session.file_count(); ++i) {
+    data.add(session.file(i).name);
+    data.add(session.file(i).text);
+  }
+  return data.value();
+}
+
+void store_symbols(const Session& session, Model& model) {
+  for (const Symbol* s : session.symbols.sorted())
+    model.symbols.emplace_back(
+        std::string(s->constant ? "const " : "") + type_name(type_of(s->value)) + " " + s->name,
+        printed(s->value));
+}
+
+Diagnostic plain_error(std::string code, std::string file, std::string message) {
+  Diagnostic d;
+  d.code = std::move(code);
+  d.file = std::move(file);
+  d.message = std::move(message);
+  return d;
+}
+
+/// Reads into `session`; the model, or null with the reason in the session's diagnostics.
+ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnostic>& extra) {
+  Deck deck(session, builder, full_registry());
+  Statements statements(session);
+  DeckReader(deck, statements).read();
+  if (session.errors() == 0) session.bind_strings();
+  if (session.errors() > 0) return nullptr;
+  Model& model = builder.model();
+  model.digest = digest(session, deck.data_files);
+  store_symbols(session, model);
+  Result<ModelPtr> finished = builder.finish();
+  if (!finished) {
+    extra.push_back(plain_error("model", session.file(0).name, finished.error().message));
+    return nullptr;
+  }
+  if ((*finished)->unknowns > session.limits.unknowns) {
+    extra.push_back(plain_error("limit-unknowns", session.file(0).name,
+                                "the model has " + std::to_string((*finished)->unknowns) +
+                                    " unknowns; the limit is " +
+                                    std::to_string(session.limits.unknowns)));
+    return nullptr;
+  }
+  return *finished;
+}
+
+}  // namespace
+
+LoadReport load_deck(const FileSource& files, const std::string& main_file, const Limits& limits) {
+  LoadReport report;
+  try {
+    ModelBuilder builder;
+    Session session(files, limits, &builder);
+    const Result<int> opened = session.open_file(main_file);
+    if (!opened) {
+      report.diagnostics.push_back(
+          plain_error(opened.error().kind == ErrorKind::limit ? "limit-deck-bytes" : "no-file",
+                      main_file, opened.error().message));
+      return report;
+    }
+    std::vector<Diagnostic> extra;
+    report.model = read_model(session, builder, extra);
+    report.printed = session.printed;
+    report.diagnostics = session.take_diagnostics();
+    report.diagnostics.insert(report.diagnostics.end(), extra.begin(), extra.end());
+  } catch (const std::exception& error) {
+    report.model = nullptr;
+    report.diagnostics.push_back(plain_error(
+        "internal", main_file, std::string("the deck cannot be read: ") + error.what()));
+  }
+  return report;
+}
+
+}  // namespace mbcosim
