@@ -1,7 +1,14 @@
 #include "elements/joints/clamp.h"
+#include "elements/joints/deformable.h"
 #include "elements/joints/distance.h"
+#include "elements/joints/guide.h"
+#include "elements/joints/invariant.h"
 #include "elements/joints/revolute.h"
+#include "elements/joints/rod.h"
 #include "elements/joints/spherical.h"
+#include "elements/joints/total.h"
+#include "elements/joints/universal.h"
+#include "elements/joints/velocity.h"
 #include "elements/registry.h"
 
 namespace mbcosim {
@@ -20,6 +27,32 @@ void register_joints(Registry& registry) {
   joint({"pin", "spherical pin"}, read_spherical_pin);
   joint({"distance"}, read_distance);
   joint({"distance with offset"}, read_distance_with_offset);
+  joint({"rod"}, read_rod);
+  joint({"rod with offset"}, read_rod_with_offset);
+  joint({"total joint"}, read_total_joint);
+  joint({"total pin joint"}, read_total_pin_joint);
+  joint({"in line"}, read_in_line);
+  joint({"in plane"}, read_in_plane);
+  joint({"prismatic"}, read_prismatic);
+  joint({"drive hinge"}, read_drive_hinge);
+  joint({"drive displacement"}, read_drive_displacement);
+  joint({"drive displacement pin"}, read_drive_displacement_pin);
+  joint({"deformable hinge"}, read_deformable_hinge);
+  joint({"deformable displacement joint"}, read_deformable_displacement);
+  joint({"deformable joint"}, read_deformable_joint);
+  joint({"deformable axial joint"}, read_deformable_axial_joint);
+  joint({"invariant deformable hinge"}, read_invariant_hinge);
+  joint({"invariant deformable displacement joint"}, read_invariant_displacement);
+  joint({"invariant deformable joint"}, read_invariant_joint);
+  joint({"viscous body"}, read_viscous_body);
+  joint({"linear velocity"}, read_linear_velocity);
+  joint({"angular velocity"}, read_angular_velocity);
+  joint({"linear acceleration"}, read_linear_acceleration);
+  joint({"angular acceleration"}, read_angular_acceleration);
+  joint({"cardano hinge", "universal hinge"}, read_cardano_hinge);
+  joint({"cardano rotation", "universal rotation"}, read_cardano_rotation);
+  joint({"cardano pin", "universal pin"}, read_cardano_pin);
+  joint({"gimbal rotation"}, read_gimbal_rotation);
 }
 
 }  // namespace mbcosim

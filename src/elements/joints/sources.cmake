@@ -1,1 +1,2 @@
-set(SOURCES register.cpp joint_common.cpp clamp.cpp revolute.cpp spherical.cpp distance.cpp)
+set(SOURCES register.cpp joint_common.cpp clamp.cpp deformable.cpp distance.cpp guide.cpp invariant.cpp revolute.cpp rod.cpp
+            spherical.cpp total.cpp universal.cpp velocity.cpp)

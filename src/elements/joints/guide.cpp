@@ -1,0 +1,154 @@
+#include "elements/joints/guide.h"
+
+namespace mbcosim {
+
+// ------------------------------------------------------------------ in line
+
+void InLine::output(const Local<double>& u, OutputRow& row) const {
+  const Vec3 f(u.own(0), u.own(1), 0);
+  row.begin(OutputFile::jnt, u.label());
+  row.reactions(f, Vec3::Zero(), hinge_a(u) * f, Vec3::Zero());
+  row.end();
+}
+
+void read_in_line(Card& card, ElementInfo& info) {
+  InLine e;
+  e.a = read_attachment(card);
+  read_offset(card, e.a);
+  card.one_of({"orientation", "hinge"});
+  e.a.Rh = card.relative_orientation("orientation of the line", e.a.node);
+  e.b = read_attachment(card);
+  if (card.keyword("offset")) read_offset(card, e.b, &e.a);
+  add_element(card.builder(), info, e);
+}
+
+// ------------------------------------------------------------------ in plane
+
+namespace {
+
+/// An orientation whose axis 3 is `normal`.
+Mat3 frame_of_normal(const Vec3& normal) {
+  int smallest = 0;
+  normal.cwiseAbs().minCoeff(&smallest);
+  const Vec3 first = Vec3(Vec3::Unit(smallest)).cross(normal).normalized();
+  Mat3 R;
+  R << first, normal.cross(first), normal;
+  return R;
+}
+
+}  // namespace
+
+void InPlane::output(const Local<double>& u, OutputRow& row) const {
+  row.begin(OutputFile::jnt, u.label());
+  row.reactions(Vec3(u.own(0), 0, 0), Vec3::Zero(), u.R(0) * normal * u.own(0), Vec3::Zero());
+  row.end();
+}
+
+std::string InPlane::log(const Model& model, int label) const {
+  const Attachment plane{a.node, a.f, frame_of_normal(normal)};
+  return LogLine("inplane", label).add(model, plane).add(model, b).str();
+}
+
+void read_in_plane(Card& card, ElementInfo& info) {
+  InPlane e;
+  e.a = read_attachment(card);
+  read_offset(card, e.a);
+  e.normal = card.relative_unit_vector("normal of the plane", e.a.node);
+  e.b = read_attachment(card);
+  if (card.keyword("offset")) read_offset(card, e.b, &e.a);
+  add_element(card.builder(), info, e);
+}
+
+// ------------------------------------------------------------------ prismatic
+
+void Prismatic::output(const Local<double>& u, OutputRow& row) const {
+  const Vec3 M = u.own3(0);
+  row.begin(OutputFile::jnt, u.label());
+  row.reactions(Vec3::Zero(), M, Vec3::Zero(), hinge_a(u) * M);
+  row.end();
+}
+
+std::string Prismatic::log(const Model& model, int label) const {
+  const Attachment first{a.node, Vec3::Zero(), a.Rh}, second{b.node, Vec3::Zero(), b.Rh};
+  return LogLine("prismatic", label).add(model, first).add(model, second).str();
+}
+
+namespace {
+
+/// `<node> [ , position , <f> ] [ , hinge , <Rh> ]` twice; positions do not matter to the joint.
+template <class E>
+E read_hinges(Card& card) {
+  E e;
+  e.a = read_attachment(card);
+  read_optional_offset(card, e.a);
+  read_optional_hinge(card, e.a);
+  e.b = read_attachment(card);
+  read_optional_offset(card, e.b, &e.a);
+  read_optional_hinge(card, e.b, &e.a);
+  return e;
+}
+
+}  // namespace
+
+void read_prismatic(Card& card, ElementInfo& info) {
+  const Prismatic e = read_hinges<Prismatic>(card);
+  add_element(card.builder(), info, e);
+}
+
+// ------------------------------------------------------------------ drive hinge
+
+void DriveHinge::output(const Local<double>& u, OutputRow& row) const {
+  const Vec3 M = u.own3(0);
+  const Mat3 relative = relative_rotation(u);
+  row.begin(OutputFile::jnt, u.label());
+  row.reactions(Vec3::Zero(), M, Vec3::Zero(), hinge_a(u) * M);
+  row.orientation("E", relative, OrientationDescription::euler123);
+  row.vec3("theta", "rad", vector_of_rotation(relative));
+  row.end();
+}
+
+void read_drive_hinge(Card& card, ElementInfo& info) {
+  DriveHinge e = read_hinges<DriveHinge>(card);
+  e.theta = card.vec3_drive("imposed rotation");
+  add_element(card.builder(), info, e);
+}
+
+// ------------------------------------------------------------------ drive displacement
+
+void DriveDisplacement::output(const Local<double>& u, OutputRow& row) const {
+  const Vec3 F = u.own3(0);
+  row.begin(OutputFile::jnt, u.label());
+  row.reactions(u.R(0).transpose() * F, Vec3::Zero(), F, Vec3::Zero());
+  row.vec3("d", "m", u.x(1) + arm_b(u) - u.x(0) - arm_a(u));
+  row.end();
+}
+
+void read_drive_displacement(Card& card, ElementInfo& info) {
+  DriveDisplacement e;
+  e.a = read_attachment(card);
+  read_offset(card, e.a);
+  e.b = read_attachment(card);
+  read_offset(card, e.b, &e.a);
+  e.delta = card.vec3_drive("imposed displacement", e.a.node);
+  add_element(card.builder(), info, e);
+}
+
+void DriveDisplacementPin::output(const Local<double>& u, OutputRow& row) const {
+  const Vec3 F = u.own3(0);
+  row.begin(OutputFile::jnt, u.label());
+  row.reactions(F, Vec3::Zero(), F, Vec3::Zero());
+  row.vec3("d", "m", u.x(0) + u.R(0) * a.f - X);
+  row.end();
+}
+
+void read_drive_displacement_pin(Card& card, ElementInfo& info) {
+  DriveDisplacementPin e;
+  e.a = read_attachment(card);
+  read_offset(card, e.a);
+  card.keyword("position");
+  e.X = card.absolute_position("pin position", e.a.node);
+  e.delta = card.vec3_drive("imposed displacement");
+  add_element(card.builder(), info, e);
+}
+
+}  // namespace mbcosim
