@@ -1,1 +1,1 @@
-set(SOURCES register.cpp)
+set(SOURCES abstract_force.cpp register.cpp structural_force.cpp)
