@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "source_dir.h"
+
 #include <fstream>
 
 namespace mbcosim {
@@ -12,7 +14,7 @@ struct Row {
 };
 
 std::vector<Row> read_table() {
-  std::ifstream in(std::string(MBCOSIM_SOURCE_DIR) + "/tests/unit/input/expressions.tsv");
+  std::ifstream in(source_dir() + "/tests/unit/input/expressions.tsv");
   std::vector<Row> rows;
   std::string line;
   while (std::getline(in, line)) {
