@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# Installs the Debian packages of dependencies.txt that are missing. Usage: install-dependencies.sh [build|run|all]
+#   build  what compiles the program          run  what a container needs to run the daemon
+#   all    what builds, tests and shows (default)
+set -euo pipefail
+here=$(cd "$(dirname "$0")" && pwd)
+what=${1:-all}
+
+case $what in
+  build) wanted='$2 == ""' ;;
+  run) wanted='$2 == "run"' ;;
+  all) wanted='$2 != "run"' ;;
+  *) echo "usage: $0 [build|run|all]" >&2; exit 4 ;;
+esac
+mapfile -t packages < <(sed 's/#.*//' "$here/dependencies.txt" | awk "NF && $wanted {print \$1}")
+
+missing=()
+for package in "${packages[@]}"; do
+  state=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
+  [ "$state" = installed ] || missing+=("$package")
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  command -v sudo >/dev/null || { echo "these packages are missing, and there is no sudo: ${missing[*]}" >&2; exit 4; }
+  as_root=(sudo)
+fi
+echo "installing: ${missing[*]}"
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"
