@@ -1,0 +1,17 @@
+"""Client of the mbcosim co-simulation server.
+
+    import mbcosim
+
+    with mbcosim.connect() as server, server.load("pendulum.mbd") as simulation:
+        simulation.run_until(1.0)
+        print(simulation.time, simulation["node.structural.1.X"])
+"""
+from .client import Server, connect, default_address
+from .errors import (DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
+                     StepFailed, Unavailable)
+from .simulation import Simulation, Snapshot, StepResult, Stepper, Subscription
+
+__all__ = [
+    "connect", "default_address", "Server", "Simulation", "Snapshot", "StepResult", "Stepper", "Subscription", "Error",
+    "DeckError", "LimitExceeded", "NotAllowed", "NotFound", "PreconditionFailed", "StepFailed", "Unavailable",
+]

@@ -1,0 +1,114 @@
+"""Server errors as exceptions with the server's details."""
+import contextlib
+
+import grpc
+
+from mbcosim.v1 import common_pb2
+
+
+class Error(Exception):
+    """A call was refused or failed.
+
+    code      grpc.StatusCode
+    reason    name of a `mbcosim.v1.Reason`: "WRONG_STEP", ...; empty when the server gave none
+    metadata  particulars by name, as text
+    """
+
+    def __init__(self, message, code=None, reason="", metadata=None):
+        super().__init__(message)
+        self.code = code
+        self.reason = reason
+        self.metadata = dict(metadata or {})
+        self.diagnostics = []
+        self.failure = None
+
+
+class DeckError(Error):
+    """The deck is wrong; `diagnostics` has every finding."""
+
+    def __str__(self):
+        if not self.diagnostics:
+            return super().__str__()
+        return "\n".join(diagnostic_text(d) for d in self.diagnostics)
+
+
+class NotFound(Error):
+    """No such simulation, snapshot, variable, port or model."""
+
+
+class PreconditionFailed(Error):
+    """The call does not fit the simulation's state."""
+
+
+class LimitExceeded(Error):
+    """A limit of the server; its name is `metadata["limit"]`."""
+
+
+class NotAllowed(Error):
+    """Credentials are missing, wrong or too weak."""
+
+
+class Unavailable(Error):
+    """The server cannot be reached or is shutting down."""
+
+
+class StepFailed(Error):
+    """A step failed; the simulation stands at its last accepted step.
+
+    `failure` is a `mbcosim.v1.SolverFailure`; `result` the StepResult, None when the initial solution failed.
+    """
+
+    result = None
+
+
+_CLASSES = {
+    grpc.StatusCode.NOT_FOUND: NotFound,
+    grpc.StatusCode.FAILED_PRECONDITION: PreconditionFailed,
+    grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceeded,
+    grpc.StatusCode.UNAUTHENTICATED: NotAllowed,
+    grpc.StatusCode.PERMISSION_DENIED: NotAllowed,
+    grpc.StatusCode.UNAVAILABLE: Unavailable,
+    grpc.StatusCode.ABORTED: StepFailed,
+}
+
+
+def diagnostic_text(diagnostic):
+    """`file:line:column: error: message`, the line and a caret."""
+    severity = {1: "error", 2: "warning", 3: "note"}.get(diagnostic.severity, "error")
+    place = ":".join(str(part) for part in (diagnostic.file, diagnostic.line, diagnostic.column) if part)
+    text = f"{place}: {severity}: {diagnostic.message}"
+    if diagnostic.source_line:
+        blanks = " " * max(diagnostic.column - 1, 0)
+        text += f"\n  {diagnostic.source_line}\n  {blanks}{'^' * max(diagnostic.length, 1)}"
+    return text + (f"\n  {diagnostic.hint}" if diagnostic.hint else "")
+
+
+def from_rpc_error(rpc_error):
+    """The exception that tells what a grpc.RpcError carries."""
+    code = rpc_error.code()
+    status = common_pb2.ErrorStatus()
+    for key, value in rpc_error.trailing_metadata() or ():
+        if key == "grpc-status-details-bin":
+            status.ParseFromString(value)
+    info, failure, diagnostics = common_pb2.ErrorInfo(), None, []
+    for detail in status.details:
+        if detail.type_url.endswith("google.rpc.ErrorInfo"):
+            info.ParseFromString(detail.value)
+        elif detail.Is(common_pb2.SolverFailure.DESCRIPTOR):
+            failure = common_pb2.SolverFailure.FromString(detail.value)
+        elif detail.Is(common_pb2.DeckDiagnostics.DESCRIPTOR):
+            diagnostics = list(common_pb2.DeckDiagnostics.FromString(detail.value).diagnostics)
+    kind = DeckError if info.reason == "DECK_ERROR" else _CLASSES.get(code, Error)
+    error = kind(rpc_error.details(), code, info.reason, info.metadata)
+    error.failure = failure
+    error.diagnostics = diagnostics
+    return error
+
+
+@contextlib.contextmanager
+def translated():
+    """Turns grpc errors raised inside into exceptions of this module."""
+    try:
+        yield
+    except grpc.RpcError as error:
+        raise from_rpc_error(error) from None
