@@ -1,0 +1,68 @@
+#include "cli/deck_report.h"
+
+#include <algorithm>
+
+namespace mbcosim::cli {
+
+LoadReport load_path(const std::string& deck) {
+  const std::size_t slash = deck.rfind('/');
+  const std::string folder = slash == std::string::npos ? "." : deck.substr(0, slash + 1);
+  const std::string name = slash == std::string::npos ? deck : deck.substr(slash + 1);
+  return load_deck(FolderSource(folder, /*unrestricted=*/true), name);
+}
+
+void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out) {
+  for (const Diagnostic& d : diagnostics) {
+    const std::string text = d.text();
+    std::fwrite(text.data(), 1, text.size(), out);
+    if (text.empty() || text.back() != '\n') std::fputc('\n', out);
+  }
+}
+
+ExitCode exit_code_of(const LoadReport& report) {
+  if (report.ok()) return kDone;
+  const bool limit =
+      std::any_of(report.diagnostics.begin(), report.diagnostics.end(), [](const Diagnostic& d) {
+        return d.severity == Severity::error && d.code.compare(0, 6, "limit-") == 0;
+      });
+  return limit ? kRefused : kDeckRefused;
+}
+
+ExitCode exit_code_of(const Error& error) {
+  switch (error.kind) {
+    case ErrorKind::deck:
+      return kDeckRefused;
+    case ErrorKind::not_converged:
+    case ErrorKind::singular:
+    case ErrorKind::evaluation:
+    case ErrorKind::peer:
+    case ErrorKind::internal:
+      return kNumericalFailure;
+    case ErrorKind::cancelled:
+      return kInterrupted;
+    case ErrorKind::argument:
+    case ErrorKind::precondition:
+    case ErrorKind::limit:
+    case ErrorKind::io:
+    case ErrorKind::data_loss:
+      return kRefused;
+  }
+  return kNumericalFailure;
+}
+
+void print_error(const Error& error, std::FILE* out) {
+  std::fprintf(out, "error: %s\n", error.message.c_str());
+  print_diagnostics(error.diagnostics, out);
+  const SolverFailure& f = error.failure;
+  if (f.residual_history.empty() && f.worst.empty()) return;
+  std::fprintf(out, "  time %.17g s, step %ld, iteration %d\n", f.time, f.step, f.iteration);
+  if (!f.residual_history.empty()) {
+    std::fprintf(out, "  residual norms:");
+    for (const double r : f.residual_history) std::fprintf(out, " %.6g", r);
+    std::fputc('\n', out);
+  }
+  for (const WorstEquation& w : f.worst)
+    std::fprintf(out, "  %s, %s: residual %.6g\n", w.owner.c_str(), w.equation.c_str(), w.residual);
+}
+
+}  // namespace mbcosim::cli

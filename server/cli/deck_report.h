@@ -1,0 +1,25 @@
+/// What the subcommands share: opening a deck and telling the user what was found in it.
+#pragma once
+
+#include <cstdio>
+#include <string>
+
+#include "cli/commands.h"
+#include "simulation/simulation.h"
+
+namespace mbcosim::cli {
+
+/// Reads a deck from the user's own files, without the restrictions that uploaded decks are under.
+LoadReport load_path(const std::string& deck);
+
+/// Diagnostics as text, one after another.
+void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out);
+
+/// `kDone`, or how a deck with these diagnostics is refused: `kRefused` for an exceeded limit.
+ExitCode exit_code_of(const LoadReport& report);
+ExitCode exit_code_of(const Error& error);
+
+/// An error of the solver: message, residual history, worst equations.
+void print_error(const Error& error, std::FILE* out);
+
+}  // namespace mbcosim::cli

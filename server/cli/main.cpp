@@ -1,0 +1,55 @@
+/// mbcosim: runs and inspects decks on the command line.
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.h"
+
+namespace {
+
+constexpr const char* kFooter =
+    "Exit codes: 0 done, 2 deck refused, 3 numerical failure, 4 refused or limit exceeded, "
+    "130 interrupted.\n"
+    "The daemon is `mbcosimd`; clients are under client_examples/.";
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace mbcosim::cli;
+  CLI::App app{"Multibody and co-simulation solver for decks in MBDyn's input language.",
+               "mbcosim"};
+  app.set_version_flag("--version", std::string("mbcosim ") + MBCOSIM_VERSION);
+  app.require_subcommand(1);
+  app.footer(kFooter);
+
+  int exit_code = kDone;
+  RunOptions run_options;
+  CLI::App* run_app =
+      app.add_subcommand("run", "Run a deck to its final time and write the results");
+  run_app->add_option("deck", run_options.deck, "Main file of the deck")->required();
+  run_app->add_option("-o,--output", run_options.prefix,
+                      "Prefix of the result files (PREFIX.mov, PREFIX.jnt, ...); "
+                      "default: the deck's name");
+  run_app->add_flag("-q,--quiet", run_options.quiet,
+                    "No progress bar and no summary on a terminal");
+  run_app->callback([&] { exit_code = run(run_options); });
+
+  std::string deck;
+  bool json = false;
+  CLI::App* validate_app =
+      app.add_subcommand("validate", "Read a deck and report all that is wrong with it");
+  validate_app->add_option("deck", deck, "Main file of the deck")->required();
+  validate_app->add_flag("--json", json, "Print the diagnostics as JSON");
+  validate_app->callback([&] { exit_code = validate(deck, json); });
+
+  CLI::App* describe_app =
+      app.add_subcommand("describe", "List a deck's nodes, elements and variables");
+  describe_app->add_option("deck", deck, "Main file of the deck")->required();
+  describe_app->add_flag("--json", json, "Print the description as JSON");
+  describe_app->callback([&] { exit_code = describe(deck, json); });
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kDone : kRefused;
+  }
+  return exit_code;
+}
