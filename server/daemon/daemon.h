@@ -1,0 +1,48 @@
+/// A running server: listeners, services, and the parts behind them.
+#pragma once
+
+#include <grpcpp/server.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "service/config.h"
+#include "service/other_services.h"
+#include "service/simulations_service.h"
+#include "service/telemetry_service.h"
+
+namespace mbcosim::server {
+
+class Daemon {
+ public:
+  /// Binds the listeners and serves. Throws std::runtime_error with a message for the operator.
+  explicit Daemon(const Config& config);
+  ~Daemon();
+
+  /// Stops accepting, interrupts running steps at an iteration boundary, ends streams. Returns when
+  /// all calls have ended.
+  void shut_down();
+
+ private:
+  void check_listener(const std::string& address) const;
+  std::shared_ptr<grpc::ServerCredentials> credentials_for(const std::string& address) const;
+
+  const Config config_;
+  const Authenticator authenticator_;
+  Metrics metrics_;
+  SolverSlots slots_;
+  SessionStore store_;
+  CallWatch watch_;
+  Parts parts_;
+  SimulationsService simulations_;
+  TelemetryService telemetry_;
+  CouplingService coupling_;
+  ReductionService reduction_;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+/// Whether a daemon answers at the address: exit code 0 or 1.
+int check_health(const std::string& address);
+
+}  // namespace mbcosim::server

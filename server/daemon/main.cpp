@@ -1,0 +1,33 @@
+/// mbcosimd: serves simulations over gRPC until SIGTERM or SIGINT.
+#include <signal.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "daemon/daemon.h"
+#include "daemon/logging.h"
+#include "daemon/options.h"
+
+int main(int argc, char** argv) {
+  using namespace mbcosim::server;
+  const Invocation invocation = read_options(argc, argv);
+  if (invocation.exit_code) return *invocation.exit_code;
+  if (!invocation.check_address.empty()) return check_health(invocation.check_address);
+
+  sigset_t signals;  // blocked before any thread starts, so that only sigwait below sees them
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  try {
+    start_logging(invocation.config);
+    Daemon daemon(invocation.config);
+    int signal_number = 0;
+    sigwait(&signals, &signal_number);
+    daemon.shut_down();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "mbcosimd: error: %s\n", error.what());
+    return 4;
+  }
+  return 0;
+}

@@ -1,0 +1,119 @@
+#include "daemon/options.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+
+namespace mbcosim::server {
+namespace {
+
+void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
+  const auto add = [&](const char* name, auto& value, const char* help) {
+    app.add_option(name, value, help)
+        ->group("Limits")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+  };
+  add("--limit-sessions", limits.sessions, "Simulations alive at once");
+  add("--limit-snapshots", limits.snapshots, "Snapshots of one simulation");
+  add("--limit-snapshot-bytes", limits.snapshot_bytes, "Memory of all snapshots of one simulation");
+  add("--limit-bundle-files", limits.bundle_files, "Files of one uploaded deck");
+  add("--limit-deck-bytes", limits.engine.deck_bytes, "Bytes of one deck with all its files");
+  add("--limit-include-depth", limits.engine.include_depth, "Nested includes");
+  add("--limit-unknowns", limits.engine.unknowns, "Unknowns of one model");
+  add("--limit-message-bytes", limits.message_bytes, "Bytes of one message");
+  add("--limit-open-calls", limits.open_calls, "Calls and streams at once");
+  add("--limit-telemetry-samples", limits.telemetry_samples,
+      "Samples buffered for one subscription");
+  add("--lease", lease, "Seconds that a simulation lives without calls, default and longest");
+}
+
+// Every option is also an environment variable: --model-root is MBCOSIMD_MODEL_ROOT.
+void add_environment_names(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_lnames().empty()) continue;
+    const std::string& name = option->get_lnames().front();
+    if (name == "help" || name == "version" || name == "print-config") continue;
+    std::string variable = "MBCOSIMD_";
+    for (const char c : name)
+      variable += c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    option->envname(variable);
+  }
+}
+
+}  // namespace
+
+std::string default_listener() {
+  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime && *runtime)
+    return "unix:" + std::string(runtime) + "/mbcosim.sock";
+  const std::string folder = "/tmp/mbcosim-" + std::to_string(::getuid());
+  ::mkdir(folder.c_str(), 0700);
+  return "unix:" + folder + "/mbcosim.sock";
+}
+
+Invocation read_options(int argc, char** argv) {
+  Invocation invocation;
+  Config& config = invocation.config;
+  CLI::App app{"Multibody co-simulation server.", "mbcosimd"};
+  app.set_version_flag("--version", std::string("mbcosimd ") + MBCOSIM_VERSION);
+  app.set_config("--config", "", "File of options, one `name=value` a line");
+  bool print_config = false;
+  std::int64_t lease = config.limits.lease.count(), grace = config.shutdown_grace.count();
+
+  app.add_option("--listen", config.listen,
+                 "Addresses: unix:PATH or HOST:PORT; default: " + default_listener());
+  app.add_option("--model-root", config.model_root, "Folder of decks that clients may name")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--workers", config.workers, "Simulations that step at once; 0: one per core")
+      ->capture_default_str();
+  app.add_option("--metrics", config.metrics, "HOST:PORT of Prometheus metrics");
+  app.add_option("--shutdown-grace", grace, "Seconds that open calls get on SIGTERM")
+      ->capture_default_str();
+  app.add_flag("--reflection,!--no-reflection", config.reflection, "Serve gRPC reflection");
+  app.add_option("--log-level", config.log_level, "trace, debug, info, warn, error, off")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
+  app.add_option("--log-format", config.log_format, "text or json")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"text", "json"}));
+  app.add_option("--tls-certificate", config.tls_certificate, "PEM file")
+      ->group("Security")
+      ->check(CLI::ExistingFile);
+  app.add_option("--tls-key", config.tls_key, "PEM file")
+      ->group("Security")
+      ->check(CLI::ExistingFile);
+  app.add_option("--tls-client-ca", config.tls_client_ca,
+                 "PEM file; clients need a certificate of this authority")
+      ->group("Security")
+      ->check(CLI::ExistingFile);
+  app.add_option("--tokens", config.tokens_file, "File of lines `TOKEN ROLE IDENTITY [EXPIRY]`")
+      ->group("Security")
+      ->check(CLI::ExistingFile);
+  app.add_flag("--insecure", config.insecure, "Allow addresses other than loopback without TLS")
+      ->group("Security");
+  add_limits(app, config.limits, lease);
+  add_environment_names(app);
+  app.add_option("--check", invocation.check_address,
+                 "Ask whether a daemon serves at ADDRESS; exit code 0 or 1")
+      ->configurable(false);
+  app.add_flag("--print-config", print_config, "Print the options in force and exit")
+      ->configurable(false);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    invocation.exit_code = app.exit(error) == 0 ? 0 : 4;
+    return invocation;
+  }
+  config.limits.lease = std::chrono::seconds(lease);
+  config.shutdown_grace = std::chrono::seconds(grace);
+  if (config.listen.empty()) config.listen.push_back(default_listener());
+  if (print_config) {
+    std::printf("%s", app.config_to_str(true, true).c_str());
+    invocation.exit_code = 0;
+  }
+  return invocation;
+}
+
+}  // namespace mbcosim::server

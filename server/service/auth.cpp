@@ -1,0 +1,90 @@
+#include "service/auth.h"
+
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "service/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+bool same_text(const std::string& a,
+               const std::string& b) {  // in a time that does not tell where they differ
+  if (a.size() != b.size()) return false;
+  unsigned char difference = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) difference |= static_cast<unsigned char>(a[i] ^ b[i]);
+  return difference == 0;
+}
+
+Role role_of(const std::string& name, int line) {
+  for (const Role role : {Role::observe, Role::control, Role::admin})
+    if (name == role_name(role)) return role;
+  throw std::runtime_error("tokens file, line " + std::to_string(line) + ": role \"" + name +
+                           "\" is none of observe, control, admin");
+}
+
+}  // namespace
+
+const char* role_name(Role role) {
+  constexpr const char* kNames[] = {"observe", "control", "admin"};
+  return kNames[static_cast<int>(role)];
+}
+
+Authenticator Authenticator::from_file(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error("cannot read the tokens file");
+  Authenticator result;
+  result.tokens_required_ = true;
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    std::istringstream words(line.substr(0, line.find('#')));
+    Token token;
+    std::string role;
+    if (!(words >> token.text)) continue;
+    if (!(words >> role >> token.caller.identity))
+      throw std::runtime_error("tokens file, line " + std::to_string(number) +
+                               ": expected TOKEN ROLE IDENTITY [EXPIRY]");
+    token.caller.role = role_of(role, number);
+    words >> token.expiry;
+    result.tokens_.push_back(std::move(token));
+  }
+  return result;
+}
+
+const Authenticator::Token* Authenticator::find(const std::string& text) const {
+  const Token* found = nullptr;
+  for (const Token& token : tokens_)
+    if (same_text(token.text, text)) found = &token;
+  return found;
+}
+
+Caller Authenticator::check(const grpc::ServerContext& context, Role required) const {
+  Caller caller{"local", Role::admin};
+  const auto auth = context.auth_context();
+  if (tokens_required_) {
+    const auto& metadata = context.client_metadata();
+    const auto header = metadata.find("authorization");
+    constexpr const char* kScheme = "Bearer ";
+    std::string text =
+        header == metadata.end() ? "" : std::string(header->second.data(), header->second.size());
+    if (text.rfind(kScheme, 0) != 0)
+      throw Refusal(v1::REASON_UNAUTHENTICATED, "a bearer token is required");
+    const Token* token = find(text.substr(std::string(kScheme).size()));
+    if (!token) throw Refusal(v1::REASON_UNAUTHENTICATED, "unknown bearer token");
+    if (token->expiry != 0 && token->expiry < std::time(nullptr))
+      throw Refusal(v1::REASON_UNAUTHENTICATED, "the bearer token has expired");
+    caller = token->caller;
+  } else if (auth && auth->IsPeerAuthenticated()) {
+    const auto names = auth->FindPropertyValues("x509_common_name");
+    if (!names.empty()) caller = {std::string(names[0].data(), names[0].size()), Role::control};
+  }
+  if (caller.role < required) {
+    throw Refusal(v1::REASON_ROLE_TOO_LOW, std::string("the call needs role ") +
+                                               role_name(required) + ", the caller has " +
+                                               role_name(caller.role));
+  }
+  return caller;
+}
+
+}  // namespace mbcosim::server

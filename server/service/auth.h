@@ -1,0 +1,47 @@
+/// Who calls, and what they may do.
+#pragma once
+
+#include <grpcpp/server_context.h>
+
+#include <ctime>
+#include <string>
+#include <vector>
+
+namespace mbcosim::server {
+
+enum class Role { observe, control, admin };
+const char* role_name(Role role);
+
+struct Caller {
+  std::string identity;
+  Role role = Role::observe;
+  bool may_touch(const std::string& owner) const {
+    return role == Role::admin || identity == owner;
+  }
+};
+
+/// Knows the tokens. Without tokens and without client certificates every caller is "local" with
+/// role admin: the Unix socket's mode decides who can connect.
+class Authenticator {
+ public:
+  /// Reads lines `TOKEN ROLE IDENTITY [EXPIRY]`; `#` starts a comment. Throws std::runtime_error
+  /// that names the line.
+  static Authenticator from_file(const std::string& path);
+  Authenticator() = default;
+
+  /// Throws Refusal: UNAUTHENTICATED, or PERMISSION_DENIED when the role is below `required`.
+  Caller check(const grpc::ServerContext& context, Role required) const;
+
+ private:
+  struct Token {
+    std::string text;
+    Caller caller;
+    std::time_t expiry = 0;  ///< 0: never
+  };
+  const Token* find(const std::string& text) const;
+
+  bool tokens_required_ = false;
+  std::vector<Token> tokens_;
+};
+
+}  // namespace mbcosim::server

@@ -1,0 +1,65 @@
+/// Notices calls whose client went away or whose deadline passed, and tells the solver.
+#pragma once
+
+#include <grpcpp/server_context.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "simulation/simulation.h"
+
+namespace mbcosim::server {
+
+class CallWatch;
+
+/// One call or stream in progress. While a token is attached, the end of the call cancels it.
+class Call {
+ public:
+  Call(CallWatch& watch, grpc::ServerContext& context);
+  ~Call();
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+
+  bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
+  void attach(CancelToken* token);  ///< null detaches
+
+ private:
+  friend class CallWatch;
+  void poll();
+  void cancel();
+
+  CallWatch& watch_;
+  grpc::ServerContext& context_;
+  std::atomic<bool> cancelled_{false};
+  std::mutex mutex_;
+  CancelToken* token_ = nullptr;
+};
+
+/// Polls the calls in progress from a thread of its own: gRPC's synchronous handlers learn of a
+/// cancellation only by asking.
+class CallWatch {
+ public:
+  CallWatch();
+  ~CallWatch();
+  /// Cancels all calls, now and from now on.
+  void cancel_all();
+  bool closing() const { return closing_.load(); }
+
+ private:
+  friend class Call;
+  void add(Call* call);
+  void remove(Call* call);
+  void loop();
+
+  std::mutex mutex_;
+  std::condition_variable stop_signal_;
+  std::set<Call*> calls_;
+  std::atomic<bool> closing_{false};
+  bool stop_ = false;
+  std::thread thread_;
+};
+
+}  // namespace mbcosim::server

@@ -1,0 +1,171 @@
+#include "service/convert.h"
+
+#include <cstdio>
+
+#include "service/refusal.h"
+
+namespace mbcosim::server {
+
+std::string digest_text(std::uint64_t digest) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(digest));
+  return text;
+}
+
+namespace {
+
+// Length of the UTF-8 sequence that starts at `i`, or 0 when there is none.
+std::size_t sequence_length(const std::string& s, std::size_t i) {
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(s[k]); };
+  const unsigned char lead = byte(i);
+  if (lead < 0x80) return 1;
+  const std::size_t length = lead >= 0xC2 && lead < 0xE0   ? 2
+                             : lead >= 0xE0 && lead < 0xF0 ? 3
+                             : lead >= 0xF0 && lead < 0xF5 ? 4
+                                                           : 0;
+  if (length == 0 || i + length > s.size()) return 0;
+  for (std::size_t k = 1; k < length; ++k)
+    if ((byte(i + k) & 0xC0) != 0x80) return 0;
+  if ((lead == 0xE0 && byte(i + 1) < 0xA0) || (lead == 0xED && byte(i + 1) > 0x9F) ||
+      (lead == 0xF0 && byte(i + 1) < 0x90) || (lead == 0xF4 && byte(i + 1) > 0x8F))
+    return 0;
+  return length;
+}
+
+v1::Severity to_proto(Severity severity) {
+  switch (severity) {
+    case Severity::error:
+      return v1::SEVERITY_ERROR;
+    case Severity::warning:
+      return v1::SEVERITY_WARNING;
+    case Severity::note:
+      return v1::SEVERITY_NOTE;
+  }
+  return v1::SEVERITY_UNSPECIFIED;
+}
+
+v1::Causality to_proto(Causality causality) {
+  switch (causality) {
+    case Causality::input:
+      return v1::CAUSALITY_INPUT;
+    case Causality::output:
+      return v1::CAUSALITY_OUTPUT;
+    case Causality::parameter:
+      return v1::CAUSALITY_PARAMETER;
+    case Causality::state:
+      return v1::CAUSALITY_STATE;
+  }
+  return v1::CAUSALITY_UNSPECIFIED;
+}
+
+}  // namespace
+
+std::string utf8(const std::string& text) {
+  std::string out;
+  out.reserve(text.size());
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = sequence_length(text, i);
+    if (length == 0) {
+      out += '?';
+      ++i;
+    } else {
+      out.append(text, i, length);
+      i += length;
+    }
+  }
+  return out;
+}
+
+void to_proto(const std::vector<Diagnostic>& diagnostics, DiagnosticList* out) {
+  for (const Diagnostic& d : diagnostics) {
+    v1::Diagnostic* p = out->Add();
+    p->set_severity(to_proto(d.severity));
+    p->set_code(d.code);
+    p->set_file(utf8(d.file));
+    p->set_line(d.line);
+    p->set_column(d.column);
+    p->set_length(d.length);
+    p->set_message(utf8(d.message));
+    p->set_source_line(utf8(d.source_line.substr(0, 2000)));
+    p->set_hint(utf8(d.hint));
+    for (const std::string& t : d.trail) p->add_trail(utf8(t));
+  }
+}
+
+void to_proto(const Error& error, v1::SolverFailure* out) {
+  out->set_reason(reason_of(error.kind));
+  out->set_message(utf8(error.message));
+  out->set_time_s(error.failure.time);
+  out->set_step(error.failure.step);
+  out->set_iteration(error.failure.iteration);
+  out->mutable_residual_norms()->Assign(error.failure.residual_history.begin(),
+                                        error.failure.residual_history.end());
+  for (const WorstEquation& w : error.failure.worst) {
+    v1::WorstEquation* p = out->add_worst_equations();
+    p->set_owner(utf8(w.owner));
+    p->set_equation(utf8(w.equation));
+    p->set_residual(w.residual);
+  }
+}
+
+void to_proto(const Variable& variable, int handle, v1::Variable* out) {
+  out->set_handle(handle);
+  out->set_name(utf8(variable.name));
+  out->mutable_shape()->Assign(variable.shape.begin(), variable.shape.end());
+  out->set_size(variable.size);
+  out->set_unit(utf8(variable.unit));
+  out->set_frame(variable.frame);
+  out->set_causality(to_proto(variable.causality));
+  out->set_description(utf8(variable.description));
+  out->set_owner(utf8(variable.owner));
+}
+
+void to_proto(const Model& model, v1::ModelDescription* out) {
+  out->set_title(utf8(model.title));
+  out->set_model_digest(digest_text(model.digest));
+  out->set_unknowns(model.unknowns);
+  out->set_initial_time_s(model.initial_value.initial_time);
+  out->set_final_time_s(model.initial_value.final_time);
+  out->set_step_s(model.initial_value.time_step);
+  for (const StructuralNode& n : model.structural) {
+    v1::NodeDescription* p = out->add_nodes();
+    p->set_family("structural");
+    p->set_kind(kind_name(n.kind));
+    p->set_label(n.label);
+    p->set_name(utf8(n.name));
+  }
+  for (const ScalarNode& n : model.scalars) {
+    v1::NodeDescription* p = out->add_nodes();
+    p->set_family(kind_name(n.kind));
+    p->set_label(n.label);
+    p->set_name(utf8(n.name));
+  }
+  for (const ElementRef& e : model.elements) {
+    const ElementInfo& info = e.set->info(e.index);
+    v1::ElementDescription* p = out->add_elements();
+    p->set_family(family_name(info.family));
+    p->set_type(utf8(info.type));
+    p->set_label(info.label);
+    p->set_name(utf8(info.name));
+  }
+}
+
+v1::StepOutcome to_proto(StepOutcome outcome) {
+  switch (outcome) {
+    case StepOutcome::accepted:
+      return v1::STEP_OUTCOME_ACCEPTED;
+    case StepOutcome::finished:
+      return v1::STEP_OUTCOME_FINISHED;
+    case StepOutcome::not_converged:
+      return v1::STEP_OUTCOME_NOT_CONVERGED;
+    case StepOutcome::interrupted:
+      return v1::STEP_OUTCOME_INTERRUPTED;
+    case StepOutcome::peer_lost:
+      return v1::STEP_OUTCOME_PEER_LOST;
+    case StepOutcome::limit:
+      return v1::STEP_OUTCOME_LIMIT;
+  }
+  return v1::STEP_OUTCOME_UNSPECIFIED;
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,439 @@
+#include "service/session.h"
+
+#include <google/protobuf/util/time_util.h>
+
+#include <cmath>
+
+#include "service/convert.h"
+#include "service/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr auto kSlice =
+    std::chrono::milliseconds(5);  // longest hold of lock and slot by many short steps
+constexpr auto kBlockSlice =
+    std::chrono::milliseconds(20);  // longest wait for a subscriber before looking round
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+bool holds(v1::Comparison comparison, double value, double threshold) {
+  switch (comparison) {
+    case v1::COMPARISON_LESS:
+      return value < threshold;
+    case v1::COMPARISON_LESS_OR_EQUAL:
+      return value <= threshold;
+    case v1::COMPARISON_GREATER:
+      return value > threshold;
+    case v1::COMPARISON_GREATER_OR_EQUAL:
+      return value >= threshold;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+/// Goal and progress of one call of `step`.
+struct Session::Advance {
+  const v1::StepRequest& request;
+  v1::StepReply& reply;
+  CancelToken token;
+  std::int64_t steps_left = 1;
+  double until = INFINITY;
+  bool started = false, ended = false;
+  struct Pending {
+    std::shared_ptr<TelemetryBuffer> buffer;
+    v1::Sample sample;
+  };
+  std::vector<Pending> pending;  ///< samples not yet delivered
+};
+
+/// Marks the session as stepping while it lives, and connects its token with whoever may interrupt.
+class Session::SteppingClaim {
+ public:
+  SteppingClaim(Session& session, Call& call) : session_(session), call_(call) {
+    if (session_.stepping_.exchange(true))
+      throw Refusal(v1::REASON_SIMULATION_BUSY,
+                    "another call advances the simulation at the moment");
+  }
+  ~SteppingClaim() {
+    attach(nullptr);
+    session_.stepping_.store(false);
+  }
+  SteppingClaim(const SteppingClaim&) = delete;
+  SteppingClaim& operator=(const SteppingClaim&) = delete;
+  void attach(CancelToken* token) {
+    {
+      std::lock_guard guard(session_.published_mutex_);
+      session_.running_ = token;
+      if (token && session_.closed_.load()) token->cancel();
+    }
+    call_.attach(token);
+  }
+
+ private:
+  Session& session_;
+  Call& call_;
+};
+
+Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared)
+    : identity_(std::move(identity)),
+      shared_(shared),
+      model_(&simulation->model()),
+      variables_(&simulation->variables()),
+      simulation_(std::move(simulation)),
+      last_use_(Clock::now().time_since_epoch().count()) {
+  publish();
+}
+
+// ------------------------------------------------------------------ telling
+
+void Session::fill(v1::SimulationInfo* out) const {
+  Published p;
+  {
+    std::lock_guard guard(published_mutex_);
+    p = published_;
+  }
+  out->set_name(identity_.id);
+  out->set_display_name(identity_.display_name);
+  out->set_owner(identity_.owner);
+  out->set_state(p.failed           ? v1::SIMULATION_STATE_FAILED
+                 : stepping_.load() ? v1::SIMULATION_STATE_STEPPING
+                 : p.finished       ? v1::SIMULATION_STATE_FINISHED
+                                    : v1::SIMULATION_STATE_READY);
+  out->set_step(p.step);
+  out->set_time_s(p.time);
+  out->set_next_step_s(p.next_step);
+  out->set_model_digest(digest_text(model_->digest));
+  out->set_final_time_s(model_->initial_value.final_time);
+  *out->mutable_lease() =
+      google::protobuf::util::TimeUtil::MillisecondsToDuration(identity_.lease.count());
+  out->set_last_failure(p.last_failure);
+}
+
+void Session::fill(v1::ModelDescription* out, const std::string& variable_prefix) const {
+  to_proto(*model_, out);
+  for (std::size_t i = 0; i < variables_->size(); ++i) {
+    const Variable& variable = (*variables_)[i];
+    if (variable.name.compare(0, variable_prefix.size(), variable_prefix) == 0)
+      to_proto(variable, static_cast<int>(i), out->add_variables());
+  }
+}
+
+void Session::publish() {
+  std::lock_guard guard(published_mutex_);
+  published_.step = simulation_->step_number();
+  published_.time = simulation_->time();
+  published_.next_step = simulation_->next_step_size();
+  published_.finished = simulation_->finished();
+}
+
+void Session::fail(const std::string& why) {
+  std::lock_guard guard(published_mutex_);
+  published_.failed = true;
+  published_.last_failure = why;
+}
+
+void Session::require_usable() const {
+  if (closed_.load()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
+  std::lock_guard guard(published_mutex_);
+  if (published_.failed)
+    throw Refusal(v1::REASON_SIMULATION_FAILED,
+                  "the simulation has failed; restore a snapshot or delete it");
+}
+
+// ------------------------------------------------------------------ checks
+
+void Session::check_handle(int handle) const {
+  if (handle >= 0 && handle < static_cast<int>(variables_->size())) return;
+  throw Refusal(v1::REASON_NO_SUCH_VARIABLE, "no variable has handle " + std::to_string(handle) +
+                                                 "; there are " +
+                                                 std::to_string(variables_->size()));
+}
+
+void Session::check_inputs(const v1::Values& inputs) const {
+  std::int64_t size = 0;
+  for (const int handle : inputs.handles()) {
+    check_handle(handle);
+    const Variable& variable = (*variables_)[handle];
+    if (variable.causality != Causality::input)
+      throw Refusal(v1::REASON_NOT_WRITABLE,
+                    "variable \"" + utf8(variable.name) + "\" is not an input");
+    size += variable.size;
+  }
+  if (size != inputs.values_size())
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "the variables to write take " + std::to_string(size) +
+                                               " values, got " +
+                                               std::to_string(inputs.values_size()));
+  for (const double value : inputs.values())
+    if (!std::isfinite(value))
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "a value to write is not finite");
+}
+
+void Session::check(const v1::StepRequest& request) const {
+  if (request.has_steps() && request.steps() < 0)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`steps` must not be negative, got " + std::to_string(request.steps()));
+  if (request.has_until_time_s() && std::isnan(request.until_time_s()))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`until_time_s` is not a number");
+  if (request.step_size_s() != 0)
+    throw Refusal(v1::REASON_NOT_SERVED,
+                  "`step_size_s` is not served: the deck's strategy sets the step");
+  if (request.has_until()) {
+    check_handle(request.until().handle());
+    const int size = (*variables_)[request.until().handle()].size;
+    if (request.until().element() < 0 || request.until().element() >= size)
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    "`until.element` must be from 0 to " + std::to_string(size - 1));
+    if (request.until().comparison() == v1::COMPARISON_UNSPECIFIED)
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`until.comparison` is missing");
+  }
+  for (const int handle : request.outputs()) check_handle(handle);
+  check_inputs(request.inputs());
+}
+
+void Session::check_step(std::int64_t expected) const {
+  const std::int64_t step = simulation_->step_number();
+  if (expected == step) return;
+  throw Refusal(v1::REASON_WRONG_STEP,
+                "expected step " + std::to_string(expected) + ", the simulation is at step " +
+                    std::to_string(step),
+                {{"step", std::to_string(step)}});
+}
+
+bool Session::replay(const v1::StepRequest& request, v1::StepReply* reply) const {
+  if (request.request_id().empty() || request.request_id() != last_reply_.request_id())
+    return false;
+  *reply = last_reply_;
+  return true;
+}
+
+void Session::apply_inputs(const v1::Values& inputs) {
+  const double* value = inputs.values().data();
+  for (const int handle : inputs.handles()) {
+    const std::size_t size = (*variables_)[handle].size;
+    const auto status = simulation_->set(handle, {value, size});
+    if (!status) throw Refusal(status.error());
+    value += size;
+  }
+}
+
+void Session::read_values(const google::protobuf::RepeatedField<int>& handles,
+                          google::protobuf::RepeatedField<double>* out) {
+  scratch_.clear();
+  for (const int handle : handles) simulation_->get(handle, scratch_);
+  out->Add(scratch_.begin(), scratch_.end());
+}
+
+// ------------------------------------------------------------------ advancing
+
+void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
+                   const Progress& progress) {
+  const Clock::time_point start = Clock::now();
+  require_usable();
+  check(request);
+  SteppingClaim claim(*this, call);
+  Advance advance{request, *reply, {}, 1, INFINITY, false, false, {}};
+  if (request.has_steps()) advance.steps_left = request.steps();
+  if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
+    advance.steps_left = INT64_MAX;
+  if (request.has_until_time_s()) advance.until = request.until_time_s();
+  claim.attach(&advance.token);
+  while (!run_slice(advance)) {
+    deliver_samples(advance);
+    if (progress) progress();
+  }
+  while (!deliver_samples(advance)) {
+  }
+  reply->set_total_seconds(seconds_since(start));
+  shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
+                                reply->solver_seconds());
+  if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
+}
+
+bool Session::wants_more(const Advance& advance) const {
+  return !advance.ended && advance.steps_left > 0 && !simulation_->finished() &&
+         simulation_->time() + 0.5 * simulation_->next_step_size() <= advance.until;
+}
+
+// Steps for a while with lock and slot held. True: the advance has ended and the reply is complete.
+bool Session::run_slice(Advance& advance) {
+  std::lock_guard lock(lock_);
+  const v1::StepRequest& request = advance.request;
+  if (!advance.started) {
+    if (replay(request, &advance.reply)) return true;
+    if (request.has_expected_step()) check_step(request.expected_step());
+    apply_inputs(request.inputs());
+    advance.started = true;
+    advance.reply.set_request_id(request.request_id());
+    advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
+                                                      : v1::STEP_OUTCOME_ACCEPTED);
+  }
+  if (!advance.pending.empty()) return false;
+  if (!wants_more(advance)) {
+    finish(advance);
+    return true;
+  }
+  const SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
+  const Clock::time_point slice_end = Clock::now() + kSlice;
+  while (wants_more(advance)) {
+    if (!slot || advance.token.cancelled()) {
+      advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
+      break;
+    }
+    take_one_step(advance);
+    if (!wants_more(advance)) break;
+    if (!advance.pending.empty() || lock_.contended() || Clock::now() >= slice_end) return false;
+  }
+  finish(advance);
+  return true;
+}
+
+void Session::take_one_step(Advance& advance) {
+  StepReport report;
+  try {
+    report = simulation_->step(&advance.token);
+  } catch (const std::exception&) {
+    fail("internal error while stepping");
+    throw Refusal(v1::REASON_INTERNAL,
+                  "internal error while stepping; the simulation is lost, restore a snapshot");
+  }
+  v1::StepReply& reply = advance.reply;
+  reply.set_outcome(to_proto(report.outcome));
+  reply.set_steps_done(reply.steps_done() + report.steps_done);
+  reply.set_step_size_s(report.step_size);
+  reply.set_iterations(report.iterations);
+  reply.set_total_iterations(reply.total_iterations() + report.iterations);
+  reply.set_residual_error(report.residual_error);
+  reply.set_solution_error(report.solution_error);
+  reply.set_solver_seconds(reply.solver_seconds() + report.solver_seconds);
+  publish();
+  const bool accepted =
+      report.outcome == StepOutcome::accepted || report.outcome == StepOutcome::finished;
+  if (!accepted) {
+    advance.ended = true;
+    if (report.error && report.outcome != StepOutcome::interrupted) {
+      to_proto(*report.error, reply.mutable_failure());
+      std::lock_guard guard(published_mutex_);
+      published_.last_failure = reply.failure().message();
+    }
+    return;
+  }
+  --advance.steps_left;
+  if (has_subscribers_.load(std::memory_order_relaxed)) take_samples(advance);
+  if (advance.request.has_until()) {
+    const v1::Condition& until = advance.request.until();
+    scratch_.clear();
+    simulation_->get(until.handle(), scratch_);
+    if (holds(until.comparison(), scratch_[until.element()], until.threshold())) {
+      reply.set_condition_met(true);
+      advance.ended = true;
+    }
+  }
+}
+
+void Session::finish(Advance& advance) {
+  v1::StepReply& reply = advance.reply;
+  reply.set_step(simulation_->step_number());
+  reply.set_time_s(simulation_->time());
+  read_values(advance.request.outputs(), reply.mutable_outputs());
+  if (!advance.request.request_id().empty()) last_reply_ = reply;
+}
+
+bool Session::interrupt() {
+  std::lock_guard guard(published_mutex_);
+  if (!running_) return false;
+  running_->cancel();
+  return true;
+}
+
+// ------------------------------------------------------------------ reading and writing
+
+void Session::read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply) {
+  require_usable();
+  for (const int handle : request.handles()) check_handle(handle);
+  std::lock_guard lock(lock_);
+  reply->set_step(simulation_->step_number());
+  reply->set_time_s(simulation_->time());
+  read_values(request.handles(), reply->mutable_values());
+}
+
+void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply) {
+  require_usable();
+  check_inputs(request.values());
+  if (stepping_.load())
+    throw Refusal(v1::REASON_SIMULATION_BUSY,
+                  "a call advances the simulation; inputs are written between advances");
+  std::lock_guard lock(lock_);
+  if (request.has_expected_step()) check_step(request.expected_step());
+  apply_inputs(request.values());
+  reply->set_step(simulation_->step_number());
+}
+
+// ------------------------------------------------------------------ telemetry
+
+void Session::subscribe(std::shared_ptr<TelemetryBuffer> buffer) {
+  for (const int handle : buffer->handles()) check_handle(handle);
+  std::lock_guard guard(subscribers_mutex_);
+  if (closed_.load()) buffer->close();
+  subscribers_.push_back(std::move(buffer));
+  has_subscribers_.store(true);
+}
+
+void Session::unsubscribe(const std::shared_ptr<TelemetryBuffer>& buffer) {
+  buffer->close();
+  std::lock_guard guard(subscribers_mutex_);
+  std::erase(subscribers_, buffer);
+  has_subscribers_.store(!subscribers_.empty());
+}
+
+void Session::take_samples(Advance& advance) {
+  std::lock_guard guard(subscribers_mutex_);
+  for (const auto& buffer : subscribers_) {
+    if (!buffer->wants(simulation_->step_number())) continue;
+    v1::Sample sample;
+    sample.set_step(simulation_->step_number());
+    sample.set_time_s(simulation_->time());
+    scratch_.clear();
+    for (const int handle : buffer->handles()) simulation_->get(handle, scratch_);
+    sample.mutable_values()->Add(scratch_.begin(), scratch_.end());
+    if (!buffer->offer(sample)) advance.pending.push_back({buffer, std::move(sample)});
+  }
+}
+
+// Without lock and slot: nobody else waits for a slow reader. True: all delivered.
+bool Session::deliver_samples(Advance& advance) {
+  if (advance.pending.empty()) return true;
+  for (auto& pending : advance.pending) pending.buffer->wait_for_room(kBlockSlice);
+  std::erase_if(advance.pending,
+                [](Advance::Pending& pending) { return pending.buffer->offer(pending.sample); });
+  if (advance.token.cancelled()) advance.pending.clear();
+  return advance.pending.empty();
+}
+
+// ------------------------------------------------------------------ end of life
+
+void Session::close() {
+  closed_.store(true);
+  interrupt();
+  std::lock_guard guard(subscribers_mutex_);
+  for (const auto& buffer : subscribers_) buffer->close();
+}
+
+Session::Use::Use(Session& session) : session_(session) { session_.uses_.fetch_add(1); }
+
+Session::Use::~Use() {
+  session_.last_use_.store(Clock::now().time_since_epoch().count());
+  session_.uses_.fetch_sub(1);
+}
+
+bool Session::lease_is_over(Clock::time_point now) const {
+  const Clock::time_point last{Clock::duration(last_use_.load())};
+  return uses_.load() == 0 && now - last > identity_.lease;
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,152 @@
+/// One simulation on the server: who owns it, who advances it, what is saved of it.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "mbcosim/v1/simulations.pb.h"
+#include "service/call_watch.h"
+#include "service/config.h"
+#include "service/fair_mutex.h"
+#include "service/metrics.h"
+#include "service/telemetry_buffer.h"
+#include "simulation/simulation.h"
+
+namespace mbcosim::server {
+
+/// Thread-safe. One call at a time advances the simulation; others read between its steps. Methods
+/// throw Refusal.
+class Session {
+ public:
+  struct Identity {
+    std::string id;  ///< "simulations/4f3a…"
+    std::string display_name, owner, request_id;
+    std::chrono::milliseconds lease{3600 * 1000};
+  };
+  /// What all sessions of a daemon share; outlives them.
+  struct Shared {
+    SolverSlots& slots;
+    const ServiceLimits& limits;
+    Metrics& metrics;
+  };
+  using Progress = std::function<void()>;  ///< called between slices of a long advance
+
+  Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared);
+
+  const Identity& identity() const { return identity_; }
+  const Model& model() const { return *model_; }
+  const std::vector<Variable>& variables() const { return *variables_; }
+  void fill(v1::SimulationInfo* out) const;
+  void fill(v1::ModelDescription* out, const std::string& variable_prefix) const;
+
+  /// Advances as asked; see `Simulations.Step`.
+  void step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
+            const Progress& progress = {});
+  bool interrupt();  ///< was anything advancing?
+  void read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply);
+  void write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply);
+
+  void save(const std::string& display_name, v1::Snapshot* out);
+  void restore(int snapshot);
+  void list_snapshots(v1::ListSnapshotsReply* out) const;
+  void delete_snapshot(int snapshot);
+  std::string export_state(int snapshot);  ///< negative: the current state
+  void import_state(const std::string& bytes, const std::string& display_name, bool also_restore,
+                    v1::Snapshot* out);
+  std::unique_ptr<Simulation> fork(int snapshot);  ///< negative: the current state
+
+  void subscribe(std::shared_ptr<TelemetryBuffer> buffer);
+  void unsubscribe(const std::shared_ptr<TelemetryBuffer>& buffer);
+
+  /// Interrupts, ends subscriptions; later calls find the session gone.
+  void close();
+
+  /// Keeps the lease from running out while it lives.
+  class Use {
+   public:
+    explicit Use(Session& session);
+    ~Use();
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+
+   private:
+    Session& session_;
+  };
+  bool lease_is_over(std::chrono::steady_clock::time_point now) const;
+
+ private:
+  struct Saved {
+    std::string display_name;
+    State state;
+    std::int64_t bytes = 0;
+  };
+  struct Published {  ///< what can be told without waiting for a step
+    std::int64_t step = 0;
+    double time = 0, next_step = 0;
+    bool finished = false, failed = false;
+    std::string last_failure;
+  };
+  struct Advance;  ///< one call of `step` in progress
+  class SteppingClaim;
+
+  bool replay(const v1::StepRequest& request, v1::StepReply* reply) const;
+  void check(const v1::StepRequest& request) const;
+  void check_handle(int handle) const;
+  void check_inputs(const v1::Values& inputs) const;
+  void check_step(std::int64_t expected) const;
+  void apply_inputs(const v1::Values& inputs);
+  bool wants_more(const Advance& advance) const;
+  bool run_slice(Advance& advance);
+  void take_one_step(Advance& advance);
+  void take_samples(Advance& advance);
+  bool deliver_samples(Advance& advance);
+  void finish(Advance& advance);
+  void publish();
+  void fail(const std::string& why);
+  void require_usable() const;
+  void read_values(const google::protobuf::RepeatedField<int>& handles,
+                   google::protobuf::RepeatedField<double>* out);
+  const Saved& find_snapshot(int snapshot) const;
+  int add_snapshot(Saved saved);
+  void fill(int number, const Saved& saved, v1::Snapshot* out) const;
+
+  const Identity identity_;
+  const Shared shared_;
+  const Model* const model_;
+  const std::vector<Variable>* const variables_;
+
+  FairMutex lock_;  // protects the three below
+  std::unique_ptr<Simulation> simulation_;
+  std::vector<double> scratch_;
+  v1::StepReply last_reply_;
+
+  std::atomic<bool> stepping_{false}, closed_{false};
+
+  mutable std::mutex published_mutex_;  // protects the two below
+  Published published_;
+  CancelToken* running_ = nullptr;
+
+  mutable std::mutex snapshots_mutex_;  // protects the three below
+  std::map<int, Saved> snapshots_;
+  int next_snapshot_ = 1;
+  std::int64_t snapshot_bytes_ = 0;
+
+  std::mutex subscribers_mutex_;  // protects the one below
+  std::vector<std::shared_ptr<TelemetryBuffer>> subscribers_;
+  std::atomic<bool> has_subscribers_{false};
+
+  std::atomic<int> uses_{0};
+  std::atomic<std::chrono::steady_clock::rep> last_use_;
+};
+
+/// Number in "simulations/ID/snapshots/N" after splitting off the simulation's name; -1: not such a
+/// name.
+int split_snapshot_name(const std::string& name, std::string* simulation);
+
+}  // namespace mbcosim::server

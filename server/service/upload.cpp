@@ -1,0 +1,86 @@
+#include "service/upload.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "service/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+void check_name(const std::string& name) {
+  constexpr std::size_t kLongest = 1024;
+  const fs::path path(name);
+  const bool climbs =
+      std::any_of(path.begin(), path.end(), [](const fs::path& part) { return part == ".."; });
+  if (name.empty() || name.size() > kLongest || name.find('\0') != std::string::npos ||
+      path.is_absolute() || climbs || name.back() == '/') {
+    throw Refusal(
+        v1::REASON_BAD_ARGUMENT,
+        "file names must be relative, without \"..\", and at most 1024 bytes long; got \"" +
+            name.substr(0, 100) + "\"");
+  }
+}
+
+LoadReport load_from_root(const std::string& name, const Config& config) {
+  if (config.model_root.empty())
+    throw Refusal(v1::REASON_NO_SUCH_MODEL, "the server has no model root; upload a bundle");
+  check_name(name);
+  std::error_code error;
+  const fs::path root = fs::canonical(config.model_root, error);
+  const fs::path file = error ? fs::path() : fs::canonical(root / name, error);
+  const bool inside =
+      !error &&
+      std::mismatch(root.begin(), root.end(), file.begin(), file.end()).first == root.end();
+  if (!inside || !fs::is_regular_file(file, error))
+    throw Refusal(v1::REASON_NO_SUCH_MODEL,
+                  "no deck is named \"" + name + "\" under the model root");
+  return load_deck(FolderSource(file.parent_path().string()), file.filename().string(),
+                   config.limits.engine);
+}
+
+}  // namespace
+
+Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceLimits& limits) {
+  Upload upload;
+  v1::UploadRequest message;
+  if (!reader->Read(&message) || !message.has_header())
+    throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an upload must be `header`");
+  upload.header = message.header();
+  if (upload.header.source_case() == v1::UploadHeader::SOURCE_NOT_SET)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "the header must have `bundle_main_file` or `model_root_file`");
+  std::int64_t bytes = 0;
+  while (reader->Read(&message)) {
+    if (!message.has_chunk())
+      throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` an upload has only `chunk` messages");
+    if (!upload.header.has_bundle_main_file())
+      throw Refusal(v1::REASON_OUT_OF_TURN, "a deck of the model root takes no `chunk` messages");
+    const v1::FileChunk& chunk = message.chunk();
+    check_name(chunk.path());
+    bytes += static_cast<std::int64_t>(chunk.data().size());
+    if (bytes > limits.engine.deck_bytes)
+      throw limit_refusal("deck_bytes", limits.engine.deck_bytes,
+                          "the bundle is larger than allowed");
+    upload.files[chunk.path()] += chunk.data();
+    if (static_cast<int>(upload.files.size()) > limits.bundle_files)
+      throw limit_refusal("bundle_files", limits.bundle_files,
+                          "the bundle has more files than allowed");
+  }
+  return upload;
+}
+
+LoadReport load(const Upload& upload, const Config& config) {
+  if (upload.header.has_model_root_file())
+    return load_from_root(upload.header.model_root_file(), config);
+  const std::string& main_file = upload.header.bundle_main_file();
+  check_name(main_file);
+  if (upload.files.count(main_file) == 0)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
+  return load_deck(BundleSource(upload.files), main_file, config.limits.engine);
+}
+
+}  // namespace mbcosim::server

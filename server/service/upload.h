@@ -1,0 +1,24 @@
+/// Decks on their way in: bundles in pieces, or names under the model root.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "mbcosim/v1/simulations.grpc.pb.h"
+#include "service/config.h"
+
+namespace mbcosim::server {
+
+struct Upload {
+  v1::UploadHeader header;
+  std::map<std::string, std::string> files;  ///< by name within the bundle
+};
+
+/// Collects the messages of an upload. Throws Refusal.
+Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceLimits& limits);
+
+/// Reads the deck. Throws Refusal when the model root or the file in it is not to be had; a wrong
+/// deck is in the report.
+LoadReport load(const Upload& upload, const Config& config);
+
+}  // namespace mbcosim::server
