@@ -160,9 +160,9 @@ void Session::check_inputs(const v1::Values& inputs) const {
   for (const int handle : inputs.handles()) {
     check_handle(handle);
     const Variable& variable = (*variables_)[handle];
-    if (variable.causality != Causality::input)
+    if (variable.causality != Causality::input && variable.causality != Causality::parameter)
       throw Refusal(v1::REASON_NOT_WRITABLE,
-                    "variable \"" + utf8(variable.name) + "\" is not an input");
+                    "variable \"" + utf8(variable.name) + "\" is neither an input nor a parameter");
     size += variable.size;
   }
   if (size != inputs.values_size())

@@ -11,7 +11,7 @@ namespace {
 std::int64_t size_of(const State& s) {
   const std::size_t numbers = s.y.size() + s.yp.size() + s.y1.size() + s.yp1.size() + s.y2.size() +
                               s.yp2.size() + s.memory.size() + s.variables.size() +
-                              s.control.size();
+                              s.external_loads.size() + s.control.size();
   return static_cast<std::int64_t>(numbers * sizeof(double) +
                                    s.rotation.size() * sizeof(NodeRotation) + sizeof(State));
 }

@@ -1,0 +1,70 @@
+#!/usr/bin/env python3
+"""Steps the tumbling body on a server, shows a progress bar, and plots its spin.
+
+usage: tumbling_body.py [--address ADDRESS] [--deck DECK] [--plot FILE.png]
+"""
+import argparse
+import os
+import sys
+
+import numpy as np
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+BUILT = os.path.join(HERE, "..", "..", "build", "python")
+if os.path.isdir(BUILT):
+    sys.path.insert(0, BUILT)
+
+import mbcosim  # noqa: E402
+from tqdm import tqdm  # noqa: E402
+
+SPIN, ROTATION = "node.structural.1.Omega", "node.structural.1.R"
+INERTIA = np.diag([1.0, 2.0, 3.0])  # of the deck, node frame [kg m^2]
+
+
+def simulate(simulation):
+    """Times (n), spins in the node frame (n x 3), kinetic energies (n)."""
+    info = simulation.describe()
+    steps = round((info.final_time_s - info.initial_time_s) / info.step_s)
+    times, spins = [], []
+    with simulation.stepper(outputs=[SPIN, ROTATION]) as stepper:
+        for _ in tqdm(range(steps), unit="step", disable=None):
+            result = stepper.step()
+            times.append(result.time)
+            spins.append(result.values[ROTATION].T @ result.values[SPIN])
+    spins = np.array(spins)
+    return np.array(times), spins, 0.5 * np.einsum("ni,ij,nj->n", spins, INERTIA, spins)
+
+
+def plot(times, spins, path):
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(8, 4))
+    for axis, label in enumerate("xyz"):
+        axes.plot(times, spins[:, axis], label=f"about {label}")
+    axes.set(xlabel="time [s]", ylabel="spin in the body's frame [rad/s]", title="Tumbling body")
+    axes.legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--address", help="of the server; default: the one of this user")
+    parser.add_argument("--deck", default=os.path.join(HERE, "..", "models", "tumbling.mbd"))
+    parser.add_argument("--plot", default="tumbling.png")
+    options = parser.parse_args()
+
+    with mbcosim.connect(options.address) as server, server.load(options.deck, name="tumbling body") as simulation:
+        times, spins, energy = simulate(simulation)
+    plot(times, spins, options.plot)
+
+    print(f"{'time [s]':>10} {'wx':>10} {'wy':>10} {'wz':>10} {'energy [J]':>12}   (spin in rad/s, body frame)")
+    for i in np.linspace(0, len(times) - 1, 6).astype(int):
+        print(f"{times[i]:10.3f} {spins[i, 0]:10.4f} {spins[i, 1]:10.4f} {spins[i, 2]:10.4f} {energy[i]:12.6f}")
+    print(f"plot: {os.path.abspath(options.plot)}")
+
+
+if __name__ == "__main__":
+    main()

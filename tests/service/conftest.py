@@ -1,0 +1,89 @@
+"""A real daemon for each test module, and the decks that tests run."""
+import os
+import signal
+import subprocess
+import time
+
+import pytest
+
+import mbcosim
+
+BIN = os.environ.get("MBCOSIM_BIN", os.path.join(os.path.dirname(__file__), "..", "..", "build", "bin"))
+MODELS = os.path.join(os.path.dirname(__file__), "..", "..", "client_examples", "models")
+
+
+class Daemon:
+    """A daemon on a socket of its own. Ends with SIGTERM and must then exit with 0."""
+
+    def __init__(self, folder, *options):
+        self.address = f"unix:{folder}/mbcosim.sock"
+        self.log_path = os.path.join(folder, "log")
+        self._log = open(self.log_path, "ab")
+        command = [os.path.join(BIN, "mbcosimd"), "--listen", self.address, "--shutdown-grace", "1", *options]
+        self.process = subprocess.Popen(command, stderr=self._log, stdin=subprocess.DEVNULL)
+
+    def connect(self, **options):
+        return mbcosim.connect(self.address, timeout=30, **options)
+
+    def alive(self):
+        return self.process.poll() is None
+
+    def log(self):
+        with open(self.log_path, errors="replace") as file:
+            return file.read()
+
+    def stop(self):
+        if self.alive():
+            self.process.send_signal(signal.SIGTERM)
+        code = self.process.wait(30)
+        self._log.close()
+        assert code == 0, f"the daemon ended with {code}:\n{self.log()[-4000:]}"
+
+
+@pytest.fixture
+def start_daemon(tmp_path_factory):
+    """Function that starts a daemon with options; all are stopped at the end of the test."""
+    daemons = []
+
+    def start(*options):
+        daemons.append(Daemon(str(tmp_path_factory.mktemp("d")), *options))
+        return daemons[-1]
+
+    yield start
+    for daemon in daemons:
+        daemon.stop()
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory):
+    """One daemon for the tests of a module."""
+    running = Daemon(str(tmp_path_factory.mktemp("d")), "--model-root", MODELS)
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def server(daemon):
+    """A connection to the module's daemon."""
+    with daemon.connect() as connection:
+        yield connection
+
+
+@pytest.fixture
+def tumbling():
+    """Path of a deck: a free body that tumbles, 1000 steps."""
+    return os.path.join(MODELS, "tumbling.mbd")
+
+
+@pytest.fixture
+def pendulum():
+    """Path of a deck with joints and gravity, 1000 steps."""
+    return os.path.join(MODELS, "pendulum.mbd")
+
+
+def wait_for(condition, seconds=10):
+    """Waits until `condition()` is true."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.01)

@@ -1,0 +1,27 @@
+"""Decks as text, for tests that change something in them."""
+
+BODY = """
+begin: data; problem: initial value; end: data;
+begin: initial value;
+  initial time: 0.; final time: {final_time}; time step: {step};
+  method: ms, 0.6; tolerance: {tolerance}; max iterations: {iterations};
+end: initial value;
+begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;
+begin: nodes; structural: 1, dynamic, null, eye, 0., 1., 0., {spin}; end: nodes;
+begin: elements; body: 1, 1, 1., null, diag, {inertia}; end: elements;
+"""
+
+
+def body(final_time="1.", step="1.e-3", tolerance="1.e-9", iterations="20", spin="0.1, 5., 0.1", inertia="1., 2., 3."):
+    """A free rigid body at node 1."""
+    return BODY.format(final_time=final_time, step=step, tolerance=tolerance, iterations=iterations, spin=spin, inertia=inertia)
+
+
+def endless():
+    """A run that lasts until it is stopped."""
+    return body(final_time="1.e9")
+
+
+def impossible():
+    """A body whose steps cannot converge: one iteration, a tolerance out of reach, a fast spin in long steps."""
+    return body(final_time="10.", step="0.05", tolerance="1.e-14", iterations="1", spin="1., 20., 1.")

@@ -1,0 +1,89 @@
+"""The command line: exit codes, output, and the same numbers as the service."""
+import json
+import os
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+import decks
+from conftest import BIN
+
+MBCOSIM = os.path.join(BIN, "mbcosim")
+
+
+def mbcosim(*arguments, cwd=None):
+    return subprocess.run([MBCOSIM, *arguments], cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=60)
+
+
+@pytest.fixture
+def deck(tmp_path):
+    path = tmp_path / "deck"
+    path.write_text(decks.body())
+    return path
+
+
+def test_run_writes_what_the_service_gives(server, deck, tmp_path):
+    run = mbcosim("run", str(deck), "-o", str(tmp_path / "out"))
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
+    rows = np.loadtxt(tmp_path / "out.mov")
+    with server.load(str(deck)) as simulation:
+        simulation.step(1000)
+        assert rows[-1, 1:4] == pytest.approx(simulation["node.structural.1.X"], rel=1e-5, abs=1e-6)
+    assert {p.suffix for p in tmp_path.iterdir()} <= {"", ".mov", ".out", ".log", ".ine"}
+
+
+def test_default_prefix_is_the_decks_name(deck, tmp_path):
+    assert mbcosim("run", "deck", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "deck.mov").exists()
+
+
+def test_deck_errors_exit_with_2(tmp_path):
+    bad = tmp_path / "bad"
+    bad.write_text(decks.body().replace("body: 1, 1", "boddy: 1, 1"))
+    run = mbcosim("run", str(bad))
+    assert run.returncode == 2 and "bad:9:" in run.stderr and "^" in run.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bad"]
+    assert mbcosim("run", str(tmp_path / "nothing")).returncode == 2
+    assert mbcosim("run", str(tmp_path)).returncode == 2
+
+
+def test_numerical_failure_exits_with_3(tmp_path):
+    deck = tmp_path / "deck"
+    deck.write_text(decks.impossible())
+    run = mbcosim("run", str(deck))
+    assert run.returncode == 3 and "residual" in run.stderr
+
+
+def test_wrong_usage_exits_with_4(deck):
+    assert mbcosim().returncode == 4
+    assert mbcosim("run").returncode == 4
+    assert mbcosim("run", str(deck), "-o", "/nonexistent/folder/x").returncode == 4
+
+
+def test_interrupt_exits_with_130(tmp_path):
+    deck = tmp_path / "deck"
+    deck.write_text(decks.endless())
+    process = subprocess.Popen([MBCOSIM, "run", str(deck)], stderr=subprocess.DEVNULL)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 130
+
+
+def test_validate_and_describe_as_json(deck, tmp_path):
+    good = mbcosim("validate", str(deck), "--json")
+    assert good.returncode == 0 and json.loads(good.stdout) == {"ok": True, "diagnostics": []}
+    description = json.loads(mbcosim("describe", str(deck), "--json").stdout)
+    assert description["unknowns"] == 12
+    assert "node.structural.1.X" in [v["name"] for v in description["variables"]]
+    bad = tmp_path / "bad"
+    bad.write_text("begin: nothing;")
+    report = mbcosim("validate", str(bad), "--json")
+    assert report.returncode == 2 and json.loads(report.stdout)["diagnostics"]
+
+
+def test_help_and_version():
+    assert mbcosim("--version").stdout.startswith("mbcosim ")
+    assert "Exit codes" in mbcosim("--help").stdout
