@@ -109,6 +109,7 @@ void read_drive_caller(DeckCard& card) {
   }
   card.expect_end();
   deck.drives[d.label] = {d.drive, card.head()};
+  deck.drive_depth[d.label] = card.drive_depth();
   card.model().drive_index[d.label] = static_cast<int>(card.model().drives.size());
   card.model().drives.push_back(std::move(d));
 }

@@ -62,6 +62,8 @@ struct Deck {
 
   std::unordered_map<int, std::size_t> frames;  ///< label -> index in Model::frames
   LabelMap<DrivePtr> drives;
+  std::unordered_map<int, int>
+      drive_depth;  ///< length of the chain of references behind a drive caller
   std::vector<int> drives_without_output;  ///< indices in Model::drives whose card has no `output`
   LabelMap<LawPtr<1>> laws1;
   LabelMap<LawPtr<3>> laws3;

@@ -64,9 +64,7 @@ void DeckCard::skip() {
   consumed();
 }
 
-void DeckCard::consumed() {
-  has_peeked_ = false;
-}
+void DeckCard::consumed() { has_peeked_ = false; }
 
 // ----------------------------------------------------------------------------------------------
 // words
@@ -125,6 +123,19 @@ bool DeckCard::at_string() { return cursor_.more() && cursor_.at_string(); }
 
 // ----------------------------------------------------------------------------------------------
 // numbers
+
+DeckCard::Nesting::Nesting(DeckCard& card) : card_(card) {
+  if (++card_.nesting_ <= card_.deck_.session.limits.expression_depth) return;
+  --card_.nesting_;
+  card_.deck_.session.fail_limit(card_.last(), "expression-depth",
+                                 "drives, laws or functions are nested too deeply");
+}
+
+void DeckCard::need_numbers(std::string_view what, std::int64_t count) {
+  if (count > static_cast<std::int64_t>(statement_.text.size()))
+    fail(std::string(what) + ": " + std::to_string(count) +
+         " numbers expected; the card has fewer");
+}
 
 void DeckCard::need_argument(std::string_view what) {
   if (!cursor_.more()) fail(std::string(what) + " missing");

@@ -2,6 +2,7 @@
 /// deck read so far.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -99,6 +100,7 @@ class DeckCard final : public Card {
   void set_defining(std::string kind, int label = -1);
   const std::string& defined_kind() const { return defined_kind_; }
   int defined_label() const { return defined_label_; }
+  int drive_depth() const { return drive_depth_; }
   std::string_view next_text();            ///< the next argument as it is written
   void skip();                             ///< the next argument
   FileDriverPtr file_driver_definition();  ///< `<type>, ...` of a `file` card
@@ -145,7 +147,22 @@ class DeckCard final : public Card {
     Mat3 local = Mat3::Identity();
   };
 
+  /// Counts nested drives, laws and functions; hostile nesting is refused before the stack is used
+  /// up.
+  class Nesting {
+   public:
+    explicit Nesting(DeckCard& card);
+    ~Nesting() { --card_.nesting_; }
+    Nesting(const Nesting&) = delete;
+    Nesting& operator=(const Nesting&) = delete;
+
+   private:
+    DeckCard& card_;
+  };
+
   void need_argument(std::string_view what);
+  /// Refuses a matrix with more entries than the card can hold.
+  void need_numbers(std::string_view what, std::int64_t count);
   void consumed();
   /// The next argument is a word of the language but no variable: refused where a number is
   /// expected.
@@ -167,6 +184,7 @@ class DeckCard final : public Card {
   Vec3 unit(std::string_view what, const Vec3& v);
 
   DrivePtr constant_drive(std::string_view what);
+  DrivePtr drive_reference();
   template <int N>
   LawPtr<N> law_of();
   ScalarFunctionPtr function_definition(const std::string& name, SourceSpan where);
@@ -186,6 +204,8 @@ class DeckCard final : public Card {
   Cursor cursor_;
   std::string subject_, type_, defined_kind_;
   int defined_label_ = -1;
+  int nesting_ = 0;
+  int drive_depth_ = 0;  ///< longest chain of drives that this card makes
   std::string peeked_;
   bool has_peeked_ = false;
 };

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "input/cards.h"
 #include "input/deck.h"
@@ -597,45 +598,24 @@ void read_linear_solver(DeckCard& card) {
       "linear solver", {"umfpack", "umfpack3", "klu", "naive", "lapack", "y12", "superlu", "taucs",
                         "harwell", "meschach", "watson", "pardiso", "empty"});
   if (solver == 12) card.fail_at(where, "the linear solver \"empty\" solves nothing");
+  static const std::set<std::string, std::less<>> kFlags = {
+      "map",          "cc",     "columncompressed", "dir",
+      "directaccess", "colamd", "minimumdegree",    "rcmk",
+      "king",         "sloan",  "nesteddissection", "mmdata"};
   while (card.more()) {
-    switch (card.required("linear solver option", {"map",
-                                                   "cc",
-                                                   "column compressed",
-                                                   "dir",
-                                                   "direct access",
-                                                   "colamd",
-                                                   "minimum degree",
-                                                   "rcmk",
-                                                   "king",
-                                                   "sloan",
-                                                   "nested dissection",
-                                                   "mmdata",
-                                                   "mt",
-                                                   "multi thread",
-                                                   "workspace size",
-                                                   "block size",
-                                                   "pivot factor",
-                                                   "drop tolerance",
-                                                   "scale",
-                                                   "max iterations",
-                                                   "tolerance"})) {
-      case 12:
-      case 13:
-      case 14:
-      case 15:
-      case 19:
-        card.integer("value");
-        break;
-      case 16:
-      case 17:
-      case 20:
-        card.real("value");
-        break;
-      case 18:
-        card.word("scaling");
-        break;
-      default:
-        break;
+    if (kFlags.count(card.peek_word())) {
+      card.skip();
+    } else if (card.one_of(
+                   {"mt", "multi thread", "workspace size", "block size", "max iterations"}) >= 0) {
+      card.integer("linear solver option");
+    } else if (card.one_of({"pivot factor", "drop tolerance", "tolerance"}) >= 0) {
+      card.real("linear solver option");
+    } else {
+      card.required("linear solver option", {"scale"});
+      card.required("scaling",
+                    {"no", "none", "max", "sum", "row max", "row sum", "column max", "column sum",
+                     "row max column max", "lapack", "iterative", "always", "once"});
+      card.one_of({"always", "once", "never"});
     }
   }
 }

@@ -287,7 +287,7 @@ class Machine {
         v = frame_.texts.back();
         break;
     }
-    in.symbol->damaged = false;
+    in.symbol->damaged = frame_.session && frame_.session->is_damaged();
   }
 
   std::string pop_text() {
@@ -358,7 +358,13 @@ class Machine {
   void divide_real() {
     --top_;
     if (value_of(top_[1].r) == 0) throw EvaluationError("division by zero");
-    top_->r = top_->r / top_[1].r;
+    const double quotient = value_of(top_->r) / value_of(top_[1].r);
+    if constexpr (std::is_same_v<T, double>) {
+      top_->r = quotient;
+    } else {
+      top_->r /= top_[1].r;
+      top_->r.v = quotient;  // the same bits as without derivatives
+    }
   }
 
   void integer_operation(const Instruction& in) {
@@ -474,6 +480,7 @@ class Machine {
     top_->i = 0;
     if (condition == 0) return;
     if (frame_.session && status == 0) frame_.session->exited = true;
+    if (frame_.session) frame_.session->stop();
     throw EvaluationError("stopped by the deck: stop(" + std::to_string(condition) + ", " +
                           std::to_string(status) + ")");
   }

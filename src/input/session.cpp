@@ -193,15 +193,23 @@ Diagnostic Session::diagnostic(Severity severity, std::string code, SourceSpan w
 }
 
 void Session::report(Diagnostic d) {
-  if (damaged_ || exited) return;
+  if (damaged_ || exited || is_known(d)) return;
   if (d.severity == Severity::error) {
     if (errors_ >= limits.errors) return;
     ++errors_;
   } else if (++warnings_ > kMostWarnings) {
     return;
   }
-  if (d.code.rfind("limit-", 0) == 0) stopped_ = true;
+  if (d.code.starts_with("limit-")) stopped_ = true;
   diagnostics_.push_back(std::move(d));
+}
+
+/// Was the same said about the same place? Passes of loops and repeated includes would repeat it.
+bool Session::is_known(const Diagnostic& d) const {
+  return std::any_of(diagnostics_.begin(), diagnostics_.end(), [&](const Diagnostic& other) {
+    return other.line == d.line && other.column == d.column && other.severity == d.severity &&
+           other.file == d.file && other.message == d.message;
+  });
 }
 
 void Session::warn(SourceSpan where, std::string message, std::string hint) {

@@ -94,6 +94,7 @@ class Session {
   SourceSpan expression_span(std::size_t where, std::size_t length) const;
   /// Errors of the present statement are consequences of an earlier one and are not reported.
   void set_damaged(bool damaged) { damaged_ = damaged; }
+  bool is_damaged() const { return damaged_; }
 
   int add_trail(Trail t);
   /// Frees the trail and those after it, unless a run-time string was read since then.
@@ -127,7 +128,9 @@ class Session {
   std::string printed;  ///< what `remark`, `print symbol table` and `print()` printed
   bool exited = false;  ///< `exit;` or stop(1, 0): the deck ends here with success
 
-  ExpressionScratch& scratch() { return *scratch_; }  ///< buffers for evaluating one expression at a time
+  ExpressionScratch& scratch() {
+    return *scratch_;
+  }  ///< buffers for evaluating one expression at a time
 
   std::int32_t random();  ///< next of rand(): 0..2147483647
   void seed(std::uint32_t value);
@@ -136,6 +139,7 @@ class Session {
   static constexpr int kMostWarnings = 1000;
 
   Result<std::string> read_counted(const std::string& name);
+  bool is_known(const Diagnostic& d) const;
   Result<std::string> expand_environment(std::string_view name) const;
 
   const FileSource& source_;

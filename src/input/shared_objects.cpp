@@ -43,6 +43,8 @@ std::vector<std::string> written_words(const Map& table, const Registry& registr
   return words;
 }
 
+constexpr int kMostChainedDrives = 1000;  // evaluation recurses along the chain
+
 template <class T>
 const T& labelled(DeckCard& card, const LabelMap<T>& map, std::string_view kind) {
   const int label = card.label(std::string(kind) + " label");
@@ -85,6 +87,16 @@ DrivePtr DeckCard::constant_drive(std::string_view what) {
   return make_constant_drive(real(what));
 }
 
+DrivePtr DeckCard::drive_reference() {
+  const int label = this->label("drive caller label");
+  const auto found = deck_.drives.find(label);
+  if (found == deck_.drives.end()) deck_.undefined(*this, "drive caller", label);
+  drive_depth_ = std::max(drive_depth_, nesting_ + deck_.drive_depth[label]);
+  if (drive_depth_ > kMostChainedDrives)
+    fail("the chain of drives behind drive caller " + std::to_string(label) + " is too long");
+  return found->second.object;
+}
+
 DrivePtr DeckCard::drive(std::string_view what) {
   need_argument(what);
   if (cursor_.at_empty()) {
@@ -94,7 +106,9 @@ DrivePtr DeckCard::drive(std::string_view what) {
   if (at_string())
     fail_at(next(), std::string(what) + ": drive expected, string found",
             "write: string, \"<expression>\"");
-  if (keyword("reference")) return labelled(*this, deck_.drives, "drive caller");
+  const Nesting nesting(*this);
+  drive_depth_ = std::max(drive_depth_, nesting_);
+  if (keyword("reference")) return drive_reference();
   keyword("function");
   const auto reader = registry().drives.find(peek_word());
   if (reader == registry().drives.end()) return constant_drive(what);
@@ -226,6 +240,7 @@ const LabelMap<LawPtr<N>>& laws(const Deck& d) {
 template <int N>
 LawPtr<N> DeckCard::law_of() {
   need_argument("constitutive law");
+  const Nesting nesting(*this);
   if (keyword("reference")) {
     const LawPtr<N>& law = labelled(*this, laws<N>(deck_), "constitutive law");
     const LawPtr<N> copy = law->copy(builder());
@@ -255,6 +270,7 @@ LawPtr<6> DeckCard::law6() { return law_of<6>(); }
 // functions and fluids
 
 ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceSpan where) {
+  const Nesting nesting(*this);
   if (const auto known = deck_.function_places.find(name); known != deck_.function_places.end())
     fail_at(where, "scalar function \"" + name + "\" already defined at " +
                        deck_.session.place(known->second));
@@ -296,6 +312,7 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
 
 FluidPtr DeckCard::fluid() {
   need_argument("hydraulic fluid");
+  const Nesting nesting(*this);
   one_of({"hydraulic fluid", "fluid"});
   if (keyword("reference")) return labelled(*this, deck_.fluids, "hydraulic fluid");
   const std::string w = peek_word();

@@ -113,6 +113,7 @@ Mat6 DeckCard::mat6(std::string_view what) {
 
 MatX DeckCard::mat6xn(std::string_view what, int columns) {
   need_argument(what);
+  need_numbers(what, columns);
   MatX m = MatX::Zero(6, columns);
   if (keyword("null")) return m;
   const bool anba = keyword("anba");
@@ -125,6 +126,7 @@ MatX DeckCard::mat6xn(std::string_view what, int columns) {
 }
 
 MatX DeckCard::numbers(std::string_view what, int rows, int columns) {
+  need_numbers(what, static_cast<std::int64_t>(rows) * columns);
   MatX m(rows, columns);
   for (int i = 0; i < rows; ++i)
     for (int j = 0; j < columns; ++j)

@@ -31,6 +31,14 @@ Diagnostic plain_error(std::string code, std::string file, std::string message) 
   return d;
 }
 
+std::int64_t count_unknowns(const Model& model) {
+  std::int64_t n = 0;
+  for (const StructuralNode& node : model.structural) n += node.unknowns();
+  for (const ScalarNode& node : model.scalars) n += node.kind != ScalarKind::parameter;
+  for (const ElementRef& e : model.elements) n += e.set->unknowns(e.index);
+  return n;
+}
+
 /// Reads into `session`; the model, or null with the reason in the session's diagnostics.
 ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnostic>& extra) {
   Deck deck(session, builder, full_registry());
@@ -39,18 +47,17 @@ ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnos
   if (session.errors() == 0) session.bind_strings();
   if (session.errors() > 0) return nullptr;
   Model& model = builder.model();
+  if (const std::int64_t n = count_unknowns(model); n > session.limits.unknowns) {
+    extra.push_back(plain_error("limit-unknowns", session.file(0).name,
+                                "the model has " + std::to_string(n) + " unknowns; the limit is " +
+                                    std::to_string(session.limits.unknowns)));
+    return nullptr;
+  }
   model.digest = digest(session, deck.data_files);
   store_symbols(session, model);
   Result<ModelPtr> finished = builder.finish();
   if (!finished) {
     extra.push_back(plain_error("model", session.file(0).name, finished.error().message));
-    return nullptr;
-  }
-  if ((*finished)->unknowns > session.limits.unknowns) {
-    extra.push_back(plain_error("limit-unknowns", session.file(0).name,
-                                "the model has " + std::to_string((*finished)->unknowns) +
-                                    " unknowns; the limit is " +
-                                    std::to_string(session.limits.unknowns)));
     return nullptr;
   }
   return *finished;

@@ -1,0 +1,269 @@
+/// Malformed decks and the full text of what is said about them.
+#include <gtest/gtest.h>
+
+#include "deck_fixture.h"
+
+namespace mbcosim::testing {
+namespace {
+
+const char* const kDynamic = "structural: 1, dynamic, null, eye, null, null;";
+
+struct Malformed {
+  const char* name;
+  DeckText deck;
+  const char* expected;
+};
+
+class MalformedDeck : public ::testing::TestWithParam<Malformed> {};
+
+TEST_P(MalformedDeck, IsNamed) {
+  EXPECT_EQ(findings(load(GetParam().deck).diagnostics), GetParam().expected);
+}
+
+DeckText nodes(const std::string& cards, const std::string& control = "") {
+  DeckText d;
+  d.nodes = cards;
+  d.control = control;
+  return d;
+}
+DeckText initial_value(const std::string& cards) {
+  DeckText d;
+  d.initial_value = cards;
+  return d;
+}
+DeckText control(const std::string& cards) {
+  DeckText d;
+  d.control = cards;
+  return d;
+}
+DeckText elements(const std::string& cards, const std::string& node_cards = kDynamic,
+                  const std::string& control_cards = "") {
+  DeckText d;
+  d.elements = cards;
+  d.nodes = node_cards;
+  d.control = control_cards;
+  return d;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Nodes, MalformedDeck,
+    ::testing::Values(
+        Malformed{"kind", nodes("structural: 1, null, eye, null, null;"),
+                  "error: structural node 1: kind expected (static, dynamic, modal, static "
+                  "displacement, dynamic displacement, "
+                  "dummy), \"null\" found"},
+        Malformed{"missing", nodes("structural: 1, dynamic, null, eye, 0.,1.,0.;"),
+                  "error: structural node 1: angular velocity missing"},
+        Malformed{"extra", nodes("structural: 1, dynamic, null, eye, null, null, 5;"),
+                  "error: structural node 1: unexpected argument \"5\""},
+        Malformed{
+            "keyword", nodes("structural: 1, dynamic, 1.,2., eye, null, null;"),
+            "error: structural node 1: position: third component expected, keyword \"eye\" found"},
+        Malformed{"parallel",
+                  nodes("structural: 1, dynamic, null, 1, 1.,0.,0., 2, 2.,0.,0., null, null;"),
+                  "error: structural node 1: orientation: vectors are parallel"},
+        Malformed{"axis",
+                  nodes("structural: 1, dynamic, null, 1, 1.,0.,0., 1, 0.,1.,0., null, null;"),
+                  "error: structural node 1: orientation: second axis index equals the first"},
+        Malformed{"nullAxis",
+                  nodes("structural: 1, dynamic, null, 1, 0.,0.,0., 2, 0.,1.,0., null, null;"),
+                  "error: structural node 1: orientation: first vector is null"},
+        Malformed{"frame", nodes("structural: 1, dynamic, reference, 9, null, eye, null, null;"),
+                  "error: structural node 1: reference frame 9 is not defined"},
+        Malformed{"frameTwice", nodes("reference: 1, null, eye; reference: 1, null, eye;"),
+                  "error: reference frame 1 already defined at deck.mbd:9"},
+        Malformed{"otherNode",
+                  nodes("structural: 1, dynamic, reference, other node, null, eye, null, null;"),
+                  "error: structural node 1: \"other node\" is only allowed for the second node of "
+                  "an element"},
+        Malformed{"negativeLabel", nodes("structural: -1, dynamic, null, eye, null, null;"),
+                  "error: structural node: label must be between 0 and 2147483647, got -1"},
+        Malformed{"twice", nodes(std::string(kDynamic) + kDynamic),
+                  "error: structural node 1 already defined at deck.mbd:9"},
+        Malformed{"hydraulicTwice", nodes("hydraulic: 1; hydraulic: 1; abstract: 1;"),
+                  "error: hydraulic node 1 already defined at deck.mbd:9"},
+        Malformed{"tooMany", nodes("abstract: 1; abstract: 2;", "abstract nodes: 1;"),
+                  "error: abstract node 2 exceeds the declared number (1)"},
+        Malformed{"tooFew", nodes("abstract: 1;", "abstract nodes: 3;"),
+                  "error: end of the deck: 2 abstract nodes missing"},
+        Malformed{"scaleLate", nodes("abstract: 1, value, 0., output, no, scale, 2.;"),
+                  "error: abstract node 1: \"scale\" must precede \"output\""},
+        Malformed{
+            "dofIndex",
+            nodes(std::string(kDynamic) + "parameter: 1, sample and hold, 1, structural, 9, 1.;"),
+            "error: parameter node 1: structural node 1 has 6 degrees of freedom; index 9"},
+        Malformed{"unbound", nodes("parameter: 3, element;"),
+                  "error: parameter node 3 is bound to no element"}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+INSTANTIATE_TEST_SUITE_P(
+    Settings, MalformedDeck,
+    ::testing::Values(
+        Malformed{"count", control("rigid bodies: -1;"),
+                  "error: count must not be negative, got -1"},
+        Malformed{"realCount", control("rigid bodies: 0.9;"), "warning: count 0.9 truncated to 0"},
+        Malformed{"stringCount", control("rigid bodies: \"1\";"),
+                  "error: count: number expected, string found"},
+        Malformed{"secondArgument", control("rigid bodies: 0, 2;"),
+                  "error: rigid bodies: unexpected argument \"2\""},
+        Malformed{"unknownCard", initial_value("mx iterations: 3;"),
+                  "error: unknown card \"mx iterations\""},
+        Malformed{"defaultOutput", control("default output: foo;"),
+                  "warning: unknown item \"foo\" ignored"},
+        Malformed{"print", control("print: foo;"),
+                  "error: item expected (dof stats, dof description, equation description, "
+                  "description, element connection, node "
+                  "connection, connection, all, none, to file), \"foo\" found"},
+        Malformed{"timeStep", initial_value("time step: 0.;"), "error: time step must not be zero"},
+        Malformed{"finalTime", initial_value("initial time: 1.; final time: 0.;"),
+                  "warning: final time is before the initial time: there is nothing to integrate"},
+        Malformed{"methodTwice", initial_value("method: ms, .6;\nmethod: bdf;"),
+                  "error: method already set at deck.mbd:3"},
+        Malformed{"strategy", initial_value("strategy: factor, .5, 2, 1.1, 10, 5;"), ""},
+        Malformed{"noTest", initial_value("tolerance: null;"),
+                  "error: solution tolerance required when the residual test is off"},
+        Malformed{"scaleWithoutTest", initial_value("tolerance: 1e-6, scale;"),
+                  "error: \"scale\" must follow the kind of test: test, norm, scale"},
+        Malformed{"frequencyTwice", control("output frequency: 2; output meter: 1.;"),
+                  "error: output frequency or output meter is given twice"},
+        Malformed{"use", control("use: rigid bodies;"),
+                  "error: \"in assembly\" missing at the end of the card"},
+        Malformed{"inverse",
+                  [] {
+                    DeckText d;
+                    d.before = "begin: data; problem: inverse dynamics; end: data;";
+                    return d;
+                  }(),
+                  "error: \"inverse dynamics\" (problem) is not supported yet"}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+INSTANTIATE_TEST_SUITE_P(
+    Elements, MalformedDeck,
+    ::testing::Values(
+        Malformed{"node", elements("body: 1, 2, 1., null, eye;"),
+                  "error: body 1: structural node 2 is not defined"},
+        Malformed{"bodies", elements("", kDynamic, "rigid bodies: 2;"),
+                  "error: end of the deck: 2 rigid bodies missing"},
+        Malformed{"joints", elements("joint: 2, clamp, 1, node, node;", kDynamic, "joints: 0;"),
+                  "error: joint 2 exceeds the declared number (0)"},
+        Malformed{"twice",
+                  elements("joint: 2, clamp, 1, node, node; joint: 2, clamp, 1, node, node;"),
+                  "error: joint 2 already defined at deck.mbd:12"},
+        Malformed{"unsupported", elements("rotor: 1, 2, 3;"),
+                  "error: induced velocity element 1: \"rotor\" (induced velocity element) is not "
+                  "supported yet"},
+        Malformed{"unknown", elements("bodi: 1, 2;"), "error: unknown card \"bodi\""},
+        Malformed{"type", elements("joint: 1, clam, 1, node, node;"),
+                  "error: joint 1: unknown joint type \"clam\""},
+        Malformed{"driven", elements("driven: 1, 1., joint: 5, clamp, 1, node, node;"),
+                  "error: inner label 5 differs from driven label 1"},
+        Malformed{"drive", elements("driven: 1, cosin, joint: 1, clamp, 1, node, node;"),
+                  "error: driven 1: unknown drive or variable \"cosin\""},
+        Malformed{"bind",
+                  elements("joint: 1, clamp, 1, node, node; bind: 1, joint, 3, string, \"foo\";",
+                           std::string(kDynamic) + "parameter: 3, element;"),
+                  "error: bind: joint 1 (clamp) has no private datum \"foo\""},
+        Malformed{"consequence",
+                  elements("body: 1, 2, 1., null, eye; joint: 1, clamp, 2, node, node;",
+                           "structural: 2, dynamic, null, null;"),
+                  "error: structural node 2: orientation expected, keyword \"null\" found"}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+TEST(MalformedDeck, SuggestsTheNearestWord) {
+  EXPECT_EQ(load(initial_value("mx iterations: 3;")).diagnostics.at(0).hint,
+            "did you mean \"max iterations\"?");
+  EXPECT_EQ(load(elements("bodi: 1, 2;")).diagnostics.at(0).hint, "did you mean \"body\"?");
+  EXPECT_EQ(load(elements("joint: 1, clam, 1, node, node;")).diagnostics.at(0).hint,
+            "did you mean \"clamp\"?");
+}
+
+TEST(MalformedDeck, IsShownWithItsPlace) {
+  const LoadReport report = load(
+      "begin: data; end: data;\nbegin: initial value;\n  time stp: 1;\nend: initial value;\n"
+      "begin: control data; end: control data;");
+  ASSERT_EQ(report.diagnostics.size(), 1u);
+  const Diagnostic& d = report.diagnostics[0];
+  EXPECT_EQ(d.file, "deck.mbd");
+  EXPECT_EQ(d.line, 3);
+  EXPECT_EQ(d.column, 3);
+  EXPECT_EQ(d.length, 8);
+  EXPECT_EQ(d.source_line, "  time stp: 1;");
+  EXPECT_FALSE(report.ok());
+}
+
+struct Blocks {
+  const char* text;
+  const char* expected;
+};
+
+TEST(Blocks, AreCheckedForOrderAndBalance) {
+  const std::string head = "begin: data; end: data;\nbegin: initial value; end: initial value;\n";
+  const std::string control_data = "begin: control data; end: control data;\n";
+  const std::pair<std::string, const char*> cases[] = {
+      {"begin: data; end: data;\nbegin: control data; end: control data;",
+       "error: block \"initial value\" expected"},
+      {head + control_data + "begin: nodes;\nend: elements;",
+       "error: block \"nodes\" (begun at line 4) closed by \"end: elements\""},
+      {head + control_data + "begin: nodes;\nbegin: elements; end: elements;",
+       "error: block \"nodes\" begun at line 4 is not closed"},
+      {head + control_data + "begin: elements;\n",
+       "error: end of file in block \"elements\" begun at line 4"},
+      {head + control_data + "begin: elements; end: elements;\nmore text;",
+       "warning: text after the last block is ignored"},
+      {head + control_data +
+           "begin: elements; end: elements;\n# comment\n/* more */ begin: parallel; end: parallel;",
+       ""},
+      {head + control_data + "begin: nodes, 3; end: nodes;",
+       "error: unexpected argument after \"nodes\""},
+      {head + control_data + "begin: node; structural: 1; end: node;",
+       "error: unknown block \"node\""},
+      {head, "error: block \"control data\" expected, end of file found"},
+      {head + head,
+       "error: block \"data\" must stand before block \"initial value\"\n"
+       "error: block \"initial value\" occurs twice\n"
+       "error: block \"control data\" expected, end of file found"},
+      {"begin: data; end: data;\nbegin: multistep; end: multistep;\n" + control_data, ""},
+      {"end: nodes;", "error: \"end: nodes\" without its \"begin\""},
+      {"time step: 1;", "error: unknown card \"time step\""},
+      {"set: integer a = 3;", ""},
+  };
+  for (const auto& c : cases) EXPECT_EQ(findings(load(c.first).diagnostics), c.second) << c.first;
+}
+
+TEST(Blocks, WithoutAnyGiveAnEmptyModel) {
+  const LoadReport report = load("remark: 1+1;");
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report.model->unknowns, 0);
+  EXPECT_NE(report.printed.find("2"), std::string::npos);
+}
+
+TEST(Drive, WarnsAboutAConstantThatMentionsTheTime) {
+  EXPECT_EQ(
+      probe({}, "Time*2.", [](Card& card) { card.drive(); }),
+      "warning: user defined element 1: drive: value frozen at input time; use a string drive");
+}
+
+TEST(NodeDof, AsksForTheOrderOfDifferentialOnes) {
+  DeckText deck;
+  deck.nodes = std::string(kDynamic) + "abstract: 1; abstract: 2, algebraic; hydraulic: 3;";
+  EXPECT_EQ(probe(deck,
+                  "1, abstract, differential, 2, abstract, 3, hydraulic, 1, structural, 2, order, "
+                  "2, 1, abstract, order, 0",
+                  [](Card& card) {
+                    EXPECT_EQ(card.node_dof(true).order, 1);
+                    EXPECT_EQ(card.node_dof(true).differential, false);
+                    EXPECT_EQ(card.node_dof(true).order, 0);
+                    const NodeDof d = card.node_dof(true);
+                    EXPECT_TRUE(d.structural);
+                    EXPECT_EQ(d.component, 1);
+                    EXPECT_EQ(d.order, 2);
+                    EXPECT_EQ(card.node_dof(true).order, 0);
+                  }),
+            "");
+  EXPECT_EQ(probe(deck, "1, abstract, 1.", [](Card& card) { card.node_dof(true); }),
+            "error: user defined element 1: \"algebraic\", \"differential\" or \"order\" expected "
+            "after the node's degree of freedom");
+}
+
+}  // namespace
+}  // namespace mbcosim::testing

@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include "deck_fixture.h"
+#include "simulation/describe.h"
+
+#include <nlohmann/json.hpp>
+
+namespace mbcosim::testing {
+namespace {
+
+const char* const kNodes =
+    "structural: 1, dynamic, null, eye, null, null; structural: 2, name, \"base\", static, null, "
+    "eye, null, null;";
+
+DeckText elements(const std::string& cards, const std::string& more_nodes = "") {
+  DeckText d;
+  d.nodes = kNodes + more_nodes;
+  d.elements = cards;
+  return d;
+}
+
+TEST(Element, HasLabelNameAndOutput) {
+  const ModelPtr model = model_of(elements(
+      "joint: 7, name, \"foot\", clamp, 2, node, node, output, no; body: 3, 1, 2., null, eye;"));
+  ASSERT_TRUE(model);
+  ASSERT_EQ(model->elements.size(), 2u);
+  const ElementRef joint = model->find_element(Family::joint, 7);
+  ASSERT_TRUE(joint.set);
+  const ElementInfo& info = joint.set->info(joint.index);
+  EXPECT_EQ(info.name, "foot");
+  EXPECT_EQ(info.type, "clamp");
+  EXPECT_FALSE(info.output);
+  EXPECT_EQ(model->element_text(joint), "joint 7 (clamp)");
+  EXPECT_TRUE(model->elements[1].set->info(model->elements[1].index).output);
+}
+
+TEST(Element, TakesItsOutputFromTheDefault) {
+  DeckText d = elements(
+      "joint: 7, clamp, 2, node, node; body: 3, 1, 2., null, eye; body: 4, 1, 2., null, eye, "
+      "output, default;"
+      "output: body, 3;");
+  d.control = "default output: none, joints;";
+  const ModelPtr model = model_of(d);
+  ASSERT_TRUE(model);
+  const auto output = [&](int i) {
+    return model->elements[i].set->info(model->elements[i].index).output;
+  };
+  EXPECT_TRUE(output(0));
+  EXPECT_TRUE(output(1));
+  EXPECT_FALSE(output(2));
+}
+
+TEST(Driven, GivesItsDriveToTheElement) {
+  const ModelPtr model =
+      model_of(elements("driven: 7, 1., hint, \"offset{1}\", joint: 7, clamp, 2, node, node; "
+                        "joint: 8, clamp, 1, node, node;"
+                        "driven: 8, 0., existing: joint, 8;"));
+  ASSERT_TRUE(model);
+  for (const int label : {7, 8}) {
+    const ElementRef e = model->find_element(Family::joint, label);
+    ASSERT_TRUE(e.set);
+    const ElementInfo& info = e.set->info(e.index);
+    ASSERT_TRUE(info.driven);
+    EXPECT_EQ(info.driven->value(EvalContext{}), label == 7 ? 1 : 0);
+    EXPECT_GE(info.active_memory, 0);
+  }
+  const ElementRef e = model->find_element(Family::joint, 7);
+  EXPECT_EQ(e.set->info(e.index).hints, (std::vector<std::string>{"offset{1}"}));
+}
+
+TEST(Counts, AcceptExactNumbers) {
+  DeckText d = elements(
+      "joint: 7, clamp, 2, node, node; body: 3, 1, 2., null, eye; gravity: uniform, 0.,0.,-1., "
+      "9.81;");
+  d.control = "structural nodes: 2; rigid bodies: 1; joints: 1; gravity;";
+  EXPECT_TRUE(model_of(d));
+}
+
+TEST(ModelFunctions, AreEvaluatedOnTheInputConfiguration) {
+  DeckText d;
+  d.nodes =
+      "structural: 1, static, .5,.6,.7, euler, .2,.1,-.3, .1,.2,.3, .4,.5,.6;"
+      "structural: 2, static, -.5,.3,.2, euler, -.4,.5,.6, .3,.1,-.2, -.1,.7,.2;"
+      "remark: model::position(1), model::position2(1), model::distance(1,2), "
+      "model::xdistance(1,2), model::zdistance(2,1),"
+      " model::xunitvec(1,2), model::angle(1), model::xangle(1), model::anglerel(1,2);"
+      "remark: model::xanglerel(1,2), model::yanglerel(1,2), model::zanglerel(1,2), "
+      "model::velocity2(1), model::vrel(1,2),"
+      " model::xvrel(1,2), model::angvel2(1), model::angvrel2(1,2), model::xangvrel(1,2);"
+      "remark: model::node::structural(1, \"x[2]\");";
+  const LoadReport report = load(d);
+  EXPECT_EQ(findings(report.diagnostics), "");
+  const std::string expected[] = {
+      "1.04881, 1.1, 1.15758, -1., 0.5, -0.863868, 0.365502, 0.183334, 0.985357",
+      "-0.522458, 0.478847, 0.684596, 0.14, 0.547723, 0.2, 0.77, 0.45, -0.5", "0.824932"};
+  for (const std::string& line : expected)
+    EXPECT_NE(report.printed.find(line), std::string::npos) << report.printed;
+}
+
+TEST(Describe, ListsWhatTheModelHas) {
+  DeckText d = elements(
+      "set: real L = .5; joint: 7, clamp, 2, node, node; driven: 3, 1., body: 3, 1, 2., null, eye;"
+      "drive caller: 4, name, \"ramp\", 2.;",
+      "abstract: 5, value, 2.;");
+  d.control = "title: \"arm\";";
+  d.initial_value = "final time: forever;";
+  const ModelPtr model = model_of(d);
+  ASSERT_TRUE(model);
+  const ModelDescription description = describe(*model);
+  ASSERT_EQ(description.nodes.size(), 3u);
+  EXPECT_EQ(description.nodes[1].name, "base");
+  EXPECT_EQ(description.nodes[2].data, (std::vector<std::string>{"x", "xP"}));
+  ASSERT_EQ(description.elements.size(), 2u);
+  EXPECT_EQ(description.elements[0].type, "clamp");
+  EXPECT_EQ(description.elements[0].nodes, (std::vector<int>{2}));
+  EXPECT_TRUE(description.elements[1].driven);
+  ASSERT_EQ(description.drives.size(), 1u);
+  EXPECT_EQ(description.drives[0].name, "ramp");
+  const std::string text = to_text(description);
+  EXPECT_NE(text.find("model \"arm\"\n"), std::string::npos);
+  EXPECT_NE(text.find("\n  structural node 2 \"base\", static, at 0 0 0\n"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("\n  joint 7, clamp, nodes 2\n"), std::string::npos);
+  EXPECT_NE(text.find("\n  real L = 0.5\n"), std::string::npos);
+  const nlohmann::json json = nlohmann::json::parse(to_json(description));
+  EXPECT_EQ(json["elements"][0]["type"], "clamp");
+  EXPECT_TRUE(json["finalTime"].is_null());
+  EXPECT_EQ(json["nodes"].size(), 3u);
+}
+
+}  // namespace
+}  // namespace mbcosim::testing

@@ -1,0 +1,72 @@
+#include "input/sources.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+namespace mbcosim {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder `inside` with a file and links, and a file `secret` beside it.
+class FolderSourceTest : public testing::Test {
+ protected:
+  FolderSourceTest() {
+    std::string name = (fs::temp_directory_path() / "mbcosim-sources-XXXXXX").string();
+    root_ = mkdtemp(name.data());
+    fs::create_directories(root_ / "inside/sub");
+    std::ofstream(root_ / "secret") << "secret";
+    std::ofstream(root_ / "inside/a.mbd") << "text";
+    fs::create_symlink(root_ / "secret", root_ / "inside/link");
+    fs::create_symlink("a.mbd", root_ / "inside/good");
+    fs::create_symlink(root_, root_ / "inside/up");
+  }
+  ~FolderSourceTest() override { fs::remove_all(root_); }
+
+  std::string read(const std::string& name, bool unrestricted = false) const {
+    const Result<std::string> r =
+        FolderSource((root_ / "inside").string(), unrestricted).read(name);
+    return r ? *r : "error: " + r.error().message;
+  }
+
+  fs::path root_;
+};
+
+TEST_F(FolderSourceTest, ReadsFilesBelowTheFolder) {
+  EXPECT_EQ(read("a.mbd"), "text");
+  EXPECT_EQ(read("sub/../a.mbd"), "text");
+  EXPECT_EQ(read("good"), "text");
+}
+
+TEST_F(FolderSourceTest, RefusesWhatLiesOutside) {
+  EXPECT_EQ(read("../secret"), "error: \"../secret\" is outside the allowed folder");
+  EXPECT_EQ(read((root_ / "secret").string()),
+            "error: \"" + (root_ / "secret").string() + "\" is outside the allowed folder");
+  EXPECT_EQ(read("link"), "error: \"link\" is outside the allowed folder");
+  EXPECT_EQ(read("up/secret"), "error: \"up/secret\" is outside the allowed folder");
+  EXPECT_EQ(read("sub/../../secret"), "error: \"sub/../../secret\" is outside the allowed folder");
+}
+
+TEST_F(FolderSourceTest, RefusesWhatIsNoFile) {
+  EXPECT_EQ(read("sub"), "error: \"sub\" is not a regular file");
+  EXPECT_EQ(read("missing"), "error: cannot open \"missing\"");
+  EXPECT_EQ(read(""), "error: cannot open \"\"");
+}
+
+TEST_F(FolderSourceTest, UnrestrictedReadsTheUsersOwnFiles) {
+  EXPECT_EQ(read("../secret", true), "secret");
+  EXPECT_EQ(read((root_ / "secret").string(), true), "secret");
+}
+
+TEST(BundleSource, KnowsItsFilesOnly) {
+  const BundleSource bundle(std::map<std::string, std::string>{{"a/b", "text"}});
+  EXPECT_EQ(*bundle.read("a/b"), "text");
+  EXPECT_EQ(bundle.read("b").error().message, "cannot open \"b\"");
+  EXPECT_EQ(bundle.read("../b").error().message, "\"../b\" is outside the allowed folder");
+}
+
+}  // namespace
+}  // namespace mbcosim
