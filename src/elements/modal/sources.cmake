@@ -1,1 +1,12 @@
-set(SOURCES register.cpp)
+set(SOURCES
+  fem_binary.cpp
+  fem_data.cpp
+  fem_text.cpp
+  modal_assembly.cpp
+  modal_body.cpp
+  modal_card.cpp
+  modal_force.cpp
+  modal_joint.cpp
+  modal_output.cpp
+  modal_tangent.cpp
+  register.cpp)
