@@ -430,6 +430,7 @@ class ElementSetOf final : public ElementSet {
     s.element.tangent(u, t);
   }
   const Slot& slot(int i) const { return slots_[i]; }
+  Slot& slot(int i) { return slots_[i]; }  ///< while the model is built
   void gather(const EvalContext& context, const Slot& s, Local<double>& u) const {
     detail::gather(context, s.connection, s.info, detail::uses_parameters<E>(), u);
   }

@@ -1,25 +1,31 @@
 #include "elements/joints/guide.h"
 
+#include "elements/joints/friction_joints.h"
+
 namespace mbcosim {
 
 // ------------------------------------------------------------------ in line
 
-void InLine::output(const Local<double>& u, OutputRow& row) const {
+void InLine::output_columns(const Local<double>& u, OutputRow& row) const {
   const Vec3 f(u.own(0), u.own(1), 0);
   row.begin(OutputFile::jnt, u.label());
   row.reactions(f, Vec3::Zero(), hinge_a(u) * f, Vec3::Zero());
-  row.end();
 }
 
 void read_in_line(Card& card, ElementInfo& info) {
-  InLine e;
+  InLineFriction e;
   e.a = read_attachment(card);
   read_offset(card, e.a);
   card.one_of({"orientation", "hinge"});
   e.a.Rh = card.relative_orientation("orientation of the line", e.a.node);
   e.b = read_attachment(card);
   if (card.keyword("offset")) read_offset(card, e.b, &e.a);
-  add_element(card.builder(), info, e);
+  if (card.keyword("friction")) {
+    e.friction = read_friction(card);
+    add_element(card.builder(), info, e);
+  } else {
+    add_element(card.builder(), info, static_cast<const InLine&>(e));
+  }
 }
 
 // ------------------------------------------------------------------ in plane

@@ -30,7 +30,11 @@ struct InLine : TwoAttachments, NamedData<InLine> {  // a: p and Rv, b: q
     r.load(1, -F, -q.cross(F));
     for (int k = 0; k < 2; ++k) r.own(k, (T(a.Rh.col(k).dot(a.f)) - V.col(k).dot(s)) / u.c());
   }
-  void output(const Local<double>& u, OutputRow& row) const;
+  void output_columns(const Local<double>& u, OutputRow& row) const;
+  void output(const Local<double>& u, OutputRow& row) const {
+    output_columns(u, row);
+    row.end();
+  }
   std::string log(const Model& model, int label) const {
     return LogLine("inline", label).add(model, a).add(model, b).str();
   }

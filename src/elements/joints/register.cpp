@@ -1,12 +1,16 @@
 #include "elements/joints/clamp.h"
 #include "elements/joints/deformable.h"
 #include "elements/joints/distance.h"
+#include "elements/joints/friction_joints.h"
 #include "elements/joints/guide.h"
 #include "elements/joints/invariant.h"
 #include "elements/joints/revolute.h"
 #include "elements/joints/rod.h"
+#include "elements/joints/screw.h"
 #include "elements/joints/spherical.h"
+#include "elements/joints/tikhonov.h"
 #include "elements/joints/total.h"
+#include "elements/joints/total_equation.h"
 #include "elements/joints/universal.h"
 #include "elements/joints/velocity.h"
 #include "elements/registry.h"
@@ -31,6 +35,11 @@ void register_joints(Registry& registry) {
   joint({"rod with offset"}, read_rod_with_offset);
   joint({"total joint"}, read_total_joint);
   joint({"total pin joint"}, read_total_pin_joint);
+  joint({"total equation"}, read_total_equation);
+  joint({"total internal reaction"}, read_total_reaction);
+  joint({"brake"}, read_brake);
+  joint({"screw"}, read_screw);
+  register_tikhonov(registry);
   joint({"in line"}, read_in_line);
   joint({"in plane"}, read_in_plane);
   joint({"prismatic"}, read_prismatic);

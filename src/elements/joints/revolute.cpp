@@ -1,5 +1,7 @@
 #include "elements/joints/revolute.h"
 
+#include "elements/joints/friction_joints.h"
+
 namespace mbcosim {
 
 namespace {
@@ -112,16 +114,33 @@ void RevoluteHinge::start(Start& s) const {
   for (int i = 0; i < 2; ++i) s.own(3 + i) = M0(i);
 }
 
-void RevoluteHinge::output(const Local<double>& u, OutputRow& row) const {
+void RevoluteHinge::output_columns(const Local<double>& u, OutputRow& row) const {
   output_hinge(*this, u, row, u.own3(0), Vec3(u.own(3), u.own(4), 0));
   row.vec3("Omega", "rad/s", relative_velocity(u));
-  row.end();
 }
 
 double RevoluteHinge::private_value(const Local<double>& u, int datum) const {
   if (datum < 5) return hinge_datum(*this, u, datum);
   return datum < 7 ? u.own(datum - 2) : 0.0;
 }
+
+namespace {
+
+/// Adds the hinge, with friction when `friction , <average radius> , …` follows.
+template <class Hinge>
+void finish_hinge(Card& card, ElementInfo& info, const Hinge& e) {
+  if (!card.keyword("friction")) {
+    add_element(card.builder(), info, e);
+    return;
+  }
+  HingeFriction<Hinge> f;
+  static_cast<Hinge&>(f) = e;
+  f.radius = card.real("average radius");
+  f.friction = read_friction(card);
+  add_element(card.builder(), info, f);
+}
+
+}  // namespace
 
 void read_revolute_hinge(Card& card, ElementInfo& info) {
   RevoluteHinge e;
@@ -133,7 +152,7 @@ void read_revolute_hinge(Card& card, ElementInfo& info) {
     e.F0 = card.vec3("initial force");
     for (int i = 0; i < 2; ++i) e.M0(i) = card.real("initial moment");
   }
-  add_element(card.builder(), info, e);
+  finish_hinge(card, info, e);
 }
 
 // ------------------------------------------------------------------ revolute rotation
@@ -182,11 +201,10 @@ void AxialRotation::assembly_residual(const Local<TimeDual>& u, Residual<TimeDua
   r.own(5, TimeDual::variable(-u.own(5).v, 0, u.drive(omega).v - axis.dot(w)));
 }
 
-void AxialRotation::output(const Local<double>& u, OutputRow& row) const {
+void AxialRotation::output_columns(const Local<double>& u, OutputRow& row) const {
   output_hinge(*this, u, row, u.own3(0), u.own3(3));
   row.scalar("Omega0", "rad/s", u.drive(omega));
   row.vec3("Omega", "rad/s", relative_velocity(u));
-  row.end();
 }
 
 double AxialRotation::private_value(const Local<double>& u, int datum) const {
@@ -201,7 +219,7 @@ void read_axial_rotation(Card& card, ElementInfo& info) {
   check_axes(card, e, "axial rotation");
   e.omega = card.drive("relative angular velocity");
   e.description = read_description(card);
-  add_element(card.builder(), info, e);
+  finish_hinge(card, info, e);
 }
 
 }  // namespace mbcosim

@@ -111,7 +111,11 @@ struct RevoluteHinge : RevoluteAxes, NamedData<RevoluteHinge> {
     r.load(1, F, d2.cross(F) + MT);
   }
   void start(Start& s) const;
-  void output(const Local<double>& u, OutputRow& row) const;
+  void output_columns(const Local<double>& u, OutputRow& row) const;
+  void output(const Local<double>& u, OutputRow& row) const {
+    output_columns(u, row);
+    row.end();
+  }
   std::string log(const Model& model, int label) const {
     return LogLine("revolutehinge", label).add(model, a).add(model, b).str();
   }
@@ -183,7 +187,11 @@ struct AxialRotation : RevoluteAxes, NamedData<AxialRotation> {
   /// The velocity constraint acts at the rate level; its position level is M₃ = 0.
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;
   void start(Start& s) const { start_angle(s); }
-  void output(const Local<double>& u, OutputRow& row) const;
+  void output_columns(const Local<double>& u, OutputRow& row) const;
+  void output(const Local<double>& u, OutputRow& row) const {
+    output_columns(u, row);
+    row.end();
+  }
   std::string log(const Model& model, int label) const {
     return LogLine("axialrotation", label).add(model, a).add(model, b).str();
   }

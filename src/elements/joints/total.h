@@ -112,18 +112,20 @@ struct TotalJoint : NamedData<TotalJoint> {
     Vec<T> spin;                ///< Q₁ᵀ(w₂ − w₁)
     Mat<T> rotation;            ///< Q₁ᵀQ₂
   };
+  /// Of local nodes k and k + 1.
   template <class T>
-  Motion<T> motion(const Local<T>& u) const {
+  Motion<T> motion(const Local<T>& u, int k = 0) const {
     Motion<T> m;
-    m.P = u.R(0) * R1h.cast<T>();
-    m.Q1 = u.R(0) * R1r.cast<T>();
-    m.arm = u.R(1) * f2.cast<T>();
-    m.s = u.x(1) + m.arm - u.x(0);
+    m.P = u.R(k) * R1h.cast<T>();
+    m.Q1 = u.R(k) * R1r.cast<T>();
+    m.arm = u.R(k + 1) * f2.cast<T>();
+    m.s = u.x(k + 1) + m.arm - u.x(k);
     const Vec3 origin = R1h.transpose() * f1;
     m.position = m.P.transpose() * m.s - origin.cast<T>();
-    m.velocity = m.P.transpose() * (u.v(1) + u.w(1).cross(m.arm) - u.v(0) - u.w(0).cross(m.s));
-    m.spin = m.Q1.transpose() * (u.w(1) - u.w(0));
-    m.rotation = m.Q1.transpose() * (u.R(1) * R2r.cast<T>());
+    m.velocity =
+        m.P.transpose() * (u.v(k + 1) + u.w(k + 1).cross(m.arm) - u.v(k) - u.w(k).cross(m.s));
+    m.spin = m.Q1.transpose() * (u.w(k + 1) - u.w(k));
+    m.rotation = m.Q1.transpose() * (u.R(k + 1) * R2r.cast<T>());
     return m;
   }
   /// vec(Q₁ᵀQ₂ Rot(θ0)ᵀ).
@@ -134,10 +136,11 @@ struct TotalJoint : NamedData<TotalJoint> {
     return vector_of_rotation(error);
   }
   template <class T>
-  void loads(Residual<T>& r, const Motion<T>& m, const Vec<T>& force, const Vec<T>& moment) const {
+  void loads(Residual<T>& r, const Motion<T>& m, const Vec<T>& force, const Vec<T>& moment,
+             int k = 0) const {
     const Vec<T> F = m.P * force, M = m.Q1 * moment;
-    r.load(0, F, M + m.s.cross(F));
-    r.load(1, -F, -(M + m.arm.cross(F)));
+    r.load(k, F, M + m.s.cross(F));
+    r.load(k + 1, -F, -(M + m.arm.cross(F)));
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {

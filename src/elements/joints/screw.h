@@ -1,0 +1,86 @@
+#pragma once
+
+#include "elements/joints/joint_common.h"
+
+namespace mbcosim {
+
+/// Screw: advance along an axis of node 1 in proportion to the rotation about it.
+///
+///   e = axis 3 of H₁ = R₁ Rh, φ = vec(R₁ᵀR₂), θ = e·φ + 2π·turns, d = x₂ + R₂ q − x₁ − R₁ p, h =
+///   pitch/2π unknown     F [N];  row (h θ − e·d)/c loads       node 2 (F e, R₂q × F e − h F g), g
+///   = R₁ Γ⁻ᵀ(φ) e;  node 1: −F e, −s × F e + h F (g − e × φ),  s = x₂ + R₂ q − x₁
+///
+/// As in MBDyn the components of e are global and those of φ are of node 1, so that a node 1 that
+/// is not aligned with the global frame changes the effective pitch; the loads are those that do no
+/// work for this very constraint.
+struct Screw : TwoAttachments {  // a: p and Rh, b: q
+  double lead = 0;               ///< h: advance per radian [m]
+
+  static constexpr int width = 13;
+  static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+
+  void connect(Connector& c) const {
+    TwoAttachments::connect(c);
+    c.algebraic(1);
+    c.memory(UnwrappedAngle::memory);
+  }
+  template <class T>
+  struct Motion {
+    Vec<T> e, phi, g, q, s, d;
+    T angle;  ///< e·φ
+  };
+  template <class T>
+  Motion<T> motion(const Local<T>& u) const {
+    Motion<T> m;
+    m.e = hinge_a(u).col(2);
+    const Mat<T> relative = u.R(0).transpose() * u.R(1);
+    m.phi = vector_of_rotation(relative);
+    m.angle = m.e.dot(m.phi);
+    m.g = u.R(0) * inverse_transposed_gamma(m.phi, m.e);
+    m.q = arm_b(u);
+    m.s = u.x(1) + m.q - u.x(0);
+    m.d = m.s - arm_a(u);
+    return m;
+  }
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    const Motion<T> m = motion(u);
+    const Vec<T> F = m.e * u.own(0);
+    const T moment = u.own(0) * lead;
+    r.load(0, -F, (m.g - m.e.cross(m.phi)) * moment - m.s.cross(F));
+    r.load(1, F, m.q.cross(F) - m.g * moment);
+    r.own(0, ((m.angle + full_turns(u, value_of(m.angle))) * lead - m.e.dot(m.d)) / u.c());
+  }
+  /// 2π·turns that make the angle continue that of the last accepted step.
+  template <class T>
+  static double full_turns(const Local<T>& u, double angle) {
+    return 2 * kPi * UnwrappedAngle::turns(angle, u.memory(0), u.memory(1));
+  }
+  /// Γ⁻ᵀ(φ) a, where δφ = Γ⁻¹(φ) δθ for R = Rot(φ), δθ in the fixed frame.
+  template <class T>
+  static Vec<T> inverse_transposed_gamma(const Vec<T>& phi, const Vec<T>& a) {
+    using std::sqrt;
+    using std::tan;
+    const T square = phi.dot(phi);
+    T k;  // (1 − (φ/2) cot(φ/2))/φ²
+    if (value_of(square) < 1e-4) {
+      k = (square / 60.0 + 1.0) / 12.0 + square * square / 30240.0;
+    } else {
+      const T half = sqrt(square) * 0.5;
+      k = (T(1.0) - half / tan(half)) / square;
+    }
+    const Vec<T> turned = phi.cross(a);
+    return a + turned * 0.5 + phi.cross(turned) * k;
+  }
+  void start(Start& s) const;
+  void after_convergence(const Local<double>& u, State& state) const;
+  void output(const Local<double>& u, OutputRow& row) const;
+  std::string log(const Model& model, int label) const {
+    return LogLine("screw", label).add(model, a).add(model, b).str();
+  }
+  std::string row_name(int) const { return "screw constraint"; }
+};
+
+void read_screw(Card& card, ElementInfo& info);
+
+}  // namespace mbcosim

@@ -1,0 +1,61 @@
+#pragma once
+
+#include "model/element_set.h"
+#include "model/registry.h"
+
+namespace mbcosim {
+
+/// Tikhonov regularization of a joint's constraints: row k of the joint gets −εₖ λₖ, so that
+/// redundant constraints leave a matrix that can be factored. It adds to rows of another element,
+/// hence a set of its own and not an ElementSetOf.
+class TikhonovSet final : public ElementSet {
+ public:
+  void add(ElementInfo info, ElementRef joint, std::vector<double> coefficients);
+
+  int size() const override { return static_cast<int>(slots_.size()); }
+  const ElementInfo& info(int i) const override { return slots_[i].info; }
+  ElementInfo& info(int i) override { return slots_[i].info; }
+  int unknowns(int) const override { return 0; }
+  bool is_differential(int, int) const override { return false; }
+  std::string row_name(int, int) const override { return {}; }
+  std::vector<int> nodes(int) const override { return {}; }
+  int first_own(int) const override { return -1; }
+  void bind(const Model& model, int i, int first_own) override;
+  void collect_pattern(PatternSink& sink) const override;
+  void set_positions(const PositionSource& positions) override;
+
+  void start(const EvalContext&, State&, int) const override {}
+  void residual(const EvalContext& context, double* r) const override;
+  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const override;
+  void after_predict(const EvalContext&, State&) const override {}
+  void after_convergence(const EvalContext&, State&) const override {}
+
+  AssemblyRole assembly_role(int) const override { return AssemblyRole::custom; }
+  void assembly_residual(const EvalContext& context, int i, double* r,
+                         double* r_rate) const override;
+  void assembly_jacobian(const EvalContext& context, int i, int n,
+                         std::vector<Triplet>& out) const override;
+
+  void output(const EvalContext&, int, OutputRow&) const override {}
+  std::string log_line(const Model&, int) const override { return {}; }
+  int private_datum(int, std::string_view) const override { return -1; }
+  std::vector<std::string> private_data(int) const override { return {}; }
+  double private_value(const EvalContext&, int, int) const override { return 0; }
+  void add_inertia(const EvalContext&, int, int, Inertia&) const override {}
+  void add_momentum(const EvalContext&, int, State&) const override {}
+
+ private:
+  struct Slot {
+    ElementInfo info;
+    ElementRef joint;
+    std::vector<double> epsilon;  ///< one per algebraic unknown of the joint
+    std::vector<int> rows;        ///< those unknowns
+    std::vector<int> positions;
+  };
+  std::vector<Slot> slots_;
+};
+
+/// `joint regularization : <joint label> , tikhonov , { list , <ε1> , … | <ε> } ;`
+void register_tikhonov(Registry& registry);
+
+}  // namespace mbcosim
