@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "service/config.h"
-#include "service/other_services.h"
+#include "service/coupling_service.h"
+#include "service/reduction_service.h"
 #include "service/simulations_service.h"
 #include "service/telemetry_service.h"
 

@@ -15,6 +15,8 @@ void Call::attach(CancelToken* token) {
 }
 
 void Call::poll() {
+  if (std::chrono::steady_clock::now().time_since_epoch().count() > deadline_.load())
+    context_.TryCancel();
   if (!cancelled() && context_.IsCancelled()) cancel();
 }
 

@@ -4,6 +4,7 @@
 #include <grpcpp/server_context.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <set>
@@ -25,6 +26,11 @@ class Call {
 
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
   void attach(CancelToken* token);  ///< null detaches
+  /// Breaks the call off at this time, unless the deadline is cleared before.
+  void set_deadline(std::chrono::steady_clock::time_point deadline) {
+    deadline_.store(deadline.time_since_epoch().count());
+  }
+  void clear_deadline() { deadline_.store(kNoDeadline); }
 
  private:
   friend class CallWatch;
@@ -33,6 +39,8 @@ class Call {
 
   CallWatch& watch_;
   grpc::ServerContext& context_;
+  static constexpr auto kNoDeadline = std::chrono::steady_clock::duration::max().count();
+  std::atomic<std::chrono::steady_clock::rep> deadline_{kNoDeadline};
   std::atomic<bool> cancelled_{false};
   std::mutex mutex_;
   CancelToken* token_ = nullptr;

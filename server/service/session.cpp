@@ -6,86 +6,25 @@
 
 #include "service/convert.h"
 #include "service/refusal.h"
+#include "service/session_advance.h"
 
 namespace mbcosim::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr auto kSlice =
-    std::chrono::milliseconds(5);  // longest hold of lock and slot by many short steps
 constexpr auto kBlockSlice =
     std::chrono::milliseconds(20);  // longest wait for a subscriber before looking round
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-bool holds(v1::Comparison comparison, double value, double threshold) {
-  switch (comparison) {
-    case v1::COMPARISON_LESS:
-      return value < threshold;
-    case v1::COMPARISON_LESS_OR_EQUAL:
-      return value <= threshold;
-    case v1::COMPARISON_GREATER:
-      return value > threshold;
-    case v1::COMPARISON_GREATER_OR_EQUAL:
-      return value >= threshold;
-    default:
-      return false;
-  }
-}
-
 }  // namespace
 
-/// Goal and progress of one call of `step`.
-struct Session::Advance {
-  const v1::StepRequest& request;
-  v1::StepReply& reply;
-  CancelToken token;
-  std::int64_t steps_left = 1;
-  double until = INFINITY;
-  bool started = false, ended = false;
-  struct Pending {
-    std::shared_ptr<TelemetryBuffer> buffer;
-    v1::Sample sample;
-  };
-  std::vector<Pending> pending;  ///< samples not yet delivered
-};
-
-/// Marks the session as stepping while it lives, and connects its token with whoever may interrupt.
-class Session::SteppingClaim {
- public:
-  SteppingClaim(Session& session, Call& call) : session_(session), call_(call) {
-    if (session_.stepping_.exchange(true))
-      throw Refusal(v1::REASON_SIMULATION_BUSY,
-                    "another call advances the simulation at the moment");
-  }
-  ~SteppingClaim() {
-    attach(nullptr);
-    session_.stepping_.store(false);
-  }
-  SteppingClaim(const SteppingClaim&) = delete;
-  SteppingClaim& operator=(const SteppingClaim&) = delete;
-  void attach(CancelToken* token) {
-    {
-      std::lock_guard guard(session_.published_mutex_);
-      session_.running_ = token;
-      if (token && session_.closed_.load()) token->cancel();
-    }
-    call_.attach(token);
-  }
-
- private:
-  Session& session_;
-  Call& call_;
-};
-
-Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared)
+Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
+                 const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports)
     : identity_(std::move(identity)),
       shared_(shared),
       model_(&simulation->model()),
       variables_(&simulation->variables()),
       simulation_(std::move(simulation)),
+      coupler_(ports, *simulation_),
       last_use_(Clock::now().time_since_epoch().count()) {
   publish();
 }
@@ -113,6 +52,7 @@ void Session::fill(v1::SimulationInfo* out) const {
   *out->mutable_lease() =
       google::protobuf::util::TimeUtil::MillisecondsToDuration(identity_.lease.count());
   out->set_last_failure(p.last_failure);
+  out->set_waiting_for(coupler_.waiting_text());
 }
 
 void Session::fill(v1::ModelDescription* out, const std::string& variable_prefix) const {
@@ -122,6 +62,7 @@ void Session::fill(v1::ModelDescription* out, const std::string& variable_prefix
     if (variable.name.compare(0, variable_prefix.size(), variable_prefix) == 0)
       to_proto(variable, static_cast<int>(i), out->add_variables());
   }
+  for (const auto& port : coupler_.ports()) port->fill(out->add_ports());
 }
 
 void Session::publish() {
@@ -136,6 +77,17 @@ void Session::fail(const std::string& why) {
   std::lock_guard guard(published_mutex_);
   published_.failed = true;
   published_.last_failure = why;
+}
+
+void Session::remember_failure(const std::string& why) {
+  std::lock_guard guard(published_mutex_);
+  published_.last_failure = why;
+}
+
+Port& Session::port(const std::string& name) const {
+  if (Port* found = coupler_.find(name)) return *found;
+  throw Refusal(v1::REASON_NO_SUCH_PORT,
+                identity_.id + " has no port named \"" + name.substr(0, 100) + "\"");
 }
 
 void Session::require_usable() const {
@@ -227,121 +179,6 @@ void Session::read_values(const google::protobuf::RepeatedField<int>& handles,
   scratch_.clear();
   for (const int handle : handles) simulation_->get(handle, scratch_);
   out->Add(scratch_.begin(), scratch_.end());
-}
-
-// ------------------------------------------------------------------ advancing
-
-void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
-                   const Progress& progress) {
-  const Clock::time_point start = Clock::now();
-  require_usable();
-  check(request);
-  SteppingClaim claim(*this, call);
-  Advance advance{request, *reply, {}, 1, INFINITY, false, false, {}};
-  if (request.has_steps()) advance.steps_left = request.steps();
-  if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
-    advance.steps_left = INT64_MAX;
-  if (request.has_until_time_s()) advance.until = request.until_time_s();
-  claim.attach(&advance.token);
-  while (!run_slice(advance)) {
-    deliver_samples(advance);
-    if (progress) progress();
-  }
-  while (!deliver_samples(advance)) {
-  }
-  reply->set_total_seconds(seconds_since(start));
-  shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
-                                reply->solver_seconds());
-  if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
-}
-
-bool Session::wants_more(const Advance& advance) const {
-  return !advance.ended && advance.steps_left > 0 && !simulation_->finished() &&
-         simulation_->time() + 0.5 * simulation_->next_step_size() <= advance.until;
-}
-
-// Steps for a while with lock and slot held. True: the advance has ended and the reply is complete.
-bool Session::run_slice(Advance& advance) {
-  std::lock_guard lock(lock_);
-  const v1::StepRequest& request = advance.request;
-  if (!advance.started) {
-    if (replay(request, &advance.reply)) return true;
-    if (request.has_expected_step()) check_step(request.expected_step());
-    apply_inputs(request.inputs());
-    advance.started = true;
-    advance.reply.set_request_id(request.request_id());
-    advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
-                                                      : v1::STEP_OUTCOME_ACCEPTED);
-  }
-  if (!advance.pending.empty()) return false;
-  if (!wants_more(advance)) {
-    finish(advance);
-    return true;
-  }
-  const SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
-  const Clock::time_point slice_end = Clock::now() + kSlice;
-  while (wants_more(advance)) {
-    if (!slot || advance.token.cancelled()) {
-      advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
-      break;
-    }
-    take_one_step(advance);
-    if (!wants_more(advance)) break;
-    if (!advance.pending.empty() || lock_.contended() || Clock::now() >= slice_end) return false;
-  }
-  finish(advance);
-  return true;
-}
-
-void Session::take_one_step(Advance& advance) {
-  StepReport report;
-  try {
-    report = simulation_->step(&advance.token);
-  } catch (const std::exception&) {
-    fail("internal error while stepping");
-    throw Refusal(v1::REASON_INTERNAL,
-                  "internal error while stepping; the simulation is lost, restore a snapshot");
-  }
-  v1::StepReply& reply = advance.reply;
-  reply.set_outcome(to_proto(report.outcome));
-  reply.set_steps_done(reply.steps_done() + report.steps_done);
-  reply.set_step_size_s(report.step_size);
-  reply.set_iterations(report.iterations);
-  reply.set_total_iterations(reply.total_iterations() + report.iterations);
-  reply.set_residual_error(report.residual_error);
-  reply.set_solution_error(report.solution_error);
-  reply.set_solver_seconds(reply.solver_seconds() + report.solver_seconds);
-  publish();
-  const bool accepted =
-      report.outcome == StepOutcome::accepted || report.outcome == StepOutcome::finished;
-  if (!accepted) {
-    advance.ended = true;
-    if (report.error && report.outcome != StepOutcome::interrupted) {
-      to_proto(*report.error, reply.mutable_failure());
-      std::lock_guard guard(published_mutex_);
-      published_.last_failure = reply.failure().message();
-    }
-    return;
-  }
-  --advance.steps_left;
-  if (has_subscribers_.load(std::memory_order_relaxed)) take_samples(advance);
-  if (advance.request.has_until()) {
-    const v1::Condition& until = advance.request.until();
-    scratch_.clear();
-    simulation_->get(until.handle(), scratch_);
-    if (holds(until.comparison(), scratch_[until.element()], until.threshold())) {
-      reply.set_condition_met(true);
-      advance.ended = true;
-    }
-  }
-}
-
-void Session::finish(Advance& advance) {
-  v1::StepReply& reply = advance.reply;
-  reply.set_step(simulation_->step_number());
-  reply.set_time_s(simulation_->time());
-  read_values(advance.request.outputs(), reply.mutable_outputs());
-  if (!advance.request.request_id().empty()) last_reply_ = reply;
 }
 
 bool Session::interrupt() {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "coupling/coupler.h"
 #include "mbcosim/v1/simulations.pb.h"
 #include "service/call_watch.h"
 #include "service/config.h"
@@ -37,7 +38,8 @@ class Session {
   };
   using Progress = std::function<void()>;  ///< called between slices of a long advance
 
-  Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared);
+  Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
+          const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports = {});
 
   const Identity& identity() const { return identity_; }
   const Model& model() const { return *model_; }
@@ -63,6 +65,9 @@ class Session {
 
   void subscribe(std::shared_ptr<TelemetryBuffer> buffer);
   void unsubscribe(const std::shared_ptr<TelemetryBuffer>& buffer);
+
+  /// Throws NO_SUCH_PORT. The port lives as long as the session.
+  Port& port(const std::string& name) const;
 
   /// Interrupts, ends subscriptions; later calls find the session gone.
   void close();
@@ -102,13 +107,23 @@ class Session {
   void check_step(std::int64_t expected) const;
   void apply_inputs(const v1::Values& inputs);
   bool wants_more(const Advance& advance) const;
+  bool begin(Advance& advance);
   bool run_slice(Advance& advance);
-  void take_one_step(Advance& advance);
+  bool run_coupled_step(Advance& advance);
+  void step_coupled(Advance& advance);
+  StepReport run_passes(Advance& advance);
+  void lose_peer(Advance& advance, const std::string& why);
+  StepReport attempt(Advance& advance);
+  StepReport attempt_in_slot(Advance& advance);
+  void restore_or_fail(const State& state);
+  bool condition_holds(const v1::Condition& condition);
+  void account(Advance& advance, const StepReport& report);
   void take_samples(Advance& advance);
   bool deliver_samples(Advance& advance);
   void finish(Advance& advance);
   void publish();
   void fail(const std::string& why);
+  void remember_failure(const std::string& why);
   void require_usable() const;
   void read_values(const google::protobuf::RepeatedField<int>& handles,
                    google::protobuf::RepeatedField<double>* out);
@@ -121,8 +136,9 @@ class Session {
   const Model* const model_;
   const std::vector<Variable>* const variables_;
 
-  FairMutex lock_;  // protects the three below
+  FairMutex lock_;  // protects the four below
   std::unique_ptr<Simulation> simulation_;
+  Coupler coupler_;  // its ports are thread-safe by themselves
   std::vector<double> scratch_;
   v1::StepReply last_reply_;
 

@@ -89,6 +89,7 @@ void Session::restore(int snapshot) {
   std::scoped_lock lock(lock_, snapshots_mutex_);
   const auto status = simulation_->restore(find_snapshot(snapshot).state);
   if (!status) throw Refusal(status.error());
+  coupler_.reset();
   last_reply_.Clear();
   {
     std::lock_guard guard(published_mutex_);

@@ -31,9 +31,6 @@ void check_options(const v1::CreateOptions& options) {
   if (options.non_convergence_policy() > v1::NON_CONVERGENCE_POLICY_FAIL)
     throw Refusal(v1::REASON_NOT_SERVED,
                   "non-convergence policies other than FAIL are not served by this version");
-  if (options.ports_size() > 0)
-    throw Refusal(v1::REASON_NOT_SERVED,
-                  "ports attached at creation are not served by this version");
 }
 
 [[noreturn]] void refuse_deck(const LoadReport& report) {
@@ -141,8 +138,8 @@ grpc::Status SimulationsService::GetServerInfo(Context context, const v1::GetSer
     add_limit(reply, "unknowns", limits.engine.unknowns);
     reply->set_identity(caller.identity);
     reply->set_role(role_name(caller.role));
-    for (const char* method : {"Simulations/Linearize", "Simulations/ComputeEigenvalues",
-                               "Coupling/Attach", "Reduction/Reduce"})
+    for (const char* method :
+         {"Simulations/Linearize", "Simulations/ComputeEigenvalues", "Reduction/Reduce"})
       reply->add_methods_not_served(method);
   });
 }
@@ -169,11 +166,11 @@ Session::Identity SimulationsService::make_identity(const v1::CreateOptions& opt
   return identity;
 }
 
-SessionPtr SimulationsService::add(Session::Identity identity,
+SessionPtr SimulationsService::add(const v1::CreateOptions& options, const Caller& caller,
                                    std::unique_ptr<Simulation> simulation) {
   auto session = std::make_shared<Session>(
-      std::move(identity), std::move(simulation),
-      Session::Shared{parts_.slots, parts_.config.limits, parts_.metrics});
+      make_identity(options, caller), std::move(simulation),
+      Session::Shared{parts_.slots, parts_.config.limits, parts_.metrics}, options.ports());
   parts_.store.add(session);
   return session;
 }
@@ -189,8 +186,7 @@ void SimulationsService::create(const v1::UploadHeader& header, LoadReport repor
   }();
   call.attach(nullptr);
   if (!simulation) throw Refusal(simulation.error());
-  add(make_identity(header.options(), caller), std::move(*simulation))
-      ->fill(reply->mutable_simulation());
+  add(header.options(), caller, std::move(*simulation))->fill(reply->mutable_simulation());
   to_proto(report.diagnostics, reply->mutable_diagnostics());
   reply->set_printed(utf8(report.printed));
   reply->set_protocol_version(kProtocolVersion);
@@ -451,8 +447,7 @@ grpc::Status SimulationsService::ForkSimulation(Context context,
                                    : std::pair(parts_.store.get(request->simulation(), caller), -1);
       const Session::Use use(*session);
       const SessionStore::Place place(parts_.store);
-      add(make_identity(request->options(), caller), session->fork(number))
-          ->fill(reply->mutable_simulation());
+      add(request->options(), caller, session->fork(number))->fill(reply->mutable_simulation());
     } else {
       known->fill(reply->mutable_simulation());
     }

@@ -52,7 +52,8 @@ class SimulationsService final : public v1::Simulations::Service {
   Session::Identity make_identity(const v1::CreateOptions& options, const Caller& caller) const;
   void create(const v1::UploadHeader& header, LoadReport report, Call& call, const Caller& caller,
               v1::CreateSimulationReply* reply);
-  SessionPtr add(Session::Identity identity, std::unique_ptr<Simulation> simulation);
+  SessionPtr add(const v1::CreateOptions& options, const Caller& caller,
+                 std::unique_ptr<Simulation> simulation);
   /// Session and number of a snapshot named by the client.
   std::pair<SessionPtr, int> find_snapshot(const std::string& name, const Caller& caller) const;
 

@@ -7,11 +7,12 @@
         print(simulation.time, simulation["node.structural.1.X"])
 """
 from .client import Server, connect, default_address
+from .coupling import Motion, Peer, signal_port, structural_port
 from .errors import (DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
                      StepFailed, Unavailable)
 from .simulation import Simulation, Snapshot, StepResult, Stepper, Subscription
 
 __all__ = [
-    "connect", "default_address", "Server", "Simulation", "Snapshot", "StepResult", "Stepper", "Subscription", "Error",
-    "DeckError", "LimitExceeded", "NotAllowed", "NotFound", "PreconditionFailed", "StepFailed", "Unavailable",
+    "connect", "default_address", "Server", "Simulation", "Snapshot", "StepResult", "Stepper", "Subscription", "Motion", "Peer",
+    "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound", "PreconditionFailed", "StepFailed", "Unavailable",
 ]

@@ -4,7 +4,7 @@ import uuid
 
 import grpc
 
-from mbcosim.v1 import simulations_pb2, simulations_pb2_grpc, telemetry_pb2_grpc
+from mbcosim.v1 import coupling_pb2_grpc, simulations_pb2, simulations_pb2_grpc, telemetry_pb2_grpc
 
 from . import bundle
 from .errors import translated
@@ -47,6 +47,7 @@ class Server:
         self.address = address
         self.metadata = [("authorization", f"Bearer {token}")] if token else []
         self.simulations = simulations_pb2_grpc.SimulationsStub(self._channel)
+        self.coupling = coupling_pb2_grpc.CouplingStub(self._channel)
         self.telemetry = telemetry_pb2_grpc.TelemetryStub(self._channel)
 
     def __enter__(self):
@@ -74,21 +75,23 @@ class Server:
         """Creates a simulation from a deck given as text."""
         return self.load_bundle("deck", {"deck": text.encode()}, **options)
 
-    def load_bundle(self, main, files, *, name="", lease=None):
+    def load_bundle(self, main, files, *, name="", lease=None, ports=()):
         """Creates a simulation from files (bytes by name) whose main one is `main`.
 
         name   for people
         lease  seconds that the simulation lives without calls; None: the server's default
+        ports  places where peers can couple: structural_port, signal_port
         """
-        return self._create(simulations_pb2.UploadHeader(bundle_main_file=main), files, name, lease)
+        return self._create(simulations_pb2.UploadHeader(bundle_main_file=main), files, name, lease, ports)
 
-    def load_from_root(self, deck, *, name="", lease=None):
+    def load_from_root(self, deck, *, name="", lease=None, ports=()):
         """Creates a simulation from a deck under the server's model root."""
-        return self._create(simulations_pb2.UploadHeader(model_root_file=deck), {}, name, lease)
+        return self._create(simulations_pb2.UploadHeader(model_root_file=deck), {}, name, lease, ports)
 
-    def _create(self, header, files, name, lease):
+    def _create(self, header, files, name, lease, ports):
         header.options.request_id = uuid.uuid4().hex
         header.options.display_name = name
+        header.options.ports.extend(ports)
         if lease is not None:
             header.options.lease.FromMilliseconds(int(lease * 1000))
         with translated():

@@ -8,6 +8,7 @@ import numpy as np
 
 from mbcosim.v1 import common_pb2, simulations_pb2 as pb, telemetry_pb2
 
+from .coupling import Peer
 from .errors import StepFailed, Unavailable, translated
 
 _ATTEMPTS = 3  # of a step whose reply was lost on the way; the server applies it once
@@ -209,9 +210,10 @@ class Simulation:
             self.step_number, self.time = snapshot.step, snapshot.time
         return snapshot
 
-    def fork(self, snapshot=None, *, name=""):
+    def fork(self, snapshot=None, *, name="", ports=()):
         """A new simulation at a saved state or the current one, sharing the model."""
-        request = pb.ForkSimulationRequest(options=pb.CreateOptions(display_name=name, request_id=uuid.uuid4().hex))
+        request = pb.ForkSimulationRequest(options=pb.CreateOptions(display_name=name, ports=ports,
+                                                                   request_id=uuid.uuid4().hex))
         if snapshot is None:
             request.simulation = self.name
         else:
@@ -228,6 +230,10 @@ class Simulation:
     def delete(self):
         """Ends the simulation."""
         self._call(self._stub.DeleteSimulation, pb.DeleteSimulationRequest(name=self.name))
+
+    def couple(self, port, answer, **options):
+        """Attaches a peer to a port; see coupling.Peer."""
+        return Peer(self, port, answer, **options)
 
     def subscribe(self, names, *, every=1, policy="drop_oldest", buffer=1024):
         """Samples of variables every so many steps, whoever advances; see Subscription."""

@@ -1,0 +1,28 @@
+/// What a peer and a port have agreed on in their handshake.
+#pragma once
+
+#include <chrono>
+
+#include "mbcosim/v1/coupling.pb.h"
+
+namespace mbcosim::server {
+
+struct Agreement {
+  v1::RotationForm rotation_form = v1::ROTATION_FORM_MATRIX;
+  v1::PortFrame frame = v1::PORT_FRAME_GLOBAL;
+  bool accelerations = false;
+  v1::CouplingMode mode = v1::COUPLING_MODE_LOOSE;
+  int every = 1;  ///< steps between exchanges
+  v1::InputHold hold = v1::INPUT_HOLD_ZERO_ORDER;
+  std::chrono::milliseconds timeout{10000};  ///< longest wait for an answer
+  v1::PeerPolicy policy = v1::PEER_POLICY_FAIL_STEP;
+  v1::Acceleration acceleration = v1::ACCELERATION_NONE;
+  double relaxation = 0.5;
+  double tolerance = 1e-6;  ///< of the interface, relative
+  int maximum_passes = 50;
+  int generation = 0;  ///< number of the handshake on this port
+
+  bool is_window() const { return mode == v1::COUPLING_MODE_WINDOW; }
+};
+
+}  // namespace mbcosim::server

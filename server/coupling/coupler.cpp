@@ -1,0 +1,196 @@
+#include "coupling/coupler.h"
+
+#include <algorithm>
+#include <set>
+
+#include "service/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Adds the time of its life to a counter.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& seconds) : seconds_(seconds) {}
+  ~Stopwatch() { seconds_ += std::chrono::duration<double>(Clock::now() - start_).count(); }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& seconds_;
+  Clock::time_point start_ = Clock::now();
+};
+
+}  // namespace
+
+Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
+                 const Simulation& simulation) {
+  std::set<std::string> names;
+  std::set<int> written;
+  for (const v1::PortDefinition& definition : ports) {
+    PortModel model(definition, simulation);
+    if (!names.insert(model.name()).second)
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "two ports are named \"" + model.name() + "\"");
+    for (const int handle : model.written()) {
+      if (!written.insert(handle).second)
+        throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + model.name() + "\": variable \"" +
+                                                   simulation.variables()[handle].name +
+                                                   "\" is written twice");
+    }
+    ports_.push_back(std::make_unique<Port>(std::move(model)));
+    lines_.emplace_back().port = ports_.back().get();
+  }
+}
+
+Port* Coupler::find(const std::string& name) const {
+  for (const auto& port : ports_)
+    if (port->model().name() == name) return port.get();
+  return nullptr;
+}
+
+std::string Coupler::waiting_text() const {
+  std::string text;
+  for (const auto& port : ports_) {
+    const std::string one = port->waiting_text();
+    if (!one.empty()) text += (text.empty() ? "" : ", ") + one;
+  }
+  return text;
+}
+
+bool Coupler::has_window() const {
+  return std::any_of(lines_.begin(), lines_.end(),
+                     [](const Line& line) { return line.agreement.is_window(); });
+}
+
+int Coupler::maximum_passes() const {
+  int most = 1;
+  for (const Line& line : lines_)
+    if (line.agreement.is_window()) most = std::max(most, line.agreement.maximum_passes);
+  return most;
+}
+
+void Coupler::fill(Line& line, const Simulation& simulation, double target_time, int iteration) {
+  line.message.Clear();
+  v1::ServerExchange* out = line.message.mutable_exchange();
+  out->set_step(simulation.step_number());
+  out->set_time_s(simulation.time());
+  out->set_target_time_s(target_time);
+  out->set_iteration(iteration);
+  line.port->model().fill(simulation, line.agreement, out);
+}
+
+void Coupler::reset() {
+  for (Line& line : lines_) {
+    line.history.clear();
+    line.sent_for = -1;
+    line.port->forget();
+  }
+}
+
+// ------------------------------------------------------------------ explicit ports
+
+void Coupler::await_peers(const CancelToken& cancel) {
+  const Stopwatch watch(waited_);
+  for (Line& line : lines_) line.port->await_peer(cancel);
+}
+
+void Coupler::prepare(const Simulation& simulation) {
+  const std::int64_t step = simulation.step_number();
+  target_time_ = simulation.time() + simulation.next_step_size();
+  for (Line& line : lines_) {
+    const Agreement now = line.port->agreement();
+    if (now.hold != line.agreement.hold) line.history = InputHistory(now.hold);
+    line.agreement = now;
+    line.due = !now.is_window() && (step % now.every == 0 || line.history.empty());
+    const bool on_its_way = line.sent_for == step && line.port->is_waiting();
+    if (!line.due || on_its_way) continue;
+    line.sent_for = -1;
+    fill(line, simulation, target_time_, 0);
+  }
+}
+
+void Coupler::take_answer(Line& line, const CancelToken& cancel) {
+  line.sent_for = -1;
+  if (const auto answer = line.port->take(cancel)) line.history.add(target_time_, *answer);
+}
+
+// All peers compute at the same time: everything is sent before the first answer is awaited.
+void Coupler::exchange(const CancelToken& cancel) {
+  const Stopwatch watch(waited_);
+  for (Line& line : lines_)
+    if (line.due && line.sent_for < 0) line.port->send(line.message, line.agreement.generation);
+  for (Line& line : lines_)
+    if (line.due) take_answer(line, cancel);
+}
+
+void Coupler::apply(Simulation& simulation) {
+  for (Line& line : lines_)
+    if (!line.agreement.is_window() && !line.history.empty())
+      line.port->model().apply(line.history.at(target_time_), simulation);
+}
+
+void Coupler::finish(const Simulation& simulation) {
+  for (Line& line : lines_) {
+    const bool staggered = line.agreement.mode == v1::COUPLING_MODE_STAGGERED;
+    if (!staggered || simulation.finished() || simulation.step_number() % line.agreement.every != 0)
+      continue;
+    if (!line.port->has_peer()) continue;
+    fill(line, simulation, simulation.time() + simulation.next_step_size(), 0);
+    line.port->send(line.message, line.agreement.generation);
+    line.sent_for = simulation.step_number();
+  }
+}
+
+// ------------------------------------------------------------------ window ports
+
+void Coupler::start_passes() {
+  for (Line& line : lines_) {
+    if (!line.agreement.is_window()) continue;
+    line.fixed_point = FixedPoint(line.agreement.acceleration, line.agreement.relaxation);
+    line.fixed_point.start();
+    if (line.interface.size() != line.port->model().answer_size())
+      line.interface = Eigen::VectorXd::Zero(line.port->model().answer_size());
+  }
+}
+
+void Coupler::apply_window(Simulation& simulation) const {
+  for (const Line& line : lines_) {
+    if (!line.agreement.is_window()) continue;
+    line.port->model().apply({line.interface.data(), line.interface.data() + line.interface.size()},
+                             simulation);
+  }
+}
+
+bool Coupler::step_window(Line& line, const CancelToken& cancel) {
+  const auto answer = line.port->take(cancel);
+  if (!answer) return true;  // the policy goes on with what was applied
+  const Eigen::Map<const Eigen::VectorXd> given(answer->data(),
+                                                static_cast<Eigen::Index>(answer->size()));
+  const double change = (given - line.interface).norm();
+  if (change <= line.agreement.tolerance * given.norm() || change == 0) return true;
+  line.interface = line.fixed_point.next(line.interface, given);
+  return false;
+}
+
+bool Coupler::exchange_window(const Simulation& simulation, int pass, const CancelToken& cancel) {
+  const Stopwatch watch(waited_);
+  for (Line& line : lines_) {
+    if (!line.agreement.is_window()) continue;
+    fill(line, simulation, simulation.time(), pass);
+    line.port->send(line.message, line.agreement.generation);
+  }
+  bool agreed = true;
+  for (Line& line : lines_)
+    if (line.agreement.is_window()) agreed = step_window(line, cancel) && agreed;
+  return agreed;
+}
+
+void Coupler::notify_window(bool accepted, const Simulation& simulation) {
+  for (Line& line : lines_)
+    if (line.agreement.is_window())
+      line.port->notify(accepted, simulation.step_number(), simulation.time());
+}
+
+}  // namespace mbcosim::server

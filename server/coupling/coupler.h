@@ -1,0 +1,71 @@
+/// All ports of one session, in step with it.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coupling/fixed_point.h"
+#include "coupling/port.h"
+
+namespace mbcosim::server {
+
+/// Order within step k (see `Coupling` in the proto):
+///
+///   explicit ports   prepare (state k−1) · exchange · apply · step · finish (staggered ports send
+///   state k) window ports     then passes: apply · step · exchange · test; redone from state k−1
+///   until all interfaces agree
+///
+/// `prepare`, `apply` and `finish` touch the simulation and need the session's lock; `await_peers`
+/// and `exchange` wait and need none.
+class Coupler {
+ public:
+  Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
+          const Simulation& simulation);
+
+  Port* find(const std::string& name) const;
+  const std::vector<std::unique_ptr<Port>>& ports() const { return ports_; }
+  std::string waiting_text() const;
+  bool has_window() const;
+
+  void await_peers(const CancelToken& cancel);
+  void prepare(const Simulation& simulation);
+  void exchange(const CancelToken& cancel);  ///< throws PeerLost
+  void apply(Simulation& simulation);
+  void finish(const Simulation& simulation);
+  /// The simulation went to another state: what peers answered before says nothing any more.
+  void reset();
+
+  // --- window ports
+  void start_passes();
+  void apply_window(Simulation& simulation) const;
+  /// One exchange at the end of a pass. True: all interfaces agree. Throws PeerLost.
+  bool exchange_window(const Simulation& simulation, int pass, const CancelToken& cancel);
+  int maximum_passes() const;
+  void notify_window(bool accepted, const Simulation& simulation);
+
+  double waited_seconds() const { return waited_; }  ///< in exchanges since the last `start_clock`
+  void start_clock() { waited_ = 0; }
+
+ private:
+  struct Line {  ///< what belongs to one port
+    Port* port = nullptr;
+    Agreement agreement;  ///< during the present step
+    InputHistory history{v1::INPUT_HOLD_ZERO_ORDER};
+    v1::ServerMessage message;
+    bool due = false;
+    std::int64_t sent_for = -1;  ///< step whose motion is on its way; −1: none
+    FixedPoint fixed_point{v1::ACCELERATION_NONE, 1};
+    Eigen::VectorXd interface;  ///< window: values applied
+  };
+  void fill(Line& line, const Simulation& simulation, double target_time, int iteration);
+  void take_answer(Line& line, const CancelToken& cancel);
+  bool step_window(Line& line, const CancelToken& cancel);
+
+  std::vector<std::unique_ptr<Port>> ports_;
+  std::vector<Line> lines_;
+  double target_time_ = 0;  ///< end of the step [s]
+  double waited_ = 0;
+};
+
+}  // namespace mbcosim::server

@@ -1,0 +1,31 @@
+/// A peer's last answers, and what they say about times between exchanges.
+#pragma once
+
+#include <deque>
+#include <vector>
+
+#include "coupling/agreement.h"
+
+namespace mbcosim::server {
+
+/// Polynomial through the last one, two or three answers (Lagrange), evaluated at or after the
+/// newest.
+class InputHistory {
+ public:
+  explicit InputHistory(v1::InputHold hold);
+  void clear() { points_.clear(); }
+  bool empty() const { return points_.empty(); }
+  void add(double time, const std::vector<double>& values);
+  /// Values at `time` [s]. There must be an answer.
+  std::vector<double> at(double time) const;
+
+ private:
+  struct Point {
+    double time;
+    std::vector<double> values;
+  };
+  std::size_t depth_;
+  std::deque<Point> points_;  ///< oldest first
+};
+
+}  // namespace mbcosim::server

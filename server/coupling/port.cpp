@@ -1,0 +1,197 @@
+#include "coupling/port.h"
+
+#include <google/protobuf/util/time_util.h>
+
+#include <cstdio>
+#include <thread>
+
+#include "service/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+constexpr auto kLook = std::chrono::milliseconds(10);  // how soon a cancelled step is noticed
+constexpr std::chrono::milliseconds kLongestWait = std::chrono::minutes(60);  // of policy WAIT
+constexpr int kSpins = 200;  // looks before sleeping: quick peers answer within them
+
+std::string in_port(const std::string& name, const std::string& text) {
+  return "port \"" + name + "\": " + text;
+}
+
+}  // namespace
+
+void Port::fill(v1::PortLayout* out) const {
+  std::lock_guard guard(mutex_);
+  *out = model_.layout();
+  out->set_has_peer(link_ != nullptr);
+  *out->mutable_peer_timeout() =
+      google::protobuf::util::TimeUtil::MillisecondsToDuration(agreement_.timeout.count());
+}
+
+std::string Port::waiting_text() const {
+  std::lock_guard guard(mutex_);
+  if (!waiting_since_) return "";
+  char text[64];
+  std::snprintf(text, sizeof text, " since %.1f s",
+                std::chrono::duration<double>(Clock::now() - *waiting_since_).count());
+  return "port " + model_.name() + text;
+}
+
+// ------------------------------------------------------------------ the peer's thread
+
+void Port::reserve(const Agreement& agreement) {
+  std::lock_guard guard(mutex_);
+  if (reserved_)
+    throw Refusal(v1::REASON_PORT_TAKEN, in_port(model_.name(), "a peer is attached already"));
+  reserved_ = true;
+  const int generation = agreement_.generation + 1;
+  agreement_ = agreement;
+  agreement_.generation = generation;
+}
+
+void Port::attach(PeerLink* link) {
+  {
+    std::lock_guard guard(mutex_);
+    link_ = link;
+    index_ = 0;
+    awaited_ = false;
+    answer_.reset();
+    peer_failure_.clear();
+  }
+  changed_.notify_all();
+}
+
+void Port::detach() {
+  std::unique_lock guard(mutex_);
+  changed_.wait(guard, [&] { return !sending_; });
+  link_ = nullptr;
+  reserved_ = false;
+  guard.unlock();
+  changed_.notify_all();
+}
+
+void Port::deliver(const v1::PeerExchange& answer) {
+  {
+    std::lock_guard guard(mutex_);
+    if (answer.index() < 1 || answer.index() > index_ || (answer.index() == index_ && answer_))
+      throw Refusal(v1::REASON_OUT_OF_TURN,
+                    in_port(model_.name(), "answer to exchange " + std::to_string(answer.index()) +
+                                               "; the last one sent is " + std::to_string(index_)));
+    if (answer.index() < index_ || !awaited_) return;
+    peer_failure_ = answer.failure();
+    std::vector<double> values;
+    if (peer_failure_.empty()) {
+      const std::string wrong = model_.decode(answer, agreement_, &values);
+      if (!wrong.empty()) throw Refusal(v1::REASON_BAD_ARGUMENT, in_port(model_.name(), wrong));
+    }
+    answer_ = std::move(values);
+  }
+  changed_.notify_all();
+}
+
+// ------------------------------------------------------------------ the session's thread
+
+Agreement Port::agreement() const {
+  std::lock_guard guard(mutex_);
+  return agreement_;
+}
+
+bool Port::has_peer() const {
+  std::lock_guard guard(mutex_);
+  return link_ != nullptr;
+}
+
+bool Port::is_waiting() const {
+  std::lock_guard guard(mutex_);
+  return awaited_;
+}
+
+void Port::forget() {
+  std::lock_guard guard(mutex_);
+  awaited_ = false;
+  answer_.reset();
+}
+
+void Port::await_peer(const CancelToken& cancel) {
+  std::unique_lock guard(mutex_);
+  const bool patient =
+      agreement_.policy == v1::PEER_POLICY_WAIT || agreement_.policy == v1::PEER_POLICY_FAIL_STEP;
+  if (link_ || !patient) return;
+  const bool forever = agreement_.policy == v1::PEER_POLICY_WAIT;
+  const Clock::time_point deadline = Clock::now() + (forever ? kLongestWait : agreement_.timeout);
+  waiting_since_ = Clock::now();
+  while (!link_ && Clock::now() < deadline && !cancel.cancelled()) changed_.wait_for(guard, kLook);
+  waiting_since_.reset();
+}
+
+// Sending may block while the peer does not read, so it happens without the lock; `detach` waits
+// for its end.
+void Port::send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message) {
+  PeerLink* link = link_;
+  const Clock::time_point deadline = Clock::now() + agreement_.timeout;
+  sending_ = true;
+  guard.unlock();
+  link->send(message, deadline);  // a broken link is noticed by the peer's thread, which detaches
+  guard.lock();
+  sending_ = false;
+  guard.unlock();
+  changed_.notify_all();
+}
+
+void Port::send(v1::ServerMessage& message, int generation) {
+  std::unique_lock guard(mutex_);
+  if (!link_ || generation != agreement_.generation) return;
+  message.mutable_exchange()->set_index(++index_);
+  awaited_ = true;
+  answer_.reset();
+  send_unlocked(guard, message);
+}
+
+std::optional<std::vector<double>> Port::take(const CancelToken& cancel) {
+  std::unique_lock guard(mutex_);
+  for (int spin = 0; spin < kSpins && awaited_ && !answer_ && link_; ++spin) {
+    guard.unlock();
+    std::this_thread::yield();
+    guard.lock();
+  }
+  const bool forever = agreement_.policy == v1::PEER_POLICY_WAIT;
+  const Clock::time_point deadline = Clock::now() + (forever ? kLongestWait : agreement_.timeout);
+  waiting_since_ = Clock::now();
+  while (awaited_ && !answer_ && link_ && Clock::now() < deadline && !cancel.cancelled())
+    changed_.wait_for(guard, kLook);
+  waiting_since_.reset();
+  const bool answered = awaited_ && answer_.has_value();
+  const bool late = awaited_ && !answered && link_;
+  awaited_ = false;
+  if (!answered)
+    return go_on_without(late ? "the peer did not answer in time" : "the peer is gone");
+  if (!peer_failure_.empty())
+    return go_on_without("the peer failed: " + peer_failure_.substr(0, 500));
+  last_answer_ = *answer_;
+  return last_answer_;
+}
+
+void Port::lose(const std::string& why) { throw PeerLost{in_port(model_.name(), why)}; }
+
+std::optional<std::vector<double>> Port::go_on_without(const std::string& why) {
+  switch (agreement_.policy) {
+    case v1::PEER_POLICY_HOLD_LAST:
+      return std::nullopt;
+    case v1::PEER_POLICY_ZERO:
+      return std::vector<double>(static_cast<std::size_t>(model_.answer_size()), 0.0);
+    default:
+      lose(why);
+  }
+}
+
+void Port::notify(bool accepted, std::int64_t step, double time) {
+  v1::ServerMessage message;
+  v1::StepNotice* notice = accepted ? message.mutable_accepted() : message.mutable_rejected();
+  notice->set_step(step);
+  notice->set_time_s(time);
+  std::unique_lock guard(mutex_);
+  if (!link_) return;
+  send_unlocked(guard, message);
+}
+
+}  // namespace mbcosim::server

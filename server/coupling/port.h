@@ -1,0 +1,85 @@
+/// Where a stepping session and the stream of a peer meet.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "coupling/input_history.h"
+#include "coupling/port_model.h"
+#include "mbcosim/v1/coupling.pb.h"
+
+namespace mbcosim::server {
+
+/// Sends to one peer. Implemented over gRPC by the service, over a queue by tests.
+class PeerLink {
+ public:
+  virtual ~PeerLink() = default;
+  /// False: the peer is gone. Returns at `deadline` at the latest, the link being broken then.
+  virtual bool send(const v1::ServerMessage& message,
+                    std::chrono::steady_clock::time_point deadline) = 0;
+};
+
+/// A peer did not answer; the text tells why. The step fails with PEER_LOST.
+struct PeerLost {
+  std::string text;
+};
+
+/// Thread-safe: the session's thread exchanges, the peer's thread attaches, delivers and detaches.
+class Port {
+ public:
+  explicit Port(PortModel model) : model_(std::move(model)) {}
+
+  PortModel& model() { return model_; }
+  const PortModel& model() const { return model_; }
+  void fill(v1::PortLayout* out) const;
+  /// For whom and since when the session waits; empty: for nobody.
+  std::string waiting_text() const;
+
+  // --- the peer's thread
+  /// Takes the port for a peer. Throws PORT_TAKEN.
+  void reserve(const Agreement& agreement);
+  void attach(PeerLink* link);  ///< after `reserve`; exchanges may start
+  void detach();
+  /// Hands over an answer. Throws OUT_OF_TURN or BAD_ARGUMENT; answers to exchanges given up are
+  /// dropped.
+  void deliver(const v1::PeerExchange& answer);
+
+  // --- the session's thread, in this order within a step
+  Agreement agreement() const;
+  bool has_peer() const;
+  /// Waits until a peer is attached, as long as the policy says.
+  void await_peer(const CancelToken& cancel);
+  /// Sends what `model().fill` put into `message` for the peer of this handshake. Does not throw:
+  /// `take` tells.
+  void send(v1::ServerMessage& message, int generation);
+  /// The answer to the last `send`, or nothing when the policy goes on without. Throws PeerLost.
+  std::optional<std::vector<double>> take(const CancelToken& cancel);
+  bool is_waiting() const;  ///< was a message sent whose answer was not taken?
+  void forget();            ///< gives up the answer that is on its way
+  /// Tells the peer how an implicit step ended.
+  void notify(bool accepted, std::int64_t step, double time);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message);
+  [[noreturn]] void lose(const std::string& why);
+  std::optional<std::vector<double>> go_on_without(const std::string& why);
+
+  PortModel model_;
+  mutable std::mutex mutex_;  // protects all below; `model_` too while an answer is decoded
+  std::condition_variable changed_;
+  Agreement agreement_;
+  bool reserved_ = false, sending_ = false;
+  PeerLink* link_ = nullptr;
+  std::int64_t index_ = 0;  ///< of the last exchange on the present stream
+  bool awaited_ = false;    ///< its answer is wanted
+  std::optional<std::vector<double>> answer_;
+  std::string peer_failure_;  ///< the peer could not compute
+  std::vector<double> last_answer_;
+  std::optional<Clock::time_point> waiting_since_;
+};
+
+}  // namespace mbcosim::server

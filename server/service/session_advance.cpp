@@ -1,0 +1,303 @@
+/// The part of Session that advances.
+#include "service/session_advance.h"
+#include "service/convert.h"
+#include "service/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr auto kSlice =
+    std::chrono::milliseconds(5);  // longest hold of lock and slot by many short steps
+bool is_accepted(StepOutcome outcome) {
+  return outcome == StepOutcome::accepted || outcome == StepOutcome::finished;
+}
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+bool holds(v1::Comparison comparison, double value, double threshold) {
+  switch (comparison) {
+    case v1::COMPARISON_LESS:
+      return value < threshold;
+    case v1::COMPARISON_LESS_OR_EQUAL:
+      return value <= threshold;
+    case v1::COMPARISON_GREATER:
+      return value > threshold;
+    case v1::COMPARISON_GREATER_OR_EQUAL:
+      return value >= threshold;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+/// Marks the session as stepping while it lives, and connects its token with whoever may interrupt.
+class Session::SteppingClaim {
+ public:
+  SteppingClaim(Session& session, Call& call) : session_(session), call_(call) {
+    if (session_.stepping_.exchange(true))
+      throw Refusal(v1::REASON_SIMULATION_BUSY,
+                    "another call advances the simulation at the moment");
+  }
+  ~SteppingClaim() {
+    attach(nullptr);
+    session_.stepping_.store(false);
+  }
+  SteppingClaim(const SteppingClaim&) = delete;
+  SteppingClaim& operator=(const SteppingClaim&) = delete;
+  void attach(CancelToken* token) {
+    {
+      std::lock_guard guard(session_.published_mutex_);
+      session_.running_ = token;
+      if (token && session_.closed_.load()) token->cancel();
+    }
+    call_.attach(token);
+  }
+
+ private:
+  Session& session_;
+  Call& call_;
+};
+
+// ------------------------------------------------------------------ advancing
+
+void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
+                   const Progress& progress) {
+  const Clock::time_point start = Clock::now();
+  require_usable();
+  check(request);
+  SteppingClaim claim(*this, call);
+  Advance advance{request, *reply, {}, 1, INFINITY, false, false, {}};
+  if (request.has_steps()) advance.steps_left = request.steps();
+  if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
+    advance.steps_left = INT64_MAX;
+  if (request.has_until_time_s()) advance.until = request.until_time_s();
+  claim.attach(&advance.token);
+  const bool coupled = !coupler_.ports().empty();
+  while (!(coupled ? run_coupled_step(advance) : run_slice(advance))) {
+    deliver_samples(advance);
+    if (progress) progress();
+  }
+  while (!deliver_samples(advance)) {
+  }
+  reply->set_total_seconds(seconds_since(start));
+  shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
+                                reply->solver_seconds());
+  if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
+}
+
+bool Session::wants_more(const Advance& advance) const {
+  return !advance.ended && advance.steps_left > 0 && !simulation_->finished() &&
+         simulation_->time() + 0.5 * simulation_->next_step_size() <= advance.until;
+}
+
+// Does once what comes before the first step. True: nothing is to be done, the reply is complete.
+bool Session::begin(Advance& advance) {
+  if (advance.started) return false;
+  const v1::StepRequest& request = advance.request;
+  if (replay(request, &advance.reply)) return true;
+  if (request.has_expected_step()) check_step(request.expected_step());
+  apply_inputs(request.inputs());
+  advance.started = true;
+  advance.reply.set_request_id(request.request_id());
+  advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
+                                                    : v1::STEP_OUTCOME_ACCEPTED);
+  return false;
+}
+
+// Steps for a while with lock and slot held. True: the advance has ended and the reply is complete.
+bool Session::run_slice(Advance& advance) {
+  std::lock_guard lock(lock_);
+  if (begin(advance)) return true;
+  if (!advance.pending.empty()) return false;
+  if (!wants_more(advance)) {
+    finish(advance);
+    return true;
+  }
+  const SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
+  const Clock::time_point slice_end = Clock::now() + kSlice;
+  while (wants_more(advance)) {
+    if (!slot || advance.token.cancelled()) {
+      advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
+      break;
+    }
+    account(advance, attempt(advance));
+    if (!wants_more(advance)) break;
+    if (!advance.pending.empty() || lock_.contended() || Clock::now() >= slice_end) return false;
+  }
+  finish(advance);
+  return true;
+}
+
+StepReport Session::attempt(Advance& advance) {
+  try {
+    return simulation_->step(&advance.token);
+  } catch (const std::exception&) {
+    fail("internal error while stepping");
+    throw Refusal(v1::REASON_INTERNAL,
+                  "internal error while stepping; restore a snapshot or delete the simulation");
+  }
+}
+
+// Enters one step, or its failure, into the reply.
+void Session::account(Advance& advance, const StepReport& report) {
+  v1::StepReply& reply = advance.reply;
+  reply.set_outcome(to_proto(report.outcome));
+  reply.set_steps_done(reply.steps_done() + report.steps_done);
+  reply.set_step_size_s(report.step_size);
+  reply.set_iterations(report.iterations);
+  reply.set_total_iterations(reply.total_iterations() + report.iterations);
+  reply.set_residual_error(report.residual_error);
+  reply.set_solution_error(report.solution_error);
+  reply.set_solver_seconds(reply.solver_seconds() + report.solver_seconds);
+  publish();
+  if (!is_accepted(report.outcome)) {
+    advance.ended = true;
+    if (report.error && report.outcome != StepOutcome::interrupted) {
+      to_proto(*report.error, reply.mutable_failure());
+      remember_failure(reply.failure().message());
+    }
+    return;
+  }
+  --advance.steps_left;
+  if (has_subscribers_.load(std::memory_order_relaxed)) take_samples(advance);
+  if (advance.request.has_until() && condition_holds(advance.request.until())) {
+    reply.set_condition_met(true);
+    advance.ended = true;
+  }
+}
+
+bool Session::condition_holds(const v1::Condition& condition) {
+  scratch_.clear();
+  simulation_->get(condition.handle(), scratch_);
+  return holds(condition.comparison(), scratch_[condition.element()], condition.threshold());
+}
+
+void Session::finish(Advance& advance) {
+  v1::StepReply& reply = advance.reply;
+  reply.set_step(simulation_->step_number());
+  reply.set_time_s(simulation_->time());
+  read_values(advance.request.outputs(), reply.mutable_outputs());
+  if (!advance.request.request_id().empty()) last_reply_ = reply;
+}
+
+// ------------------------------------------------------------------ with ports
+
+// One step with its exchanges. The session's lock is free while peers compute, except between
+// passes of window ports.
+bool Session::run_coupled_step(Advance& advance) {
+  {
+    std::lock_guard lock(lock_);
+    if (begin(advance)) return true;
+    if (!advance.pending.empty()) return false;
+    if (!wants_more(advance)) {
+      finish(advance);
+      return true;
+    }
+  }
+  coupler_.start_clock();
+  try {
+    coupler_.await_peers(advance.token);
+    {
+      std::lock_guard lock(lock_);
+      coupler_.prepare(*simulation_);
+    }
+    coupler_.exchange(advance.token);
+    std::lock_guard lock(lock_);
+    step_coupled(advance);
+  } catch (const PeerLost& lost) {
+    lose_peer(advance, lost.text);
+  }
+  advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() +
+                                      coupler_.waited_seconds());
+  std::lock_guard lock(lock_);
+  if (wants_more(advance)) return false;
+  finish(advance);
+  return true;
+}
+
+void Session::step_coupled(Advance& advance) {
+  coupler_.apply(*simulation_);
+  const StepReport report = coupler_.has_window() ? run_passes(advance) : attempt_in_slot(advance);
+  account(advance, report);
+  if (is_accepted(report.outcome)) coupler_.finish(*simulation_);
+}
+
+StepReport Session::attempt_in_slot(Advance& advance) {
+  const SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
+  if (slot) return attempt(advance);
+  StepReport report;
+  report.outcome = StepOutcome::interrupted;
+  return report;
+}
+
+// Redoes the step until the interfaces of all window ports agree. On failure the state is as
+// before.
+StepReport Session::run_passes(Advance& advance) {
+  const State base = simulation_->snapshot();
+  const int most = coupler_.maximum_passes();
+  int iterations = 0;
+  StepReport report;
+  coupler_.start_passes();
+  for (int pass = 1; pass <= most; ++pass) {
+    coupler_.apply_window(*simulation_);
+    report = attempt_in_slot(advance);
+    iterations += report.iterations;
+    report.iterations = iterations;
+    if (!is_accepted(report.outcome)) {
+      coupler_.notify_window(false, *simulation_);
+      return report;
+    }
+    bool agreed = false;
+    try {
+      agreed = coupler_.exchange_window(*simulation_, pass, advance.token);
+    } catch (const PeerLost&) {
+      restore_or_fail(base);
+      coupler_.notify_window(false, *simulation_);
+      throw;
+    }
+    if (agreed) {
+      coupler_.notify_window(true, *simulation_);
+      return report;
+    }
+    restore_or_fail(base);
+  }
+  coupler_.notify_window(false, *simulation_);
+  report.outcome = StepOutcome::not_converged;
+  report.steps_done = 0;
+  Error& error = report.error.emplace();
+  error.kind = ErrorKind::not_converged;
+  error.message = "the interface did not converge in " + std::to_string(most) + " passes";
+  error.failure.time = simulation_->time() + simulation_->next_step_size();
+  error.failure.step = simulation_->step_number() + 1;
+  return report;
+}
+
+void Session::restore_or_fail(const State& state) {
+  const auto status = simulation_->restore(state);
+  if (status) return;
+  fail("internal error while redoing a step");
+  throw Refusal(v1::REASON_INTERNAL, "internal error while redoing a step");
+}
+
+void Session::lose_peer(Advance& advance, const std::string& why) {
+  std::lock_guard lock(lock_);
+  advance.ended = true;
+  publish();
+  if (advance.token.cancelled()) {
+    advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
+    return;
+  }
+  advance.reply.set_outcome(v1::STEP_OUTCOME_PEER_LOST);
+  v1::SolverFailure* failure = advance.reply.mutable_failure();
+  failure->set_reason(v1::REASON_PEER_LOST);
+  failure->set_message(utf8(why));
+  failure->set_step(simulation_->step_number() + 1);
+  failure->set_time_s(simulation_->time() + simulation_->next_step_size());
+  remember_failure(failure->message());
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,40 @@
+#include "coupling/input_history.h"
+
+#include <gtest/gtest.h>
+
+namespace mbcosim::server {
+namespace {
+
+double value(const InputHistory& history, double time) { return history.at(time)[0]; }
+
+TEST(InputHistory, FollowsPolynomialsUpToItsDegree) {
+  InputHistory held(v1::INPUT_HOLD_ZERO_ORDER), line(v1::INPUT_HOLD_LINEAR), parabola(v1::INPUT_HOLD_QUADRATIC);
+  for (const double t : {1.0, 2.0, 4.0}) {
+    held.add(t, {5 * t});
+    line.add(t, {3 * t - 1});
+    parabola.add(t, {t * t - 2 * t});
+  }
+  EXPECT_DOUBLE_EQ(value(held, 5), 20);
+  EXPECT_DOUBLE_EQ(value(line, 5), 14);
+  EXPECT_DOUBLE_EQ(value(parabola, 5), 15);
+  EXPECT_DOUBLE_EQ(value(parabola, 4), 8);
+}
+
+TEST(InputHistory, StartsWithFewerPoints) {
+  InputHistory parabola(v1::INPUT_HOLD_QUADRATIC);
+  parabola.add(0, {1});
+  EXPECT_DOUBLE_EQ(value(parabola, 3), 1);
+  parabola.add(1, {2});
+  EXPECT_DOUBLE_EQ(value(parabola, 3), 4);
+}
+
+TEST(InputHistory, ForgetsAFutureThatWasUndone) {
+  InputHistory line(v1::INPUT_HOLD_LINEAR);
+  line.add(1, {1});
+  line.add(2, {2});
+  line.add(1.5, {7});
+  EXPECT_DOUBLE_EQ(value(line, 3), 7);
+}
+
+}  // namespace
+}  // namespace mbcosim::server

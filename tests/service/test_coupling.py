@@ -1,0 +1,229 @@
+"""Peers on ports: the modes, their order, their failures."""
+import time
+
+import numpy as np
+import pytest
+
+import decks
+import mbcosim
+from conftest import wait_for
+
+STIFFNESS, SPEED = 400.0, 1.0  # of a spring that a peer computes; the unit mass starts with this speed along y
+PORT = [mbcosim.structural_port("spring", nodes=[1])]
+
+
+def oscillator(server, step="1.e-3"):
+    return server.load_text(decks.body(final_time="100.", step=step, spin="null"), ports=PORT)
+
+
+def spring(motion):
+    return -STIFFNESS * motion.x
+
+
+def exact(time):
+    omega = np.sqrt(STIFFNESS)
+    return SPEED / omega * np.sin(omega * time)
+
+
+def position(simulation):
+    return simulation["node.structural.1.X"][1]
+
+
+def error_at_end(server, step, **options):
+    with oscillator(server, f"{step}") as simulation, simulation.couple("spring", spring, **options) as peer:
+        result = simulation.run_until(0.2)
+        assert peer.error is None
+        return abs(position(simulation) - exact(result.time))
+
+
+def test_loose_exchanges_once_a_step_and_is_first_order(server):
+    with oscillator(server) as simulation, simulation.couple("spring", spring) as peer:
+        result = simulation.step(200)
+        assert peer.exchanges == 200
+        assert result.reply.peer_wait_seconds > 0
+        assert position(simulation) == pytest.approx(exact(0.2), abs=3e-3)
+    errors = [error_at_end(server, h) for h in (2e-3, 1e-3)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(1, abs=0.15)
+
+
+def test_staggered_gives_what_loose_gives(server):
+    found = []
+    for mode in ("loose", "staggered"):
+        with oscillator(server) as simulation, simulation.couple("spring", spring, mode=mode):
+            for _ in range(50):
+                simulation.step()
+            found.append(simulation["node.structural.1.X"].tobytes())
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("acceleration", ["none", "constant", "aitken", "iqn_ils"])
+def test_window_converges_to_the_implicit_solution(server, acceleration):
+    with oscillator(server, "1.e-2") as simulation, simulation.couple(
+            "spring", spring, mode="window", acceleration=acceleration, tolerance=1e-10) as peer:
+        result = simulation.run_until(0.2)
+        assert result.step == 20
+        assert [step for step, _ in peer.accepted] == list(range(1, 21))
+        assert position(simulation) == pytest.approx(exact(0.2), abs=2e-3)
+        load = simulation["node.structural.1.load"][1]
+        assert load == pytest.approx(-STIFFNESS * position(simulation), rel=1e-8)
+
+
+def test_quasi_newton_converges_where_the_plain_iteration_diverges(server):
+    def stiff(motion):
+        return -1e7 * motion.x
+
+    with oscillator(server, "1.e-2") as simulation, simulation.couple("spring", stiff, mode="window") as peer:
+        with pytest.raises(mbcosim.StepFailed, match="interface did not converge|not finite") as caught:
+            simulation.step()
+        assert caught.value.result.step == 0 and peer.accepted == []
+    with oscillator(server, "1.e-2") as simulation, simulation.couple("spring", stiff, mode="window", acceleration="iqn_ils",
+                                                                      tolerance=1e-8) as peer:
+        assert simulation.step(20).step == 20
+        assert peer.exchanges < 20 * 12
+
+
+@pytest.mark.parametrize("hold, order", [("zero_order", 1), ("linear", 2)])
+def test_multirate_inputs_show_their_order(server, hold, order):
+    omega = 20.0
+
+    def force(motion):  # depends on time alone
+        return [[0, np.cos(omega * motion.target_time), 0]]
+
+    def error(every):
+        with oscillator(server) as simulation, simulation.couple("spring", force, every=every, hold=hold) as peer:
+            result = simulation.step(240)
+            assert peer.exchanges == 240 // every
+            y = result.time + (1 - np.cos(omega * result.time)) / omega**2
+            return abs(position(simulation) - y)
+
+    assert np.log2(error(40) / error(20)) > order - 0.4
+
+
+def test_moments_offsets_and_frames(server):
+    offset = [[0.5, 0.0, 0.0]]
+    port = [mbcosim.structural_port("arm", nodes=[1], offsets=offset)]
+    found = {}
+    for frame in ("global", "node"):
+        with server.load_text(decks.body(spin="0., 0., 1."), ports=port) as simulation:
+            def push(motion):
+                return ([[0, 0, 2.0]], [[0, 0, 0.5]])
+
+            with simulation.couple("arm", push, frame=frame, rotation="quaternion") as peer:
+                simulation.step(10)
+                found[frame] = simulation["node.structural.1.load"]
+                assert peer.error is None
+    assert found["global"][:3] == pytest.approx([0, 0, 2])
+    assert found["global"][3:] == pytest.approx([0, -1.0, 0.5], abs=2e-2)
+    assert found["node"] == pytest.approx(found["global"], abs=1e-3)
+
+
+def test_signals(server):
+    port = [mbcosim.signal_port("control", outputs=["node.structural.1.X", "time"], inputs=["node.structural.1.load"])]
+    with server.load_text(decks.body(spin="null", final_time="10."), ports=port) as simulation:
+        def controller(motion):
+            assert motion.signals.shape == (4,)
+            return [0, -STIFFNESS * motion.signals[1], 0, 0, 0, 0]
+
+        with simulation.couple("control", controller) as peer:
+            simulation.step(200)
+            assert peer.error is None
+        assert position(simulation) == pytest.approx(exact(0.2), abs=3e-3)
+
+
+# ---------------------------------------------------------------- failures
+
+def test_a_peer_that_raises_fails_the_step_and_the_session_goes_on(server):
+    calls = []
+
+    def answer(motion):
+        calls.append(motion.step)
+        if len(calls) == 3:
+            raise ValueError("no aerodynamics today")
+        return spring(motion)
+
+    with oscillator(server) as simulation, simulation.couple("spring", answer):
+        with pytest.raises(mbcosim.StepFailed, match="no aerodynamics today") as caught:
+            simulation.step(10)
+        assert caught.value.reason == "PEER_LOST" and caught.value.result.outcome == "PEER_LOST"
+        assert caught.value.result.step == 2
+        assert simulation.step(10).step == 12
+
+
+@pytest.mark.parametrize("policy, expected", [("hold_last", 1.0), ("zero", 0.0)])
+def test_policies_go_on_without_the_peer(server, policy, expected):
+    with oscillator(server) as simulation:
+        with simulation.couple("spring", lambda motion: [[1.0, 0, 0]], policy=policy):
+            simulation.step()
+        wait_for(lambda: not simulation.describe().ports[0].has_peer)
+        assert simulation.step(5).step == 6
+        assert simulation["node.structural.1.load"][0] == expected
+
+
+def test_a_late_peer_is_given_up_within_its_bound(server):
+    def slow(motion):
+        time.sleep(3)
+        return spring(motion)
+
+    with oscillator(server) as simulation, simulation.couple("spring", slow, timeout=0.3):
+        start = time.monotonic()
+        with pytest.raises(mbcosim.StepFailed, match="in time"):
+            simulation.step()
+        assert 0.25 < time.monotonic() - start < 2
+        assert simulation.refresh().step == 0
+
+
+def test_a_peer_may_attach_again(server):
+    with oscillator(server) as simulation:
+        for attempt in range(3):
+            with simulation.couple("spring", spring):
+                assert simulation.step(5).step == 5 * (attempt + 1)
+            wait_for(lambda: not simulation.describe().ports[0].has_peer)
+
+
+def test_a_second_peer_is_refused(server):
+    with oscillator(server) as simulation, simulation.couple("spring", spring):
+        with pytest.raises(mbcosim.PreconditionFailed) as caught:
+            simulation.couple("spring", spring)
+        assert caught.value.reason == "PORT_TAKEN"
+
+
+def test_every_mismatch_is_told_at_once(server):
+    with oscillator(server) as simulation:
+        simulation.info.model_digest = "0" * 16
+        with pytest.raises(mbcosim.PreconditionFailed) as caught:
+            simulation.couple("spring", spring, frame="reference", mode="tight", relaxation=3)
+        assert caught.value.reason == "PORT_MISMATCH"
+        assert set(caught.value.metadata) == {"model_digest", "frame", "mode", "relaxation"}
+        with pytest.raises(mbcosim.NotFound) as caught:
+            simulation.couple("wing", spring)
+        assert caught.value.reason == "NO_SUCH_PORT"
+
+
+def test_an_answer_of_the_wrong_length_ends_the_stream(server):
+    with oscillator(server) as simulation, simulation.couple("spring", lambda motion: [[1.0, 2.0]], timeout=5) as peer:
+        with pytest.raises(mbcosim.StepFailed):
+            simulation.step()
+        wait_for(lambda: peer.error)
+        assert peer.error.reason == "BAD_ARGUMENT" and "3 numbers" in str(peer.error)
+        assert simulation.refresh().step == 0
+
+
+def test_restore_is_clean_with_a_peer(server):
+    with oscillator(server) as simulation, simulation.couple("spring", spring, mode="staggered"):
+        simulation.step(20)
+        saved = simulation.snapshot()
+        simulation.step(30)
+        first = simulation["node.structural.1.X"].tobytes()
+        saved.restore()
+        simulation.step(30)
+        assert simulation["node.structural.1.X"].tobytes() == first
+
+
+def test_bad_ports_are_refused_at_creation(server):
+    for port, reason in [(mbcosim.structural_port("p", nodes=[77]), "NO_SUCH_VARIABLE"),
+                         (mbcosim.structural_port("p", nodes=[]), "BAD_ARGUMENT"),
+                         (mbcosim.signal_port("p", ["nothing"], []), "NO_SUCH_VARIABLE"),
+                         (mbcosim.signal_port("p", [], ["time"]), "NOT_WRITABLE")]:
+        with pytest.raises(mbcosim.Error) as caught:
+            server.load_text(decks.body(), ports=[port])
+        assert caught.value.reason == reason
