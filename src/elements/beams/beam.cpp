@@ -133,11 +133,6 @@ void Beam<Nodes>::after_predict(const Local<double>& u, State& state) const {
 
 template <int Nodes>
 void Beam<Nodes>::after_convergence(const Local<double>& u, State& state) const {
-  if (u.context->phase == Phase::assembly) {
-    restart(u, state);
-    state.memory[u.memory_offset() + kMemory - 1] = 1;
-    return;
-  }
   for (int a = 0; a < points; ++a) {
     const Section<double> s = section(u, a);
     SectionHistory<double> h(&state.memory[u.memory_offset() + a * kSectionHistory]);
@@ -169,7 +164,8 @@ void Beam<Nodes>::restart(const Local<double>& u, State& state) const {
 template <int Nodes>
 void Beam<Nodes>::start(Start& s) const {
   restart(s.u, s.state);
-  s.memory(kMemory - 1) = s.u.context->phase == Phase::step;  // switched on by its drive
+  // After an initial assembly, or when a drive switches the beam on, there is no prediction to wait for.
+  s.memory(kMemory - 1) = s.u.context->phase == Phase::step || !s.u.model().control.skip_assembly;
 }
 
 template <int Nodes>

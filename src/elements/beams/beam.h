@@ -169,7 +169,7 @@ struct Beam {
   static constexpr int kMemory =
       points * kSectionHistory + 1;  ///< the last one: has the beam been loaded?
 
-  /// Until the first prediction (or the initial assembly) MBDyn keeps the internal forces at zero.
+  /// Without an initial assembly MBDyn keeps the internal forces at zero until the first prediction.
   template <class T>
   bool is_unloaded(const Local<T>& u) const {
     return u.context->phase != Phase::assembly && u.memory(kMemory - 1) == 0;
