@@ -74,6 +74,14 @@ double GeneralJacobian::rate_factor(int column) const {
   return k >= 0 && context_.model->kinds[k] == UnknownKind::algebraic ? 0.0 : 1.0;
 }
 
+void GeneralJacobian::dof(int row, int column, const NodeDof& d, double dr) {
+  if (d.order == 0) return value(row, column, dr);
+  if (d.order != 1) return;
+  if (!d.structural || d.component < 3 || d.component >= 6) return rate(row, column, dr);
+  const int axis = d.component - 3, first = column - axis;
+  for (int k = 0; k < 3; ++k) add(row, first + k, -dr * seeds_[d.node].B(axis, k));
+}
+
 void GeneralElementSet::add(ModelBuilder& builder, ElementInfo info,
                             std::unique_ptr<GeneralElement> element) {
   Slot s{std::move(element), std::move(info), GeneralConnection(builder), {}};

@@ -162,6 +162,9 @@ class GeneralJacobian {
   void rotation(int row, int column, int structural_node, const Mat3& dtheta, const Mat3& dw) {
     add3(row, column, -(dtheta * seeds_[structural_node].A + dw * seeds_[structural_node].B));
   }
+  /// Given ∂r/∂(value of a dof at its order); `column`: its local number. Second derivatives are
+  /// left out.
+  void dof(int row, int column, const NodeDof& d, double dr);
   void add3(int row, int column, const Mat3& m) {
     for (int j = 0; j < 3; ++j)
       for (int i = 0; i < 3; ++i) add(row + i, column + j, m(i, j));

@@ -191,7 +191,8 @@ StepReport Simulation::run_until(double end, const CancelToken* cancel) {
   total.time = time();
   total.step_size = impl_->state.h;
   if (finished()) total.outcome = StepOutcome::finished;
-  while (!finished() && time() + 0.5 * impl_->state.h < end) {
+  const bool to_the_end = end >= impl_->model->initial_value.final_time;
+  while (!finished() && (to_the_end || time() + 0.5 * impl_->state.h < end)) {
     StepReport one = impl_->step(cancel);
     one.steps_done += total.steps_done;
     one.total_iterations += total.total_iterations;

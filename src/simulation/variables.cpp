@@ -35,6 +35,11 @@ Variables::Variables(const Model& model) {
   for (std::size_t k = 0; k < model.drives.size(); ++k)
     add({"drive." + std::to_string(model.drives[k].label), 1, {}, "", "", Causality::output, "value of the drive caller", ""},
         {Source::drive, static_cast<int>(k), 0});
+  for (std::size_t k = 0; k < model.stream_inputs.size(); ++k) {
+    const StreamInput& stream = model.stream_inputs[k];
+    add({"stream." + stream.name, stream.channels, {stream.channels}, "", "", Causality::input, "values of the stream", ""},
+        {Source::stream, static_cast<int>(k), 0});
+  }
 }
 
 void Variables::add(Variable v, Entry e) {
@@ -138,6 +143,12 @@ void Variables::get(const EvalContext& context, int handle, std::vector<double>&
       const ElementRef& element = model.elements[e.index];
       return out.push_back(element.set->private_value(context, element.index, e.datum));
     }
+    case Source::stream: {
+      const StreamInput& stream = model.stream_inputs[e.index];
+      const double* values = &state.memory[stream.memory];
+      out.insert(out.end(), values, values + stream.channels);
+      return;
+    }
     case Source::drive: return out.push_back(model.drives[e.index].drive->value(context));
   }
 }
@@ -160,6 +171,10 @@ Status Variables::set(const Model& model, State& state, int handle, std::span<co
   }
   if (e.source == Source::parameter) {
     state.memory[model.scalars[e.index].memory] = values[0];
+    return ok();
+  }
+  if (e.source == Source::stream) {
+    std::copy(values.begin(), values.end(), state.memory.begin() + model.stream_inputs[e.index].memory);
     return ok();
   }
   if (state.external_loads.empty()) state.external_loads.assign(6 * model.structural.size(), 0.0);

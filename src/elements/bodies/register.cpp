@@ -1,4 +1,5 @@
 #include "elements/bodies/body.h"
+#include "elements/bodies/readers.h"
 #include "elements/registry.h"
 #include "model/card.h"
 
@@ -75,6 +76,7 @@ void read_gravity(Card& card, ElementInfo& info) {
 void register_bodies(Registry& registry) {
   registry.element("body", Family::body, read_body);
   registry.element("gravity", Family::gravity, read_gravity, false);
+  register_inertia_cards(registry);
 }
 
 }  // namespace mbcosim

@@ -1,7 +1,13 @@
 #include "elements/registry.h"
 
+#include "elements/genels/readers.h"
+
 namespace mbcosim {
 
-void register_genels(Registry&) {}
+void register_genels(Registry& registry) {
+  register_scalar_genels(registry);
+  register_state_spaces(registry);
+  register_electric_elements(registry);
+}
 
 }  // namespace mbcosim

@@ -1,1 +1,2 @@
-set(SOURCES register.cpp)
+set(SOURCES electric.cpp read_electric.cpp read_scalar_genels.cpp read_state_space.cpp register.cpp scalar_genels.cpp
+    state_space.cpp)

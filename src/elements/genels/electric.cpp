@@ -1,0 +1,26 @@
+#include "elements/genels/electric.h"
+
+namespace mbcosim {
+
+void Accelerometer::start(Start& s) const {
+  const Vec3 e = s.u.R(0) * e0;
+  s.own(0) = rotational ? e.dot(s.u.w(0)) : e.dot(s.u.v(0) + s.u.w(0).cross(s.u.R(0) * f));
+}
+
+double Motor::private_value(const Local<double>& u, int datum) const {
+  if (datum == 0) return torque(u);
+  return datum == 1 ? (u.R(0) * Rh.col(2)).dot(u.w(1) - u.w(0)) : u.own(0);
+}
+
+void Motor::output(const Local<double>& u, OutputRow& row) const {
+  row.begin(OutputFile::ele, u.label());
+  row.scalar("M", "N m", private_value(u, 0));
+  row.scalar("Omega", "rad/s", private_value(u, 1));
+  row.scalar("i", "A", u.own(0));
+  row.scalar("iP", "A/s", u.own_rate(0));
+  row.scalar("V1", "V", u.scalar(0));
+  row.scalar("V2", "V", u.scalar(1));
+  row.end();
+}
+
+}  // namespace mbcosim

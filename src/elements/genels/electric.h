@@ -1,0 +1,113 @@
+/// Sensors and motors that tie structural nodes to abstract and electric ones. MBDyn input manual,
+/// "Electric elements".
+#pragma once
+
+#include "elements/element.h"
+#include "model/drive.h"
+
+namespace mbcosim {
+
+/// Ideal accelerometer: the abstract node's value y follows the acceleration of a point along a
+/// direction of its node, or the angular acceleration about it. With the own differential unknown
+/// q:
+///
+///   translational  q = e · (v + w × R f),   row of y   q̇ − (w × e) · (v + w × R f) − y,   e = R e₀
+///   [m/s²] rotational     q = e · w,               row of y   q̇ − y [rad/s²]
+struct Accelerometer {
+  int node = -1, output_node = -1;
+  Vec3 e0 = Vec3::UnitX();  ///< unit direction, node frame
+  Vec3 f = Vec3::Zero();    ///< point, node frame [m]
+  bool rotational = false;
+
+  static constexpr int width = 12;
+
+  void connect(Connector& c) {
+    c.node(node);
+    c.scalar(output_node);
+    c.differential(1);
+  }
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    const Vec<T> e = u.R(0) * e0;
+    const Vec<T> v = u.v(0) + u.w(0).cross(u.R(0) * f);
+    T y = u.own_rate(0);
+    if (!rotational) y -= u.w(0).cross(e).dot(v);
+    r.scalar(0, y - u.scalar(0));
+    r.own(0, (rotational ? e.dot(u.w(0)) : e.dot(v)) - u.own(0));
+  }
+  void start(Start& s) const;
+};
+
+/// The abstract node's value follows the distance of two points: row |x₂ + R₂ f₂ − x₁ − R₁ f₁| − y
+/// [m].
+struct DisplacementSensor {
+  int first = -1, second = -1, output_node = -1;
+  Vec3 f1 = Vec3::Zero(), f2 = Vec3::Zero();  ///< node frames [m]
+  int k1 = 0, k2 = 0;                         ///< local nodes
+
+  static constexpr int width = 18;
+
+  void connect(Connector& c) {
+    k1 = c.node(first);
+    k2 = c.node(second);
+    c.scalar(output_node);
+  }
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    using std::sqrt;
+    const Vec<T> d = u.x(k2) + u.R(k2) * f2 - u.x(k1) - u.R(k1) * f1;
+    r.scalar(0, sqrt(d.dot(d)) - u.scalar(0));
+  }
+};
+
+/// Direct current motor between two structural nodes; axis e = R₁ R_h e₃, Ω = e · (w₂ − w₁), own
+/// unknown: the current i.
+///
+///   own row          −L i̇ − R(t) i − G Ω + V₂ − V₁        [V]
+///   torque           M = M₀(t) + (G + M₁(t)) i             −M e on node 1, +M e on node 2 [N·m]
+///   electric nodes   −i, +i                                [A]
+struct Motor {
+  int first = -1, second = -1, pole1 = -1, pole2 = -1;
+  Mat3 Rh = Mat3::Identity();  ///< relative to `first`
+  double G = 0;                ///< torque gain [N·m/A]
+  double L = 0;                ///< inductance [H]
+  DrivePtr R;                  ///< resistance [Ω]
+  DrivePtr M0, M1;             ///< no-load torque [N·m], correction of the gain [N·m/A]
+  double initial_current = 0;  ///< [A]
+
+  static constexpr int width = 18;
+
+  void connect(Connector& c) {
+    c.distinct_node(first);
+    c.distinct_node(second);
+    c.scalar(pole1);
+    c.scalar(pole2);
+    c.differential(1);
+  }
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    const Vec<T> e = u.R(0) * Vec3(Rh.col(2));
+    const T i = u.own(0), omega = e.dot(u.w(1) - u.w(0));
+    const Vec<T> m = e * torque(u);
+    r.moment(0, -m);
+    r.moment(1, m);
+    r.scalar(0, -i);
+    r.scalar(1, i);
+    r.own(0, u.scalar(1) - u.scalar(0) - omega * G - u.own_rate(0) * L - u.drive(R) * i);
+  }
+  void start(Start& s) const { s.own(0) = initial_current; }
+  void output(const Local<double>& u, OutputRow& row) const;
+  static int private_datum(std::string_view name) {
+    return name == "M" ? 0 : name == "omega" ? 1 : name == "i" ? 2 : -1;
+  }
+  static std::vector<std::string> private_data() { return {"M", "omega", "i"}; }
+  double private_value(const Local<double>& u, int datum) const;
+
+ private:
+  template <class T>
+  T torque(const Local<T>& u) const {
+    return u.drive(M0) + (u.drive(M1) + G) * u.own(0);
+  }
+};
+
+}  // namespace mbcosim

@@ -1,0 +1,171 @@
+#include "elements/genels/state_space.h"
+
+#include <cmath>
+#include <limits>
+
+namespace mbcosim {
+
+namespace {
+
+/// Power of 2 that brings a column of norm c and a row of norm r together.
+double balancing_factor(double c, double r, double c_max, double r_max) {
+  constexpr double kLarge = 1 / std::numeric_limits<double>::min() / 2;
+  double f = 1;
+  while (c < r / 2 && std::max({f, c, c_max}) < kLarge) {
+    f *= 2, c *= 2, c_max *= 2;
+    r /= 2, r_max /= 2;
+  }
+  while (c / 2 >= r && std::max(r, r_max) < kLarge) {
+    f /= 2, c /= 2, c_max /= 2;
+    r *= 2, r_max *= 2;
+  }
+  return f;
+}
+
+}  // namespace
+
+void balance(LinearSystem& s) {
+  if (s.E.size() != 0) return;
+  const int n = s.order();
+  constexpr double kWorthwhile = 0.95;
+  constexpr int kMostSweeps = 100;
+  bool changed = true;
+  for (int sweep = 0; changed && sweep < kMostSweeps; ++sweep) {
+    changed = false;
+    for (int i = 0; i < n; ++i) {
+      const double c = s.A.col(i).norm(), r = s.A.row(i).norm();
+      if (c == 0 || r == 0) continue;
+      const double f = balancing_factor(c, r, s.A.col(i).cwiseAbs().maxCoeff(),
+                                        s.A.row(i).cwiseAbs().maxCoeff());
+      if (c * f + r / f >= kWorthwhile * (c + r)) continue;
+      changed = true;
+      s.A.row(i) /= f;
+      s.A.col(i) *= f;
+      s.B.row(i) /= f;
+      s.C.col(i) *= f;
+    }
+  }
+}
+
+LinearSystem companion_system(CanonicalForm form, const std::vector<double>& denominator,
+                              const std::vector<double>& numerator) {
+  const int n = static_cast<int>(denominator.size()), m = static_cast<int>(numerator.size()) - 1;
+  VecX d = VecX::Map(denominator.data(), n), rest = VecX::Zero(n);
+  double direct = 0;
+  if (m == n) {
+    direct = numerator[0];
+    for (int k = 0; k < n; ++k) rest(k) = numerator[k + 1] - direct * d(k);
+  } else {
+    for (int k = 0; k <= m; ++k) rest(n - 1 - m + k) = numerator[k];
+  }
+  LinearSystem s;
+  s.A = MatX::Zero(n, n);
+  s.B = MatX::Zero(n, 1);
+  s.C = MatX::Zero(1, n);
+  if (form == CanonicalForm::controllable) {
+    s.A.row(0) = -d.transpose();
+    for (int k = 1; k < n; ++k) s.A(k, k - 1) = 1;
+    s.B(0, 0) = 1;
+    s.C = rest.transpose();
+  } else {
+    s.A.col(0) = -d;
+    for (int k = 1; k < n; ++k) s.A(k - 1, k) = 1;
+    s.B = rest;
+    s.C(0, 0) = 1;
+  }
+  if (direct != 0) s.D = MatX::Constant(1, 1, direct);
+  return s;
+}
+
+void StateSpace::connect(GeneralConnection& c) {
+  for (const NodeDof& dof : outputs_) output_.push_back(c.dof(dof));
+  for (const ScalarValue& value : inputs_) input_.push_back(value.drive ? -1 : c.dof(value.dof));
+  first_state_ = c.differential(system_.order());
+}
+
+double StateSpace::input(const GeneralView& u, int k) const {
+  return inputs_[k].drive ? u.drive(inputs_[k].drive) : u.dof(inputs_[k].dof);
+}
+
+void StateSpace::residual(const GeneralView& u, GeneralResidual& r) const {
+  const int n = system_.order();
+  for (int i = 0; i < n; ++i) {
+    double sum = 0;
+    for (int j = 0; j < n; ++j) {
+      sum += system_.A(i, j) * u.value(first_state_ + j);
+      if (system_.E.size() != 0) sum -= system_.E(i, j) * u.rate(first_state_ + j);
+    }
+    if (system_.E.size() == 0) sum -= u.rate(first_state_ + i);
+    r.add(first_state_ + i, sum);
+  }
+  for (int i = 0; i < system_.outputs(); ++i) {
+    double sum = -u.dof(outputs_[i]);
+    for (int j = 0; j < n; ++j) sum += system_.C(i, j) * u.value(first_state_ + j);
+    r.add(output_[i], sum);
+  }
+  for (int k = 0; k < system_.inputs(); ++k) {
+    const double value = input(u, k);
+    for (int i = 0; i < n; ++i) r.add(first_state_ + i, system_.B(i, k) * value);
+    for (int i = 0; system_.D.size() != 0 && i < system_.outputs(); ++i)
+      r.add(output_[i], system_.D(i, k) * value);
+  }
+}
+
+void StateSpace::jacobian(const GeneralView&, GeneralJacobian& jacobian) const {
+  const int n = system_.order();
+  for (int j = 0; j < n; ++j) {
+    const int column = first_state_ + j;
+    for (int i = 0; i < n; ++i) {
+      jacobian.value(first_state_ + i, column, system_.A(i, j));
+      if (system_.E.size() != 0) jacobian.rate(first_state_ + i, column, -system_.E(i, j));
+    }
+    if (system_.E.size() == 0) jacobian.rate(column, column, -1.0);
+    for (int i = 0; i < system_.outputs(); ++i) jacobian.value(output_[i], column, system_.C(i, j));
+  }
+  for (int i = 0; i < system_.outputs(); ++i)
+    jacobian.dof(output_[i], output_[i], outputs_[i], -1.0);
+  for (int k = 0; k < system_.inputs(); ++k) {
+    if (inputs_[k].drive) continue;
+    for (int i = 0; i < n; ++i)
+      jacobian.dof(first_state_ + i, input_[k], inputs_[k].dof, system_.B(i, k));
+    for (int i = 0; system_.D.size() != 0 && i < system_.outputs(); ++i)
+      jacobian.dof(output_[i], input_[k], inputs_[k].dof, system_.D(i, k));
+  }
+}
+
+void StateSpace::start(const GeneralView& u, State& state) const {
+  for (int i = 0; i < system_.order(); ++i) {
+    const int k = u.unknown(first_state_ + i);
+    if (x0_.size() != 0) state.y[k] = x0_(i);
+    if (xp0_.size() != 0) state.yp[k] = xp0_(i);
+  }
+}
+
+void StateSpace::output(const GeneralView& u, OutputRow& row) const {
+  row.begin(OutputFile::gen, u.label());
+  for (int i = 0; i < system_.order(); ++i) row.scalar("x", "", u.value(first_state_ + i));
+  for (int i = 0; i < system_.order(); ++i) row.scalar("xP", "", u.rate(first_state_ + i));
+  row.end();
+}
+
+int StateSpace::private_datum(std::string_view name) const {
+  const std::vector<std::string> names = private_data();
+  for (std::size_t k = 0; k < names.size(); ++k)
+    if (names[k] == name) return static_cast<int>(k);
+  return -1;
+}
+
+std::vector<std::string> StateSpace::private_data() const {
+  std::vector<std::string> names;
+  for (const char* word : {"x", "xP"})
+    for (int i = 1; i <= system_.order(); ++i)
+      names.push_back(std::string(word) + "[" + std::to_string(i) + "]");
+  return names;
+}
+
+double StateSpace::private_value(const GeneralView& u, int datum) const {
+  const int n = system_.order();
+  return datum < n ? u.value(first_state_ + datum) : u.rate(first_state_ + datum - n);
+}
+
+}  // namespace mbcosim
