@@ -101,6 +101,7 @@ class Session {
   class SteppingClaim;
 
   bool replay(const v1::StepRequest& request, v1::StepReply* reply) const;
+  void remember(const v1::StepReply& reply);
   void check(const v1::StepRequest& request) const;
   void check_handle(int handle) const;
   void check_inputs(const v1::Values& inputs) const;

@@ -83,7 +83,9 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
   }
   while (!deliver_samples(advance)) {
   }
+  if (!advance.started) return;  // a repeated request: the stored reply, as it was
   reply->set_total_seconds(seconds_since(start));
+  remember(*reply);
   shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
                                 reply->solver_seconds());
   if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
@@ -92,6 +94,13 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
 bool Session::wants_more(const Advance& advance) const {
   return !advance.ended && advance.steps_left > 0 && !simulation_->finished() &&
          simulation_->time() + 0.5 * simulation_->next_step_size() <= advance.until;
+}
+
+// For a client that did not get the reply and asks again.
+void Session::remember(const v1::StepReply& reply) {
+  if (reply.request_id().empty()) return;
+  std::lock_guard lock(lock_);
+  last_reply_ = reply;
 }
 
 // Does once what comes before the first step. True: nothing is to be done, the reply is complete.
@@ -181,7 +190,6 @@ void Session::finish(Advance& advance) {
   reply.set_step(simulation_->step_number());
   reply.set_time_s(simulation_->time());
   read_values(advance.request.outputs(), reply.mutable_outputs());
-  if (!advance.request.request_id().empty()) last_reply_ = reply;
 }
 
 // ------------------------------------------------------------------ with ports
