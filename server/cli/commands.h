@@ -23,5 +23,7 @@ struct RunOptions {
 int run(const RunOptions& options);
 int validate(const std::string& deck, bool json);
 int describe(const std::string& deck, bool json);
+/// The words of the input language, served or refused by name.
+int keywords(bool json);
 
 }  // namespace mbcosim::cli

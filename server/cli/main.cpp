@@ -46,6 +46,11 @@ int main(int argc, char** argv) {
   describe_app->add_flag("--json", json, "Print the description as JSON");
   describe_app->callback([&] { exit_code = describe(deck, json); });
 
+  CLI::App* keywords_app = app.add_subcommand(
+      "keywords", "List the words of the input language; refused ones are marked");
+  keywords_app->add_flag("--json", json, "Print the list as JSON");
+  keywords_app->callback([&] { exit_code = keywords(json); });
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

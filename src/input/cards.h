@@ -17,6 +17,10 @@ void read_node_card(DeckCard& card);
 void read_driver_card(DeckCard& card);
 void read_element_card(DeckCard& card);
 
+/// The words that `read_initial_value_card` and `read_control_card` accept.
+std::vector<std::string> initial_value_words();
+std::vector<std::string> control_words();
+
 /// Kinds of nodes as cards name them.
 void read_structural_node(DeckCard& card, int label, StructuralNode node);
 void read_scalar_node(DeckCard& card, ScalarKind kind, ScalarNode node);

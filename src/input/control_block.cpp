@@ -330,6 +330,16 @@ bool read_count(DeckCard& card) {
 
 }  // namespace
 
+std::vector<std::string> control_words() {
+  std::vector<std::string> words;
+  for (const auto& c : control_cards()) words.emplace_back(c.first);
+  for (int k = 0; k < kKinds; ++k) {
+    const std::string count = kind_names(static_cast<Kind>(k)).card;
+    if (!count.empty()) words.push_back(count);
+  }
+  return words;
+}
+
 void read_control_card(DeckCard& card) {
   if (read_count(card)) {
     card.expect_end();
@@ -342,10 +352,7 @@ void read_control_card(DeckCard& card) {
   }();
   const auto found = kReaders.find(card.statement().word);
   if (found == kReaders.end()) {
-    std::vector<std::string> words;
-    for (const auto& c : control_cards()) words.emplace_back(c.first);
-    for (int k = 0; k < kKinds; ++k) words.emplace_back(kind_names(static_cast<Kind>(k)).card);
-    fail_unknown_card(card, words);
+    fail_unknown_card(card, control_words());
   }
   found->second(card);
   card.expect_end();

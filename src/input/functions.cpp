@@ -128,6 +128,12 @@ const Function* find_function(std::string_view name) {
   return it == table.end() ? nullptr : it->second;
 }
 
+std::vector<std::string> expression_function_names() {
+  std::vector<std::string> names;
+  for (const Function& f : kFunctions) names.emplace_back(f.name);
+  return names;
+}
+
 std::string nearest_function(std::string_view name) {
   Nearest nearest(name);
   for (const Function& f : kFunctions) nearest.consider(f.name);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "input/value.h"
 
@@ -70,6 +71,7 @@ struct Function {
 
 const Function* find_function(std::string_view name);
 std::string nearest_function(std::string_view name);
+std::vector<std::string> expression_function_names();
 
 /// Formats one value by a C format with exactly one conversion of its type; throws EvaluationError
 /// with the reason.

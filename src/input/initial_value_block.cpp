@@ -636,6 +636,12 @@ void read_data_card(DeckCard& card) {
   card.expect_end();
 }
 
+std::vector<std::string> initial_value_words() {
+  std::vector<std::string> words;
+  for (const auto& c : initial_value_cards()) words.emplace_back(c.first);
+  return words;
+}
+
 void read_initial_value_card(DeckCard& card) {
   static const std::map<std::string, Reader, std::less<>> kReaders = [] {
     std::map<std::string, Reader, std::less<>> m;
@@ -644,9 +650,7 @@ void read_initial_value_card(DeckCard& card) {
   }();
   const auto found = kReaders.find(card.statement().word);
   if (found == kReaders.end()) {
-    std::vector<std::string> words;
-    for (const auto& c : initial_value_cards()) words.push_back(c.first);
-    fail_unknown_card(card, words);
+    fail_unknown_card(card, initial_value_words());
   }
   found->second(card);
   card.expect_end();

@@ -33,4 +33,5 @@ set(SOURCES
   suggest.cpp
   symbols.cpp
   value.cpp
+  vocabulary.cpp
 )

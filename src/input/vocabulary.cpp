@@ -1,0 +1,144 @@
+#include "input/vocabulary.h"
+
+#include <algorithm>
+
+#include "input/cards.h"
+#include "input/functions.h"
+#include "input/symbols.h"
+
+namespace mbcosim {
+
+namespace {
+
+/// Served words by their normalized form.
+using Words = std::map<std::string, VocabularyWord>;
+
+class Collector {
+ public:
+  explicit Collector(const Registry& registry) : registry_(registry) {}
+
+  template <class Table>
+  Words of(const Table& table) const {
+    Words words;
+    for (const auto& entry : table) words[entry.first].word = shown(entry.first);
+    return words;
+  }
+
+  Words laws() const {
+    Words words;
+    add_laws(words, registry_.laws1, 1);
+    add_laws(words, registry_.laws3, 3);
+    add_laws(words, registry_.laws6, 6);
+    return words;
+  }
+
+  /// Appends a group of `words` and of those that `context` refuses.
+  void group(std::string name, std::string title, Words words, const std::string& context = "") {
+    const auto refused = registry_.not_supported.find(context);
+    if (refused != registry_.not_supported.end())
+      for (const auto& entry : refused->second)
+        if (!words.count(entry.first)) words[entry.first] = {shown(entry.first), false, {}};
+    VocabularyGroup g{std::move(name), std::move(title), {}};
+    for (const auto& entry : words) g.words.push_back(entry.second);
+    std::sort(g.words.begin(), g.words.end(),
+              [](const auto& a, const auto& b) { return a.word < b.word; });
+    groups.push_back(std::move(g));
+  }
+
+  void plain(std::string name, std::string title, const std::vector<std::string>& list) {
+    Words words;
+    for (const std::string& word : list) words[word].word = word;
+    group(std::move(name), std::move(title), std::move(words));
+  }
+
+  std::vector<VocabularyGroup> groups;
+
+ private:
+  std::string shown(const std::string& word) const {
+    const auto found = registry_.display.find(word);
+    return found == registry_.display.end() ? word : found->second;
+  }
+  template <class Table>
+  void add_laws(Words& words, const Table& table, int size) const {
+    for (const auto& entry : table) {
+      words[entry.first].word = shown(entry.first);
+      words[entry.first].sizes.push_back(size);
+    }
+  }
+
+  const Registry& registry_;
+};
+
+std::vector<std::string> constant_names() {
+  const SymbolTable predefined;
+  std::vector<std::string> names;
+  for (const Symbol* symbol : predefined.sorted()) names.push_back(symbol->name);
+  return names;
+}
+
+void add_blocks(Collector& c) {
+  c.plain("block", "Blocks",
+          {"data", "initial value", "control data", "nodes", "drivers", "elements"});
+  c.plain("statement", "Statements that may stand anywhere",
+          {"begin",
+           "end",
+           "set",
+           "setenv",
+           "include",
+           "remark",
+           "print symbol table",
+           "exit",
+           "license",
+           "warranty",
+           "for",
+           "end for",
+           "if",
+           "else if",
+           "else",
+           "end if",
+           "reference",
+           "drive caller",
+           "template drive caller",
+           "constitutive law",
+           "scalar function",
+           "hydraulic fluid"});
+  c.plain("initial value card", "Cards of `initial value`", initial_value_words());
+  c.plain("control card", "Cards of `control data`", control_words());
+  c.plain("node", "Nodes",
+          {"structural", "abstract", "electric", "hydraulic", "thermal", "parameter"});
+}
+
+void add_elements(Collector& c, const Registry& registry) {
+  Words heads = c.of(registry.heads);
+  for (const char* word : {"bind", "driven", "output"}) heads[word].word = word;
+  c.group("element", "Elements and statements of the block `elements`", std::move(heads),
+          "elements");
+  const std::pair<const char*, const char*> families[] = {{"joint", "Joints"},
+                                                          {"force", "Forces"},
+                                                          {"couple", "Couples"},
+                                                          {"genel", "Genels"},
+                                                          {"electric", "Electric elements"},
+                                                          {"hydraulic", "Hydraulic elements"}};
+  for (const auto& [head, title] : families) {
+    const auto found = registry.heads.find(head);
+    c.group(head, title, found == registry.heads.end() ? Words{} : c.of(found->second.types), head);
+  }
+}
+
+}  // namespace
+
+std::vector<VocabularyGroup> vocabulary(const Registry& registry) {
+  Collector c(registry);
+  add_blocks(c);
+  add_elements(c, registry);
+  c.group("drive", "Drives", c.of(registry.drives), "drive");
+  c.group("law", "Constitutive laws", c.laws(), "law");
+  c.group("function", "Scalar functions", c.of(registry.functions), "function");
+  c.group("fluid", "Hydraulic fluids", c.of(registry.fluids), "fluid");
+  c.group("file driver", "File drivers", c.of(registry.file_drivers), "file driver");
+  c.plain("expression function", "Functions of expressions", expression_function_names());
+  c.plain("constant", "Constants of expressions", constant_names());
+  return std::move(c.groups);
+}
+
+}  // namespace mbcosim

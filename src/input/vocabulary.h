@@ -1,0 +1,27 @@
+/// The words of the language by place: what the feature table of the README and the editor grammar
+/// are checked against.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "model/registry.h"
+
+namespace mbcosim {
+
+struct VocabularyWord {
+  std::string word;        ///< as written in documentation, "revolute hinge"
+  bool served = true;      ///< false: known and refused by name
+  std::vector<int> sizes;  ///< of constitutive laws: 1, 3, 6
+};
+
+/// Words that may stand in one place, sorted.
+struct VocabularyGroup {
+  std::string name;   ///< "joint", "drive", "initial value card"
+  std::string title;  ///< "Joints"
+  std::vector<VocabularyWord> words;
+};
+
+std::vector<VocabularyGroup> vocabulary(const Registry& registry);
+
+}  // namespace mbcosim

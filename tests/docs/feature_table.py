@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+"""Holds the feature tables of README.md against what the program serves.
+
+usage: feature_table.py MBCOSIM README.md [--write]
+
+MBCOSIM is the executable; its `keywords --json` is the truth. --write brings the tables up to date: new words are added, words
+that are gone are dropped, notes and the status `partly` stay as they are.
+"""
+import argparse
+import json
+import re
+import subprocess
+import sys
+
+BEGIN, END = "<!-- feature tables -->", "<!-- end of the feature tables -->"
+SERVED, REFUSED = {"yes", "partly", "ignored"}, {"not yet", "no"}
+# Expressions have their own short lists in the text; their words are not features one by one.
+PLAIN = {"expression function", "constant"}
+# Cards of the language proper: a word of these groups is known to the reader even where it is refused.
+ANY_STATUS = {"block", "statement", "initial value card", "control card", "node"}
+
+
+def vocabulary(executable):
+    """Groups that have a table."""
+    text = subprocess.run([executable, "keywords", "--json"], check=True, stdout=subprocess.PIPE).stdout
+    return [group for group in json.loads(text) if group["name"] not in PLAIN]
+
+
+def parse(text):
+    """(status, note) by word, by title of the table."""
+    tables, rows = {}, None
+    for line in text.splitlines():
+        if line.startswith("### "):
+            rows = tables.setdefault(line[4:], {})
+        elif line.startswith("|") and rows is not None and not re.match(r"\|\s*(-+|Word)\s*\|", line):
+            cells = [cell.strip() for cell in line.strip("|").split("|")]
+            rows[cells[0].strip("`")] = (cells[1], cells[2] if len(cells) > 2 else "")
+    return tables
+
+
+def allowed(group, word):
+    """Statuses that a row may have."""
+    if group["name"] in ANY_STATUS:
+        return SERVED | REFUSED
+    return SERVED if word["served"] else REFUSED
+
+
+def complaints(groups, tables):
+    """What is wrong with the tables, a sentence each."""
+    found = []
+    for group in groups:
+        rows = tables.get(group["title"], {})
+        words = {word["word"]: word for word in group["words"]}
+        found += [f"{group['title']}: no row for `{word}`" for word in words if word not in rows]
+        found += [f"{group['title']}: `{word}` is no word of the language" for word in rows if word not in words]
+        for word, (status, _) in rows.items():
+            if word in words and status not in allowed(group, words[word]):
+                found.append(f"{group['title']}: `{word}` is marked `{status}`; "
+                             f"the program says: {'served' if words[word]['served'] else 'refused by name'}")
+    titles = {group["title"] for group in groups}
+    return found + [f"a table of unknown title: {title}" for title in tables if title not in titles]
+
+
+def written(groups, tables):
+    """The tables as they should be."""
+    lines = []
+    for group in groups:
+        lines += [f"### {group['title']}", "", "| Word | Served | Notes |", "|---|---|---|"]
+        for word in group["words"]:
+            status, note = tables.get(group["title"], {}).get(word["word"], ("", ""))
+            if status not in allowed(group, word):
+                status = "yes" if word["served"] else "not yet"
+            if not note and "sizes" in word and word["sizes"] != [1, 3, 6]:
+                note = "for " + " and ".join(f"{n} component{'s' * (n > 1)}" for n in word["sizes"])
+            lines.append(f"| `{word['word']}` | {status} | {note} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("executable")
+    parser.add_argument("readme")
+    parser.add_argument("--write", action="store_true")
+    options = parser.parse_args()
+
+    with open(options.readme, encoding="utf-8") as file:
+        text = file.read()
+    before, begin, rest = text.partition(BEGIN)
+    inside, end, after = rest.partition(END)
+    if not begin or not end:
+        sys.exit(f"{options.readme}: the markers of the tables are missing")
+    groups, tables = vocabulary(options.executable), parse(inside)
+    if options.write:
+        with open(options.readme, "w", encoding="utf-8") as file:
+            file.write(f"{before}{begin}\n\n{written(groups, tables)}\n{end}{after}")
+        return
+    found = complaints(groups, tables)
+    for sentence in found:
+        print(sentence)
+    if found:
+        sys.exit("update the tables: tests/docs/feature_table.py build/bin/mbcosim README.md --write")
+    print(f"{sum(len(rows) for rows in tables.values())} words, all in the tables")
+
+
+if __name__ == "__main__":
+    main()
