@@ -1,0 +1,35 @@
+"""What the example scripts share: finding the package, the command line, figures."""
+import argparse
+import os
+import sys
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+BUILT = os.path.join(HERE, "..", "..", "build", "python")
+if os.path.isdir(BUILT):
+    sys.path.insert(0, BUILT)
+
+
+def model(name):
+    """Path of an example deck."""
+    return os.path.join(HERE, "..", "models", name)
+
+
+def options(description, plot):
+    """--address of the server, --plot file."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--address", help="of the server; default: the one of this user")
+    parser.add_argument("--plot", default=plot, help="picture to write; default: %(default)s")
+    return parser.parse_args()
+
+
+def figure(rows=1, **arguments):
+    """Figure and axes, without a display."""
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    return plt.subplots(rows, 1, squeeze=False, layout="constrained", **arguments)
+
+
+def save(picture, path):
+    picture.savefig(path, dpi=120)
+    print(f"plot: {os.path.abspath(path)}")

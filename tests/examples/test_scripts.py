@@ -1,0 +1,46 @@
+"""The example scripts against a daemon: they end well, print what they should, and leave a picture."""
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+BIN = os.environ["MBCOSIM_BIN"]
+SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "client_examples", "python")
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    address = f"unix:{tmp_path_factory.mktemp('run')}/s"
+    daemon = subprocess.Popen([os.path.join(BIN, "mbcosimd"), "--listen", address, "--log-level", "warn"])
+    yield address
+    daemon.terminate()
+    assert daemon.wait(20) == 0
+
+
+def run(script, address, tmp_path):
+    """The numbers that a script prints on its last line, before its last word."""
+    plot = tmp_path / "plot.png"
+    done = subprocess.run([sys.executable, os.path.join(SCRIPTS, script), "--address", address, "--plot", str(plot)],
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=200)
+    assert done.returncode == 0, done.stderr
+    assert plot.read_bytes().startswith(b"\x89PNG") and plot.stat().st_size > 10000
+    return [[float(x) for x in re.findall(r"(?<![\w.])-?\d+\.\d+(?:e[-+]?\d+)?", line)]
+            for line in done.stdout.splitlines() if not line.startswith("plot")]
+
+
+def test_pendulum(address, tmp_path):
+    (free, pushed), = run("pendulum_stepping.py", address, tmp_path)
+    assert free == pytest.approx(0, abs=2e-3)  # where it started
+    assert 0.05 < pushed < 0.1
+
+
+def test_shunt_damping(address, tmp_path):
+    opened, shunted = run("shunt_damping.py", address, tmp_path)
+    assert shunted[-1] < 0.05 * opened[-1]
+
+
+def test_servo_reaches_its_command(address, tmp_path):
+    (stroke, error), = run("servo_beam.py", address, tmp_path)
+    assert stroke == pytest.approx(100, abs=0.5) and error < 20
