@@ -39,7 +39,8 @@ TEST(FixedPoint, OneUnknownIsSolvedBySecants) {
 }
 
 TEST(FixedPoint, AZeroStartStaysZero) {
-  for (const auto kind : {v1::ACCELERATION_NONE, v1::ACCELERATION_CONSTANT, v1::ACCELERATION_AITKEN, v1::ACCELERATION_IQN_ILS}) {
+  for (const auto kind : {v1::ACCELERATION_NONE, v1::ACCELERATION_CONSTANT, v1::ACCELERATION_AITKEN,
+                          v1::ACCELERATION_IQN_ILS}) {
     FixedPoint fixed_point(kind, 0.5);
     fixed_point.start();
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(4);

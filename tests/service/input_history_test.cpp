@@ -8,7 +8,8 @@ namespace {
 double value(const InputHistory& history, double time) { return history.at(time)[0]; }
 
 TEST(InputHistory, FollowsPolynomialsUpToItsDegree) {
-  InputHistory held(v1::INPUT_HOLD_ZERO_ORDER), line(v1::INPUT_HOLD_LINEAR), parabola(v1::INPUT_HOLD_QUADRATIC);
+  InputHistory held(v1::INPUT_HOLD_ZERO_ORDER), line(v1::INPUT_HOLD_LINEAR),
+      parabola(v1::INPUT_HOLD_QUADRATIC);
   for (const double t : {1.0, 2.0, 4.0}) {
     held.add(t, {5 * t});
     line.add(t, {3 * t - 1});

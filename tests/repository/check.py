@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""Rules about the sources that no compiler checks. usage: check.py ROOT {arrows|headers|layout|format} [arguments]
+
+arrows   folders include only what stands below them
+headers  every header compiles alone: the build shows it for those that their source includes first, the compiler for the
+         others; arguments: compiler and its options
+layout   the top level has the agreed entries and no others
+format   clang-format would change nothing in the folders that follow it fully
+"""
+import concurrent.futures
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+# What the sources of a folder may include besides their own folder.
+ARROWS = {
+    "src/math": set(),
+    "src/model": {"math"},
+    "src/elements": {"math", "model"},
+    "src/solver": {"math", "model", "elements"},
+    "src/input": {"math", "model"},
+    "src/output": {"math", "model"},
+    "src/reduction": {"math", "model", "input", "solver"},
+    "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
+    "server/cli": {"math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
+    "server/coupling": {"math", "model", "simulation", "service", "mbcosim"},
+    "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "mbcosim"},
+    "server/daemon": {"service", "mbcosim"},
+}
+TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",
+             "tests"}
+FORMATTED = ["server", "client_examples/cpp", "tests/service", "tests/install"]
+INCLUDE = re.compile(r'^\s*#\s*include\s+"([a-z_0-9]+)/', re.MULTILINE)
+
+
+def sources(folder, *endings):
+    return sorted(p for p in folder.rglob("*") if p.suffix in endings)
+
+
+def arrows(root):
+    for folder, allowed in ARROWS.items():
+        for path in sources(root / folder, ".h", ".cpp"):
+            for included in INCLUDE.findall(path.read_text(encoding="utf-8")):
+                if included not in allowed | {os.path.basename(folder)}:
+                    yield f"{path.relative_to(root)} includes \"{included}/…\"; {folder} may include: {', '.join(sorted(allowed))}"
+
+
+def leads_its_source(header):
+    source = header.with_suffix(".cpp")
+    if not source.exists():
+        return False
+    first = re.search(r'^\s*#\s*include\s+(\S+)', source.read_text(encoding="utf-8"), re.MULTILINE)
+    return first and first.group(1).endswith(f"/{header.name}\"")
+
+
+def headers(root, *compiler):
+    def compile_alone(path):
+        command = [*compiler, "-fsyntax-only", "-include", str(path), "-x", "c++", os.devnull]
+        done = subprocess.run(command, capture_output=True, text=True)
+        return f"{path.relative_to(root)} does not compile alone:\n{done.stderr}" if done.returncode else None
+
+    paths = [p for p in sources(root / "src", ".h") + sources(root / "server", ".h") if not leads_its_source(p)]
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        yield from filter(None, pool.map(compile_alone, paths))
+
+
+def layout(root):
+    if not shutil.which("git"):
+        return
+    listed = subprocess.run(["git", "-C", str(root), "ls-files"], capture_output=True, text=True)
+    if listed.returncode:  # not a clone: an unpacked archive, say
+        return
+    found = {name.split("/")[0] for name in listed.stdout.splitlines()}
+    for name in sorted(found - TOP_LEVEL):
+        if not name.startswith("."):
+            yield f"{name} does not belong to the top level"
+    for name in sorted(TOP_LEVEL - found):
+        yield f"{name} is missing at the top level"
+
+
+def format(root, tool="clang-format"):
+    paths = [str(p) for folder in FORMATTED for p in sources(root / folder, ".h", ".cpp")]
+    done = subprocess.run([tool, "--dry-run", "--Werror", *paths], capture_output=True, text=True)
+    if done.returncode:
+        yield done.stderr
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]).resolve()
+    checks = {"arrows": arrows, "headers": headers, "layout": layout, "format": format}
+    findings = list(checks[sys.argv[2]](root, *sys.argv[3:]))
+    print("\n".join(findings))
+    sys.exit(1 if findings else 0)
+
+
+if __name__ == "__main__":
+    main()
