@@ -2,6 +2,8 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace mbcosim::cli {
 
@@ -20,9 +22,20 @@ struct RunOptions {
   bool quiet = false;
 };
 
+struct ReduceCommand {
+  std::string job;     ///< file of lines `name = value`; may be empty
+  std::string output;  ///< FEM data file
+  bool quiet = false;
+  std::vector<std::pair<std::string, std::string>> options;  ///< of the command line
+};
+
 int run(const RunOptions& options);
 int validate(const std::string& deck, bool json);
 int describe(const std::string& deck, bool json);
+/// Reduces a finite element model to a FEM data file, and reports beside it as OUTPUT.json.
+int reduce_model(const ReduceCommand& command);
+/// What a FEM data file holds.
+int fem_info(const std::string& file, bool json);
 /// The words of the input language, served or refused by name.
 int keywords(bool json);
 

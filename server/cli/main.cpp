@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
+#include "reduction/job.h"
 
 namespace {
 
@@ -9,6 +10,25 @@ constexpr const char* kFooter =
     "Exit codes: 0 done, 2 deck refused, 3 numerical failure, 4 refused or limit exceeded, "
     "130 interrupted.\n"
     "The daemon is `mbcosimd`; clients are under client_examples/.";
+
+/// `mbcosim reduce`: each option of a job is one of the command line too.
+void add_reduce(CLI::App& app, mbcosim::cli::ReduceCommand& command, int& exit_code) {
+  CLI::App* reduce_app = app.add_subcommand(
+      "reduce", "Reduce a finite element model to a FEM data file for the modal joint");
+  reduce_app->add_option("job", command.job,
+                         "File of lines `name = value` with the options below; files that it names "
+                         "are relative to it");
+  reduce_app->add_option("-o,--output", command.output, "FEM data file to write")->required();
+  reduce_app->add_flag("-q,--quiet", command.quiet, "No progress bar and no report");
+  for (const mbcosim::ReductionOptionHelp& option : mbcosim::reduction_option_help())
+    reduce_app->add_option_function<std::string>(
+        std::string("--") + option.name,
+        [&command, name = std::string(option.name)](const std::string& value) {
+          command.options.emplace_back(name, value);
+        },
+        option.help);
+  reduce_app->callback([&] { exit_code = reduce_model(command); });
+}
 
 }  // namespace
 
@@ -45,6 +65,13 @@ int main(int argc, char** argv) {
   describe_app->add_option("deck", deck, "Main file of the deck")->required();
   describe_app->add_flag("--json", json, "Print the description as JSON");
   describe_app->callback([&] { exit_code = describe(deck, json); });
+
+  ReduceCommand reduce_command;
+  add_reduce(app, reduce_command, exit_code);
+  CLI::App* fem_app = app.add_subcommand("fem-info", "Tell what a FEM data file holds");
+  fem_app->add_option("file", deck, "FEM data file, text or binary")->required();
+  fem_app->add_flag("--json", json, "Print it as JSON");
+  fem_app->callback([&] { exit_code = fem_info(deck, json); });
 
   CLI::App* keywords_app = app.add_subcommand(
       "keywords", "List the words of the input language; refused ones are marked");

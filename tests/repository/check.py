@@ -23,7 +23,7 @@ ARROWS = {
     "src/solver": {"math", "model", "elements"},
     "src/input": {"math", "model"},
     "src/output": {"math", "model"},
-    "src/reduction": {"math", "model", "input", "solver"},
+    "src/reduction": {"math", "model", "input", "elements", "solver"},  # elements: the FEM data file
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
     "server/cli": {"math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/coupling": {"math", "model", "simulation", "service", "mbcosim"},

@@ -1,0 +1,112 @@
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "input/sources.h"
+#include "reduction/job.h"
+
+namespace fs = std::filesystem;
+
+namespace mbcosim::cli {
+namespace {
+
+constexpr int kBarWidth = 30;
+
+/// A file of the user's own, relative to `folder`.
+std::string read_file(const std::string& folder, const std::string& name) {
+  const auto text = FolderSource(folder, true).read(name);
+  if (!text) throw ReductionError(ErrorKind::io, text.error().message);
+  return *text;
+}
+
+void write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw ReductionError(ErrorKind::io, "cannot write " + path);
+}
+
+/// The job file first, then what the command line says.
+ReductionJob read_command(const ReduceCommand& command) {
+  ReductionJob job;
+  if (!command.job.empty()) read_job(command.job, read_file(".", command.job), job);
+  for (const auto& [name, value] : command.options) {
+    job.set(name, value);
+    if (const auto file = job.files.find(name); file != job.files.end())
+      file->second = fs::absolute(value).string();
+  }
+  return job;
+}
+
+/// A line on the terminal that shows the phase and how far it is.
+class PhaseBar {
+ public:
+  explicit PhaseBar(bool visible) : visible_(visible) {}
+  void show(const std::string& phase, double fraction) {
+    const int filled = static_cast<int>(fraction * kBarWidth);
+    if (!visible_ || (phase == phase_ && filled == filled_)) return;
+    phase_ = phase;
+    filled_ = filled;
+    std::fprintf(stderr, "\r%-18s [%s%s]", phase.c_str(), std::string(filled, '#').c_str(),
+                 std::string(kBarWidth - filled, ' ').c_str());
+    std::fflush(stderr);
+  }
+  void clear() const {
+    if (visible_) std::fprintf(stderr, "\r%*s\r", kBarWidth + 22, "");
+  }
+
+ private:
+  bool visible_;
+  std::string phase_;
+  int filled_ = -1;
+};
+
+ExitCode complain(const Error& error) {
+  std::fprintf(stderr, "error: %s\n", error.message.c_str());
+  switch (error.kind) {
+    case ErrorKind::argument:
+    case ErrorKind::io:
+      return kDeckRefused;
+    case ErrorKind::cancelled:
+      return kInterrupted;
+    case ErrorKind::limit:
+      return kRefused;
+    default:
+      return kNumericalFailure;
+  }
+}
+
+}  // namespace
+
+int reduce_model(const ReduceCommand& command) {
+  InterruptGuard interrupt;
+  Error error;
+  try {
+    const ReductionJob job = read_command(command);
+    const std::string folder = fs::path(command.job).parent_path().string();
+    const FeModel model = load_model(job, [&](const std::string& name) {
+      return read_file(folder.empty() ? "." : folder, name);
+    });
+    PhaseBar bar(!command.quiet && ::isatty(STDERR_FILENO));
+    const auto reduction =
+        reduce(model, job.options, [&](const std::string& phase, double fraction) {
+          bar.show(phase, fraction);
+          return !interrupt.token()->cancelled();
+        });
+    bar.clear();
+    if (!reduction) return complain(reduction.error());
+    write_file(command.output, write_fem_text(reduction->data, reduction->comments));
+    write_file(command.output + ".json", report_json(*reduction) + "\n");
+    if (!command.quiet) std::fputs(report_text(*reduction).c_str(), stdout);
+    return kDone;
+  } catch (const ReductionError& e) {
+    error.kind = e.kind;
+    error.message = e.what();
+  }
+  return complain(error);
+}
+
+}  // namespace mbcosim::cli

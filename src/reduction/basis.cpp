@@ -1,0 +1,246 @@
+#include "reduction/basis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace mbcosim {
+
+namespace {
+
+constexpr double kNearlyFree = 1e-5;
+constexpr double kPoorResidual = 1e-6;
+
+double hertz(double square) { return std::sqrt(square) / (2 * std::numbers::pi); }
+
+std::vector<char> with_rows_held(std::vector<char> held, const std::vector<int>& rows) {
+  for (const int row : rows) held[row] = 1;
+  return held;
+}
+
+bool is_static(ReductionBasis basis) {
+  return basis != ReductionBasis::free_modes && basis != ReductionBasis::constrained_modes;
+}
+
+}  // namespace
+
+BasisBuilder::BasisBuilder(const FeModel& model, const ReductionOptions& options,
+                           const ReductionProgress& progress, std::vector<std::string>& warnings)
+    : model_(model), options_(options), progress_(progress), warnings_(warnings) {
+  report("rigid motions", 0);
+  body_ = std::make_unique<Structure>(model, model.supported);
+  if (body_->softest() < kNearlyFree && body_->rigid_count() < 6)
+    warnings_.push_back(
+        "the stiffness matrix hardly resists a rigid motion: if the body should be free, write the "
+        "matrix with more digits or check the coordinates");
+  choose_frame();
+  find_interface();
+  check_options();
+}
+
+void BasisBuilder::report(const std::string& phase, double fraction) const {
+  if (progress_ && !progress_(phase, fraction))
+    throw ReductionError(ErrorKind::cancelled, "the reduction was stopped");
+}
+
+void BasisBuilder::choose_frame() {
+  const bool moves = body_->rigid_count() > 0;
+  frame_ = options_.frame;
+  if (frame_ == ReductionFrame::automatic)
+    frame_ = moves ? ReductionFrame::mean_axes : ReductionFrame::point;
+  if (frame_ == ReductionFrame::point && moves)
+    refuse_reduction("the body has " + std::to_string(body_->rigid_count()) +
+                         " rigid motions, which a frame at a fixed point would leave in the shapes",
+                     "choose mean axes or the frame of a node");
+  if (frame_ == ReductionFrame::mean_axes && !moves)
+    refuse_reduction("mean axes are for bodies that can move, this one is supported",
+                     "remove the supports, or place the frame at a point");
+  if (frame_ != ReductionFrame::node) return;
+  frame_node_ = model_.node(options_.frame_node);
+  if (options_.basis == ReductionBasis::free_modes)
+    refuse_reduction("free modes do not vanish at node " + options_.frame_node,
+                     "use constrained modes, or mean axes");
+  if (options_.basis == ReductionBasis::inertia_decoupling)
+    refuse_reduction("inertia decoupling refers to mean axes, not to a node", "use inertia relief");
+  attached_ = std::make_unique<Structure>(
+      model_, with_rows_held(model_.supported, model_.rows_of(frame_node_)));
+}
+
+void BasisBuilder::find_interface() {
+  for (const std::string& label : options_.interface_nodes) {
+    const int node = model_.node(label);
+    std::vector<int> rows = model_.rows_of(node);
+    const auto digits = options_.interface_components.find(label);
+    if (digits != options_.interface_components.end()) {
+      rows.clear();
+      for (const int component : parse_components(digits->second))
+        if (const int row = model_.row(node, component); row >= 0) rows.push_back(row);
+    }
+    for (const int row : rows) {
+      if (std::find(interface_.begin(), interface_.end(), row) != interface_.end())
+        refuse_reduction(model_.dof_text(row) + " is an interface twice");
+      if (attached().position(row) >= 0) interface_.push_back(row);
+    }
+  }
+}
+
+void BasisBuilder::check_options() {
+  if (options_.modes < 0) refuse_reduction("the number of normal modes must not be negative");
+  if (is_static(options_.basis) && interface_.empty())
+    refuse_reduction(std::string(basis_name(options_.basis)) +
+                     " needs interface nodes that can move");
+  if (!is_static(options_.basis) && options_.modes == 0 && options_.max_frequency <= 0)
+    refuse_reduction("a basis of normal modes needs at least one");
+  if (options_.basis == ReductionBasis::inertia_decoupling && body_->rigid_count() == 0)
+    refuse_reduction("inertia decoupling is for bodies that can move, this one is supported");
+  if (options_.basis == ReductionBasis::free_modes && body_->rigid_count() == 0)
+    warnings_.push_back("the body is supported: its free modes are the constrained ones");
+}
+
+void BasisBuilder::require_supported(const char* what) {
+  if (attached().rigid_count() == 0) return;
+  refuse_reduction(std::string(what) + ": the body has " +
+                       std::to_string(attached().rigid_count()) + " rigid motions",
+                   "give supports, place the frame at a node, or use inertia relief");
+}
+
+int BasisBuilder::mode_count(Structure& structure) const {
+  if (options_.max_frequency <= 0) return options_.modes;
+  const double omega = 2 * std::numbers::pi * options_.max_frequency;
+  const int count = structure.count_modes_below(omega * omega);
+  if (count < 0)
+    throw ReductionError(ErrorKind::not_converged,
+                         "the modes below the highest frequency could not be counted");
+  return count;
+}
+
+void BasisBuilder::add_modes(Structure& structure, BasisShapes& basis) {
+  report("normal modes", 0);
+  const int count = mode_count(structure);
+  const NormalModes modes = structure.modes(count, progress_);
+  if (modes.residual > kPoorResidual)
+    warnings_.push_back("the normal modes satisfy their equation only to " +
+                        std::to_string(modes.residual));
+  if (options_.check_completeness && count > 0) check_count(structure, modes);
+  basis.eigen_residual = modes.residual;
+  basis.factor_nonzeros = structure.factor_nonzeros();
+  for (const double square : modes.squares) basis.normal_frequencies.push_back(hertz(square));
+  const auto before = basis.shapes.cols();
+  basis.shapes.conservativeResize(model_.rows(), before + count);
+  basis.shapes.rightCols(count) = structure.embedded(modes.shapes);
+}
+
+/// As many eigenvalues lie below the middle of the widest upper gap as were found there.
+void BasisBuilder::check_count(Structure& structure, const NormalModes& modes) {
+  report("count of the modes", 0);
+  const int n = static_cast<int>(modes.squares.size());
+  int at = n - 1;  // eigenvalues below index `at` are counted
+  double widest = 0;
+  for (int k = n - 1; k > std::max(0, n - 5); --k) {
+    const double gap = modes.squares(k) / modes.squares(k - 1) - 1;
+    if (gap > 4 * widest) {
+      widest = gap;
+      at = k;
+    }
+  }
+  const double mu =
+      n == 1 ? 0.5 * modes.squares(0) : std::sqrt(modes.squares(at) * modes.squares(at - 1));
+  const int expected = n == 1 ? 0 : at, counted = structure.count_modes_below(mu);
+  if (counted >= 0 && counted != expected)
+    warnings_.push_back("the model has " + std::to_string(counted) + " normal modes below " +
+                        std::to_string(hertz(mu)) + " Hz, " + std::to_string(expected) +
+                        " were found");
+}
+
+/// Unit loads at the interface, rows of `structure`.
+MatX BasisBuilder::unit_loads(const Structure& structure) const {
+  MatX loads = MatX::Zero(structure.size(), interface_.size());
+  for (std::size_t k = 0; k < interface_.size(); ++k)
+    loads(structure.position(interface_[k]), k) = 1;
+  return loads;
+}
+
+/// Ψ = [−K_oo⁻¹ K_op; 1], model rows.
+MatX BasisBuilder::constraint_shapes(Structure& omitted) const {
+  MatX shapes = MatX::Zero(model_.rows(), interface_.size());
+  for (std::size_t k = 0; k < interface_.size(); ++k) {
+    VecX force = VecX::Zero(omitted.size());
+    for (SparseMatrix::InnerIterator it(model_.stiffness, interface_[k]); it; ++it)
+      if (const int row = omitted.position(it.row()); row >= 0) force(row) = -it.value();
+    shapes.col(k) = omitted.embedded(omitted.solve(force));
+    shapes(interface_[k], k) = 1;
+    report("static shapes", double(k + 1) / interface_.size());
+  }
+  return shapes;
+}
+
+/// K⁻ P f. A supported body is relieved by its six geometric motions.
+MatX BasisBuilder::relief_shapes() {
+  MatX loads = unit_loads(*body_);
+  if (body_->rigid_count() > 0) {
+    loads = body_->balanced(loads);
+  } else {
+    const MatX x = body_->restricted(model_.rigid_shapes(model_.positions.rowwise().mean()));
+    const MatX inertia_load = body_->mass() * x;
+    const Eigen::CompleteOrthogonalDecomposition<MatX> inertia(x.transpose() * inertia_load);
+    loads -= inertia_load * inertia.solve(x.transpose() * loads);
+  }
+  Structure& s = attached();
+  return s.embedded(s.solve_all(s.restricted(body_->embedded(loads))));
+}
+
+MatX BasisBuilder::flexibility_columns() {
+  Structure& s = attached();
+  const MatX loads = unit_loads(s);
+  if (s.rigid_count() == 0) return s.embedded(s.solve_all(loads));
+  return s.embedded(s.without_rigid(s.solve_all(s.balanced(loads))));
+}
+
+BasisShapes BasisBuilder::build() {
+  BasisShapes basis;
+  basis.shapes.resize(model_.rows(), 0);
+  switch (options_.basis) {
+    case ReductionBasis::free_modes:
+      add_modes(*body_, basis);
+      break;
+    case ReductionBasis::constrained_modes:
+      require_supported("constrained modes");
+      add_modes(attached(), basis);
+      break;
+    case ReductionBasis::craig_bampton: {
+      std::vector<char> held = with_rows_held(model_.supported, interface_);
+      if (frame_node_ >= 0) held = with_rows_held(held, model_.rows_of(frame_node_));
+      Structure omitted(model_, held);
+      if (omitted.rigid_count() > 0)
+        refuse_reduction("the body can move while its interface is held",
+                         "name more interface nodes or components");
+      if (!options_.interface_components.empty())
+        warnings_.push_back(
+            "Craig-Bampton with some components of an interface node: the others have no static "
+            "shape of their own");
+      basis.shapes = constraint_shapes(omitted);
+      basis.static_count = static_cast<int>(interface_.size());
+      add_modes(omitted, basis);
+      break;
+    }
+    case ReductionBasis::complement:
+      require_supported("complement shapes");
+      report("static shapes", 0);
+      basis.shapes = attached().embedded(attached().solve_all(unit_loads(attached())));
+      basis.static_count = static_cast<int>(interface_.size());
+      add_modes(attached(), basis);
+      break;
+    case ReductionBasis::inertia_relief:
+    case ReductionBasis::inertia_decoupling:
+      report("static shapes", 0);
+      basis.shapes = relief_shapes();
+      if (options_.basis == ReductionBasis::inertia_decoupling)
+        basis.shapes = body_->embedded(body_->without_rigid(body_->restricted(basis.shapes)));
+      basis.static_count = static_cast<int>(interface_.size());
+      add_modes(attached(), basis);
+      break;
+  }
+  return basis;
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,171 @@
+#include "reduction/job.h"
+
+#include <charconv>
+#include <cmath>
+
+namespace mbcosim {
+
+namespace {
+
+std::string trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return "";
+  return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
+}
+
+std::vector<std::string> list(std::string_view text, char separator = ',') {
+  std::vector<std::string> items;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find(separator), text.size());
+    if (const std::string item = trimmed(text.substr(0, end)); !item.empty()) items.push_back(item);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return items;
+}
+
+double real(const std::string& name, const std::string& value) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+  if (error != std::errc() || end != value.data() + value.size() || !std::isfinite(number))
+    refuse_reduction(name + ": a number expected, got `" + value + "`");
+  return number;
+}
+
+int whole(const std::string& name, const std::string& value) {
+  const double number = real(name, value);
+  if (number != std::floor(number) || number < 0 || number > 1e6)
+    refuse_reduction(name + ": a whole number expected, got `" + value + "`");
+  return static_cast<int>(number);
+}
+
+bool yes_or_no(const std::string& name, const std::string& value) {
+  if (value != "yes" && value != "no")
+    refuse_reduction(name + ": `yes` or `no` expected, got `" + value + "`");
+  return value == "yes";
+}
+
+/// `1:123456; 9:3`
+void set_components(const std::string& value, ReductionOptions& options) {
+  for (const std::string& item : list(value, ';')) {
+    const std::size_t colon = item.find(':');
+    if (colon == std::string::npos)
+      refuse_reduction("components: `label:digits` expected, got `" + item + "`");
+    const std::string label = trimmed(item.substr(0, colon)),
+                      digits = trimmed(item.substr(colon + 1));
+    parse_components(digits);
+    options.interface_components[label] = digits;
+  }
+}
+
+/// `auto`, `mean-axes`, `node:LABEL`, `point:x,y,z`
+void set_frame(const std::string& value, ReductionOptions& options) {
+  if (value == "auto") {
+    options.frame = ReductionFrame::automatic;
+  } else if (value == "mean-axes") {
+    options.frame = ReductionFrame::mean_axes;
+  } else if (value.starts_with("node:")) {
+    options.frame = ReductionFrame::node;
+    options.frame_node = trimmed(value.substr(5));
+  } else if (value.starts_with("point:")) {
+    const std::vector<std::string> numbers = list(value.substr(6));
+    if (numbers.size() != 3) refuse_reduction("frame: three coordinates expected after `point:`");
+    options.frame = ReductionFrame::point;
+    for (int a = 0; a < 3; ++a) options.frame_point(a) = real("frame", numbers[a]);
+  } else {
+    refuse_reduction("unknown frame `" + value + "`",
+                     "accepted: auto, mean-axes, node:LABEL, point:x,y,z");
+  }
+}
+
+ReductionInertia parse_inertia(const std::string& value) {
+  if (value == "lumped") return ReductionInertia::lumped;
+  if (value == "rigid") return ReductionInertia::rigid;
+  if (value == "both") return ReductionInertia::both;
+  if (value == "none") return ReductionInertia::none;
+  refuse_reduction("unknown inertia `" + value + "`", "accepted: lumped, rigid, both, none");
+}
+
+}  // namespace
+
+const std::vector<ReductionOptionHelp>& reduction_option_help() {
+  static const std::vector<ReductionOptionHelp> kHelp = {
+      {"mass", "File of the mass matrix (Matrix Market)"},
+      {"stiffness", "File of the stiffness matrix (Matrix Market)"},
+      {"nodes", "File of nodes: lines `label,x,y,z`"},
+      {"dofs", "File of matrix rows: lines `label,component` (1 to 6); default: 6 rows a node"},
+      {"supports", "File of supports: lines `label,components`, e.g. `7,123456`"},
+      {"basis",
+       "free, constrained, craig-bampton, complement, inertia-relief or inertia-decoupling"},
+      {"interface", "Labels of the interface nodes, separated by commas"},
+      {"components", "Components of interface nodes, `LABEL:DIGITS; ...`; default: all"},
+      {"modes", "Number of normal modes"},
+      {"max-frequency", "All normal modes below this frequency [Hz], instead of a number"},
+      {"frame", "Floating frame: auto, mean-axes, node:LABEL or point:x,y,z"},
+      {"inertia", "lumped (record group 11), rigid (12), both or none"},
+      {"expose", "Labels of the nodes in the file, or `interface`; default: all"},
+      {"diagonalize", "yes or no: shapes that make the reduced matrices diagonal"},
+      {"rank-tolerance", "Relative energy below which a combination of shapes is dependent"},
+  };
+  return kHelp;
+}
+
+void ReductionJob::set(const std::string& name, const std::string& value) {
+  if (name == "mass" || name == "stiffness" || name == "nodes" || name == "dofs" ||
+      name == "supports")
+    files[name] = value;
+  else if (name == "basis")
+    options.basis = parse_basis(value);
+  else if (name == "interface")
+    options.interface_nodes = list(value);
+  else if (name == "components")
+    set_components(value, options);
+  else if (name == "modes")
+    options.modes = whole(name, value);
+  else if (name == "max-frequency")
+    options.max_frequency = real(name, value);
+  else if (name == "frame")
+    set_frame(value, options);
+  else if (name == "inertia")
+    options.inertia = parse_inertia(value);
+  else if (name == "expose")
+    options.exposed = list(value);
+  else if (name == "diagonalize")
+    options.diagonalize = yes_or_no(name, value);
+  else if (name == "rank-tolerance")
+    options.rank_tolerance = real(name, value);
+  else
+    refuse_reduction("unknown option `" + name + "`");
+}
+
+void read_job(const std::string& name, std::string_view text, ReductionJob& job) {
+  int number = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string line = trimmed(text.substr(0, std::min(end, text.find('#'))));
+    text.remove_prefix(std::min(end + 1, text.size()));
+    ++number;
+    if (line.empty()) continue;
+    const std::size_t equal = line.find('=');
+    const std::string place = name + ":" + std::to_string(number) + ": ";
+    if (equal == std::string::npos) refuse_reduction(place + "`name = value` expected");
+    try {
+      job.set(trimmed(line.substr(0, equal)), trimmed(line.substr(equal + 1)));
+    } catch (const ReductionError& error) {
+      throw ReductionError(error.kind, place + error.what());
+    }
+  }
+}
+
+FeModel load_model(const ReductionJob& job,
+                   const std::function<std::string(const std::string&)>& read) {
+  const auto text = [&](const char* name, bool needed) {
+    const auto file = job.files.find(name);
+    if (file != job.files.end() && !file->second.empty()) return read(file->second);
+    if (needed) refuse_reduction(std::string("the file `") + name + "` is not given");
+    return std::string();
+  };
+  return make_fe_model({text("mass", true), text("stiffness", true), text("nodes", true),
+                        text("dofs", false), text("supports", false)});
+}
+
+}  // namespace mbcosim

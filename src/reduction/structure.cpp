@@ -1,0 +1,208 @@
+#include "reduction/structure.h"
+
+#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace mbcosim {
+
+namespace {
+
+constexpr double kNoEnergy = 1e-8;     ///< relative strain of a rigid motion
+constexpr double kSmallPivot = 1e-14;  ///< relative to the diagonal of K
+constexpr int kDenseOrder = 400;       ///< up to here dense eigensolutions
+
+/// √ of the diagonal of K, which makes the strains of different rows comparable.
+VecX row_scales(const SparseMatrix& stiffness) {
+  const VecX diagonal = stiffness.diagonal().cwiseMax(0);
+  const double mean = std::max(diagonal.mean(), 1e-300);
+  return diagonal.unaryExpr([mean](double d) { return std::sqrt(d > 1e-14 * mean ? d : mean); });
+}
+
+[[noreturn]] void fail_singular(const std::string& where) {
+  refuse_reduction("the stiffness matrix is singular or not positive definite at " + where,
+                   "a mechanism, a part that is not connected, or an unstable model");
+}
+
+}  // namespace
+
+SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<int>& rows,
+                       const std::vector<int>& columns) {
+  std::vector<int> place(matrix.rows(), -1);
+  for (std::size_t k = 0; k < rows.size(); ++k) place[rows[k]] = static_cast<int>(k);
+  SparseMatrix part(rows.size(), columns.size());
+  std::vector<int> counts(columns.size(), 0);
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    for (SparseMatrix::InnerIterator it(matrix, columns[c]); it; ++it)
+      counts[c] += place[it.row()] >= 0;
+  part.reserve(counts);
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    for (SparseMatrix::InnerIterator it(matrix, columns[c]); it; ++it)
+      if (place[it.row()] >= 0) part.insert(place[it.row()], c) = it.value();
+  part.makeCompressed();
+  return part;
+}
+
+SparseFactor SparseFactor::positive(const SparseMatrix& matrix,
+                                    const std::function<std::string(int)>& row_text) {
+  for (int k = 0; k < matrix.rows(); ++k)
+    if (!(matrix.coeff(k, k) > 0)) fail_singular(row_text(k));
+  SparseFactor f;
+  f.factor_ = std::make_shared<Factor>(matrix);
+  if (f.factor_->info() != Eigen::Success) fail_singular("an unknown place");
+  const VecX pivots = f.factor_->vectorD();
+  const auto& order = f.factor_->permutationP().indices();
+  for (int k = 0; k < matrix.rows(); ++k)
+    if (!(pivots(order(k)) > kSmallPivot * matrix.coeff(k, k))) fail_singular(row_text(k));
+  return f;
+}
+
+int SparseFactor::count_below(const SparseMatrix& stiffness, const SparseMatrix& mass, double mu) {
+  const Factor factor(SparseMatrix(stiffness - mu * mass));
+  if (factor.info() != Eigen::Success) return -1;
+  return static_cast<int>((factor.vectorD().array() < 0).count());
+}
+
+Structure::Structure(const FeModel& model, const std::vector<char>& held)
+    : model_(model), position_(model.rows(), -1) {
+  for (int r = 0; r < model.rows(); ++r) {
+    if (held[r]) continue;
+    position_[r] = size();
+    rows_.push_back(r);
+  }
+  if (rows_.empty()) refuse_reduction("every degree of freedom is held");
+  stiffness_ = submatrix(model.stiffness, rows_, rows_);
+  mass_ = submatrix(model.mass, rows_, rows_);
+  find_rigid_motions();
+  hold_determinate_set();
+}
+
+/// Combinations of the six geometric motions without strain, orthonormal in M.
+void Structure::find_rigid_motions() {
+  const VecX scale = row_scales(stiffness_);
+  const MatX geometric = restricted(model_.rigid_shapes(model_.positions.rowwise().mean()));
+  Eigen::ColPivHouseholderQR<MatX> qr((scale.asDiagonal() * geometric).eval());
+  qr.setThreshold(1e-10);
+  const int independent = static_cast<int>(qr.rank());
+  const MatX motions = scale.cwiseInverse().asDiagonal() *
+                       MatX(qr.householderQ() * MatX::Identity(size(), independent));
+  const Eigen::JacobiSVD<MatX> svd(MatX(scale.cwiseInverse().asDiagonal() * (stiffness_ * motions)),
+                                   Eigen::ComputeThinV);
+  int count = 0;
+  softest_ = 1;
+  for (int k = 0; k < independent; ++k) {
+    if (svd.singularValues()(k) <= kNoEnergy)
+      ++count;
+    else
+      softest_ = std::min(softest_, svd.singularValues()(k));
+  }
+  rigid_ = motions * svd.matrixV().rightCols(count);
+  const MatX inertia = rigid_.transpose() * (mass_ * rigid_);
+  const Eigen::LLT<MatX> root(inertia);
+  if (count > 0 &&
+      (root.info() != Eigen::Success ||
+       Eigen::SelfAdjointEigenSolver<MatX>(inertia).eigenvalues()(0) <= 1e-12 * inertia.trace()))
+    refuse_reduction("a rigid motion of the body has no inertia");
+  if (count > 0) rigid_ = root.matrixU().solve<Eigen::OnTheRight>(rigid_);
+  mass_rigid_ = mass_ * rigid_;
+}
+
+void Structure::hold_determinate_set() {
+  std::vector<char> held(size(), 0);
+  if (rigid_count() > 0) {
+    const Eigen::ColPivHouseholderQR<MatX> qr(MatX(rigid_.transpose()));
+    for (int k = 0; k < rigid_count(); ++k) held[qr.colsPermutation().indices()(k)] = 1;
+  }
+  for (int k = 0; k < size(); ++k)
+    if (!held[k]) kept_.push_back(k);
+}
+
+void Structure::factor() {
+  if (factor_) return;
+  const SparseMatrix part = submatrix(stiffness_, kept_, kept_);
+  factor_ = std::make_unique<SparseFactor>(
+      SparseFactor::positive(part, [this](int k) { return model_.dof_text(rows_[kept_[k]]); }));
+}
+
+VecX Structure::solve(const VecX& f) {
+  factor();
+  VecX part(kept_.size());
+  for (std::size_t k = 0; k < kept_.size(); ++k) part(k) = f(kept_[k]);
+  part = factor_->solve(part);
+  VecX x = VecX::Zero(size());
+  for (std::size_t k = 0; k < kept_.size(); ++k) x(kept_[k]) = part(k);
+  return x;
+}
+
+MatX Structure::solve_all(const MatX& loads) {
+  MatX x(loads.rows(), loads.cols());
+  for (int j = 0; j < loads.cols(); ++j) x.col(j) = solve(loads.col(j));
+  return x;
+}
+
+NormalModes Structure::modes(int count, const ReductionProgress& progress) {
+  if (count == 0) return {VecX(), MatX(size(), 0), 0};
+  factor();  // refuses mechanisms by name
+  NormalModes found = size() <= kDenseOrder ? dense_modes(count) : lanczos_modes(count, progress);
+  finish(found);
+  return found;
+}
+
+/// M φ = μ (K + a M X_R X_Rᵀ M) φ with μ = 1/ω²; massless combinations have μ = 0.
+NormalModes Structure::dense_modes(int count) const {
+  const MatX mass = mass_;
+  const double a = MatX(stiffness_).trace() / std::max(mass.trace(), 1e-300);
+  const MatX stiffness = MatX(stiffness_) + a * mass_rigid_ * mass_rigid_.transpose();
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatX> solver(mass, stiffness);
+  if (solver.info() != Eigen::Success)
+    throw ReductionError(ErrorKind::not_converged, "the dense eigensolution failed");
+  NormalModes modes{VecX(count), MatX(size(), count), 0};
+  const double largest = solver.eigenvalues()(size() - 1);
+  int n = 0;
+  for (int k = size() - 1; k >= 0 && n < count; --k) {
+    const VecX shape = solver.eigenvectors().col(k);
+    const double norm = std::sqrt(std::max(shape.dot(mass_ * shape), 1e-300));
+    const bool is_rigid = (mass_rigid_.transpose() * shape).norm() > 0.5 * norm;
+    if (is_rigid) continue;
+    if (solver.eigenvalues()(k) <= 1e-13 * largest) break;
+    modes.squares(n) = 1 / solver.eigenvalues()(k);
+    modes.shapes.col(n++) = shape / norm;
+  }
+  if (n < count)
+    refuse_reduction(std::to_string(count) + " normal modes asked for, the model has " +
+                     std::to_string(n));
+  return modes;
+}
+
+/// Largest component positive; residual of the eigenproblem.
+void Structure::finish(NormalModes& modes) const {
+  for (int j = 0; j < modes.shapes.cols(); ++j) {
+    auto shape = modes.shapes.col(j);
+    shape /= std::sqrt(shape.dot(mass_ * shape));
+    int largest = 0;
+    shape.cwiseAbs().maxCoeff(&largest);
+    if (shape(largest) < 0) shape = -shape;
+    const VecX force = stiffness_ * shape;
+    const double error = (force - modes.squares(j) * (mass_ * shape)).norm() / force.norm();
+    modes.residual = std::max(modes.residual, error);
+  }
+}
+
+int Structure::count_modes_below(double square) const {
+  const int below = SparseFactor::count_below(stiffness_, mass_, square);
+  return below < 0 ? below : below - rigid_count();
+}
+
+MatX Structure::embedded(const MatX& shapes) const {
+  MatX whole = MatX::Zero(model_.rows(), shapes.cols());
+  for (int k = 0; k < size(); ++k) whole.row(rows_[k]) = shapes.row(k);
+  return whole;
+}
+
+MatX Structure::restricted(const MatX& model_shapes) const {
+  MatX part(size(), model_shapes.cols());
+  for (int k = 0; k < size(); ++k) part.row(k) = model_shapes.row(rows_[k]);
+  return part;
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,101 @@
+/// The part of a finite element model that is left when some rows are held: its rigid motions,
+/// static solutions and normal modes.
+///
+///   K x = f                       static solution, factored once: sparse LDLᵀ
+///   K φ = ω² M φ                  normal modes, Mᵀ-normalised, ω > 0
+///   X_R                           motions without elastic energy, X_Rᵀ M X_R = 1
+///   P f = f − M X_R X_Rᵀ f        loads balanced by inertia (inertia relief)
+///   Pᵀ x = x − X_R X_Rᵀ M x       motions free of rigid content (mean axes)
+///
+/// A body that can move freely has a singular K. Static solutions of balanced loads then hold a
+/// statically determinate set of rows; the choice adds rigid motion only, which Pᵀ removes.
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "reduction/error.h"
+#include "reduction/fe_model.h"
+
+namespace mbcosim {
+
+/// Sparse LDLᵀ of a symmetric matrix without pivoting.
+class SparseFactor {
+ public:
+  /// Throws ReductionError when `matrix` is not positive definite: `row_text` names a row of it.
+  static SparseFactor positive(const SparseMatrix& matrix,
+                               const std::function<std::string(int)>& row_text);
+  /// Number of eigenvalues of K − μ M below zero; -1 when the factorization breaks down.
+  static int count_below(const SparseMatrix& stiffness, const SparseMatrix& mass, double mu);
+
+  VecX solve(const VecX& f) const { return factor_->solve(f); }
+  long nonzeros() const { return factor_->matrixL().nestedExpression().nonZeros(); }
+
+ private:
+  using Factor = Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<int>>;
+  std::shared_ptr<Factor> factor_;
+};
+
+/// Normal modes: rows of the structure.
+struct NormalModes {
+  VecX squares;         ///< ω² [1/s²], ascending
+  MatX shapes;          ///< (rows × modes)
+  double residual = 0;  ///< largest |K φ − ω² M φ| / |K φ|
+};
+
+class Structure {
+ public:
+  /// `held`: flags of the model's rows. The model must outlive the structure.
+  Structure(const FeModel& model, const std::vector<char>& held);
+
+  int size() const { return static_cast<int>(rows_.size()); }
+  const std::vector<int>& rows() const { return rows_; }              ///< of the model
+  int position(int model_row) const { return position_[model_row]; }  ///< −1: held
+  const SparseMatrix& stiffness() const { return stiffness_; }
+  const SparseMatrix& mass() const { return mass_; }
+  int rigid_count() const { return static_cast<int>(rigid_.cols()); }
+  const MatX& rigid() const { return rigid_; }  ///< X_R
+  /// Largest strain of the softest combination that is not rigid, relative; small: nearly free.
+  double softest() const { return softest_; }
+
+  MatX balanced(MatX loads) const { return loads - mass_rigid_ * (rigid_.transpose() * loads); }
+  MatX without_rigid(MatX shapes) const {
+    return shapes - rigid_ * (mass_rigid_.transpose() * shapes);
+  }
+  /// K x = f; for a free body f must be balanced, and rows of a determinate set stay at zero.
+  VecX solve(const VecX& f);
+  MatX solve_all(const MatX& loads);
+  /// The lowest elastic modes.
+  NormalModes modes(int count, const ReductionProgress& progress);
+  /// Number of elastic modes with ω² below `square`.
+  int count_modes_below(double square) const;
+  long factor_nonzeros() const { return factor_ ? factor_->nonzeros() : 0; }
+
+  /// Shapes of this structure as shapes of the model: held rows are zero.
+  MatX embedded(const MatX& shapes) const;
+  MatX restricted(const MatX& model_shapes) const;
+
+ private:
+  void find_rigid_motions();
+  void hold_determinate_set();
+  void factor();
+  NormalModes dense_modes(int count) const;
+  NormalModes lanczos_modes(int count, const ReductionProgress& progress);
+  void finish(NormalModes& modes) const;
+
+  const FeModel& model_;
+  std::vector<int> rows_, position_;
+  SparseMatrix stiffness_, mass_;
+  MatX rigid_, mass_rigid_;
+  double softest_ = 1;
+  std::vector<int> kept_;  ///< rows outside the determinate set
+  std::unique_ptr<SparseFactor> factor_;
+};
+
+/// The rows and columns of `matrix` that are listed.
+SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<int>& rows,
+                       const std::vector<int>& columns);
+
+}  // namespace mbcosim

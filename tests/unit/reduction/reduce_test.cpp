@@ -1,0 +1,319 @@
+#include "reduction/reduce.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "fe_models.h"
+#include "reduction/structure.h"
+
+namespace mbcosim {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr double kTwoPi = 2 * std::numbers::pi;
+
+/// Options for a basis with consistent mass.
+ReductionOptions options_of(ReductionBasis basis, int modes,
+                            std::vector<std::string> interface_nodes = {}) {
+  ReductionOptions o;
+  o.basis = basis;
+  o.modes = modes;
+  o.interface_nodes = std::move(interface_nodes);
+  o.inertia = ReductionInertia::rigid;
+  return o;
+}
+
+Reduction reduced(const FeModel& model, const ReductionOptions& options) {
+  auto r = reduce(model, options);
+  if (!r) throw std::runtime_error(r.error().message);
+  return std::move(*r);
+}
+
+std::string refusal(const FeModel& model, const ReductionOptions& options) {
+  const auto r = reduce(model, options);
+  return r ? "accepted" : r.error().message;
+}
+
+/// Angular frequencies of the reduced body against `expected`.
+void expect_omegas(const Reduction& r, const std::vector<double>& expected, double tolerance) {
+  ASSERT_GE(r.report.frequencies.size(), expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    EXPECT_NEAR(kTwoPi * r.report.frequencies[k] / expected[k], 1, tolerance) << "mode " << k + 1;
+}
+
+FeModel clamped(FeModel model, const std::string& label) {
+  for (const int row : model.rows_of(model.node(label))) model.supported[row] = 1;
+  return model;
+}
+
+// ------------------------------------------------------------------------------------------------
+// chains: closed forms
+
+TEST(ReduceChain, FreeModes) {
+  const Reduction r = reduced(spring_chain(5), options_of(ReductionBasis::free_modes, 4));
+  EXPECT_EQ(r.report.rigid_motions, 1);
+  expect_omegas(r, {6.180339887, 11.75570505, 16.18033989, 19.02113033}, 1e-9);
+}
+
+TEST(ReduceChain, ConstrainedModes) {
+  const Reduction r =
+      reduced(clamped(spring_chain(5), "1"), options_of(ReductionBasis::constrained_modes, 4));
+  expect_omegas(r, {3.472963553, 10, 15.32088886, 18.79385242}, 1e-9);
+}
+
+TEST(ReduceChain, CraigBamptonConvergesFromAbove) {
+  const FeModel chain = spring_chain(5, 100);
+  const std::vector<std::vector<double>> known = {
+      {2.961240237, 9.551494975},
+      {2.848105152, 8.636653469, 13.62583791},
+      {2.846733147, 8.308494525, 13.26731315, 16.88817266},
+      {2.846296766, 8.308300260, 13.09721468, 16.82507066, 19.18985947}};
+  for (int n = 0; n < 4; ++n)
+    expect_omegas(reduced(chain, options_of(ReductionBasis::craig_bampton, n, {"1", "5"})),
+                  known[n], 1e-9);
+}
+
+TEST(ReduceChain, ComplementShapesAreTheFlexibility) {
+  ReductionOptions o = options_of(ReductionBasis::complement, 0, {"1", "5"});
+  o.diagonalize = false;
+  const Reduction r = reduced(spring_chain(5, 100), o);
+  for (int n = 0; n < 5; ++n) {
+    EXPECT_NEAR(r.data.shapes(6 * n, 0), 0.01, 1e-14);
+    EXPECT_NEAR(r.data.shapes(6 * n, 1), 0.01 * (n + 1), 1e-14);
+  }
+  EXPECT_LT(r.report.static_error, 1e-12);
+  expect_omegas(reduced(spring_chain(5, 100), options_of(ReductionBasis::complement, 2, {"5"})),
+                {2.846296766, 8.308300260, 13.91455950}, 1e-9);
+}
+
+TEST(ReduceChain, ReliefAndDecoupling) {
+  ReductionOptions o = options_of(ReductionBasis::inertia_decoupling, 0, {"1", "5"});
+  o.diagonalize = false;
+  const Reduction r = reduced(spring_chain(5), o);
+  const double column[] = {.012, .004, -.002, -.006, -.008};
+  for (int n = 0; n < 5; ++n) {
+    EXPECT_NEAR(r.data.shapes(6 * n, 0), column[n], 1e-14);
+    EXPECT_NEAR(r.data.shapes(6 * n, 1), column[4 - n], 1e-14);
+  }
+  for (const auto basis : {ReductionBasis::inertia_relief, ReductionBasis::inertia_decoupling})
+    expect_omegas(reduced(spring_chain(5), options_of(basis, 0, {"1", "5"})),
+                  {6.324555320, 11.95228609}, 1e-9);
+}
+
+// ------------------------------------------------------------------------------------------------
+// beams and plates: known frequencies
+
+TEST(ReduceBeam, PlanarCantileverAndFree) {
+  const std::vector<std::pair<int, std::vector<double>>> cantilevers = {
+      {4, {3.5161302706, 22.060166308, 62.174892526}},
+      {10, {3.5160182751, 22.035220870, 61.712922975}},
+      {20, {3.5160154528, 22.034537783, 61.698224323}}};
+  for (const auto& [elements, omegas] : cantilevers)
+    expect_omegas(reduced(clamped(planar_beam(elements), "1"),
+                          options_of(ReductionBasis::constrained_modes, 3)),
+                  omegas, 1e-8);  // the spectrum spans 1e7
+  expect_omegas(reduced(planar_beam(20), options_of(ReductionBasis::free_modes, 2)),
+                {22.373333670, 61.673825465}, 1e-9);
+}
+
+TEST(ReduceBeam, SpaceBeamInAllBases) {
+  const FeModel beam = space_beam();
+  const auto omegas = [&](const FeModel& model, ReductionOptions o,
+                          const std::vector<double>& known) {
+    o.inertia = ReductionInertia::lumped;
+    const Reduction r = reduced(model, o);
+    expect_omegas(r, known, 2e-9);
+    return r.report;
+  };
+  omegas(beam, options_of(ReductionBasis::free_modes, 6),
+         {43.19176580, 52.89889365, 98.70876272, 114.4368738, 140.1559743, 193.6242031});
+  ReductionOptions attached = options_of(ReductionBasis::constrained_modes, 6);
+  attached.frame = ReductionFrame::node;
+  attached.frame_node = "1";
+  omegas(beam, attached,
+         {7.119396478, 8.719444324, 43.62055183, 49.59318611, 53.42404715, 119.3320639});
+  attached = options_of(ReductionBasis::craig_bampton, 4, {"9"});
+  attached.frame = ReductionFrame::node;
+  attached.frame_node = "1";
+  omegas(beam, attached,
+         {7.119795307, 8.722369232, 43.65565512, 49.79304885, 53.57937952, 119.4436728});
+  EXPECT_LT(reduced(beam, attached).report.static_error, 1e-9);
+  const ReductionReport both =
+      omegas(beam, options_of(ReductionBasis::craig_bampton, 4, {"1", "9"}),
+             {43.30258341, 53.03461695, 107.8719780, 114.6045129});
+  EXPECT_EQ(both.removed_shapes, 6);
+  EXPECT_GT(both.static_error, 0.1);  // inertia loads the inside, which four modes carry in part
+  attached = options_of(ReductionBasis::complement, 4, {"9"});
+  attached.interface_components["9"] = "23";
+  attached.frame = ReductionFrame::node;
+  attached.frame_node = "1";
+  omegas(beam, attached,
+         {7.119396478, 8.719444324, 43.62055183, 49.59318611, 56.64654879, 130.2785504});
+  ReductionOptions ends = options_of(ReductionBasis::inertia_decoupling, 4, {"1", "9"});
+  ends.interface_components = {{"1", "23"}, {"9", "23"}};
+  omegas(beam, ends,
+         {43.19176580, 52.89889365, 98.70876272, 114.4368738, 143.6485617, 222.0448285, 271.9482650,
+          353.0358811});
+}
+
+TEST(ReduceBeam, RigidInertiaAndMeanAxes) {
+  ReductionOptions o = options_of(ReductionBasis::inertia_decoupling, 2, {"9"});
+  o.interface_components["9"] = "3";
+  o.inertia = ReductionInertia::both;
+  o.diagonalize = false;
+  const Reduction r = reduced(space_beam(), o);
+  EXPECT_NEAR(r.data.rigid->mass, 3, 1e-12);
+  EXPECT_NEAR(
+      (r.data.rigid->inertia - Vec3(0.04, 1.036057692, 1.036057692).asDiagonal().toDenseMatrix())
+          .norm(),
+      0, 1e-8);
+  EXPECT_NEAR(r.data.shapes(6 * 8 + 2, 0), 7.287352961e-4, 1e-12);
+  EXPECT_NEAR(r.data.shapes(6 * 4 + 2, 0), -3.792317708e-4, 1e-12);
+  EXPECT_NEAR(r.data.shapes(2, 0), 5.700928289e-4, 1e-12);
+  const MatX& lumped = *r.data.lumped;
+  for (int j = 0; j < r.data.mode_count(); ++j) {  // Inv3 = Inv4 = 0
+    Vec3 momentum = Vec3::Zero(), moment = Vec3::Zero();
+    for (int n = 0; n < 9; ++n) {
+      const Vec3 u = r.data.shapes.block<3, 1>(6 * n, j),
+                 v = r.data.shapes.block<3, 1>(6 * n + 3, j);
+      momentum += lumped(0, n) * u;
+      moment += lumped(0, n) * Vec3(r.data.positions.col(n)).cross(u) +
+                Vec3(lumped.block<3, 1>(3, n)).cwiseProduct(v);
+    }
+    EXPECT_LT(momentum.norm(), 1e-12);
+    EXPECT_LT(moment.norm(), 1e-12);
+  }
+}
+
+TEST(ReducePlate, SimplySupported) {
+  const double a = 1.5, b = 1;
+  const Reduction r =
+      reduced(plate(a, b, 24, 16, true), options_of(ReductionBasis::constrained_modes, 4));
+  std::vector<double> exact;
+  for (int m = 1; m < 4; ++m)
+    for (int n = 1; n < 4; ++n)
+      exact.push_back(std::pow(std::numbers::pi, 2) * (m * m / (a * a) + n * n / (b * b)));
+  std::sort(exact.begin(), exact.end());
+  exact.resize(4);
+  expect_omegas(r, exact, 5e-3);  // the element converges from below with the square of its size
+  for (int k = 0; k < 4; ++k) EXPECT_LT(kTwoPi * r.report.frequencies[k], exact[k]);
+}
+
+TEST(ReducePlate, LanczosFindsDoubleModes) {  // a square plate has pairs of equal frequencies
+  const FeModel square = plate(1, 1, 12, 12, true);
+  Structure structure(square, square.supported);
+  const NormalModes modes = structure.modes(8, {});
+  ASSERT_GT(structure.size(), 400);
+  EXPECT_NEAR(modes.squares(1) / modes.squares(2), 1, 1e-9);
+  EXPECT_NEAR(modes.squares(6) / modes.squares(7), 1, 1e-9);
+  EXPECT_EQ(structure.count_modes_below(1.001 * modes.squares(7)), 8);
+  EXPECT_LT(modes.residual, 1e-8);
+  const MatX gram = modes.shapes.transpose() * (structure.mass() * modes.shapes);
+  EXPECT_LT((gram - MatX::Identity(8, 8)).norm(), 1e-8);
+}
+
+TEST(ReducePlate, FreePlateHasThreeRigidMotionsOutOfPlane) {
+  const Reduction r =
+      reduced(plate(1, 1, 12, 12, false), options_of(ReductionBasis::free_modes, 3));
+  EXPECT_EQ(r.report.rigid_motions, 3);
+  // Leissa: ω a² √(ρh/D) = 13.489, 19.789, 24.432 for ν = 0.3
+  expect_omegas(r, {13.468, 19.596, 24.270}, 1e-2);
+}
+
+TEST(ReduceModes, HighestFrequencyInsteadOfANumber) {
+  ReductionOptions o = options_of(ReductionBasis::free_modes, 0);
+  o.max_frequency = 100 / kTwoPi;
+  EXPECT_EQ(reduced(space_beam(), o).report.normal_modes, 3);
+}
+
+TEST(ReduceModes, EffectiveMassesAddUpToTheMass) {
+  const Reduction r =
+      reduced(clamped(spring_chain(5), "1"), options_of(ReductionBasis::constrained_modes, 4));
+  EXPECT_NEAR(r.report.effective_masses.row(0).sum(), 4, 1e-10);  // all but the held one
+}
+
+// ------------------------------------------------------------------------------------------------
+// refusals
+
+TEST(ReduceRefusals, MechanismsAreNamed) {
+  EXPECT_THAT(refusal(space_beam(0), options_of(ReductionBasis::free_modes, 4)),
+              AllOf(HasSubstr("singular or not positive definite at node "), HasSubstr(", rx")));
+}
+
+TEST(ReduceRefusals, WhatDoesNotFit) {
+  const FeModel beam = space_beam();
+  EXPECT_THAT(refusal(beam, options_of(ReductionBasis::craig_bampton, 4, {"77"})),
+              HasSubstr("the model has no node 77"));
+  EXPECT_THAT(refusal(beam, options_of(ReductionBasis::craig_bampton, 4)),
+              HasSubstr("needs interface nodes"));
+  EXPECT_THAT(refusal(beam, options_of(ReductionBasis::constrained_modes, 4)),
+              HasSubstr("6 rigid motions"));
+  EXPECT_THAT(refusal(beam, options_of(ReductionBasis::complement, 4, {"9"})),
+              HasSubstr("use inertia relief"));
+  ReductionOptions o = options_of(ReductionBasis::free_modes, 4);
+  o.frame = ReductionFrame::point;
+  EXPECT_THAT(refusal(beam, o), HasSubstr("choose mean axes"));
+  o = options_of(ReductionBasis::free_modes, 60);
+  EXPECT_THAT(refusal(beam, o), HasSubstr("60 normal modes asked for, the model has 48"));
+  o = options_of(ReductionBasis::free_modes, 4);
+  o.inertia = ReductionInertia::lumped;
+  o.exposed = {"1", "9"};
+  EXPECT_THAT(refusal(beam, o), HasSubstr("choose rigid inertia"));
+  EXPECT_THAT(refusal(clamped(beam, "1"), options_of(ReductionBasis::inertia_decoupling, 4, {"9"})),
+              HasSubstr("this one is supported"));
+}
+
+TEST(ReduceRefusals, StopsWhenAsked) {
+  const auto r = reduce(space_beam(), options_of(ReductionBasis::free_modes, 4),
+                        [](const std::string&, double) { return false; });
+  ASSERT_FALSE(r);
+  EXPECT_EQ(r.error().kind, ErrorKind::cancelled);
+}
+
+// ------------------------------------------------------------------------------------------------
+// input files
+
+std::string model_refusal(const FeModelFiles& files) {
+  try {
+    make_fe_model(files);
+  } catch (const ReductionError& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+TEST(FeModelFilesTest, RoundTripAndRefusals) {
+  const FeModel chain = spring_chain(3, 100);
+  FeModelFiles files{write_matrix_market(chain.mass), write_matrix_market(chain.stiffness),
+                     "label,x,y,z\na,0,0,0\nb,1,0,0  # middle\nc,2,0,0\n", "a,1\nb,1\nc,1\n", ""};
+  const FeModel again = make_fe_model(files);
+  EXPECT_EQ((again.stiffness - chain.stiffness).norm(), 0);
+  EXPECT_EQ(again.dof_text(2), "node c, ux");
+  FeModelFiles bad = files;
+  bad.dofs = "";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("6 rows for each of 3 nodes make 18"));
+  bad = files;
+  bad.nodes += "b,1,1,1\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("nodes:5: node b is there twice"));
+  bad = files;
+  bad.supports = "z,123\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("there is no node z"));
+  bad = files;
+  bad.mass = "%%MatrixMarket matrix coordinate real general\n2 2 2\n1 2 1.\n2 1 3.\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("not symmetric"));
+  bad.mass = "%%MatrixMarket matrix coordinate real symmetric\n2 3 1\n1 1 1.\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("not square"));
+  bad.mass = "%%MatrixMarket matrix coordinate real symmetric\n9 9 999999999999\n1 1 1.\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("too short"));
+  bad.mass = "%%MatrixMarket matrix coordinate real symmetric\n2 2 1\n1 1 nan\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("not finite"));
+  bad.mass = "%%MatrixMarket matrix coordinate real symmetric\n2 2 1\n3 1 1.\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("mass:3: entry (3, 1) lies outside"));
+}
+
+}  // namespace
+}  // namespace mbcosim

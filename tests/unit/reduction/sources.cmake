@@ -1,0 +1,1 @@
+set(SOURCES reduce_test.cpp)
