@@ -54,6 +54,9 @@ int run(const RunOptions& options) {
   std::fputs(report.printed.c_str(), stdout);
   print_diagnostics(report.diagnostics, stderr);
   if (!report.ok()) return exit_code_of(report);
+  for (const StructuralPort& port : report.model->structural_ports)
+    std::fprintf(stderr, "note: nobody is coupled to port \"%s\"; its loads stay zero\n",
+                 port.name.c_str());
 
   const auto writer = make_text_writer(options.prefix.empty() ? options.deck : options.prefix);
   const ExitCode exit_code = simulate(report.model, writer, interrupt.token(), options.quiet);

@@ -1,7 +1,6 @@
 #include "coupling/coupler.h"
 
 #include <algorithm>
-#include <set>
 
 #include "service/refusal.h"
 
@@ -27,21 +26,27 @@ class Stopwatch {
 
 Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
                  const Simulation& simulation) {
-  std::set<std::string> names;
-  std::set<int> written;
-  for (const v1::PortDefinition& definition : ports) {
-    PortModel model(definition, simulation);
-    if (!names.insert(model.name()).second)
-      throw Refusal(v1::REASON_BAD_ARGUMENT, "two ports are named \"" + model.name() + "\"");
-    for (const int handle : model.written()) {
-      if (!written.insert(handle).second)
-        throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + model.name() + "\": variable \"" +
-                                                   simulation.variables()[handle].name +
-                                                   "\" is written twice");
-    }
-    ports_.push_back(std::make_unique<Port>(std::move(model)));
-    lines_.emplace_back().port = ports_.back().get();
+  for (const v1::PortDefinition& definition : ports) add({definition, simulation}, simulation);
+  for (const StructuralPort& port : simulation.model().structural_ports)
+    add({port, simulation}, simulation);
+  for (const StreamInput& stream : simulation.model().stream_inputs) {
+    PortModel model(stream, simulation);
+    const bool taken = written_.count(model.written().front()) > 0;  // by a port of the client
+    if (!taken && !find(model.name())) add(std::move(model), simulation);
   }
+}
+
+void Coupler::add(PortModel model, const Simulation& simulation) {
+  if (find(model.name()))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "two ports are named \"" + model.name() + "\"");
+  for (const int handle : model.written()) {
+    if (!written_.insert(handle).second)
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + model.name() + "\": variable \"" +
+                                                 simulation.variables()[handle].name +
+                                                 "\" is written by another port, too");
+  }
+  ports_.push_back(std::make_unique<Port>(std::move(model)));
+  lines_.emplace_back().port = ports_.back().get();
 }
 
 Port* Coupler::find(const std::string& name) const {
@@ -103,7 +108,8 @@ void Coupler::prepare(const Simulation& simulation) {
     const Agreement now = line.port->agreement();
     if (now.hold != line.agreement.hold) line.history = InputHistory(now.hold);
     line.agreement = now;
-    line.due = !now.is_window() && (step % now.every == 0 || line.history.empty());
+    const bool idle = line.port->is_idle();
+    line.due = !idle && !now.is_window() && (step % now.every == 0 || line.history.empty());
     const bool on_its_way = line.sent_for == step && line.port->is_waiting();
     if (!line.due || on_its_way) continue;
     line.sent_for = -1;
@@ -145,13 +151,12 @@ void Coupler::finish(const Simulation& simulation) {
 
 // ------------------------------------------------------------------ window ports
 
-void Coupler::start_passes() {
+void Coupler::start_passes(const Simulation& simulation) {
   for (Line& line : lines_) {
     if (!line.agreement.is_window()) continue;
     line.fixed_point = FixedPoint(line.agreement.acceleration, line.agreement.relaxation);
     line.fixed_point.start();
-    if (line.interface.size() != line.port->model().answer_size())
-      line.interface = Eigen::VectorXd::Zero(line.port->model().answer_size());
+    line.interface = line.port->model().applied(simulation);
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,7 @@ class Coupler {
   void reset();
 
   // --- window ports
-  void start_passes();
+  void start_passes(const Simulation& simulation);
   void apply_window(Simulation& simulation) const;
   /// One exchange at the end of a pass. True: all interfaces agree. Throws PeerLost.
   bool exchange_window(const Simulation& simulation, int pass, const CancelToken& cancel);
@@ -58,11 +59,13 @@ class Coupler {
     FixedPoint fixed_point{v1::ACCELERATION_NONE, 1};
     Eigen::VectorXd interface;  ///< window: values applied
   };
+  void add(PortModel model, const Simulation& simulation);
   void fill(Line& line, const Simulation& simulation, double target_time, int iteration);
   void take_answer(Line& line, const CancelToken& cancel);
   bool step_window(Line& line, const CancelToken& cancel);
 
   std::vector<std::unique_ptr<Port>> ports_;
+  std::set<int> written_;  ///< handles that ports write
   std::vector<Line> lines_;
   double target_time_ = 0;  ///< end of the step [s]
   double waited_ = 0;

@@ -101,6 +101,11 @@ bool Port::has_peer() const {
   return link_ != nullptr;
 }
 
+bool Port::is_idle() const {
+  std::lock_guard guard(mutex_);
+  return model_.layout().optional() && agreement_.generation == 0;
+}
+
 bool Port::is_waiting() const {
   std::lock_guard guard(mutex_);
   return awaited_;
@@ -116,7 +121,8 @@ void Port::await_peer(const CancelToken& cancel) {
   std::unique_lock guard(mutex_);
   const bool patient =
       agreement_.policy == v1::PEER_POLICY_WAIT || agreement_.policy == v1::PEER_POLICY_FAIL_STEP;
-  if (link_ || !patient) return;
+  const bool idle = model_.layout().optional() && agreement_.generation == 0;
+  if (link_ || !patient || idle) return;
   const bool forever = agreement_.policy == v1::PEER_POLICY_WAIT;
   const Clock::time_point deadline = Clock::now() + (forever ? kLongestWait : agreement_.timeout);
   waiting_since_ = Clock::now();

@@ -50,6 +50,8 @@ class Port {
   // --- the session's thread, in this order within a step
   Agreement agreement() const;
   bool has_peer() const;
+  /// Optional, and nobody has attached so far: the port takes no part in steps.
+  bool is_idle() const;
   /// Waits until a peer is attached, as long as the policy says.
   void await_peer(const CancelToken& cancel);
   /// Sends what `model().fill` put into `message` for the peer of this handshake. Does not throw:

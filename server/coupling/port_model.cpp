@@ -1,6 +1,7 @@
 #include "coupling/port_model.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "service/refusal.h"
@@ -61,6 +62,28 @@ void put_rotation(const Mat3& R, v1::RotationForm form, Numbers* out) {
 Vec3 triple(const Numbers& numbers, std::size_t i) {
   return Vec3(numbers.Get(static_cast<int>(3 * i)), numbers.Get(static_cast<int>(3 * i + 1)),
               numbers.Get(static_cast<int>(3 * i + 2)));
+}
+
+v1::CouplingMode to_mode(PortCoupling coupling) {
+  switch (coupling) {
+    case PortCoupling::staggered:
+      return v1::COUPLING_MODE_STAGGERED;
+    case PortCoupling::tight:
+      return v1::COUPLING_MODE_WINDOW;  // the implicit mode that is served
+    default:
+      return v1::COUPLING_MODE_LOOSE;
+  }
+}
+
+v1::RotationForm to_form(OrientationDescription description) {
+  switch (description) {
+    case OrientationDescription::vector:
+      return v1::ROTATION_FORM_VECTOR;
+    case OrientationDescription::euler123:
+      return v1::ROTATION_FORM_EULER_123;
+    default:
+      return v1::ROTATION_FORM_MATRIX;
+  }
 }
 
 std::string check_array(const char* name, const Numbers& numbers, std::size_t size,
@@ -127,12 +150,53 @@ void PortModel::make_structural(const v1::PortDefinition& definition,
     points_.push_back(point);
     layout_.add_node_labels(definition.node_labels(i));
   }
-  if (definition.has_reference_node_label()) {
-    has_reference_ = true;
-    reference_ = find_point(simulation, definition.reference_node_label());
-    layout_.set_reference_node_label(definition.reference_node_label());
-  }
+  *layout_.mutable_point_labels() = layout_.node_labels();
+  if (definition.has_reference_node_label())
+    make_reference(simulation, definition.reference_node_label());
+  for (const Point& point : points_)
+    if (std::find(written_.begin(), written_.end(), point.load) == written_.end())
+      written_.push_back(point.load);
   answer_size_ = 6 * n;
+}
+
+void PortModel::make_reference(const Simulation& simulation, int label) {
+  has_reference_ = true;
+  reference_ = find_point(simulation, label);
+  layout_.set_reference_node_label(label);
+}
+
+PortModel::PortModel(const StructuralPort& port, const Simulation& simulation) {
+  const auto label_of = [&](int node) { return simulation.model().structural[node].label; };
+  layout_.set_name(port.name);
+  layout_.set_kind(v1::PORT_KIND_STRUCTURAL);
+  layout_.set_from_deck(true);
+  layout_.set_default_mode(to_mode(port.coupling));
+  layout_.set_default_rotation_form(to_form(port.orientation));
+  layout_.set_default_frame(port.reference < 0 ? v1::PORT_FRAME_GLOBAL : v1::PORT_FRAME_REFERENCE);
+  layout_.set_reference_loads(port.use_reference_loads);
+  for (int k = 0; k < port.points(); ++k) {
+    points_.push_back(find_point(simulation, label_of(port.nodes[k])));
+    points_.back().offset = port.offsets[k];
+    layout_.add_node_labels(label_of(port.nodes[k]));
+    layout_.add_point_labels(port.point_labels[k]);
+  }
+  if (port.reference >= 0) make_reference(simulation, label_of(port.reference));
+  needs_accelerations_ = port.accelerations;
+  deck_loads_ = handle_of(simulation, "port." + port.name + ".loads");
+  written_.push_back(deck_loads_);
+  answer_size_ = port.load_size();
+}
+
+PortModel::PortModel(const StreamInput& stream, const Simulation& simulation) {
+  v1::PortDefinition definition;
+  definition.set_name(stream.name);
+  definition.set_kind(v1::PORT_KIND_SIGNAL);
+  definition.add_input_variables("stream." + stream.name);
+  layout_.set_name(stream.name);
+  layout_.set_kind(v1::PORT_KIND_SIGNAL);
+  layout_.set_from_deck(true);
+  layout_.set_optional(true);
+  make_signal(definition, simulation);
 }
 
 void PortModel::make_signal(const v1::PortDefinition& definition, const Simulation& simulation) {
@@ -151,6 +215,7 @@ void PortModel::make_signal(const v1::PortDefinition& definition, const Simulati
       throw Refusal(v1::REASON_NOT_WRITABLE,
                     "port \"" + name() + "\": variable \"" + variable + "\" cannot be written");
     inputs_.push_back(handle);
+    written_.push_back(handle);
     answer_size_ += variables[handle].size;
     layout_.add_input_names(variable);
     layout_.add_input_units(variables[handle].unit);
@@ -163,12 +228,6 @@ bool PortModel::offers_accelerations() const {
   for (const Point& point : points_)
     if (point.a < 0 || point.wp < 0) return false;
   return !has_reference_ || (reference_.a >= 0 && reference_.wp >= 0);
-}
-
-std::vector<int> PortModel::written() const {
-  std::vector<int> handles = inputs_;
-  for (const Point& point : points_) handles.push_back(point.load);
-  return handles;
 }
 
 PortModel::Motion PortModel::motion(const Simulation& simulation, const Point& point) const {
@@ -233,7 +292,7 @@ std::string PortModel::decode(const v1::PeerExchange& in, const Agreement& agree
   const bool structural = !points_.empty();
   const std::size_t vectors = 3 * points_.size();
   std::string wrong = check_array("forces_n", in.forces_n(), vectors, !structural);
-  if (wrong.empty()) wrong = check_array("moments_nm", in.moments_nm(), vectors, true);
+  if (wrong.empty()) wrong = check_loads(in);
   const std::size_t signals = structural ? 0 : static_cast<std::size_t>(answer_size_);
   if (wrong.empty()) wrong = check_array("signals", in.signals(), signals, false);
   if (!wrong.empty()) return wrong;
@@ -242,26 +301,69 @@ std::string PortModel::decode(const v1::PeerExchange& in, const Agreement& agree
   return "";
 }
 
+std::string PortModel::check_loads(const v1::PeerExchange& in) const {
+  std::string wrong = check_array("moments_nm", in.moments_nm(), 3 * points_.size(), true);
+  const std::size_t reference = layout_.reference_loads() ? 3 : 0;
+  if (wrong.empty())
+    wrong = check_array("reference_force_n", in.reference_force_n(), reference, false);
+  if (wrong.empty())
+    wrong = check_array("reference_moment_nm", in.reference_moment_nm(), reference, false);
+  return wrong;
+}
+
+// The moment about the node when the node takes the load; about the point when the deck's element
+// does.
 void PortModel::decode_loads(const v1::PeerExchange& in, const Agreement& agreement,
                              std::vector<double>* answer) const {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Mat3 turn = to_global(agreement, i);
     const Vec3 force = turn * triple(in.forces_n(), i);
-    Vec3 moment = sent_[i].arm.cross(force);
+    Vec3 moment = Vec3::Zero();
+    if (deck_loads_ < 0) moment = sent_[i].arm.cross(force);
     if (!in.moments_nm().empty()) moment += turn * triple(in.moments_nm(), i);
     answer->insert(answer->end(), force.data(), force.data() + 3);
     answer->insert(answer->end(), moment.data(), moment.data() + 3);
   }
+  if (!layout_.reference_loads()) return;
+  Mat3 turn = Mat3::Identity();
+  if (agreement.frame != v1::PORT_FRAME_GLOBAL) turn = sent_reference_.R;
+  for (const Vec3& v : {triple(in.reference_force_n(), 0), triple(in.reference_moment_nm(), 0)}) {
+    const Vec3 global = turn * v;
+    answer->insert(answer->end(), global.data(), global.data() + 3);
+  }
+}
+
+// Several points of one node: their sum.
+std::vector<double> PortModel::node_loads(const std::vector<double>& answer) const {
+  std::vector<double> loads(6 * written_.size(), 0.0);
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    const auto target = std::find(written_.begin(), written_.end(), points_[k].load);
+    double* load = &loads[6 * static_cast<std::size_t>(target - written_.begin())];
+    for (std::size_t i = 0; i < 6; ++i) load[i] += answer[6 * k + i];
+  }
+  return loads;
 }
 
 void PortModel::apply(const std::vector<double>& answer, Simulation& simulation) const {
-  const double* value = answer.data();
-  for (const int handle : written()) {
+  const bool to_nodes = !points_.empty() && deck_loads_ < 0;
+  const std::vector<double> loads = to_nodes ? node_loads(answer) : std::vector<double>();
+  const double* value = to_nodes ? loads.data() : answer.data();
+  for (const int handle : written_) {
     const auto size = static_cast<std::size_t>(simulation.variables()[handle].size);
     const auto status = simulation.set(handle, {value, size});
     if (!status) throw Refusal(status.error());
     value += size;
   }
+}
+
+// Part of the state, so that a restored simulation redoes a step from where it started the first
+// time.
+Eigen::VectorXd PortModel::applied(const Simulation& simulation) const {
+  std::vector<double> values;
+  for (const int handle : written_) simulation.get(handle, values);
+  if (static_cast<int>(values.size()) != answer_size_)  // several points of one node
+    return Eigen::VectorXd::Zero(answer_size_);
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), answer_size_);
 }
 
 }  // namespace mbcosim::server

@@ -17,14 +17,21 @@ class PortModel {
  public:
   /// Resolves labels and names. Throws Refusal that names what does not exist.
   PortModel(const v1::PortDefinition& definition, const Simulation& simulation);
+  /// A port of the deck. Its loads are held by an element, which turns their arms with the nodes.
+  PortModel(const StructuralPort& port, const Simulation& simulation);
+  /// A stream of the deck: nothing out, its values in. Optional: without a peer it holds its
+  /// values.
+  PortModel(const StreamInput& stream, const Simulation& simulation);
 
   const std::string& name() const { return layout_.name(); }
   const v1::PortLayout& layout() const { return layout_; }
   bool offers_accelerations() const;
+  /// Does the deck want accelerations sent whatever the peer says?
+  bool needs_accelerations() const { return needs_accelerations_; }
   /// Numbers in an answer: 6 for each node, or the inputs' sizes.
   int answer_size() const { return answer_size_; }
   /// Handles that the port writes.
-  std::vector<int> written() const;
+  const std::vector<int>& written() const { return written_; }
 
   /// Motion or signals at the simulation's state. Keeps what is needed to decode the answer.
   void fill(const Simulation& simulation, const Agreement& agreement, v1::ServerExchange* out);
@@ -32,6 +39,8 @@ class PortModel {
   std::string decode(const v1::PeerExchange& in, const Agreement& agreement,
                      std::vector<double>* answer) const;
   void apply(const std::vector<double>& answer, Simulation& simulation) const;
+  /// The answer that is in force at the simulation's state, where that can be told; else zero.
+  Eigen::VectorXd applied(const Simulation& simulation) const;
 
  private:
   struct Point {
@@ -51,12 +60,16 @@ class PortModel {
   void decode_loads(const v1::PeerExchange& in, const Agreement& agreement,
                     std::vector<double>* answer) const;
   Mat3 to_global(const Agreement& agreement, std::size_t point) const;
+  std::string check_loads(const v1::PeerExchange& in) const;
+  void make_reference(const Simulation& simulation, int label);
+  std::vector<double> node_loads(const std::vector<double>& answer) const;
 
   v1::PortLayout layout_;
   std::vector<Point> points_;
-  std::vector<int> outputs_, inputs_;
+  std::vector<int> outputs_, inputs_, written_;
   int answer_size_ = 0;
-  bool has_reference_ = false;
+  int deck_loads_ = -1;  ///< handle of a deck's port; negative: loads go to the nodes
+  bool has_reference_ = false, needs_accelerations_ = false;
   Point reference_{};
   std::vector<Motion> sent_;  ///< global, of the last `fill`
   Motion sent_reference_{};

@@ -83,10 +83,12 @@ Agreement agree(const v1::Hello& hello, const Port& port, const Model& model) {
   mismatches.refuse_if_any(hello.port());
 
   Agreement agreement;
-  agreement.rotation_form = chosen(hello.rotation_form(), agreement.rotation_form);
-  agreement.frame = chosen(hello.frame(), agreement.frame);
-  agreement.accelerations = hello.accelerations();
-  agreement.mode = chosen(hello.mode(), agreement.mode);
+  const v1::PortLayout& layout = port.model().layout();
+  agreement.rotation_form = chosen(hello.rotation_form(),
+                                   chosen(layout.default_rotation_form(), agreement.rotation_form));
+  agreement.frame = chosen(hello.frame(), chosen(layout.default_frame(), agreement.frame));
+  agreement.accelerations = hello.accelerations() || port.model().needs_accelerations();
+  agreement.mode = chosen(hello.mode(), chosen(layout.default_mode(), agreement.mode));
   agreement.every = std::max(hello.every(), 1);
   agreement.hold = chosen(hello.input_hold(), agreement.hold);
   agreement.policy = chosen(hello.policy(), agreement.policy);

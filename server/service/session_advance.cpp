@@ -249,7 +249,7 @@ StepReport Session::run_passes(Advance& advance) {
   const int most = coupler_.maximum_passes();
   int iterations = 0;
   StepReport report;
-  coupler_.start_passes();
+  coupler_.start_passes(*simulation_);
   for (int pass = 1; pass <= most; ++pass) {
     coupler_.apply_window(*simulation_);
     report = attempt_in_slot(advance);

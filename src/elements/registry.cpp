@@ -9,6 +9,7 @@ const Registry& full_registry() {
     register_joints(r);
     register_beams(r);
     register_forces(r);
+    register_external_forces(r);
     register_genels(r);
     register_hydraulics(r);
     register_modal(r);

@@ -20,6 +20,7 @@
 #include "model/node_equations.h"
 #include "model/settings.h"
 #include "model/state.h"
+#include "model/structural_port.h"
 
 namespace mbcosim {
 
@@ -90,6 +91,7 @@ class Model {
   std::vector<std::pair<std::string, std::string>> symbols;
 
   std::vector<StreamInput> stream_inputs;
+  std::vector<StructuralPort> structural_ports;
   /// `default scale` of the rows that each family of elements owns.
   std::array<double, static_cast<int>(Family::count)> family_scale = [] {
     std::array<double, static_cast<int>(Family::count)> a;

@@ -40,6 +40,12 @@ Variables::Variables(const Model& model) {
     add({"stream." + stream.name, stream.channels, {stream.channels}, "", "", Causality::input, "values of the stream", ""},
         {Source::stream, static_cast<int>(k), 0});
   }
+  for (std::size_t k = 0; k < model.structural_ports.size(); ++k) {
+    const StructuralPort& port = model.structural_ports[k];
+    add({"port." + port.name + ".loads", port.load_size(), {port.load_size() / 6, 6}, "N, N m", "global", Causality::input,
+         "force and moment about each point of the port", "port " + port.name},
+        {Source::port_loads, static_cast<int>(k), 0});
+  }
 }
 
 void Variables::add(Variable v, Entry e) {
@@ -149,6 +155,12 @@ void Variables::get(const EvalContext& context, int handle, std::vector<double>&
       out.insert(out.end(), values, values + stream.channels);
       return;
     }
+    case Source::port_loads: {
+      const StructuralPort& port = model.structural_ports[e.index];
+      const double* values = &state.memory[port.memory];
+      out.insert(out.end(), values, values + port.load_size());
+      return;
+    }
     case Source::drive: return out.push_back(model.drives[e.index].drive->value(context));
   }
 }
@@ -175,6 +187,10 @@ Status Variables::set(const Model& model, State& state, int handle, std::span<co
   }
   if (e.source == Source::stream) {
     std::copy(values.begin(), values.end(), state.memory.begin() + model.stream_inputs[e.index].memory);
+    return ok();
+  }
+  if (e.source == Source::port_loads) {
+    std::copy(values.begin(), values.end(), state.memory.begin() + model.structural_ports[e.index].memory);
     return ok();
   }
   if (state.external_loads.empty()) state.external_loads.assign(6 * model.structural.size(), 0.0);

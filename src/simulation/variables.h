@@ -24,10 +24,10 @@ class Variables {
  private:
   enum class Source { time, step, node_position, node_rotation, node_orientation, node_velocity, node_omega, node_acceleration,
                       node_angular_acceleration, momentum, momenta_moment, node_load, scalar_value, scalar_rate, parameter,
-                      element_datum, drive, stream };
+                      element_datum, drive, stream, port_loads };
   struct Entry {
     Source source;
-    int index = 0;   ///< of the node, element, drive or stream
+    int index = 0;   ///< of the node, element, drive, stream or port
     int datum = 0;
   };
   void add(Variable v, Entry e);

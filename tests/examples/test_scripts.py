@@ -44,3 +44,10 @@ def test_shunt_damping(address, tmp_path):
 def test_servo_reaches_its_command(address, tmp_path):
     (stroke, error), = run("servo_beam.py", address, tmp_path)
     assert stroke == pytest.approx(100, abs=0.5) and error < 20
+
+
+def test_coupled_spring(address, tmp_path):
+    """The explicit exchange feeds energy into the swing, the implicit one does not."""
+    (loose, once), (window, passes) = run("coupled_spring.py", address, tmp_path)
+    assert once == 1 and passes > 1.5
+    assert loose > 1.5 * window > 0

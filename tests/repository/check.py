@@ -28,6 +28,7 @@ ARROWS = {
     "server/cli": {"math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/coupling": {"math", "model", "simulation", "service", "mbcosim"},
     "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "mbcosim"},
+    "server/client": {"mbcosim"},
     "server/daemon": {"service", "mbcosim"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",

@@ -54,17 +54,21 @@ def signal_port(name, outputs, inputs):
 
 
 def _enum(kind, prefix, name):
-    return kind.Value(prefix + name.upper())
+    """Value of a choice; None leaves it to the server."""
+    return 0 if name is None else kind.Value(prefix + name.upper())
 
 
 class Peer:
     """An attached peer. A thread of its own calls `answer(Motion)` for each exchange.
 
-    answer returns forces (n x 3), or (forces, moments), or the signals; an exception in it fails the step.
+    answer returns forces (n x 3), or (forces, moments), or the signals; an exception in it fails the step. On a port of the deck
+    with reference loads it returns (forces, moments, force on the reference node, moment on it).
+    mode       "loose", "staggered" or "window"; None: the port's own, "loose" unless its deck says otherwise
+    frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
     After the end `error` has what ended the stream, None when it ended in good order.
     """
 
-    def __init__(self, simulation, port, answer, *, mode="loose", rotation="matrix", frame="global", accelerations=False,
+    def __init__(self, simulation, port, answer, *, mode=None, rotation="matrix", frame=None, accelerations=False,
                  every=1, hold="zero_order", timeout=10.0, policy="fail_step", acceleration="none", relaxation=0.5,
                  tolerance=1e-6, maximum_passes=50, check_model=True):
         hello = pb.Hello(
@@ -88,6 +92,7 @@ class Peer:
         self.error = None
         self.exchanges = 0
         self.accepted = []  # (step, time) of the implicit steps that ended
+        self.rejected = []  # (step, time) to go back to, of those that failed
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
@@ -111,6 +116,8 @@ class Peer:
                     self.exchanges += 1
                 elif message.HasField("accepted"):
                     self.accepted.append((message.accepted.step, message.accepted.time_s))
+                elif message.HasField("rejected"):
+                    self.rejected.append((message.rejected.step, message.rejected.time_s))
         except grpc.RpcError as error:
             self.error = from_rpc_error(error)
 
@@ -119,14 +126,15 @@ class Peer:
         try:
             answer = self._answer(self._motion(exchange))
             if exchange.positions_m:
-                forces, moments = answer if isinstance(answer, tuple) else (answer, None)
-                reply.forces_n.extend(np.ravel(np.asarray(forces, float)))
-                if moments is not None:
-                    reply.moments_nm.extend(np.ravel(np.asarray(moments, float)))
+                answers = answer if isinstance(answer, tuple) else (answer,)
+                fields = (reply.forces_n, reply.moments_nm, reply.reference_force_n, reply.reference_moment_nm)
+                for field, values in zip(fields, answers):
+                    if values is not None:
+                        field.extend(np.ravel(np.asarray(values, float)))
             else:
                 reply.signals.extend(np.ravel(np.asarray(answer, float)))
         except Exception as error:  # whatever the user's code raises becomes a failed step with this text
-            del reply.forces_n[:], reply.moments_nm[:], reply.signals[:]
+            reply = pb.PeerExchange(index=exchange.index)
             reply.failure = f"{type(error).__name__}: {error}"
         return reply
 

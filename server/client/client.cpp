@@ -1,0 +1,232 @@
+#include <grpcpp/client_context.h>
+#include <grpcpp/create_channel.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "client/bundle.h"
+#include "client/connection.h"
+#include "client/peer.h"
+#include "mbcosim/v1/common.pb.h"
+
+namespace mbcosim::client {
+namespace {
+
+constexpr std::size_t kChunkBytes = 1 << 20;
+
+std::string diagnostics_text(const v1::DeckDiagnostics& all) {
+  std::string text;
+  for (const v1::Diagnostic& d : all.diagnostics())
+    text += "\n" + d.file() + ":" + std::to_string(d.line()) + ":" + std::to_string(d.column()) +
+            ": " + d.message();
+  return text;
+}
+
+v1::PortDefinition to_proto(const Port& port) {
+  v1::PortDefinition out;
+  out.set_name(port.name);
+  out.set_kind(port.nodes.empty() ? v1::PORT_KIND_SIGNAL : v1::PORT_KIND_STRUCTURAL);
+  out.mutable_node_labels()->Add(port.nodes.begin(), port.nodes.end());
+  out.mutable_offsets_m()->Add(port.offsets.begin(), port.offsets.end());
+  for (const std::string& name : port.outputs) out.add_output_variables(name);
+  for (const std::string& name : port.inputs) out.add_input_variables(name);
+  return out;
+}
+
+Outcome to_outcome(v1::StepOutcome outcome) {
+  switch (outcome) {
+    case v1::STEP_OUTCOME_FINISHED:
+      return Outcome::finished;
+    case v1::STEP_OUTCOME_NOT_CONVERGED:
+      return Outcome::not_converged;
+    case v1::STEP_OUTCOME_INTERRUPTED:
+      return Outcome::interrupted;
+    case v1::STEP_OUTCOME_PEER_LOST:
+      return Outcome::peer_lost;
+    case v1::STEP_OUTCOME_LIMIT:
+      return Outcome::limit;
+    default:
+      return Outcome::accepted;
+  }
+}
+
+}  // namespace
+
+void require(const grpc::Status& status) {
+  if (status.ok()) return;
+  std::string message = status.error_message(), reason;
+  std::map<std::string, std::string> metadata;
+  v1::ErrorStatus details;
+  details.ParseFromString(status.error_details());
+  for (const google::protobuf::Any& detail : details.details()) {
+    v1::DeckDiagnostics diagnostics;
+    v1::ErrorInfo info;
+    if (detail.UnpackTo(&diagnostics)) message += diagnostics_text(diagnostics);
+    if (detail.type_url().find("google.rpc.ErrorInfo") == std::string::npos) continue;
+    if (!info.ParseFromString(detail.value())) continue;
+    reason = info.reason();
+    metadata = {info.metadata().begin(), info.metadata().end()};
+  }
+  throw Error(message, static_cast<int>(status.error_code()), reason, metadata);
+}
+
+// ------------------------------------------------------------------ Server
+
+Server::Server(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Server::Server(Server&&) noexcept = default;
+Server& Server::operator=(Server&&) noexcept = default;
+Server::~Server() = default;
+
+Server Server::connect(const std::string& address, double timeout) {
+  auto impl = std::make_shared<Impl>();
+  impl->channel = grpc::CreateChannel(address, grpc::InsecureChannelCredentials());
+  impl->simulations = v1::Simulations::NewStub(impl->channel);
+  impl->coupling = v1::Coupling::NewStub(impl->channel);
+  const auto deadline = std::chrono::system_clock::now() +
+                        std::chrono::milliseconds(static_cast<std::int64_t>(timeout * 1000));
+  if (!impl->channel->WaitForConnected(deadline))
+    throw Error("no server answers at " + address, static_cast<int>(grpc::StatusCode::UNAVAILABLE),
+                "", {});
+  return Server(std::move(impl));
+}
+
+std::string Server::version() const {
+  grpc::ClientContext context;
+  v1::ServerInfo info;
+  require(impl_->simulations->GetServerInfo(&context, {}, &info));
+  return info.version();
+}
+
+Simulation Server::load(const std::string& path, const LoadOptions& options) {
+  const std::filesystem::path deck(path);
+  const std::string main = deck.filename().string();
+  return create(main, collect_bundle(deck.parent_path().string(), main), options);
+}
+
+Simulation Server::load_text(const std::string& deck, const LoadOptions& options) {
+  return create("deck", {{"deck", deck}}, options);
+}
+
+// ------------------------------------------------------------------ Simulation
+
+struct Simulation::Impl {
+  std::shared_ptr<Server::Impl> server;
+  v1::SimulationInfo info;
+  std::map<std::string, v1::Variable> variables;
+
+  const v1::Variable& variable(const std::string& name) const {
+    const auto found = variables.find(name);
+    if (found != variables.end()) return found->second;
+    throw Error("the model has no variable \"" + name + "\"", 5, "NO_SUCH_VARIABLE", {});
+  }
+  StepResult advance(const v1::StepRequest& request) {
+    grpc::ClientContext context;
+    v1::StepReply reply;
+    require(server->simulations->Step(&context, request, &reply));
+    StepResult result;
+    result.outcome = to_outcome(reply.outcome());
+    result.steps_done = reply.steps_done();
+    result.step = reply.step();
+    result.time = reply.time_s();
+    result.iterations = reply.iterations();
+    result.solver_seconds = reply.solver_seconds();
+    result.peer_wait_seconds = reply.peer_wait_seconds();
+    result.failure = reply.failure().message();
+    return result;
+  }
+};
+
+Simulation Server::create(const std::string& main, const std::map<std::string, std::string>& files,
+                          const LoadOptions& options) {
+  grpc::ClientContext context;
+  v1::CreateSimulationReply reply;
+  const auto upload = impl_->simulations->CreateSimulation(&context, &reply);
+  v1::UploadRequest message;
+  message.mutable_header()->set_bundle_main_file(main);
+  message.mutable_header()->mutable_options()->set_display_name(options.display_name);
+  for (const Port& port : options.ports)
+    *message.mutable_header()->mutable_options()->add_ports() = to_proto(port);
+  bool open = upload->Write(message);
+  for (const auto& [name, bytes] : files) {
+    for (std::size_t at = 0; open && (at == 0 || at < bytes.size()); at += kChunkBytes) {
+      message.mutable_chunk()->set_path(name);
+      message.mutable_chunk()->set_data(bytes.substr(at, kChunkBytes));
+      open = upload->Write(message);
+    }
+  }
+  upload->WritesDone();
+  require(upload->Finish());
+
+  auto created = std::make_unique<Simulation::Impl>();
+  created->server = impl_;
+  created->info = reply.simulation();
+  grpc::ClientContext describe_context;
+  v1::DescribeSimulationRequest request;
+  request.set_name(created->info.name());
+  v1::ModelDescription description;
+  require(impl_->simulations->DescribeSimulation(&describe_context, request, &description));
+  for (const v1::Variable& variable : description.variables())
+    created->variables[variable.name()] = variable;
+  return Simulation(std::move(created));
+}
+
+Simulation::Simulation(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Simulation::Simulation(Simulation&&) noexcept = default;
+Simulation& Simulation::operator=(Simulation&&) noexcept = default;
+
+Simulation::~Simulation() {
+  if (!impl_) return;
+  grpc::ClientContext context;
+  v1::DeleteSimulationRequest request;
+  request.set_name(impl_->info.name());
+  v1::DeleteSimulationReply reply;
+  impl_->server->simulations->DeleteSimulation(&context, request, &reply);
+}
+
+const std::string& Simulation::name() const { return impl_->info.name(); }
+
+StepResult Simulation::step(std::int64_t count) {
+  v1::StepRequest request;
+  request.set_simulation(name());
+  request.set_steps(count);
+  return impl_->advance(request);
+}
+
+StepResult Simulation::run_until(double time) {
+  v1::StepRequest request;
+  request.set_simulation(name());
+  request.set_until_time_s(time);
+  return impl_->advance(request);
+}
+
+std::vector<double> Simulation::read(const std::string& variable) const {
+  grpc::ClientContext context;
+  v1::ReadVariablesRequest request;
+  request.set_simulation(name());
+  request.add_handles(impl_->variable(variable).handle());
+  v1::ReadVariablesReply reply;
+  require(impl_->server->simulations->ReadVariables(&context, request, &reply));
+  return {reply.values().begin(), reply.values().end()};
+}
+
+void Simulation::write(const std::string& variable, const std::vector<double>& values) {
+  grpc::ClientContext context;
+  v1::WriteVariablesRequest request;
+  request.set_simulation(name());
+  request.mutable_values()->add_handles(impl_->variable(variable).handle());
+  request.mutable_values()->mutable_values()->Add(values.begin(), values.end());
+  v1::WriteVariablesReply reply;
+  require(impl_->server->simulations->WriteVariables(&context, request, &reply));
+}
+
+Peer Simulation::attach(const std::string& port, const PeerOptions& options) {
+  return Peer(attach_peer(impl_->server, make_hello(impl_->info, port, options)));
+}
+
+Peer Simulation::couple(const std::string& port, Answer answer, const PeerOptions& options) {
+  Peer peer = attach(port, options);
+  peer.impl_->serve(std::move(answer));
+  return peer;
+}
+
+}  // namespace mbcosim::client

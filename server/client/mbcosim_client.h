@@ -1,0 +1,178 @@
+/// Client library: drive a simulation on an mbcosim server, and take part in it as a coupled peer.
+/// No gRPC type appears here.
+///
+///   mbcosim::client::Server server =
+///   mbcosim::client::Server::connect("unix:/run/user/1000/mbcosim.sock");
+///   mbcosim::client::Simulation beam = server.load("beam.mbd", {.ports = {{.name = "tip", .nodes =
+///   {2}}}}); mbcosim::client::Peer spring = beam.couple("tip", [](const Motion& m) { return
+///   Loads{…}; }); beam.run_until(1.0);
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace mbcosim::client {
+
+/// A call was refused or failed.
+class Error : public std::runtime_error {
+ public:
+  Error(const std::string& message, int code, std::string reason,
+        std::map<std::string, std::string> metadata)
+      : std::runtime_error(message),
+        code_(code),
+        reason_(std::move(reason)),
+        metadata_(std::move(metadata)) {}
+  int code() const { return code_; }  ///< of the call, as in gRPC: 5 is NOT_FOUND
+  const std::string& reason() const {
+    return reason_;
+  }  ///< "WRONG_STEP", …; empty: the server gave none
+  const std::map<std::string, std::string>& metadata() const { return metadata_; }
+
+ private:
+  int code_;
+  std::string reason_;
+  std::map<std::string, std::string> metadata_;
+};
+
+/// A place where peers attach: points on structural nodes, or variables out and inputs in.
+struct Port {
+  std::string name;
+  std::vector<int> nodes = {};       ///< labels of structural nodes; empty: a signal port
+  std::vector<double> offsets = {};  ///< from the nodes, in their frames [m] (3 × nodes), or empty
+  std::vector<std::string> outputs = {};  ///< variables sent to the peer
+  std::vector<std::string> inputs = {};   ///< inputs that the peer gives
+};
+
+struct LoadOptions {
+  std::string display_name = {};
+  std::vector<Port> ports = {};
+};
+
+enum class Outcome { accepted, finished, not_converged, interrupted, peer_lost, limit };
+
+/// What an advance did. A failure is no exception: the simulation stands at its last accepted step.
+struct StepResult {
+  Outcome outcome = Outcome::accepted;
+  std::int64_t steps_done = 0;
+  std::int64_t step = 0;  ///< number of the last accepted step
+  double time = 0;        ///< its time [s]
+  int iterations = 0;     ///< linear solutions of the last step
+  double solver_seconds = 0, peer_wait_seconds = 0;
+  std::string failure;  ///< empty unless the step failed
+  bool ok() const { return outcome == Outcome::accepted || outcome == Outcome::finished; }
+};
+
+/// What a peer gets: n points, global frame unless agreed otherwise, SI units.
+struct Motion {
+  std::int64_t step = 0;
+  double time = 0;              ///< of the values [s]
+  double target_time = 0;       ///< for which an answer is wanted [s]
+  int iteration = 0;            ///< pass of a window, from 1; 0: explicit
+  std::vector<double> x;        ///< positions [m] (3n)
+  std::vector<double> R;        ///< rotation matrices by rows, node frame to global (9n)
+  std::vector<double> v;        ///< velocities [m/s] (3n)
+  std::vector<double> w;        ///< angular velocities [rad/s] (3n)
+  std::vector<double> signals;  ///< of a signal port
+};
+
+/// What a peer answers.
+struct Loads {
+  std::vector<double> forces = {};   ///< [N] (3n)
+  std::vector<double> moments = {};  ///< about the points [N·m] (3n); empty: zero
+  std::vector<double> signals = {};  ///< of a signal port
+};
+
+enum class Mode { port_default, loose, staggered, window };
+enum class Policy { fail_step, hold_last, zero, wait };
+enum class Acceleration { none, constant, aitken, iqn_ils };
+
+struct PeerOptions {
+  Mode mode = Mode::port_default;
+  int every = 1;        ///< steps between exchanges
+  double timeout = 10;  ///< longest wait for an answer [s]
+  Policy policy = Policy::fail_step;
+  Acceleration acceleration = Acceleration::none;
+  double relaxation = 0.5;
+  double tolerance = 1e-6;  ///< of the interface, relative
+  int maximum_passes = 50;
+};
+
+/// An attached peer. Ends when it is destroyed.
+class Peer {
+ public:
+  struct Impl;  // of the library
+
+  Peer(Peer&&) noexcept;
+  Peer& operator=(Peer&&) noexcept;
+  ~Peer();
+  /// Synchronous use: waits for the next exchange; false: the stream has ended. Answer each with
+  /// `answer` or `fail`.
+  bool next(Motion& motion);
+  void answer(const Loads& loads);
+  /// The peer cannot compute; the step fails with this text.
+  void fail(const std::string& why);
+  std::int64_t exchanges() const;
+  void close();
+
+ private:
+  friend class Simulation;
+  explicit Peer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+using Answer = std::function<Loads(const Motion&)>;
+
+/// A simulation on the server. Deletes it when destroyed. Calls throw Error; one thread at a time.
+class Simulation {
+ public:
+  struct Impl;  // of the library
+
+  Simulation(Simulation&&) noexcept;
+  Simulation& operator=(Simulation&&) noexcept;
+  ~Simulation();
+  const std::string& name() const;  ///< "simulations/4f3a…"
+  StepResult step(std::int64_t count = 1);
+  StepResult run_until(double time);
+  std::vector<double> read(const std::string& variable) const;
+  void write(const std::string& variable, const std::vector<double>& values);
+  /// Attaches a peer that asks for exchanges itself: `Peer::next`. It needs a thread other than the
+  /// one that steps.
+  Peer attach(const std::string& port, const PeerOptions& options = {});
+  /// Attaches a peer whose own thread calls `answer` at each exchange; an exception in it fails the
+  /// step.
+  Peer couple(const std::string& port, Answer answer, const PeerOptions& options = {});
+
+ private:
+  friend class Server;
+  explicit Simulation(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A connection.
+class Server {
+ public:
+  struct Impl;  // of the library
+
+  /// "unix:PATH" or "HOST:PORT"; waits until the server answers, at most `timeout` seconds.
+  static Server connect(const std::string& address, double timeout = 10);
+  Server(Server&&) noexcept;
+  Server& operator=(Server&&) noexcept;
+  ~Server();
+  std::string version() const;
+  /// A deck of this machine, with the files that it names in quotes.
+  Simulation load(const std::string& path, const LoadOptions& options = {});
+  Simulation load_text(const std::string& deck, const LoadOptions& options = {});
+
+ private:
+  explicit Server(std::shared_ptr<Impl> impl);
+  Simulation create(const std::string& main, const std::map<std::string, std::string>& files,
+                    const LoadOptions& options);
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace mbcosim::client

@@ -1,0 +1,19 @@
+"""The C++ client library and its example against a real daemon."""
+import os
+import subprocess
+
+from conftest import BIN
+
+
+def test_the_library(daemon):
+    run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1"], timeout=200, text=True,
+                         env={**os.environ, "MBCOSIM_ADDRESS": daemon.address}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert run.returncode == 0, run.stdout
+
+
+def test_the_example(daemon, tumbling):
+    run = subprocess.run([os.path.join(BIN, "spring_peer"), daemon.address, tumbling, "1", "20"], timeout=60, text=True,
+                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert run.returncode == 0, run.stdout
+    lines = run.stdout.splitlines()
+    assert len(lines) == 3 and lines[0].startswith("  0.1000 s") and lines[2].endswith("exchanges")
