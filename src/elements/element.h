@@ -234,7 +234,7 @@ class Tangent {
   void add_orientation(int row, int k, const Mat3& dtheta) { block(row, col_node(k) + 3) -= dtheta * seeds[k].A; }
 
   int nodes = 0, scalars = 0, owns = 0, rows = 0, columns = 0;
-  double c = 1;
+  double c = 1;  ///< ∂x/∂δ
   NodeSeeds seeds[kMaxNodes];
   double* data = nullptr;  ///< column-major (rows × columns), zero at entry
 };
@@ -424,7 +424,7 @@ class ElementSetOf final : public ElementSet {
     t.owns = s.connection.own_count;
     t.rows = s.row_count;
     t.columns = s.column_count;
-    t.c = context.c;
+    t.c = context.seed;
     for (int k = 0; k < t.nodes; ++k) t.seeds[k] = seeds[s.connection.node[k]];
     t.data = matrix;
     s.element.tangent(u, t);
@@ -578,13 +578,13 @@ class ElementSetOf final : public ElementSet {
     const Connection& c = s.connection;
     const int base = 6 * c.node_count + c.scalar_count;
     for (int i = 0; i < c.own_count; ++i)
-      matrix[(base + i) * s.row_count + base + i] = c.own_differential[i] ? context.c : 1.0;
+      matrix[(base + i) * s.row_count + base + i] = c.own_differential[i] ? context.seed : 1.0;
   }
   /// Values with derivatives with respect to local columns start .. start+width−1.
   template <class D>
   void lift(const Slot& s, const Local<double>& u, const NodeSeeds* seeds, int start, Local<D>& l) const {
     const Connection& c = s.connection;
-    const double cc = u.context->c;
+    const double cc = u.context->seed;
     const auto slot_of = [&](int column) {
       const int j = column - start;
       return j >= 0 && j < D::directions ? j : -1;

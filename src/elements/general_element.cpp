@@ -66,7 +66,7 @@ double GeneralView::rate(int local) const {
 
 double GeneralJacobian::value_factor(int column) const {
   const int k = connection_.columns_[column];
-  return k >= 0 && context_.model->kinds[k] == UnknownKind::algebraic ? 1.0 : context_.c;
+  return k >= 0 && context_.model->kinds[k] == UnknownKind::algebraic ? 1.0 : context_.seed;
 }
 
 double GeneralJacobian::rate_factor(int column) const {

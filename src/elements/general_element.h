@@ -155,7 +155,7 @@ class GeneralJacobian {
   void rate(int row, int column, double dr) { add(row, column, -dr * rate_factor(column)); }
   /// Rows row..row+2, columns column..column+2 of the x (or v of a whole node): given ∂r/∂x, ∂r/∂v.
   void translation(int row, int column, const Mat3& dx, const Mat3& dv) {
-    add3(row, column, -(dx * context_.c + dv));
+    add3(row, column, -(dx * context_.seed + dv));
   }
   /// Columns of the rotation of `structural_node` starting at `column`: given ∂r/∂θ, ∂r/∂w (global
   /// components).

@@ -14,7 +14,8 @@ struct EvalContext {
   const State* state = nullptr;
   double time = 0;  ///< end of the step [s]
   double h = 0;     ///< step length [s]
-  double c = 1;     ///< ∂y/∂ẏ of differential unknowns; position constraint rows are divided by it
+  double c = 1;     ///< coefficient of the step: position constraint rows are divided by it
+  double seed = 1;  ///< ∂y/∂δ of differential unknowns in Jacobians; c except where ∂r/∂y and ∂r/∂ẏ are taken apart
   double c_algebraic = 1;  ///< ∂ẏ/∂y of algebraic unknowns (bookkeeping)
   Phase phase = Phase::step;
   Vec3 uniform_gravity = Vec3::Zero();  ///< [m/s²]; see Model::gravity_at for any point

@@ -71,12 +71,12 @@ void NodeEquations::jacobian(const EvalContext& context, double* values) const {
     const int n = row.rotation ? 6 : 3;
     const int* p = &positions_[row.position];
     for (int i = 0; i < n; ++i) {
-      values[*p++] -= context.c;
+      values[*p++] -= context.seed;
       values[*p++] += 1;
     }
     if (!row.rotation) continue;
     const Mat3 by_x = -cross<double>(at(y, row.first + 6));
-    const Mat3 by_b = context.c * cross<double>(at(yp, row.first));
+    const Mat3 by_b = context.seed * cross<double>(at(yp, row.first));
     for (int k = 0; k < 9; ++k) values[*p++] += by_x(k);
     for (int k = 0; k < 9; ++k) values[*p++] += by_b(k);
   }

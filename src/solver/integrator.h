@@ -25,6 +25,7 @@ struct StepFormula {
   double c_algebraic() const { return i0; }
 };
 
+/// For the third-order method: the prediction of the end of the step (see solver/third_order.h for the rest).
 /// `odd` is the kind of the `hope` step; rho and rho_algebraic are the asymptotic spectral radii.
 StepFormula step_formula(Method method, double h, double h_previous, double rho, double rho_algebraic, bool odd);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "solver/control.h"
 #include "solver/line_search.h"
 #include "solver/system.h"
 
@@ -11,19 +12,9 @@ namespace mbcosim {
 
 namespace {
 
-double measure(ResidualTest test, const std::vector<double>& v, const Model& model, bool scale, double constraint_factor) {
-  double sum = 0;
-  const bool weighted = scale || constraint_factor != 1;
-  for (std::size_t i = 0; i < v.size(); ++i) {
-    double x = v[i];
-    if (weighted) {
-      if (scale) x *= model.row_scale[i];
-      if (model.is_constraint_row[i]) x *= constraint_factor;
-    }
-    if (test == ResidualTest::norm) sum += x * x;
-    else if (!(std::abs(x) <= sum)) sum = std::abs(x);  // keeps NaN
-  }
-  return test == ResidualTest::norm ? std::sqrt(sum) : sum;
+double row_factor(const Model& model, const NewtonSettings& settings, std::size_t row) {
+  const double scale = settings.scale ? model.row_scale[row] : 1.0;
+  return model.is_constraint_row[row] ? scale * settings.constraint_factor : scale;
 }
 
 class Newton {
@@ -35,17 +26,10 @@ class Newton {
   NewtonReport run() {
     ws_.residual_history.clear();
     NewtonReport report;
-    double first_error = 0;
     for (;;) {
       report.residual_error = residual();
       ws_.residual_history.push_back(report.residual_error);
-      if (report.iterations == 0) first_error = report.residual_error;
-      if (!std::isfinite(report.residual_error)) return finish(report, NewtonOutcome::not_converged);
-      if (settings_.tolerance > 0 && report.residual_error < settings_.tolerance) return finish(report, NewtonOutcome::converged);
-      if (report.iterations >= settings_.max_iterations) {
-        const bool accepted = settings_.at_most && report.residual_error < first_error;
-        return finish(report, accepted ? NewtonOutcome::converged : NewtonOutcome::not_converged);
-      }
+      if (const auto verdict = judge_residual(settings_, ws_.residual_history, report.iterations)) return finish(report, *verdict);
       if (exceeds_limits()) return finish(report, NewtonOutcome::not_converged);
       if (hooks_.cancelled()) return finish(report, NewtonOutcome::cancelled);
       if (!correct(report)) return report;
@@ -64,18 +48,7 @@ class Newton {
 
   double residual() {
     compute_residual(model_.context(state_, phase_, c_, ca_), ws_.residual);
-    if (settings_.residual_test == ResidualTest::none) return 0;
-    double error = measure(settings_.residual_test, ws_.residual, model_, settings_.scale, settings_.constraint_factor);
-    if (settings_.modify_residual_test) {
-      double sum = 1;
-      for (int i = 0; i < model_.unknowns; ++i)
-        if (model_.kinds[i] == UnknownKind::differential) {
-          const double x = state_.yp[i] * (settings_.scale ? model_.row_scale[i] : 1.0);
-          sum += x * x;
-        }
-      error /= sum;
-    }
-    return error;
+    return residual_error(model_, settings_, state_, ws_.residual);
   }
 
   bool exceeds_limits() const {
@@ -92,15 +65,12 @@ class Newton {
 
   /// One linear solve and update; false (with the outcome set) when the matrix cannot be factored.
   bool correct(NewtonReport& report) {
-    const bool due = settings_.jacobian_every <= 1 || report.iterations % settings_.jacobian_every == 0;
+    const bool factored = factor(report.iterations);
     ++report.iterations;
-    if (due) {
-      compute_jacobian(model_.context(state_, phase_, c_, ca_), ws_);
-      if (ws_.solver.factor(ws_.values.data()) != LinearSolver::Outcome::ok) {
-        report.singular_column = ws_.solver.singular_column();
-        finish(report, NewtonOutcome::singular);
-        return false;
-      }
+    if (!factored) {
+      report.singular_column = ws_.solver.singular_column();
+      finish(report, NewtonOutcome::singular);
+      return false;
     }
     std::copy(ws_.residual.begin(), ws_.residual.end(), ws_.delta.begin());
     ws_.solver.solve(ws_.delta.data());
@@ -108,8 +78,24 @@ class Newton {
     else apply_correction(model_, ws_.delta, c_, ca_, state_);
     hooks_.after_correction(state_);
     if (settings_.solution_test != ResidualTest::none)
-      report.solution_error = measure(settings_.solution_test, ws_.delta, model_, false, 1);
+      report.solution_error = test_value(settings_.solution_test, ws_.delta);
     return true;
+  }
+
+  /// Builds and factors the matrix when it is due; false when it cannot be factored.
+  bool factor(int iterations) {
+    const bool keep = settings_.keep_jacobian;
+    double* const kept = keep ? &state_.control[control::kCount] : nullptr;
+    const long count = keep ? static_cast<long>(state_.control[control::kKeptIterations]++) : iterations;
+    if (count % settings_.jacobian_every == 0) {
+      compute_jacobian(model_.context(state_, phase_, c_, ca_), ws_);
+      if (keep) std::copy(ws_.values.begin(), ws_.values.end(), kept);
+    } else if (keep && iterations == 0) {
+      std::copy(kept, kept + ws_.values.size(), ws_.values.begin());
+    } else {
+      return true;
+    }
+    return ws_.solver.factor(ws_.values.data()) == LinearSolver::Outcome::ok;
   }
 
   const Model& model_;
@@ -122,6 +108,45 @@ class Newton {
 };
 
 }  // namespace
+
+double test_value(ResidualTest test, const std::vector<double>& v) {
+  double value = 0;
+  for (const double x : v)
+    if (test == ResidualTest::norm) value += x * x;
+    else if (!(std::abs(x) <= value)) value = std::abs(x);  // keeps NaN
+  return test == ResidualTest::norm ? std::sqrt(value) : value;
+}
+
+double residual_error(const Model& model, const NewtonSettings& settings, const State& state, const std::vector<double>& residual) {
+  if (settings.residual_test == ResidualTest::none) return 0;
+  double error = 0;
+  if (!settings.scale && settings.constraint_factor == 1) {
+    error = test_value(settings.residual_test, residual);
+  } else {
+    for (std::size_t i = 0; i < residual.size(); ++i) {
+      const double x = residual[i] * row_factor(model, settings, i);
+      if (settings.residual_test == ResidualTest::norm) error += x * x;
+      else if (!(std::abs(x) <= error)) error = std::abs(x);
+    }
+    if (settings.residual_test == ResidualTest::norm) error = std::sqrt(error);
+  }
+  if (!settings.modify_residual_test) return error;
+  double sum = 1;
+  for (int i = 0; i < model.unknowns; ++i)
+    if (model.kinds[i] == UnknownKind::differential) {
+      const double x = state.yp[i] * (settings.scale ? model.row_scale[i] : 1.0);
+      sum += x * x;
+    }
+  return error / sum;
+}
+
+std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations) {
+  const double error = errors.back();
+  if (!std::isfinite(error)) return NewtonOutcome::not_converged;
+  if (settings.tolerance > 0 && error < settings.tolerance) return NewtonOutcome::converged;
+  if (iterations < settings.max_iterations) return std::nullopt;
+  return settings.at_most && error < errors.front() ? NewtonOutcome::converged : NewtonOutcome::not_converged;
+}
 
 NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic, const NewtonSettings& settings,
                           const NewtonHooks& hooks, State& state, Workspace& workspace) {

@@ -1,6 +1,7 @@
 /// Newton iteration on one instant. Spec 02 section 4.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "model/model.h"
@@ -15,7 +16,8 @@ struct NewtonSettings {
   bool scale = false, modify_residual_test = false;
   int max_iterations = 1;
   bool at_most = false;
-  int jacobian_every = 1;  ///< > 1: modified Newton
+  int jacobian_every = 1;      ///< > 1: modified Newton
+  bool keep_jacobian = false;  ///< modified Newton counts its iterations across steps; the matrix is kept in the state
   const LineSearchSettings* line_search = nullptr;
   double max_residual = 0, max_residual_differential = 0;  ///< 0: none
   double constraint_factor = 1;  ///< `enforce constraint equations: constraint violations`
@@ -31,6 +33,13 @@ struct NewtonReport {
   bool by_solution = false;  ///< accepted by the solution test
   int singular_column = -1;
 };
+
+/// norm: sqrt(Σ v²); minmax: max |v|, NaN if any is.
+double test_value(ResidualTest test, const std::vector<double>& v);
+/// The residual test with its scales and options.
+double residual_error(const Model& model, const NewtonSettings& settings, const State& state, const std::vector<double>& residual);
+/// What the last residual error says after `iterations` solves: an outcome, or nothing to go on.
+std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations);
 
 /// What the phase that iterates adds.
 class NewtonHooks {

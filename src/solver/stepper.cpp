@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "solver/control.h"
 #include "solver/initial_assembly.h"
 #include "solver/singularity.h"
 #include "solver/system.h"
@@ -27,6 +28,7 @@ NewtonSettings regular_settings(const InitialValueSettings& s) {
   n.max_iterations = s.max_iterations;
   n.at_most = s.at_most;
   n.jacobian_every = s.modified_newton ? std::max(1, s.jacobian_every) : 1;
+  n.keep_jacobian = s.modified_newton && s.keep_jacobian;
   n.line_search = s.line_search ? &*s.line_search : nullptr;
   n.max_residual = s.max_residual;
   n.max_residual_differential = s.max_residual_differential;
@@ -42,6 +44,7 @@ NewtonSettings start_settings(const InitialValueSettings& s, double tolerance, i
   if (n.residual_test == ResidualTest::none) n.residual_test = ResidualTest::norm;
   n.max_iterations = max_iterations;
   n.at_most = false;
+  n.keep_jacobian = false;
   n.max_residual = n.max_residual_differential = 0;
   return n;
 }
@@ -49,6 +52,8 @@ NewtonSettings start_settings(const InitialValueSettings& s, double tolerance, i
 double drive_or(const DrivePtr& drive, const EvalContext& context, double otherwise) {
   return drive ? drive->value(context) : otherwise;
 }
+
+bool is_third_order(const MethodSettings& m) { return m.method == Method::third_order || m.method == Method::third_order_ad_hoc; }
 
 }  // namespace
 
@@ -88,10 +93,14 @@ Stepper::Stepper(const Model& model)
       derivatives_(start_settings(model.initial_value, model.initial_value.derivatives_tolerance,
                                   model.initial_value.derivatives_max_iterations)),
       dummy_(start_settings(model.initial_value, model.initial_value.dummy_tolerance, model.initial_value.dummy_max_iterations)),
-      derivatives_coefficient_(model.initial_value.derivatives_coefficient) {}
+      derivatives_coefficient_(model.initial_value.derivatives_coefficient) {
+  const InitialValueSettings& s = model.initial_value;
+  if (is_third_order(s.method) || (s.dummy_method && is_third_order(*s.dummy_method)))
+    third_order_ = std::make_unique<ThirdOrderSolver>(model);
+}
 
 Status Stepper::assemble(State& state) {
-  state.control.assign(control::kCount, 0.0);
+  state.control.assign(control::kCount + (regular_.keep_jacobian ? model_.row_index.size() : 0), 0.0);
   state.h = state.h_previous = model_.initial_value.time_step;
   for (const auto& listener : model_.step_listeners) listener->advance(model_.context(state, Phase::assembly), state, true);
   update_activity(model_.context(state, Phase::assembly), state, false);
@@ -151,6 +160,9 @@ void Stepper::choose_pivots(const State& state) {
   const double c = 0.5 * model_.initial_value.time_step;
   compute_jacobian(model_.context(state, Phase::step, c, c), workspace_);
   workspace_.solver.analyze(workspace_.values.data());
+  if (!third_order_) return;
+  const InitialValueSettings& s = model_.initial_value;
+  third_order_->choose_pivots(state, third_order(state, is_third_order(s.method) ? s.method : *s.dummy_method), workspace_);
 }
 
 PhaseReport Stepper::run_dummy_steps(State& state) {
@@ -178,6 +190,18 @@ StepFormula Stepper::formula(State& state, double h, const MethodSettings& metho
     state.control[control::kHopeOdd] = odd ? 1 : 0;
   }
   return step_formula(method.method, h, state.h_previous, rho, rho_algebraic, odd);
+}
+
+ThirdOrderFormula Stepper::third_order(const State& state, const MethodSettings& method) const {
+  if (method.method == Method::third_order_ad_hoc) return ThirdOrderFormula::ad_hoc();
+  return ThirdOrderFormula::tunable(drive_or(method.rho, model_.context(state, Phase::step), 0));
+}
+
+NewtonReport Stepper::iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first,
+                              const NewtonSettings& settings) {
+  const StepHooks hooks(cancel_);
+  if (!first && is_third_order(method)) return third_order_->solve(third_order(state, method), settings, hooks, state, workspace_);
+  return solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, hooks, state, workspace_);
 }
 
 /// Values at the last two accepted steps -> prediction at the new time. Rotation unknowns are first rewritten relative to the
@@ -256,7 +280,7 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     update_activity(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, true);
     const EvalContext context = model_.context(state, Phase::step, f.c(), f.c_algebraic());
     for (const auto& set : model_.sets) set->after_predict(context, state);
-    report.newton = solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, StepHooks(cancel_), state, workspace_);
+    report.newton = iterate(state, f, method, first, settings);
     if (report.newton.outcome == NewtonOutcome::converged) {
       after_convergence(state, Phase::step, f.c(), f.c_algebraic());
       return report;

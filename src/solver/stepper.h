@@ -1,20 +1,17 @@
 /// Time stepping: the phases of a run and one attempt at a step. Spec 02 sections 2 to 6.
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "model/model.h"
 #include "solver/integrator.h"
 #include "solver/newton.h"
 #include "solver/cancel.h"
+#include "solver/third_order.h"
 #include "solver/workspace.h"
 
 namespace mbcosim {
-
-/// Slots of State::control.
-namespace control {
-enum Slot { kRegularSteps, kHopeOdd, kSinceReduction, kSinceRaise, kLastIterations, kLastChange, kLastChance, kNextStep, kCount };
-}
 
 /// Result of a phase or step that was solved (or not).
 struct PhaseReport {
@@ -51,6 +48,9 @@ class Stepper {
   class StepHooks;
   class DerivativesHooks;
   PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first, const NewtonSettings& settings);
+  /// Newton on the prediction, by the method of the step.
+  NewtonReport iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first, const NewtonSettings& settings);
+  ThirdOrderFormula third_order(const State& state, const MethodSettings& method) const;
   StepFormula formula(State& state, double h, const MethodSettings& method, bool first) const;
   void predict(State& state, const StepFormula& f) const;
   void finish_prediction(State& state) const;
@@ -59,6 +59,7 @@ class Stepper {
 
   const Model& model_;
   Workspace workspace_;
+  std::unique_ptr<ThirdOrderSolver> third_order_;  ///< when a method of the deck needs it
   State backup_;
   const CancelToken* cancel_ = nullptr;
   NewtonSettings regular_, derivatives_, dummy_;

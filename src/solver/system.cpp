@@ -50,7 +50,7 @@ void compute_jacobian(const EvalContext& context, Workspace& workspace) {
       continue;
     }
     const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
-    workspace.seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]), state.rotation[k].w_ref, context.c);
+    workspace.seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]), state.rotation[k].w_ref, context.seed);
   }
   std::fill(workspace.values.begin(), workspace.values.end(), 0.0);
   model.node_equations.jacobian(context, workspace.values.data());

@@ -183,7 +183,7 @@ void ModalJointSet::jacobian(const EvalContext& context, const NodeSeeds* seeds,
     const FloatingFrame k = floating_frame(context, i);
     const ModalUnknowns u = unknowns(context, i);
     s.blocks.rate_q.add_diagonal(values, 1);
-    s.blocks.rate_p.add_diagonal(values, -context.c);
+    s.blocks.rate_p.add_diagonal(values, -context.seed);
     if (s.joint.node >= 0) {
       frame_jacobian(context, s, k, u, seeds, values);
       if (s.joint.body->detailed) coupling_jacobian(context, s, k, u, seeds, values);
@@ -199,9 +199,9 @@ void ModalJointSet::definition_jacobian(const EvalContext& context, const Slot& 
                                         const NodeSeeds* seeds, double* values) const {
   const Blocks& b = s.blocks;
   b.velocity_x.add_diagonal(values, 1);
-  b.velocity_v.add_diagonal(values, -context.c);
+  b.velocity_v.add_diagonal(values, -context.seed);
   b.spin_g.add(values, seeds[s.joint.node].B);
-  b.spin_w.add_diagonal(values, -context.c);
+  b.spin_w.add_diagonal(values, -context.seed);
 }
 
 void ModalJointSet::inactive_jacobian(const EvalContext& context, const Slot& s,
@@ -210,8 +210,8 @@ void ModalJointSet::inactive_jacobian(const EvalContext& context, const Slot& s,
   // The rows of q and p are −q = 0 and −p = 0.
   const int m = s.joint.body->modes;
   for (int j = 0; j < m; ++j) {
-    values[b.rate_q.start[j]] += context.c;
-    values[b.modes_p.start[j] + (b.modes_p.diagonal ? 0 : j)] += context.c;
+    values[b.rate_q.start[j]] += context.seed;
+    values[b.modes_p.start[j] + (b.modes_p.diagonal ? 0 : j)] += context.seed;
   }
   for (const InterfaceBlocks& interface : b.interfaces) interface.reaction.add_diagonal(values, 1);
   if (s.joint.node >= 0) definition_jacobian(context, s, seeds, values);
@@ -243,7 +243,7 @@ void ModalJointSet::frame_jacobian(const EvalContext& context, const Slot& s,
       twice_rotated = k.R * cross<double>(k.w_l.cross(d.spin));
   }
   const Mat3 Rt = k.R.transpose(), A = seeds[s.joint.node].A;
-  const double c = context.c;
+  const double c = context.seed;
   Eigen::Matrix<double, 6, 9> block;
   block.topLeftCorner<3, 3>() = (cross<double>(k.R * d.force) - k.R * f.by_rotation(k) * Rt) * A;
   block.bottomLeftCorner<3, 3>() =
@@ -259,7 +259,7 @@ void ModalJointSet::frame_jacobian(const EvalContext& context, const Slot& s,
 void ModalJointSet::coupling_jacobian(const EvalContext& context, const Slot& s,
                                       const FloatingFrame& k, const ModalUnknowns& u, Seeds seeds,
                                       double* values) const {
-  const double c = context.c;
+  const double c = context.seed;
   const Mat3 Rt_A = k.R.transpose() * seeds[s.joint.node].A;
   const Mat3 loads_rotary = s.joint.consistent_rotary_coupling ? Mat3::Identity() : k.R;
   const Blocks& blocks = s.blocks;
@@ -286,7 +286,7 @@ void ModalJointSet::central_gravity_jacobian(const EvalContext& context, const S
                                              const FloatingFrame& k, const ModalUnknowns& u,
                                              double* values) const {
   const ModalBody& b = *s.joint.body;
-  const Mat3 gradient = context.c * context.model->gravity_gradient(context, k.x);
+  const Mat3 gradient = context.seed * context.model->gravity_gradient(context, k.x);
   Eigen::Matrix<double, 6, 3> loads;
   loads.topRows<3>() = -b.m * gradient;
   loads.bottomRows<3>() = -cross<double>(k.R * b.first_moment(u.q)) * gradient;
@@ -301,7 +301,7 @@ void ModalJointSet::central_gravity_jacobian(const EvalContext& context, const S
 void ModalJointSet::modes_jacobian(const EvalContext& context, const Slot& s,
                                    const FloatingFrame& k, double* values) const {
   const ModalBody& b = *s.joint.body;
-  const double c = context.c;
+  const double c = context.seed;
   if (s.blocks.modes_q.diagonal) {
     for (int j = 0; j < b.modes; ++j) {
       values[s.blocks.modes_q.start[j]] += c * b.stiffness.full(j, j);
@@ -340,7 +340,7 @@ void ModalJointSet::interface_jacobian(const EvalContext& context, const Slot& s
   const Vec3 d1 = k.R * local, d2 = node.R * interface.o;
   const Mat3 couple_x = cross<double>(couple), force_x = cross<double>(force),
              d1x = cross<double>(d1), d2x = cross<double>(d2);
-  const double c = context.c;
+  const double c = context.seed, row = context.c, ratio = c / row;
 
   Eigen::Matrix<double, 3, 6> arms;
   b.node_force_f.add_diagonal(values, -1);
@@ -359,8 +359,8 @@ void ModalJointSet::interface_jacobian(const EvalContext& context, const Slot& s
       0.5 * angle.by_axis * (relative.trace() * Mat3::Identity() - relative.transpose()) -
       2 * angle.by_trace * ax(relative).transpose();
   Eigen::Matrix<double, 6, 3> turn;
-  turn << d2x / c * A, -by_turn / c * A;
-  b.position_x.add_diagonal(values, -1);
+  turn << d2x / row * A, -by_turn / row * A;
+  b.position_x.add_diagonal(values, -ratio);
   b.constraint_g.add(values, turn);
 
   const Mat3 Rt = k.R.transpose();
@@ -372,8 +372,8 @@ void ModalJointSet::interface_jacobian(const EvalContext& context, const Slot& s
     arms << d1x, node.R;
     b.frame_moment_f.add(values, arms);
     b.frame_moment_g.add(values, Mat3(-couple_x * A));
-    turn << -d1x / c * A1, by_turn / c * A1;
-    b.position_frame_x.add_diagonal(values, 1);
+    turn << -d1x / row * A1, by_turn / row * A1;
+    b.position_frame_x.add_diagonal(values, ratio);
     b.constraint_frame_g.add(values, turn);
     const Mat3 by_theta = force_x * d1x * A1;
     for (int j = 0; j < 3; ++j)
@@ -383,7 +383,7 @@ void ModalJointSet::interface_jacobian(const EvalContext& context, const Slot& s
     const Vec3 U = k.R * interface.U.col(j), V = k.R * interface.V.col(j);
     VecN<6> constraint;
     constraint << U, by_shape * interface.V.col(j);
-    for (int i = 0; i < 6; ++i) b.constraint_q.at(values, i, j) += constraint(i);
+    for (int i = 0; i < 6; ++i) b.constraint_q.at(values, i, j) += ratio * constraint(i);
     const Vec3 V_node = node.R.transpose() * V, by_node = A.transpose() * couple.cross(V);
     for (int i = 0; i < 3; ++i) {
       b.modes_f.at(values, j, i) += U(i);

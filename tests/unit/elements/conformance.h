@@ -160,7 +160,7 @@ class Bench {
     c.state = &s;
     c.time = s.time;
     c.h = s.h;
-    c.c = kC;
+    c.c = c.seed = kC;
     c.c_algebraic = 1;
     return c;
   }
@@ -347,7 +347,7 @@ TYPED_TEST_P(ElementConformance, AssemblyRatesAreTimeDerivatives) {
       }
       for (int i = bench.first_own(); i < bench.n; ++i) s.y[i] += dt * s.yp[i];
       EvalContext c = bench.context(s);
-      c.c = 1;
+      c.c = c.seed = 1;
       c.phase = Phase::assembly;
       VecX r = VecX::Zero(bench.n);
       rate = VecX::Zero(bench.n);
