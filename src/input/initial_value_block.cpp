@@ -7,6 +7,7 @@
 #include "input/cards.h"
 #include "input/deck.h"
 #include "input/suggest.h"
+#include "model/suffix_format.h"
 
 namespace mbcosim {
 
@@ -442,7 +443,7 @@ void read_eigen_option(DeckCard& card, EigenSettings& e) {
        "results output precision", "upper frequency limit", "lower frequency limit", "suffix width",
        "suffix format", "use lapack", "use arpack", "use jdqz", "balance"})) {
     case 0:
-      e.parameter = card.real("parameter");
+      e.parameter = card.real_above("parameter", 0, false);
       break;
     case 1:
     case 2:
@@ -474,6 +475,8 @@ void read_eigen_option(DeckCard& card, EigenSettings& e) {
       break;
     case 11:
       e.suffix_format = card.quoted("suffix format");
+      if (!SuffixFormat::parse(e.suffix_format))
+        card.fail("suffix format \"" + e.suffix_format + "\" is not a format of one integer", "\"%02d\" or \"%0*d\", for instance");
       break;
     case 12:
       e.solver = EigenSettings::Solver::lapack;
@@ -493,7 +496,11 @@ void read_eigenanalysis(DeckCard& card) {
   EigenSettings e;
   read_eigen_times(card, e);
   while (card.more()) read_eigen_option(card, e);
-  settings(card).eigenanalyses.push_back(std::move(e));
+  if (e.solver == EigenSettings::Solver::lapack || e.ncv > e.nev) {
+    settings(card).eigenanalyses.push_back(std::move(e));
+    return;
+  }
+  card.fail("the number of basis vectors must be greater than the number of eigenvalues");
 }
 
 void read_output_meter(DeckCard& card) {

@@ -106,13 +106,20 @@ Mat3 Model::gravity_gradient(const EvalContext&, const Vec3& x) const {
   return gravity->mass_g / (r2 * std::sqrt(r2)) * (3 / r2 * d * d.transpose() - Mat3::Identity());
 }
 
+MatX Model::dense(const std::vector<double>& values) const {
+  MatX m = MatX::Zero(unknowns, unknowns);
+  for (int j = 0; j < unknowns; ++j)
+    for (int k = column_start[j]; k < column_start[j + 1]; ++k) m(row_index[k], j) = values[k];
+  return m;
+}
+
 EvalContext Model::context(const State& state, Phase phase, double c, double c_algebraic) const {
   EvalContext r;
   r.model = this;
   r.state = &state;
   r.time = state.time;
   r.h = state.h;
-  r.c = c;
+  r.c = r.seed = c;
   r.c_algebraic = c_algebraic;
   r.phase = phase;
   if (gravity && gravity->uniform) r.uniform_gravity = gravity->uniform->value(r);

@@ -131,6 +131,9 @@ class Model {
   double structural_datum_value(const EvalContext& context, int node, int datum) const;
   static std::vector<std::string> structural_data_names(const StructuralNode& node);
 
+  /// Values in the sparse pattern as a full matrix (n, n).
+  MatX dense(const std::vector<double>& values) const;
+
   // --- diagnosis
   std::string node_text(int node) const;     ///< "structural node 7"
   std::string element_text(ElementRef e) const;  ///< "joint 7 (revolute hinge)"

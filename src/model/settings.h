@@ -39,7 +39,7 @@ struct EigenSettings {
   int nev = 0, ncv = 0;
   double tolerance = 0;
   int suffix_width = -1;  ///< -1: compute
-  std::string suffix_format = "%02d";
+  std::string suffix_format = "%0*d";  ///< as SuffixFormat reads it
 };
 
 struct InitialValueSettings {

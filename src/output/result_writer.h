@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "model/diagnostic.h"
+#include "model/eigen_report.h"
 #include "model/model.h"
 
 namespace mbcosim {
@@ -28,6 +29,8 @@ class ResultWriter {
   virtual void step(const StepLine& line) = 0;
   /// Free text for the run log, e.g. an eigenanalysis table.
   virtual void note(const std::string& text) = 0;
+  /// An eigenanalysis of the deck; `model` is the one of `begin`.
+  virtual void eigenanalysis(const EigenReport&) {}
   /// One record: everything that has its output switched on, at the state in `context`.
   virtual void record(const EvalContext& context) = 0;
   /// Flushes; ErrorKind::io when something could not be written (now or earlier).

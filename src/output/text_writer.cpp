@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "output/eigen_text.h"
 #include "output/model_log.h"
 #include "output/record.h"
 
@@ -50,7 +51,6 @@ class TextFile {
     if (file_ && std::fflush(file_) != 0) failed_ = true;
     return !failed_;
   }
-  const std::string& path() const { return path_; }
 
  private:
   std::string path_;
@@ -62,7 +62,7 @@ class TextFile {
 
 class TextWriter : public ResultWriter, private OutputRow {
  public:
-  explicit TextWriter(const std::string& prefix) {
+  explicit TextWriter(const std::string& prefix) : prefix_(prefix) {
     for (std::size_t k = 0; k < files_.size(); ++k) files_[k].open(prefix + "." + extension(static_cast<OutputFile>(k)));
     out_.open(prefix + ".out");
     log_.open(prefix + ".log");
@@ -109,17 +109,24 @@ class TextWriter : public ResultWriter, private OutputRow {
     out_.commit(p);
   }
   void note(const std::string& text) override { out_.text(text); }
+  void eigenanalysis(const EigenReport& report) override {
+    out_.text(eigen_table(report));
+    TextFile file;
+    file.open(prefix_ + eigen_suffix(report) + ".m");
+    file.text(eigen_file(report, *model_));
+    if (!file.finish()) failed_ = true;
+  }
   void record(const EvalContext& context) override {
     if (context.model->control.text) write_record(context, *this);
   }
   Status finish() override {
-    bool fine = out_.finish() && log_.finish();
+    bool fine = out_.finish() && log_.finish() && !failed_;
     for (TextFile& f : files_) fine = f.finish() && fine;
     if (fine) return ok();
     Error e;
     e.kind = ErrorKind::io;
     e.reason = "OUTPUT_NOT_WRITTEN";
-    e.message = "cannot write the result files " + out_.path().substr(0, out_.path().size() - 4) + ".*";
+    e.message = "cannot write the result files " + prefix_ + ".*";
     return e;
   }
 
@@ -175,8 +182,10 @@ class TextWriter : public ResultWriter, private OutputRow {
     current_->commit(p + 1);
   }
 
+  std::string prefix_;
   const Model* model_ = nullptr;
   int precision_ = 6;
+  bool failed_ = false;
   std::array<TextFile, static_cast<std::size_t>(OutputFile::count)> files_;
   TextFile out_, log_;
   TextFile* current_ = nullptr;

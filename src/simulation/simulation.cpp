@@ -6,6 +6,7 @@
 #include "output/result_writer.h"
 #include "simulation/state_bytes.h"
 #include "simulation/variables.h"
+#include "solver/eigenanalysis.h"
 #include "solver/stepper.h"
 
 namespace mbcosim {
@@ -58,6 +59,8 @@ struct Simulation::Impl {
   }
 
   Status start();
+  /// The deck's eigenanalyses with times in (after, until].
+  Status analyse_modes(double after, double until);
   StepReport step(const CancelToken* cancel);
 };
 
@@ -73,6 +76,7 @@ Status Simulation::Impl::start() {
     record();
     return ok();
   }
+  if (auto status = analyse_modes(-HUGE_VAL, std::nextafter(s.initial_time, -HUGE_VAL)); !status) return status;
   PhaseReport report = stepper.solve_derivatives(state);
   if (report.error) {
     record();
@@ -93,11 +97,29 @@ Status Simulation::Impl::start() {
   line.residual_error = last.residual_error;
   line.recorded = record();
   if (writer) writer->step(line);
+  return analyse_modes(std::nextafter(s.initial_time, -HUGE_VAL), s.initial_time);
+}
+
+Status Simulation::Impl::analyse_modes(double after, double until) {
+  if (!writer) return ok();
+  int index = 0, count = 0;
+  for (const EigenSettings& s : model->initial_value.eigenanalyses) count += static_cast<int>(s.times.size());
+  for (const EigenSettings& s : model->initial_value.eigenanalyses)
+    for (const double time : s.times) {
+      const int position = index++;
+      if (!(time > after && time <= until)) continue;
+      auto report = mbcosim::analyse_modes(*model, state, s);
+      if (!report) return report.error();
+      report->index = position;
+      report->count = count;
+      writer->eigenanalysis(*report);
+    }
   return ok();
 }
 
 StepReport Simulation::Impl::step(const CancelToken* cancel) {
   StepReport report;
+  const double previous_time = state.time;
   const auto begin = std::chrono::steady_clock::now();
   stepper.set_cancelled(cancel);
   double h = stepper.next_step_size(state);
@@ -126,6 +148,11 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
                   phase.newton.by_solution, false};
     line.recorded = record();
     writer->step(line);
+    if (auto status = analyse_modes(previous_time, state.time); !status) {
+      report.outcome = StepOutcome::limit;
+      report.error = status.error();
+      return report;
+    }
   }
   if (!(state.time < model->initial_value.final_time)) report.outcome = StepOutcome::finished;
   return report;
@@ -218,6 +245,12 @@ Status Simulation::restore(const State& state) {
     return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL", "the state belongs to another model: its layout differs");
   impl_->state = state;
   return ok();
+}
+
+Linearization Simulation::linearize() const { return mbcosim::linearize(*impl_->model, impl_->state); }
+
+Result<Spectrum> Simulation::eigen(int count, std::complex<double> shift) const {
+  return mbcosim::eigen(linearize(), count, shift);
 }
 
 std::string Simulation::export_state() const { return state_to_bytes(impl_->state, impl_->model->digest); }

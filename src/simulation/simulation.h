@@ -18,6 +18,7 @@
 #include "model/state.h"
 #include "simulation/variable.h"
 #include "solver/cancel.h"
+#include "solver/eigen_spectrum.h"
 
 namespace mbcosim {
 
@@ -79,6 +80,12 @@ class Simulation {
   void get(int handle, std::vector<double>& out) const;
   /// Sets an input variable (parameter nodes, attached loads). ErrorKind::argument when it is not writable or of the wrong size.
   Status set(int handle, std::span<const double> values);
+
+  /// E and A about the current state.
+  Linearization linearize() const;
+  /// The `count` eigenvalues nearest to `shift` [1/s] about the current state; 0: all finite ones. ErrorKind::limit when
+  /// all of a large model are asked for.
+  Result<Spectrum> eigen(int count = 0, std::complex<double> shift = 0) const;
 
   State snapshot() const { return state(); }
   /// ErrorKind::precondition when `state` has another model's layout.

@@ -1,0 +1,290 @@
+#include "solver/eigen_spectrum.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <numeric>
+#include <random>
+
+#include "solver/doubled_pattern.h"
+#include "solver/linear_solver.h"
+
+namespace mbcosim {
+
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::MatrixXcd;
+using Eigen::VectorXcd;
+
+constexpr double kDenseShift = 1.2345;    ///< [1/s], any value that is no eigenvalue
+constexpr double kRankTolerance = 1e-12;  ///< relative to the largest pivot of the balanced matrix
+constexpr int kLargestBasis = 1500;
+constexpr int kSmall = 300;            ///< unknowns up to which the dense way is taken anyway
+constexpr int kLargestDense = 3000;    ///< unknowns
+constexpr double kShiftOffset = 1e-2;  ///< [1/s], keeps the shift off eigenvalues at zero
+
+Error eigen_error(ErrorKind kind, std::string message) {
+  Error e;
+  e.kind = kind;
+  e.reason = "EIGENANALYSIS_FAILED";
+  e.message = "eigenanalysis: " + std::move(message);
+  return e;
+}
+
+/// Applies T; real and imaginary parts are solved together for a complex shift.
+class ShiftInvert {
+ public:
+  ShiftInvert(const Linearization& system, Complex shift)
+      : system_(system),
+        n_(system.model->unknowns),
+        complex_(shift.imag() != 0),
+        solver_(make_solver(*system.model, complex_)),
+        work_(complex_ ? 2 * n_ : n_) {
+    const Model& m = *system.model;
+    std::vector<double> values;
+    for (int half = 0; half < (complex_ ? 2 : 1); ++half)
+      for (int j = 0; j < n_; ++j)
+        for (int block = 0; block < (complex_ ? 2 : 1); ++block)
+          for (int k = m.column_start[j]; k < m.column_start[j + 1]; ++k)
+            values.push_back(block == half ? system.a[k] - shift.real() * system.e[k]
+                                           : (half == 1 ? 1 : -1) * shift.imag() * system.e[k]);
+    regular_ = solver_.factor(values.data()) == LinearSolver::Outcome::ok;
+  }
+  bool regular() const { return regular_; }
+
+  VectorXcd apply(const VectorXcd& v) {
+    const Model& m = *system_.model;
+    VectorXcd x = VectorXcd::Zero(n_);
+    for (int j = 0; j < n_; ++j)
+      for (int k = m.column_start[j]; k < m.column_start[j + 1]; ++k)
+        x(m.row_index[k]) += system_.e[k] * v(j);
+    if (complex_) {
+      work_ << x.real(), x.imag();
+      solver_.solve(work_.data());
+      x.real() = work_.head(n_);
+      x.imag() = work_.tail(n_);
+      return x;
+    }
+    work_ = x.real();
+    solver_.solve(work_.data());
+    x.real() = work_;
+    work_ = x.imag();
+    if (!work_.isZero(0)) solver_.solve(work_.data());
+    x.imag() = work_;
+    return x;
+  }
+
+ private:
+  static LinearSolver make_solver(const Model& m, bool complex) {
+    if (!complex) return LinearSolver(m.unknowns, m.column_start, m.row_index);
+    const DoubledPattern p(m);
+    return LinearSolver(2 * m.unknowns, p.column_start, p.row_index);
+  }
+
+  const Linearization& system_;
+  int n_;
+  bool complex_;
+  bool regular_ = false;
+  LinearSolver solver_;
+  VecX work_;
+};
+
+/// Orthonormal basis that grows by one vector at a time: T Q = Q H + residual.
+class Krylov {
+ public:
+  Krylov(ShiftInvert& t, int n) : t_(t), n_(n), basis_(n, 1), hessenberg_(1, 0) {
+    basis_.col(0) = fresh_vector();
+  }
+
+  /// Grows to m columns of H; breakdowns are continued with new random directions.
+  void grow(int m) {
+    int k = static_cast<int>(hessenberg_.cols());
+    basis_.conservativeResize(n_, m + 1);
+    hessenberg_.conservativeResizeLike(MatrixXcd::Zero(m + 1, m));
+    for (; k < m; ++k) {
+      VectorXcd w = t_.apply(basis_.col(k));
+      const double before = w.norm();
+      hessenberg_.col(k).head(k + 1) = orthogonalize(w, k + 1);
+      const double length = w.norm();
+      if (length > 1e-13 * before && length > 0) {
+        hessenberg_(k + 1, k) = length;
+        basis_.col(k + 1) = w / length;
+      } else {
+        VectorXcd other = fresh_vector();
+        orthogonalize(other, k + 1);
+        const double size = other.norm();
+        basis_.col(k + 1) = size > 1e-10 ? VectorXcd(other / size) : VectorXcd::Zero(n_);
+      }
+    }
+  }
+  int size() const { return static_cast<int>(hessenberg_.cols()); }
+  MatrixXcd square() const { return hessenberg_.topRows(size()); }
+  double last() const { return std::abs(hessenberg_(size(), size() - 1)); }
+  auto basis() const { return basis_.leftCols(size()); }
+
+ private:
+  /// Random, filtered by T thrice: what infinite eigenvalues span is gone.
+  VectorXcd fresh_vector() {
+    std::normal_distribution<double> normal;
+    VectorXcd v(n_);
+    for (int i = 0; i < n_; ++i) v(i) = normal(random_);
+    for (int pass = 0; pass < 3; ++pass) {
+      v = t_.apply(v);
+      const double size = v.norm();
+      if (size > 0) v /= size;
+    }
+    return v;
+  }
+  VectorXcd orthogonalize(VectorXcd& w, int count) const {
+    const auto q = basis_.leftCols(count);
+    VectorXcd h = q.adjoint() * w;
+    w -= q * h;
+    const VectorXcd again = q.adjoint() * w;
+    w -= q * again;
+    return h + again;
+  }
+
+  ShiftInvert& t_;
+  int n_;
+  MatrixXcd basis_, hessenberg_;
+  std::mt19937_64 random_{20};
+};
+
+std::vector<int> by_size(const VectorXcd& mu) {
+  std::vector<int> order(mu.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return std::abs(mu(a)) > std::abs(mu(b)); });
+  return order;
+}
+
+/// Similarity scaling that evens out row and column norms; returns the scales d with D⁻¹ T D
+/// balanced.
+VecX balance(MatX& t) {
+  VecX d = VecX::Ones(t.rows());
+  for (int pass = 0; pass < 8; ++pass)
+    for (Eigen::Index i = 0; i < t.rows(); ++i) {
+      const double row = t.row(i).norm(), column = t.col(i).norm();
+      if (!(row > 0) || !(column > 0)) continue;
+      const double f = std::sqrt(row / column);
+      t.row(i) /= f;
+      t.col(i) *= f;
+      d(i) *= f;
+    }
+  return d;
+}
+
+void normalize_columns(MatrixXcd& v) {
+  for (Eigen::Index j = 0; j < v.cols(); ++j)
+    if (const double size = v.col(j).norm(); size > 0) v.col(j) /= size;
+}
+
+}  // namespace
+
+Result<Spectrum> finite_spectrum(const Linearization& system) {
+  const int n = system.model->unknowns;
+  if (n == 0) return Spectrum{};
+  const MatX e = system.model->dense(system.e), a = system.model->dense(system.a);
+  const Eigen::PartialPivLU<MatX> lu(a - kDenseShift * e);
+  if (!(lu.rcond() > 0))
+    return eigen_error(ErrorKind::singular,
+                       "the linearized system is singular: constraints are redundant or something "
+                       "is undetermined");
+  MatX t = lu.solve(e);
+  MatX basis = balance(t).asDiagonal();
+  for (;;) {
+    const Eigen::ColPivHouseholderQR<MatX> qr = [&] {
+      Eigen::ColPivHouseholderQR<MatX> q(t.rows(), t.cols());
+      q.setThreshold(kRankTolerance);
+      q.compute(t);
+      return q;
+    }();
+    const Eigen::Index rank = qr.rank();
+    if (rank == t.rows()) break;
+    const MatX q = MatX(qr.householderQ()).leftCols(rank);
+    basis = (basis * q).eval();
+    t = (q.transpose() * t * q).eval();
+    if (rank == 0) return Spectrum{};
+  }
+  const Eigen::EigenSolver<MatX> solver(t);
+  if (solver.info() != Eigen::Success)
+    return eigen_error(ErrorKind::not_converged, "the QR iteration did not converge");
+  Spectrum result;
+  result.values = (solver.eigenvalues().cwiseInverse().array() + kDenseShift).matrix();
+  result.vectors = basis * solver.eigenvectors();
+  normalize_columns(result.vectors);
+  return result;
+}
+
+Result<Spectrum> spectrum_near(const Linearization& system, std::complex<double> shift, int count,
+                               double tolerance, int basis) {
+  const int n = system.model->unknowns;
+  count = std::min(count, n);
+  if (count == 0) return Spectrum{};
+  ShiftInvert t(system, shift);
+  if (!t.regular())
+    return eigen_error(ErrorKind::singular,
+                       "the linearized system is singular at the shift: it is an eigenvalue, or "
+                       "constraints are redundant");
+  Krylov krylov(t, n);
+  const int largest = std::min(n, kLargestBasis);
+  for (int m = std::min(std::max(basis, 2 * count + 20), largest);; m = std::min(2 * m, largest)) {
+    krylov.grow(m);
+    const Eigen::ComplexEigenSolver<MatrixXcd> solver(krylov.square());
+    if (solver.info() != Eigen::Success)
+      return eigen_error(ErrorKind::not_converged, "the QR iteration did not converge");
+    const VectorXcd& mu = solver.eigenvalues();
+    const std::vector<int> order = by_size(mu);
+    int converged = 0;
+    while (converged < count &&
+           krylov.last() * std::abs(solver.eigenvectors()(m - 1, order[converged])) <=
+               tolerance * std::abs(mu(order[converged])))
+      ++converged;
+    if (converged < count && m < largest) continue;
+    if (converged < count && m < n)
+      return eigen_error(ErrorKind::not_converged,
+                         "only " + std::to_string(converged) + " of " + std::to_string(count) +
+                             " eigenvalues converged with " + std::to_string(m) + " basis vectors");
+    Spectrum result;
+    std::vector<int> kept;
+    for (int k = 0; k < count; ++k)
+      if (std::abs(mu(order[k])) > 1e-9 * std::abs(mu(order[0]))) kept.push_back(order[k]);
+    result.values.resize(static_cast<Eigen::Index>(kept.size()));
+    result.vectors.resize(n, static_cast<Eigen::Index>(kept.size()));
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+      result.values(k) = shift + 1.0 / mu(kept[k]);
+      result.vectors.col(k) = krylov.basis() * solver.eigenvectors().col(kept[k]);
+    }
+    normalize_columns(result.vectors);
+    return result;
+  }
+}
+
+Result<Spectrum> eigen(const Linearization& system, int count, std::complex<double> shift) {
+  const int n = system.model->unknowns;
+  const bool all = count <= 0;
+  if (all && n > kLargestDense) {
+    Error e = eigen_error(ErrorKind::limit, "all eigenvalues of " + std::to_string(n) +
+                                                " unknowns are too many (at most " +
+                                                std::to_string(kLargestDense) +
+                                                "); ask for a number of them near a frequency");
+    e.reason = "EIGENANALYSIS_SIZE";
+    return e;
+  }
+  auto found = all || n <= kSmall ? finite_spectrum(system)
+                                  : spectrum_near(system, shift + kShiftOffset, count);
+  if (!found) return found;
+  std::vector<int> order(found->values.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return std::abs(found->values(a) - shift) < std::abs(found->values(b) - shift);
+  });
+  if (!all && count < static_cast<int>(order.size())) order.resize(count);
+  Spectrum sorted;
+  sorted.values = found->values(order);
+  sorted.vectors = found->vectors(Eigen::all, order);
+  return sorted;
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,16 @@
+/// The `eigenanalysis` card: eigenproblem of the bilinear transformation of the system about the
+/// current state.
+#pragma once
+
+#include "model/diagnostic.h"
+#include "model/eigen_report.h"
+#include "model/model.h"
+
+namespace mbcosim {
+
+/// Analyses `state`. ErrorKind::limit when the dense solver is asked for a model that is too large
+/// for it.
+Result<EigenReport> analyse_modes(const Model& model, const State& state,
+                                  const EigenSettings& settings);
+
+}  // namespace mbcosim

@@ -1,0 +1,1 @@
+set(SOURCES integrators_test.cpp eigen_test.cpp)
