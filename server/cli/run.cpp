@@ -4,7 +4,7 @@
 #include "cli/deck_report.h"
 #include "cli/interrupt.h"
 #include "cli/progress.h"
-#include "output/text_writer.h"
+#include "output/result_files.h"
 
 namespace mbcosim::cli {
 namespace {
@@ -58,7 +58,8 @@ int run(const RunOptions& options) {
     std::fprintf(stderr, "note: nobody is coupled to port \"%s\"; its loads stay zero\n",
                  port.name.c_str());
 
-  const auto writer = make_text_writer(options.prefix.empty() ? options.deck : options.prefix);
+  const auto writer =
+      make_result_writer(*report.model, options.prefix.empty() ? options.deck : options.prefix);
   const ExitCode exit_code = simulate(report.model, writer, interrupt.token(), options.quiet);
   const auto written = writer->finish();
   if (!written) return complain(written.error());

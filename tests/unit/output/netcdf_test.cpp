@@ -1,0 +1,150 @@
+/// NetCDF results, read back with the C library.
+#include <netcdf.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "deck_run.h"
+#include "output/result_files.h"
+
+namespace mbcosim {
+namespace {
+
+const char* const kDeck = R"(begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: .05; time step: 1e-2; max iterations: 20; tolerance: 1e-9;
+  derivatives tolerance: 1e-3; eigenanalysis: list, 2, 0., .02, parameter, .1, output full matrices, output eigenvectors;
+end: initial value;
+begin: control data; structural nodes: 3; rigid bodies: 2; joints: 2; forces: 2; gravity; default output: all, accelerations;
+  output results: netcdf, no text; end: control data;
+begin: nodes;
+  structural: 1, static, null, eye, null, null;
+  structural: 2, dynamic, 1.,0.,0., eye, null, null, accelerations, yes;
+  structural: 7, dynamic, 0.,1.,0., eye, orientation description, orientation matrix, null, 0.,0.,2.;
+end: nodes;
+begin: elements;
+  body: 2, 2, 1.5, null, eye;
+  body: 7, 7, 1., null, eye;
+  joint: 1, clamp, 1, node, node;
+  joint: 3, rod, 1, 2, 1., linear elastic, 1000.;
+  force: 4, absolute, 2, position, 0.,.5,0., 0.,1.,0., const, 3.;
+  couple: 5, absolute, 7, 0.,0.,1., const, .5;
+  gravity: uniform, 0.,0.,-1., const, 9.81;
+end: elements;
+)";
+
+class NetcdfResults : public testing::Test {
+ protected:
+  void SetUp() override {
+    prefix_ = testing::TempDir() + "mbcosim_netcdf_" +
+              std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "_" +
+              std::to_string(reinterpret_cast<std::uintptr_t>(this));
+    const LoadReport report = load_deck(BundleSource({{"deck.mbd", kDeck}}), "deck.mbd");
+    for (const Diagnostic& d : report.diagnostics)
+      EXPECT_NE(d.severity, Severity::error) << d.text();
+    ASSERT_TRUE(report.ok());
+    auto writer = make_result_writer(*report.model, prefix_);
+    auto simulation = Simulation::create(report.model, nullptr, writer);
+    ASSERT_TRUE(simulation) << simulation.error().message;
+    simulation_ = std::move(*simulation);
+    const StepReport run = simulation_->run_until(0.05);
+    ASSERT_FALSE(run.error) << run.error->message;
+    const Status written = writer->finish();
+    ASSERT_TRUE(written) << written.error().message;
+    ASSERT_EQ(nc_open((prefix_ + ".nc").c_str(), NC_NOWRITE, &file_), NC_NOERR);
+  }
+  void TearDown() override {
+    nc_close(file_);
+    for (const char* end : {".nc", ".out", ".log", "_0.m", "_1.m"})
+      std::remove((prefix_ + end).c_str());
+  }
+  int id(const std::string& name) {
+    int variable = -1;
+    EXPECT_EQ(nc_inq_varid(file_, name.c_str(), &variable), NC_NOERR) << name;
+    return variable;
+  }
+  std::vector<std::size_t> shape(const std::string& name) {
+    int dimensions[8], count = 0;
+    EXPECT_EQ(nc_inq_var(file_, id(name), nullptr, nullptr, &count, dimensions, nullptr), NC_NOERR);
+    std::vector<std::size_t> lengths(count);
+    for (int k = 0; k < count; ++k) nc_inq_dimlen(file_, dimensions[k], &lengths[k]);
+    return lengths;
+  }
+  std::vector<double> values(const std::string& name) {
+    std::size_t size = 1;
+    for (const std::size_t n : shape(name)) size *= n;
+    std::vector<double> data(size);
+    EXPECT_EQ(nc_get_var_double(file_, id(name), data.data()), NC_NOERR) << name;
+    return data;
+  }
+  std::string text(const std::string& variable, const char* attribute) {
+    std::size_t length = 0;
+    const int v = id(variable);
+    if (nc_inq_attlen(file_, v, attribute, &length) != NC_NOERR) return "";
+    std::string s(length, ' ');
+    nc_get_att_text(file_, v, attribute, s.data());
+    return s;
+  }
+
+  std::string prefix_;
+  std::unique_ptr<Simulation> simulation_;
+  int file_ = -1;
+};
+
+using Shape = std::vector<std::size_t>;
+
+TEST_F(NetcdfResults, HaveOneValueForEachRecord) {
+  EXPECT_EQ(values("run.step"), (std::vector<double>{0, 1, 2, 3, 4, 5}));
+  EXPECT_NEAR(values("time").back(), 0.05, 1e-12);
+  EXPECT_EQ(values("run.timestep")[1], 0.01);
+  EXPECT_EQ(shape("node.struct.2.X"), (Shape{6, 3}));
+  EXPECT_EQ(shape("node.struct.7.R"), (Shape{6, 3, 3}));
+  EXPECT_EQ(shape("elem.joint.3.l"), (Shape{6}));
+}
+
+TEST_F(NetcdfResults, AreThoseOfTheSimulation) {
+  const Model& model = simulation_->model();
+  const EvalContext context = model.context(simulation_->state(), Phase::step);
+  const NodeState n2 = model.node_state(context, 1), n7 = model.node_state(context, 2);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(values("node.struct.2.X")[15 + i], n2.x(i));
+    EXPECT_EQ(values("node.struct.2.XP")[15 + i], n2.v(i));
+    EXPECT_EQ(values("node.struct.7.Omega")[15 + i], n7.w(i));
+    for (int j = 0; j < 3; ++j) EXPECT_EQ(values("node.struct.7.R")[45 + 3 * i + j], n7.R(i, j));
+  }
+  EXPECT_NEAR(values("node.struct.2.XPP")[15 + 2], -9.81, 1e-2);
+  EXPECT_EQ(values("elem.force.4.F")[1], 3);
+  EXPECT_EQ(values("elem.force.4.Arm")[1], .5);
+  EXPECT_EQ(values("elem.couple.5.M")[2], .5);
+  EXPECT_EQ(shape("elem.joint.3.F"), (Shape{6, 3}));
+  EXPECT_EQ(shape("node.struct.2.B"), (Shape{6, 3}));
+  EXPECT_EQ(shape("node.struct.2.E"), (Shape{6, 3}));
+}
+
+TEST_F(NetcdfResults, DescribeThemselves) {
+  EXPECT_EQ(values("node.struct"), (std::vector<double>{1, 2, 7}));
+  EXPECT_EQ(values("elem.joint"), (std::vector<double>{1, 3}));
+  EXPECT_EQ(values("elem.couple"), (std::vector<double>{5}));
+  EXPECT_EQ(text("node.struct.2", "type"), "dynamic");
+  EXPECT_EQ(text("node.struct.2.XP", "units"), "m/s");
+  EXPECT_EQ(text("time", "units"), "s");
+  EXPECT_EQ(text("node.struct.7.R", "units"), "");
+}
+
+TEST_F(NetcdfResults, HoldEigenanalyses) {
+  EXPECT_EQ(values("eig.1.step"), std::vector<double>{2});
+  EXPECT_EQ(values("eig.0.dCoef"), std::vector<double>{.05});
+  const std::size_t n = simulation_->model().unknowns, m = shape("eig.0.alpha")[1];
+  EXPECT_EQ(shape("eig.0.alpha")[0], 3u);
+  EXPECT_EQ(shape("eig.0.Aplus"), (Shape{n, n}));
+  EXPECT_EQ(shape("eig.0.VR"), (Shape{2, n, m}));
+}
+
+TEST_F(NetcdfResults, ReplaceTheTextFilesWhenAsked) {
+  EXPECT_FALSE(std::filesystem::exists(prefix_ + ".mov"));
+  EXPECT_TRUE(std::filesystem::exists(prefix_ + ".out"));
+}
+
+}  // namespace
+}  // namespace mbcosim

@@ -1,0 +1,1 @@
+set(SOURCES netcdf_test.cpp)
