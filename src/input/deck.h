@@ -56,7 +56,7 @@ struct Deck {
   std::array<double, 5> scalar_scale;  ///< by ScalarKind
   bool method_set = false;
   SourceSpan method_where;
-  SourceSpan final_time_where;
+  SourceSpan final_time_where, strategy_where;
   bool output_rate_set = false;   ///< by `output frequency` or `output meter`
   bool inverse_dynamics = false;  ///< refused: nothing more is read
 

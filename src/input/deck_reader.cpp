@@ -1,5 +1,7 @@
 #include "input/deck_reader.h"
 
+#include <limits>
+
 #include "input/cards.h"
 #include "input/suggest.h"
 
@@ -222,6 +224,31 @@ void DeckReader::check_parameters() {
           "add a \"bind\" card to the elements"));
 }
 
+/// What the cards of the initial value block must agree on, in whatever order they stand.
+void DeckReader::check_initial_value() {
+  const InitialValueSettings& s = deck_.builder.model().initial_value;
+  const auto refuse = [&](SourceSpan where, const std::string& message) {
+    deck_.session.report(deck_.session.diagnostic(Severity::error, "initial-value", where, message));
+  };
+  const bool third_order =
+      s.method.method == Method::third_order || s.method.method == Method::third_order_ad_hoc;
+  if (third_order && s.line_search)
+    refuse(deck_.method_where, "the third order method has no line search: use newton raphson");
+  if (s.strategy != StepStrategy::change) return;
+  double largest = std::numeric_limits<double>::infinity();
+  try {
+    if (s.max_time_step) largest = s.max_time_step->value(deck_.builder.input_context());
+  } catch (const EvaluationError&) {
+    return;  // known only while the model runs
+  }
+  if (s.min_time_step > largest)
+    refuse(deck_.strategy_where, "min time step is greater than max time step");
+  else if (s.time_step < s.min_time_step)
+    refuse(deck_.strategy_where, "time step is less than min time step");
+  else if (s.time_step > largest)
+    refuse(deck_.strategy_where, "time step is greater than max time step");
+}
+
 void DeckReader::finish() {
   Session& session = deck_.session;
   if (block_ != Block::none) {
@@ -240,6 +267,7 @@ void DeckReader::finish() {
   }
   check_counts();
   check_parameters();
+  check_initial_value();
   Model& model = deck_.builder.model();
   const InitialValueSettings& iv = model.initial_value;
   if (iv.final_time < iv.initial_time && deck_.final_time_where.file >= 0)

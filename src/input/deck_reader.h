@@ -25,6 +25,7 @@ class DeckReader {
   void finish();
   void check_counts();
   void check_parameters();
+  void check_initial_value();
   void warn_about_rest(const Statement& last);
   void record(const DeckError& error, const DeckCard& card);
 

@@ -48,6 +48,7 @@ void read_max_time_step(DeckCard& card) {
 
 void read_strategy(DeckCard& card) {
   InitialValueSettings& s = settings(card);
+  card.deck().strategy_where = card.head();
   switch (card.required("strategy", {"no change", "factor", "change"})) {
     case 0:
       s.strategy = StepStrategy::no_change;
@@ -66,8 +67,7 @@ void read_strategy(DeckCard& card) {
   s.raise = card.real_above("raise factor", 1, true);
   s.steps_before_raise = card.integer_at_least("steps before raise", 1);
   s.min_iterations = card.integer_at_least("min iterations", 1);
-  s.max_iterations_factor = 0;
-  if (!card.more()) return;
+  if (!card.more()) card.fail("strategy factor: the largest number of iterations is missing");
   s.max_iterations_factor = card.integer_at_least("max iterations", 1);
   if (s.max_iterations_factor <= s.min_iterations)
     card.fail("max iterations must be greater than min iterations");

@@ -124,7 +124,7 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
   stepper.set_cancelled(cancel);
   double h = stepper.next_step_size(state);
   PhaseReport phase = stepper.step(state, h);
-  while (phase.error && phase.error->kind != ErrorKind::cancelled && phase.error->kind != ErrorKind::evaluation) {
+  while (phase.error && phase.error->kind != ErrorKind::cancelled) {
     h = stepper.retry_step_size(state, h);
     if (h <= 0) break;
     phase = stepper.step(state, h);

@@ -52,7 +52,18 @@ void limit_step(const LineSearchSettings& s, const State& state, std::vector<dou
 
 }  // namespace
 
-void search_along(const Model& model, Phase phase, double c, double c_algebraic, const LineSearchSettings& s, State& state,
+/// Is the gradient of ½ rᵀr so small that its minimum is a spurious one? J: the matrix in the workspace.
+bool is_local_minimum(const Model& model, const LineSearchSettings& s, const State& state, double f, const Workspace& ws) {
+  double largest = 0;
+  for (int j = 0; j < model.unknowns; ++j) {
+    double g = 0;
+    for (int k = model.column_start[j]; k < model.column_start[j + 1]; ++k) g += ws.values[k] * ws.residual[model.row_index[k]];
+    largest = std::max(largest, std::abs(g) * std::max({std::abs(state.y[j]), std::abs(state.yp[j]), 1.0}));
+  }
+  return largest < s.tolerance_min * std::max(f, 0.5 * model.unknowns);
+}
+
+bool search_along(const Model& model, Phase phase, double c, double c_algebraic, const LineSearchSettings& s, State& state,
                   Workspace& ws) {
   const State start = state;
   const double f0 = 0.5 * dot(ws.residual, ws.residual);
@@ -70,8 +81,13 @@ void search_along(const Model& model, Phase phase, double c, double c_algebraic,
     apply_correction(model, ws.delta, c, c_algebraic, state);
     compute_residual(model.context(state, phase, c, c_algebraic), ws.residual);
     now.f = 0.5 * dot(ws.residual, ws.residual);
-    if (std::isfinite(now.f) && now.f <= f0 + s.alpha * now.lambda * slope) return;
-    if (now.lambda <= lambda_min || k >= s.max_iterations) return;
+    if (std::isfinite(now.f) && now.f <= f0 + s.alpha * now.lambda * slope) return true;
+    if (k >= s.max_iterations) return false;
+    if (now.lambda <= lambda_min) {
+      if (s.abort_at_lambda_min || !std::isfinite(now.f)) return false;
+      if (!s.zero_gradient_continue && is_local_minimum(model, s, state, now.f, ws)) return false;
+      return !s.divergence_check || now.f <= s.divergence_factor * f0;
+    }
     const double next = std::isfinite(now.f) ? next_lambda(s, k == 0, f0, slope, now, before) : 0.5 * now.lambda;
     before = now;
     now.lambda = std::max(next, lambda_min);

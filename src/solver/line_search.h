@@ -7,8 +7,9 @@
 
 namespace mbcosim {
 
-/// Moves `state` along workspace.delta (scaled in place to the accepted step) so that ½ rᵀr decreases.
-void search_along(const Model& model, Phase phase, double c, double c_algebraic, const LineSearchSettings& settings, State& state,
+/// Moves `state` along workspace.delta (scaled in place to the accepted step) so that ½ rᵀr decreases. False when it gives up: the
+/// smallest step is reached without enough decrease (unless the settings accept that), or after too many trials.
+bool search_along(const Model& model, Phase phase, double c, double c_algebraic, const LineSearchSettings& settings, State& state,
                   Workspace& workspace);
 
 }  // namespace mbcosim

@@ -26,11 +26,12 @@ class Newton {
   NewtonReport run() {
     ws_.residual_history.clear();
     NewtonReport report;
+    report.tolerance = settings_.tolerance;
     for (;;) {
       report.residual_error = residual();
       ws_.residual_history.push_back(report.residual_error);
       if (const auto verdict = judge_residual(settings_, ws_.residual_history, report.iterations)) return finish(report, *verdict);
-      if (exceeds_limits()) return finish(report, NewtonOutcome::not_converged);
+      if (exceeds_residual_limits(model_, settings_, ws_.residual)) return finish(report, NewtonOutcome::not_converged);
       if (hooks_.cancelled()) return finish(report, NewtonOutcome::cancelled);
       if (!correct(report)) return report;
       if (settings_.solution_tolerance > 0 && report.solution_error < settings_.solution_tolerance) {
@@ -51,19 +52,8 @@ class Newton {
     return residual_error(model_, settings_, state_, ws_.residual);
   }
 
-  bool exceeds_limits() const {
-    if (settings_.max_residual <= 0 && settings_.max_residual_differential <= 0) return false;
-    double all = 0, differential = 0;
-    for (int i = 0; i < model_.unknowns; ++i) {
-      const double x = std::abs(ws_.residual[i]);
-      all = std::max(all, x);
-      if (!model_.is_constraint_row[i]) differential = std::max(differential, x);
-    }
-    return (settings_.max_residual > 0 && all > settings_.max_residual) ||
-           (settings_.max_residual_differential > 0 && differential > settings_.max_residual_differential);
-  }
-
-  /// One linear solve and update; false (with the outcome set) when the matrix cannot be factored.
+  /// One linear solve and update; false (with the outcome set) when the matrix cannot be factored
+  /// or the line search gives up.
   bool correct(NewtonReport& report) {
     const bool factored = factor(report.iterations);
     ++report.iterations;
@@ -74,8 +64,12 @@ class Newton {
     }
     std::copy(ws_.residual.begin(), ws_.residual.end(), ws_.delta.begin());
     ws_.solver.solve(ws_.delta.data());
-    if (settings_.line_search) search_along(model_, phase_, c_, ca_, *settings_.line_search, state_, ws_);
-    else apply_correction(model_, ws_.delta, c_, ca_, state_);
+    if (!settings_.line_search) {
+      apply_correction(model_, ws_.delta, c_, ca_, state_);
+    } else if (!search_along(model_, phase_, c_, ca_, *settings_.line_search, state_, ws_)) {
+      finish(report, NewtonOutcome::not_converged);
+      return false;
+    }
     hooks_.after_correction(state_);
     if (settings_.solution_test != ResidualTest::none)
       report.solution_error = test_value(settings_.solution_test, ws_.delta);
@@ -140,10 +134,23 @@ double residual_error(const Model& model, const NewtonSettings& settings, const 
   return error / sum;
 }
 
+bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings, const std::vector<double>& residual) {
+  if (settings.max_residual <= 0 && settings.max_residual_differential <= 0) return false;
+  double all = 0, differential = 0;
+  for (int i = 0; i < model.unknowns; ++i) {
+    const double x = std::abs(residual[i]);
+    all = std::max(all, x);
+    if (!model.is_constraint_row[i]) differential = std::max(differential, x);
+  }
+  return (settings.max_residual > 0 && all > settings.max_residual) ||
+         (settings.max_residual_differential > 0 && differential > settings.max_residual_differential);
+}
+
 std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations) {
   const double error = errors.back();
   if (!std::isfinite(error)) return NewtonOutcome::not_converged;
-  if (settings.tolerance > 0 && error < settings.tolerance) return NewtonOutcome::converged;
+  const bool tested = settings.residual_test != ResidualTest::none && settings.tolerance > 0;
+  if (tested && error < settings.tolerance) return NewtonOutcome::converged;
   if (iterations < settings.max_iterations) return std::nullopt;
   return settings.at_most && error < errors.front() ? NewtonOutcome::converged : NewtonOutcome::not_converged;
 }

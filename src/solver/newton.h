@@ -23,12 +23,14 @@ struct NewtonSettings {
   double constraint_factor = 1;  ///< `enforce constraint equations: constraint violations`
 };
 
+/// `not_converged` also covers divergence and a line search without success.
 enum class NewtonOutcome { converged, not_converged, singular, cancelled };
 
 struct NewtonReport {
   NewtonOutcome outcome = NewtonOutcome::converged;
   int iterations = 0;  ///< linear solves
   double residual_error = 0;
+  double tolerance = 0;  ///< of the residual test
   double solution_error = 0;
   bool by_solution = false;  ///< accepted by the solution test
   int singular_column = -1;
@@ -38,6 +40,8 @@ struct NewtonReport {
 double test_value(ResidualTest test, const std::vector<double>& v);
 /// The residual test with its scales and options.
 double residual_error(const Model& model, const NewtonSettings& settings, const State& state, const std::vector<double>& residual);
+/// Is a residual beyond `max residual`?
+bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings, const std::vector<double>& residual);
 /// What the last residual error says after `iterations` solves: an outcome, or nothing to go on.
 std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations);
 

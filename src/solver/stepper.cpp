@@ -198,8 +198,13 @@ ThirdOrderFormula Stepper::third_order(const State& state, const MethodSettings&
 }
 
 NewtonReport Stepper::iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first,
-                              const NewtonSettings& settings) {
+                              NewtonSettings settings) {
   const StepHooks hooks(cancel_);
+  const InitialValueSettings& s = model_.initial_value;
+  if (s.constraint_violations) {
+    const double c = !first && is_third_order(method) ? 1 : f.c();
+    settings.constraint_factor = c * (s.constraint_scale > 0 ? s.constraint_scale : 1 / s.time_step);
+  }
   if (!first && is_third_order(method)) return third_order_->solve(third_order(state, method), settings, hooks, state, workspace_);
   return solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, hooks, state, workspace_);
 }
@@ -301,10 +306,7 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
 
 PhaseReport Stepper::step(State& state, double h) {
   NewtonSettings settings = regular_;
-  if (model_.initial_value.constraint_violations) {
-    const double scale = model_.initial_value.constraint_scale;
-    settings.constraint_factor = 0.5 * h * (scale > 0 ? scale : 1 / model_.initial_value.time_step);
-  }
+  if (h <= 2 * model_.initial_value.min_time_step) settings.max_residual = settings.max_residual_differential = 0;
   const bool first = state.control[control::kRegularSteps] == 0;
   PhaseReport report = attempt(state, h, model_.initial_value.method, first, settings);
   if (!report.error) {
@@ -328,7 +330,7 @@ double Stepper::next_step_size(State& state) {
   since_reduction += 1;
   since_raise += 1;
   const double iterations = state.control[control::kLastIterations];
-  if (iterations > s.max_iterations_factor && since_reduction > s.steps_before_reduction) {
+  if (iterations > s.max_iterations_factor) {
     since_reduction = 0;
     return std::max(std::min(h * s.reduction, limit), s.min_time_step);
   }
@@ -346,7 +348,7 @@ double Stepper::retry_step_size(State& state, double h) {
     return other < h && other >= s.min_time_step ? other : 0;
   }
   if (s.strategy != StepStrategy::factor || h <= s.min_time_step) return 0;
-  if (h * s.reduction > s.min_time_step) {
+  if (h * s.reduction > s.min_time_step && s.reduction < 1 && state.time + h * s.reduction > state.time) {
     state.control[control::kSinceReduction] = 0;
     return h * s.reduction;
   }
@@ -384,7 +386,7 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
   e.failure.worst = worst_equations(model_, workspace_.residual);
   char text[160];
   std::snprintf(text, sizeof text, ": no convergence in %d iterations, residual %.6g, tolerance %.6g", report.iterations,
-                report.residual_error, model_.initial_value.tolerance);
+                report.residual_error, report.tolerance);
   e.message = where + std::string(text);
   for (const WorstEquation& w : e.failure.worst) {
     std::snprintf(text, sizeof text, "%.6g", w.residual);

@@ -49,7 +49,7 @@ class Stepper {
   class DerivativesHooks;
   PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first, const NewtonSettings& settings);
   /// Newton on the prediction, by the method of the step.
-  NewtonReport iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first, const NewtonSettings& settings);
+  NewtonReport iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first, NewtonSettings settings);
   ThirdOrderFormula third_order(const State& state, const MethodSettings& method) const;
   StepFormula formula(State& state, double h, const MethodSettings& method, bool first) const;
   void predict(State& state, const StepFormula& f) const;

@@ -142,6 +142,7 @@ NewtonReport ThirdOrderSolver::solve(const ThirdOrderFormula& f, const NewtonSet
   predict_stage(f, state);
   workspace.residual_history.clear();
   NewtonReport report;
+  report.tolerance = settings.tolerance;
   const auto finish = [&](NewtonOutcome outcome) {
     report.outcome = outcome;
     return report;
@@ -152,6 +153,8 @@ NewtonReport ThirdOrderSolver::solve(const ThirdOrderFormula& f, const NewtonSet
     if (const auto verdict =
             judge_residual(settings, workspace.residual_history, report.iterations))
       return finish(*verdict);
+    if (exceeds_residual_limits(model_, settings, workspace.residual) || exceeds_residual_limits(model_, settings, stage_residual_))
+      return finish(NewtonOutcome::not_converged);
     if (hooks.cancelled()) return finish(NewtonOutcome::cancelled);
     if (settings.jacobian_every <= 1 || report.iterations % settings.jacobian_every == 0) {
       assemble(f, state, workspace);

@@ -89,6 +89,7 @@ Vec3 read_unused_arm(Card& card, int node) {
 }
 
 void read_couple(Card& card, ElementInfo& info, bool follower) {
+  info.type += " couple";
   StructuralCouple e;
   e.follower = follower;
   e.node = card.structural_node();
@@ -98,6 +99,7 @@ void read_couple(Card& card, ElementInfo& info, bool follower) {
 }
 
 void read_internal_couple(Card& card, ElementInfo& info, bool follower) {
+  info.type += " couple";
   InternalCouple e;
   e.follower = follower;
   e.first = card.structural_node();

@@ -40,7 +40,7 @@ class NetcdfResults : public testing::Test {
     prefix_ = testing::TempDir() + "mbcosim_netcdf_" +
               std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "_" +
               std::to_string(reinterpret_cast<std::uintptr_t>(this));
-    const LoadReport report = load_deck(BundleSource({{"deck.mbd", kDeck}}), "deck.mbd");
+    const LoadReport report = load_deck(BundleSource({{"deck.mbd", std::string(kDeck)}}), "deck.mbd");
     for (const Diagnostic& d : report.diagnostics)
       EXPECT_NE(d.severity, Severity::error) << d.text();
     ASSERT_TRUE(report.ok());

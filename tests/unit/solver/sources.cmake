@@ -1,1 +1,1 @@
-set(SOURCES integrators_test.cpp eigen_test.cpp)
+set(SOURCES integrators_test.cpp eigen_test.cpp newton_test.cpp)
