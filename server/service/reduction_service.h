@@ -1,4 +1,4 @@
-/// Handler of `mbcosim.v1.Reduction`, which this version does not serve.
+/// Handler of `mbcosim.v1.Reduction`: finite element models to FEM data files.
 #pragma once
 
 #include "mbcosim/v1/reduction.grpc.pb.h"
@@ -8,16 +8,13 @@ namespace mbcosim::server {
 
 class ReductionService final : public v1::Reduction::Service {
  public:
+  using Stream = grpc::ServerReaderWriter<v1::ReduceReply, v1::ReduceRequest>;
   explicit ReductionService(Parts parts) : parts_(parts) {}
-  grpc::Status Reduce(grpc::ServerContext* context,
-                      grpc::ServerReaderWriter<v1::ReduceReply, v1::ReduceRequest>*) override {
-    return serve(parts_, *context, "Reduce", Role::control, [](const Caller&) {
-      throw Refusal(v1::REASON_NOT_SERVED,
-                    "Reduce is not served by this version: use `mbcosim reduce`");
-    });
-  }
+  grpc::Status Reduce(grpc::ServerContext* context, Stream* stream) override;
 
  private:
+  void answer(Stream* stream, Call& call);
+
   Parts parts_;
 };
 

@@ -43,6 +43,18 @@ LoadReport load_from_root(const std::string& name, const Config& config) {
 
 }  // namespace
 
+void Bundle::add(const v1::FileChunk& chunk) {
+  check_name(chunk.path());
+  bytes_ += static_cast<std::int64_t>(chunk.data().size());
+  if (bytes_ > limits_.engine.deck_bytes)
+    throw limit_refusal("deck_bytes", limits_.engine.deck_bytes,
+                        "the bundle is larger than allowed");
+  files_[chunk.path()] += chunk.data();
+  if (static_cast<int>(files_.size()) > limits_.bundle_files)
+    throw limit_refusal("bundle_files", limits_.bundle_files,
+                        "the bundle has more files than allowed");
+}
+
 Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceLimits& limits) {
   Upload upload;
   v1::UploadRequest message;
@@ -52,23 +64,15 @@ Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceL
   if (upload.header.source_case() == v1::UploadHeader::SOURCE_NOT_SET)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "the header must have `bundle_main_file` or `model_root_file`");
-  std::int64_t bytes = 0;
+  Bundle bundle(limits);
   while (reader->Read(&message)) {
     if (!message.has_chunk())
       throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` an upload has only `chunk` messages");
     if (!upload.header.has_bundle_main_file())
       throw Refusal(v1::REASON_OUT_OF_TURN, "a deck of the model root takes no `chunk` messages");
-    const v1::FileChunk& chunk = message.chunk();
-    check_name(chunk.path());
-    bytes += static_cast<std::int64_t>(chunk.data().size());
-    if (bytes > limits.engine.deck_bytes)
-      throw limit_refusal("deck_bytes", limits.engine.deck_bytes,
-                          "the bundle is larger than allowed");
-    upload.files[chunk.path()] += chunk.data();
-    if (static_cast<int>(upload.files.size()) > limits.bundle_files)
-      throw limit_refusal("bundle_files", limits.bundle_files,
-                          "the bundle has more files than allowed");
+    bundle.add(message.chunk());
   }
+  upload.files = bundle.take();
   return upload;
 }
 

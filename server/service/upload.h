@@ -14,6 +14,20 @@ struct Upload {
   std::map<std::string, std::string> files;  ///< by name within the bundle
 };
 
+/// Files that arrive in pieces.
+class Bundle {
+ public:
+  explicit Bundle(const ServiceLimits& limits) : limits_(limits) {}
+  /// Appends a piece. Throws Refusal for a bad name or an exceeded limit.
+  void add(const v1::FileChunk& chunk);
+  std::map<std::string, std::string> take() { return std::move(files_); }
+
+ private:
+  const ServiceLimits& limits_;
+  std::int64_t bytes_ = 0;
+  std::map<std::string, std::string> files_;
+};
+
 /// Collects the messages of an upload. Throws Refusal.
 Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceLimits& limits);
 

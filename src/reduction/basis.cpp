@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kNearlyFree = 1e-5;
 constexpr double kPoorResidual = 1e-6;
+constexpr double kPoorRounding = 1e3;
 
 double hertz(double square) { return std::sqrt(square) / (2 * std::numbers::pi); }
 
@@ -118,7 +119,7 @@ void BasisBuilder::add_modes(Structure& structure, BasisShapes& basis) {
   report("normal modes", 0);
   const int count = mode_count(structure);
   const NormalModes modes = structure.modes(count, progress_);
-  if (modes.residual > kPoorResidual)
+  if (modes.residual > std::max(kPoorResidual, kPoorRounding * modes.rounding))
     warnings_.push_back("the normal modes satisfy their equation only to " +
                         std::to_string(modes.residual));
   if (options_.check_completeness && count > 0) check_count(structure, modes);

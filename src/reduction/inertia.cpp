@@ -86,7 +86,9 @@ FemRigidInertia rigid_inertia(const FeModel& model, std::string& warning) {
   inertia.mass = g.diagonal().head<3>().maxCoeff();
   if (!(inertia.mass > 0)) refuse_reduction("the model has no mass");
   if (g.diagonal().head<3>().minCoeff() < (1 - 1e-6) * inertia.mass)
-    warning = "the mass of the model is not the same in all directions; the largest is taken";
+    warning =
+        "the mass of the model is not the same in all directions (or it has no rows in some); the "
+        "largest is taken";
   // The coupling of translation and rotation is -S×: S = m c.
   inertia.center = -ax<double>(Mat3(g.topRightCorner<3, 3>())) / inertia.mass;
   const Mat3 arm = cross<double>(inertia.center);

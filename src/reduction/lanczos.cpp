@@ -83,7 +83,7 @@ NormalModes Structure::lanczos_modes(int count, const ReductionProgress& progres
     throw ReductionError(ErrorKind::not_converged,
                          "only " + std::to_string(converged) + " of " + std::to_string(count) +
                              " normal modes converged (does the model have that many?)");
-  return {solver.eigenvalues(), solver.eigenvectors(), 0};
+  return {solver.eigenvalues(), solver.eigenvectors(), 0, 0};
 }
 
 }  // namespace mbcosim

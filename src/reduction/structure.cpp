@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <limits>
 
 namespace mbcosim {
 
@@ -141,7 +142,7 @@ MatX Structure::solve_all(const MatX& loads) {
 }
 
 NormalModes Structure::modes(int count, const ReductionProgress& progress) {
-  if (count == 0) return {VecX(), MatX(size(), 0), 0};
+  if (count == 0) return {VecX(), MatX(size(), 0), 0, 0};
   factor();  // refuses mechanisms by name
   NormalModes found = size() <= kDenseOrder ? dense_modes(count) : lanczos_modes(count, progress);
   finish(found);
@@ -156,7 +157,7 @@ NormalModes Structure::dense_modes(int count) const {
   const Eigen::GeneralizedSelfAdjointEigenSolver<MatX> solver(mass, stiffness);
   if (solver.info() != Eigen::Success)
     throw ReductionError(ErrorKind::not_converged, "the dense eigensolution failed");
-  NormalModes modes{VecX(count), MatX(size(), count), 0};
+  NormalModes modes{VecX(count), MatX(size(), count), 0, 0};
   const double largest = solver.eigenvalues()(size() - 1);
   int n = 0;
   for (int k = size() - 1; k >= 0 && n < count; --k) {
@@ -185,6 +186,9 @@ void Structure::finish(NormalModes& modes) const {
     const VecX force = stiffness_ * shape;
     const double error = (force - modes.squares(j) * (mass_ * shape)).norm() / force.norm();
     modes.residual = std::max(modes.residual, error);
+    modes.rounding = std::max(modes.rounding,
+                              std::numeric_limits<double>::epsilon() *
+                                  (stiffness_.cwiseAbs() * shape.cwiseAbs()).norm() / force.norm());
   }
 }
 

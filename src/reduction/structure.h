@@ -43,6 +43,7 @@ struct NormalModes {
   VecX squares;         ///< ω² [1/s²], ascending
   MatX shapes;          ///< (rows × modes)
   double residual = 0;  ///< largest |K φ − ω² M φ| / |K φ|
+  double rounding = 0;  ///< of it what the arithmetic cannot avoid: largest ε ‖ |K| |φ| ‖ / |K φ|
 };
 
 class Structure {

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 MBCOSIM = os.path.join(os.environ["MBCOSIM_BIN"], "mbcosim")
+BIN_DAEMON = MBCOSIM + "d"
 NODES, LENGTH, EA, GJ, EIY, EIZ, MASS = 9, 2.0, 1e5, 80.0, 100.0, 150.0, 1.5
 
 

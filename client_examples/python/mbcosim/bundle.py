@@ -2,7 +2,7 @@
 import os
 import re
 
-from mbcosim.v1 import common_pb2, simulations_pb2
+from mbcosim.v1 import common_pb2, reduction_pb2, simulations_pb2
 
 CHUNK_BYTES = 1 << 20
 _QUOTED = re.compile(rb'"([^"\n]{1,1000})"')
@@ -36,10 +36,35 @@ def _names_of(text, current, folder):
     return found
 
 
+def collect_job(job):
+    """Name of a job file of the reduction, and the bytes of it and of the files beside it that it names, by name."""
+    folder, main = os.path.split(os.path.abspath(job))
+    with open(job, "rb") as file:
+        files = {main: file.read()}
+    for line in files[main].decode(errors="replace").splitlines():
+        _, equal, value = line.split("#")[0].partition("=")
+        path = os.path.join(folder, value.strip())
+        if equal and value.strip() and os.path.isfile(path):
+            with open(path, "rb") as file:
+                files[value.strip()] = file.read()
+    return main, files
+
+
+def _chunks(files):
+    for name, data in files.items():
+        for start in range(0, max(len(data), 1), CHUNK_BYTES):
+            yield common_pb2.FileChunk(path=name, data=data[start:start + CHUNK_BYTES])
+
+
 def requests(header, files):
     """The messages of an upload."""
     yield simulations_pb2.UploadRequest(header=header)
-    for name, data in files.items():
-        for start in range(0, max(len(data), 1), CHUNK_BYTES):
-            chunk = common_pb2.FileChunk(path=name, data=data[start:start + CHUNK_BYTES])
-            yield simulations_pb2.UploadRequest(chunk=chunk)
+    for chunk in _chunks(files):
+        yield simulations_pb2.UploadRequest(chunk=chunk)
+
+
+def reduce_requests(header, files):
+    """The messages of a reduction."""
+    yield reduction_pb2.ReduceRequest(header=header)
+    for chunk in _chunks(files):
+        yield reduction_pb2.ReduceRequest(chunk=chunk)

@@ -4,7 +4,7 @@ import uuid
 
 import grpc
 
-from mbcosim.v1 import coupling_pb2_grpc, simulations_pb2, simulations_pb2_grpc, telemetry_pb2_grpc
+from mbcosim.v1 import coupling_pb2_grpc, reduction_pb2, reduction_pb2_grpc, simulations_pb2, simulations_pb2_grpc, telemetry_pb2_grpc
 
 from . import bundle
 from .errors import translated
@@ -47,6 +47,7 @@ class Server:
         self.address = address
         self.metadata = [("authorization", f"Bearer {token}")] if token else []
         self.simulations = simulations_pb2_grpc.SimulationsStub(self._channel)
+        self.reduction = reduction_pb2_grpc.ReductionStub(self._channel)
         self.coupling = coupling_pb2_grpc.CouplingStub(self._channel)
         self.telemetry = telemetry_pb2_grpc.TelemetryStub(self._channel)
 
@@ -104,6 +105,26 @@ class Server:
         header = simulations_pb2.UploadHeader(bundle_main_file=main)
         with translated():
             return self.simulations.ValidateModel(bundle.requests(header, files), metadata=self.metadata)
+
+    def reduce(self, job, *, progress=None, **options):
+        """Reduces a finite element model: `job` is a job file on this machine, beside the files that it names.
+
+        Options of the job can be given here: basis="complement", max_frequency=100. `progress(phase, fraction)` is called on the
+        way. Returns (`mbcosim.v1.ReduceReport`, bytes of the FEM data file).
+        """
+        main, files = bundle.collect_job(job)
+        header = reduction_pb2.ReduceHeader(main_file=main)
+        header.options.update({name.replace("_", "-"): str(value) for name, value in options.items()})
+        report, data = None, bytearray()
+        with translated():
+            for reply in self.reduction.Reduce(bundle.reduce_requests(header, files), metadata=self.metadata):
+                if reply.HasField("chunk"):
+                    data += reply.chunk.data
+                elif reply.HasField("report"):
+                    report = reply.report
+                elif progress is not None:
+                    progress(reply.progress.phase, reply.progress.fraction)
+        return report, bytes(data)
 
     def list(self):
         """`mbcosim.v1.SimulationInfo` of every simulation of this identity."""
