@@ -47,11 +47,11 @@ struct EigenReport {
   };
   std::vector<NodePose> nodes;  ///< structural nodes with unknowns
 
-  /// s [1/s]; infinite for Λ = −1.
+  /// s [1/s]; infinite for Λ = −1 to rounding.
   std::complex<double> eigenvalue(int mode) const {
     const double r = solution.alpha_r(mode), i = solution.alpha_i(mode), b = solution.beta(mode);
     const double d = pencil.kappa * ((r + b) * (r + b) + i * i);
-    if (d == 0) return {std::numeric_limits<double>::infinity(), 0};
+    if (d <= 1e-24 * pencil.kappa * (r * r + i * i + b * b)) return {std::numeric_limits<double>::infinity(), 0};
     return {(r * r + i * i - b * b) / d, 2 * i * b / d};
   }
 };

@@ -4,17 +4,31 @@
 
 namespace mbcosim {
 
+namespace {
+
+constexpr double kPoorGrowth = 1e-9;  ///< reciprocal pivot growth below which the kept pivots are given up
+constexpr double kSuspicious = 1e-3;  ///< ratio of pivots, against the reference matrix, below which growth is looked at
+
+}  // namespace
+
 struct LinearSolver::Klu {
   klu_common common;
   klu_symbolic* symbolic = nullptr;
   klu_numeric* kept = nullptr;   ///< with the kept pivots
   klu_numeric* fresh = nullptr;  ///< of the last matrix, when the kept pivots were poor
   klu_numeric* current = nullptr;
+  double kept_ratio = 0;  ///< smallest to largest pivot of the reference matrix
 
   Klu() {
     klu_defaults(&common);
     common.tol = 0.1;  // threshold pivoting: prefer the diagonal unless it is ten times smaller
     common.halt_if_singular = 1;
+  }
+  /// Judges the kept pivots on the matrix just factored. Growth makes some pivots small against others, which costs
+  /// little to see; the growth itself is computed only then.
+  bool pivots_are_good(int* column_start, int* row_index, double* values) {
+    if (klu_rcond(symbolic, kept, &common) && common.rcond > kSuspicious * kept_ratio) return true;
+    return klu_rgrowth(column_start, row_index, values, symbolic, kept, &common) && common.rgrowth > kPoorGrowth;
   }
   ~Klu() {
     klu_free_numeric(&kept, &common);
@@ -22,12 +36,6 @@ struct LinearSolver::Klu {
     klu_free_symbolic(&symbolic, &common);
   }
 };
-
-namespace {
-
-constexpr double kPoorGrowth = 1e-9;  ///< reciprocal pivot growth below which the kept pivots are given up
-
-}  // namespace
 
 LinearSolver::LinearSolver(int n, const std::vector<int>& column_start, const std::vector<int>& row_index)
     : klu_(std::make_unique<Klu>()), n_(n), column_start_(column_start), row_index_(row_index) {
@@ -43,7 +51,11 @@ LinearSolver::Outcome LinearSolver::analyze(double* values) {
   klu_free_numeric(&klu_->kept, &klu_->common);
   klu_->kept = klu_factor(column_start_.data(), row_index_.data(), values, klu_->symbolic, &klu_->common);
   klu_->current = klu_->kept;
-  if (klu_->kept) return Outcome::ok;
+  if (klu_->kept) {
+    klu_rcond(klu_->symbolic, klu_->kept, &klu_->common);
+    klu_->kept_ratio = klu_->common.rcond;
+    return Outcome::ok;
+  }
   if (klu_->common.status != KLU_SINGULAR) return Outcome::failed;
   singular_column_ = klu_->common.singular_col < n_ ? klu_->common.singular_col : -1;
   return Outcome::singular;
@@ -54,9 +66,7 @@ LinearSolver::Outcome LinearSolver::factor(double* values) {
   if (!klu_->kept) return analyze(values);
   klu_common* common = &klu_->common;
   if (klu_refactor(column_start_.data(), row_index_.data(), values, klu_->symbolic, klu_->kept, common) &&
-      common->status == KLU_OK &&
-      klu_rgrowth(column_start_.data(), row_index_.data(), values, klu_->symbolic, klu_->kept, common) &&
-      common->rgrowth > kPoorGrowth) {
+      common->status == KLU_OK && klu_->pivots_are_good(column_start_.data(), row_index_.data(), values)) {
     klu_->current = klu_->kept;
     return Outcome::ok;
   }

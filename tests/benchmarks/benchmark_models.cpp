@@ -44,10 +44,10 @@ Bundle rigid_chain(int links) {
 
 Bundle cantilever(int count) {
   const int nodes_count = 2 * count + 1;
-  const double piece = 1.0 / (2 * count);
+  const double piece = 0.5;
   std::string nodes, elements = "joint: 1, clamp, 0, node, node;\nforce: 1, follower, " +
                                 std::to_string(nodes_count - 1) +
-                                ", position, null, 0.,1.,0., ramp, 10., 0., forever, 0.;\n";
+                                ", position, null, 0.,1.,0., ramp, .1, 0., forever, 0.;\n";
   for (int k = 0; k < nodes_count; ++k) {
     const std::string label = std::to_string(k);
     nodes += "structural: " + label + (k == 0 ? ", static, " : ", dynamic, ") + number(k * piece) +
@@ -66,7 +66,7 @@ Bundle cantilever(int count) {
   return {{"deck.mbd", blocks("structural nodes: " + std::to_string(nodes_count) +
                                   "; rigid bodies: " + std::to_string(nodes_count - 1) +
                                   "; beams: " + std::to_string(count) + "; joints: 1; forces: 1; ",
-                              nodes, elements)}};
+                              nodes, elements, "tolerance: 1e-4; ")}};
 }
 
 Bundle modal_body(int modes) {
@@ -94,7 +94,7 @@ Bundle modal_body(int modes) {
     fem += "**    NORMAL MODE SHAPE #  " + std::to_string(j + 1) + "\n";
     for (int k = 0; k < points; ++k) {
       const double x = k / (points - 1.0), a = (j / 2 + 1) * M_PI / 2,
-                   shape = x * x * std::sin(a * x + .3), slope = x * std::cos(a * x);
+                   shape = .1 * x * x * std::sin(a * x + .3), slope = .1 * x * std::cos(a * x);
       fem += j % 2 ? "0. 0. " + number(shape) + " 0. " + number(-slope) + " 0.\n"
                    : "0. " + number(shape) + " 0. 0. 0. " + number(slope) + "\n";
     }

@@ -2,6 +2,30 @@
 
 namespace mbcosim {
 
+namespace {
+
+/// A point at d from node k that is held: the node gets sign·(F, d × F), the rows −sign·(x + d)/c.
+void hold_point(const Local<double>& u, Tangent& t, int k, const Vec3& d, double sign) {
+  const Mat3 Fx = cross<double>(u.own3(0)), dx = cross<double>(d);
+  const int rows = t.row_node(k), own = t.row_own(0), columns = t.col_own(0);
+  t.block(rows, columns) -= sign * Mat3::Identity();
+  t.block(rows + 3, columns) -= sign * dx;
+  t.add_orientation(rows + 3, k, sign * Fx * dx);
+  t.add_position(own, k, -sign / u.c() * Mat3::Identity());
+  t.add_orientation(own, k, sign / u.c() * dx);
+}
+
+}  // namespace
+
+void SphericalHinge::tangent(const Local<double>& u, Tangent& t) const {
+  hold_point(u, t, 0, arm_a(u), -1);
+  hold_point(u, t, 1, arm_b(u), 1);
+}
+
+void SphericalPin::tangent(const Local<double>& u, Tangent& t) const {
+  hold_point(u, t, 0, u.R(0) * a.f, -1);
+}
+
 void SphericalHinge::output(const Local<double>& u, OutputRow& row) const {
   const Vec3 F = u.own3(0);
   row.begin(OutputFile::jnt, u.label());

@@ -28,6 +28,7 @@ struct SphericalHinge : TwoAttachments, NamedData<SphericalHinge> {
     r.load(1, F, d2.cross(F));
     r.own3(0, (u.x(0) + d1 - u.x(1) - d2) / u.c());
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const {
     return LogLine("sphericalhinge", label).add(model, a).add(model, b).str();
@@ -57,6 +58,7 @@ struct SphericalPin : NamedData<SphericalPin> {
     r.load(0, -F, -d.cross(F));
     r.own3(0, (u.x(0) + d - X0.cast<T>()) / u.c());
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
   std::string row_name(int k) const { return constraint_name(k, 3); }
