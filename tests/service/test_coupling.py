@@ -82,7 +82,7 @@ def test_quasi_newton_converges_where_the_plain_iteration_diverges(server):
         assert peer.exchanges < 20 * 12
 
 
-@pytest.mark.parametrize("hold, order", [("zero_order", 1), ("linear", 2)])
+@pytest.mark.parametrize("hold, order", [("zero_order", 1), ("linear", 2), ("quadratic", 3)])
 def test_multirate_inputs_show_their_order(server, hold, order):
     omega = 20.0
 

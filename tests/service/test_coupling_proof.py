@@ -13,7 +13,8 @@ import pytest
 
 import decks
 import mbcosim
-from conftest import wait_for
+from conftest import Daemon, wait_for
+from mbcosim.v1 import simulations_pb2 as pb
 from test_coupling import PORT, oscillator, position, spring
 
 # ---------------------------------------------------------------- order of events
@@ -273,3 +274,64 @@ def test_several_ports_with_modes_of_their_own(server):
                 "watch", lambda m: seen.append(m.step) or [], mode="loose", every=2):
             simulation.step(6)
             assert seen == [0, 2, 4]
+
+
+# ---------------------------------------------------------------- death of the daemon
+
+@pytest.mark.parametrize("blow", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("when", ["idle", "in a step"])
+def test_when_the_daemon_ends_peer_and_client_are_told(tmp_path_factory, blow, when):
+    daemon = Daemon(str(tmp_path_factory.mktemp("d")))
+    release, outcome = threading.Event(), {}
+
+    def answer(motion):
+        if when == "in a step" and motion.step == 2:
+            release.wait(30)
+        return spring(motion)
+
+    def step():
+        try:
+            outcome["result"] = simulation.step(10 if when == "in a step" else 2).outcome
+        except mbcosim.Error as error:
+            outcome["error"] = error
+
+    with daemon.connect() as server:
+        simulation = oscillator(server)
+        simulation._owned = False  # nobody is left to delete it
+        peer = simulation.couple("spring", answer, timeout=20)
+        client = threading.Thread(target=step)
+        client.start()
+        if when == "idle":
+            client.join(10)
+        else:
+            wait_for(lambda: "port spring since" in simulation.refresh().waiting_for)
+        daemon.process.send_signal(blow)
+        start = time.monotonic()
+        assert daemon.process.wait(10) == (0 if blow == signal.SIGTERM else -signal.SIGKILL)
+        client.join(5)
+        release.set()
+        assert not client.is_alive() and time.monotonic() - start < 8
+        if when == "in a step":
+            assert outcome.get("result") == "INTERRUPTED" or outcome["error"].code.name in ("UNAVAILABLE", "CANCELLED")
+        wait_for(lambda: peer.error)
+        with pytest.raises(mbcosim.Unavailable):
+            simulation.refresh()
+        peer.close()
+    daemon._log.close()
+
+
+def test_a_client_that_dies_in_a_coupled_step_leaves_the_session_to_others(server, daemon):
+    code = """
+import sys, mbcosim
+simulation = mbcosim.connect(sys.argv[1]).attach(sys.argv[2])
+simulation.step(10**6)
+"""
+    with oscillator(server) as simulation:
+        with simulation.couple("spring", lambda m: time.sleep(0.02) or spring(m)):
+            client = subprocess.Popen([sys.executable, "-c", code, daemon.address, simulation.name])
+            wait_for(lambda: simulation.refresh().step > 2)
+            client.kill()
+            client.wait()
+            wait_for(lambda: simulation.refresh().state == pb.SIMULATION_STATE_READY)
+            step = simulation.info.step
+            assert simulation.step(3).step == step + 3
