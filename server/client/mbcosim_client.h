@@ -72,7 +72,7 @@ struct Motion {
   std::int64_t step = 0;
   double time = 0;              ///< of the values [s]
   double target_time = 0;       ///< for which an answer is wanted [s]
-  int iteration = 0;            ///< pass of a window, from 1; 0: explicit
+  int iteration = 0;            ///< of a tight step, or pass of a window, from 1; 0: explicit
   std::vector<double> x;        ///< positions [m] (3n)
   std::vector<double> R;        ///< rotation matrices by rows, node frame to global (9n)
   std::vector<double> v;        ///< velocities [m/s] (3n)
@@ -87,13 +87,13 @@ struct Loads {
   std::vector<double> signals = {};  ///< of a signal port
 };
 
-enum class Mode { port_default, loose, staggered, window };
+enum class Mode { port_default, loose, staggered, tight, window };
 enum class Policy { fail_step, hold_last, zero, wait };
 enum class Acceleration { none, constant, aitken, iqn_ils };
 
 struct PeerOptions {
   Mode mode = Mode::port_default;
-  int every = 1;        ///< steps between exchanges
+  int every = 1;        ///< steps between exchanges; tight: iterations
   double timeout = 10;  ///< longest wait for an answer [s]
   Policy policy = Policy::fail_step;
   Acceleration acceleration = Acceleration::none;

@@ -11,6 +11,8 @@ v1::CouplingMode to_proto(Mode mode) {
       return v1::COUPLING_MODE_LOOSE;
     case Mode::staggered:
       return v1::COUPLING_MODE_STAGGERED;
+    case Mode::tight:
+      return v1::COUPLING_MODE_TIGHT;
     case Mode::window:
       return v1::COUPLING_MODE_WINDOW;
     default:

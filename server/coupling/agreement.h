@@ -12,7 +12,7 @@ struct Agreement {
   v1::PortFrame frame = v1::PORT_FRAME_GLOBAL;
   bool accelerations = false;
   v1::CouplingMode mode = v1::COUPLING_MODE_LOOSE;
-  int every = 1;  ///< steps between exchanges
+  int every = 1;  ///< steps between exchanges; tight: iterations
   v1::InputHold hold = v1::INPUT_HOLD_ZERO_ORDER;
   std::chrono::milliseconds timeout{10000};  ///< longest wait for an answer
   v1::PeerPolicy policy = v1::PEER_POLICY_FAIL_STEP;
@@ -23,6 +23,8 @@ struct Agreement {
   int generation = 0;  ///< number of the handshake on this port
 
   bool is_window() const { return mode == v1::COUPLING_MODE_WINDOW; }
+  bool is_tight() const { return mode == v1::COUPLING_MODE_TIGHT; }
+  bool is_implicit() const { return is_window() || is_tight(); }
 };
 
 }  // namespace mbcosim::server

@@ -64,6 +64,11 @@ std::string Coupler::waiting_text() const {
   return text;
 }
 
+bool Coupler::has_tight() const {
+  return std::any_of(lines_.begin(), lines_.end(),
+                     [](const Line& line) { return line.agreement.is_tight(); });
+}
+
 bool Coupler::has_window() const {
   return std::any_of(lines_.begin(), lines_.end(),
                      [](const Line& line) { return line.agreement.is_window(); });
@@ -109,7 +114,7 @@ void Coupler::prepare(const Simulation& simulation) {
     if (now.hold != line.agreement.hold) line.history = InputHistory(now.hold);
     line.agreement = now;
     const bool idle = line.port->is_idle();
-    line.due = !idle && !now.is_window() && (step % now.every == 0 || line.history.empty());
+    line.due = !idle && !now.is_implicit() && (step % now.every == 0 || line.history.empty());
     const bool on_its_way = line.sent_for == step && line.port->is_waiting();
     if (!line.due || on_its_way) continue;
     line.sent_for = -1;
@@ -133,7 +138,7 @@ void Coupler::exchange(const CancelToken& cancel) {
 
 void Coupler::apply(Simulation& simulation) {
   for (Line& line : lines_)
-    if (!line.agreement.is_window() && !line.history.empty())
+    if (!line.agreement.is_implicit() && !line.history.empty())
       line.port->model().apply(line.history.at(target_time_), simulation);
 }
 
@@ -149,26 +154,37 @@ void Coupler::finish(const Simulation& simulation) {
   }
 }
 
-// ------------------------------------------------------------------ window ports
+// ------------------------------------------------------------------ implicit ports
+
+void Coupler::start(Line& line, const Simulation& simulation) {
+  line.fixed_point = FixedPoint(line.agreement.acceleration, line.agreement.relaxation);
+  line.fixed_point.start();
+  line.interface = line.port->model().applied(simulation);
+  line.settled = false;
+}
 
 void Coupler::start_passes(const Simulation& simulation) {
-  for (Line& line : lines_) {
-    if (!line.agreement.is_window()) continue;
-    line.fixed_point = FixedPoint(line.agreement.acceleration, line.agreement.relaxation);
-    line.fixed_point.start();
-    line.interface = line.port->model().applied(simulation);
-  }
+  for (Line& line : lines_)
+    if (line.agreement.is_window()) start(line, simulation);
+}
+
+void Coupler::start_iterations(const Simulation& simulation) {
+  for (Line& line : lines_)
+    if (line.agreement.is_tight()) start(line, simulation);
+}
+
+void Coupler::apply_interface(const Line& line, Simulation& simulation) const {
+  line.port->model().apply({line.interface.data(), line.interface.data() + line.interface.size()},
+                           simulation);
 }
 
 void Coupler::apply_window(Simulation& simulation) const {
-  for (const Line& line : lines_) {
-    if (!line.agreement.is_window()) continue;
-    line.port->model().apply({line.interface.data(), line.interface.data() + line.interface.size()},
-                             simulation);
-  }
+  for (const Line& line : lines_)
+    if (line.agreement.is_window()) apply_interface(line, simulation);
 }
 
-bool Coupler::step_window(Line& line, const CancelToken& cancel) {
+// True: the answer is what is applied, within the tolerance.
+bool Coupler::take_interface(Line& line, const CancelToken& cancel) {
   const auto answer = line.port->take(cancel);
   if (!answer) return true;  // the policy goes on with what was applied
   const Eigen::Map<const Eigen::VectorXd> given(answer->data(),
@@ -188,13 +204,34 @@ bool Coupler::exchange_window(const Simulation& simulation, int pass, const Canc
   }
   bool agreed = true;
   for (Line& line : lines_)
-    if (line.agreement.is_window()) agreed = step_window(line, cancel) && agreed;
+    if (line.agreement.is_window()) agreed = take_interface(line, cancel) && agreed;
   return agreed;
 }
 
-void Coupler::notify_window(bool accepted, const Simulation& simulation) {
+bool Coupler::exchange_iteration(Simulation& simulation, int iteration, const CancelToken& cancel) {
+  const Stopwatch watch(waited_);
+  const auto takes_part = [&](const Line& line) {
+    return line.agreement.is_tight() && iteration % line.agreement.every == 0;
+  };
+  for (Line& line : lines_) {
+    if (!takes_part(line)) continue;
+    fill(line, simulation, simulation.time(), iteration + 1);
+    line.port->send(line.message, line.agreement.generation);
+  }
+  bool settled = true;
+  for (Line& line : lines_) {
+    if (takes_part(line)) {
+      line.settled = take_interface(line, cancel);
+      if (!line.settled) apply_interface(line, simulation);
+    }
+    settled = settled && (line.settled || !line.agreement.is_tight());
+  }
+  return settled;
+}
+
+void Coupler::notify(bool accepted, const Simulation& simulation) {
   for (Line& line : lines_)
-    if (line.agreement.is_window())
+    if (line.agreement.is_implicit())
       line.port->notify(accepted, simulation.step_number(), simulation.time());
 }
 

@@ -13,9 +13,9 @@ namespace mbcosim::server {
 
 /// Order within step k (see `Coupling` in the proto):
 ///
-///   explicit ports   prepare (state k−1) · exchange · apply · step · finish (staggered ports send
-///   state k) window ports     then passes: apply · step · exchange · test; redone from state k−1
-///   until all interfaces agree
+///   explicit ports   prepare (state k−1) · exchange · apply · step · finish (staggered: state k)
+///   tight ports      within the step, before each residual: exchange at the iterate · apply
+///   window ports     passes: apply · step · exchange · test; redone from state k−1 until all agree
 ///
 /// `prepare`, `apply` and `finish` touch the simulation and need the session's lock; `await_peers`
 /// and `exchange` wait and need none.
@@ -28,6 +28,7 @@ class Coupler {
   const std::vector<std::unique_ptr<Port>>& ports() const { return ports_; }
   std::string waiting_text() const;
   bool has_window() const;
+  bool has_tight() const;
 
   void await_peers(const CancelToken& cancel);
   void prepare(const Simulation& simulation);
@@ -37,13 +38,20 @@ class Coupler {
   /// The simulation went to another state: what peers answered before says nothing any more.
   void reset();
 
-  // --- window ports
+  // --- window ports: redo the step
   void start_passes(const Simulation& simulation);
   void apply_window(Simulation& simulation) const;
   /// One exchange at the end of a pass. True: all interfaces agree. Throws PeerLost.
   bool exchange_window(const Simulation& simulation, int pass, const CancelToken& cancel);
   int maximum_passes() const;
-  void notify_window(bool accepted, const Simulation& simulation);
+
+  // --- tight ports: take part in the iteration
+  void start_iterations(const Simulation& simulation);
+  /// One exchange at the iterate. True: the loads of all tight ports have settled. Throws PeerLost.
+  bool exchange_iteration(Simulation& simulation, int iteration, const CancelToken& cancel);
+
+  /// Tells window and tight peers how the step ended.
+  void notify(bool accepted, const Simulation& simulation);
 
   double waited_seconds() const { return waited_; }  ///< in exchanges since the last `start_clock`
   void start_clock() { waited_ = 0; }
@@ -57,12 +65,15 @@ class Coupler {
     bool due = false;
     std::int64_t sent_for = -1;  ///< step whose motion is on its way; −1: none
     FixedPoint fixed_point{v1::ACCELERATION_NONE, 1};
-    Eigen::VectorXd interface;  ///< window: values applied
+    Eigen::VectorXd interface;  ///< window, tight: values applied
+    bool settled = false;       ///< tight: the last answer was what is applied
   };
   void add(PortModel model, const Simulation& simulation);
   void fill(Line& line, const Simulation& simulation, double target_time, int iteration);
   void take_answer(Line& line, const CancelToken& cancel);
-  bool step_window(Line& line, const CancelToken& cancel);
+  void start(Line& line, const Simulation& simulation);
+  void apply_interface(const Line& line, Simulation& simulation) const;
+  bool take_interface(Line& line, const CancelToken& cancel);
 
   std::vector<std::unique_ptr<Port>> ports_;
   std::set<int> written_;  ///< handles that ports write

@@ -69,7 +69,7 @@ v1::CouplingMode to_mode(PortCoupling coupling) {
     case PortCoupling::staggered:
       return v1::COUPLING_MODE_STAGGERED;
     case PortCoupling::tight:
-      return v1::COUPLING_MODE_WINDOW;  // the implicit mode that is served
+      return v1::COUPLING_MODE_TIGHT;
     default:
       return v1::COUPLING_MODE_LOOSE;
   }
@@ -291,6 +291,7 @@ std::string PortModel::decode(const v1::PeerExchange& in, const Agreement& agree
                               std::vector<double>* answer) const {
   const bool structural = !points_.empty();
   const std::size_t vectors = 3 * points_.size();
+  if (in.has_tangent()) return "`tangent` is not served by this version; leave it out";
   std::string wrong = check_array("forces_n", in.forces_n(), vectors, !structural);
   if (wrong.empty()) wrong = check_loads(in);
   const std::size_t signals = structural ? 0 : static_cast<std::size_t>(answer_size_);

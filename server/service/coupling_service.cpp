@@ -54,8 +54,6 @@ void check_layout(const v1::Hello& hello, const PortModel& port, const Model& mo
 }
 
 void check_choices(const v1::Hello& hello, Mismatches& mismatches) {
-  mismatches.expect(hello.mode() != v1::COUPLING_MODE_TIGHT, "mode",
-                    "TIGHT is not served by this version; use WINDOW");
   mismatches.expect(
       v1::CouplingMode_IsValid(hello.mode()) && v1::RotationForm_IsValid(hello.rotation_form()) &&
           v1::PortFrame_IsValid(hello.frame()) && v1::InputHold_IsValid(hello.input_hold()) &&

@@ -99,6 +99,7 @@ class Session {
   };
   struct Advance;  ///< one call of `step` in progress
   class SteppingClaim;
+  class ExchangeInStep;
 
   bool replay(const v1::StepRequest& request, v1::StepReply* reply) const;
   void remember(const v1::StepReply& reply);

@@ -1,5 +1,8 @@
 /// The part of Session that advances.
 #include "service/session_advance.h"
+
+#include <optional>
+
 #include "service/convert.h"
 #include "service/refusal.h"
 
@@ -217,6 +220,7 @@ bool Session::run_coupled_step(Advance& advance) {
     std::lock_guard lock(lock_);
     step_coupled(advance);
   } catch (const PeerLost& lost) {
+    coupler_.notify(false, *simulation_);
     lose_peer(advance, lost.text);
   }
   advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() +
@@ -231,13 +235,46 @@ void Session::step_coupled(Advance& advance) {
   coupler_.apply(*simulation_);
   const StepReport report = coupler_.has_window() ? run_passes(advance) : attempt_in_slot(advance);
   account(advance, report);
+  coupler_.notify(is_accepted(report.outcome), *simulation_);
   if (is_accepted(report.outcome)) coupler_.finish(*simulation_);
 }
 
+/// While it lives, steps exchange with tight ports at each iteration; the slot is free while peers
+/// compute.
+class Session::ExchangeInStep {
+ public:
+  ExchangeInStep(Session& session, Advance& advance, std::optional<SolverSlots::Slot>& slot)
+      : simulation_(session.coupler_.has_tight() ? session.simulation_.get() : nullptr) {
+    if (!simulation_) return;
+    session.coupler_.start_iterations(*simulation_);
+    simulation_->set_exchange([&session, &advance, &slot](int iteration) {
+      slot.reset();
+      const bool settled =
+          session.coupler_.exchange_iteration(*session.simulation_, iteration, advance.token);
+      slot.emplace(session.shared_.slots.acquire(advance.token));
+      return settled;
+    });
+  }
+  ~ExchangeInStep() {
+    if (simulation_) simulation_->set_exchange({});
+  }
+  ExchangeInStep(const ExchangeInStep&) = delete;
+  ExchangeInStep& operator=(const ExchangeInStep&) = delete;
+
+ private:
+  Simulation* simulation_;
+};
+
 StepReport Session::attempt_in_slot(Advance& advance) {
-  const SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
-  if (slot) return attempt(advance);
+  std::optional<SolverSlots::Slot> slot(shared_.slots.acquire(advance.token));
+  const ExchangeInStep exchange(*this, advance, slot);
   StepReport report;
+  if (*slot) {
+    const double waited = coupler_.waited_seconds();
+    report = attempt(advance);
+    report.solver_seconds -= coupler_.waited_seconds() - waited;
+    return report;
+  }
   report.outcome = StepOutcome::interrupted;
   return report;
 }
@@ -255,25 +292,17 @@ StepReport Session::run_passes(Advance& advance) {
     report = attempt_in_slot(advance);
     iterations += report.iterations;
     report.iterations = iterations;
-    if (!is_accepted(report.outcome)) {
-      coupler_.notify_window(false, *simulation_);
-      return report;
-    }
+    if (!is_accepted(report.outcome)) return report;
     bool agreed = false;
     try {
       agreed = coupler_.exchange_window(*simulation_, pass, advance.token);
     } catch (const PeerLost&) {
       restore_or_fail(base);
-      coupler_.notify_window(false, *simulation_);
       throw;
     }
-    if (agreed) {
-      coupler_.notify_window(true, *simulation_);
-      return report;
-    }
+    if (agreed) return report;
     restore_or_fail(base);
   }
-  coupler_.notify_window(false, *simulation_);
   report.outcome = StepOutcome::not_converged;
   report.steps_done = 0;
   Error& error = report.error.emplace();

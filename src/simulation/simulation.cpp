@@ -193,6 +193,8 @@ bool Simulation::finished() const {
   return s.abort_after != InitialValueSettings::AbortAfter::never || !(impl_->state.time < s.final_time);
 }
 
+void Simulation::set_exchange(std::function<bool(int)> exchange) { impl_->stepper.set_exchange(std::move(exchange)); }
+
 StepReport Simulation::step(const CancelToken* cancel) { return step_many(1, cancel); }
 
 StepReport Simulation::step_many(std::int64_t count, const CancelToken* cancel) {

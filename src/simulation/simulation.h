@@ -70,6 +70,11 @@ class Simulation {
 
   /// One step. On failure the state is that of the last accepted step and `report.error` says why.
   StepReport step(const CancelToken* cancel = nullptr);
+  /// For loads that depend on the iterate: `exchange` is called before each residual of a step with the number of
+  /// corrections so far. `get` then gives values at the iterate and `set` changes inputs of this iteration; false: the loads
+  /// have not settled and the iteration goes on. What it throws leaves `step`, and the state is that of the last accepted
+  /// step. Empty: none.
+  void set_exchange(std::function<bool(int)> exchange);
   StepReport step_many(std::int64_t count, const CancelToken* cancel = nullptr);
   /// Steps until `time` (within half a step) or the deck's final time.
   StepReport run_until(double time, const CancelToken* cancel = nullptr);

@@ -28,13 +28,14 @@ class Newton {
     NewtonReport report;
     report.tolerance = settings_.tolerance;
     for (;;) {
+      const bool settled = hooks_.exchange(report.iterations);
       report.residual_error = residual();
       ws_.residual_history.push_back(report.residual_error);
-      if (const auto verdict = judge_residual(settings_, ws_.residual_history, report.iterations)) return finish(report, *verdict);
+      if (const auto verdict = judge_residual(settings_, ws_.residual_history, report.iterations, settled)) return finish(report, *verdict);
       if (exceeds_residual_limits(model_, settings_, ws_.residual)) return finish(report, NewtonOutcome::not_converged);
       if (hooks_.cancelled()) return finish(report, NewtonOutcome::cancelled);
       if (!correct(report)) return report;
-      if (settings_.solution_tolerance > 0 && report.solution_error < settings_.solution_tolerance) {
+      if (settled && settings_.solution_tolerance > 0 && report.solution_error < settings_.solution_tolerance) {
         report.by_solution = true;
         return finish(report, NewtonOutcome::converged);
       }
@@ -146,13 +147,14 @@ bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings,
          (settings.max_residual_differential > 0 && differential > settings.max_residual_differential);
 }
 
-std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations) {
+std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations,
+                                            bool settled) {
   const double error = errors.back();
   if (!std::isfinite(error)) return NewtonOutcome::not_converged;
   const bool tested = settings.residual_test != ResidualTest::none && settings.tolerance > 0;
-  if (tested && error < settings.tolerance) return NewtonOutcome::converged;
+  if (tested && settled && error < settings.tolerance) return NewtonOutcome::converged;
   if (iterations < settings.max_iterations) return std::nullopt;
-  return settings.at_most && error < errors.front() ? NewtonOutcome::converged : NewtonOutcome::not_converged;
+  return settled && settings.at_most && error < errors.front() ? NewtonOutcome::converged : NewtonOutcome::not_converged;
 }
 
 NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic, const NewtonSettings& settings,

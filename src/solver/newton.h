@@ -42,8 +42,10 @@ double test_value(ResidualTest test, const std::vector<double>& v);
 double residual_error(const Model& model, const NewtonSettings& settings, const State& state, const std::vector<double>& residual);
 /// Is a residual beyond `max residual`?
 bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings, const std::vector<double>& residual);
-/// What the last residual error says after `iterations` solves: an outcome, or nothing to go on.
-std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations);
+/// What the last residual error says after `iterations` solves: an outcome, or nothing to go on. Nothing converges before
+/// loads from outside have `settled`.
+std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations,
+                                            bool settled);
 
 /// What the phase that iterates adds.
 class NewtonHooks {
@@ -51,6 +53,8 @@ class NewtonHooks {
   virtual ~NewtonHooks() = default;
   /// After each correction was added to the state (the derivatives phase puts nodes back).
   virtual void after_correction(State&) const {}
+  /// Before each residual: loads from outside may change. False: they have not settled, so that nothing has converged yet.
+  virtual bool exchange(int /*iteration*/) const { return true; }
   /// Asked before each correction; true stops with `cancelled`.
   virtual bool cancelled() const { return false; }
 };

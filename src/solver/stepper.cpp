@@ -60,11 +60,14 @@ bool is_third_order(const MethodSettings& m) { return m.method == Method::third_
 /// Regular steps only ask whether to go on.
 class Stepper::StepHooks : public NewtonHooks {
  public:
-  explicit StepHooks(const CancelToken* cancel) : cancel_(cancel) {}
+  explicit StepHooks(const CancelToken* cancel, const std::function<bool(int)>* exchange = nullptr)
+      : cancel_(cancel), exchange_(exchange) {}
+  bool exchange(int iteration) const override { return !exchange_ || !*exchange_ || (*exchange_)(iteration); }
   bool cancelled() const override { return cancel_ && cancel_->cancelled(); }
 
  private:
   const CancelToken* cancel_;
+  const std::function<bool(int)>* exchange_;
 };
 
 /// The derivatives phase holds the kinematics: after each correction positions, orientations and velocities of nodes are
@@ -199,7 +202,7 @@ ThirdOrderFormula Stepper::third_order(const State& state, const MethodSettings&
 
 NewtonReport Stepper::iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first,
                               NewtonSettings settings) {
-  const StepHooks hooks(cancel_);
+  const StepHooks hooks(cancel_, &exchange_);
   const InitialValueSettings& s = model_.initial_value;
   if (s.constraint_violations) {
     const double c = !first && is_third_order(method) ? 1 : f.c();
@@ -299,6 +302,9 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     error.failure.time = state.time;
     error.failure.step = static_cast<long>(state.step);
     report.error = std::move(error);
+  } catch (...) {  // from the exchange
+    state = backup_;
+    throw;
   }
   state = backup_;
   return report;

@@ -1,6 +1,7 @@
 /// Time stepping: the phases of a run and one attempt at a step. Spec 02 sections 2 to 6.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -25,6 +26,10 @@ class Stepper {
 
   /// `cancel` is asked between iterations; may be null.
   void set_cancelled(const CancelToken* cancel) { cancel_ = cancel; }
+
+  /// Called before each residual of a step with the number of corrections so far; false: loads from outside have not
+  /// settled. May be empty. What it throws leaves the step, and the state is as it was.
+  void set_exchange(std::function<bool(int)> exchange) { exchange_ = std::move(exchange); }
 
   /// Initial assembly, momenta. The state comes from make_initial_state.
   Status assemble(State& state);
@@ -62,6 +67,7 @@ class Stepper {
   std::unique_ptr<ThirdOrderSolver> third_order_;  ///< when a method of the deck needs it
   State backup_;
   const CancelToken* cancel_ = nullptr;
+  std::function<bool(int)> exchange_;
   NewtonSettings regular_, derivatives_, dummy_;
   double derivatives_coefficient_ = 0;
 };

@@ -148,10 +148,15 @@ NewtonReport ThirdOrderSolver::solve(const ThirdOrderFormula& f, const NewtonSet
     return report;
   };
   for (;;) {
+    const bool settled = hooks.exchange(report.iterations);
+    if (!settled) {  // loads from outside changed; both halves of the step take them
+      stage_.external_loads = state.external_loads;
+      stage_.memory = state.memory;
+    }
     report.residual_error = evaluate(settings, state, workspace);
     workspace.residual_history.push_back(report.residual_error);
     if (const auto verdict =
-            judge_residual(settings, workspace.residual_history, report.iterations))
+            judge_residual(settings, workspace.residual_history, report.iterations, settled))
       return finish(*verdict);
     if (exceeds_residual_limits(model_, settings, workspace.residual) || exceeds_residual_limits(model_, settings, stage_residual_))
       return finish(NewtonOutcome::not_converged);
@@ -174,7 +179,7 @@ NewtonReport ThirdOrderSolver::solve(const ThirdOrderFormula& f, const NewtonSet
     hooks.after_correction(state);
     if (settings.solution_test == ResidualTest::none) continue;
     report.solution_error = test_value(settings.solution_test, right_);
-    if (settings.solution_tolerance > 0 && report.solution_error < settings.solution_tolerance) {
+    if (settled && settings.solution_tolerance > 0 && report.solution_error < settings.solution_tolerance) {
       report.by_solution = true;
       return finish(NewtonOutcome::converged);
     }

@@ -191,9 +191,9 @@ def test_every_mismatch_is_told_at_once(server):
     with oscillator(server) as simulation:
         simulation.info.model_digest = "0" * 16
         with pytest.raises(mbcosim.PreconditionFailed) as caught:
-            simulation.couple("spring", spring, frame="reference", mode="tight", relaxation=3)
+            simulation.couple("spring", spring, frame="reference", every=-1, relaxation=3)
         assert caught.value.reason == "PORT_MISMATCH"
-        assert set(caught.value.metadata) == {"model_digest", "frame", "mode", "relaxation"}
+        assert set(caught.value.metadata) == {"model_digest", "frame", "every", "relaxation"}
         with pytest.raises(mbcosim.NotFound) as caught:
             simulation.couple("wing", spring)
         assert caught.value.reason == "NO_SUCH_PORT"

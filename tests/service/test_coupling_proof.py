@@ -25,7 +25,10 @@ GOLDEN = {
     "staggered": [("exchange", 0, 1, 0), ("exchange", 1, 2, 0), ("exchange", 2, 3, 0)],
     "window": [("exchange", 1, 1, 1), ("exchange", 1, 1, 2), ("accepted", 1), ("exchange", 2, 2, 1), ("exchange", 2, 2, 2),
                ("accepted", 2)],
+    "tight": [("exchange", 1, 1, 1), ("exchange", 1, 1, 2), ("accepted", 1), ("exchange", 2, 2, 1), ("exchange", 2, 2, 2),
+              ("accepted", 2)],
 }
+IMPLICIT = ("window", "tight")
 
 
 @pytest.mark.parametrize("mode", GOLDEN)
@@ -34,12 +37,12 @@ def test_event_order(server, mode):
 
     def constant(motion):
         trace.append(("exchange", motion.step, round(motion.target_time / h), motion.iteration))
-        return [[1.0, 0.0, 0.0]] if motion.step < 2 or mode != "window" else [[2.0, 0.0, 0.0]]
+        return [[1.0, 0.0, 0.0]] if motion.step < 2 or mode not in IMPLICIT else [[2.0, 0.0, 0.0]]
 
     with oscillator(server, str(h)) as simulation, simulation.couple("spring", constant, mode=mode) as peer:
         for step in (1, 2):
             simulation.step()
-            if mode == "window":
+            if mode in IMPLICIT:
                 wait_for(lambda: len(peer.accepted) == step)
                 trace.append(("accepted", peer.accepted[-1][0]))
         if mode == "staggered":

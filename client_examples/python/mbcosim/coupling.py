@@ -27,7 +27,7 @@ class Motion:
     step: int
     time: float            # of the values [s]
     target_time: float     # for which loads are wanted [s]
-    iteration: int         # pass of a window, from 1; 0: explicit
+    iteration: int         # of a tight step, or pass of a window, from 1; 0: explicit
     x: np.ndarray
     rotations: np.ndarray  # n x 3 x 3 for "matrix", n x 4 for "quaternion", else n x 3
     v: np.ndarray
@@ -63,7 +63,8 @@ class Peer:
 
     answer returns forces (n x 3), or (forces, moments), or the signals; an exception in it fails the step. On a port of the deck
     with reference loads it returns (forces, moments, force on the reference node, moment on it).
-    mode       "loose", "staggered" or "window"; None: the port's own, "loose" unless its deck says otherwise
+    every      steps between exchanges; "tight": iterations
+    mode       "loose", "staggered", "tight" or "window"; None: the port's own, "loose" unless its deck says otherwise
     frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
     After the end `error` has what ended the stream, None when it ended in good order.
     """
