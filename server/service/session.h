@@ -54,6 +54,10 @@ class Session {
   void read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply);
   void write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply);
 
+  void linearize(const v1::LinearizeRequest& request, v1::LinearizeReply* reply);
+  void eigenvalues(const v1::ComputeEigenvaluesRequest& request,
+                   v1::ComputeEigenvaluesReply* reply);
+
   void save(const std::string& display_name, v1::Snapshot* out);
   void restore(int snapshot);
   void list_snapshots(v1::ListSnapshotsReply* out) const;
@@ -127,6 +131,7 @@ class Session {
   void fail(const std::string& why);
   void remember_failure(const std::string& why);
   void require_usable() const;
+  void require_rest() const;  ///< usable and not advancing
   void read_values(const google::protobuf::RepeatedField<int>& handles,
                    google::protobuf::RepeatedField<double>* out);
   const Saved& find_snapshot(int snapshot) const;

@@ -138,9 +138,6 @@ grpc::Status SimulationsService::GetServerInfo(Context context, const v1::GetSer
     add_limit(reply, "unknowns", limits.engine.unknowns);
     reply->set_identity(caller.identity);
     reply->set_role(role_name(caller.role));
-    for (const char* method :
-         {"Simulations/Linearize", "Simulations/ComputeEigenvalues", "Reduction/Reduce"})
-      reply->add_methods_not_served(method);
   });
 }
 
@@ -457,22 +454,22 @@ grpc::Status SimulationsService::ForkSimulation(Context context,
 
 // ------------------------------------------------------------------ analysis
 
-grpc::Status SimulationsService::Linearize(Context context, const v1::LinearizeRequest*,
-                                           v1::LinearizeReply*) {
-  return serve(parts_, *context, "Linearize", Role::control, [](const Caller&) {
-    throw Refusal(
-        v1::REASON_NOT_SERVED,
-        "Linearize is not served by this version: the engine's library has no linearization yet");
+grpc::Status SimulationsService::Linearize(Context context, const v1::LinearizeRequest* request,
+                                           v1::LinearizeReply* reply) {
+  return serve(parts_, *context, "Linearize", Role::control, [&](const Caller& caller) {
+    const SessionPtr session = parts_.store.get(request->simulation(), caller);
+    const Session::Use use(*session);
+    session->linearize(*request, reply);
   });
 }
 
 grpc::Status SimulationsService::ComputeEigenvalues(Context context,
-                                                    const v1::ComputeEigenvaluesRequest*,
-                                                    v1::ComputeEigenvaluesReply*) {
-  return serve(parts_, *context, "ComputeEigenvalues", Role::control, [](const Caller&) {
-    throw Refusal(
-        v1::REASON_NOT_SERVED,
-        "ComputeEigenvalues is not served by this version: use `eigenanalysis` in the deck");
+                                                    const v1::ComputeEigenvaluesRequest* request,
+                                                    v1::ComputeEigenvaluesReply* reply) {
+  return serve(parts_, *context, "ComputeEigenvalues", Role::control, [&](const Caller& caller) {
+    const SessionPtr session = parts_.store.get(request->simulation(), caller);
+    const Session::Use use(*session);
+    session->eigenvalues(*request, reply);
   });
 }
 

@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "output/result_writer.h"
+#include "simulation/linearize.h"
 #include "simulation/state_bytes.h"
 #include "simulation/variables.h"
 #include "solver/eigenanalysis.h"
@@ -250,6 +251,10 @@ Status Simulation::restore(const State& state) {
 }
 
 Linearization Simulation::linearize() const { return mbcosim::linearize(*impl_->model, impl_->state); }
+
+Result<InputsOutputs> Simulation::linearize(std::span<const int> inputs, std::span<const int> outputs) const {
+  return linearize_inputs_outputs(*impl_->model, impl_->state, impl_->all_variables(), inputs, outputs);
+}
 
 Result<Spectrum> Simulation::eigen(int count, std::complex<double> shift) const {
   return mbcosim::eigen(linearize(), count, shift);

@@ -19,6 +19,7 @@
 #include "simulation/variable.h"
 #include "solver/cancel.h"
 #include "solver/eigen_spectrum.h"
+#include "solver/state_space.h"
 
 namespace mbcosim {
 
@@ -88,6 +89,9 @@ class Simulation {
 
   /// E and A about the current state.
   Linearization linearize() const;
+  /// Derivatives with respect to the inputs and of the outputs (handles) that go with it. ErrorKind::argument when a
+  /// handle is not an input.
+  Result<InputsOutputs> linearize(std::span<const int> inputs, std::span<const int> outputs) const;
   /// The `count` eigenvalues nearest to `shift` [1/s] about the current state; 0: all finite ones. ErrorKind::limit when
   /// all of a large model are asked for.
   Result<Spectrum> eigen(int count = 0, std::complex<double> shift = 0) const;

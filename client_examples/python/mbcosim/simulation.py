@@ -16,6 +16,15 @@ _POLICIES = {"block": telemetry_pb2.OVERFLOW_POLICY_BLOCK, "drop_oldest": teleme
              "decimate": telemetry_pb2.OVERFLOW_POLICY_DECIMATE}
 
 
+def _matrix(message):
+    """`mbcosim.v1.Matrix` as a numpy array."""
+    if not message.sparse:
+        return np.array(message.values).reshape(message.rows, message.columns)
+    full = np.zeros((message.rows, message.columns))
+    full[list(message.row_indices), list(message.column_indices)] = message.values
+    return full
+
+
 @dataclasses.dataclass
 class StepResult:
     """What an advance did."""
@@ -188,6 +197,28 @@ class Simulation:
         """Goes to a saved state."""
         self.info = self._call(self._stub.RestoreSnapshot, pb.RestoreSnapshotRequest(name=snapshot.name))
         self.step_number, self.time = self.info.step, self.info.time_s
+
+    # ---------------------------------------------------------------- analysis
+
+    def eigenvalues(self, count=0, *, shift_hz=0.0, vectors=False):
+        """Eigenvalues [1/s] about the current state, nearest to `shift_hz` first; 0: all finite ones. With `vectors` also
+        the eigenvectors, one a column."""
+        reply = self._call(self._stub.ComputeEigenvalues, pb.ComputeEigenvaluesRequest(
+            simulation=self.name, count=count, shift_hz=shift_hz, eigenvectors=vectors))
+        values = np.array(reply.real) + 1j * np.array(reply.imaginary)
+        return (values, _matrix(reply.vectors_real) + 1j * _matrix(reply.vectors_imaginary)) if vectors else values
+
+    def linearize(self, inputs=(), outputs=()):
+        """State space matrices A, B, C, D about the current state, for variables by name."""
+        reply = self._call(self._stub.Linearize, pb.LinearizeRequest(
+            simulation=self.name, inputs=self.handles(inputs), outputs=self.handles(outputs)))
+        return tuple(_matrix(m) for m in (reply.a, reply.b, reply.c, reply.d))
+
+    def linearize_descriptor(self, inputs=(), outputs=()):
+        """Matrices E, A, B, C, D of E dx/dt = A x + B u, y = C x + D u with all unknowns of the model."""
+        reply = self._call(self._stub.Linearize, pb.LinearizeRequest(
+            simulation=self.name, inputs=self.handles(inputs), outputs=self.handles(outputs), descriptor_form=True))
+        return tuple(_matrix(m) for m in (reply.e, reply.a, reply.b, reply.c, reply.d))
 
     def export_state(self):
         """The current state as bytes."""
