@@ -177,7 +177,8 @@ void read_output_results(DeckCard& card) {
   if (card.required("result format", {"netcdf", "text"}) == 1) return;
   c.netcdf = true;
   while (card.more()) {
-    if (card.required("option", {"sync", "no text", "classic", "netcdf4"}) == 1) c.text = false;
+    if (card.required("option", {"sync", "no text", "classic", "netcdf4"}) == 1)
+      card.warn("`no text` is ignored: the text files are written beside the NetCDF file");
   }
 }
 

@@ -41,8 +41,8 @@ class DeckCard final : public Card {
   Mat3 orientation(std::string_view what) override;
   OrientationDescription orientation_description() override;
 
-  Vec3 absolute_position(std::string_view what, int context = -1) override;
-  Mat3 absolute_orientation(std::string_view what, int context = -1) override;
+  Vec3 absolute_position(std::string_view what, int context = -1, const OtherNode* other = nullptr) override;
+  Mat3 absolute_orientation(std::string_view what, int context = -1, const OtherNode* other = nullptr) override;
   Vec3 absolute_velocity(std::string_view what, const Vec3& at) override;
   Vec3 absolute_angular_velocity(std::string_view what) override;
   Vec3 absolute_vector(std::string_view what) override;

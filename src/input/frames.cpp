@@ -55,9 +55,9 @@ DeckCard::Reference DeckCard::reference_prefix(Entity entity, const OtherNode* o
   return r;
 }
 
-Vec3 DeckCard::absolute_position(std::string_view what, int context) {
+Vec3 DeckCard::absolute_position(std::string_view what, int context, const OtherNode* other) {
   need_argument(what);
-  const Reference ref = reference_prefix(Entity::position, nullptr);
+  const Reference ref = reference_prefix(Entity::position, other);
   const Vec3 r = vec3(what);
   const Frame c = node_frame(context);
   switch (ref.prefix) {
@@ -67,14 +67,19 @@ Vec3 DeckCard::absolute_position(std::string_view what, int context) {
       return c.x + c.R * ref.local * r;
     case Prefix::frame:
       return ref.frame.x + ref.frame.R * r;
+    case Prefix::other_node:
+    case Prefix::other_position: {
+      const Frame a = node_frame(other->node);
+      return a.x + a.R * (ref.prefix == Prefix::other_node ? r : Vec3(other->offset + r));
+    }
     default:
       return r;
   }
 }
 
-Mat3 DeckCard::absolute_orientation(std::string_view what, int context) {
+Mat3 DeckCard::absolute_orientation(std::string_view what, int context, const OtherNode* other) {
   need_argument(what);
-  const Reference ref = reference_prefix(Entity::orientation, nullptr);
+  const Reference ref = reference_prefix(Entity::orientation, other);
   const Mat3 m = orientation(what);
   const Frame c = node_frame(context);
   switch (ref.prefix) {
@@ -83,6 +88,10 @@ Mat3 DeckCard::absolute_orientation(std::string_view what, int context) {
       return c.R * m;
     case Prefix::frame:
       return ref.frame.R * m;
+    case Prefix::other_node:
+      return node_frame(other->node).R * m;
+    case Prefix::other_orientation:
+      return node_frame(other->node).R * other->orientation * m;
     default:
       return m;
   }

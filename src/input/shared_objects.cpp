@@ -174,8 +174,9 @@ TplDrivePtr<R, C> DeckCard::template_drive(std::string_view what, ReadEntity rea
     const typename Sum::Value entity = read();
     terms.push_back({entity, drive(std::string(what) + ": drive")});
   };
-  switch (one_of({"null", "component", "array", "reference", "single"})) {
+  switch (one_of({"null", "component", "array", "reference", "zero", "single"})) {
     case 0:
+    case 4:
       break;
     case 1:
       return component_drive<R, C>(what);

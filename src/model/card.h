@@ -69,8 +69,8 @@ class Card {
 
   // ------------------------------------------------------------------ in frames (spec 01 section 7); `node`: structural node index
   /// `context`: structural node that `reference, node` and `reference, local` mean; -1: the global frame.
-  virtual Vec3 absolute_position(std::string_view what, int context = -1) = 0;
-  virtual Mat3 absolute_orientation(std::string_view what, int context = -1) = 0;
+  virtual Vec3 absolute_position(std::string_view what, int context = -1, const OtherNode* other = nullptr) = 0;
+  virtual Mat3 absolute_orientation(std::string_view what, int context = -1, const OtherNode* other = nullptr) = 0;
   virtual Vec3 absolute_velocity(std::string_view what, const Vec3& at) = 0;
   virtual Vec3 absolute_angular_velocity(std::string_view what) = 0;
   virtual Vec3 absolute_vector(std::string_view what) = 0;

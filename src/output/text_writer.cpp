@@ -117,7 +117,7 @@ class TextWriter : public ResultWriter, private OutputRow {
     if (!file.finish()) failed_ = true;
   }
   void record(const EvalContext& context) override {
-    if (context.model->control.text) write_record(context, *this);
+    write_record(context, *this);
   }
   Status finish() override {
     bool fine = out_.finish() && log_.finish() && !failed_;

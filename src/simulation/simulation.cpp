@@ -71,7 +71,10 @@ Status Simulation::Impl::start() {
   using AbortAfter = InitialValueSettings::AbortAfter;
   state = make_initial_state(*model);
   if (writer) writer->begin(*model);
-  if (s.abort_after == AbortAfter::input) return ok();
+  if (s.abort_after == AbortAfter::input) {
+    record();
+    return ok();
+  }
   if (auto status = stepper.assemble(state); !status) return status;
   if (s.abort_after == AbortAfter::assembly || s.final_time < s.initial_time) {
     record();

@@ -24,7 +24,8 @@ void register_joints(Registry& registry) {
   };
   joint({"clamp"}, read_clamp);
   joint({"revolute pin", "plane pin"}, read_revolute_pin);
-  joint({"revolute hinge", "plane hinge"}, read_revolute_hinge);
+  joint({"revolute hinge"}, read_revolute_hinge);
+  joint({"plane hinge"}, read_plane_hinge);
   joint({"revolute rotation"}, read_revolute_rotation);
   joint({"axial rotation"}, read_axial_rotation);
   joint({"spherical hinge"}, read_spherical_hinge);

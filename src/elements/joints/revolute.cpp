@@ -95,7 +95,7 @@ void output_hinge(const RevoluteAxes& e, const Local<double>& u, OutputRow& row,
   const Mat3 H2 = e.hinge_b(u);
   row.begin(OutputFile::jnt, u.label());
   row.reactions(H2.transpose() * F, m, F, H2 * m);
-  row.orientation("E", e.relative_rotation(u), e.description);
+  if (!e.without_angles) row.orientation("E", e.relative_rotation(u), e.description);
 }
 
 double hinge_datum(const RevoluteAxes& e, const Local<double>& u, int datum) {
@@ -142,8 +142,11 @@ void finish_hinge(Card& card, ElementInfo& info, const Hinge& e) {
 
 }  // namespace
 
-void read_revolute_hinge(Card& card, ElementInfo& info) {
+namespace {
+
+void read_hinge(Card& card, ElementInfo& info, bool without_angles) {
   RevoluteHinge e;
+  e.without_angles = without_angles;
   e.a = read_point_and_hinge(card);
   e.b = read_point_and_hinge(card, &e.a);
   check_axes(card, e, "revolute hinge");
@@ -154,6 +157,11 @@ void read_revolute_hinge(Card& card, ElementInfo& info) {
   }
   finish_hinge(card, info, e);
 }
+
+}  // namespace
+
+void read_revolute_hinge(Card& card, ElementInfo& info) { read_hinge(card, info, false); }
+void read_plane_hinge(Card& card, ElementInfo& info) { read_hinge(card, info, true); }
 
 // ------------------------------------------------------------------ revolute rotation
 

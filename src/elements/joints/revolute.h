@@ -17,6 +17,7 @@ struct RevolutePin : NamedData<RevolutePin> {
   Vec3 X0 = Vec3::Zero();
   Mat3 R0 = Mat3::Identity();
   double initial_turns = 0;
+  bool without_angles = false;  ///< `plane hinge`, the old name, writes no relative orientation
 
   static constexpr int width = 11;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
@@ -59,6 +60,7 @@ struct RevolutePin : NamedData<RevolutePin> {
 struct RevoluteAxes : TwoAttachments {
   OrientationDescription description = OrientationDescription::euler123;
   double initial_turns = 0;
+  bool without_angles = false;  ///< `plane hinge`, the old name, writes no relative orientation
 
   /// Moment of (M₁, M₂) on node 2; fills the two rows from `row` on.
   template <class T>
@@ -203,6 +205,7 @@ struct AxialRotation : RevoluteAxes, NamedData<AxialRotation> {
 
 void read_revolute_pin(Card& card, ElementInfo& info);
 void read_revolute_hinge(Card& card, ElementInfo& info);
+void read_plane_hinge(Card& card, ElementInfo& info);
 void read_revolute_rotation(Card& card, ElementInfo& info);
 void read_axial_rotation(Card& card, ElementInfo& info);
 

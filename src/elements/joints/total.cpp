@@ -269,11 +269,13 @@ void read_total_pin_joint(Card& card, ElementInfo& info) {
     e.Rh = card.relative_orientation("position orientation", e.node);
   if (card.keyword("rotation orientation"))
     e.Rr = card.relative_orientation("rotation orientation", e.node);
-  if (card.keyword("position")) e.Xc = card.absolute_position("pin position", e.node);
+  const OtherNode position{e.node, e.f, e.Rh}, rotation{e.node, e.f, e.Rr};
+  if (card.keyword("position"))
+    e.Xc = card.absolute_position("pin position", e.node, &position);
   if (card.keyword("position orientation"))
-    e.Rc = card.absolute_orientation("position orientation", e.node);
+    e.Rc = card.absolute_orientation("position orientation", e.node, &position);
   if (card.keyword("rotation orientation"))
-    e.Rcr = card.absolute_orientation("rotation orientation", e.node);
+    e.Rcr = card.absolute_orientation("rotation orientation", e.node, &rotation);
   e.constraint = read_total_constraint(card);
   add_element(card.builder(), info, e);
 }

@@ -14,13 +14,13 @@ double RememberedDrive::value(const EvalContext& context, double) const {
   return context.state->memory[memory_];
 }
 
-void ClosestNextDrive::advance(const EvalContext& context, State& state, bool) const {
+void ClosestNextDrive::advance(const EvalContext& context, State& state, bool initial) const {
   constexpr double kMostIncrements = 1e6;
   double& fires = state.memory[memory_];
   double& next = state.memory[memory_ + 1];
   const double t = context.time;
   fires = t >= next && t <= t1_ ? 1 : 0;
-  if (fires == 0) return;
+  if (fires == 0 || initial) return;  // the reference solver fires again at the first step
   const double increment = increment_->value(context);
   if (!(increment > 0))
     throw EvaluationError("closest next: the increment must be positive, got " +

@@ -42,12 +42,11 @@ ScalarFunctionPtr read_log(Card& card) {
   return std::make_shared<LogarithmFunction>(s.multiplier, s.base, s.coefficient);
 }
 
-/// [do not extrapolate,] x1, y1, …, end
+/// [do not extrapolate,] x1, y1, … [, end]: `end` is needed only where more arguments follow
 FunctionPoints read_points(Card& card, const char* what, std::size_t least) {
   FunctionPoints p;
   p.extrapolate = !card.keyword("do not extrapolate");
-  while (!card.keyword("end")) {
-    if (!card.more()) card.fail(std::string(what) + ": `end` is missing after the points");
+  while (card.more() && !card.keyword("end")) {
     const double x = card.real("abscissa");
     if (!p.x.empty() && !(x > p.x.back()))
       card.fail(std::string(what) + ": abscissa " + std::to_string(x) +
@@ -66,10 +65,7 @@ ScalarFunctionPtr read_chebyshev(Card& card) {
   if (!(b > a)) card.fail("chebychev: the upper bound must exceed the lower one");
   const bool extrapolate = !card.keyword("do not extrapolate");
   std::vector<double> c;
-  while (!card.keyword("end")) {
-    if (!card.more()) card.fail("chebychev: `end` is missing after the coefficients");
-    c.push_back(card.real("coefficient"));
-  }
+  while (card.more() && !card.keyword("end")) c.push_back(card.real("coefficient"));
   if (c.empty()) card.fail("chebychev: at least one coefficient is needed");
   return std::make_shared<ChebyshevFunction>(a, b, std::move(c), extrapolate);
 }

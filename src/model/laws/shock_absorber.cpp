@@ -134,6 +134,7 @@ LawPtr<1> read_shock_absorber(Card& card) {
   Prestress<1> pre;
   if (card.keyword("prestrain")) pre.strain = card.drive("prestrain");
   ShockAbsorberData d;
+  (void)card.keyword("help");  // asks the reference solver to print the syntax
   d.pressure = card.real("reference pressure");
   d.area = card.real("reference area");
   d.interaction = card.real("interaction coefficient");
