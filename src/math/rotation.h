@@ -76,6 +76,16 @@ Mat<T> rotation_of_vector(const Vec<T>& theta) {
   return r;
 }
 
+/// Aᵀ B, each entry summed in the same order: Aᵀ A is symmetric to the last bit, so that equal frames have a relative
+/// rotation vector of exactly zero. (The derivatives phase divides constraint errors by the square of a small number.)
+template <class T>
+Mat<T> relative_rotation(const Mat<T>& a, const Mat<T>& b) {
+  Mat<T> r;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) r(i, j) = (a(0, i) * b(0, j) + a(1, i) * b(1, j)) + a(2, i) * b(2, j);
+  return r;
+}
+
 /// Rotation vector of R, norm in [0, π]; the inverse of `rotation_of_vector`. Also defined for matrices that are not
 /// quite orthogonal. Half turns take the axis from the symmetric part.
 template <class T>

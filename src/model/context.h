@@ -19,7 +19,6 @@ struct EvalContext {
   double c_algebraic = 1;  ///< ∂ẏ/∂y of algebraic unknowns (bookkeeping)
   Phase phase = Phase::step;
   Vec3 uniform_gravity = Vec3::Zero();  ///< [m/s²]; see Model::gravity_at for any point
-  Vec3 frame_acceleration = Vec3::Zero();  ///< of `rigid body kinematics`
 };
 
 /// Position, orientation and velocities of a structural node, global components.

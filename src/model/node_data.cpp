@@ -29,6 +29,8 @@ Vec3 vector_datum(const Model& model, const EvalContext& context, int node, int 
     case kE321: return euler321_of_rotation(s.R);
     default: break;
   }
+  // Unknown to the derivatives phase until it is over: as drive arguments accelerations start from zero.
+  if (context.phase == Phase::derivatives) return Vec3::Zero();
   const NodeAcceleration a = model.node_acceleration(context, node);
   const Vec3 global = group == kXPP || group == kxPP ? a.a : a.wp;
   return group == kxPP || group == komegaP ? Vec3(s.R.transpose() * global) : global;

@@ -1,4 +1,5 @@
 #include "elements/bodies/body.h"
+#include "elements/bodies/moving_frame.h"
 #include "elements/bodies/readers.h"
 #include "elements/registry.h"
 #include "model/card.h"
@@ -27,6 +28,14 @@ void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
   body.J0 += j - m * xx * xx;
 }
 
+template <class B>
+void add_body(Card& card, ElementInfo& info, B body) {
+  if (card.model().frame_motion)
+    add_element(card.builder(), info, InMovingFrame<B>(std::move(body)));
+  else
+    add_element(card.builder(), info, std::move(body));
+}
+
 void read_body(Card& card, ElementInfo& info) {
   const int node = card.structural_node(Card::NodeNeed::not_dummy);
   const StructuralNode& n = card.model().structural[node];
@@ -35,7 +44,7 @@ void read_body(Card& card, ElementInfo& info) {
   if (n.is_displacement()) {
     const double m = card.real("mass");
     if (!(m > 0)) card.fail("mass must be positive");
-    add_element(card.builder(), info, PointMass{node, m});
+    add_body(card, info, PointMass{node, m});
     return;
   }
   int parts = 1;
@@ -48,7 +57,7 @@ void read_body(Card& card, ElementInfo& info) {
   body.node = node;
   for (int i = 0; i < parts; ++i) read_body_part(card, node, negative, body);
   if (std::abs(body.m) < 2.2204460492503131e-16 && !negative) card.fail("the mass is zero");
-  add_element(card.builder(), info, std::move(body));
+  add_body(card, info, std::move(body));
 }
 
 void read_gravity(Card& card, ElementInfo& info) {

@@ -27,7 +27,7 @@ struct Clamp : NamedData<Clamp> {
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     r.load(0, -u.own3(0), -u.own3(3));
-    const Mat<T> rotation = u.R(0) * R0.transpose().cast<T>();
+    const Mat<T> rotation = relative_rotation<T>(u.R(0).transpose(), R0.transpose().cast<T>());
     r.own3(0, (X0.cast<T>() - u.x(0)) / u.c());
     r.own3(3, -vector_of_rotation(rotation) / u.c());
   }

@@ -16,7 +16,7 @@ struct HingeMotion : TwoAttachments {
   template <class T>
   void rotation(const Local<T>& u, Vec<T>& theta, Vec<T>& omega) const {
     const Mat<T> H1 = hinge_a(u);
-    const Mat<T> relative = H1.transpose() * hinge_b(u);
+    const Mat<T> relative = relative_rotation(u);
     theta = vector_of_rotation(relative);
     omega = H1.transpose() * (u.w(1) - u.w(0));
   }

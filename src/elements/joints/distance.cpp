@@ -3,7 +3,7 @@
 namespace mbcosim {
 
 void Distance::assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const {
-  if (offsets) return residual(u, r);
+  if (offsets) return rows(u, r, TimeDual(u.drive(length).v));
   const Vec3 axis = value_of(u.own3(0)), v = value_of(u.v(0)) - value_of(u.v(1));
   const Vec3 gap = value_of(u.x(0)) - value_of(u.x(1)) + axis * u.drive(length).v;
   for (int i = 0; i < 3; ++i) {

@@ -6,9 +6,9 @@ namespace mbcosim {
 
 /// Distance: two points stay D(t) apart.
 ///
-///   unknowns    u: unit vector from point 1 to point 2 (3), a: force [N], traction positive;  T =
-///   a u loads       node 1 (T, f₁ × T), node 2 (−T, −f₂ × T) rows        x₁ + f₁ − x₂ − f₂ + D u
-///   [m],  1 − |u|     (not divided by c)
+///   unknowns    u: unit vector from point 1 to point 2 (3), a: force [N], traction positive;  T = a u
+///   loads       node 1 (T, f₁ × T), node 2 (−T, −f₂ × T)
+///   rows        x₁ + f₁ − x₂ − f₂ + D u [m],  1 − |u|     (not divided by c)
 struct Distance : TwoAttachments, NamedData<Distance> {
   DrivePtr length;  ///< D [m]
   bool offsets = false;
@@ -23,16 +23,20 @@ struct Distance : TwoAttachments, NamedData<Distance> {
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
+    rows(u, r, T(u.drive(length)));
+  }
+  template <class T>
+  void rows(const Local<T>& u, Residual<T>& r, const T& D) const {
     using std::sqrt;
     const Vec<T> f1 = arm_a(u), f2 = arm_b(u), axis = u.own3(0);
     const Vec<T> tension = axis * u.own(3);
     r.load(0, tension, f1.cross(tension));
     r.load(1, -tension, -f2.cross(tension));
-    r.own3(0, u.x(0) + f1 - u.x(1) - f2 + axis * u.drive(length));
+    r.own3(0, u.x(0) + f1 - u.x(1) - f2 + axis * D);
     r.own(3, T(1.0) - sqrt(axis.dot(axis)));
   }
-  /// Without offsets the rate level is b u on the velocities and (v₁ − v₂)·u = 0, with u′ = u as a
-  /// placeholder.
+  /// The initial assembly holds the length D(t₀): its rate is taken as zero, as in the reference solver. Without
+  /// offsets the rate level is b u on the velocities and (v₁ − v₂)·u = 0, with u′ = u as a placeholder.
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;
   void start(Start& s) const;
   void output(const Local<double>& u, OutputRow& row) const;

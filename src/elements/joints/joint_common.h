@@ -85,7 +85,7 @@ struct TwoAttachments {
   /// H1ᵀ H2.
   template <class T>
   Mat<T> relative_rotation(const Local<T>& u) const {
-    return hinge_a(u).transpose() * hinge_b(u);
+    return mbcosim::relative_rotation<T>(hinge_a(u), hinge_b(u));
   }
 };
 

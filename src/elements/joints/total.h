@@ -125,7 +125,7 @@ struct TotalJoint : NamedData<TotalJoint> {
     m.velocity =
         m.P.transpose() * (u.v(k + 1) + u.w(k + 1).cross(m.arm) - u.v(k) - u.w(k).cross(m.s));
     m.spin = m.Q1.transpose() * (u.w(k + 1) - u.w(k));
-    m.rotation = m.Q1.transpose() * (u.R(k + 1) * R2r.cast<T>());
+    m.rotation = relative_rotation<T>(m.Q1, u.R(k + 1) * R2r.cast<T>());
     return m;
   }
   /// vec(Q₁ᵀQ₂ Rot(θ0)ᵀ).

@@ -1,0 +1,48 @@
+/// Inertia forces of bodies in a moving frame.
+#pragma once
+
+#include "elements/bodies/body.h"
+
+namespace mbcosim {
+
+/// A body or point mass in a model with `rigid body kinematics` (MBDyn input manual, control data): positions and
+/// velocities are relative to a frame whose origin accelerates by a₀ and that turns with ω₀, α₀ = dω₀/dt (components in
+/// the moving axes). The inertia loads of a part of mass m, first moment S and second moment J about the node are
+///
+///   a_e = a₀ + α₀ × x + ω₀ × (ω₀ × x)                              acceleration of the frame at the node
+///   F  = −m a_e − α₀ × S − ω₀ × (ω₀ × S) − 2 ω₀ × (m v + w × S)
+///   M  = −S × a_e − J α₀ − ω₀ × J ω₀ − 2 S × (ω₀ × v) + 2 w × P ω₀,  P = ½ tr(J) I − J = ∫ r rᵀ dm
+template <class B>
+struct InMovingFrame : B {
+  explicit InMovingFrame(B body) : B(std::move(body)) {}
+  void tangent(const Local<double>& u, Tangent& t) const = delete;
+
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    B::residual(u, r);
+    const FrameMotion& frame = *u.model().frame_motion;
+    const auto drive = [&](const Vec3DrivePtr& d) -> Vec<T> {
+      return (d ? d->value(*u.context) : Vec3(Vec3::Zero())).template cast<T>();
+    };
+    const Vec<T> a0 = drive(frame.acceleration), w0 = drive(frame.angular_velocity),
+                 alpha = drive(frame.angular_acceleration);
+    const Vec<T> a = a0 + alpha.cross(u.x(0)) + w0.cross(Vec<T>(w0.cross(u.x(0))));
+    const Vec<T> v = u.v(0);
+    Vec<T> F = a * T(-this->m) - w0.cross(v) * T(2 * this->m);
+    if constexpr (requires(B b) { b.J0; }) {
+      const Vec<T> S = u.R(0) * this->S0, w = u.w(0);
+      const auto J = [&](const Vec<T>& y) -> Vec<T> {
+        return u.R(0) * (this->J0 * Vec<T>(u.R(0).transpose() * y));
+      };
+      const Vec<T> P_w0 = w0 * T(0.5 * this->J0.trace()) - J(w0);
+      F -= alpha.cross(S) + w0.cross(Vec<T>(w0.cross(S))) + w0.cross(Vec<T>(w.cross(S))) * T(2.0);
+      const Vec<T> M = -S.cross(a) - J(alpha) - w0.cross(J(w0)) -
+                       S.cross(Vec<T>(w0.cross(v))) * T(2.0) + w.cross(P_w0) * T(2.0);
+      r.load(0, F, M);
+    } else {
+      r.force(0, F);
+    }
+  }
+};
+
+}  // namespace mbcosim
