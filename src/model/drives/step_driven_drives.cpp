@@ -20,7 +20,7 @@ void ClosestNextDrive::advance(const EvalContext& context, State& state, bool in
   double& next = state.memory[memory_ + 1];
   const double t = context.time;
   fires = t >= next && t <= t1_ ? 1 : 0;
-  if (fires == 0 || initial) return;  // the reference solver fires again at the first step
+  if (fires == 0) return;
   const double increment = increment_->value(context);
   if (!(increment > 0))
     throw EvaluationError("closest next: the increment must be positive, got " +
@@ -28,6 +28,7 @@ void ClosestNextDrive::advance(const EvalContext& context, State& state, bool in
   if ((t - next) / increment > kMostIncrements)
     throw EvaluationError("closest next: the increment " + std::to_string(increment) +
                           " is too small for the time step");
+  if (initial) return;  // it fires again at the first step, as in the reference solver
   while (next <= t) next += increment;
 }
 

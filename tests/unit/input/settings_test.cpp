@@ -196,7 +196,6 @@ TEST(ControlData, ReadsAssemblyAndOutput) {
   EXPECT_EQ(c.output_precision, 12);
   EXPECT_EQ(c.orientation, OrientationDescription::vector);
   EXPECT_TRUE(c.netcdf);
-  EXPECT_FALSE(c.text);
   EXPECT_TRUE(c.output_reference_frames && c.output_drives);
   EXPECT_EQ(model->title, "a \"b\"");
 }
