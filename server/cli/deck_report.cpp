@@ -53,16 +53,14 @@ ExitCode exit_code_of(const Error& error) {
 void print_error(const Error& error, std::FILE* out) {
   std::fprintf(out, "error: %s\n", error.message.c_str());
   print_diagnostics(error.diagnostics, out);
-  const SolverFailure& f = error.failure;
-  if (f.residual_history.empty() && f.worst.empty()) return;
-  std::fprintf(out, "  time %.17g s, step %ld, iteration %d\n", f.time, f.step, f.iteration);
-  if (!f.residual_history.empty()) {
-    std::fprintf(out, "  residual norms:");
-    for (const double r : f.residual_history) std::fprintf(out, " %.6g", r);
-    std::fputc('\n', out);
-  }
-  for (const WorstEquation& w : f.worst)
-    std::fprintf(out, "  %s, %s: residual %.6g\n", w.owner.c_str(), w.equation.c_str(), w.residual);
+  const std::vector<double>& errors = error.failure.residual_history;
+  if (errors.empty()) return;
+  constexpr std::size_t kShown = 12;
+  const std::size_t left_out = errors.size() > kShown ? errors.size() - kShown : 0;
+  std::fprintf(out, "  residual norms of the iterations:");
+  if (left_out > 0) std::fprintf(out, " (%zu before)", left_out);
+  for (std::size_t k = left_out; k < errors.size(); ++k) std::fprintf(out, " %.4g", errors[k]);
+  std::fputc('\n', out);
 }
 
 }  // namespace mbcosim::cli

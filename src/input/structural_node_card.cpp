@@ -74,6 +74,16 @@ void read_configuration(DeckCard& card, StructuralNode& node) {
   node.w = card.absolute_angular_velocity("angular velocity");
 }
 
+/// A node with a frame, dummy nodes included.
+int frame_node(DeckCard& card) {
+  const int node = card.structural_node(Card::NodeNeed::any);
+  const StructuralNode& n = card.model().structural[node];
+  if (n.is_displacement())
+    card.fail("structural node " + std::to_string(n.label) +
+              " is a displacement node; a node with orientation is needed here");
+  return node;
+}
+
 void read_offset_dummy(DeckCard& card, StructuralNode& node) {
   card.keyword("position");
   node.offset = card.relative_position("offset", node.base);
@@ -83,21 +93,21 @@ void read_offset_dummy(DeckCard& card, StructuralNode& node) {
 }
 
 void read_relative_dummy(DeckCard& card, StructuralNode& node) {
-  node.reference = card.structural_node();
+  node.reference = frame_node(card);
   if (card.keyword("position")) node.offset = card.relative_position("position", node.reference);
   if (card.keyword("orientation")) {
     node.orientation = card.relative_orientation("orientation", node.reference);
     if (card.keyword("orientation description")) node.description = card.orientation_description();
   }
   if (!card.keyword("pivot node")) return;
-  node.pivot = card.structural_node();
+  node.pivot = frame_node(card);
   if (card.keyword("position")) node.pivot_offset = card.relative_position("position", node.pivot);
   if (card.keyword("orientation"))
     node.pivot_orientation = card.relative_orientation("orientation", node.pivot);
 }
 
 void read_dummy(DeckCard& card, StructuralNode& node) {
-  node.base = card.structural_node();
+  node.base = frame_node(card);
   if (card.required("kind of dummy node", {"offset", "relative frame"}) == 0) {
     node.kind = StructuralKind::dummy_offset;
     read_offset_dummy(card, node);

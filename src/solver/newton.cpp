@@ -66,7 +66,9 @@ class Newton {
     std::copy(ws_.residual.begin(), ws_.residual.end(), ws_.delta.begin());
     ws_.solver.solve(ws_.delta.data());
     if (!settings_.line_search) {
-      apply_correction(model_, ws_.delta, c_, ca_, state_);
+      // Full steps that cycle (dry friction, contacts) are shortened; a search without success goes on from where it ended.
+      if (cycles()) (void)search_along(model_, phase_, c_, ca_, rescue_, state_, ws_);
+      else apply_correction(model_, ws_.delta, c_, ca_, state_);
     } else if (!search_along(model_, phase_, c_, ca_, *settings_.line_search, state_, ws_)) {
       finish(report, NewtonOutcome::not_converged);
       return false;
@@ -75,6 +77,22 @@ class Newton {
     if (settings_.solution_test != ResidualTest::none)
       report.solution_error = test_value(settings_.solution_test, ws_.delta);
     return true;
+  }
+
+  /// Has the residual found no new minimum in the last iterations?
+  bool cycles() const {
+    constexpr std::size_t kPatience = 8;
+    const std::vector<double>& errors = ws_.residual_history;
+    if (settings_.jacobian_every > 1 || errors.size() <= kPatience) return false;
+    const auto recent = errors.end() - kPatience;
+    return !(*std::min_element(recent, errors.end()) < *std::min_element(errors.begin(), recent));
+  }
+  static LineSearchSettings rescue_settings() {
+    LineSearchSettings s;
+    s.lambda_min = 1e-3;
+    s.lambda_min_relative = s.scale_newton_step = s.divergence_check = s.abort_at_lambda_min = false;
+    s.zero_gradient_continue = true;
+    return s;
   }
 
   /// Builds and factors the matrix when it is due; false when it cannot be factored.
@@ -100,6 +118,7 @@ class Newton {
   const NewtonHooks& hooks_;
   State& state_;
   Workspace& ws_;
+  const LineSearchSettings rescue_ = rescue_settings();
 };
 
 }  // namespace

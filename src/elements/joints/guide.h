@@ -134,6 +134,16 @@ struct DriveHinge : TwoAttachments, NamedData<DriveHinge> {
   }
 };
 
+/// Arm of a prescribed displacement's force. The velocity rows of the initial assembly take it as constant: with its rate,
+/// a position that has to be corrected would turn the nodes (the reference solver leaves that term out, too).
+template <class T>
+Vec<T> load_arm(const Vec<T>& arm) {
+  if constexpr (std::is_same_v<T, TimeDual>)
+    return value_of(arm).template cast<T>();
+  else
+    return arm;
+}
+
 /// Drive displacement: a point of node 2 stays at the point f₁ + δ of node 1.
 ///
 ///   p = R₁(f₁ + δ);  unknowns F [N] global;  loads node 1 (F, p × F), node 2 (−F, −f₂ × F);  rows
@@ -154,8 +164,8 @@ struct DriveDisplacement : TwoAttachments, NamedData<DriveDisplacement> {
   void residual(const Local<T>& u, Residual<T>& r) const {
     const Vec<T> offset = u.drive(delta) + a.f.cast<T>(), p = u.R(0) * offset, f2 = arm_b(u),
                  F = u.own3(0);
-    r.load(0, F, p.cross(F));
-    r.load(1, -F, -f2.cross(F));
+    r.load(0, F, load_arm(p).cross(F));
+    r.load(1, -F, -load_arm(f2).cross(F));
     r.own3(0, -(u.x(1) + f2 - u.x(0) - p) / u.c());
   }
   void output(const Local<double>& u, OutputRow& row) const;
@@ -188,7 +198,7 @@ struct DriveDisplacementPin : NamedData<DriveDisplacementPin> {
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     const Vec<T> f = u.R(0) * a.f.cast<T>(), F = u.own3(0);
-    r.load(0, -F, -f.cross(F));
+    r.load(0, -F, -load_arm(f).cross(F));
     r.own3(0, -(u.x(0) + f - X.cast<T>() - u.drive(delta)) / u.c());
   }
   void output(const Local<double>& u, OutputRow& row) const;
