@@ -23,16 +23,22 @@ class Assembly {
     for (;; ++report.iterations) {
       compute_residual();
       report.error = error();
-      if (report.error <= model_.control.assembly_tolerance) break;
+      if (report.error <= model_.control.assembly_tolerance) return polish(report);
       if (report.iterations >= model_.control.assembly_max_iterations || !std::isfinite(report.error))
         return failure(ErrorKind::not_converged, report);
       if (!correct()) return failure(ErrorKind::singular, report);
       report.moved = true;
     }
-    return report;
   }
 
  private:
+  /// Nodes that were moved get one more correction: what is left of a violation is divided by the square of a small number in
+  /// the derivatives phase. Consistent input stays as it is.
+  Result<AssemblyReport> polish(AssemblyReport& report) {
+    if (report.moved && !correct()) return failure(ErrorKind::singular, report);
+    return report;
+  }
+
   bool takes_part(const ElementRef& e) const {
     if (e.set->assembly_role(e.index) == AssemblyRole::none || !e.set->is_active(state_, e.index)) return false;
     switch (e.set->info(e.index).family) {

@@ -134,15 +134,8 @@ struct DriveHinge : TwoAttachments, NamedData<DriveHinge> {
   }
 };
 
-/// Arm of a prescribed displacement's force. The velocity rows of the initial assembly take it as constant: with its rate,
-/// a position that has to be corrected would turn the nodes (the reference solver leaves that term out, too).
-template <class T>
-Vec<T> load_arm(const Vec<T>& arm) {
-  if constexpr (std::is_same_v<T, TimeDual>)
-    return value_of(arm).template cast<T>();
-  else
-    return arm;
-}
+/// The arm of a force without its rate.
+inline Vec<TimeDual> constant_arm(const Vec<TimeDual>& arm) { return value_of(arm).cast<TimeDual>(); }
 
 /// Drive displacement: a point of node 2 stays at the point f₁ + δ of node 1.
 ///
@@ -162,6 +155,13 @@ struct DriveDisplacement : TwoAttachments, NamedData<DriveDisplacement> {
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
+    rows(u, r, [](const Vec<T>& v) { return v; });
+  }
+  /// Takes the arms of the force as constant: with their rates, a position that has to be corrected would turn the nodes.
+  /// (The reference solver leaves these terms out, too.)
+  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const { rows(u, r, constant_arm); }
+  template <class T, class Arm>
+  void rows(const Local<T>& u, Residual<T>& r, Arm load_arm) const {
     const Vec<T> offset = u.drive(delta) + a.f.cast<T>(), p = u.R(0) * offset, f2 = arm_b(u),
                  F = u.own3(0);
     r.load(0, F, load_arm(p).cross(F));
@@ -197,6 +197,13 @@ struct DriveDisplacementPin : NamedData<DriveDisplacementPin> {
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
+    rows(u, r, [](const Vec<T>& v) { return v; });
+  }
+  /// Takes the arms of the force as constant: with their rates, a position that has to be corrected would turn the nodes.
+  /// (The reference solver leaves these terms out, too.)
+  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const { rows(u, r, constant_arm); }
+  template <class T, class Arm>
+  void rows(const Local<T>& u, Residual<T>& r, Arm load_arm) const {
     const Vec<T> f = u.R(0) * a.f.cast<T>(), F = u.own3(0);
     r.load(0, -F, -load_arm(f).cross(F));
     r.own3(0, -(u.x(0) + f - X.cast<T>() - u.drive(delta)) / u.c());

@@ -141,8 +141,8 @@ TEST_F(NetcdfResults, HoldEigenanalyses) {
   EXPECT_EQ(shape("eig.0.VR"), (Shape{2, n, m}));
 }
 
-TEST_F(NetcdfResults, ReplaceTheTextFilesWhenAsked) {
-  EXPECT_FALSE(std::filesystem::exists(prefix_ + ".mov"));
+TEST_F(NetcdfResults, StandBesideTheTextFiles) {
+  EXPECT_TRUE(std::filesystem::exists(prefix_ + ".mov"));
   EXPECT_TRUE(std::filesystem::exists(prefix_ + ".out"));
 }
 
