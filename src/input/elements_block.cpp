@@ -204,6 +204,7 @@ void read_driven(DeckCard& card) {
   while (card.keyword("hint")) {
     do driven.hints.push_back(card.quoted("hint"));
     while (card.at_string());
+    card.warn("hints are not applied: the element starts as its card says");
   }
   if (!card.more())
     card.fail("inner element missing", "e.g. driven: 1, <drive>, joint: 1, clamp, ...");

@@ -1,0 +1,81 @@
+/// A step after the first does not allocate on the heap.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+#include <string>
+
+#include "deck_run.h"
+
+namespace {
+std::atomic<long> allocations{0};
+
+void* counted(std::size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size)) return p;
+  throw std::bad_alloc();
+}
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete[](void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+
+namespace mbcosim {
+namespace {
+
+/// Allocations of `steps` steps after a few others.
+long allocations_of(const std::string& deck, int steps) {
+  DeckRun run(deck);
+  if (!run.ready()) return -1;
+  run.step(5);
+  const long before = allocations;
+  const StepReport report = run.simulation().step_many(steps);
+  const long during = allocations - before;
+  EXPECT_FALSE(report.error);
+  return during;
+}
+
+TEST(Allocation, TumblingBodyStepsWithout) {
+  EXPECT_EQ(
+      allocations_of(
+          initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-9; method: ms, .6;") +
+              "begin: control data; structural nodes: 1; rigid bodies: 1; gravity; end: control "
+              "data;"
+              "begin: nodes; structural: 1, dynamic, null, eye, null, .01, 2., .01; end: nodes;"
+              "begin: elements; body: 1, 1, 1., null, diag, 1., 2., 3.;"
+              " gravity: uniform, 0., 0., -1., const, 9.81; end: elements;",
+          100),
+      0);
+}
+
+TEST(Allocation, BeamUnderAForceOnAPendulumStepsWithout) {
+  EXPECT_EQ(
+      allocations_of(
+          initial_value_block(1e-3, 1,
+                              "max iterations: 20; tolerance: 1e-6; derivatives tolerance: 1e-3;") +
+              "begin: control data; structural nodes: 3; rigid bodies: 3; joints: 1; beams: 1; "
+              "forces: 1;"
+              " end: control data;"
+              "begin: nodes; structural: 1, dynamic, null, eye, null, null;"
+              " structural: 2, dynamic, .5,0.,0., eye, null, null;"
+              " structural: 3, dynamic, 1.,0.,0., eye, null, null; end: nodes;"
+              "begin: elements;"
+              " body: 1, 1, 1., null, eye; body: 2, 2, 1., null, eye; body: 3, 3, 1., null, eye;"
+              " joint: 1, revolute pin, 1, null, hinge, 1, 1.,0.,0., 3, 0.,1.,0.,"
+              "  null, hinge, 1, 1.,0.,0., 3, 0.,1.,0.;"
+              " beam3: 1, 1, null, 2, null, 3, null, eye,"
+              "  linear viscoelastic generic, diag, 1e6,1e6,1e6,1e3,1e3,1e3, proportional, 1e-3, "
+              "same, same;"
+              " force: 1, follower, 3, position, null, 0.,0.,1., sine, 0., 5., 10., forever, 0.;"
+              "end: elements;",
+          100),
+      0);
+}
+
+}  // namespace
+}  // namespace mbcosim
