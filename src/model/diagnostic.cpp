@@ -18,6 +18,44 @@ const char* severity_name(Severity s) {
   return "error";
 }
 
+/// Bytes of the UTF-8 sequence at `text[i]`; 0 when it is none that a terminal can show.
+std::size_t shown_bytes(const std::string& text, std::size_t i) {
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+  const unsigned char c = byte(i);
+  if (c < 0x80) return c == '\t' || c == '\n' || (c >= 0x20 && c != 0x7f) ? 1 : 0;
+  const std::size_t n = c >= 0xf0 && c < 0xf5 ? 4 : c >= 0xe0 ? 3 : c >= 0xc2 ? 2 : 0;
+  if (n == 0 || c >= 0xf5 || i + n > text.size()) return 0;
+  for (std::size_t k = 1; k < n; ++k)
+    if ((byte(i + k) & 0xc0) != 0x80) return 0;
+  return n;
+}
+
+/// The line with a dot for each byte that is no text.
+std::string printable(const std::string& line) {
+  std::string r;
+  for (std::size_t i = 0; i < line.size();) {
+    const std::size_t n = shown_bytes(line, i);
+    r += n > 0 ? line.substr(i, n) : ".";
+    i += std::max<std::size_t>(n, 1);
+  }
+  return r;
+}
+
+/// The part of a long line around a column, with that column's place in it.
+struct Excerpt {
+  std::string line;
+  int column;
+};
+Excerpt excerpt(const std::string& line, int column) {
+  constexpr std::size_t kWidth = 160, kBefore = 60;
+  if (line.size() <= kWidth) return {printable(line), column};
+  const std::size_t at = static_cast<std::size_t>(std::max(column - 1, 0));
+  const std::size_t begin = at > kBefore ? std::min(at - kBefore, line.size() - kWidth) : 0;
+  const bool cut_before = begin > 0, cut_after = begin + kWidth < line.size();
+  return {(cut_before ? "..." : "") + printable(line.substr(begin, kWidth)) + (cut_after ? "..." : ""),
+          column - static_cast<int>(begin) + (cut_before ? 3 : 0)};
+}
+
 /// The blanks that put a caret below `column`; tabs stay tabs, so that both lines indent alike.
 std::string caret_indent(const std::string& line, int column) {
   std::string indent;
@@ -32,10 +70,11 @@ std::string Diagnostic::text() const {
   std::string r = file;
   if (line > 0) r += ":" + std::to_string(line) + ":" + std::to_string(column);
   if (!r.empty()) r += ": ";
-  r += std::string(severity_name(severity)) + ": " + message + "\n";
+  r += std::string(severity_name(severity)) + ": " + printable(message) + "\n";
   if (!source_line.empty()) {
-    r += "  " + source_line + "\n  " + caret_indent(source_line, column) + "^";
-    const int room = static_cast<int>(source_line.size()) - column;
+    const Excerpt shown = excerpt(source_line, column);
+    r += "  " + shown.line + "\n  " + caret_indent(shown.line, shown.column) + "^";
+    const int room = static_cast<int>(shown.line.size()) - shown.column;
     if (length > 1 && room > 0) r += std::string(std::min(length - 1, room), '~');
     r += "\n";
   }

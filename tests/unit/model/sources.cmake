@@ -1,1 +1,1 @@
-set(SOURCES drives_test.cpp laws_test.cpp scalar_functions_test.cpp)
+set(SOURCES diagnostic_test.cpp drives_test.cpp laws_test.cpp scalar_functions_test.cpp)
