@@ -138,6 +138,8 @@ grpc::Status SimulationsService::GetServerInfo(Context context, const v1::GetSer
     add_limit(reply, "unknowns", limits.engine.unknowns);
     reply->set_identity(caller.identity);
     reply->set_role(role_name(caller.role));
+    for (const char* method : {"Simulations/UpdateSimulation", "Simulations/GetRecord"})
+      reply->add_methods_not_served(method);
   });
 }
 
