@@ -187,7 +187,7 @@ void read_hydraulic_fluid(DeckCard& card) {
   card.optional_name();
   if (card.peek_word() == "reference")
     card.fail_at(card.next(), "a hydraulic fluid cannot refer to another one");
-  FluidPtr fluid = card.fluid();
+  FluidPtr fluid = card.fluid_definition();
   card.expect_end();
   deck.fluids[label] = {std::move(fluid), card.head()};
 }

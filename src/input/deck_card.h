@@ -104,6 +104,7 @@ class DeckCard final : public Card {
   std::string_view next_text();            ///< the next argument as it is written
   void skip();                             ///< the next argument
   FileDriverPtr file_driver_definition();  ///< `<type>, ...` of a `file` card
+  FluidPtr fluid_definition();             ///< `<type>, ...` of a `hydraulic fluid` card
   void read_function_definition();         ///< `"<name>", <definition>` of a `scalar function` card
   /// Refuses arguments that nobody read.
   void expect_end();

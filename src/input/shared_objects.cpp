@@ -313,9 +313,15 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
 
 FluidPtr DeckCard::fluid() {
   need_argument("hydraulic fluid");
-  const Nesting nesting(*this);
-  one_of({"hydraulic fluid", "fluid"});
+  if (one_of({"hydraulic fluid", "fluid"}) < 0)
+    fail_at(next(), "the word \"fluid\" expected before the hydraulic fluid");
   if (keyword("reference")) return labelled(*this, deck_.fluids, "hydraulic fluid");
+  return fluid_definition();
+}
+
+FluidPtr DeckCard::fluid_definition() {
+  need_argument("hydraulic fluid");
+  const Nesting nesting(*this);
   const std::string w = peek_word();
   const auto reader = registry().fluids.find(w);
   if (reader == registry().fluids.end()) {

@@ -1,6 +1,7 @@
 /// load_deck: text to model.
 #include "elements/registry.h"
 #include "input/deck_reader.h"
+#include "simulation/model_check.h"
 #include "simulation/simulation.h"
 
 namespace mbcosim {
@@ -60,7 +61,8 @@ ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnos
     extra.push_back(plain_error("model", session.file(0).name, finished.error().message));
     return nullptr;
   }
-  return *finished;
+  check_model(session, **finished);
+  return session.errors() == 0 ? *finished : nullptr;
 }
 
 }  // namespace

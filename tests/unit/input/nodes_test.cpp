@@ -1,15 +1,20 @@
 #include <gtest/gtest.h>
 
 #include "deck_fixture.h"
+#include "elements/modal_bodies.h"
 
 namespace mbcosim::testing {
 namespace {
 
-ModelPtr nodes(const std::string& cards, const std::string& control = "") {
+ModelPtr nodes(const std::string& cards, const std::string& control = "",
+               const std::string& elements = "") {
   DeckText d;
   d.nodes = cards;
   d.control = control;
-  return model_of(d);
+  d.elements = elements;
+  const LoadReport report = load(d.text(), {{"body.fem", write_fem_text(hand_made(true), {})}});
+  EXPECT_TRUE(report.ok()) << findings(report.diagnostics);
+  return report.model;
 }
 
 void expect_near(const Vec3& value, double a, double b, double c) {
@@ -26,7 +31,8 @@ TEST(StructuralNode, ReadsEveryKind) {
       "structural: 2, static, null, eye, null, null;"
       "structural: 3, modal, null, eye, null, null;"
       "structural: 4, static displacement, 1.,0.,0., null;"
-      "structural: 5, dynamic displacement, 1.,0.,0., null, assembly, 2., 3., accelerations, no;");
+      "structural: 5, dynamic displacement, 1.,0.,0., null, assembly, 2., 3., accelerations, no;",
+      "", "joint: 1, modal, 3, 2, from file, no damping, \"body.fem\", 0;");
   ASSERT_TRUE(model);
   ASSERT_EQ(model->structural.size(), 5u);
   const StructuralNode& n = model->structural[0];
@@ -103,7 +109,8 @@ TEST(ScalarNode, ReadsValuesWithAndWithoutKeyword) {
       "5., scale, 6., output, no;"
       "abstract: 4, output, no; electric: 1, value, 7., derivative, 8.; hydraulic: 1, 1e5; "
       "thermal: 1, name, \"wall\", value, 300.;"
-      "parameter: 1, 9.; parameter: 2, value, 10., output, no;");
+      "parameter: 1, 9.; parameter: 2, value, 10., output, no;",
+      "", "genel: 1, clamp, 1, hydraulic, const, 1e5;");
   ASSERT_TRUE(model);
   ASSERT_EQ(model->scalars.size(), 9u);
   EXPECT_TRUE(model->scalars[0].differential);
