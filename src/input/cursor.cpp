@@ -211,6 +211,14 @@ std::string Cursor::quoted(std::string_view what) {
   return decoded;
 }
 
+Statement Cursor::quoted_statement(std::string_view what) {
+  quoted(what);
+  Statement s = statement_;
+  s.text = statement_.text.substr(last_begin_ + 1, last_end_ - last_begin_ - 2);
+  s.offset = statement_.offset + last_begin_ + 1;
+  return s;
+}
+
 Statement Cursor::rest_as_statement() {
   Statement s = statement_;
   const std::size_t begin = skip_blanks(statement_.text, position_);

@@ -40,6 +40,8 @@ class Cursor {
   /// Evaluates the next argument as one expression statement. An empty argument is an error here: check `at_empty` first.
   Value expression(std::string_view what);
   std::string quoted(std::string_view what);  ///< a quoted argument, escapes decoded (section 1.6)
+  /// The inside of a quoted argument as a statement of its own, characters as they are written.
+  Statement quoted_statement(std::string_view what);
   /// For `driven`: the rest of the statement from the next argument on, as a statement of its own.
   Statement rest_as_statement();
   SourceSpan next();  ///< span of the next argument

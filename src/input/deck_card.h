@@ -5,13 +5,23 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "input/cursor.h"
 #include "model/card.h"
+#include "model/element_set.h"
 
 namespace mbcosim {
 
 struct Deck;
+
+/// `"<name>{<arguments>}"` of a `driven` card.
+struct Hint {
+  std::string name;
+  Statement arguments;
+  SourceSpan where;
+  bool used = false;
+};
 
 class DeckCard final : public Card {
  public:
@@ -68,6 +78,8 @@ class DeckCard final : public Card {
   ExpressionPtr expression_of(const std::string& text,
                               const std::vector<std::string>& names) override;
   void set_current(const std::string& name, double value) override;
+  DrivePtr hinted(std::string_view name, DrivePtr given) override;
+  Vec3DrivePtr hinted(std::string_view name, Vec3DrivePtr given) override;
 
   int structural_node(NodeNeed need = NodeNeed::six_dof) override;
   int scalar_node(ScalarKind kind) override;
@@ -110,6 +122,9 @@ class DeckCard final : public Card {
   void expect_end();
   /// For `driven`: what follows, as a statement of its own.
   Statement rest_as_statement() { return cursor_.rest_as_statement(); }
+  Hint hint();  ///< reads a quoted hint
+  /// For the card inside a `driven` card; the hints outlive it. What they sample is appended to `samples`.
+  void set_hints(std::vector<Hint>* hints, std::vector<HintSample>* samples);
   /// A count: an integer >= 0, 0 when empty.
   int count(std::string_view what);
   /// An integer or real > 0 (or >= `least`).
@@ -200,7 +215,12 @@ class DeckCard final : public Card {
   NodeDof structural_dof(int label, SourceSpan where);
   void read_order(NodeDof& dof, bool dynamic);
 
+  Hint* take_hint(std::string_view name);
+  int sample(DeckCard& arguments, std::string_view what);
+
   Deck& deck_;
+  std::vector<Hint>* hints_ = nullptr;
+  std::vector<HintSample>* samples_ = nullptr;
   Statement statement_;
   Cursor cursor_;
   std::string subject_, type_, defined_kind_;

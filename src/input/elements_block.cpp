@@ -55,7 +55,7 @@ const std::map<std::string, Family, std::less<>>& families_by_head() {
 /// What `driven` gives to its inner element.
 struct Driven {
   DrivePtr drive;
-  std::vector<std::string> hints;
+  std::vector<Hint> hints;
   int label = -1;
 };
 
@@ -126,10 +126,7 @@ void read_element_head(DeckCard& card, Family family, bool has_label, const Driv
     }
     card.set_subject(std::string(name) + " " + std::to_string(info.label));
   }
-  if (driven) {
-    info.driven = driven->drive;
-    info.hints = driven->hints;
-  }
+  if (driven) info.driven = driven->drive;
 }
 
 /// The trailing `output` option applies to what the reader added (after `before` elements).
@@ -143,7 +140,17 @@ void read_trailing_output(DeckCard& card, Family family, std::size_t before) {
     model.elements[i].set->info(model.elements[i].index).output = output;
 }
 
-void read_element(DeckCard& card, const Driven* driven = nullptr) {
+/// Hints that the element's reader did not ask for.
+void warn_of_unused(DeckCard& card, const std::vector<Hint>& hints) {
+  for (const Hint& h : hints)
+    if (!h.used)
+      card.warn_at(h.where,
+                   "hint \"" + h.name + "\" is not applied: the element starts as its card says",
+                   "applied are drive{} (distance), drive3{} (drive hinge, drive displacement), "
+                   "position-drive3{} and orientation-drive3{} (total joint)");
+}
+
+void read_element(DeckCard& card, Driven* driven = nullptr) {
   const Registry& registry = card.registry();
   const std::string word = card.statement().word;
   const auto family = families_by_head().find(word);
@@ -165,7 +172,16 @@ void read_element(DeckCard& card, const Driven* driven = nullptr) {
   if (info.type.empty()) info.type = registry.display.at(word);
   if (!head->second.types.empty()) card.set_subject(subject + " (" + info.type + ")", info.type);
   const std::size_t before = card.model().elements.size();
+  std::vector<HintSample> samples;
+  if (driven) card.set_hints(&driven->hints, &samples);
   reader(card, info);
+  if (driven) {
+    warn_of_unused(card, driven->hints);
+    if (!samples.empty()) {
+      const ElementRef e = card.model().elements[before];
+      e.set->info(e.index).hints = std::move(samples);
+    }
+  }
   read_trailing_output(card, f, before);
   card.expect_end();
   if (counted_later && card.model().elements.size() > before)
@@ -190,7 +206,6 @@ void drive_existing(DeckCard& card, const Driven& driven) {
   read_output_option(card, info.output, info.output);
   card.expect_end();
   info.driven = driven.drive;
-  info.hints = driven.hints;
   info.active_memory = card.builder().allocate_memory(1, 1);
   card.model().has_driven = true;
 }
@@ -202,14 +217,16 @@ void read_driven(DeckCard& card) {
   card.set_subject("driven " + std::to_string(driven.label));
   driven.drive = card.drive();
   while (card.keyword("hint")) {
-    do driven.hints.push_back(card.quoted("hint"));
+    do driven.hints.push_back(card.hint());
     while (card.at_string());
-    card.warn("hints are not applied: the element starts as its card says");
   }
   if (!card.more())
     card.fail("inner element missing", "e.g. driven: 1, <drive>, joint: 1, clamp, ...");
   DeckCard inner(card.deck(), card.rest_as_statement());
   if (inner.statement().word == "existing") {
+    if (!driven.hints.empty())
+      card.fail_at(driven.hints.front().where, "a hint with `existing` is not supported yet",
+                   "write the element inside the driven card");
     drive_existing(inner, driven);
     return;
   }

@@ -13,6 +13,7 @@ set(SOURCES
   frames.cpp
   function_values.cpp
   functions.cpp
+  hints.cpp
   initial_value_block.cpp
   lexer.cpp
   machine.cpp

@@ -108,6 +108,7 @@ void read_relative_dummy(DeckCard& card, StructuralNode& node) {
 
 void read_dummy(DeckCard& card, StructuralNode& node) {
   node.base = frame_node(card);
+  node.accelerations = card.model().structural[node.base].accelerations;
   if (card.required("kind of dummy node", {"offset", "relative frame"}) == 0) {
     node.kind = StructuralKind::dummy_offset;
     read_offset_dummy(card, node);

@@ -107,6 +107,12 @@ class Card {
   /// Sets a symbol that `model::current("L")` sees until the end of this card.
   virtual void set_current(const std::string& name, double value) = 0;
 
+  /// The drive of a `driven` element's datum: `given` as the card has it or, with the hint `<name>{<number>}`, the number
+  /// that the hint's expression had when the element became active.
+  virtual DrivePtr hinted(std::string_view name, DrivePtr given) = 0;
+  /// The same for `<name>{<x>, <y>, <z> [, <drive>]}`; the drive multiplies the vector.
+  virtual Vec3DrivePtr hinted(std::string_view name, Vec3DrivePtr given) = 0;
+
   // ------------------------------------------------------------------ references to nodes and elements
   enum class NodeNeed { any, six_dof, dynamic_or_static_displacement, not_dummy };
   /// Index of a structural node read by label. `six_dof`: refuses displacement and dummy nodes.

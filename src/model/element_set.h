@@ -23,6 +23,13 @@ enum class Family {
 };
 const char* family_name(Family family);  ///< "joint", "hydraulic", ... as in private data and messages
 
+/// A number of a `driven` element that is taken anew from the model's state whenever the element becomes active (`hint`
+/// of `driven`, input manual): State::memory[memory] = source.
+struct HintSample {
+  DrivePtr source;
+  int memory = -1;
+};
+
 /// What every element has, whatever it is.
 struct ElementInfo {
   Family family = Family::joint;
@@ -34,7 +41,7 @@ struct ElementInfo {
   DrivePtr driven;       ///< active while non-zero; null: always active
   int active_memory = -1;  ///< offset of the activity flag in State::memory when driven
   int order = 0;         ///< declaration order over all elements
-  std::vector<std::string> hints;  ///< of `driven`
+  std::vector<HintSample> hints;  ///< of `driven`
 };
 
 /// How dependences of a node's kinematics on its Newton increments enter Jacobians: δx = c δ, δv = δ for the position

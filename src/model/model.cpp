@@ -25,6 +25,37 @@ NodeState attached_state(const NodeState& r, const Vec3& f, const Mat3& h) {
   return {r.x + arm, r.R * h, r.v + r.w.cross(arm), r.w};
 }
 
+/// Second time derivative of `relative_state`.
+NodeAcceleration relative_acceleration(const NodeState& n, const NodeAcceleration& an, const NodeState& r,
+                                       const NodeAcceleration& ar, const Mat3& h) {
+  const Mat3 t = h.transpose() * r.R.transpose();
+  const Vec3 d = n.x - r.x, v = n.v - r.v;
+  return {t * (an.a - ar.a - ar.wp.cross(d) - 2 * r.w.cross(v) + r.w.cross(r.w.cross(d))),
+          t * (an.wp - ar.wp - r.w.cross(n.w - r.w))};
+}
+
+/// Acceleration of a point at `arm` (global axes) on the rigid frame r.
+NodeAcceleration attached_acceleration(const NodeState& r, const NodeAcceleration& ar, const Vec3& arm) {
+  return {ar.a + ar.wp.cross(arm) + r.w.cross(r.w.cross(arm)), ar.wp};
+}
+
+NodeAcceleration dummy_acceleration(const Model& model, const EvalContext& context, const StructuralNode& n) {
+  const NodeState base = model.node_state(context, n.base);
+  const NodeAcceleration a = model.node_acceleration(context, n.base);
+  if (n.kind == StructuralKind::dummy_offset) return attached_acceleration(base, a, base.R * n.offset);
+  const NodeState reference = model.node_state(context, n.reference);
+  const NodeAcceleration s = relative_acceleration(base, a, reference, model.node_acceleration(context, n.reference), n.orientation);
+  if (n.pivot < 0) return s;
+  // The relative motion again, carried by the pivot's frame p: a = p̈ + Coriolis + P s̈.
+  const NodeState relative = relative_state(base, reference, n.offset, n.orientation);
+  const NodeState pivot = model.node_state(context, n.pivot);
+  const NodeState p = attached_state(pivot, n.pivot_offset, n.pivot_orientation);
+  const NodeAcceleration carried = attached_acceleration(pivot, model.node_acceleration(context, n.pivot),
+                                                         pivot.R * n.pivot_offset + p.R * relative.x);
+  const Vec3 spin = p.R * relative.w;
+  return {carried.a + 2 * p.w.cross(p.R * relative.v) + p.R * s.a, carried.wp + p.w.cross(spin) + p.R * s.wp};
+}
+
 }  // namespace
 
 const char* family_name(Family family) {
@@ -62,14 +93,9 @@ NodeState Model::node_state(const EvalContext& context, int node) const {
 
 NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) const {
   const StructuralNode& n = structural[node];
+  if (n.is_dummy()) return dummy_acceleration(*this, context, n);
   NodeAcceleration r;
-  if (n.kind == StructuralKind::dummy_offset) {
-    const NodeAcceleration base = node_acceleration(context, n.base);
-    const NodeState s = node_state(context, n.base);
-    const Vec3 arm = s.R * n.offset;
-    return {base.a + base.wp.cross(arm) + s.w.cross(s.w.cross(arm)), base.wp};
-  }
-  if (context.phase == Phase::input || n.is_dummy()) return r;
+  if (context.phase == Phase::input) return r;
   const std::vector<double>& yp = context.state->yp;
   if (n.kind == StructuralKind::modal) return {at(yp, n.first + 6), at(yp, n.first + 9)};
   if (!n.has_momentum()) return r;

@@ -47,7 +47,7 @@ int Model::structural_datum(int node, std::string_view name) const {
   for (int g = 0; g < kGroups; ++g) {
     if (word != kNames[g]) continue;
     const StructuralNode& n = structural[node];
-    if (needs_acceleration(g) && !n.has_momentum() && n.kind != StructuralKind::modal && n.kind != StructuralKind::dummy_offset) return -1;
+    if (needs_acceleration(g) && !n.has_momentum() && n.kind != StructuralKind::modal && !n.is_dummy()) return -1;
     if (g == kPE) return index >= 0 && index <= 3 ? g * kSlots + index : -1;
     return index >= 1 && index <= 3 ? g * kSlots + index - 1 : -1;
   }
@@ -65,7 +65,7 @@ double Model::structural_datum_value(const EvalContext& context, int node, int d
 
 std::vector<std::string> Model::structural_data_names(const StructuralNode& node) {
   std::vector<std::string> names;
-  const bool accelerations = node.has_momentum() || node.kind == StructuralKind::modal;
+  const bool accelerations = node.has_momentum() || node.kind == StructuralKind::modal || node.is_dummy();
   for (int g = 0; g < kGroups; ++g) {
     if (needs_acceleration(g) && !accelerations) continue;
     for (int i = g == kPE ? 0 : 1; i <= 3; ++i) names.push_back(std::string(kNames[g]) + "[" + std::to_string(i) + "]");

@@ -15,9 +15,7 @@ void write_structural(const EvalContext& context, int index, OutputRow& row) {
   else row.orientation("R", s.R, node.description);
   row.vec3("XP", "m/s", s.v);
   row.vec3("Omega", "rad/s", s.w);
-  const bool has_acceleration =
-      node.is_dummy() ? node.accelerations || context.model->structural[node.base].accelerations : node.accelerations;
-  if (has_acceleration && (node.has_momentum() || node.kind == StructuralKind::modal || node.is_dummy())) {
+  if (node.accelerations && (node.has_momentum() || node.kind == StructuralKind::modal || node.is_dummy())) {
     const NodeAcceleration a = context.model->node_acceleration(context, index);
     row.vec3("XPP", "m/s^2", a.a);
     row.vec3("OmegaP", "rad/s^2", a.wp);

@@ -91,6 +91,8 @@ void update_activity(const EvalContext& context, State& state, bool restart) {
     if (!info.driven) continue;
     const bool active = info.driven->value(context) != 0;
     double& flag = state.memory[info.active_memory];
+    if (active && (flag == 0 || !restart))
+      for (const HintSample& hint : info.hints) state.memory[hint.memory] = hint.source->value(context);
     if (restart && active && flag == 0) e.set->start(context, state, e.index);
     flag = active ? 1 : 0;
   }

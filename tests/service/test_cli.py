@@ -67,9 +67,12 @@ def test_interrupt_exits_with_130(tmp_path):
     deck = tmp_path / "deck"
     deck.write_text(decks.endless())
     process = subprocess.Popen([MBCOSIM, "run", str(deck)], stderr=subprocess.DEVNULL)
-    time.sleep(0.5)
+    output = tmp_path / "deck.mov"
+    deadline = time.monotonic() + 60
+    while not (output.exists() and output.stat().st_size) and time.monotonic() < deadline:
+        time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    assert process.wait(20) == 130
+    assert process.wait(60) == 130
 
 
 def test_validate_and_describe_as_json(deck, tmp_path):

@@ -42,6 +42,9 @@ class DeckRun {
   NodeState node(int label) const {
     return model().node_state(context(), model().find_structural(label));
   }
+  NodeAcceleration acceleration(int label) const {
+    return model().node_acceleration(context(), model().find_structural(label));
+  }
   Vec3 rotation_vector(int label) const { return vector_of_rotation(node(label).R); }
   double scalar_node(ScalarKind kind, int label) const {
     return simulation_->state().y[model().scalars[model().find_scalar(kind, label)].unknown];

@@ -50,6 +50,7 @@ void finish(Card& card, ElementInfo& info, Distance& e) {
       card.fail("distance: the imposed distance is zero at the start",
                 "use `spherical hinge` for coincident points");
   }
+  e.length = card.hinted("drive", e.length);
   add_element(card.builder(), info, e);
 }
 

@@ -115,7 +115,7 @@ void DriveHinge::output(const Local<double>& u, OutputRow& row) const {
 
 void read_drive_hinge(Card& card, ElementInfo& info) {
   DriveHinge e = read_hinges<DriveHinge>(card);
-  e.theta = card.vec3_drive("imposed rotation");
+  e.theta = card.hinted("drive3", card.vec3_drive("imposed rotation"));
   add_element(card.builder(), info, e);
 }
 
@@ -135,7 +135,7 @@ void read_drive_displacement(Card& card, ElementInfo& info) {
   read_offset(card, e.a);
   e.b = read_attachment(card);
   read_offset(card, e.b, &e.a);
-  e.delta = card.vec3_drive("imposed displacement", e.a.node);
+  e.delta = card.hinted("drive3", card.vec3_drive("imposed displacement", e.a.node));
   add_element(card.builder(), info, e);
 }
 
@@ -153,7 +153,7 @@ void read_drive_displacement_pin(Card& card, ElementInfo& info) {
   read_offset(card, e.a);
   card.keyword("position");
   e.X = card.absolute_position("pin position", e.a.node);
-  e.delta = card.vec3_drive("imposed displacement");
+  e.delta = card.hinted("drive3", card.vec3_drive("imposed displacement"));
   add_element(card.builder(), info, e);
 }
 

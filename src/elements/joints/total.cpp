@@ -228,12 +228,12 @@ TotalConstraint read_total_constraint(Card& card, bool with_drives) {
   if (card.keyword("position constraint")) {
     for (auto& kind : c.translation)
       kind = read_status(card, {"inactive", "active", "position", "velocity"});
-    if (with_drives) c.displacement = card.vec3_drive("imposed displacement");
+    if (with_drives) c.displacement = card.hinted("position-drive3", card.vec3_drive("imposed displacement"));
   }
   if (card.keyword("orientation constraint")) {
     for (auto& kind : c.rotation)
       kind = read_status(card, {"inactive", "active", "rotation", "angular velocity"});
-    if (with_drives) c.angle = card.vec3_drive("imposed rotation");
+    if (with_drives) c.angle = card.hinted("orientation-drive3", card.vec3_drive("imposed rotation"));
   }
   return c;
 }

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "deck_fixture.h"
@@ -65,7 +66,32 @@ TEST(Driven, GivesItsDriveToTheElement) {
     EXPECT_GE(info.active_memory, 0);
   }
   const ElementRef e = model->find_element(Family::joint, 7);
-  EXPECT_EQ(e.set->info(e.index).hints, (std::vector<std::string>{"offset{1}"}));
+  EXPECT_TRUE(e.set->info(e.index).hints.empty());
+}
+
+TEST(Driven, SaysWhichHintsAreNotApplied) {
+  const LoadReport report =
+      load(elements("driven: 7, 1., hint, \"offset{1}\", joint: 7, clamp, 2, node, node;"));
+  ASSERT_TRUE(report.ok());
+  ASSERT_EQ(report.diagnostics.size(), 1u);
+  EXPECT_EQ(report.diagnostics[0].severity, Severity::warning);
+  EXPECT_EQ(report.diagnostics[0].message,
+            "joint 7 (clamp): hint \"offset\" is not applied: the element starts as its card says");
+}
+
+TEST(Driven, RefusesHintsThatCannotBeRead) {
+  const auto message = [](const std::string& hint, const std::string& rest) {
+    const LoadReport report = load(elements("driven: 7, 1., hint, \"" + hint + "\", " + rest));
+    return report.diagnostics.empty() ? "" : report.diagnostics[0].message;
+  };
+  const std::string distance = "joint: 7, distance, 1, position, 1.,0.,0., 2, 3.;";
+  EXPECT_THAT(message("drive", distance), ::testing::HasSubstr("<name>{<arguments>}"));
+  EXPECT_THAT(message("drive{}", distance), ::testing::HasSubstr("empty expression"));
+  EXPECT_THAT(message("drive{sine, 0., 1., 2., forever, 0.}", distance),
+              ::testing::HasSubstr("a number is expected"));
+  EXPECT_THAT(message("drive{1., 2.}", distance), ::testing::HasSubstr("2."));
+  EXPECT_THAT(message("drive{model::nothing(1)}", distance), ::testing::HasSubstr("nothing"));
+  EXPECT_THAT(message("drive{1.}", "existing: joint, 7;"), ::testing::HasSubstr("existing"));
 }
 
 TEST(Counts, AcceptExactNumbers) {

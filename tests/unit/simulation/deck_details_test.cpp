@@ -159,5 +159,98 @@ end: elements;
   EXPECT_GT(run.node(3).x(0), 1.03);
 }
 
+// A hint makes the joint keep what it finds when it becomes active. The distance of two bodies that
+// drift apart at 1 m/s is caught at 1.5 s as model::distance_prev has it, and again, larger, after
+// a pause.
+TEST(DeckDetails, HintsOfDrivenAreTakenAtEachActivation) {
+  DeckRun run(deck("final time: 4.; time step: .1; max iterations: 20; tolerance: 1e-9;",
+                   "structural nodes: 2; rigid bodies: 1; joints: 2; forces: 1;",
+                   R"deck(begin: nodes;
+  structural: 1, static, null, eye, null, null;
+  structural: 2, dynamic, 1.,0.,0., eye, 1.,0.,0., null;
+end: nodes;
+begin: elements;
+  body: 2, 2, 2., null, eye;
+  joint: 1, clamp, 1, node, node;
+  driven: 2, string, "(Time > 1.45 && Time < 1.95) || Time > 2.95", hint, "drive{model::distance_prev(1, 2)}",
+    joint: 2, distance, 1, 2, 7.;
+  force: 1, absolute, 2, position, null, 1.,0.,0., string, "4. * (Time > 1.95 && Time < 2.95)";
+end: elements;
+)deck"));
+  ASSERT_TRUE(run.ready());
+  run.step(14);
+  EXPECT_NEAR(run.node(2).x.x(), 2.4, 1e-9);
+  run.step(1);  // t = 1.5: the distance at t = 1.4
+  EXPECT_NEAR(run.datum(Family::joint, 2, "d"), 2.4, 1e-9);
+  run.step(4);
+  EXPECT_NEAR(run.node(2).x.x(), 2.4, 1e-9);
+  run.step(10);  // released at t = 2, pushed until 2.9
+  const double caught = run.node(2).x.x();
+  EXPECT_GT(caught, 2.6);
+  run.step(11);
+  EXPECT_NEAR(run.node(2).x.x(), caught, 1e-9);
+}
+
+TEST(DeckDetails, VectorHintsHoldATotalJointWhereItIs) {
+  DeckRun run(deck(
+      "final time: 2.; time step: .05; max iterations: 20; tolerance: 1e-9; method: ms, .6, .6;",
+      "structural nodes: 2; rigid bodies: 1; joints: 2;",
+      R"deck(begin: nodes;
+  structural: 1, static, null, eye, null, null;
+  structural: 2, dynamic, .1,.2,.3, eye, .1,-.2,.3, null;
+end: nodes;
+begin: elements;
+  body: 2, 2, 2., null, eye;
+  joint: 1, clamp, 1, node, node;
+  driven: 2, string, "Time > .975",
+    hint, "position-drive3{model::xposition_prev(2), model::yposition_prev(2), model::zposition_prev(2), const, 1.}",
+    joint: 2, total joint, 1, 2, position constraint, 1, 1, 1, null, orientation constraint, 1, 1, 1, null;
+end: elements;
+)deck"));
+  ASSERT_TRUE(run.ready());
+  run.step(19);
+  const Vec3 last = run.node(2).x;
+  EXPECT_LT((last - Vec3(.195, .01, .585)).norm(), 1e-9);
+  run.step(20);
+  EXPECT_LT((run.node(2).x - last).norm(), 1e-9);
+}
+
+// Accelerations of dummy nodes are the time derivatives of their velocities, whatever the frames
+// do.
+TEST(DeckDetails, DummyAccelerationsAreTheRatesOfTheirVelocities) {
+  DeckRun run(
+      deck("final time: 1.; time step: 1e-4; max iterations: 20; tolerance: 1e-9; method: ms, 1.;",
+           "structural nodes: 6; rigid bodies: 3;",
+           R"deck(begin: nodes;
+  structural: 1, dynamic, .3,.1,0., euler123, .1,.2,.3, .5,-.2,.1, 1.,2.,-1., accelerations, yes;
+  structural: 2, dynamic, 0.,1.,.5, euler123, -.3,.1,.4, -.3,.4,.2, -2.,.5,1.5;
+  structural: 3, dynamic, 1.,0.,.2, euler123, .2,-.4,.1, .1,.1,-.6, .7,-1.2,2.2;
+  structural: 4, dummy, 1, offset, .4,-.3,.2, euler123, .3,.1,-.2;
+  structural: 5, dummy, 4, relative frame, 2, position, .2,.1,.3, orientation, euler123, .5,.1,.2;
+  structural: 6, dummy, 4, relative frame, 2, position, .2,.1,.3, orientation, euler123, .5,.1,.2,
+    pivot node, 3, position, -.1,.3,.2, orientation, euler123, -.2,.3,.6;
+end: nodes;
+begin: elements;
+  body: 1, 1, 1., .1,.2,.1, diag, 1.,2.,3.;
+  body: 2, 2, 2., null, diag, 3.,2.,1.;
+  body: 3, 3, 3., null, diag, 1.,3.,2.;
+end: elements;
+)deck"));
+  ASSERT_TRUE(run.ready());
+  run.step(100);
+  for (int label : {4, 5, 6}) EXPECT_TRUE(run.model().structural[label - 1].accelerations) << label;
+  NodeState before[3], after[3];
+  for (int i = 0; i < 3; ++i) before[i] = run.node(4 + i);
+  run.step(1);
+  NodeAcceleration a[3];
+  for (int i = 0; i < 3; ++i) a[i] = run.acceleration(4 + i);
+  run.step(1);
+  for (int i = 0; i < 3; ++i) {
+    after[i] = run.node(4 + i);
+    EXPECT_LT(((after[i].v - before[i].v) / 2e-4 - a[i].a).norm(), 1e-5 * a[i].a.norm()) << 4 + i;
+    EXPECT_LT(((after[i].w - before[i].w) / 2e-4 - a[i].wp).norm(), 1e-5 * a[i].wp.norm()) << 4 + i;
+  }
+}
+
 }  // namespace
 }  // namespace mbcosim
