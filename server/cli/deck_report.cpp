@@ -5,10 +5,7 @@
 namespace mbcosim::cli {
 
 LoadReport load_path(const std::string& deck) {
-  const std::size_t slash = deck.rfind('/');
-  const std::string folder = slash == std::string::npos ? "." : deck.substr(0, slash + 1);
-  const std::string name = slash == std::string::npos ? deck : deck.substr(slash + 1);
-  return load_deck(FolderSource(folder, /*unrestricted=*/true), name);
+  return load_deck(FolderSource(".", /*unrestricted=*/true), deck);
 }
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out) {

@@ -8,10 +8,14 @@ namespace mbcosim {
 
 namespace {
 
-/// Of all files read: the deck, what it includes, data files in the order of reading.
+/// Of all files read: the deck, what it includes, data files in the order of reading. Names count relative to the deck's
+/// folder.
 std::uint64_t digest(const Session& session, Digest data) {
+  const std::string& main = session.file(0).name;
+  const std::string folder = main.substr(0, main.rfind('/') + 1);
   for (int i = 0; i < session.file_count(); ++i) {
-    data.add(session.file(i).name);
+    const std::string& name = session.file(i).name;
+    data.add(name.starts_with(folder) ? name.substr(folder.size()) : name);
     data.add(session.file(i).text);
   }
   return data.value();

@@ -63,6 +63,18 @@ def test_wrong_usage_exits_with_4(deck):
     assert mbcosim("run", str(deck), "-o", "/nonexistent/folder/x").returncode == 4
 
 
+def test_messages_name_files_as_they_were_typed(deck, tmp_path):
+    folder = tmp_path / "parts"
+    folder.mkdir()
+    (folder / "wrong.inc").write_text("set: real a = ;\n")
+    (folder / "outer.mbd").write_text('include: "wrong.inc";\n' + deck.read_text())
+    typed = str(folder / "outer.mbd")
+    run = mbcosim("validate", typed)
+    assert run.returncode == 2 and f"{folder}/wrong.inc:1:" in run.stdout and f"included from {typed}:1" in run.stdout
+    run = mbcosim("run", str(folder))
+    assert f"{folder}: error:" in run.stderr and "not a regular file" in run.stderr
+
+
 def test_interrupt_exits_with_130(tmp_path):
     deck = tmp_path / "deck"
     deck.write_text(decks.endless())
