@@ -2,20 +2,24 @@
 # Installs what is missing, builds, and runs every test. Works on Debian 12 as root or with sudo.
 #
 # usage: tests/run.sh [--asan | --tsan] [--quick] [ctest arguments …]
+#        tests/run.sh --tidy [REVISION | --all]
 #   --asan   address and undefined-behaviour sanitizers, in build-asan/
 #   --tsan   thread sanitizer, in build-tsan/
 #   --quick  skips the tests labelled `slow`
+#   --tidy   clang-tidy on the sources changed since REVISION (default: the commit before the last), instead of the tests
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 preset=release
 arguments=()
+tidy=
 while [ $# -gt 0 ]; do
   case $1 in
     --asan) preset=asan ;;
     --tsan) preset=tsan ;;
     --quick) arguments+=(--label-exclude slow) ;;
-    -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    --tidy) tidy=yes ;;
+    -h | --help) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) arguments+=("$1") ;;
   esac
   shift
@@ -27,6 +31,11 @@ jobs=$(nproc)
 docker/install-dependencies.sh all
 cmake --preset $preset
 cmake --build $folder --parallel "$jobs"
+[ -z $tidy ] || exec tests/repository/tidy.py . $folder "${arguments[@]}"
+case $preset in  # what bounds on time are multiplied by
+  asan) export MBCOSIM_TIME_FACTOR=5 ;;
+  tsan) export MBCOSIM_TIME_FACTOR=20 ;;
+esac
 export TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp history_size=7 ${TSAN_OPTIONS:-}"
 export ASAN_OPTIONS="detect_leaks=1 ${ASAN_OPTIONS:-}" LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp ${LSAN_OPTIONS:-}"
 exec ctest --test-dir $folder --output-on-failure --parallel "$jobs" "${arguments[@]}"

@@ -44,7 +44,7 @@ NodeAcceleration dummy_acceleration(const Model& model, const EvalContext& conte
   const NodeAcceleration a = model.node_acceleration(context, n.base);
   if (n.kind == StructuralKind::dummy_offset) return attached_acceleration(base, a, base.R * n.offset);
   const NodeState reference = model.node_state(context, n.reference);
-  const NodeAcceleration s = relative_acceleration(base, a, reference, model.node_acceleration(context, n.reference), n.orientation);
+  NodeAcceleration s = relative_acceleration(base, a, reference, model.node_acceleration(context, n.reference), n.orientation);
   if (n.pivot < 0) return s;
   // The relative motion again, carried by the pivot's frame p: a = p̈ + Coriolis + P s̈.
   const NodeState relative = relative_state(base, reference, n.offset, n.orientation);

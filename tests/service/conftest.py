@@ -11,6 +11,9 @@ import mbcosim
 BIN = os.environ.get("MBCOSIM_BIN", os.path.join(os.path.dirname(__file__), "..", "..", "build", "bin"))
 MODELS = os.path.join(os.path.dirname(__file__), "..", "..", "client_examples", "models")
 
+# Bounds on time are multiplied by this: tests/run.sh sets it for sanitized programs, which are many times slower.
+TIME_FACTOR = float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
+
 
 class Daemon:
     """A daemon on a socket of its own. Ends with SIGTERM and must then exit with 0."""
@@ -35,7 +38,7 @@ class Daemon:
     def stop(self):
         if self.alive():
             self.process.send_signal(signal.SIGTERM)
-        code = self.process.wait(30)
+        code = self.process.wait(30 * TIME_FACTOR)
         self._log.close()
         assert code == 0, f"the daemon ended with {code}:\n{self.log()[-4000:]}"
 
@@ -83,7 +86,7 @@ def pendulum():
 
 def wait_for(condition, seconds=10):
     """Waits until `condition()` is true."""
-    end = time.monotonic() + seconds
+    end = time.monotonic() + seconds * TIME_FACTOR
     while not condition():
         assert time.monotonic() < end, "waited too long"
         time.sleep(0.01)
