@@ -1,5 +1,8 @@
 #include "elements/modal/modal_body.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
 #include <algorithm>
 
 #include <Eigen/Cholesky>
@@ -31,7 +34,7 @@ void note_asymmetry(const MatX& m, const char* what, std::vector<std::string>& w
   const double scale = m.cwiseAbs().maxCoeff();
   if ((m - m.transpose()).cwiseAbs().maxCoeff() > 1e-10 * scale)
     warnings.emplace_back(std::string("the modal ") + what +
-                       " matrix is not symmetric; it is used as it is");
+                          " matrix is not symmetric; it is used as it is");
 }
 
 MatX damping_matrix(const FemData& data, const ModalSelection& s, const ModalBody& body,
@@ -137,7 +140,8 @@ MatX lumped_modal_mass(const MatX& lumped, const ModalBody& body) {
   return m;
 }
 
-void check_inertia(const MatX& lumped, const ModalBody& body, std::vector<std::string>& warnings) {
+void check_lumped_mass(const MatX& lumped, const ModalBody& body,
+                       std::vector<std::string>& warnings) {
   const double scale = body.mass.full.cwiseAbs().maxCoeff();
   const double difference =
       (body.mass.full - lumped_modal_mass(lumped, body)).cwiseAbs().maxCoeff();
@@ -146,11 +150,33 @@ void check_inertia(const MatX& lumped, const ModalBody& body, std::vector<std::s
         "record groups 9 and 11 disagree: the modal mass matrix differs from the one of the lumped "
         "masses by " +
         std::to_string(difference) + " (largest entry " + std::to_string(scale) + ")");
+}
+
+void check_inertia(const ModalBody& body, std::vector<std::string>& warnings) {
   const MatX inertia = body.inertia_matrix();
   const VecX d = inertia.ldlt().vectorD();
   if (d.minCoeff() < -1e-9 * std::max(d.maxCoeff(), inertia.cwiseAbs().maxCoeff()))
     warnings.emplace_back(
         "the inertia matrix of the flexible body is indefinite; the motion may be unstable");
+}
+
+/// Dependent modes: a combination that has neither mass nor stiffness.
+void check_dependence(const ModalBody& body, std::vector<std::string>& warnings) {
+  const MatX &m = body.mass.full, &k = body.stiffness.full;
+  if (body.mass.diagonal && body.stiffness.diagonal) return;
+  const double mass = m.diagonal().cwiseAbs().sum(), stiffness = k.diagonal().cwiseAbs().sum();
+  MatX sum = k + (mass > 0 ? stiffness / mass : 0) * m;
+  const VecX scale = sum.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  sum = scale.asDiagonal() * MatX(0.5 * (sum + sum.transpose())) * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatX> solver(sum);
+  if (solver.info() != Eigen::Success || std::abs(solver.eigenvalues()(0)) > 1e-12) return;
+  std::string names;
+  const VecX part = solver.eigenvectors().col(0).cwiseAbs();
+  for (int j = 0; j < body.modes; ++j)
+    if (part(j) > .1 * part.maxCoeff())
+      names += (names.empty() ? "" : ", ") + std::to_string(body.mode_numbers[j]);
+  warnings.emplace_back("a combination of modes has neither mass nor stiffness; dependent modes: " +
+                        names);
 }
 
 }  // namespace
@@ -216,8 +242,10 @@ std::shared_ptr<const ModalBody> make_modal_body(const FemData& data,
   }
   if (data.lumped) {
     sum_lumped(*data.lumped, !data.rigid, selection.second_order_inertia, b);
-    check_inertia(*data.lumped, b, warnings);
+    check_lumped_mass(*data.lumped, b, warnings);
   }
+  if (data.lumped || data.rigid) check_inertia(b, warnings);
+  check_dependence(b, warnings);
   return body;
 }
 

@@ -1,6 +1,7 @@
 /// Reader of `joint: <label>, modal, ...`.
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
 #include "elements/modal/modal_cards.h"
@@ -56,49 +57,51 @@ class ModalJointReader {
       joint_.R0 = card_.absolute_orientation("orientation of the floating frame");
   }
 
+  /// Counts of the card are checked against the FEM data file, which comes later: nothing is sized
+  /// by them before.
   void read_list() {
-    selection_.modes.resize(mode_count_);
-    std::iota(selection_.modes.begin(), selection_.modes.end(), 1);
     if (!card_.keyword("list")) return;
     listed_ = true;
+    std::vector<int>& modes = selection_.modes;
     for (int k = 0; k < mode_count_; ++k) {
       const int mode = card_.integer("mode number");
       if (mode < 1) card_.fail("modal joint: mode numbers start at 1, got " + std::to_string(mode));
-      if (std::find(selection_.modes.begin(), selection_.modes.begin() + k, mode) !=
-          selection_.modes.begin() + k)
+      if (std::binary_search(modes.begin(), modes.end(), mode))
         card_.fail("modal joint: mode " + std::to_string(mode) + " is listed twice");
-      if (k > 0 && mode < selection_.modes[k - 1])
+      if (k > 0 && mode < modes.back())
         card_.fail("modal joint: the list of modes must be ascending, got " + std::to_string(mode) +
-                       " after " + std::to_string(selection_.modes[k - 1]),
+                       " after " + std::to_string(modes.back()),
                    "MBDyn takes the shapes in the order of the file but the labels in the order of "
                    "the list");
-      selection_.modes[k] = mode;
+      modes.push_back(mode);
     }
   }
 
+  /// Index of a FEM mode number among the active modes.
   int active_mode(int number) {
-    const auto it = std::find(selection_.modes.begin(), selection_.modes.end(), number);
-    if (it == selection_.modes.end())
+    const std::vector<int>& modes = selection_.modes;
+    const auto it = std::lower_bound(modes.begin(), modes.end(), number);
+    const bool found =
+        listed_ ? it != modes.end() && *it == number : number >= 1 && number <= mode_count_;
+    if (!found)
       card_.fail("modal joint: mode " + std::to_string(number) + " is not one of the active modes");
-    return static_cast<int>(it - selection_.modes.begin());
+    return listed_ ? static_cast<int>(it - modes.begin()) : number - 1;
   }
 
+  void read_initial_value(int j) {
+    const double q = card_.real("initial amplitude");
+    initial_values_.push_back({j, q, card_.real("initial velocity")});
+  }
   void read_initial_values() {
     if (!card_.keyword("initial value")) return;
-    joint_.initial_q.setZero(mode_count_);
-    joint_.initial_p.setZero(mode_count_);
+    has_initial_values_ = true;
     if (card_.keyword("mode")) {
       do {
-        const int j = active_mode(card_.integer("mode number"));
-        joint_.initial_q(j) = card_.real("initial amplitude");
-        joint_.initial_p(j) = card_.real("initial velocity");
+        read_initial_value(active_mode(card_.integer("mode number")));
       } while (card_.keyword("mode"));
       return;
     }
-    for (int j = 0; j < mode_count_; ++j) {
-      joint_.initial_q(j) = card_.real("initial amplitude");
-      joint_.initial_p(j) = card_.real("initial velocity");
-    }
+    for (int j = 0; j < mode_count_; ++j) read_initial_value(j);
     if (mode_count_ > 1)
       card_.warn(
           "modal joint: `initial value` gives one pair to each mode in turn; MBDyn keeps only the "
@@ -119,7 +122,6 @@ class ModalJointReader {
   void read_damping() {
     ModalDamping& d = selection_.damping;
     d.kind = ModalDamping::Kind::diagonal;
-    d.ratios.assign(mode_count_, 0.0);
     switch (card_.one_of({"no damping", "rayleigh damping", "single factor damping",
                           "proportional damping", "diag damping", "damping from file"})) {
       case 0:
@@ -135,10 +137,10 @@ class ModalJointReader {
                    "write `single factor damping`");
         [[fallthrough]];
       case 2:
-        std::fill(d.ratios.begin(), d.ratios.end(), ratio("damping ratio"));
+        uniform_ratio_ = ratio("damping ratio");
         return;
       case 4:
-        return read_diagonal_damping(d);
+        return read_diagonal_damping();
       case 5:
         d.kind = ModalDamping::Kind::from_file;
         return;
@@ -151,26 +153,24 @@ class ModalJointReader {
     }
   }
 
-  void read_diagonal_damping(ModalDamping& d) {
+  void read_diagonal_damping() {
     if (card_.keyword("all")) {
-      for (double& v : d.ratios) v = ratio("damping ratio");
+      for (int j = 0; j < mode_count_; ++j) ratios_[j] = ratio("damping ratio");
       return;
     }
     const int count = card_.integer("number of damped modes");
     if (count < 1 || count > mode_count_)
       card_.fail("modal joint: the number of damped modes must be 1 to " +
                  std::to_string(mode_count_) + ", got " + std::to_string(count));
-    std::vector<bool> given(mode_count_);
     for (int k = 0; k < count; ++k) {
       const int index = card_.integer("index of a damped mode");
       if (index < 1 || index > mode_count_)
         card_.fail("modal joint: the index of a damped mode counts the active modes, 1 to " +
                    std::to_string(mode_count_) + "; got " + std::to_string(index));
-      if (given[index - 1])
+      if (ratios_.count(index - 1))
         card_.fail("modal joint: the damping of active mode " + std::to_string(index) +
                    " is given twice");
-      given[index - 1] = true;
-      d.ratios[index - 1] = ratio("damping ratio");
+      ratios_[index - 1] = ratio("damping ratio");
     }
   }
 
@@ -188,9 +188,28 @@ class ModalJointReader {
       refuse_file("the card announces " + std::to_string(fem_nodes_) + " FEM nodes, but \"" + name +
                       "\" has " + std::to_string(data_.node_count()),
                   "write `from file` for the number of FEM nodes");
-    if (selection_.modes.back() > data_.mode_count())
+    const int last = listed_ ? selection_.modes.back() : mode_count_;
+    if (last > data_.mode_count())
       refuse_file("\"" + name + "\" has " + std::to_string(data_.mode_count()) +
-                  " modes, but mode " + std::to_string(selection_.modes.back()) + " is asked for");
+                  " modes, but mode " + std::to_string(last) + " is asked for");
+    size_modes();
+  }
+
+  /// What the card says of its modes, now that their number is known to be right.
+  void size_modes() {
+    if (!listed_) {
+      selection_.modes.resize(mode_count_);
+      std::iota(selection_.modes.begin(), selection_.modes.end(), 1);
+    }
+    selection_.damping.ratios.assign(mode_count_, uniform_ratio_);
+    for (const auto& [j, ratio] : ratios_) selection_.damping.ratios[j] = ratio;
+    if (!has_initial_values_) return;
+    joint_.initial_q.setZero(mode_count_);
+    joint_.initial_p.setZero(mode_count_);
+    for (const InitialValue& v : initial_values_) {
+      joint_.initial_q(v.mode) = v.q;
+      joint_.initial_p(v.mode) = v.p;
+    }
   }
   [[noreturn]] void refuse_file(const std::string& message, const std::string& hint = "") {
     card_.fail_at(file_span_, "modal joint: " + message, hint);
@@ -351,6 +370,11 @@ class ModalJointReader {
     }
   }
 
+  struct InitialValue {
+    int mode;  ///< index among the active modes
+    double q, p;
+  };
+
   Card& card_;
   ElementInfo& info_;
   ModalJoint joint_;
@@ -359,7 +383,10 @@ class ModalJointReader {
   MatX positions_;
   SourceSpan file_span_;
   int mode_count_ = 0, fem_nodes_ = -1;
-  bool listed_ = false;
+  bool listed_ = false, has_initial_values_ = false;
+  std::vector<InitialValue> initial_values_;
+  double uniform_ratio_ = 0;
+  std::map<int, double> ratios_;  ///< `diag damping`, by index among the active modes
 };
 
 }  // namespace
