@@ -14,6 +14,8 @@ enum Slot {
   kLastChance,
   kNextStep,
   kKeptIterations,
+  kKeptCoefficient,
+  kKeptAlgebraicCoefficient,
   kCount
 };
 

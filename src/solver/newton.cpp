@@ -99,7 +99,7 @@ class Newton {
   bool factor(int iterations) {
     const bool keep = settings_.keep_jacobian;
     double* const kept = keep ? &state_.control[control::kCount] : nullptr;
-    const long count = keep ? static_cast<long>(state_.control[control::kKeptIterations]++) : iterations;
+    const long count = keep ? kept_iterations() : iterations;
     if (count % settings_.jacobian_every == 0) {
       compute_jacobian(model_.context(state_, phase_, c_, ca_), ws_);
       if (keep) std::copy(ws_.values.begin(), ws_.values.end(), kept);
@@ -109,6 +109,17 @@ class Newton {
       return true;
     }
     return ws_.solver.factor(ws_.values.data()) == LinearSolver::Outcome::ok;
+  }
+
+  /// Iterations since the integrator's coefficients changed: a matrix is not kept beyond that.
+  long kept_iterations() {
+    double& count = state_.control[control::kKeptIterations];
+    double& c = state_.control[control::kKeptCoefficient];
+    double& ca = state_.control[control::kKeptAlgebraicCoefficient];
+    if (c != c_ || ca != ca_) count = 0;
+    c = c_;
+    ca = ca_;
+    return static_cast<long>(count++);
   }
 
   const Model& model_;

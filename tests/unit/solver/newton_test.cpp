@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "deck_run.h"
+#include "solver/control.h"
 
 namespace mbcosim {
 namespace {
@@ -85,6 +86,20 @@ TEST(KeptJacobian, IsPartOfTheState) {
   ASSERT_TRUE(other.simulation().import_state(bytes));
   other.step(10);
   EXPECT_EQ(other.simulation().state().y, expected);
+}
+
+/// The first step is Crank-Nicolson's, the second has other coefficients: its matrix is new, and from there on it is kept.
+TEST(KeptJacobian, IsRenewedWhenTheCoefficientsChange) {
+  DeckRun run(pendulum(std::string(kPlain) + "nonlinear solver: newton raphson, modified, 50, keep jacobian matrix;"));
+  ASSERT_TRUE(run.ready());
+  const auto iterations = [&] { return run.simulation().step().iterations; };
+  const auto count = [&] { return run.simulation().state().control[control::kKeptIterations]; };
+  const int first = iterations();
+  EXPECT_EQ(count(), first);
+  const int second = iterations();
+  EXPECT_EQ(count(), second);
+  const int third = iterations();
+  EXPECT_EQ(count(), second + third);
 }
 
 StepReport first_steps(const std::string& initial, int count = 3,
