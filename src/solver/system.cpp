@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "math/rotation_derivative.h"
+
 namespace mbcosim {
 
 namespace {
@@ -26,17 +28,10 @@ void compute_residual(const EvalContext& context, std::vector<double>& r) {
 
 NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c) {
   if (g.isZero(0) && gp.isZero(0)) return {c * Mat3::Identity(), Mat3::Identity() - c * cross<double>(w_ref)};
-  using D = Dual<3>;
-  Vec<D> gd, gpd;
-  for (int i = 0; i < 3; ++i) {
-    gd(i) = D::variable(g(i), i, c);
-    gpd(i) = D::variable(gp(i), i, 1);
-  }
-  const Vec<D> w = cgr_g(gd) * gpd + cgr_rotation(gd) * w_ref.cast<D>();
   NodeSeeds s;
-  s.A = c * cgr_g(g);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) s.B(i, j) = w(i).d[j];
+  const Mat3 G = cgr_g(g);
+  s.A = c * G;
+  s.B = G + c * cgr_g_derivative(g, gp) - cross<double>(cgr_rotation(g) * w_ref) * s.A;
   return s;
 }
 

@@ -96,7 +96,7 @@ struct Beam {
     Mat3 R0 = Mat3::Identity();  ///< section orientation as read, section -> global
     Vec3 l0 = Vec3::UnitX();     ///< R(0)ᵀ l(0)
     double metric = 1;           ///< m = dξ/ds [1/m]
-    Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxScalars> actuation;  ///< P (6 × actuators)
+    Eigen::Matrix<double, 6, Eigen::Dynamic> actuation;  ///< P (6 × actuators)
   };
 
   std::array<int, Nodes> node{};     ///< structural node indices
@@ -162,7 +162,9 @@ struct Beam {
   void restart(const Local<double>& u, State& state) const;
 
   struct PointTangent;
-  PointTangent point_tangent(const Local<double>& u, int a) const;
+  PointTangent point_tangent(const Local<double>& u, const Tangent& t, int a) const;
+  void add_rate(const Local<double>& u, const Tangent& t, int a, const Increment<double>& i,
+                const Mat6& damping, PointTangent& p) const;
   Mat6 force_by_node(const Local<double>& u, const Tangent& t, const PointTangent& p, int a,
                      int k) const;
 

@@ -1,130 +1,158 @@
 // Closed-form linearization of beams.
 #include "elements/beams/beam.h"
+#include "math/rotation_derivative.h"
 
 namespace mbcosim {
 
 namespace {
 
-/// ∂(G(r) q)/∂r for a constant q.
-Mat3 cgr_g_derivative(const Vec3& r, const Vec3& q) {
-  const double d = cgr_d(r);
-  return -0.5 * d * d * (q + 0.5 * r.cross(q)) * r.transpose() - 0.5 * d * cross(q);
+using Mat63 = Eigen::Matrix<double, 6, 3>;
+
+Mat63 stacked(const Mat3& force, const Mat3& moment) {
+  Mat63 m;
+  m << force, moment;
+  return m;
 }
 
-/// Adds to rows row..row+2 of the columns from `column` on.
-template <class Block>
-void add_rows(Tangent& t, int row, int column, const Block& values) {
-  for (int j = 0; j < values.cols(); ++j)
-    for (int i = 0; i < 3; ++i) t.at(row + i, column + j) += values(i, j);
+/// diag(R, R) K diag(R, R)ᵀ.
+Mat6 rotated(const Mat3& R, const Mat6& K) {
+  Mat6 g;
+  for (int i = 0; i < 6; i += 3)
+    for (int j = 0; j < 6; j += 3)
+      g.block<3, 3>(i, j) = R * Mat3(K.block<3, 3>(i, j)) * R.transpose();
+  return g;
+}
+
+/// K (ε; κ), by blocks of three columns.
+Mat63 product(const Mat6& K, const Mat3& strain, const Mat3& curvature) {
+  Mat63 f;
+  for (int i = 0; i < 6; i += 3)
+    f.middleRows<3>(i) = K.block<3, 3>(i, 0) * strain + K.block<3, 3>(i, 3) * curvature;
+  return f;
+}
+
+Mat63 product(const Mat6& K, const Mat3& strain) {
+  Mat63 f;
+  for (int i = 0; i < 6; i += 3) f.middleRows<3>(i) = K.block<3, 3>(i, 0) * strain;
+  return f;
 }
 
 }  // namespace
 
-/// What the columns of all nodes share at one evaluation point. [a]× is the skew matrix of a.
+/// Derivatives of (F, M) at one evaluation point, global frame, with R the section's orientation, K
+/// = ∂(F, M)/∂(ε, κ) and D = ∂(F, M)/∂(ε̇, κ̇) rotated to it, [a]× the skew matrix of a. A node
+/// enters through its weights N and m N′ alone, so that all but its offset is computed once:
+///
+///   R δε = δl + [l]× δθ,   R δκ = δ(G r′) + [G r′]× δθ,   δθ = G δr
+///   R δε̇ = δl̇ − [w]× δl + [l]× δw + [l̇ + l × w]× δθ,   R δκ̇ likewise from G ṙ′ + (G r′) × w
 template <int Nodes>
 struct Beam<Nodes>::PointTangent {
   Section<double> s;
-  Law<6>::Response law;  ///< with the actuators' part in f
-  Mat3 G, Rt;            ///< G(r), Rᵀ
-  Mat3 l, bend, F, M;    ///< [l]×, [G r′]×, [F]×, [M]× (global)
-  Mat3 dG_dr;            ///< ∂(G r′)/∂r with r′ fixed
-  // viscoelastic beams only
-  Mat3 dG_rp, dG_drp;  ///< the same for ṙ, ṙ′
-  Mat3 w, w_ref;       ///< [w]×, [Rot(r) w_ref]×
-  Mat3 slope_rate;     ///< [l̇ + l × w]×
-  Mat3 bend_rate;      ///< [G ṙ′ + (G r′) × w]×
+  Mat6 K, D;   ///< D: viscoelastic beams only
+  Mat63 x_dn;  ///< by m N′ δx of a node
+  Mat63 g_n;   ///< by N δg
+  Mat63 g_dn;  ///< by m N′ δg
+  Mat3 F;      ///< [F]×
+  Vec6 force;  ///< (F, M), global, with the actuators' part
 };
 
 template <int Nodes>
-typename Beam<Nodes>::PointTangent Beam<Nodes>::point_tangent(const Local<double>& u, int a) const {
+typename Beam<Nodes>::PointTangent Beam<Nodes>::point_tangent(const Local<double>& u,
+                                                              const Tangent& t, int a) const {
+  const double c = t.c;
   PointTangent p;
   p.s = section(u, a);
-  point[a].law->respond(*u.context, p.s.strain, p.s.rate, true, p.law);
+  Law<6>::Response law;
+  point[a].law->respond(*u.context, p.s.strain, p.s.rate, true, law);
   for (int j = 0; j < static_cast<int>(actuators.size()); ++j)
-    p.law.f += u.scalar(j) * point[a].actuation.col(j);
+    law.f += u.scalar(j) * point[a].actuation.col(j);
   const Increment<double> i = increment(u, a);
   const Mat3& R = p.s.R;
-  p.G = cgr_g(i.r);
-  p.Rt = R.transpose();
-  const Vec3 bend = p.G * i.dr;
-  p.l = cross(p.s.l);
-  p.bend = cross(bend);
-  p.F = cross<double>(R * p.law.f.template head<3>());
-  p.M = cross<double>(R * p.law.f.template tail<3>());
-  p.dG_dr = cgr_g_derivative(i.r, i.dr);
-  if (!viscoelastic) return p;
-  const SectionHistory<const double> past(
-      &u.context->state->memory[u.memory_offset() + a * kSectionHistory]);
-  p.dG_rp = cgr_g_derivative(i.r, i.rp);
-  p.dG_drp = cgr_g_derivative(i.r, i.drp);
-  p.w = cross(p.s.w);
-  p.w_ref = cross<double>(cgr_rotation(i.r) * Vec3(past.w_ref));
-  p.slope_rate = cross<double>(R * p.s.rate.template head<3>());  // l̇ + l × w = R ε̇
-  p.bend_rate = cross<double>(p.G * i.drp + bend.cross(p.s.w));
+  p.force << R * law.f.template head<3>(), R * law.f.template tail<3>();
+  p.F = cross<double>(p.force.template head<3>());
+  p.K = rotated(R, law.de);
+
+  const Mat3 G = cgr_g(i.r), cG = c * G;
+  const Vec3 bend = G * i.dr;
+  const Mat3 l = cross(p.s.l), b = cross(bend), dG_dr = c * cgr_g_derivative(i.r, i.dr);
+  p.x_dn = c * p.K.template leftCols<3>();
+  p.g_n = product(p.K, l * cG, dG_dr + b * cG) -
+          stacked(p.F * cG, cross<double>(p.force.template tail<3>()) * cG);
+  p.g_dn = p.K.template rightCols<3>() * cG;
+  if (viscoelastic) add_rate(u, t, a, i, law.dep, p);
   return p;
 }
 
-/// δ(F, M) in the section frame by the increments (x, g) of node k, 6 × 6:
-///
-///   δε = Rᵀ (δl + [l]× δθ),   δκ = Rᵀ (δ(G r′) + [G r′]× δθ)
-///   δε̇ = Rᵀ (δl̇ − [w]× δl + [l]× δw + [l̇ + l × w]× δθ),   δκ̇ likewise from G ṙ′ + (G r′) × w
+/// The dependence through the strain rates.
+template <int Nodes>
+void Beam<Nodes>::add_rate(const Local<double>& u, const Tangent& t, int a,
+                           const Increment<double>& i, const Mat6& damping, PointTangent& p) const {
+  const double c = t.c;
+  const SectionHistory<const double> past(
+      &u.context->state->memory[u.memory_offset() + a * kSectionHistory]);
+  const Mat3 G = cgr_g(i.r), cG = c * G, w = cross(p.s.w), l = cross(p.s.l);
+  const Vec3 bend = G * i.dr;
+  const Mat3 dw = G + c * cgr_g_derivative(i.r, i.rp) -
+                  cross<double>(cgr_rotation(i.r) * Vec3(past.w_ref)) * cG;  // δw by N δg
+  const Mat3 slope_rate = cross<double>(p.s.R * p.s.rate.template head<3>());  // l̇ + l × w = R ε̇
+  const Mat3 bend_rate = cross<double>(G * i.drp + bend.cross(p.s.w));
+  p.D = rotated(p.s.R, damping);
+  p.x_dn += product(p.D, Mat3::Identity() - c * w);
+  p.g_n += product(p.D, l * dw + slope_rate * cG,
+                   c * (cgr_g_derivative(i.r, i.drp) - w * cgr_g_derivative(i.r, i.dr)) +
+                       cross(bend) * dw + bend_rate * cG);
+  p.g_dn += p.D.template rightCols<3>() * (G - w * cG);
+}
+
+/// δ(F, M + δp × F) by the increments (x, g) of node k, global, 6 × 6.
 template <int Nodes>
 Mat6 Beam<Nodes>::force_by_node(const Local<double>& u, const Tangent& t, const PointTangent& p,
                                 int a, int k) const {
   const double n = BeamShape<Nodes>::n[a][k], dn = BeamShape<Nodes>::dn[a][k] * point[a].metric,
                c = t.c;
-  const Mat3 arm = cross<double>(u.R(k) * offset[k]);
-  const Mat3 darm = -arm * t.seeds[k].A, dtheta = c * n * p.G;
-  const Mat3 dbend = c * (dn * p.G + n * p.dG_dr);
-  Mat6 strain = Mat6::Zero();
-  strain.template block<3, 3>(0, 0) = c * dn * p.Rt;
-  strain.template block<3, 3>(0, 3) = p.Rt * (dn * darm + p.l * dtheta);
-  strain.template block<3, 3>(3, 3) = p.Rt * (dbend + p.bend * dtheta);
-  if (!viscoelastic) return p.law.de * strain;
-
-  const Mat3 dw = n * (p.G + c * p.dG_rp) - p.w_ref * dtheta;
-  const Mat3 dvelocity = cross(u.w(k)) * darm - arm * t.seeds[k].B;
-  Mat6 rate = Mat6::Zero();
-  rate.template block<3, 3>(0, 0) = dn * p.Rt * (Mat3::Identity() - c * p.w);
-  rate.template block<3, 3>(0, 3) =
-      p.Rt * (dn * (dvelocity - p.w * darm) + p.l * dw + p.slope_rate * dtheta);
-  rate.template block<3, 3>(3, 3) =
-      p.Rt * (dn * p.G + c * n * p.dG_drp - p.w * dbend + p.bend * dw + p.bend_rate * dtheta);
-  return p.law.de * strain + p.law.dep * rate;
+  Mat6 f;
+  f.template leftCols<3>() = dn * p.x_dn;
+  f.template rightCols<3>() = n * p.g_n + dn * p.g_dn;
+  f.template block<3, 3>(3, 0) -= (c * n) * p.F;
+  if (offset[k].isZero(0)) return f;
+  const Mat3 arm = cross<double>(u.R(k) * offset[k]), darm = -arm * t.seeds[k].A;
+  f.template rightCols<3>() += product(p.K, dn * darm);
+  f.template block<3, 3>(3, 3) -= n * p.F * darm;
+  if (viscoelastic)
+    f.template rightCols<3>() +=
+        product(p.D, dn * ((cross(u.w(k)) - cross(p.s.w)) * darm - arm * t.seeds[k].B));
+  return f;
 }
 
 /// Rows of the two nodes beside point a: load (F, M + (p − x) × F) and its opposite.
 template <int Nodes>
 void Beam<Nodes>::tangent(const Local<double>& u, Tangent& t) const {
   if (is_unloaded(u)) return;
-  using Block = Eigen::Matrix<double, 3, 6>;
   for (int a = 0; a < points; ++a) {
-    const PointTangent p = point_tangent(u, a);
-    const Mat3 reach[2] = {cross<double>(p.s.p - u.x(a)), cross<double>(p.s.p - u.x(a + 1))};
-    const auto add = [&](int column, const auto& dF, const auto& dM) {
+    const PointTangent p = point_tangent(u, t, a);
+    const Vec3 reach[2] = {p.s.p - u.x(a), p.s.p - u.x(a + 1)};
+    const auto add = [&](int column, const Vec6& f) {
       for (int side = 0; side < 2; ++side) {
         const double sign = side == 0 ? -1 : 1;  // the matrix is −∂r/∂δ
-        const int row = t.row_node(a + side);
-        add_rows(t, row, column, (sign * dF).eval());
-        add_rows(t, row + 3, column, (sign * (dM + reach[side] * dF)).eval());
+        double* const rows = &t.at(t.row_node(a + side), column);
+        const Vec3 moment = f.tail<3>() + reach[side].cross(f.head<3>());
+        for (int i = 0; i < 3; ++i) {
+          rows[i] += sign * f(i);
+          rows[3 + i] += sign * moment(i);
+        }
       }
     };
     for (int k = 0; k < Nodes; ++k) {
-      const double n = BeamShape<Nodes>::n[a][k];
-      const Mat3 dtheta = t.c * n * p.G;
-      const Mat6 local = force_by_node(u, t, p, a, k);
-      Block dF = p.s.R * local.template topRows<3>(), dM = p.s.R * local.template bottomRows<3>();
-      dF.template rightCols<3>() -= p.F * dtheta;
-      dM.template rightCols<3>() -= p.M * dtheta;
-      dM.template leftCols<3>() -= t.c * n * p.F;  // δp × F
-      dM.template rightCols<3>() += n * p.F * cross<double>(u.R(k) * offset[k]) * t.seeds[k].A;
-      add(t.col_node(k), dF, dM);
+      const Mat6 f = force_by_node(u, t, p, a, k);
+      for (int j = 0; j < 6; ++j) add(t.col_node(k) + j, f.col(j));
     }
     t.block(t.row_node(a) + 3, t.col_node(a)) -= t.c * p.F;  // −δx × F
     t.block(t.row_node(a + 1) + 3, t.col_node(a + 1)) += t.c * p.F;
     for (int j = 0; j < static_cast<int>(actuators.size()); ++j) {
       const Vec6 local = t.c * point[a].actuation.col(j);
-      add(t.col_scalar(j), Vec3(p.s.R * local.head<3>()), Vec3(p.s.R * local.tail<3>()));
+      Vec6 f;
+      f << p.s.R * local.head<3>(), p.s.R * local.tail<3>();
+      add(t.col_scalar(j), f);
     }
   }
 }
