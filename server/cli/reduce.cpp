@@ -98,7 +98,9 @@ int reduce_model(const ReduceCommand& command) {
         });
     bar.clear();
     if (!reduction) return complain(reduction.error());
-    write_file(command.output, write_fem_text(reduction->data, reduction->comments));
+    write_file(command.output, command.output.ends_with(".bin")
+                                   ? write_fem_binary(reduction->data)
+                                   : write_fem_text(reduction->data, reduction->comments));
     write_file(command.output + ".json", report_json(*reduction) + "\n");
     if (!command.quiet) std::fputs(report_text(*reduction).c_str(), stdout);
     return kDone;

@@ -9,7 +9,7 @@ namespace mbcosim {
 namespace {
 
 constexpr double kNearlyFree = 1e-5;
-constexpr double kPoorResidual = 1e-6;
+constexpr double kPoorResidual = 1e4;  ///< times the tolerance
 constexpr double kPoorRounding = 1e3;
 
 double hertz(double square) { return std::sqrt(square) / (2 * std::numbers::pi); }
@@ -92,6 +92,9 @@ void BasisBuilder::check_options() {
                      " needs interface nodes that can move");
   if (!is_static(options_.basis) && options_.modes == 0 && options_.max_frequency <= 0)
     refuse_reduction("a basis of normal modes needs at least one");
+  if (!is_static(options_.basis) && options_.normal == ReductionNormal::omitted)
+    refuse_reduction("modes with the interface held are for bases with static shapes",
+                     "craig-bampton, complement, inertia-relief or inertia-decoupling");
   if (options_.basis == ReductionBasis::inertia_decoupling && body_->rigid_count() == 0)
     refuse_reduction("inertia decoupling is for bodies that can move, this one is supported");
   if (options_.basis == ReductionBasis::free_modes && body_->rigid_count() == 0)
@@ -118,8 +121,9 @@ int BasisBuilder::mode_count(Structure& structure) const {
 void BasisBuilder::add_modes(Structure& structure, BasisShapes& basis) {
   report("normal modes", 0);
   const int count = mode_count(structure);
-  const NormalModes modes = structure.modes(count, progress_);
-  if (modes.residual > std::max(kPoorResidual, kPoorRounding * modes.rounding))
+  const EigenOptions eigen{options_.eigen_tolerance, options_.shift};
+  const NormalModes modes = structure.modes(count, eigen, progress_);
+  if (modes.residual > std::max(kPoorResidual * eigen.tolerance, kPoorRounding * modes.rounding))
     warnings_.push_back("the normal modes satisfy their equation only to " +
                         std::to_string(modes.residual));
   if (options_.check_completeness && count > 0) check_count(structure, modes);
@@ -151,6 +155,17 @@ void BasisBuilder::check_count(Structure& structure, const NormalModes& modes) {
     warnings_.push_back("the model has " + std::to_string(counted) + " normal modes below " +
                         std::to_string(hertz(mu)) + " Hz, " + std::to_string(expected) +
                         " were found");
+}
+
+Structure& BasisBuilder::omitted() {
+  if (omitted_) return *omitted_;
+  std::vector<char> held = with_rows_held(model_.supported, interface_);
+  if (frame_node_ >= 0) held = with_rows_held(held, model_.rows_of(frame_node_));
+  omitted_ = std::make_unique<Structure>(model_, held);
+  if (omitted_->rigid_count() > 0)
+    refuse_reduction("the body can move while its interface is held",
+                     "name more interface nodes or components");
+  return *omitted_;
 }
 
 /// Unit loads at the interface, rows of `structure`.
@@ -209,19 +224,13 @@ BasisShapes BasisBuilder::build() {
       add_modes(attached(), basis);
       break;
     case ReductionBasis::craig_bampton: {
-      std::vector<char> held = with_rows_held(model_.supported, interface_);
-      if (frame_node_ >= 0) held = with_rows_held(held, model_.rows_of(frame_node_));
-      Structure omitted(model_, held);
-      if (omitted.rigid_count() > 0)
-        refuse_reduction("the body can move while its interface is held",
-                         "name more interface nodes or components");
       if (!options_.interface_components.empty())
         warnings_.push_back(
             "Craig-Bampton with some components of an interface node: the others have no static "
             "shape of their own");
-      basis.shapes = constraint_shapes(omitted);
+      basis.shapes = constraint_shapes(omitted());
       basis.static_count = static_cast<int>(interface_.size());
-      add_modes(omitted, basis);
+      add_modes(options_.normal == ReductionNormal::whole ? attached() : omitted(), basis);
       break;
     }
     case ReductionBasis::complement:
@@ -229,7 +238,7 @@ BasisShapes BasisBuilder::build() {
       report("static shapes", 0);
       basis.shapes = attached().embedded(attached().solve_all(unit_loads(attached())));
       basis.static_count = static_cast<int>(interface_.size());
-      add_modes(attached(), basis);
+      add_modes(options_.normal == ReductionNormal::omitted ? omitted() : attached(), basis);
       break;
     case ReductionBasis::inertia_relief:
     case ReductionBasis::inertia_decoupling:
@@ -238,7 +247,7 @@ BasisShapes BasisBuilder::build() {
       if (options_.basis == ReductionBasis::inertia_decoupling)
         basis.shapes = body_->embedded(body_->without_rigid(body_->restricted(basis.shapes)));
       basis.static_count = static_cast<int>(interface_.size());
-      add_modes(attached(), basis);
+      add_modes(options_.normal == ReductionNormal::omitted ? omitted() : attached(), basis);
       break;
   }
   return basis;

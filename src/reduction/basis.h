@@ -33,6 +33,7 @@ class BasisBuilder {
   MatX flexibility_columns();
 
  private:
+  Structure& omitted();  ///< with the interface held
   void choose_frame();
   void find_interface();
   void check_options();
@@ -51,7 +52,7 @@ class BasisBuilder {
   std::vector<std::string>& warnings_;
   ReductionFrame frame_ = ReductionFrame::point;
   int frame_node_ = -1;
-  std::unique_ptr<Structure> body_, attached_;
+  std::unique_ptr<Structure> body_, attached_, omitted_;
   std::vector<int> interface_;  ///< model rows
 };
 

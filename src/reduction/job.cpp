@@ -85,6 +85,36 @@ ReductionInertia parse_inertia(const std::string& value) {
   refuse_reduction("unknown inertia `" + value + "`", "accepted: lumped, rigid, both, none");
 }
 
+ReductionNormal parse_normal(const std::string& value) {
+  if (value == "auto") return ReductionNormal::automatic;
+  if (value == "omitted") return ReductionNormal::omitted;
+  if (value == "whole") return ReductionNormal::whole;
+  refuse_reduction("normal: unknown choice `" + value + "`", "accepted: auto, omitted, whole");
+}
+
+/// Must the mass matrix be lumped already?
+bool parse_lumping(const std::string& value) {
+  if (value != "hrz" && value != "diagonal")
+    refuse_reduction("unknown lumping `" + value + "`", "accepted: hrz, diagonal");
+  return value == "diagonal";
+}
+
+double share(const std::string& name, const std::string& value) {
+  const double number = real(name, value);
+  if (!(number > 0 && number < 1))
+    refuse_reduction(name + ": a number between 0 and 1 expected, got `" + value + "`");
+  return number;
+}
+
+double shift(const std::string& value) {
+  const double number = real("shift", value);
+  if (number > 0)
+    refuse_reduction(
+        "shift: a number below zero expected, got `" + value + "`",
+        "a tenth of the lowest elastic frequency squared, with a minus sign, is a good choice");
+  return number;
+}
+
 }  // namespace
 
 const std::vector<ReductionOptionHelp>& reduction_option_help() {
@@ -104,6 +134,10 @@ const std::vector<ReductionOptionHelp>& reduction_option_help() {
       {"inertia", "lumped (record group 11), rigid (12), both or none"},
       {"expose", "Labels of the nodes in the file, or `interface`; default: all"},
       {"diagonalize", "yes or no: shapes that make the reduced matrices diagonal"},
+      {"normal", "Normal modes with the interface held (omitted) or not (whole); default: auto"},
+      {"lumping", "hrz: lump the mass by its diagonal; diagonal: refuse a mass that is not lumped"},
+      {"tolerance", "Relative tolerance of the normal modes; default: 1e-10"},
+      {"shift", "Shift of the eigensolution [1/s^2], below zero; default: none"},
       {"rank-tolerance", "Relative energy below which a combination of shapes is dependent"},
   };
   return kHelp;
@@ -131,8 +165,16 @@ void ReductionJob::set(const std::string& name, const std::string& value) {
     options.exposed = list(value);
   else if (name == "diagonalize")
     options.diagonalize = yes_or_no(name, value);
+  else if (name == "normal")
+    options.normal = parse_normal(value);
+  else if (name == "lumping")
+    options.must_be_lumped = parse_lumping(value);
+  else if (name == "tolerance")
+    options.eigen_tolerance = share(name, value);
+  else if (name == "shift")
+    options.shift = shift(value);
   else if (name == "rank-tolerance")
-    options.rank_tolerance = real(name, value);
+    options.rank_tolerance = share(name, value);
   else
     refuse_reduction("unknown option `" + name + "`");
 }

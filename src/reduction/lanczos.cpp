@@ -2,6 +2,7 @@
 /// out.
 #include <Spectra/SymGEigsShiftSolver.h>
 
+#include <optional>
 #include <random>
 
 #include "reduction/structure.h"
@@ -10,22 +11,27 @@ namespace mbcosim {
 
 namespace {
 
-constexpr double kTolerance = 1e-12;  ///< of the inverted eigenvalues
+constexpr double kInverted =
+    1e-2;  ///< tolerance of the inverted eigenvalues over that of the modes
 constexpr int kRestarts = 300;
 
-/// y = Pᵀ K⁻ P x: the elastic flexibility.
+/// y = Pᵀ K⁻ P x, or with a shift σ y = Pᵀ (K − σ M)⁻¹ P x: the elastic flexibility.
 class Flexibility {
  public:
   using Scalar = double;
-  Flexibility(Structure& structure, const ReductionProgress& progress, int expected)
-      : structure_(structure), progress_(progress), expected_(expected) {}
+  Flexibility(Structure& structure, double shift, const ReductionProgress& progress, int expected)
+      : structure_(structure), progress_(progress), expected_(expected) {
+    if (shift < 0)
+      shifted_ = SparseFactor::positive(structure.stiffness() - shift * structure.mass(),
+                                        [&](int k) { return structure.row_text(k); });
+  }
   Eigen::Index rows() const { return structure_.size(); }
   Eigen::Index cols() const { return structure_.size(); }
   void set_shift(double) {}
   void perform_op(const double* in, double* out) const {
-    const Eigen::Map<const VecX> x(in, rows());
+    const VecX load = structure_.balanced(Eigen::Map<const VecX>(in, rows()));
     Eigen::Map<VecX>(out, rows()) =
-        structure_.without_rigid(structure_.solve(structure_.balanced(x)));
+        structure_.without_rigid(shifted_ ? shifted_->solve(load) : structure_.solve(load));
     ++*done_;
     if (progress_ && !progress_("normal modes", std::min(0.99, double(*done_) / expected_)))
       throw ReductionError(ErrorKind::cancelled, "the reduction was stopped");
@@ -35,6 +41,7 @@ class Flexibility {
   Structure& structure_;
   const ReductionProgress& progress_;
   int expected_;
+  std::optional<SparseFactor> shifted_;
   std::unique_ptr<int> done_ = std::make_unique<int>(0);
 };
 
@@ -65,20 +72,22 @@ VecX start_vector(const Structure& structure, const Flexibility& flexibility, un
 
 }  // namespace
 
-NormalModes Structure::lanczos_modes(int count, const ReductionProgress& progress) {
+NormalModes Structure::lanczos_modes(int count, const EigenOptions& options,
+                                     const ReductionProgress& progress) {
   if (count > size() / 4)
     refuse_reduction(std::to_string(count) + " normal modes of a model with " +
                          std::to_string(size()) + " unknowns are too many",
                      "at most a quarter");
   const int basis = std::min(size(), std::max(2 * count + 1, 20));
-  Flexibility flexibility(*this, progress, 3 * basis);
+  Flexibility flexibility(*this, options.shift, progress, 3 * basis);
   MassProduct product(mass_);
   Spectra::SymGEigsShiftSolver<Flexibility, MassProduct, Spectra::GEigsMode::ShiftInvert> solver(
-      flexibility, product, count, basis, 0.0);
+      flexibility, product, count, basis, options.shift);
   const VecX start = start_vector(*this, flexibility, 1u);
   solver.init(start.data());
-  const auto converged = solver.compute(Spectra::SortRule::LargestMagn, kRestarts, kTolerance,
-                                        Spectra::SortRule::SmallestAlge);
+  const auto converged =
+      solver.compute(Spectra::SortRule::LargestMagn, kRestarts, kInverted * options.tolerance,
+                     Spectra::SortRule::SmallestAlge);
   if (solver.info() != Spectra::CompInfo::Successful)
     throw ReductionError(ErrorKind::not_converged,
                          "only " + std::to_string(converged) + " of " + std::to_string(count) +

@@ -107,6 +107,9 @@ class Reducer {
       refuse_reduction("lumped inertia needs all nodes of the model in the file",
                        "write all nodes, or choose rigid inertia");
     if (!is_lumped(model_)) {
+      if (options_.must_be_lumped)
+        refuse_reduction("the mass matrix is not lumped",
+                         "lump it (`lumping = hrz`), or choose rigid inertia");
       model_.mass = lumped_mass(model_);
       lumped_here_ = true;
     }

@@ -37,6 +37,10 @@ enum class ReductionBasis {
 /// Where the floating frame is. `automatic`: mean axes for a body that can move, else as the model.
 enum class ReductionFrame { automatic, mean_axes, node, point };
 
+/// Of which structure the normal modes are: with the interface held (`omitted`) or not (`whole`).
+/// `automatic`: omitted for Craig-Bampton, else whole.
+enum class ReductionNormal { automatic, omitted, whole };
+
 /// How the body's inertia is written: group 11, group 12, both, or not at all.
 enum class ReductionInertia { lumped, rigid, both, none };
 
@@ -53,6 +57,11 @@ struct ReductionOptions {
   std::vector<std::string> exposed;  ///< nodes that the file lists, or "interface"; empty: all
   bool diagonalize = true;           ///< M_r = 1 and K_r = diag(ω²)
   double rank_tolerance = 1e-8;
+  ReductionNormal normal = ReductionNormal::automatic;
+  bool must_be_lumped = false;  ///< refuse a mass matrix that is not lumped instead of lumping it
+  double eigen_tolerance = 1e-10;  ///< relative, of the normal modes
+  double shift = 0;  ///< [1/s²] of the Lanczos process, at most 0; 0: a determinate set of rows is
+                     ///< held instead
   bool check_completeness = true;  ///< count the eigenvalues below the highest normal mode
 };
 

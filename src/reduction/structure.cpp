@@ -141,10 +141,12 @@ MatX Structure::solve_all(const MatX& loads) {
   return x;
 }
 
-NormalModes Structure::modes(int count, const ReductionProgress& progress) {
+NormalModes Structure::modes(int count, const EigenOptions& options,
+                             const ReductionProgress& progress) {
   if (count == 0) return {VecX(), MatX(size(), 0), 0, 0};
   factor();  // refuses mechanisms by name
-  NormalModes found = size() <= kDenseOrder ? dense_modes(count) : lanczos_modes(count, progress);
+  NormalModes found =
+      size() <= kDenseOrder ? dense_modes(count) : lanczos_modes(count, options, progress);
   finish(found);
   return found;
 }

@@ -46,6 +46,12 @@ struct NormalModes {
   double rounding = 0;  ///< of it what the arithmetic cannot avoid: largest ε ‖ |K| |φ| ‖ / |K φ|
 };
 
+/// How normal modes of large structures are found.
+struct EigenOptions {
+  double tolerance = 1e-10;  ///< relative
+  double shift = 0;  ///< σ <= 0 [1/s²]: K − σ M is factored, or with 0 the K of a determinate set
+};
+
 class Structure {
  public:
   /// `held`: flags of the model's rows. The model must outlive the structure.
@@ -54,6 +60,7 @@ class Structure {
   int size() const { return static_cast<int>(rows_.size()); }
   const std::vector<int>& rows() const { return rows_; }              ///< of the model
   int position(int model_row) const { return position_[model_row]; }  ///< −1: held
+  std::string row_text(int k) const { return model_.dof_text(rows_[k]); }
   const SparseMatrix& stiffness() const { return stiffness_; }
   const SparseMatrix& mass() const { return mass_; }
   int rigid_count() const { return static_cast<int>(rigid_.cols()); }
@@ -69,7 +76,7 @@ class Structure {
   VecX solve(const VecX& f);
   MatX solve_all(const MatX& loads);
   /// The lowest elastic modes.
-  NormalModes modes(int count, const ReductionProgress& progress);
+  NormalModes modes(int count, const EigenOptions& options, const ReductionProgress& progress);
   /// Number of elastic modes with ω² below `square`.
   int count_modes_below(double square) const;
   long factor_nonzeros() const { return factor_ ? factor_->nonzeros() : 0; }
@@ -83,7 +90,8 @@ class Structure {
   void hold_determinate_set();
   void factor();
   NormalModes dense_modes(int count) const;
-  NormalModes lanczos_modes(int count, const ReductionProgress& progress);
+  NormalModes lanczos_modes(int count, const EigenOptions& options,
+                            const ReductionProgress& progress);
   void finish(NormalModes& modes) const;
 
   const FeModel& model_;

@@ -137,7 +137,33 @@ def test_fem_info(folder):
     assert bad.returncode == 2 and "record group 8" in bad.stderr
 
 
+def test_packed_form_runs_like_the_text(folder):
+    """A name that ends with .bin asks for the packed form; decks and fem-info take both."""
+    shape = ["--basis", "complement", "--interface", "9", "--frame", "node:1", "--modes", "2"]
+    reduced(folder, *shape)
+    run = mbcosim("reduce", folder / "beam.job", "-o", folder / "beam.bin", *shape)
+    assert run.returncode == 0, run.stderr
+    assert (folder / "beam.bin").read_bytes()[:4] == b"bmod"
+    text, packed = (json.loads(mbcosim("fem-info", folder / name, "--json").stdout) for name in ("beam.fem", "beam.bin"))
+    assert packed["binary"] and not text["binary"]
+    assert {**packed, "binary": 0, "revision": 0} == {**text, "binary": 0, "revision": 0}
+    for name in ("beam.fem", "beam.bin"):
+        (folder / f"{name}.deck").write_text(clamped_deck(8, 1e-3).replace("final time: 6.", "final time: .5").replace("beam.fem", name))
+        run = mbcosim("run", folder / f"{name}.deck", "-o", folder / f"out_{name}")
+        assert run.returncode == 0, run.stderr
+    assert (folder / "out_beam.fem.mov").read_text() == (folder / "out_beam.bin.mov").read_text()
+
+
+def test_options_of_the_eigensolution(folder):
+    """They are taken from the command line; models as small as this one are solved with full matrices all the same."""
+    reports = [reduced(folder, "--basis", "free", "--modes", "4", *more)[0]["frequencies_hz"]
+               for more in ([], ["--shift", "-100", "--tolerance", "1e-8"])]
+    assert reports[1] == pytest.approx(reports[0], rel=1e-8)
+
+
 @pytest.mark.parametrize("options, message", [
+    (["--shift", "3"], "below zero"), (["--tolerance", "0"], "between 0 and 1"), (["--lumping", "row"], "unknown lumping"),
+    (["--normal", "most"], "unknown choice"),
     (["--basis", "fancy"], "unknown basis `fancy`"), (["--interface", "77"], "the model has no node 77"),
     (["--mass", "missing.mtx"], "cannot open"), (["--basis", "constrained"], "6 rigid motions"),
     (["--modes", "many"], "modes: a number expected"), (["--frame", "somewhere"], "unknown frame")])

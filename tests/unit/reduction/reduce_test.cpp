@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "fe_models.h"
+#include "reduction/job.h"
 #include "reduction/structure.h"
 
 namespace mbcosim {
@@ -13,6 +14,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
@@ -206,7 +208,7 @@ TEST(ReducePlate, SimplySupported) {
 TEST(ReducePlate, LanczosFindsDoubleModes) {  // a square plate has pairs of equal frequencies
   const FeModel square = plate(1, 1, 12, 12, true);
   Structure structure(square, square.supported);
-  const NormalModes modes = structure.modes(8, {});
+  const NormalModes modes = structure.modes(8, {}, {});
   ASSERT_GT(structure.size(), 400);
   EXPECT_NEAR(modes.squares(1) / modes.squares(2), 1, 1e-9);
   EXPECT_NEAR(modes.squares(6) / modes.squares(7), 1, 1e-9);
@@ -216,12 +218,92 @@ TEST(ReducePlate, LanczosFindsDoubleModes) {  // a square plate has pairs of equ
   EXPECT_LT((gram - MatX::Identity(8, 8)).norm(), 1e-8);
 }
 
+/// K − σ M is regular for a body that can move, too; the modes are the same.
+TEST(ReducePlate, ShiftedEigensolutionFindsTheSameModes) {
+  for (const bool supported : {true, false}) {
+    const FeModel square = plate(1, 1, 12, 12, supported);
+    Structure plain(square, square.supported), shifted(square, square.supported);
+    const NormalModes expected = plain.modes(6, {}, {});
+    for (const double share : {-1e-2, -1.0}) {
+      const NormalModes modes = shifted.modes(6, {1e-10, share * expected.squares(0)}, {});
+      EXPECT_LT(
+          (modes.squares - expected.squares).cwiseAbs().cwiseQuotient(expected.squares).maxCoeff(),
+          1e-9);
+      EXPECT_LT((shifted.rigid().transpose() * (shifted.mass() * modes.shapes)).norm(), 1e-9);
+    }
+    const NormalModes rough = shifted.modes(6, {1e-4, 0}, {});
+    EXPECT_LT(
+        (rough.squares - expected.squares).cwiseAbs().cwiseQuotient(expected.squares).maxCoeff(),
+        1e-4);
+  }
+}
+
 TEST(ReducePlate, FreePlateHasThreeRigidMotionsOutOfPlane) {
   const Reduction r =
       reduced(plate(1, 1, 12, 12, false), options_of(ReductionBasis::free_modes, 3));
   EXPECT_EQ(r.report.rigid_motions, 3);
   // Leissa: ω a² √(ρh/D) = 13.489, 19.789, 24.432 for ν = 0.3
   expect_omegas(r, {13.468, 19.596, 24.270}, 1e-2);
+}
+
+/// P f is in balance and P is a projection; Pᵀ x has no rigid content; K x = P f for the relieved
+/// shapes x.
+TEST(ReduceProjections, HoldToRoundOff) {
+  const FeModel beam = space_beam();
+  Structure body(beam, beam.supported);
+  ASSERT_EQ(body.rigid_count(), 6);
+  const MatX loads = MatX::Identity(body.size(), body.size());
+  const MatX balanced = body.balanced(loads);
+  EXPECT_LT((body.rigid().transpose() * balanced).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_LT((body.balanced(balanced) - balanced).cwiseAbs().maxCoeff(), 1e-14);
+  const MatX relieved = body.solve_all(balanced);
+  EXPECT_LT((body.stiffness() * relieved - balanced).cwiseAbs().maxCoeff(),
+            1e-9);  // stiffness up to 1e6
+  const MatX decoupled = body.without_rigid(relieved);
+  EXPECT_LT((body.rigid().transpose() * (body.mass() * decoupled)).cwiseAbs().maxCoeff(),
+            1e-14 * relieved.cwiseAbs().maxCoeff());
+  EXPECT_LT((body.without_rigid(decoupled) - decoupled).cwiseAbs().maxCoeff(),
+            1e-14 * relieved.cwiseAbs().maxCoeff());
+  EXPECT_LT((decoupled - decoupled.transpose()).cwiseAbs().maxCoeff(),
+            1e-12 * decoupled.cwiseAbs().maxCoeff());
+  const NormalModes modes =
+      body.modes(10, {}, {});  // Σ φ φᵀ/ω² over all elastic modes is the same flexibility
+  EXPECT_LT((body.rigid().transpose() * (body.mass() * modes.shapes)).cwiseAbs().maxCoeff(), 1e-10);
+}
+
+/// With whole normal modes the lowest frequencies are those of the model, with those of the held
+/// interface they are above.
+TEST(ReduceModes, OfTheWholeStructureOrWithTheInterfaceHeld) {
+  const FeModel chain = spring_chain(5, 100);
+  ReductionOptions o = options_of(ReductionBasis::craig_bampton, 2, {"1", "5"});
+  o.normal = ReductionNormal::whole;
+  expect_omegas(reduced(chain, o), {2.846296766, 8.308300260}, 1e-9);
+  o.normal = ReductionNormal::automatic;
+  EXPECT_GT(kTwoPi * reduced(chain, o).report.frequencies[0], 2.8467);
+  o.basis = ReductionBasis::complement;
+  expect_omegas(reduced(chain, o), {2.846296766, 8.308300260}, 1e-9);
+  o.normal = ReductionNormal::omitted;  // the span of Craig-Bampton
+  expect_omegas(reduced(chain, o), {2.846733147, 8.308494525, 13.26731315, 16.88817266}, 1e-9);
+  o.basis = ReductionBasis::free_modes;
+  EXPECT_THAT(refusal(chain, o),
+              HasSubstr("modes with the interface held are for bases with static shapes"));
+}
+
+/// More normal modes bring every frequency of a Craig-Bampton basis down to the model's, never
+/// below.
+TEST(ReduceModes, CraigBamptonOfABeamConvergesFromAbove) {
+  const FeModel beam = clamped(space_beam(), "1");
+  const Reduction exact = reduced(beam, options_of(ReductionBasis::constrained_modes, 6));
+  std::vector<double> before(6, 1e9);
+  for (const int modes : {0, 2, 6, 12}) {
+    const Reduction r = reduced(beam, options_of(ReductionBasis::craig_bampton, modes, {"9"}));
+    for (int k = 0; k < 6; ++k) {
+      EXPECT_GT(r.report.frequencies[k], exact.report.frequencies[k] * (1 - 1e-9)) << modes;
+      EXPECT_LT(r.report.frequencies[k], before[k] * (1 + 1e-9)) << modes;
+      before[k] = r.report.frequencies[k];
+    }
+  }
+  for (int k = 0; k < 6; ++k) EXPECT_NEAR(before[k] / exact.report.frequencies[k], 1, 2e-3);
 }
 
 TEST(ReduceModes, HighestFrequencyInsteadOfANumber) {
@@ -265,6 +347,66 @@ TEST(ReduceRefusals, WhatDoesNotFit) {
   EXPECT_THAT(refusal(beam, o), HasSubstr("choose rigid inertia"));
   EXPECT_THAT(refusal(clamped(beam, "1"), options_of(ReductionBasis::inertia_decoupling, 4, {"9"})),
               HasSubstr("this one is supported"));
+}
+
+TEST(ReduceRefusals, IndefiniteMatrices) {
+  FeModel beam = space_beam();
+  beam.stiffness *= -1;
+  EXPECT_THAT(refusal(beam, options_of(ReductionBasis::free_modes, 4)),
+              HasSubstr("not positive definite at node"));
+  beam = space_beam();
+  beam.mass *= -1;
+  EXPECT_NE(refusal(beam, options_of(ReductionBasis::free_modes, 4)), "accepted");
+  beam = space_beam();
+  beam.mass.coeffRef(7, 7) = -5;
+  EXPECT_NE(refusal(beam, options_of(ReductionBasis::free_modes, 4)), "accepted");
+}
+
+TEST(ReduceRefusals, InterfaceTwiceAndUnlumpedMass) {
+  EXPECT_THAT(refusal(space_beam(), options_of(ReductionBasis::craig_bampton, 4, {"9", "9"})),
+              HasSubstr("is an interface twice"));
+  ReductionOptions o = options_of(ReductionBasis::constrained_modes, 3);
+  o.inertia = ReductionInertia::lumped;
+  o.must_be_lumped = true;
+  EXPECT_THAT(refusal(clamped(planar_beam(10), "1"), o),
+              HasSubstr("the mass matrix is not lumped"));
+  EXPECT_EQ(refusal(clamped(space_beam(), "1"), o), "accepted");
+}
+
+std::string option_refusal(const std::string& name, const std::string& value) {
+  ReductionJob job;
+  try {
+    job.set(name, value);
+  } catch (const ReductionError& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+TEST(ReduceOptions, AreChecked) {
+  for (const ReductionOptionHelp& help : reduction_option_help())
+    EXPECT_THAT(option_refusal(help.name, "yes"), Not(HasSubstr("unknown option"))) << help.name;
+  const std::tuple<const char*, const char*, const char*> cases[] = {
+      {"shift", "2", "a number below zero expected"},
+      {"shift", "-100", "accepted"},
+      {"tolerance", "0", "between 0 and 1"},
+      {"tolerance", "1e-8", "accepted"},
+      {"rank-tolerance", "-1", "between 0 and 1"},
+      {"normal", "some", "unknown choice `some`"},
+      {"normal", "omitted", "accepted"},
+      {"lumping", "row-sum", "unknown lumping"},
+      {"lumping", "diagonal", "accepted"},
+      {"modes", "-1", "a whole number expected"},
+      {"modes", "1e300", "a whole number expected"},
+      {"max-frequency", "inf", "a number expected"},
+      {"frame", "point:1,2", "three coordinates"},
+      {"components", "9", "`label:digits` expected"},
+      {"components", "9:78", "component"},
+      {"inertia", "heavy", "unknown inertia"},
+      {"diagonalize", "maybe", "`yes` or `no` expected"},
+      {"fancy", "1", "unknown option"}};
+  for (const auto& [name, value, message] : cases)
+    EXPECT_THAT(option_refusal(name, value), HasSubstr(message));
 }
 
 TEST(ReduceRefusals, StopsWhenAsked) {
