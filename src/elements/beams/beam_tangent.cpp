@@ -124,10 +124,10 @@ Mat6 Beam<Nodes>::force_by_node(const Local<double>& u, const Tangent& t, const 
   return f;
 }
 
-/// Rows of the two nodes beside point a: load (F, M + (p − x) × F) and its opposite.
+/// Rows of the two nodes beside point a: load (F, M + (p − x) × F) and its opposite. A beam that
+/// has not been loaded yet is stiff nonetheless: modes about the initial state need it.
 template <int Nodes>
 void Beam<Nodes>::tangent(const Local<double>& u, Tangent& t) const {
-  if (is_unloaded(u)) return;
   for (int a = 0; a < points; ++a) {
     const PointTangent p = point_tangent(u, t, a);
     const Vec3 reach[2] = {p.s.p - u.x(a), p.s.p - u.x(a + 1)};
