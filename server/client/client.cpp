@@ -79,6 +79,7 @@ Server::~Server() = default;
 
 Server Server::connect(const std::string& address, double timeout) {
   auto impl = std::make_shared<Impl>();
+  impl->address = address;
   impl->channel = grpc::CreateChannel(address, grpc::InsecureChannelCredentials());
   impl->simulations = v1::Simulations::NewStub(impl->channel);
   impl->coupling = v1::Coupling::NewStub(impl->channel);
@@ -110,8 +111,20 @@ Simulation Server::load_text(const std::string& deck, const LoadOptions& options
 // ------------------------------------------------------------------ Simulation
 
 struct Simulation::Impl {
+  Impl(std::shared_ptr<Server::Impl> connection, const v1::SimulationInfo& simulation, bool is_ours)
+      : server(std::move(connection)), info(simulation), owned(is_ours) {
+    grpc::ClientContext context;
+    v1::DescribeSimulationRequest request;
+    request.set_name(info.name());
+    v1::ModelDescription description;
+    require(server->simulations->DescribeSimulation(&context, request, &description));
+    for (const v1::Variable& variable : description.variables())
+      variables[variable.name()] = variable;
+  }
+
   std::shared_ptr<Server::Impl> server;
   v1::SimulationInfo info;
+  bool owned;
   std::map<std::string, v1::Variable> variables;
 
   const v1::Variable& variable(const std::string& name) const {
@@ -157,17 +170,16 @@ Simulation Server::create(const std::string& main, const std::map<std::string, s
   upload->WritesDone();
   require(upload->Finish());
 
-  auto created = std::make_unique<Simulation::Impl>();
-  created->server = impl_;
-  created->info = reply.simulation();
-  grpc::ClientContext describe_context;
-  v1::DescribeSimulationRequest request;
-  request.set_name(created->info.name());
-  v1::ModelDescription description;
-  require(impl_->simulations->DescribeSimulation(&describe_context, request, &description));
-  for (const v1::Variable& variable : description.variables())
-    created->variables[variable.name()] = variable;
-  return Simulation(std::move(created));
+  return Simulation(std::make_unique<Simulation::Impl>(impl_, reply.simulation(), true));
+}
+
+Simulation Server::find(const std::string& name) {
+  grpc::ClientContext context;
+  v1::GetSimulationRequest request;
+  request.set_name(name);
+  v1::SimulationInfo info;
+  require(impl_->simulations->GetSimulation(&context, request, &info));
+  return Simulation(std::make_unique<Simulation::Impl>(impl_, info, false));
 }
 
 Simulation::Simulation(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -175,7 +187,7 @@ Simulation::Simulation(Simulation&&) noexcept = default;
 Simulation& Simulation::operator=(Simulation&&) noexcept = default;
 
 Simulation::~Simulation() {
-  if (!impl_) return;
+  if (!impl_ || !impl_->owned) return;
   grpc::ClientContext context;
   v1::DeleteSimulationRequest request;
   request.set_name(impl_->info.name());
@@ -220,7 +232,7 @@ void Simulation::write(const std::string& variable, const std::vector<double>& v
 }
 
 Peer Simulation::attach(const std::string& port, const PeerOptions& options) {
-  return Peer(attach_peer(impl_->server, make_hello(impl_->info, port, options)));
+  return Peer(attach_peer(impl_->server, make_hello(impl_->info, port, options), options));
 }
 
 Peer Simulation::couple(const std::string& port, Answer answer, const PeerOptions& options) {

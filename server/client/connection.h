@@ -16,6 +16,7 @@ namespace mbcosim::client {
 void require(const grpc::Status& status);
 
 struct Server::Impl {
+  std::string address;
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<v1::Simulations::Stub> simulations;
   std::unique_ptr<v1::Coupling::Stub> coupling;

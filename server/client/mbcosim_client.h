@@ -70,13 +70,15 @@ struct StepResult {
 /// What a peer gets: n points, global frame unless agreed otherwise, SI units.
 struct Motion {
   std::int64_t step = 0;
-  double time = 0;              ///< of the values [s]
-  double target_time = 0;       ///< for which an answer is wanted [s]
-  int iteration = 0;            ///< of a tight step, or pass of a window, from 1; 0: explicit
-  std::vector<double> x;        ///< positions [m] (3n)
-  std::vector<double> R;        ///< rotation matrices by rows, node frame to global (9n)
-  std::vector<double> v;        ///< velocities [m/s] (3n)
-  std::vector<double> w;        ///< angular velocities [rad/s] (3n)
+  double time = 0;         ///< of the values [s]
+  double target_time = 0;  ///< for which an answer is wanted [s]
+  int iteration = 0;       ///< of a tight step, or pass of a window, from 1; 0: explicit
+  std::vector<double> x;   ///< positions [m] (3n)
+  std::vector<double> R;   ///< orientations, node frame to the port's: by rows (9n) unless agreed
+                           ///< otherwise
+  std::vector<double> v;   ///< velocities [m/s] (3n)
+  std::vector<double> w;   ///< angular velocities [rad/s] (3n)
+  std::vector<double> a, wp;    ///< accelerations [m/s², rad/s²] (3n) when agreed, else empty
   std::vector<double> signals;  ///< of a signal port
 };
 
@@ -85,11 +87,24 @@ struct Loads {
   std::vector<double> forces = {};   ///< [N] (3n)
   std::vector<double> moments = {};  ///< about the points [N·m] (3n); empty: zero
   std::vector<double> signals = {};  ///< of a signal port
+  /// On the reference node [N], [N·m] (3 each), for ports of a deck that want them.
+  std::vector<double> reference_force = {}, reference_moment = {};
 };
 
 enum class Mode { port_default, loose, staggered, tight, window };
 enum class Policy { fail_step, hold_last, zero, wait };
 enum class Acceleration { none, constant, aitken, iqn_ils };
+enum class Rotation { matrix, vector, quaternion, euler_123 };
+enum class Frame { port_default, global, node, reference };
+enum class Hold { zero_order, linear, quadratic };
+/// What carries the exchanges: the stream of the server's protocol, or shared memory, for peers on
+/// the host of a server at "unix:PATH" that need a few microseconds an exchange. The results are
+/// the same, bit for bit.
+enum class Transport { stream, shared_memory };
+
+/// Called when an implicit step has ended: accepted, or to be redone from the state at that step
+/// and time [s].
+using StepEnded = std::function<void(bool accepted, std::int64_t step, double time)>;
 
 struct PeerOptions {
   Mode mode = Mode::port_default;
@@ -100,6 +115,12 @@ struct PeerOptions {
   double relaxation = 0.5;
   double tolerance = 1e-6;  ///< of the interface, relative
   int maximum_passes = 50;
+  Rotation rotation = Rotation::matrix;
+  Frame frame = Frame::port_default;
+  bool accelerations = false;
+  Hold hold = Hold::zero_order;  ///< of inputs between exchanges
+  Transport transport = Transport::stream;
+  StepEnded step_ended = {};  ///< called by the thread that reads: `next`, or the peer's own
 };
 
 /// An attached peer. Ends when it is destroyed.
@@ -127,7 +148,7 @@ class Peer {
 
 using Answer = std::function<Loads(const Motion&)>;
 
-/// A simulation on the server. Deletes it when destroyed. Calls throw Error; one thread at a time.
+/// A simulation on the server. Deletes it when destroyed, if it was loaded here. Calls throw Error; one thread at a time.
 class Simulation {
  public:
   struct Impl;  // of the library
@@ -167,6 +188,8 @@ class Server {
   /// A deck of this machine, with the files that it names in quotes.
   Simulation load(const std::string& path, const LoadOptions& options = {});
   Simulation load_text(const std::string& deck, const LoadOptions& options = {});
+  /// A simulation that another client loaded, by its name; it lives on afterwards.
+  Simulation find(const std::string& name);
 
  private:
   explicit Server(std::shared_ptr<Impl> impl);

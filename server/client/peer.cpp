@@ -46,33 +46,75 @@ v1::Acceleration to_proto(Acceleration acceleration) {
   }
 }
 
+v1::RotationForm to_proto(Rotation rotation) {
+  switch (rotation) {
+    case Rotation::vector:
+      return v1::ROTATION_FORM_VECTOR;
+    case Rotation::quaternion:
+      return v1::ROTATION_FORM_QUATERNION;
+    case Rotation::euler_123:
+      return v1::ROTATION_FORM_EULER_123;
+    default:
+      return v1::ROTATION_FORM_MATRIX;
+  }
+}
+
+v1::PortFrame to_proto(Frame frame) {
+  switch (frame) {
+    case Frame::global:
+      return v1::PORT_FRAME_GLOBAL;
+    case Frame::node:
+      return v1::PORT_FRAME_NODE;
+    case Frame::reference:
+      return v1::PORT_FRAME_REFERENCE;
+    default:
+      return v1::PORT_FRAME_UNSPECIFIED;
+  }
+}
+
+v1::InputHold to_proto(Hold hold) {
+  switch (hold) {
+    case Hold::linear:
+      return v1::INPUT_HOLD_LINEAR;
+    case Hold::quadratic:
+      return v1::INPUT_HOLD_QUADRATIC;
+    default:
+      return v1::INPUT_HOLD_ZERO_ORDER;
+  }
+}
+
+using Numbers = google::protobuf::RepeatedField<double>;
+
+void take(const Numbers& numbers, std::vector<double>& out) {
+  out.assign(numbers.begin(), numbers.end());
+}
+
 void take(const v1::ServerExchange& in, Motion& motion) {
   motion.step = in.step();
   motion.time = in.time_s();
   motion.target_time = in.target_time_s();
   motion.iteration = in.iteration();
-  motion.x.assign(in.positions_m().begin(), in.positions_m().end());
-  motion.R.assign(in.rotations().begin(), in.rotations().end());
-  motion.v.assign(in.velocities_m_s().begin(), in.velocities_m_s().end());
-  motion.w.assign(in.angular_velocities_rad_s().begin(), in.angular_velocities_rad_s().end());
-  motion.signals.assign(in.signals().begin(), in.signals().end());
+  take(in.positions_m(), motion.x);
+  take(in.rotations(), motion.R);
+  take(in.velocities_m_s(), motion.v);
+  take(in.angular_velocities_rad_s(), motion.w);
+  take(in.accelerations_m_s2(), motion.a);
+  take(in.angular_accelerations_rad_s2(), motion.wp);
+  take(in.signals(), motion.signals);
 }
 
-v1::PeerMessage to_message(std::int64_t index, const Loads& loads) {
-  v1::PeerMessage message;
-  v1::PeerExchange* out = message.mutable_exchange();
-  out->set_index(index);
-  out->mutable_forces_n()->Add(loads.forces.begin(), loads.forces.end());
-  out->mutable_moments_nm()->Add(loads.moments.begin(), loads.moments.end());
-  out->mutable_signals()->Add(loads.signals.begin(), loads.signals.end());
-  return message;
+void put(const std::vector<double>& values, Numbers* out) {
+  out->Clear();
+  out->Add(values.begin(), values.end());
 }
 
-v1::PeerMessage failure_message(std::int64_t index, const std::string& why) {
-  v1::PeerMessage message;
-  message.mutable_exchange()->set_index(index);
-  message.mutable_exchange()->set_failure(why.empty() ? "the peer gave no reason" : why);
-  return message;
+void put(const Loads& loads, v1::PeerExchange* out) {
+  out->clear_failure();
+  put(loads.forces, out->mutable_forces_n());
+  put(loads.moments, out->mutable_moments_nm());
+  put(loads.signals, out->mutable_signals());
+  put(loads.reference_force, out->mutable_reference_force_n());
+  put(loads.reference_moment, out->mutable_reference_moment_nm());
 }
 
 }  // namespace
@@ -85,9 +127,12 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   hello.set_simulation(simulation.name());
   hello.set_port(port);
   hello.set_model_digest(simulation.model_digest());
-  hello.set_rotation_form(v1::ROTATION_FORM_MATRIX);
+  hello.set_rotation_form(to_proto(options.rotation));
+  hello.set_frame(to_proto(options.frame));
+  hello.set_accelerations(options.accelerations);
   hello.set_mode(to_proto(options.mode));
   hello.set_every(options.every);
+  hello.set_input_hold(to_proto(options.hold));
   *hello.mutable_peer_timeout() = google::protobuf::util::TimeUtil::MillisecondsToDuration(
       static_cast<std::int64_t>(options.timeout * 1000));
   hello.set_policy(to_proto(options.policy));
@@ -100,40 +145,57 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
 }
 
 std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
-                                        const v1::Hello& hello) {
+                                        const v1::Hello& hello, const PeerOptions& options) {
   auto impl = std::make_unique<Peer::Impl>();
+  impl->wire = options.transport == Transport::shared_memory
+                   ? open_shared_memory(server->address, options.timeout)
+                   : open_stream(*server);
   impl->server = std::move(server);
-  impl->stream = impl->server->coupling->Attach(&impl->context);
+  impl->step_ended = options.step_ended;
   v1::PeerMessage first;
   *first.mutable_hello() = hello;
-  if (impl->stream->Write(first) && impl->stream->Read(&impl->in)) return impl;
+  if (impl->wire->write(first) && impl->wire->read(&impl->in)) return impl;
   impl->open = false;
-  require(impl->stream->Finish());
+  require(impl->wire->finish());
   throw Error("the server ended the handshake", static_cast<int>(grpc::StatusCode::UNAVAILABLE), "",
               {});
 }
 
 bool Peer::Impl::next(Motion& motion) {
-  while (stream->Read(&in)) {
-    if (!in.has_exchange()) continue;  // heartbeats, ends of implicit steps
-    take(in.exchange(), motion);
-    ++exchanges;
-    return true;
+  while (wire->read(&in)) {
+    if (in.has_exchange()) {
+      take(in.exchange(), motion);
+      ++exchanges;
+      return true;
+    }
+    const bool ended = in.has_accepted() || in.has_rejected();
+    const v1::StepNotice& notice = in.has_accepted() ? in.accepted() : in.rejected();
+    if (ended && step_ended) step_ended(in.has_accepted(), notice.step(), notice.time_s());
   }
   return false;
 }
 
-void Peer::Impl::send(v1::PeerMessage message) { stream->Write(message); }
+void Peer::Impl::answer(const Loads& loads) {
+  out.mutable_exchange()->set_index(in.exchange().index());
+  put(loads, out.mutable_exchange());
+  wire->write(out);
+}
 
-void Peer::Impl::serve(Answer answer) {
-  thread = std::thread([this, answer = std::move(answer)] {
+void Peer::Impl::fail(const std::string& why) {
+  v1::PeerMessage message;
+  message.mutable_exchange()->set_index(in.exchange().index());
+  message.mutable_exchange()->set_failure(why.empty() ? "the peer gave no reason" : why);
+  wire->write(message);
+}
+
+void Peer::Impl::serve(Answer function) {
+  thread = std::thread([this, function = std::move(function)] {
     Motion motion;
     while (next(motion)) {
-      const std::int64_t index = in.exchange().index();
       try {
-        send(to_message(index, answer(motion)));
+        answer(function(motion));
       } catch (const std::exception& error) {
-        send(failure_message(index, error.what()));
+        fail(error.what());
       }
     }
   });
@@ -142,9 +204,9 @@ void Peer::Impl::serve(Answer answer) {
 void Peer::Impl::close() {
   if (!open) return;
   open = false;
-  context.TryCancel();  // ends a read that is under way
+  wire->cancel();  // ends a read that is under way
   if (thread.joinable()) thread.join();
-  stream->Finish();
+  wire->finish();
 }
 
 Peer::Peer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -153,12 +215,8 @@ Peer& Peer::operator=(Peer&&) noexcept = default;
 Peer::~Peer() = default;
 
 bool Peer::next(Motion& motion) { return impl_->next(motion); }
-void Peer::answer(const Loads& loads) {
-  impl_->send(to_message(impl_->in.exchange().index(), loads));
-}
-void Peer::fail(const std::string& why) {
-  impl_->send(failure_message(impl_->in.exchange().index(), why));
-}
+void Peer::answer(const Loads& loads) { impl_->answer(loads); }
+void Peer::fail(const std::string& why) { impl_->fail(why); }
 std::int64_t Peer::exchanges() const { return impl_->exchanges; }
 void Peer::close() { impl_->close(); }
 

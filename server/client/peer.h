@@ -1,14 +1,13 @@
 /// Internal to the client library: the stream of a peer.
 #pragma once
 
-#include <grpcpp/client_context.h>
-
 #include <atomic>
 #include <memory>
 #include <string>
 #include <thread>
 
 #include "client/connection.h"
+#include "client/wire.h"
 
 namespace mbcosim::client {
 
@@ -16,18 +15,18 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
                      const PeerOptions& options);
 
 struct Peer::Impl {
-  using Stream = grpc::ClientReaderWriter<v1::PeerMessage, v1::ServerMessage>;
-
   ~Impl() { close(); }
   bool next(Motion& motion);
-  void send(v1::PeerMessage message);
+  void answer(const Loads& loads);
+  void fail(const std::string& why);
   void serve(Answer answer);  ///< in a thread of its own
   void close();
 
   std::shared_ptr<Server::Impl> server;
-  grpc::ClientContext context;
-  std::unique_ptr<Stream> stream;
+  std::unique_ptr<Wire> wire;
+  StepEnded step_ended;
   v1::ServerMessage in;
+  v1::PeerMessage out;
   std::thread thread;
   std::atomic<std::int64_t> exchanges{0};
   bool open = true;
@@ -35,6 +34,6 @@ struct Peer::Impl {
 
 /// Opens the stream and shakes hands. Throws Error.
 std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
-                                        const v1::Hello& hello);
+                                        const v1::Hello& hello, const PeerOptions& options);
 
 }  // namespace mbcosim::client

@@ -63,11 +63,19 @@ void Port::attach(PeerLink* link) {
 
 void Port::detach() {
   std::unique_lock guard(mutex_);
-  changed_.wait(guard, [&] { return !sending_; });
+  changed_.wait(guard, [&] { return !link_in_use_; });
   link_ = nullptr;
   reserved_ = false;
   guard.unlock();
   changed_.notify_all();
+}
+
+void Port::receive(const v1::PeerMessage& message) {
+  if (message.has_heartbeat()) return;
+  if (!message.has_exchange())
+    throw Refusal(v1::REASON_OUT_OF_TURN,
+                  "after `hello` a peer sends only `exchange` and `heartbeat`");
+  deliver(message.exchange());
 }
 
 void Port::deliver(const v1::PeerExchange& answer) {
@@ -135,11 +143,11 @@ void Port::await_peer(const CancelToken& cancel) {
 void Port::send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message) {
   PeerLink* link = link_;
   const Clock::time_point deadline = Clock::now() + agreement_.timeout;
-  sending_ = true;
+  link_in_use_ = true;
   guard.unlock();
   link->send(message, deadline);  // a broken link is noticed by the peer's thread, which detaches
   guard.lock();
-  sending_ = false;
+  link_in_use_ = false;
   guard.unlock();
   changed_.notify_all();
 }
@@ -155,7 +163,7 @@ void Port::send(v1::ServerMessage& message, int generation) {
 
 std::optional<std::vector<double>> Port::take(const CancelToken& cancel) {
   std::unique_lock guard(mutex_);
-  for (int spin = 0; spin < kSpins && awaited_ && !answer_ && link_; ++spin) {
+  for (int spin = 0; spin < kSpins && awaited_ && !answer_ && link_ && !link_->pulls(); ++spin) {
     guard.unlock();
     std::this_thread::yield();
     guard.lock();
@@ -164,7 +172,7 @@ std::optional<std::vector<double>> Port::take(const CancelToken& cancel) {
   const Clock::time_point deadline = Clock::now() + (forever ? kLongestWait : agreement_.timeout);
   waiting_since_ = Clock::now();
   while (awaited_ && !answer_ && link_ && Clock::now() < deadline && !cancel.cancelled())
-    changed_.wait_for(guard, kLook);
+    if (!link_->pulls() || !pull(guard)) changed_.wait_for(guard, kLook);
   waiting_since_.reset();
   const bool answered = awaited_ && answer_.has_value();
   const bool late = awaited_ && !answered && link_;
@@ -175,6 +183,24 @@ std::optional<std::vector<double>> Port::take(const CancelToken& cancel) {
     return go_on_without("the peer failed: " + peer_failure_.substr(0, 500));
   last_answer_ = *answer_;
   return last_answer_;
+}
+
+// One look at a link that pulls, without the lock. False: nothing will come through it any more.
+bool Port::pull(std::unique_lock<std::mutex>& guard) {
+  PeerLink* link = link_;
+  link_in_use_ = true;
+  guard.unlock();
+  PeerLink::Pulled pulled = link->pull(&pulled_, Clock::now() + kLook);
+  try {
+    if (pulled == PeerLink::Pulled::message) receive(pulled_);
+  } catch (const Refusal& refusal) {
+    link->refuse(refusal);
+    pulled = PeerLink::Pulled::closed;
+  }
+  guard.lock();
+  link_in_use_ = false;
+  changed_.notify_all();
+  return pulled != PeerLink::Pulled::closed;
 }
 
 void Port::lose(const std::string& why) { throw PeerLost{in_port(model_.name(), why)}; }

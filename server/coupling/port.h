@@ -10,6 +10,7 @@
 #include "coupling/input_history.h"
 #include "coupling/port_model.h"
 #include "mbcosim/v1/coupling.pb.h"
+#include "service/refusal.h"
 
 namespace mbcosim::server {
 
@@ -20,6 +21,15 @@ class PeerLink {
   /// False: the peer is gone. Returns at `deadline` at the latest, the link being broken then.
   virtual bool send(const v1::ServerMessage& message,
                     std::chrono::steady_clock::time_point deadline) = 0;
+  /// May the session's thread fetch answers itself? That saves a change of threads.
+  virtual bool pulls() const { return false; }
+  enum class Pulled { message, nothing, closed };
+  /// The next message, waiting for it until then at the latest.
+  virtual Pulled pull(v1::PeerMessage*, std::chrono::steady_clock::time_point) {
+    return Pulled::closed;
+  }
+  /// A pulled message broke the protocol: ends the link with that status.
+  virtual void refuse(const Refusal&) {}
 };
 
 /// A peer did not answer; the text tells why. The step fails with PEER_LOST.
@@ -43,6 +53,8 @@ class Port {
   void reserve(const Agreement& agreement);
   void attach(PeerLink* link);  ///< after `reserve`; exchanges may start
   void detach();
+  /// Any message after `hello`. Throws OUT_OF_TURN or what `deliver` throws.
+  void receive(const v1::PeerMessage& message);
   /// Hands over an answer. Throws OUT_OF_TURN or BAD_ARGUMENT; answers to exchanges given up are
   /// dropped.
   void deliver(const v1::PeerExchange& answer);
@@ -67,6 +79,7 @@ class Port {
  private:
   using Clock = std::chrono::steady_clock;
   void send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message);
+  bool pull(std::unique_lock<std::mutex>& guard);
   [[noreturn]] void lose(const std::string& why);
   std::optional<std::vector<double>> go_on_without(const std::string& why);
 
@@ -74,7 +87,7 @@ class Port {
   mutable std::mutex mutex_;  // protects all below; `model_` too while an answer is decoded
   std::condition_variable changed_;
   Agreement agreement_;
-  bool reserved_ = false, sending_ = false;
+  bool reserved_ = false, link_in_use_ = false;
   PeerLink* link_ = nullptr;
   std::int64_t index_ = 0;  ///< of the last exchange on the present stream
   bool awaited_ = false;    ///< its answer is wanted
@@ -82,6 +95,7 @@ class Port {
   std::string peer_failure_;  ///< the peer could not compute
   std::vector<double> last_answer_;
   std::optional<Clock::time_point> waiting_since_;
+  v1::PeerMessage pulled_;  ///< of the session's thread
 };
 
 }  // namespace mbcosim::server

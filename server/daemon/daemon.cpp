@@ -112,6 +112,16 @@ Daemon::Daemon(const Config& config)
                          : address.substr(0, address.rfind(':') + 1) + std::to_string(ports[i]);
     spdlog::info("listening on {}", bound);
   }
+  if (config_.shared_memory) open_shared_memory();
+}
+
+void Daemon::open_shared_memory() {
+  for (const std::string& address : config_.listen) {
+    const std::string path = shm::rendezvous_path(address);
+    if (path.empty()) continue;
+    shared_memory_.push_back(std::make_unique<SharedMemoryService>(path, parts_, coupling_));
+    spdlog::info("shared memory for peers through {}", path);
+  }
 }
 
 Daemon::~Daemon() {
@@ -150,6 +160,7 @@ void Daemon::shut_down() {
   if (auto* health = server_->GetHealthCheckService()) health->SetServingStatus(false);
   watch_.cancel_all();
   store_.close_all();
+  shared_memory_.clear();
   server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace);
   server_.reset();
   spdlog::info("stopped");

@@ -10,6 +10,7 @@
 #include "service/config.h"
 #include "service/coupling_service.h"
 #include "service/reduction_service.h"
+#include "service/shared_memory_service.h"
 #include "service/simulations_service.h"
 #include "service/telemetry_service.h"
 
@@ -26,6 +27,7 @@ class Daemon {
   void shut_down();
 
  private:
+  void open_shared_memory();
   void check_listener(const std::string& address) const;
   std::shared_ptr<grpc::ServerCredentials> credentials_for(const std::string& address) const;
 
@@ -41,6 +43,7 @@ class Daemon {
   CouplingService coupling_;
   ReductionService reduction_;
   std::unique_ptr<grpc::Server> server_;
+  std::vector<std::unique_ptr<SharedMemoryService>> shared_memory_;  ///< one for each Unix socket
 };
 
 /// Whether a daemon answers at the address: exit code 0 or 1.

@@ -71,6 +71,9 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--shutdown-grace", grace, "Seconds that open calls get on SIGTERM")
       ->capture_default_str();
   app.add_flag("--reflection,!--no-reflection", config.reflection, "Serve gRPC reflection");
+  app.add_flag(
+      "--shared-memory,!--no-shared-memory", config.shared_memory,
+      "Beside each unix:PATH, let peers of this host exchange through shared memory: PATH.shm");
   app.add_option("--log-level", config.log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str()
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));

@@ -59,32 +59,44 @@ const Authenticator::Token* Authenticator::find(const std::string& text) const {
   return found;
 }
 
+Caller Authenticator::caller_of(const std::string& authorization) const {
+  constexpr const char* kScheme = "Bearer ";
+  if (authorization.rfind(kScheme, 0) != 0)
+    throw Refusal(v1::REASON_UNAUTHENTICATED, "a bearer token is required");
+  const Token* token = find(authorization.substr(std::string(kScheme).size()));
+  if (!token) throw Refusal(v1::REASON_UNAUTHENTICATED, "unknown bearer token");
+  if (token->expiry != 0 && token->expiry < std::time(nullptr))
+    throw Refusal(v1::REASON_UNAUTHENTICATED, "the bearer token has expired");
+  return token->caller;
+}
+
+const Caller& Authenticator::require(const Caller& caller, Role required) {
+  if (caller.role >= required) return caller;
+  throw Refusal(v1::REASON_ROLE_TOO_LOW, std::string("the call needs role ") + role_name(required) +
+                                             ", the caller has " + role_name(caller.role));
+}
+
 Caller Authenticator::check(const grpc::ServerContext& context, Role required) const {
-  Caller caller{"local", Role::admin};
   const auto auth = context.auth_context();
   if (tokens_required_) {
     const auto& metadata = context.client_metadata();
     const auto header = metadata.find("authorization");
-    constexpr const char* kScheme = "Bearer ";
-    std::string text =
-        header == metadata.end() ? "" : std::string(header->second.data(), header->second.size());
-    if (text.rfind(kScheme, 0) != 0)
-      throw Refusal(v1::REASON_UNAUTHENTICATED, "a bearer token is required");
-    const Token* token = find(text.substr(std::string(kScheme).size()));
-    if (!token) throw Refusal(v1::REASON_UNAUTHENTICATED, "unknown bearer token");
-    if (token->expiry != 0 && token->expiry < std::time(nullptr))
-      throw Refusal(v1::REASON_UNAUTHENTICATED, "the bearer token has expired");
-    caller = token->caller;
-  } else if (auth && auth->IsPeerAuthenticated()) {
+    return require(caller_of(header == metadata.end()
+                                 ? ""
+                                 : std::string(header->second.data(), header->second.size())),
+                   required);
+  }
+  Caller caller{"local", Role::admin};
+  if (auth && auth->IsPeerAuthenticated()) {
     const auto names = auth->FindPropertyValues("x509_common_name");
     if (!names.empty()) caller = {std::string(names[0].data(), names[0].size()), Role::control};
   }
-  if (caller.role < required) {
-    throw Refusal(v1::REASON_ROLE_TOO_LOW, std::string("the call needs role ") +
-                                               role_name(required) + ", the caller has " +
-                                               role_name(caller.role));
-  }
-  return caller;
+  return require(caller, required);
+}
+
+Caller Authenticator::check_local(const std::string& authorization, Role required) const {
+  return require(tokens_required_ ? caller_of(authorization) : Caller{"local", Role::admin},
+                 required);
 }
 
 }  // namespace mbcosim::server

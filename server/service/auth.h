@@ -31,6 +31,8 @@ class Authenticator {
 
   /// Throws Refusal: UNAUTHENTICATED, or PERMISSION_DENIED when the role is below `required`.
   Caller check(const grpc::ServerContext& context, Role required) const;
+  /// The same for a caller on this host that gRPC does not know: `authorization` is "Bearer TOKEN".
+  Caller check_local(const std::string& authorization, Role required) const;
 
  private:
   struct Token {
@@ -38,6 +40,8 @@ class Authenticator {
     Caller caller;
     std::time_t expiry = 0;  ///< 0: never
   };
+  Caller caller_of(const std::string& authorization) const;
+  static const Caller& require(const Caller& caller, Role required);
   const Token* find(const std::string& text) const;
 
   bool tokens_required_ = false;

@@ -34,6 +34,7 @@ struct Config {
   std::string tokens_file;  ///< lines `TOKEN ROLE IDENTITY [EXPIRY in Unix seconds]`
   bool insecure = false;    ///< allows non-loopback addresses without TLS
   bool reflection = true;
+  bool shared_memory = true;  ///< beside each Unix socket, for peers on this host
   std::string metrics;  ///< HOST:PORT of Prometheus metrics; empty: none
   std::string log_level = "info", log_format = "text";
   std::chrono::seconds shutdown_grace{5};

@@ -100,10 +100,13 @@ Agreement agree(const v1::Hello& hello, const Port& port, const Model& model) {
   return agreement;
 }
 
-/// Sends over the stream; a peer that does not read until the deadline loses it.
-class StreamLink : public PeerLink {
+constexpr auto kHandshake = std::chrono::seconds(10);  // longest wait for its next message
+
+/// Over gRPC; a peer that does not read until the deadline loses its stream.
+class GrpcStream : public PeerStream {
  public:
-  StreamLink(CouplingService::Stream* stream, Call& call) : stream_(stream), call_(call) {}
+  GrpcStream(CouplingService::Stream* stream, Call& call) : stream_(stream), call_(call) {}
+  bool read(v1::PeerMessage* message) override { return stream_->Read(message); }
   bool send(const v1::ServerMessage& message,
             std::chrono::steady_clock::time_point deadline) override {
     call_.set_deadline(deadline);
@@ -132,19 +135,23 @@ class Attachment {
 }  // namespace
 
 grpc::Status CouplingService::Attach(grpc::ServerContext* context, Stream* stream) {
-  return serve(parts_, *context, "Attach", Role::control, [&](const Caller& caller) {
+  return server::serve(parts_, *context, "Attach", Role::control, [&](const Caller& caller) {
     Call call(parts_.watch, *context);
-    v1::PeerMessage first;
-    if (!stream->Read(&first) || !first.has_hello())
-      throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `hello`");
-    const SessionPtr session = parts_.store.get(first.hello().simulation(), caller);
-    const Session::Use use(*session);
-    serve_peer(first.hello(), *session, stream, call);
+    GrpcStream peer(stream, call);
+    serve(peer, caller);
   });
 }
 
-void CouplingService::serve_peer(const v1::Hello& hello, Session& session, Stream* stream,
-                                 Call& call) {
+void CouplingService::serve(PeerStream& stream, const Caller& caller) {
+  v1::PeerMessage first;
+  if (!stream.read(&first) || !first.has_hello())
+    throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `hello`");
+  const SessionPtr session = parts_.store.get(first.hello().simulation(), caller);
+  const Session::Use use(*session);
+  serve_peer(first.hello(), *session, stream);
+}
+
+void CouplingService::serve_peer(const v1::Hello& hello, Session& session, PeerStream& stream) {
   Port& port = session.port(hello.port());
   const Attachment attachment(port, agree(hello, port, session.model()));
   v1::ServerMessage message;
@@ -157,17 +164,10 @@ void CouplingService::serve_peer(const v1::Hello& hello, Session& session, Strea
   welcome->set_step_size_s(info.next_step_s());
   welcome->set_step(info.step());
   welcome->set_time_s(info.time_s());
-  StreamLink link(stream, call);
-  if (!stream->Write(message)) return;
-  port.attach(&link);
+  if (!stream.send(message, std::chrono::steady_clock::now() + kHandshake)) return;
+  port.attach(&stream);
   v1::PeerMessage in;
-  while (stream->Read(&in)) {
-    if (in.has_heartbeat()) continue;
-    if (!in.has_exchange())
-      throw Refusal(v1::REASON_OUT_OF_TURN,
-                    "after `hello` a peer sends only `exchange` and `heartbeat`");
-    port.deliver(in.exchange());
-  }
+  while (stream.read(&in)) port.receive(in);
 }
 
 }  // namespace mbcosim::server

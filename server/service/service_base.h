@@ -23,15 +23,15 @@ struct Parts {
   Metrics& metrics;
 };
 
-/// Runs `body(caller)` after checking the caller; turns refusals into statuses. `method` is for the
-/// log.
-template <class Body>
-grpc::Status serve(const Parts& parts, const grpc::ServerContext& context, const char* method,
-                   Role role, Body&& body) {
+/// Runs `body(caller)` after `identify()` has told who calls; turns refusals into statuses.
+/// `method` is for the log.
+template <class Identify, class Body>
+grpc::Status serve_caller(const Parts& parts, const char* method, Identify&& identify,
+                          Body&& body) {
   try {
     if (parts.watch.closing())
       throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
-    const Caller caller = parts.authenticator.check(context, role);
+    const Caller caller = identify();
     body(caller);
     return grpc::Status::OK;
   } catch (const Refusal& refusal) {
@@ -46,6 +46,14 @@ grpc::Status serve(const Parts& parts, const grpc::ServerContext& context, const
     parts.metrics.count_failure(v1::REASON_INTERNAL);
     return Refusal(v1::REASON_INTERNAL, "internal error in " + std::string(method)).status();
   }
+}
+
+/// The same for calls over gRPC.
+template <class Body>
+grpc::Status serve(const Parts& parts, const grpc::ServerContext& context, const char* method,
+                   Role role, Body&& body) {
+  return serve_caller(
+      parts, method, [&] { return parts.authenticator.check(context, role); }, body);
 }
 
 }  // namespace mbcosim::server

@@ -40,6 +40,21 @@ Loads spring(const Motion& motion) {
   return loads;
 }
 
+/// Everything that a peer does holds whatever carries it.
+class Coupled : public testing::TestWithParam<Transport> {
+ protected:
+  PeerOptions options() const {
+    PeerOptions options;
+    options.transport = GetParam();
+    return options;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Transports, Coupled,
+                         testing::Values(Transport::stream, Transport::shared_memory),
+                         [](const auto& info) {
+                           return info.param == Transport::stream ? "Stream" : "SharedMemory";
+                         });
+
 TEST(Client, StepsReadsAndWrites) {
   Server server = connect();
   EXPECT_FALSE(server.version().empty());
@@ -53,10 +68,10 @@ TEST(Client, StepsReadsAndWrites) {
   EXPECT_EQ(simulation.run_until(10).outcome, Outcome::finished);
 }
 
-TEST(Client, CoupledPeerMakesAnOscillator) {
+TEST_P(Coupled, PeerMakesAnOscillator) {
   Server server = connect();
   Simulation simulation = server.load_text(body("1.e-2"), with_port());
-  PeerOptions options;
+  PeerOptions options = this->options();
   options.mode = Mode::window;
   options.acceleration = Acceleration::iqn_ils;
   options.tolerance = 1e-10;
@@ -69,16 +84,16 @@ TEST(Client, CoupledPeerMakesAnOscillator) {
   EXPECT_GE(peer.exchanges(), 20);
 }
 
-TEST(Client, SynchronousPeerGivesTheSameBits) {
+TEST_P(Coupled, SynchronousPeerGivesTheSameBits) {
   Server server = connect();
   std::vector<double> found[2];
   for (const bool synchronous : {false, true}) {
     Simulation simulation = server.load_text(body(), with_port());
     if (!synchronous) {
-      const Peer peer = simulation.couple("spring", spring);
+      const Peer peer = simulation.couple("spring", spring, options());
       ASSERT_TRUE(simulation.step(50).ok());
     } else {
-      Peer peer = simulation.attach("spring");
+      Peer peer = simulation.attach("spring", options());
       std::thread stepper([&] { EXPECT_TRUE(simulation.step(50).ok()); });
       Motion motion;
       for (int k = 0; k < 50 && peer.next(motion); ++k) peer.answer(spring(motion));
@@ -89,15 +104,181 @@ TEST(Client, SynchronousPeerGivesTheSameBits) {
   EXPECT_EQ(found[0], found[1]);
 }
 
-TEST(Client, APeerThatThrowsFailsTheStepWithItsText) {
+TEST_P(Coupled, APeerThatThrowsFailsTheStepWithItsText) {
   Server server = connect();
   Simulation simulation = server.load_text(body(), with_port());
   const Peer peer = simulation.couple(
-      "spring", [](const Motion&) -> Loads { throw std::runtime_error("no wind today"); });
+      "spring", [](const Motion&) -> Loads { throw std::runtime_error("no wind today"); },
+      options());
   const StepResult result = simulation.step();
   EXPECT_EQ(result.outcome, Outcome::peer_lost);
   EXPECT_NE(result.failure.find("no wind today"), std::string::npos);
   EXPECT_EQ(result.step, 0);
+}
+
+TEST(Client, TransportsGiveTheSameBits) {
+  Server server = connect();
+  for (const Mode mode : {Mode::loose, Mode::staggered, Mode::tight, Mode::window}) {
+    std::vector<double> found[2];
+    for (const Transport transport : {Transport::stream, Transport::shared_memory}) {
+      Simulation simulation = server.load_text(body("1.e-2"), with_port());
+      PeerOptions options;
+      options.transport = transport;
+      options.mode = mode;
+      const Peer peer = simulation.couple("spring", spring, options);
+      ASSERT_TRUE(simulation.step(50).ok());
+      found[transport == Transport::stream] = simulation.read("node.structural.1.X");
+    }
+    EXPECT_EQ(found[0], found[1]);
+  }
+}
+
+TEST_P(Coupled, PeersHearHowImplicitStepsEnd) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body("1.e-2"), with_port());
+  PeerOptions options = this->options();
+  options.mode = Mode::tight;
+  std::vector<std::int64_t> accepted, rejected;
+  options.step_ended = [&](bool good, std::int64_t step, double) {
+    (good ? accepted : rejected).push_back(step);
+  };
+  int calls = 0;
+  Peer peer = simulation.couple(
+      "spring",
+      [&](const Motion& motion) {
+        if (++calls == 5) throw std::runtime_error("a gust");
+        return spring(motion);
+      },
+      options);
+  while (simulation.step().ok()) {
+  }
+  ASSERT_TRUE(simulation.step(10).ok());
+  for (int look = 0; look < 200 && peer.exchanges() < calls; ++look)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  peer.close();
+  ASSERT_EQ(rejected.size(), 1u);
+  EXPECT_EQ(accepted.front(), 1);
+  EXPECT_GE(accepted.size(), 10u);
+}
+
+TEST_P(Coupled, OptionsOfTheExchange) {
+  Server server = connect();
+  LoadOptions load;
+  load.ports = {{.name = "spring", .nodes = {1}, .offsets = {0.5, 0, 0}}};
+  Simulation simulation = server.load_text(body(), load);
+  PeerOptions options = this->options();
+  options.rotation = Rotation::quaternion;
+  options.accelerations = true;
+  options.every = 5;
+  options.hold = Hold::linear;
+  Motion seen;  // the first one
+  const Peer peer = simulation.couple(
+      "spring",
+      [&](const Motion& motion) {
+        if (seen.x.empty()) seen = motion;
+        return spring(motion);
+      },
+      options);
+  ASSERT_TRUE(simulation.step(20).ok());
+  EXPECT_EQ(peer.exchanges(), 4);
+  EXPECT_EQ(seen.R.size(), 4u);
+  EXPECT_EQ(seen.a.size(), 3u);
+  EXPECT_EQ(seen.wp.size(), 3u);
+  EXPECT_EQ(seen.x.at(0), 0.5);
+}
+
+TEST_P(Coupled, ALateOrDeadPeerIsGivenUpInItsTime) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  PeerOptions options = this->options();
+  options.timeout = 0.3;
+  const auto start = std::chrono::steady_clock::now();
+  {
+    Peer silent = simulation.attach("spring", options);
+    const StepResult result = simulation.step();
+    EXPECT_EQ(result.outcome, Outcome::peer_lost);
+    EXPECT_NE(result.failure.find("in time"), std::string::npos) << result.failure;
+  }
+  const StepResult alone = simulation.step();
+  EXPECT_EQ(alone.outcome, Outcome::peer_lost);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
+  const Peer again = simulation.couple("spring", spring, this->options());
+  EXPECT_TRUE(simulation.step(3).ok());
+}
+
+TEST_P(Coupled, RefusalsTellWhatIsWrong) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  const auto refused = [&](const std::string& port, const PeerOptions& options) {
+    try {
+      simulation.attach(port, options);
+    } catch (const Error& error) {
+      return error.reason();
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(refused("wing", options()), "NO_SUCH_PORT");
+  PeerOptions wrong = options();
+  wrong.frame = Frame::reference;
+  EXPECT_EQ(refused("spring", wrong), "PORT_MISMATCH");
+  const Peer first = simulation.attach("spring", options());
+  EXPECT_EQ(refused("spring", options()), "PORT_TAKEN");
+}
+
+TEST_P(Coupled, AnAnswerOfTheWrongLengthEndsThePeer) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  Peer peer = simulation.attach("spring", options());
+  std::thread stepper([&] { EXPECT_EQ(simulation.step().outcome, Outcome::peer_lost); });
+  Motion motion;
+  ASSERT_TRUE(peer.next(motion));
+  peer.answer(Loads{.forces = {1, 2}});
+  EXPECT_FALSE(peer.next(motion));
+  stepper.join();
+  EXPECT_EQ(simulation.step(0).step, 0);
+}
+
+TEST_P(Coupled, SignalsOfManyNumbers) {
+  constexpr int kNumbers =
+      65536;  // twice as many go out: more than the shared memory holds at once
+  Server server = connect();
+  std::string deck = body();
+  deck.replace(deck.find("begin: elements"), 0,
+               "begin: drivers; file: 7, stream, name, \"wide\", create, yes, " +
+                   std::to_string(kNumbers) + "; end: drivers;");
+  deck.replace(deck.find("rigid bodies"), 0, "file drivers: 1; ");
+  LoadOptions load;
+  load.ports = {
+      {.name = "loop", .outputs = {"stream.wide", "stream.wide"}, .inputs = {"stream.wide"}}};
+  Simulation simulation = server.load_text(deck, load);
+  const Peer peer = simulation.couple(
+      "loop",
+      [](const Motion& motion) {
+        Loads loads;
+        EXPECT_EQ(motion.signals.size(), std::size_t{2 * kNumbers});
+        loads.signals.assign(motion.signals.begin(), motion.signals.begin() + kNumbers);
+        for (std::size_t i = 0; i < loads.signals.size(); ++i) loads.signals[i] += double(i);
+        return loads;
+      },
+      options());
+  const StepResult result = simulation.step(3);
+  ASSERT_TRUE(result.ok()) << result.failure;
+  const std::vector<double> numbers = simulation.read("stream.wide");
+  ASSERT_EQ(numbers.size(), std::size_t{kNumbers});
+  EXPECT_EQ(numbers.back(), 3.0 * (kNumbers - 1));
+}
+
+TEST(Client, APeerMayBelongToAnotherClient) {
+  Server server = connect(), other = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  {
+    Simulation same = other.find(simulation.name());
+    const Peer peer = same.couple("spring", spring);
+    EXPECT_TRUE(simulation.step(3).ok());
+    EXPECT_EQ(same.read("time"), simulation.read("time"));
+  }
+  EXPECT_EQ(simulation.read("node.structural.1.X").size(), 3u);  // not deleted by the other
+  EXPECT_THROW(other.find("simulations/none"), Error);
 }
 
 TEST(Client, ErrorsCarryTheServersDetails) {

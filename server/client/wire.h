@@ -1,0 +1,28 @@
+/// Internal to the client library: what carries a peer's messages.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <memory>
+
+#include "client/connection.h"
+
+namespace mbcosim::client {
+
+/// One thread reads, one writes, any cancels.
+class Wire {
+ public:
+  virtual ~Wire() = default;
+  virtual bool write(const v1::PeerMessage& message) = 0;
+  virtual bool read(v1::ServerMessage* message) = 0;  ///< false: the end
+  virtual void cancel() = 0;                          ///< ends a read that is under way
+  virtual grpc::Status finish() = 0;                  ///< once, after the end
+};
+
+/// Over gRPC.
+std::unique_ptr<Wire> open_stream(Server::Impl& server);
+/// Over shared memory, on the server's host; `timeout` [s] bounds a write that the server does not
+/// read. Throws Error.
+std::unique_ptr<Wire> open_shared_memory(const std::string& address, double timeout);
+
+}  // namespace mbcosim::client

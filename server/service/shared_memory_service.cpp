@@ -1,0 +1,215 @@
+#include "service/shared_memory_service.h"
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <system_error>
+
+namespace mbcosim::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr int kLookMs = 50;       // how soon the end of the service is noticed
+constexpr int kRequestMs = 5000;  // longest wait for a new client's first packet
+constexpr int kMostWaiting = 64;  // clients not yet accepted
+constexpr auto kHelloWait = std::chrono::seconds(10);
+
+sockaddr_un name_of(const std::string& path) {
+  sockaddr_un name{};
+  if (path.size() >= sizeof name.sun_path)
+    throw std::runtime_error("the socket's path is too long: " + path);
+  name.sun_family = AF_UNIX;
+  std::memcpy(name.sun_path, path.c_str(), path.size() + 1);
+  return name;
+}
+
+/// A socket file that nobody listens on is stale and is removed; anything else stays.
+void remove_stale(const std::string& path, const sockaddr_un& name) {
+  struct stat info {};
+  if (::lstat(path.c_str(), &info) != 0) return;
+  if (!S_ISSOCK(info.st_mode)) throw std::runtime_error(path + " exists and is not a socket");
+  const shm::Descriptor probe(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+  if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0)
+    throw std::runtime_error("another server listens on " + path);
+  ::unlink(path.c_str());
+}
+
+shm::Descriptor listen_on(const std::string& path) {
+  const sockaddr_un name = name_of(path);
+  remove_stale(path, name);
+  shm::Descriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+  const bool listens =
+      socket && ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0 &&
+      ::chmod(path.c_str(), 0600) == 0 && ::listen(socket.get(), kMostWaiting) == 0;
+  if (!listens) throw std::runtime_error("cannot listen on " + path + ": " + std::strerror(errno));
+  return socket;
+}
+
+bool readable(int socket, int milliseconds) {
+  pollfd look{socket, POLLIN | POLLRDHUP, 0};
+  return ::poll(&look, 1, milliseconds) != 0;
+}
+
+/// The socket's mode keeps others out; this holds even when someone changes the mode.
+bool same_user(int socket) {
+  ucred other{};
+  socklen_t size = sizeof other;
+  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &other, &size) != 0) return false;
+  return other.uid == ::geteuid() || other.uid == 0;
+}
+
+/// The session's thread fetches answers itself; between exchanges the connection's thread looks.
+class SharedMemoryStream : public PeerStream {
+ public:
+  SharedMemoryStream(shm::Channel& channel, const CallWatch& watch, const std::atomic<bool>& stop)
+      : channel_(channel), watch_(watch), stop_(stop) {}
+  ~SharedMemoryStream() override { channel_.close(); }
+
+  bool send(const v1::ServerMessage& message, Clock::time_point deadline) override {
+    try {
+      return channel_.send(message, deadline);
+    } catch (const shm::Corrupt& corrupt) {
+      refuse(Refusal(v1::REASON_OUT_OF_TURN, corrupt.what()));
+      return false;
+    }
+  }
+  bool pulls() const override { return true; }
+  Pulled pull(v1::PeerMessage* message, Clock::time_point until) override {
+    try {
+      switch (channel_.receive(message, until)) {
+        case shm::Channel::Received::message:
+          return Pulled::message;
+        case shm::Channel::Received::timeout:
+          return Pulled::nothing;
+        default:
+          return Pulled::closed;
+      }
+    } catch (const shm::Corrupt& corrupt) {
+      refuse(Refusal(v1::REASON_OUT_OF_TURN, corrupt.what()));
+      return Pulled::closed;
+    }
+  }
+  void refuse(const Refusal& refusal) override {
+    std::lock_guard guard(mutex_);
+    if (!refusal_) refusal_ = refusal;
+    channel_.close();
+  }
+
+  /// The first message, with a bound.
+  bool read_hello(v1::PeerMessage* message) {
+    const Clock::time_point deadline = Clock::now() + kHelloWait;
+    Pulled pulled = Pulled::nothing;
+    while (pulled == Pulled::nothing && Clock::now() < deadline && !is_closing())
+      pulled = pull(message, Clock::now() + std::chrono::milliseconds(kLookMs));
+    throw_refusal();
+    return pulled == Pulled::message;
+  }
+
+  bool read(v1::PeerMessage* message) override {
+    if (!std::exchange(greeted_, true)) return read_hello(message);
+    while (true) {
+      const bool ended = readable(channel_.socket(), kLookMs);
+      throw_refusal();
+      if (look(message)) return true;  // what the peer sent before its end still counts
+      if (ended || channel_.closed()) return false;
+      if (is_closing())
+        throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
+    }
+  }
+
+ private:
+  bool is_closing() const { return watch_.closing() || stop_.load(); }
+  bool look(v1::PeerMessage* message) {
+    try {
+      return channel_.try_receive(message) == shm::Channel::Received::message;
+    } catch (const shm::Corrupt& corrupt) {
+      throw Refusal(v1::REASON_OUT_OF_TURN, corrupt.what());
+    }
+  }
+  void throw_refusal() {
+    std::lock_guard guard(mutex_);
+    if (refusal_) throw Refusal(*refusal_);
+  }
+
+  shm::Channel& channel_;
+  const CallWatch& watch_;
+  const std::atomic<bool>& stop_;
+  bool greeted_ = false;
+  std::mutex mutex_;
+  std::optional<Refusal> refusal_;
+};
+
+}  // namespace
+
+SharedMemoryService::SharedMemoryService(const std::string& path, Parts parts,
+                                         CouplingService& coupling)
+    : path_(path), parts_(parts), coupling_(coupling), listener_(listen_on(path)), thread_([this] {
+        accept_loop();
+      }) {}
+
+SharedMemoryService::~SharedMemoryService() {
+  stop_.store(true);
+  thread_.join();
+  ::unlink(path_.c_str());
+  for (Connection& connection : connections_) connection.thread.join();
+}
+
+void SharedMemoryService::accept_loop() {
+  while (!stop_.load()) {
+    if (readable(listener_.get(), kLookMs)) accept_one();
+    join_ended();
+  }
+}
+
+void SharedMemoryService::accept_one() {
+  shm::Descriptor socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  if (!socket || !same_user(socket.get())) return;
+  const std::size_t most = static_cast<std::size_t>(parts_.config.limits.open_calls);
+  if (connections_.size() >= most) {
+    const grpc::Status status =
+        limit_refusal("open_calls", static_cast<long long>(most), "too many peers").status();
+    shm::send_status(socket.get(), {status.error_code(), status.error_details()});
+    return;
+  }
+  Connection& connection = connections_.emplace_back();
+  connection.thread = std::thread([this, &connection, socket = std::move(socket)]() mutable {
+    serve(std::move(socket));
+    connection.ended.store(true);
+  });
+}
+
+void SharedMemoryService::join_ended() {
+  for (auto it = connections_.begin(); it != connections_.end();) {
+    if (!it->ended.load()) {
+      ++it;
+      continue;
+    }
+    it->thread.join();
+    it = connections_.erase(it);
+  }
+}
+
+void SharedMemoryService::serve(shm::Descriptor socket) {
+  shm::Request request;
+  if (!readable(socket.get(), kRequestMs) || !shm::read_request(socket.get(), &request)) return;
+  std::optional<shm::Channel> channel;
+  const grpc::Status status = serve_caller(
+      parts_, "Attach",
+      [&] { return parts_.authenticator.check_local(request.authorization, Role::control); },
+      [&](const Caller& caller) {
+        shm::Segment segment = shm::Segment::create();
+        if (!shm::send_segment(socket.get(), segment)) return;
+        channel.emplace(std::move(socket), std::move(segment), shm::Channel::Side::server,
+                        static_cast<std::size_t>(parts_.config.limits.message_bytes));
+        SharedMemoryStream stream(*channel, parts_.watch, stop_);
+        coupling_.serve(stream, caller);
+      });
+  shm::send_status(channel ? channel->socket() : socket.get(),
+                   {status.error_code(), status.error_details()});
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,133 @@
+#include "shared_memory/channel.h"
+
+#include <poll.h>
+
+#include <cstring>
+#include <thread>
+
+namespace mbcosim::shm {
+namespace {
+
+constexpr auto kSpin = std::chrono::microseconds(40);  // longer than a quick exchange
+constexpr auto kLook = std::chrono::milliseconds(10);  // how soon a dead other side is noticed
+constexpr std::size_t kLengthBytes = sizeof(std::uint32_t);
+
+int ring_of(Channel::Side side, bool outgoing) {
+  return (side == Channel::Side::server) == outgoing ? 0 : 1;
+}
+
+/// On one core whoever spins keeps the other from answering.
+Clock::duration spin_time() {
+  return std::thread::hardware_concurrency() > 1 ? Clock::duration(kSpin) : Clock::duration::zero();
+}
+
+}  // namespace
+
+Channel::Channel(Descriptor socket, Segment segment, Side side, std::size_t longest_message)
+    : socket_(std::move(socket)),
+      segment_(std::move(segment)),
+      longest_message_(longest_message),
+      spin_(spin_time()),
+      writer_(segment_.header(ring_of(side, true)), segment_.bytes(ring_of(side, true)),
+              kRingBytes),
+      reader_(segment_.header(ring_of(side, false)), segment_.bytes(ring_of(side, false)),
+              kRingBytes) {}
+
+void Channel::close() {
+  closed_.store(true);
+  writer_.bell().ring_always();
+  reader_.bell().ring_always();
+}
+
+// The socket is silent until the other side ends; whatever comes then is the end.
+bool Channel::other_is_gone() const {
+  pollfd look{socket_.get(), POLLIN | POLLRDHUP, 0};
+  return ::poll(&look, 1, 0) != 0;
+}
+
+// ------------------------------------------------------------------ sending
+
+bool Channel::send(const google::protobuf::MessageLite& message, Clock::time_point deadline) {
+  const std::lock_guard guard(send_mutex_);
+  const std::size_t size = message.ByteSizeLong();
+  if (closed() || size > longest_message_) return false;
+  out_.resize(kLengthBytes + size);
+  const auto length = static_cast<std::uint32_t>(size);
+  std::memcpy(out_.data(), &length, kLengthBytes);
+  message.SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(&out_[kLengthBytes]));
+  const bool sent = write(out_.data(), out_.size(), deadline);
+  if (!sent) close();
+  return sent;
+}
+
+bool Channel::write(const char* bytes, std::size_t count, Clock::time_point deadline) {
+  while (count > 0) {
+    const std::size_t part = std::min(count, writer_.space());
+    if (part > 0) {
+      writer_.put(bytes, part);
+      writer_.publish();
+      bytes += part;
+      count -= part;
+      continue;
+    }
+    const Clock::time_point now = Clock::now();
+    if (closed() || now >= deadline) return false;
+    const bool room = wait_until(writer_.bell(), std::min(deadline, now + kLook), spin_,
+                                 [this] { return closed() || writer_.space() > 0; });
+    if (!room && other_is_gone()) return false;
+  }
+  return true;
+}
+
+// ------------------------------------------------------------------ receiving
+
+// Takes what is there of the message under way. True: it is complete.
+bool Channel::advance() {
+  std::size_t available = reader_.available();
+  if (!has_length_) {
+    if (available < kLengthBytes) return false;
+    std::uint32_t length = 0;
+    reader_.take(&length, kLengthBytes);
+    if (length > longest_message_) throw Corrupt("a message is too long");
+    in_.resize(length);
+    received_ = 0;
+    has_length_ = true;
+    available -= kLengthBytes;
+  }
+  const std::size_t part = std::min(available, in_.size() - received_);
+  reader_.take(in_.data() + received_, part);
+  reader_.release();
+  received_ += part;
+  return received_ == in_.size();
+}
+
+bool Channel::parse(google::protobuf::MessageLite* message) {
+  if (!advance()) return false;
+  has_length_ = false;
+  if (!message->ParseFromString(in_)) throw Corrupt("a message cannot be read");
+  return true;
+}
+
+Channel::Received Channel::receive(google::protobuf::MessageLite* message,
+                                   Clock::time_point deadline) {
+  const std::lock_guard guard(receive_mutex_);
+  bool last_look = false;
+  while (!parse(message)) {
+    if (closed() || last_look) return Received::closed;
+    const Clock::time_point now = Clock::now();
+    if (now >= deadline) return Received::timeout;
+    const bool more = wait_until(reader_.bell(), std::min(deadline, now + kLook), spin_,
+                                 [this] { return closed() || reader_.available() > 0; });
+    last_look = !more && other_is_gone();  // what it sent before its end still counts
+  }
+  return Received::message;
+}
+
+Channel::Received Channel::try_receive(google::protobuf::MessageLite* message) {
+  const std::unique_lock guard(receive_mutex_, std::try_to_lock);
+  if (!guard) return Received::timeout;
+  if (parse(message)) return Received::message;
+  return closed() ? Received::closed : Received::timeout;
+}
+
+}  // namespace mbcosim::shm
