@@ -1,11 +1,12 @@
 /// Client library: drive a simulation on an mbcosim server, and take part in it as a coupled peer.
 /// No gRPC type appears here.
 ///
-///   mbcosim::client::Server server =
-///   mbcosim::client::Server::connect("unix:/run/user/1000/mbcosim.sock");
-///   mbcosim::client::Simulation beam = server.load("beam.mbd", {.ports = {{.name = "tip", .nodes =
-///   {2}}}}); mbcosim::client::Peer spring = beam.couple("tip", [](const Motion& m) { return
-///   Loads{…}; }); beam.run_until(1.0);
+///   namespace client = mbcosim::client;
+///   client::Server server = client::Server::connect("unix:/run/user/1000/mbcosim.sock");
+///   client::Simulation beam = server.load("beam.mbd", {.ports = {{.name = "tip", .nodes = {2}}}});
+///   const auto spring = [](const client::Motion& motion) { return client::Loads{…}; };
+///   client::Peer peer = beam.couple("tip", spring, {.mode = client::Mode::tight});
+///   beam.run_until(1.0);
 #pragma once
 
 #include <cstdint>
@@ -148,7 +149,8 @@ class Peer {
 
 using Answer = std::function<Loads(const Motion&)>;
 
-/// A simulation on the server. Deletes it when destroyed, if it was loaded here. Calls throw Error; one thread at a time.
+/// A simulation on the server. Deletes it when destroyed, if it was loaded here. Calls throw Error;
+/// one thread at a time.
 class Simulation {
  public:
   struct Impl;  // of the library

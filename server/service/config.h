@@ -35,7 +35,7 @@ struct Config {
   bool insecure = false;    ///< allows non-loopback addresses without TLS
   bool reflection = true;
   bool shared_memory = true;  ///< beside each Unix socket, for peers on this host
-  std::string metrics;  ///< HOST:PORT of Prometheus metrics; empty: none
+  std::string metrics;        ///< HOST:PORT of Prometheus metrics; empty: none
   std::string log_level = "info", log_format = "text";
   std::chrono::seconds shutdown_grace{5};
   ServiceLimits limits;

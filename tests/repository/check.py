@@ -27,8 +27,9 @@ ARROWS = {
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
     "server/cli": {"math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/coupling": {"math", "model", "simulation", "service", "mbcosim"},
-    "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "mbcosim"},
-    "server/client": {"mbcosim"},
+    "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "mbcosim", "shared_memory"},
+    "server/client": {"mbcosim", "shared_memory"},
+    "server/shared_memory": set(),
     "server/daemon": {"service", "mbcosim"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",

@@ -7,12 +7,14 @@
         print(simulation.time, simulation["node.structural.1.X"])
 """
 from .client import Server, connect, default_address
-from .coupling import Motion, Peer, signal_port, structural_port
+from .coupling import Peer, modal_port, motion_port, signal_port, structural_port
 from .errors import (DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
                      StepFailed, Unavailable)
+from .exchange import Loads, Motion
 from .simulation import Simulation, Snapshot, StepResult, Stepper, Subscription
 
 __all__ = [
-    "connect", "default_address", "Server", "Simulation", "Snapshot", "StepResult", "Stepper", "Subscription", "Motion", "Peer",
+    "connect", "default_address", "Server", "Simulation", "Snapshot", "StepResult", "Stepper", "Subscription", "Motion", "Loads",
+    "Peer", "modal_port", "motion_port",
     "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound", "PreconditionFailed", "StepFailed", "Unavailable",
 ]

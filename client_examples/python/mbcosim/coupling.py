@@ -7,7 +7,6 @@
     with server.load("beam.mbd", ports=ports) as simulation, simulation.couple("tip", spring):
         simulation.run_until(1.0)
 """
-import dataclasses
 import queue
 import threading
 
@@ -16,25 +15,8 @@ import numpy as np
 
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
+from . import exchange
 from .errors import from_rpc_error
-
-_ROTATION_SIZE = {"matrix": 9, "vector": 3, "quaternion": 4, "euler_123": 3}
-
-
-@dataclasses.dataclass
-class Motion:
-    """What the simulation sends. Arrays are n x 3 for n nodes, SI units, in the frame agreed."""
-    step: int
-    time: float            # of the values [s]
-    target_time: float     # for which loads are wanted [s]
-    iteration: int         # of a tight step, or pass of a window, from 1; 0: explicit
-    x: np.ndarray
-    rotations: np.ndarray  # n x 3 x 3 for "matrix", n x 4 for "quaternion", else n x 3
-    v: np.ndarray
-    w: np.ndarray
-    a: np.ndarray          # empty unless agreed
-    wp: np.ndarray
-    signals: np.ndarray    # of a signal port
 
 
 def structural_port(name, nodes, *, offsets=None, reference=None):
@@ -53,49 +35,56 @@ def signal_port(name, outputs, inputs):
                                 input_variables=list(inputs))
 
 
-def _enum(kind, prefix, name):
-    """Value of a choice; None leaves it to the server."""
-    return 0 if name is None else kind.Value(prefix + name.upper())
+def motion_port(name, nodes, *, positions_only=False):
+    """A port that imposes the motion of nodes: reactions out, positions and orientations in."""
+    return types.PortDefinition(name=name, kind=types.PORT_KIND_MOTION, node_labels=list(nodes), positions_only=positions_only)
+
+
+def modal_port(name, joint):
+    """A port on a modal joint: amplitudes and their rates out, generalized forces in."""
+    return types.PortDefinition(name=name, kind=types.PORT_KIND_MODAL, modal_joint_label=joint)
+
+
+def open_stream(channel):
+    """The method `Coupling.Attach` of a channel, without parsing what the server sends."""
+    return channel.stream_stream("/mbcosim.v1.Coupling/Attach", request_serializer=pb.PeerMessage.SerializeToString,
+                                 response_deserializer=None)
 
 
 class Peer:
     """An attached peer. A thread of its own calls `answer(Motion)` for each exchange.
 
-    answer returns forces (n x 3), or (forces, moments), or the signals; an exception in it fails the step. On a port of the deck
-    with reference loads it returns (forces, moments, force on the reference node, moment on it).
+    answer returns forces (n x 3), or (forces, moments), or the signals, or Loads; an exception in it fails the step. On a port of
+    the deck with reference loads it returns (forces, moments, force on the reference node, moment on it), on a motion port
+    positions or (positions, rotations).
+    Without `answer` the peer is synchronous: iterate over it and answer each motion with `peer.answer(...)`, in another thread than
+    the one that steps.
+
     every      steps between exchanges; "tight": iterations
     mode       "loose", "staggered", "tight" or "window"; None: the port's own, "loose" unless its deck says otherwise
     frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
+    tangent    "dense" or "block_diagonal" when answers are Loads with derivatives
     After the end `error` has what ended the stream, None when it ended in good order.
     """
 
-    def __init__(self, simulation, port, answer, *, mode=None, rotation="matrix", frame=None, accelerations=False,
-                 every=1, hold="zero_order", timeout=10.0, policy="fail_step", acceleration="none", relaxation=0.5,
-                 tolerance=1e-6, maximum_passes=50, check_model=True):
-        hello = pb.Hello(
-            simulation=simulation.name, port=port, rotation_form=_enum(types.RotationForm, "ROTATION_FORM_", rotation),
-            frame=_enum(types.PortFrame, "PORT_FRAME_", frame), accelerations=accelerations,
-            mode=_enum(types.CouplingMode, "COUPLING_MODE_", mode), every=every,
-            input_hold=_enum(types.InputHold, "INPUT_HOLD_", hold), policy=_enum(types.PeerPolicy, "PEER_POLICY_", policy),
-            acceleration=_enum(types.Acceleration, "ACCELERATION_", acceleration), relaxation=relaxation,
-            interface_tolerance=tolerance, maximum_passes=maximum_passes, length_unit="m",
-            model_digest=simulation.info.model_digest if check_model else "")
-        hello.protocol.lowest = hello.protocol.highest = 1
-        hello.peer_timeout.FromMilliseconds(int(timeout * 1000))
-        self._answer, self._rotation = answer, rotation
+    def __init__(self, simulation, port, answer=None, *, rotation="matrix", **options):
+        self._function, self._rotation = answer, rotation
         self._out = queue.SimpleQueue()
-        self._out.put(pb.PeerMessage(hello=hello))
-        self._stream = simulation._server.coupling.Attach(iter(self._out.get, None), metadata=simulation._server.metadata)
+        self._out.put(exchange.hello(simulation, port, rotation=rotation, **options))
+        server = simulation._server
+        self._stream = open_stream(server._channel)(iter(self._out.get, None), metadata=server.metadata)
         try:
-            self.welcome = next(self._stream).welcome
+            self.welcome = exchange.receive(next(self._stream))[1]
         except grpc.RpcError as error:
             raise from_rpc_error(error) from None
         self.error = None
         self.exchanges = 0
         self.accepted = []  # (step, time) of the implicit steps that ended
         self.rejected = []  # (step, time) to go back to, of those that failed
+        self._index = 0
         self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
+        if answer is not None:
+            self._thread.start()
 
     def __enter__(self):
         return self
@@ -106,47 +95,39 @@ class Peer:
     def close(self):
         """Leaves the port."""
         self._out.put(None)
-        self._thread.join(5)
+        if self._function is not None:
+            self._thread.join(5)
         self._stream.cancel()
 
-    def _serve(self):
+    def __iter__(self):
+        """Every Motion until the stream ends."""
         try:
-            for message in self._stream:
-                if message.HasField("exchange"):
-                    self._out.put(pb.PeerMessage(exchange=self._compute(message.exchange)))
-                    self.exchanges += 1
-                elif message.HasField("accepted"):
-                    self.accepted.append((message.accepted.step, message.accepted.time_s))
-                elif message.HasField("rejected"):
-                    self.rejected.append((message.rejected.step, message.rejected.time_s))
+            for data in self._stream:
+                name, content = exchange.receive(data)
+                if name == "exchange":
+                    self._index = exchange.index(content)
+                    yield exchange.motion(content, self._rotation)
+                elif name == "accepted":
+                    self.accepted.append((content.step, content.time_s))
+                elif name == "rejected":
+                    self.rejected.append((content.step, content.time_s))
         except grpc.RpcError as error:
-            self.error = from_rpc_error(error)
+            if error.code() != grpc.StatusCode.CANCELLED:
+                self.error = from_rpc_error(error)
 
-    def _compute(self, exchange):
-        reply = pb.PeerExchange(index=exchange.index)
-        try:
-            answer = self._answer(self._motion(exchange))
-            if exchange.positions_m:
-                answers = answer if isinstance(answer, tuple) else (answer,)
-                fields = (reply.forces_n, reply.moments_nm, reply.reference_force_n, reply.reference_moment_nm)
-                for field, values in zip(fields, answers):
-                    if values is not None:
-                        field.extend(np.ravel(np.asarray(values, float)))
-            else:
-                reply.signals.extend(np.ravel(np.asarray(answer, float)))
-        except Exception as error:  # whatever the user's code raises becomes a failed step with this text
-            reply = pb.PeerExchange(index=exchange.index)
-            reply.failure = f"{type(error).__name__}: {error}"
-        return reply
+    def answer(self, value):
+        """Answers the last motion."""
+        self._out.put(exchange.answer(self._index, value, self.welcome.layout.kind))
+        self.exchanges += 1
 
-    def _motion(self, exchange):
-        def rows(values, width=3):
-            return np.fromiter(values, float, len(values)).reshape(-1, width)
+    def fail(self, error):
+        """The peer cannot answer the last motion; the step fails with this text."""
+        self._out.put(exchange.failure(self._index, error))
+        self.exchanges += 1
 
-        rotations = rows(exchange.rotations, _ROTATION_SIZE[self._rotation])
-        if self._rotation == "matrix":
-            rotations = rotations.reshape(-1, 3, 3)
-        return Motion(exchange.step, exchange.time_s, exchange.target_time_s, exchange.iteration, rows(exchange.positions_m),
-                      rotations, rows(exchange.velocities_m_s), rows(exchange.angular_velocities_rad_s),
-                      rows(exchange.accelerations_m_s2), rows(exchange.angular_accelerations_rad_s2),
-                      np.fromiter(exchange.signals, float, len(exchange.signals)))
+    def _serve(self):
+        for motion in self:
+            try:
+                self.answer(self._function(motion))
+            except Exception as error:  # whatever the user's code raises becomes a failed step with this text
+                self.fail(error)

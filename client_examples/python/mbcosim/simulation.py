@@ -262,7 +262,7 @@ class Simulation:
         """Ends the simulation."""
         self._call(self._stub.DeleteSimulation, pb.DeleteSimulationRequest(name=self.name))
 
-    def couple(self, port, answer, **options):
+    def couple(self, port, answer=None, **options):
         """Attaches a peer to a port; see coupling.Peer."""
         return Peer(self, port, answer, **options)
 

@@ -1,0 +1,123 @@
+"""The asyncio client: steps, reads, writes, couples; the same numbers as the blocking one."""
+import asyncio
+
+import pytest
+
+import decks
+import mbcosim
+import mbcosim.aio
+from test_coupling import PORT, oscillator, position, spring
+
+X = "node.structural.1.X"
+
+
+def run(daemon, body, **options):
+    """Runs body(server, simulation) on a new oscillator."""
+    async def main():
+        async with mbcosim.aio.connect(daemon.address) as server:
+            async with await server.load_text(decks.body(final_time="100.", step="1.e-3", spin="null"), ports=PORT) as simulation:
+                return await body(server, simulation)
+
+    return asyncio.run(asyncio.wait_for(main(), 60))
+
+
+def test_steps_reads_and_writes(daemon):
+    async def body(server, simulation):
+        await simulation.write({"node.structural.1.load": [0, 0, 3, 0, 0, 0]})
+        async with await simulation.couple("spring", spring):
+            result = await simulation.step(10, outputs=[X])
+            assert (result.step, simulation.step_number) == (10, 10)
+            assert (await simulation.run_until(0.02)).step == 20
+        return result.values[X], (await simulation.read([X]))[X]
+
+    first, last = run(daemon, body)
+    assert first.shape == (3,) and last[1] > first[1] > 0
+
+
+@pytest.mark.parametrize("mode", ["loose", "tight"])
+def test_gives_the_bits_of_the_blocking_client(daemon, server, mode):
+    async def slow_spring(motion):
+        await asyncio.sleep(0)
+        return spring(motion)
+
+    async def body(_, simulation):
+        async with await simulation.couple("spring", slow_spring, mode=mode) as peer:
+            await simulation.step(50)
+            assert peer.error is None and peer.exchanges >= 50
+        return (await simulation.read([X]))[X]
+
+    found = run(daemon, body)
+    with oscillator(server) as simulation, simulation.couple("spring", spring, mode=mode):
+        simulation.step(50)
+        assert simulation[X].tobytes() == found.tobytes()
+
+
+def test_a_peer_that_is_iterated_over(daemon):
+    async def body(_, simulation):
+        steps = []
+        async with await simulation.couple("spring") as peer:
+            stepping = asyncio.create_task(simulation.step(5))
+            async for motion in peer:
+                steps.append(motion.step)
+                await peer.answer(spring(motion))
+                if len(steps) == 5:
+                    break
+            await stepping
+        return steps
+
+    assert run(daemon, body) == [0, 1, 2, 3, 4]
+
+
+def test_two_simulations_side_by_side(daemon):
+    async def body(server, simulation):
+        async with await server.load_text(decks.body(final_time="100.", spin="null"), ports=PORT) as other:
+            async with await simulation.couple("spring", spring), await other.couple("spring", spring):
+                await asyncio.gather(simulation.step(20), other.step(20))
+            return [(await s.read([X]))[X].tobytes() for s in (simulation, other)]
+
+    first, second = run(daemon, body)
+    assert first == second
+
+
+def test_failures(daemon):
+    async def body(_, simulation):
+        with pytest.raises(mbcosim.NotFound) as caught:
+            await simulation.couple("wing", spring)
+        assert caught.value.reason == "NO_SUCH_PORT"
+
+        def gust(motion):
+            raise ValueError("no aerodynamics today")
+
+        async with await simulation.couple("spring", gust):
+            with pytest.raises(mbcosim.StepFailed, match="no aerodynamics today"):
+                await simulation.step()
+        wrong = await simulation.couple("spring", lambda motion: [1.0, 2.0], timeout=5)
+        with pytest.raises(mbcosim.StepFailed):
+            await simulation.step()
+        for _ in range(200):
+            if wrong.error:
+                break
+            await asyncio.sleep(0.01)
+        assert wrong.error.reason == "BAD_ARGUMENT"
+        await wrong.close()
+
+    run(daemon, body)
+
+
+def test_synchronous_peers_and_views(server):
+    """The blocking client without a callback: the arrays are views of the received bytes."""
+    import threading
+    with oscillator(server) as simulation, simulation.couple("spring") as peer:
+        stepping = threading.Thread(target=simulation.step, args=(20,))
+        stepping.start()
+        for count, motion in enumerate(peer, 1):
+            assert motion.x.shape == (1, 3) and motion.rotations.shape == (1, 3, 3)
+            assert not motion.x.flags.owndata and not motion.x.flags.writeable
+            peer.answer(spring(motion))
+            if count == 20:
+                break
+        stepping.join()
+        found = simulation[X]
+    with oscillator(server) as simulation, simulation.couple("spring", spring):
+        simulation.step(20)
+        assert simulation[X].tobytes() == found.tobytes() and position(simulation) != 0
