@@ -1,0 +1,76 @@
+"""The conformance kit: the daemon passes it over both transports, the clients pass it, and it finds every seeded error."""
+import os
+import subprocess
+import sys
+import threading
+
+import pytest
+
+import mbcosim
+from conftest import BIN
+
+KIT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "conformance")
+sys.path.insert(0, KIT)
+import check_peer  # noqa: E402
+import check_server  # noqa: E402
+import scripted_server  # noqa: E402
+import wrong_peers  # noqa: E402
+
+
+@pytest.mark.parametrize("transport", ["stream", "shared_memory"])
+def test_the_daemon_conforms(daemon, transport):
+    assert check_server.check_server(daemon.address, transport) == {}
+
+
+def test_the_scripted_server_conforms(tmp_path):
+    with scripted_server.ScriptedServer(f"unix:{tmp_path}/s"):
+        assert check_server.check_server(f"unix:{tmp_path}/s") == {}
+
+
+@pytest.mark.parametrize("fault", scripted_server.FAULTS)
+def test_errors_of_servers_are_found(tmp_path, monkeypatch, fault):
+    monkeypatch.setattr(check_server, "WAIT", 1.0)
+    with scripted_server.ScriptedServer(f"unix:{tmp_path}/s", fault):
+        found = check_server.check_server(f"unix:{tmp_path}/s", first_only=True)
+    assert found, f"the kit does not notice: {fault}"
+
+
+def python_peer(address, simulation, port):
+    """The library's peer, with a spring and a damper."""
+    def loads(motion):
+        return -100.0 * motion.x - 2.0 * motion.v
+
+    with mbcosim.connect(address) as server, server.attach(simulation).couple(port, loads, mode="tight") as peer:
+        peer._thread.join(20)
+
+
+def test_the_python_peer_conforms():
+    assert check_peer.check_peer(python_peer) == {}
+
+
+def test_the_cpp_peer_conforms():
+    def start(address, simulation, port):
+        subprocess.run([os.path.join(BIN, "spring_peer"), address, "--join", simulation, port], timeout=30, check=True,
+                       stdout=subprocess.DEVNULL)
+
+    assert check_peer.check_peer(start) == {}
+
+
+def test_a_conforming_peer_of_raw_messages(tmp_path):
+    assert check_peer.check_peer(wrong_peers.peer(None)) == {}
+
+
+@pytest.mark.parametrize("fault", wrong_peers.FAULTS)
+def test_errors_of_peers_are_found(monkeypatch, fault):
+    monkeypatch.setattr(check_peer, "WAIT", 1.0)
+    assert check_peer.check_peer(wrong_peers.peer(fault)), f"the kit does not notice: {fault}"
+
+
+def test_the_kit_is_a_program(daemon):
+    command = [sys.executable, os.path.join(KIT, "check_server.py"), daemon.address, "--transport", "shared_memory"]
+    run = subprocess.run(command, timeout=60, text=True, stdout=subprocess.PIPE)
+    assert run.returncode == 0 and run.stdout.count("ok") == len(check_server.CHECKS)
+    peer = [sys.executable, os.path.join(KIT, "wrong_peers.py"), "answers twice"]
+    run = subprocess.run([sys.executable, os.path.join(KIT, "check_peer.py"), *peer], timeout=60, text=True, stdout=subprocess.PIPE)
+    assert run.returncode == 1 and "FAILED" in run.stdout
+    assert threading.active_count() < 100
