@@ -2,12 +2,15 @@
 
 #include <klu.h>
 
+#include "solver/dense_tail.h"
+
 namespace mbcosim {
 
 namespace {
 
 constexpr double kPoorGrowth = 1e-9;  ///< reciprocal pivot growth below which the kept pivots are given up
 constexpr double kSuspicious = 1e-3;  ///< ratio of pivots, against the reference matrix, below which growth is looked at
+constexpr double kDenseOperations = 40;  ///< operations an entry from which a dense tail is looked for
 
 }  // namespace
 
@@ -18,11 +21,18 @@ struct LinearSolver::Klu {
   klu_numeric* fresh = nullptr;  ///< of the last matrix, when the kept pivots were poor
   klu_numeric* current = nullptr;
   double kept_ratio = 0;  ///< smallest to largest pivot of the reference matrix
+  std::unique_ptr<DenseTail> tail;  ///< instead of the kept pivots, when much of the matrix is full
+  bool by_tail = false;             ///< the last factorization
 
   Klu() {
     klu_defaults(&common);
     common.tol = 0.1;  // threshold pivoting: prefer the diagonal unless it is ten times smaller
     common.halt_if_singular = 1;
+  }
+  /// Many operations an entry of the factors: some of them are nearly full.
+  bool is_dense_in_parts() {
+    return klu_flops(symbolic, kept, &common) &&
+           common.flops > kDenseOperations * (static_cast<double>(kept->lnz) + kept->unz);
   }
   /// Judges the kept pivots on the matrix just factored. Growth makes some pivots small against others, which costs
   /// little to see; the growth itself is computed only then.
@@ -49,11 +59,15 @@ LinearSolver::Outcome LinearSolver::analyze(double* values) {
   singular_column_ = -1;
   if (!klu_->symbolic) return klu_->common.status == KLU_SINGULAR ? Outcome::singular : Outcome::failed;
   klu_free_numeric(&klu_->kept, &klu_->common);
+  klu_->tail.reset();
+  klu_->by_tail = false;
   klu_->kept = klu_factor(column_start_.data(), row_index_.data(), values, klu_->symbolic, &klu_->common);
   klu_->current = klu_->kept;
   if (klu_->kept) {
     klu_rcond(klu_->symbolic, klu_->kept, &klu_->common);
     klu_->kept_ratio = klu_->common.rcond;
+    if (klu_->is_dense_in_parts())
+      klu_->tail = DenseTail::plan(n_, column_start_.data(), row_index_.data(), values);
     return Outcome::ok;
   }
   if (klu_->common.status != KLU_SINGULAR) return Outcome::failed;
@@ -64,6 +78,8 @@ LinearSolver::Outcome LinearSolver::analyze(double* values) {
 LinearSolver::Outcome LinearSolver::factor(double* values) {
   if (n_ == 0) return Outcome::ok;
   if (!klu_->kept) return analyze(values);
+  klu_->by_tail = klu_->tail && klu_->tail->factor(values);
+  if (klu_->by_tail) return Outcome::ok;
   klu_common* common = &klu_->common;
   if (klu_refactor(column_start_.data(), row_index_.data(), values, klu_->symbolic, klu_->kept, common) &&
       common->status == KLU_OK && klu_->pivots_are_good(column_start_.data(), row_index_.data(), values)) {
@@ -81,7 +97,11 @@ LinearSolver::Outcome LinearSolver::factor(double* values) {
 }
 
 void LinearSolver::solve(double* rhs) {
-  if (n_ > 0) klu_solve(klu_->symbolic, klu_->current, n_, 1, rhs, &klu_->common);
+  if (n_ == 0) return;
+  if (klu_->by_tail)
+    klu_->tail->solve(rhs);
+  else
+    klu_solve(klu_->symbolic, klu_->current, n_, 1, rhs, &klu_->common);
 }
 
 }  // namespace mbcosim

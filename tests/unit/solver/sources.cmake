@@ -1,1 +1,1 @@
-set(SOURCES integrators_test.cpp eigen_test.cpp newton_test.cpp state_space_test.cpp)
+set(SOURCES dense_tail_test.cpp integrators_test.cpp eigen_test.cpp newton_test.cpp state_space_test.cpp)
