@@ -14,11 +14,15 @@ def model(name):
     return os.path.join(HERE, "..", "models", name)
 
 
-def options(description, plot):
-    """--address of the server, --plot file."""
+def options(description, plot, steps=None, second=False):
+    """--address of the server, --plot file, --steps if it has a default, --second server if it can be used."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--address", help="of the server; default: the one of this user")
     parser.add_argument("--plot", default=plot, help="picture to write; default: %(default)s")
+    if second:
+        parser.add_argument("--second", help="address of the second server; default: one is started")
+    if steps is not None:
+        parser.add_argument("--steps", type=int, default=steps, help="length of the runs; default: %(default)s")
     return parser.parse_args()
 
 

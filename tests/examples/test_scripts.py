@@ -19,10 +19,11 @@ def address(tmp_path_factory):
     assert daemon.wait(20) == 0
 
 
-def run(script, address, tmp_path):
-    """The numbers that a script prints on its last line, before its last word."""
+def run(script, address, tmp_path, *options):
+    """The numbers with a point that a script prints, for each line."""
     plot = tmp_path / "plot.png"
-    done = subprocess.run([sys.executable, os.path.join(SCRIPTS, script), "--address", address, "--plot", str(plot)],
+    done = subprocess.run([sys.executable, os.path.join(SCRIPTS, script), "--address", address, "--plot", str(plot),
+                           *options],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=200)
     assert done.returncode == 0, done.stderr
     assert plot.read_bytes().startswith(b"\x89PNG") and plot.stat().st_size > 10000
@@ -52,3 +53,23 @@ def test_coupled_spring(address, tmp_path):
     (loose, once), (window, passes) = run("coupled_spring.py", address, tmp_path)
     assert once == 1 and passes > 1.5
     assert loose > 1.5 * window > 0
+
+
+def test_controllers(address, tmp_path):
+    """Both loops settle although the controllers see only every tenth step."""
+    (start, end, cart), (stroke, _) = run("controllers.py", address, tmp_path)
+    assert start == 0.2 and abs(end) < 0.005 and abs(cart) < 0.02
+    assert stroke == pytest.approx(100, abs=1)
+
+
+def test_wind_on_chain(address, tmp_path):
+    """Ports on a deck that has none; the wind carries the chain's end away once it is free."""
+    (apart, samples), = run("wind_on_chain.py", address, tmp_path, "--steps", "1500")
+    assert 0.1 < apart < 2 and samples == 150
+
+
+def test_stiff_peer(address, tmp_path):
+    """The plain exchange diverges; quasi-Newton needs fewer passes than Aitken."""
+    _, plain, aitken, quasi_newton = run("stiff_peer.py", address, tmp_path, "--steps", "60")
+    assert plain == [0, 0] and aitken[0] == quasi_newton[0] == 60
+    assert 2 < quasi_newton[1] < 5 < aitken[1]
