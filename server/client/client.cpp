@@ -22,10 +22,23 @@ std::string diagnostics_text(const v1::DeckDiagnostics& all) {
   return text;
 }
 
+v1::PortKind kind_of(const Port& port) {
+  switch (port.kind) {
+    case PortKind::motion:
+      return v1::PORT_KIND_MOTION;
+    case PortKind::modal:
+      return v1::PORT_KIND_MODAL;
+    default:
+      return port.nodes.empty() ? v1::PORT_KIND_SIGNAL : v1::PORT_KIND_STRUCTURAL;
+  }
+}
+
 v1::PortDefinition to_proto(const Port& port) {
   v1::PortDefinition out;
   out.set_name(port.name);
-  out.set_kind(port.nodes.empty() ? v1::PORT_KIND_SIGNAL : v1::PORT_KIND_STRUCTURAL);
+  out.set_kind(kind_of(port));
+  out.set_modal_joint_label(port.modal_joint);
+  out.set_positions_only(port.positions_only);
   out.mutable_node_labels()->Add(port.nodes.begin(), port.nodes.end());
   out.mutable_offsets_m()->Add(port.offsets.begin(), port.offsets.end());
   for (const std::string& name : port.outputs) out.add_output_variables(name);

@@ -40,6 +40,10 @@ class Error : public std::runtime_error {
   std::map<std::string, std::string> metadata_;
 };
 
+/// What crosses a port: loads on nodes, or signals, when it has no nodes; imposed motion of nodes;
+/// or the amplitudes of a modal joint.
+enum class PortKind { loads_or_signals, motion, modal };
+
 /// A place where peers attach: points on structural nodes, or variables out and inputs in.
 struct Port {
   std::string name;
@@ -47,6 +51,9 @@ struct Port {
   std::vector<double> offsets = {};  ///< from the nodes, in their frames [m] (3 × nodes), or empty
   std::vector<std::string> outputs = {};  ///< variables sent to the peer
   std::vector<std::string> inputs = {};   ///< inputs that the peer gives
+  PortKind kind = PortKind::loads_or_signals;
+  int modal_joint = 0;          ///< label, of a modal port
+  bool positions_only = false;  ///< of a motion port: orientations stay free
 };
 
 struct LoadOptions {
@@ -80,14 +87,21 @@ struct Motion {
   std::vector<double> v;   ///< velocities [m/s] (3n)
   std::vector<double> w;   ///< angular velocities [rad/s] (3n)
   std::vector<double> a, wp;    ///< accelerations [m/s², rad/s²] (3n) when agreed, else empty
-  std::vector<double> signals;  ///< of a signal port
+  std::vector<double> signals;  ///< of a signal port; of a modal one: amplitudes, then their rates
+  std::vector<double> forces, moments;  ///< of a motion port: reactions [N], [N·m] (3n)
 };
 
 /// What a peer answers.
 struct Loads {
   std::vector<double> forces = {};   ///< [N] (3n)
   std::vector<double> moments = {};  ///< about the points [N·m] (3n); empty: zero
-  std::vector<double> signals = {};  ///< of a signal port
+  std::vector<double> signals = {};  ///< of a signal or modal port
+  /// Of a motion port: imposed at `target_time` [m] (3n), and orientations in the form agreed.
+  std::vector<double> positions = {}, rotations = {};
+  /// Derivatives of forces and moments with respect to positions and rotations, and to velocities
+  /// and angular velocities, as `PeerOptions::tangent` announced: (6n)² or 36n, by rows.
+  std::vector<double> stiffness = {}, damping = {};
+  bool unfinished = false;  ///< an implicit step must not end with this answer
   /// On the reference node [N], [N·m] (3 each), for ports of a deck that want them.
   std::vector<double> reference_force = {}, reference_moment = {};
 };
@@ -97,6 +111,7 @@ enum class Policy { fail_step, hold_last, zero, wait };
 enum class Acceleration { none, constant, aitken, iqn_ils };
 enum class Rotation { matrix, vector, quaternion, euler_123 };
 enum class Frame { port_default, global, node, reference };
+enum class Tangent { none, block_diagonal, dense };
 enum class Hold { zero_order, linear, quadratic };
 /// What carries the exchanges: the stream of the server's protocol, or shared memory, for peers on
 /// the host of a server at "unix:PATH" that need a few microseconds an exchange. The results are
@@ -119,7 +134,11 @@ struct PeerOptions {
   Rotation rotation = Rotation::matrix;
   Frame frame = Frame::port_default;
   bool accelerations = false;
-  Hold hold = Hold::zero_order;  ///< of inputs between exchanges
+  Hold hold = Hold::zero_order;     ///< of inputs between exchanges
+  Tangent tangent = Tangent::none;  ///< tight: the answers carry derivatives
+  /// The library sends a sign of life three times in so long [s], also while the peer computes;
+  /// when none comes the server takes the peer for dead. 0: no such promise.
+  double heartbeat_timeout = 0;
   Transport transport = Transport::stream;
   StepEnded step_ended = {};  ///< called by the thread that reads: `next`, or the peer's own
 };

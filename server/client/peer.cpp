@@ -83,6 +83,22 @@ v1::InputHold to_proto(Hold hold) {
   }
 }
 
+v1::TangentForm to_proto(Tangent form) {
+  switch (form) {
+    case Tangent::block_diagonal:
+      return v1::TANGENT_FORM_BLOCK_DIAGONAL;
+    case Tangent::dense:
+      return v1::TANGENT_FORM_DENSE;
+    default:
+      return v1::TANGENT_FORM_NONE;
+  }
+}
+
+google::protobuf::Duration to_duration(double seconds) {
+  return google::protobuf::util::TimeUtil::MillisecondsToDuration(
+      static_cast<std::int64_t>(seconds * 1000));
+}
+
 using Numbers = google::protobuf::RepeatedField<double>;
 
 void take(const Numbers& numbers, std::vector<double>& out) {
@@ -101,11 +117,21 @@ void take(const v1::ServerExchange& in, Motion& motion) {
   take(in.accelerations_m_s2(), motion.a);
   take(in.angular_accelerations_rad_s2(), motion.wp);
   take(in.signals(), motion.signals);
+  take(in.forces_n(), motion.forces);
+  take(in.moments_nm(), motion.moments);
 }
 
 void put(const std::vector<double>& values, Numbers* out) {
   out->Clear();
   out->Add(values.begin(), values.end());
+}
+
+void put_tangent(const Loads& loads, Tangent form, v1::PeerExchange* out) {
+  out->clear_tangent();
+  if (loads.stiffness.empty() && loads.damping.empty()) return;
+  put(loads.stiffness, out->mutable_tangent()->mutable_stiffness());
+  put(loads.damping, out->mutable_tangent()->mutable_damping());
+  out->mutable_tangent()->set_block_diagonal(form == Tangent::block_diagonal);
 }
 
 void put(const Loads& loads, v1::PeerExchange* out) {
@@ -115,6 +141,9 @@ void put(const Loads& loads, v1::PeerExchange* out) {
   put(loads.signals, out->mutable_signals());
   put(loads.reference_force, out->mutable_reference_force_n());
   put(loads.reference_moment, out->mutable_reference_moment_nm());
+  put(loads.positions, out->mutable_positions_m());
+  put(loads.rotations, out->mutable_rotations());
+  out->set_unfinished(loads.unfinished);
 }
 
 }  // namespace
@@ -133,8 +162,10 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   hello.set_mode(to_proto(options.mode));
   hello.set_every(options.every);
   hello.set_input_hold(to_proto(options.hold));
-  *hello.mutable_peer_timeout() = google::protobuf::util::TimeUtil::MillisecondsToDuration(
-      static_cast<std::int64_t>(options.timeout * 1000));
+  *hello.mutable_peer_timeout() = to_duration(options.timeout);
+  hello.set_tangent(to_proto(options.tangent));
+  if (options.heartbeat_timeout > 0)
+    *hello.mutable_heartbeat_timeout() = to_duration(options.heartbeat_timeout);
   hello.set_policy(to_proto(options.policy));
   hello.set_acceleration(to_proto(options.acceleration));
   hello.set_relaxation(options.relaxation);
@@ -154,7 +185,11 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
   impl->step_ended = options.step_ended;
   v1::PeerMessage first;
   *first.mutable_hello() = hello;
-  if (impl->wire->write(first) && impl->wire->read(&impl->in)) return impl;
+  if (impl->wire->write(first) && impl->wire->read(&impl->in)) {
+    impl->tangent = options.tangent;
+    if (options.heartbeat_timeout > 0) impl->keep_beating(options.heartbeat_timeout / 3);
+    return impl;
+  }
   impl->open = false;
   require(impl->wire->finish());
   throw Error("the server ended the handshake", static_cast<int>(grpc::StatusCode::UNAVAILABLE), "",
@@ -178,14 +213,40 @@ bool Peer::Impl::next(Motion& motion) {
 void Peer::Impl::answer(const Loads& loads) {
   out.mutable_exchange()->set_index(in.exchange().index());
   put(loads, out.mutable_exchange());
-  wire->write(out);
+  put_tangent(loads, tangent, out.mutable_exchange());
+  write(out);
+}
+
+void Peer::Impl::write(const v1::PeerMessage& message) {
+  const std::lock_guard guard(write_mutex);
+  wire->write(message);
+}
+
+void Peer::Impl::keep_beating(double period) {
+  heart = std::thread([this, period] {
+    v1::PeerMessage beat;
+    std::unique_lock guard(heart_mutex);
+    while (!stop.wait_for(guard, std::chrono::duration<double>(period), [&] { return stopping; })) {
+      beat.mutable_heartbeat()->set_count(beat.heartbeat().count() + 1);
+      write(beat);
+    }
+  });
+}
+
+void Peer::Impl::stop_beating() {
+  {
+    const std::lock_guard guard(heart_mutex);
+    stopping = true;
+  }
+  stop.notify_one();
+  if (heart.joinable()) heart.join();
 }
 
 void Peer::Impl::fail(const std::string& why) {
   v1::PeerMessage message;
   message.mutable_exchange()->set_index(in.exchange().index());
   message.mutable_exchange()->set_failure(why.empty() ? "the peer gave no reason" : why);
-  wire->write(message);
+  write(message);
 }
 
 void Peer::Impl::serve(Answer function) {
@@ -205,6 +266,7 @@ void Peer::Impl::close() {
   if (!open) return;
   open = false;
   wire->cancel();  // ends a read that is under way
+  stop_beating();
   if (thread.joinable()) thread.join();
   wire->finish();
 }

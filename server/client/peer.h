@@ -2,7 +2,9 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 
@@ -19,15 +21,23 @@ struct Peer::Impl {
   bool next(Motion& motion);
   void answer(const Loads& loads);
   void fail(const std::string& why);
-  void serve(Answer answer);  ///< in a thread of its own
+  void serve(Answer answer);         ///< in a thread of its own
+  void keep_beating(double period);  ///< [s], in a thread of its own
+  void stop_beating();
+  void write(const v1::PeerMessage& message);
   void close();
 
   std::shared_ptr<Server::Impl> server;
   std::unique_ptr<Wire> wire;
+  std::mutex write_mutex;  ///< the heart writes, too
+  Tangent tangent = Tangent::none;
   StepEnded step_ended;
   v1::ServerMessage in;
   v1::PeerMessage out;
-  std::thread thread;
+  std::thread thread, heart;
+  std::mutex heart_mutex;
+  std::condition_variable stop;
+  bool stopping = false;
   std::atomic<std::int64_t> exchanges{0};
   bool open = true;
 };

@@ -64,13 +64,14 @@ class Peer:
     mode       "loose", "staggered", "tight" or "window"; None: the port's own, "loose" unless its deck says otherwise
     frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
     tangent    "dense" or "block_diagonal" when answers are Loads with derivatives
+    heartbeat_timeout   the peer shows signs of life at least that often [s], also while it computes; the library sends them
     After the end `error` has what ended the stream, None when it ended in good order.
     """
 
-    def __init__(self, simulation, port, answer=None, *, rotation="matrix", **options):
+    def __init__(self, simulation, port, answer=None, *, rotation="matrix", heartbeat_timeout=None, **options):
         self._function, self._rotation = answer, rotation
         self._out = queue.SimpleQueue()
-        self._out.put(exchange.hello(simulation, port, rotation=rotation, **options))
+        self._out.put(exchange.hello(simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout, **options))
         server = simulation._server
         self._stream = open_stream(server._channel)(iter(self._out.get, None), metadata=server.metadata)
         try:
@@ -82,6 +83,9 @@ class Peer:
         self.accepted = []  # (step, time) of the implicit steps that ended
         self.rejected = []  # (step, time) to go back to, of those that failed
         self._index = 0
+        self._closing = threading.Event()
+        if heartbeat_timeout is not None:
+            threading.Thread(target=self._beat, args=(heartbeat_timeout / 3,), daemon=True).start()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         if answer is not None:
             self._thread.start()
@@ -94,6 +98,7 @@ class Peer:
 
     def close(self):
         """Leaves the port."""
+        self._closing.set()
         self._out.put(None)
         if self._function is not None:
             self._thread.join(5)
@@ -124,6 +129,12 @@ class Peer:
         """The peer cannot answer the last motion; the step fails with this text."""
         self._out.put(exchange.failure(self._index, error))
         self.exchanges += 1
+
+    def _beat(self, period):
+        count = 0
+        while not self._closing.wait(period):
+            count += 1
+            self._out.put(pb.PeerMessage(heartbeat=pb.Heartbeat(count=count)))
 
     def _serve(self):
         for motion in self:
