@@ -126,7 +126,8 @@ def test_a_peer_notices_the_death_of_the_daemon(start_daemon):
         output, _ = peer.communicate(timeout=10)
         assert peer.returncode == 0 and output.endswith("exchanges\n")
     daemon.process.wait()
-    daemon.process = subprocess.Popen(["true"])  # what the fixture stops
+    daemon.process = subprocess.Popen(["true"])  # for the fixture, which expects a good end
+    daemon.process.wait()
 
 
 def test_the_socket_is_for_its_user_and_goes_with_the_daemon(start_daemon):
