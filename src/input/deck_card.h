@@ -203,6 +203,9 @@ class DeckCard final : public Card {
   DrivePtr drive_reference();
   template <int N>
   LawPtr<N> law_of();
+  template <int N>
+  void refuse_other_dimension();
+  void refuse_order(const std::string& reason);
   ScalarFunctionPtr function_definition(const std::string& name, SourceSpan where);
   template <int R, int C, class ReadEntity>
   TplDrivePtr<R, C> template_drive(std::string_view what, ReadEntity read);

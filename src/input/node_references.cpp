@@ -75,7 +75,10 @@ NodeDof DeckCard::node_dof(bool with_order) {
   if (type == 0) {
     NodeDof dof = structural_dof(l, where);
     const StructuralNode& n = deck_.builder.model().structural[dof.node];
-    if (with_order) read_order(dof, n.has_momentum());
+    if (with_order)
+      read_order(dof, n.has_momentum());
+    else
+      refuse_order("");
     return dof;
   }
   const ScalarKind kind = static_cast<ScalarKind>(type - 1);
@@ -84,8 +87,19 @@ NodeDof DeckCard::node_dof(bool with_order) {
   if (dof.node < 0) deck_.undefined(*this, kind_names(kind_of(kind)).singular, l);
   dof.differential =
       kind != ScalarKind::parameter && deck_.builder.model().scalars[dof.node].differential;
-  if (with_order && dof.differential) read_order(dof, false);
+  if (with_order && dof.differential)
+    read_order(dof, false);
+  else
+    refuse_order(dof.differential ? "" : "; the node is algebraic");
   return dof;
+}
+
+/// An order word where none is read would be taken for the next argument.
+void DeckCard::refuse_order(const std::string& reason) {
+  const std::string word = peek_word();
+  if (word == "algebraic" || word == "differential")
+    fail_at(next(),
+            "\"" + word + "\" found; no order of the degree of freedom is written here" + reason);
 }
 
 ElementRef DeckCard::element(Family family) {

@@ -236,13 +236,50 @@ const LabelMap<LawPtr<N>>& laws(const Deck& d) {
     return d.laws6;
 }
 
+/// A law that exists in other dimensions only.
+void refuse_word_of_other_dimension(DeckCard& card, const std::string& word, int dimension) {
+  const Registry& r = card.registry();
+  std::string others;
+  const auto add = [&](const auto& readers, const char* text) {
+    if (readers.count(word)) others += (others.empty() ? "" : ", ") + std::string(text);
+  };
+  add(r.laws1, "1");
+  add(r.laws3, "3");
+  add(r.laws6, "6");
+  if (others.empty()) return;
+  const auto shown = r.display.find(word);
+  card.fail_at(card.next(), "constitutive law \"" +
+                                (shown == r.display.end() ? word : shown->second) +
+                                "\" has no form in dimension " + std::to_string(dimension) +
+                                "; it exists in dimension " + others);
+}
+
 }  // namespace
+
+/// After `reference`: refuses the label of a law that was defined in other dimensions only.
+template <int N>
+void DeckCard::refuse_other_dimension() {
+  const std::string text(next_text());
+  const auto defined = [&](const auto& map) {
+    return std::any_of(map.begin(), map.end(),
+                       [&](const auto& entry) { return std::to_string(entry.first) == text; });
+  };
+  if (defined(laws<N>(deck_))) return;
+  const int other = defined(deck_.laws1)   ? 1
+                    : defined(deck_.laws3) ? 3
+                    : defined(deck_.laws6) ? 6
+                                           : 0;
+  if (other != 0)
+    fail_at(next(), "constitutive law " + text + " has dimension " + std::to_string(other) +
+                        "; dimension " + std::to_string(N) + " is needed here");
+}
 
 template <int N>
 LawPtr<N> DeckCard::law_of() {
   need_argument("constitutive law");
   const Nesting nesting(*this);
   if (keyword("reference")) {
+    refuse_other_dimension<N>();
     const LawPtr<N>& law = labelled(*this, laws<N>(deck_), "constitutive law");
     const LawPtr<N> copy = law->copy(builder());
     return copy ? copy : law;
@@ -260,6 +297,7 @@ LawPtr<N> DeckCard::law_of() {
   if (w.empty())
     fail_at(next(), "constitutive law expected, e.g. " +
                         std::string(N == 1 ? "linear elastic" : "linear elastic generic"));
+  refuse_word_of_other_dimension(*this, w, N);
   fail_word("constitutive law", w, readers, "law");
 }
 

@@ -4,6 +4,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "model/detailed_row.h"
 #include "output/netcdf_file.h"
 #include "output/record.h"
 
@@ -53,7 +54,7 @@ struct Field {
   std::vector<std::size_t> shape;
 };
 
-class NetcdfWriter : public ResultWriter, private OutputRow {
+class NetcdfWriter : public ResultWriter, public OutputRow, public DetailedRow {
  public:
   explicit NetcdfWriter(const std::string& prefix) : prefix_(prefix) {}
 

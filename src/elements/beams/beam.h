@@ -55,6 +55,22 @@ struct SectionHistory {
 };
 constexpr int kSectionHistory = 30;  ///< numbers per point
 
+/// What `custom output` chooses.
+struct BeamOutput {
+  enum Field : unsigned {
+    position = 1,
+    orientation = 2,
+    force = 4,
+    moment = 8,
+    strain = 16,
+    curvature = 32,
+    strain_rate = 64,
+    curvature_rate = 128
+  };
+  unsigned chosen = force | moment;
+  OrientationDescription description = OrientationDescription::euler123;
+};
+
 /// Kinematics of one evaluation point.
 template <class T>
 struct Section {
@@ -105,6 +121,7 @@ struct Beam {
   std::vector<int>
       actuators;  ///< abstract nodes of the piezoelectric actuator (scalar node indices)
   bool viscoelastic = false;  ///< some law depends on the strain rate
+  BeamOutput fields;          ///< of self-describing formats; .act has forces and moments always
 
   void connect(Connector& c) {
     for (const int n : node) c.distinct_node(n);
@@ -171,7 +188,8 @@ struct Beam {
   static constexpr int kMemory =
       points * kSectionHistory + 1;  ///< the last one: has the beam been loaded?
 
-  /// Without an initial assembly MBDyn keeps the internal forces at zero until the first prediction.
+  /// Without an initial assembly MBDyn keeps the internal forces at zero until the first
+  /// prediction.
   template <class T>
   bool is_unloaded(const Local<T>& u) const {
     return u.context->phase != Phase::assembly && u.memory(kMemory - 1) == 0;

@@ -2,6 +2,7 @@
 #include <sstream>
 
 #include "elements/beams/beam.h"
+#include "model/detailed_row.h"
 
 namespace mbcosim {
 
@@ -28,17 +29,37 @@ std::string prefix(int a) {
   return Nodes == 2 ? "" : kPointPrefix[a];
 }
 
+std::string orientation_name(OrientationDescription description) {
+  return description == OrientationDescription::vector   ? "Phi"
+         : description == OrientationDescription::matrix ? "R"
+                                                         : "E";
+}
+
 }  // namespace
 
 template <int Nodes>
 void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
-  constexpr const char* force_names[2] = {Nodes == 2 ? "F" : "F_I", "F_II"};
-  constexpr const char* moment_names[2] = {Nodes == 2 ? "M" : "M_I", "M_II"};
+  using Field = BeamOutput::Field;
+  const bool free_choice = dynamic_cast<DetailedRow*>(&row) != nullptr;
+  const unsigned chosen = free_choice ? fields.chosen : Field::force | Field::moment;
   row.begin(OutputFile::act, u.label());
   for (int a = 0; a < points; ++a) {
-    const Vec6 f = is_unloaded(u) ? Vec6(Vec6::Zero()) : internal_force(u, a, section(u, a));
-    row.vec3(force_names[a], "N", f.head<3>());
-    row.vec3(moment_names[a], "N m", f.tail<3>());
+    const std::string suffix = Nodes == 2 ? "" : a == 0 ? "_I" : "_II";
+    const Section<double> s = section(u, a);
+    const Vec6 f = is_unloaded(u) ? Vec6(Vec6::Zero()) : internal_force(u, a, s);
+    const auto vector = [&](Field field, const char* name, const char* unit, const Vec3& value) {
+      if (chosen & field) row.vec3((name + suffix).c_str(), unit, value);
+    };
+    vector(Field::position, "X", "m", s.p);
+    if (chosen & Field::orientation)
+      row.orientation((orientation_name(fields.description) + suffix).c_str(), s.R,
+                      fields.description);
+    vector(Field::force, "F", "N", f.template head<3>());
+    vector(Field::moment, "M", "N m", f.template tail<3>());
+    vector(Field::strain, "nu", "-", s.strain.template head<3>());
+    vector(Field::curvature, "k", "1/m", s.strain.template tail<3>());
+    vector(Field::strain_rate, "nuP", "1/s", s.rate.template head<3>());
+    vector(Field::curvature_rate, "kP", "1/(m s)", s.rate.template tail<3>());
   }
   row.end();
 }

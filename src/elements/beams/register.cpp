@@ -94,36 +94,106 @@ void read_actuator(Card& card, Beam<Nodes>& beam) {
   }
 }
 
-/// Flags that choose columns of self-describing formats; .act has fixed columns, so they are only
-/// checked.
-void read_custom_output(Card& card, bool viscoelastic) {
-  if (!card.keyword("custom output")) return;
-  const std::initializer_list<std::string_view> flags = {"position",
-                                                         "orientation",
-                                                         "configuration",
-                                                         "force",
-                                                         "moment",
-                                                         "forces",
-                                                         "linear strain",
-                                                         "angular strain",
-                                                         "strains",
-                                                         "linear strain rate",
-                                                         "angular strain rate",
-                                                         "strain rates",
-                                                         "all",
-                                                         "none"};
-  constexpr int kFirstRate = 9, kLastRate = 11;
-  unsigned seen = 0;
-  for (int flag = card.required("custom output flag", flags); flag >= 0;
-       flag = card.one_of(flags)) {
-    const std::string name(flags.begin()[flag]);
-    if (seen & 1u << flag) card.fail("custom output: `" + name + "` is given twice");
-    seen |= 1u << flag;
-    if (name == "orientation" && card.keyword("orientation description"))
-      card.orientation_description();
-    if (flag >= kFirstRate && flag <= kLastRate && !viscoelastic)
-      card.warn("custom output: `" + name + "` is ignored, the beam is elastic");
+struct OutputFlag {
+  std::string_view word;
+  unsigned fields;
+};
+using Field = BeamOutput::Field;
+constexpr unsigned kEveryField = 255, kRates = Field::strain_rate | Field::curvature_rate;
+constexpr OutputFlag kOutputFlags[] = {{"position", Field::position},
+                                       {"orientation", Field::orientation},
+                                       {"configuration", Field::position | Field::orientation},
+                                       {"force", Field::force},
+                                       {"moment", Field::moment},
+                                       {"forces", Field::force | Field::moment},
+                                       {"linear strain", Field::strain},
+                                       {"angular strain", Field::curvature},
+                                       {"strains", Field::strain | Field::curvature},
+                                       {"linear strain rate", Field::strain_rate},
+                                       {"angular strain rate", Field::curvature_rate},
+                                       {"strain rates", Field::strain_rate | Field::curvature_rate},
+                                       {"all", kEveryField},
+                                       {"none", 0}};
+
+/// The flag that comes next, null when there is none.
+const OutputFlag* next_output_flag(Card& card) {
+  for (const OutputFlag& flag : kOutputFlags)
+    if (card.keyword(flag.word)) return &flag;
+  return nullptr;
+}
+
+/// Flags that choose the fields of self-describing formats.
+BeamOutput read_custom_output(Card& card, bool viscoelastic) {
+  BeamOutput output;
+  output.description = card.model().control.orientation;
+  if (!card.keyword("custom output")) return output;
+  const auto name = [](const OutputFlag& flag) { return "`" + std::string(flag.word) + "`"; };
+  const OutputFlag* flag = next_output_flag(card);
+  if (!flag) {
+    std::string words;
+    for (const OutputFlag& known : kOutputFlags)
+      words += (words.empty() ? "" : ", ") + std::string(known.word);
+    card.fail_at(card.next(), "custom output: a flag is expected", "accepted: " + words);
   }
+  output.chosen = 0;
+  unsigned seen = 0;
+  for (; flag; flag = next_output_flag(card)) {
+    const unsigned bit = 1u << (flag - kOutputFlags);
+    if (seen & bit) card.fail("custom output: " + name(*flag) + " is given twice");
+    seen |= bit;
+    output.chosen |= flag->fields;
+    if ((flag->fields & Field::orientation) && flag->fields != kEveryField &&
+        card.keyword("orientation description"))
+      output.description = card.orientation_description();
+    if (!viscoelastic && flag->fields != kEveryField && (flag->fields & kRates))
+      card.warn("custom output: " + name(*flag) + " is ignored, the beam is elastic");
+  }
+  if (!viscoelastic) output.chosen &= ~kRates;
+  return output;
+}
+
+template <int Nodes>
+void check_geometry(Card& card, const ElementInfo& info, Beam<Nodes>& beam) {
+  constexpr double kTiny = std::numeric_limits<double>::epsilon();
+  const char* const remedy =
+      "place the nodes (with their offsets) at distinct points, in the order end, middle, end";
+  const auto X = [&](int k) -> Vec3 {
+    const StructuralNode& n = card.model().structural[beam.node[k]];
+    return n.x + n.R * beam.offset[k];
+  };
+  for (int k = 1; k < Nodes; ++k)
+    if ((X(k) - X(k - 1)).squaredNorm() < kTiny)
+      card.fail_at(info.where,
+                   "beam: its points " + std::to_string(k) + " and " + std::to_string(k + 1) +
+                       " are in one place",
+                   remedy);
+  if (beam.set_geometry(card.model()) < kTiny)
+    card.fail_at(info.where, "beam: the reference line has no length at an evaluation point",
+                 remedy);
+  const Vec3 chord = X(Nodes - 1) - X(0);
+  for (const auto& point : beam.point)
+    if ((point.R0 * point.l0).dot(chord) <= 0)
+      card.fail_at(info.where, "beam: the reference line turns back at an evaluation point",
+                   remedy);
+}
+
+/// Stiffnesses that are not positive leave a beam without resistance or make it unstable.
+template <int Nodes>
+void warn_of_soft_section(Card& card, const Beam<Nodes>& beam, int a) {
+  const Law<6>& law = *beam.point[a].law;
+  if (law.type() == LawType::viscous) return;
+  Law<6>::Response r;
+  try {
+    law.respond(card.builder().input_context(), Vec6::Zero(), Vec6::Zero(), true, r);
+  } catch (const EvaluationError&) {
+    return;  // it depends on what is not known yet
+  }
+  for (int i = 0; i < 6; ++i)
+    if (!(r.de(i, i) > 0)) {
+      card.warn("beam: stiffness " + std::to_string(i + 1) +
+                " of 6 is not positive: " + std::to_string(r.de(i, i)));
+      return;
+    }
 }
 
 template <int Nodes>
@@ -133,12 +203,10 @@ void read_beam(Card& card, ElementInfo& info) {
   typename Beam<Nodes>::Orientations relative;
   read_nodes(card, beam, relative);
   read_sections(card, beam, relative);
-  if (beam.set_geometry(card.model()) < std::numeric_limits<double>::epsilon())
-    card.fail_at(
-        info.where, "beam: the reference line has no length at an evaluation point",
-        "place the nodes (with their offsets) at distinct points, in the order end, middle, end");
+  check_geometry(card, info, beam);
+  for (int a = 0; a < beam.points; ++a) warn_of_soft_section(card, beam, a);
   read_actuator(card, beam);
-  read_custom_output(card, beam.viscoelastic);
+  beam.fields = read_custom_output(card, beam.viscoelastic);
   add_element(card.builder(), info, std::move(beam));
 }
 

@@ -38,7 +38,7 @@ void StructuralForce::output(const Local<double>& u, OutputRow& row) const {
   row.begin(OutputFile::frc, u.label());
   row.integer(label_of(u.model(), node));
   row.vec3("F", "N", relative_output ? u.drive(d) : force(u));
-  row.vec3("X", "m", relative_output ? a : Vec3(u.x(0) + u.R(0) * a));
+  row.vec3("X", "m", u.x(0) + u.R(0) * a);
   row.end();
 }
 

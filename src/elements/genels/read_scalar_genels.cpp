@@ -39,10 +39,17 @@ void read_clamp(Card& card, ElementInfo& info) {
   add_element(card.builder(), info, std::move(e));
 }
 
+void refuse_same_dof(Card& card, const NodeDof& a, const NodeDof& b, const char* what) {
+  if (a.structural == b.structural && a.node == b.node && a.component == b.component &&
+      a.order == b.order)
+    card.fail(std::string(what) + ": both degrees of freedom are the same");
+}
+
 void read_distance(Card& card, ElementInfo& info) {
   GenelDistance e;
   e.first = read_genel_dof(card, "distance");
   e.second = read_genel_dof(card, "distance");
+  refuse_same_dof(card, e.first, e.second, "distance");
   e.d = card.drive("distance");
   add_element(card.builder(), info, std::move(e));
 }
@@ -51,7 +58,11 @@ void read_spring(Card& card, ElementInfo& info) {
   GenelSpring e;
   e.first = read_genel_dof(card, "spring");
   e.second = read_genel_dof(card, "spring");
+  refuse_same_dof(card, e.first, e.second, "spring");
+  const SourceSpan law = card.next();
   e.law = card.law1();
+  if (e.law->type() != LawType::elastic)
+    card.fail_at(law, "spring: an elastic law is needed, this one depends on the rate");
   add_element(card.builder(), info, std::move(e));
 }
 

@@ -28,7 +28,7 @@ DrivePtr read_step(Card& card) {
 
 DrivePtr read_double_step(Card& card) {
   const double t0 = card.real("time of the first step"), t1 = read_end(card);
-  if (t1 < t0) card.fail("double step: the second step must not precede the first");
+  if (!(t1 > t0)) card.fail("double step: the second step must come after the first");
   const double s = card.real("height"), i = card.real("initial value");
   return std::make_shared<StepDrive>(t0, t1, s, i);
 }

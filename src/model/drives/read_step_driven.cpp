@@ -14,14 +14,23 @@ DrivePtr add_step_driven(Card& card, Arguments&&... arguments) {
   return drive;
 }
 
+/// `t1 | forever` of a drive that works from t0 on.
+double read_end_after(Card& card, double t0, const char* drive) {
+  const double t1 = read_end(card);
+  if (t1 < t0)
+    card.fail(std::string(drive) + ": it ends at " + std::to_string(t1) + ", before its start " +
+              std::to_string(t0));
+  return t1;
+}
+
 DrivePtr read_meter(Card& card) {
-  const double t0 = card.real("initial time"), t1 = read_end(card);
+  const double t0 = card.real("initial time"), t1 = read_end_after(card, t0, "meter");
   const int steps = card.keyword("steps") ? read_count(card, "number of steps") : 1;
   return std::make_shared<MeterDrive>(t0, t1, steps);
 }
 
 DrivePtr read_closest_next(Card& card) {
-  const double t0 = card.real("initial time"), t1 = read_end(card);
+  const double t0 = card.real("initial time"), t1 = read_end_after(card, t0, "closest next");
   DrivePtr increment = card.drive("increment");
   const int memory = card.builder().allocate_memory(ClosestNextDrive::kMemory);
   card.builder().set_memory(memory + 1, t0);
@@ -33,7 +42,7 @@ DrivePtr read_random(Card& card) {
   range.amplitude = card.real("amplitude");
   range.mean = card.real("mean value");
   range.t0 = card.real("initial time");
-  range.t1 = read_end(card);
+  range.t1 = read_end_after(card, range.t0, "random");
   range.steps = card.keyword("steps") ? read_count(card, "number of steps") : 1;
   const int memory = card.builder().allocate_memory(RandomDrive::kMemory, range.mean);
   auto seed = static_cast<std::uint32_t>(memory) + 1;

@@ -59,7 +59,9 @@ LawPtr<1> read_inverse_square(Card& card) {
   InverseSquare s;
   s.a = card.real("stiffness");
   s.length = card.real("reference length");
-  if (s.length == 0) card.fail("inverse square elastic: the reference length must not be null");
+  if (!(s.length > 0))
+    card.fail("inverse square elastic: the reference length must be positive, got " +
+              std::to_string(s.length));
   return make_component_law<1>(LawType::elastic, s, read_prestress<1>(card));
 }
 

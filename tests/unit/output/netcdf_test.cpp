@@ -36,11 +36,12 @@ end: elements;
 
 class NetcdfResults : public testing::Test {
  protected:
+  virtual std::string deck() const { return kDeck; }
   void SetUp() override {
     prefix_ = testing::TempDir() + "mbcosim_netcdf_" +
               std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "_" +
               std::to_string(reinterpret_cast<std::uintptr_t>(this));
-    const LoadReport report = load_deck(BundleSource({{"deck.mbd", std::string(kDeck)}}), "deck.mbd");
+    const LoadReport report = load_deck(BundleSource({{"deck.mbd", deck()}}), "deck.mbd");
     for (const Diagnostic& d : report.diagnostics)
       EXPECT_NE(d.severity, Severity::error) << d.text();
     ASSERT_TRUE(report.ok());
@@ -139,6 +140,67 @@ TEST_F(NetcdfResults, HoldEigenanalyses) {
   EXPECT_EQ(shape("eig.0.alpha")[0], 3u);
   EXPECT_EQ(shape("eig.0.Aplus"), (Shape{n, n}));
   EXPECT_EQ(shape("eig.0.VR"), (Shape{2, n, m}));
+}
+
+/// `custom output` of beams; the lines of .act keep their columns.
+class NetcdfBeams : public NetcdfResults {
+ protected:
+  std::string deck() const override {
+    return initial_value_block(1e-2, .05,
+                               "max iterations: 20; tolerance: 1e-9; derivatives tolerance: 1e9;") +
+           R"(
+begin: control data; structural nodes: 3; beams: 4; joints: 1; forces: 1; output results: netcdf; end: control data;
+begin: nodes;
+  structural: 1, static, null, eye, null, null;
+  structural: 2, static, .5,0.,0., eye, null, null;
+  structural: 3, static, 1.,0.,0., eye, null, null;
+end: nodes;
+constitutive law: 1, 6, linear viscoelastic generic, diag, 1e3,1e3,1e3,10.,10.,10., proportional, 1e-2;
+begin: elements;
+  joint: 1, clamp, 1, node, node;
+  beam3: 1, 1, null, 2, null, 3, null, eye, reference, 1, same, same;
+  beam3: 2, 1, null, 2, null, 3, null, eye, reference, 1, same, same, custom output, all;
+  beam2: 3, 1, null, 3, null, eye, reference, 1, custom output, position, orientation,
+    orientation description, orientation vector, strains;
+  beam2: 4, 1, null, 3, null, eye, linear elastic, 1., custom output, all;
+  force: 1, absolute, 3, position, null, 1.,2.,3., ramp, 1., 0., forever, 0.;
+end: elements;
+)";
+  }
+  bool has(const std::string& name) {
+    int variable = -1;
+    return nc_inq_varid(file_, name.c_str(), &variable) == NC_NOERR;
+  }
+};
+
+TEST_F(NetcdfBeams, HaveTheFieldsThatWereChosen) {
+  for (const char* name : {"F_I", "M_I", "F_II", "M_II"})
+    EXPECT_TRUE(has(std::string("elem.beam.1.") + name)) << name;
+  for (const char* name : {"X_I", "E_I", "nu_I", "k_I", "nuP_I", "kP_II"}) {
+    EXPECT_FALSE(has(std::string("elem.beam.1.") + name)) << name;
+    EXPECT_TRUE(has(std::string("elem.beam.2.") + name)) << name;
+  }
+  for (const char* name : {"X", "Phi", "nu", "k"})
+    EXPECT_TRUE(has(std::string("elem.beam.3.") + name)) << name;
+  for (const char* name : {"F", "M", "E", "nuP"})
+    EXPECT_FALSE(has(std::string("elem.beam.3.") + name)) << name;
+  EXPECT_TRUE(has("elem.beam.4.k"));
+  EXPECT_FALSE(has("elem.beam.4.kP"));  // elastic
+  EXPECT_EQ(shape("elem.beam.2.X_I"), (Shape{6, 3}));
+}
+
+TEST_F(NetcdfBeams, HoldThePrivateData) {
+  const ElementRef beam = simulation_->model().find_element(Family::beam, 2);
+  const EvalContext context = simulation_->model().context(simulation_->state(), Phase::step);
+  const std::pair<const char*, const char*> pairs[] = {{"X_II", "pII.Xx"},   {"nu_I", "pI.ex"},
+                                                       {"k_II", "pII.kx"},   {"nuP_I", "pI.ePx"},
+                                                       {"kP_II", "pII.kPx"}, {"F_II", "pII.Fx"}};
+  for (const auto& [variable, datum] : pairs) {
+    const std::vector<double> data = values(std::string("elem.beam.2.") + variable);
+    const int first = beam.set->private_datum(beam.index, datum);
+    for (int i = 0; i < 3; ++i)
+      EXPECT_EQ(data[15 + i], beam.set->private_value(context, beam.index, first + i)) << variable;
+  }
 }
 
 TEST_F(NetcdfResults, StandBesideTheTextFiles) {
