@@ -1,0 +1,103 @@
+/// Genels, forces on points and the socket coupling's steady loads in decks, against the reference
+/// solver's numbers.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "deck_run.h"
+
+namespace mbcosim {
+namespace {
+
+/// One of each linear genel: filter, state space, spring support, mass, spring, distance.
+TEST(GenelDecks, NumbersOfTheReferenceSolver) {
+  std::string nodes, supports;
+  for (int k = 1; k <= 8; ++k)
+    nodes += "abstract: " + std::to_string(k) + (k == 3 ? ", value, 1.1;" : ";");
+  const std::pair<int, int> stiffness[] = {{5, 1}, {6, 2}, {7, 1}, {8, 2}};
+  for (const auto& [node, k] : stiffness)
+    supports += "genel: " + std::to_string(100 + node) + ", spring support, " +
+                std::to_string(node) + ", abstract, algebraic, linear viscoelastic, " +
+                std::to_string(k) + ".,1.;\n";
+  DeckRun run(initial_value_block(
+                  .01, 1, "tolerance: 1e-10; max iterations: 20; derivatives tolerance: 1e9;") +
+              "begin: control data; abstract nodes: 8; genels: 11; forces: 2; end: control "
+              "data;\nbegin: nodes; " +
+              nodes + " end: nodes;\nbegin: elements;\n" + supports + R"(
+genel: 1, clamp, 1, abstract, algebraic, sine, 0., 7., 1., forever, 0.;
+genel: 2, scalar filter, 2, abstract, algebraic, node dof, 1, abstract, algebraic,
+  canonical form, controllable, 2, .5, 20., 1, 3., 4., gain, 2., balance, no;
+genel: 3, state space SISO, 3, abstract, algebraic, node dof, 1, abstract, algebraic, 2,
+  matrix A, 0., 1., -20., -.5, matrix B, 1., 2., matrix C, 3., 4., matrix D, .5, balance, no, value, .1, .2;
+genel: 4, spring support, 4, abstract, algebraic, linear viscoelastic, 10., .5;
+genel: 5, mass, 4, abstract, algebraic, linear, 2., 0.;
+force: 4, abstract, 4, abstract, sine, 0., 7., 1., forever, 0.;
+genel: 6, spring, 5, abstract, algebraic, 6, abstract, algebraic, linear elastic, 10.;
+force: 5, abstract, 5, abstract, const, 1.;
+genel: 8, distance, 7, abstract, algebraic, 8, abstract, algebraic, cosine, 0., 3., .1, forever, 0.;
+end: elements;
+)");
+  ASSERT_TRUE(run.ready());
+  const auto x = [&](int label) { return run.scalar_node(ScalarKind::abstract, label); };
+  run.step(50);
+  EXPECT_NEAR(x(2), 0.775007992695, 1e-11);
+  EXPECT_NEAR(x(3), -4.93832663023, 1e-10);
+  EXPECT_NEAR(x(4), 0.0345577282134, 1e-12);
+  EXPECT_NEAR(x(5), 0.207257359708, 1e-11);
+  EXPECT_NEAR(x(6), 0.152935714483, 1e-11);
+  EXPECT_NEAR(x(7), -0.0499467472231, 1e-11);
+  EXPECT_NEAR(x(8), 0.0429795326101, 1e-11);
+  EXPECT_NEAR(run.own(Family::genel, 8), -0.217621955738, 1e-10);
+  run.step(50);
+  EXPECT_NEAR(x(2), -1.62164953714, 1e-10);
+  EXPECT_NEAR(x(3), 4.19496138165, 1e-10);
+  EXPECT_NEAR(x(4), 0.0167321780651, 1e-11);
+}
+
+/// Abstract forces on clamped nodes: the multipliers are the sums of what is applied.
+TEST(GenelDecks, AbstractForcesOnClampedNodes) {
+  DeckRun run(initial_value_block(
+                  .01, 1, "tolerance: 1e-10; max iterations: 20; derivatives tolerance: 1e9;") +
+              R"(
+begin: control data; abstract nodes: 2; genels: 2; forces: 2; end: control data;
+begin: nodes; abstract: 11; abstract: 12, value, 2.; end: nodes;
+begin: elements;
+genel: 1, clamp, 11, abstract, algebraic, null; genel: 2, clamp, 12, abstract, algebraic, const, 2.;
+force: 1, abstract, 11, abstract, const, 5.; force: 2, abstract internal, 11, abstract, 12, abstract, const, 3.;
+end: elements;
+)");
+  ASSERT_TRUE(run.ready());
+  run.step();
+  EXPECT_NEAR(run.own(Family::genel, 1), 8, 1e-12);
+  EXPECT_NEAR(run.own(Family::genel, 2), -3, 1e-12);
+}
+
+constexpr const char* kTwoBodies = R"(
+begin: control data; structural nodes: 2; rigid bodies: 2; forces: 3; end: control data;
+begin: nodes;
+  structural: 1, dynamic, 1.,2.,3., euler123, .1,.2,.3, .1,.2,.3, 0.,0.,1.;
+  structural: 2, dynamic, 2.,-1.,1.5, eye, null, 1.,0.,0.;
+end: nodes;
+begin: elements;
+  body: 1, 1, 1., null, eye; body: 2, 2, 1., null, eye;
+  force: 1, absolute, 1, position, .1,0.,0., 1.,0.,0., const, 1.;
+  couple: 2, absolute, 1, 0.,0.,1., const, .1;
+  force: 3, absolute, 2, position, null, 0.,2.,0., const, 1.;
+end: elements;
+)";
+
+/// What a peer in loose coupling that always sends the same loads makes of two free bodies: the
+/// loads act from the start.
+TEST(GenelDecks, SteadyLoadsOnTwoBodies) {
+  DeckRun run(initial_value_block(.01, .03, "tolerance: 1e-8; max iterations: 20;") + kTwoBodies);
+  ASSERT_TRUE(run.ready());
+  run.step(3);
+  EXPECT_NEAR(run.node(1).x(0), 1.00345000023, 1e-10);
+  EXPECT_NEAR(run.node(1).v(0), .130000010, 1e-9);
+  EXPECT_NEAR(run.node(1).w(2), 1.00201902417, 1e-9);
+  EXPECT_NEAR(run.node(2).x(1), -.9990999995, 1e-10);
+  EXPECT_NEAR(run.node(2).v(1), .06000002, 1e-9);
+}
+
+}  // namespace
+}  // namespace mbcosim
