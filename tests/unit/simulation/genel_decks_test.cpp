@@ -19,8 +19,9 @@ TEST(GenelDecks, NumbersOfTheReferenceSolver) {
     supports += "genel: " + std::to_string(100 + node) + ", spring support, " +
                 std::to_string(node) + ", abstract, algebraic, linear viscoelastic, " +
                 std::to_string(k) + ".,1.;\n";
-  DeckRun run(initial_value_block(
-                  .01, 1, "tolerance: 1e-10; max iterations: 20; derivatives tolerance: 1e9;") +
+  DeckRun run(initial_value_block(.01, 1,
+                                  "tolerance: 1e-10; max iterations: 20; derivatives tolerance: "
+                                  "1e-6; derivatives max iterations: 20;") +
               "begin: control data; abstract nodes: 8; genels: 11; forces: 2; end: control "
               "data;\nbegin: nodes; " +
               nodes + " end: nodes;\nbegin: elements;\n" + supports + R"(
