@@ -73,7 +73,10 @@ end: elements;
   EXPECT_NEAR(run.own(Family::genel, 2), -3, 1e-12);
 }
 
-constexpr const char* kTwoBodies = R"(
+/// Two free bodies under steady loads.
+std::string two_bodies(const std::string& drive, double moment) {
+  const std::string load = drive + ";\n";
+  return initial_value_block(.01, .03, "tolerance: 1e-8; max iterations: 20;") + R"(
 begin: control data; structural nodes: 2; rigid bodies: 2; forces: 3; end: control data;
 begin: nodes;
   structural: 1, dynamic, 1.,2.,3., euler123, .1,.2,.3, .1,.2,.3, 0.,0.,1.;
@@ -81,16 +84,15 @@ begin: nodes;
 end: nodes;
 begin: elements;
   body: 1, 1, 1., null, eye; body: 2, 2, 1., null, eye;
-  force: 1, absolute, 1, position, .1,0.,0., 1.,0.,0., const, 1.;
-  couple: 2, absolute, 1, 0.,0.,1., const, .1;
-  force: 3, absolute, 2, position, null, 0.,2.,0., const, 1.;
-end: elements;
-)";
+  force: 1, absolute, 1, position, .1,0.,0., 1.,0.,0., )" +
+         load + "  couple: 2, absolute, 1, 0.,0.," + std::to_string(moment) + ", " + load +
+         "  force: 3, absolute, 2, position, null, 0.,2.,0., " + load + "end: elements;\n";
+}
 
-/// What a peer in loose coupling that always sends the same loads makes of two free bodies: the
-/// loads act from the start.
-TEST(GenelDecks, SteadyLoadsOnTwoBodies) {
-  DeckRun run(initial_value_block(.01, .03, "tolerance: 1e-8; max iterations: 20;") + kTwoBodies);
+/// What a peer in loose coupling that always sends the same loads makes of them: the loads act from
+/// the start.
+TEST(SteadyLoads, ActFromTheStartInLooseCoupling) {
+  DeckRun run(two_bodies("const, 1.", .1));
   ASSERT_TRUE(run.ready());
   run.step(3);
   EXPECT_NEAR(run.node(1).x(0), 1.00345000023, 1e-10);
@@ -98,6 +100,19 @@ TEST(GenelDecks, SteadyLoadsOnTwoBodies) {
   EXPECT_NEAR(run.node(1).w(2), 1.00201902417, 1e-9);
   EXPECT_NEAR(run.node(2).x(1), -.9990999995, 1e-10);
   EXPECT_NEAR(run.node(2).v(1), .06000002, 1e-9);
+}
+
+/// In tight coupling no load acts at the start: the first step, of Crank and Nicolson, sees half of
+/// it.
+TEST(SteadyLoads, ActFromTheFirstStepInTightCoupling) {
+  DeckRun run(two_bodies("step, 1e-6, 1., 0.", .1));
+  ASSERT_TRUE(run.ready());
+  run.step(3);
+  EXPECT_NEAR(run.node(1).x(0), 1.00330648148, 1e-10);
+  EXPECT_NEAR(run.node(1).v(0), .122777778, 1e-9);
+  EXPECT_NEAR(run.node(1).w(2), 1.00152286258, 1e-9);
+  EXPECT_NEAR(run.node(2).x(1), -.999387037, 1e-9);
+  EXPECT_NEAR(run.node(2).v(1), .0455555556, 1e-9);
 }
 
 }  // namespace
