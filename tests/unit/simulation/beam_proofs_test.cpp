@@ -450,5 +450,34 @@ TEST(Damping, EnergyDecaysAsTheFirstModeSays) {
   for (int k = 1; k < 5; ++k) EXPECT_NEAR(peak[k] / peak[k - 1], std::exp(-q * w * w * half), 2e-3);
 }
 
+// --- prestress ---------------------------------------------------------------------------------
+
+/// The initial assembly relaxes prestress: the node moves until only the weak assembly springs are
+/// left to pull.
+TEST(Prestress, RelaxesInTheInitialAssembly) {
+  DeckRun run(initial_value_block(1e-3, 1,
+                                  "tolerance: 1e-8; max iterations: 30; derivatives tolerance: "
+                                  "1e-4; derivatives max iterations: 20;") +
+              R"(
+begin: control data; structural nodes: 2; rigid bodies: 1; joints: 1; beams: 1; initial tolerance: 1e-8; max initial iterations: 50;
+end: control data;
+begin: nodes;
+  structural: 1, static, null, euler123, .1, .2, 0., null, null;
+  structural: 2, dynamic, .30, .02, .01, euler123, 0., 0., .3, null, null;
+end: nodes;
+begin: elements;
+  joint: 1, clamp, 1, node, node;
+  body: 2, 2, .5, null, diag, 2e-3, 3e-3, 4e-3;
+  beam2: 1, 1, position, 0., .01, 0., 2, position, 0., 0., .02, from nodes,
+    linear elastic generic, diag, 1.e4, 2.e4, 3.e4, 20., 30., 40., prestress, 1., 2., 3., .1, .2, .3;
+end: elements;
+)");
+  ASSERT_TRUE(run.ready());
+  for (const char* datum : {"Fx", "Fy", "Fz", "Mx", "My", "Mz"})
+    EXPECT_LT(std::abs(run.datum(Family::beam, 1, datum)), 5e-3) << datum;
+  EXPECT_NEAR(run.datum(Family::beam, 1, "kz"), -.3 / 40, 1e-3 * .3 / 40 + 1e-4);
+  EXPECT_GT((run.node(2).x - Vec3(.30, .02, .01)).norm(), 1e-5);
+}
+
 }  // namespace
 }  // namespace mbcosim
