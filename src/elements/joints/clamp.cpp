@@ -1,6 +1,16 @@
 #include "elements/joints/clamp.h"
 
+#include "elements/joints/joint_tangent.h"
+
 namespace mbcosim {
+
+void Clamp::tangent(const Local<double>& u, Tangent& t) const {
+  const Mat3 rotation = relative_rotation<double>(u.R(0).transpose(), R0.transpose());
+  for (int part = 0; part < 2; ++part)
+    t.block(t.row_node(0) + 3 * part, t.col_own(3 * part)) += Mat3::Identity();
+  t.add_position(t.row_own(0), 0, -Mat3::Identity() / u.c());
+  t.add_orientation(t.row_own(3), 0, -inverse_gamma(vector_of_rotation(rotation)) / u.c());
+}
 
 void Clamp::start(Start& s) const {
   for (int i = 0; i < 3; ++i) {

@@ -31,6 +31,7 @@ struct Clamp : NamedData<Clamp> {
     r.own3(0, (X0.cast<T>() - u.x(0)) / u.c());
     r.own3(3, -vector_of_rotation(rotation) / u.c());
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void start(Start& s) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;

@@ -1,6 +1,28 @@
 #include "elements/joints/distance.h"
 
+#include "elements/joints/joint_tangent.h"
+
 namespace mbcosim {
+
+void Distance::tangent(const Local<double>& u, Tangent& t) const {
+  const Vec3 axis = u.own3(0), tension = axis * u.own(3);
+  const Mat3 Tx = cross<double>(tension);
+  for (int k = 0; k < 2; ++k) {
+    const double sign = k == 0 ? 1 : -1;
+    const Mat3 fx = cross<double>(k == 0 ? arm_a(u) : arm_b(u));
+    const int force = t.row_node(k), moment = force + 3;
+    t.add_orientation(moment, k, sign * Tx * fx);
+    t.block(force, t.col_own(0)) -= sign * u.own(3) * Mat3::Identity();
+    t.block(moment, t.col_own(0)) -= sign * u.own(3) * fx;
+    add_to_column(t, force, 3, sign * axis);
+    add_to_column(t, moment, 3, sign * (fx * axis));
+    t.add_position(t.row_own(0), k, sign * Mat3::Identity());
+    t.add_orientation(t.row_own(0), k, -sign * fx);
+  }
+  t.block(t.row_own(0), t.col_own(0)) -= u.drive(length) * Mat3::Identity();
+  const Vec3 unit = axis.normalized();
+  for (int j = 0; j < 3; ++j) t.at(t.row_own(3), t.col_own(j)) += unit(j);
+}
 
 void Distance::assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const {
   if (offsets) return rows(u, r, TimeDual(u.drive(length).v));

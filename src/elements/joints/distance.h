@@ -35,6 +35,7 @@ struct Distance : TwoAttachments, NamedData<Distance> {
     r.own3(0, u.x(0) + f1 - u.x(1) - f2 + axis * D);
     r.own(3, T(1.0) - sqrt(axis.dot(axis)));
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   /// The initial assembly holds the length D(t₀): its rate is taken as zero, as in the reference solver. Without
   /// offsets the rate level is b u on the velocities and (v₁ − v₂)·u = 0, with u′ = u as a placeholder.
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;

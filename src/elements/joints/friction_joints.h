@@ -17,6 +17,7 @@ struct InLineFriction : InLine {
 
   static constexpr int width = 15;
 
+  void tangent(const Local<double>&, Tangent&) const = delete;  ///< that of InLine lacks the friction
   void connect(Connector& c) const {
     InLine::connect(c);
     c.differential(Friction::unknowns);
@@ -61,6 +62,7 @@ struct HingeFriction : Hinge {
   static constexpr int width = Hinge::width + 1;
   static constexpr int state = Hinge::width - 12;  ///< own index of z
 
+  void tangent(const Local<double>&, Tangent&) const = delete;  ///< that of Hinge lacks the friction
   void connect(Connector& c) const {
     Hinge::connect(c);
     c.differential(Friction::unknowns);

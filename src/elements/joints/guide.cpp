@@ -1,8 +1,66 @@
 #include "elements/joints/guide.h"
 
+#include "elements/joints/joint_tangent.h"
+
 #include "elements/joints/friction_joints.h"
 
 namespace mbcosim {
+
+namespace {
+
+/// The force λ e on node 0 at s from it and −λ e on node 1 at q, e fixed to node 0, λ own unknown
+/// k; its row (… − e·s)/c.
+void push_along(const Local<double>& u, Tangent& t, int k, const Vec3& e, const Vec3& s,
+                const Vec3& q) {
+  const int a = t.row_node(0), b = t.row_node(1), row = t.row_own(k);
+  const Vec3 s_e = s.cross(e), q_e = q.cross(e);
+  const Mat3 Fx = u.own(k) * cross<double>(e), qx = cross<double>(q);
+  t.add_orientation(a, 0, -Fx);
+  t.add_orientation(b, 0, Fx);
+  t.add_position(a + 3, 0, Fx);
+  t.add_position(a + 3, 1, -Fx);
+  t.add_orientation(a + 3, 0, -cross<double>(s) * Fx);
+  t.add_orientation(a + 3, 1, Fx * qx);
+  t.add_orientation(b + 3, 0, qx * Fx);
+  t.add_orientation(b + 3, 1, -Fx * qx);
+  add_to_column(t, a, k, e);
+  add_to_column(t, a + 3, k, s_e);
+  add_to_column(t, b, k, -e);
+  add_to_column(t, b + 3, k, -q_e);
+  add_point_to_row(t, row, 0, e / u.c());
+  add_point_to_row(t, row, 1, -e / u.c());
+  add_to_row(t, row, 0, s_e / u.c());
+  add_to_row(t, row, 1, -q_e / u.c());
+}
+
+}  // namespace
+
+void InLine::tangent(const Local<double>& u, Tangent& t) const {
+  const Mat3 V = hinge_a(u);
+  const Vec3 q = arm_b(u), s = u.x(1) + q - u.x(0);
+  for (int k = 0; k < 2; ++k) push_along(u, t, k, V.col(k), s, q);
+}
+
+void InPlane::tangent(const Local<double>& u, Tangent& t) const {
+  const Vec3 q = arm_b(u);
+  push_along(u, t, 0, u.R(0) * normal, u.x(1) + q - u.x(0), q);
+}
+
+void Prismatic::tangent(const Local<double>& u, Tangent& t) const {
+  const Mat3 A = hinge_a(u), B = hinge_b(u);
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 ea = A.col((k + 1) % 3), eb = B.col((k + 2) % 3), n = ea.cross(eb);
+    const Mat3 by_first = u.own(k) * cross<double>(eb) * cross<double>(ea),
+               by_second = -u.own(k) * cross<double>(ea) * cross<double>(eb);
+    for (int node = 0; node < 2; ++node) {
+      const double sign = node == 0 ? -1 : 1;
+      t.add_orientation(t.row_node(node) + 3, 0, sign * by_first);
+      t.add_orientation(t.row_node(node) + 3, 1, sign * by_second);
+      add_to_column(t, t.row_node(node) + 3, k, sign * n);
+      add_to_row(t, t.row_own(k), node, sign / u.c() * n);
+    }
+  }
+}
 
 // ------------------------------------------------------------------ in line
 

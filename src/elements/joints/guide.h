@@ -30,6 +30,7 @@ struct InLine : TwoAttachments, NamedData<InLine> {  // a: p and Rv, b: q
     r.load(1, -F, -q.cross(F));
     for (int k = 0; k < 2; ++k) r.own(k, (T(a.Rh.col(k).dot(a.f)) - V.col(k).dot(s)) / u.c());
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output_columns(const Local<double>& u, OutputRow& row) const;
   void output(const Local<double>& u, OutputRow& row) const {
     output_columns(u, row);
@@ -67,6 +68,7 @@ struct InPlane : TwoAttachments, NamedData<InPlane> {  // a: p, b: q
     r.load(1, -F, -q.cross(F));
     r.own(0, (T(normal.dot(a.f)) - v.dot(s)) / u.c());
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
   std::string row_name(int k) const { return constraint_name(k, 1); }
@@ -99,6 +101,7 @@ struct Prismatic : TwoAttachments, NamedData<Prismatic> {
     r.moment(0, -MT);
     r.moment(1, MT);
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
   std::string row_name(int k) const { return constraint_name(k, 0); }

@@ -1,8 +1,62 @@
 #include "elements/joints/revolute.h"
 
+#include "elements/joints/joint_tangent.h"
+
 #include "elements/joints/friction_joints.h"
 
 namespace mbcosim {
+
+void RevolutePin::tangent(const Local<double>& u, Tangent& t) const {
+  const Mat3 Q = u.R(0) * a.Rh;
+  const Vec3 e1 = Q.col(0), e2 = Q.col(1), e3 = R0.col(2), p = e2 * u.own(3) - e1 * u.own(4);
+  hold_point(u, t, 0, u.R(0) * a.f, -1);
+  const int moment = t.row_node(0) + 3;
+  t.add_orientation(moment, 0, -cross<double>(e3) * cross<double>(p));
+  add_to_column(t, moment, 3, e3.cross(e2));
+  add_to_column(t, moment, 4, e1.cross(e3));
+  add_to_row(t, t.row_own(3), 0, e2.cross(e3) / u.c());
+  add_to_row(t, t.row_own(4), 0, e1.cross(e3) / u.c());
+}
+
+/// MT = p × e₃ with p = M₁ e₂ − M₂ e₁.
+void RevoluteAxes::constrain_tangent(const Local<double>& u, Tangent& t, int row) const {
+  const Vec3 e3 = hinge_a(u).col(2);
+  const Mat3 H2 = hinge_b(u);
+  const Vec3 e1 = H2.col(0), e2 = H2.col(1), p = e2 * u.own(row) - e1 * u.own(row + 1),
+             n1 = e2.cross(e3), n2 = e3.cross(e1);
+  const Mat3 by_first = -cross<double>(p) * cross<double>(e3),
+             by_second = cross<double>(e3) * cross<double>(p);
+  for (int k = 0; k < 2; ++k) {
+    const int moment = t.row_node(k) + 3;
+    const double sign = k == 0 ? -1 : 1;
+    t.add_orientation(moment, 0, sign * by_first);
+    t.add_orientation(moment, 1, sign * by_second);
+    add_to_column(t, moment, row, sign * n1);
+    add_to_column(t, moment, row + 1, sign * n2);
+    add_to_row(t, t.row_own(row), k, sign / u.c() * n1);
+    add_to_row(t, t.row_own(row + 1), k, -sign / u.c() * n2);
+  }
+}
+
+void RevoluteHinge::tangent(const Local<double>& u, Tangent& t) const {
+  hold_point(u, t, 0, arm_a(u), -1);
+  hold_point(u, t, 1, arm_b(u), 1);
+  constrain_tangent(u, t, 3);
+}
+
+void AxialRotation::tangent(const Local<double>& u, Tangent& t) const {
+  hold_point(u, t, 0, arm_a(u), -1);
+  hold_point(u, t, 1, arm_b(u), 1);
+  constrain_tangent(u, t, 3);
+  const Vec3 e3 = hinge_a(u).col(2), spin = u.w(1) - u.w(0);
+  const Mat3 turned = u.own(5) * cross<double>(e3);
+  for (int k = 0; k < 2; ++k) {
+    const double sign = k == 0 ? -1 : 1;
+    t.add_orientation(t.row_node(k) + 3, 0, -sign * turned);
+    add_to_column(t, t.row_node(k) + 3, 5, sign * e3);
+    add_to_row(t, t.row_own(5), k, k == 0 ? Vec3(-e3.cross(spin)) : Vec3::Zero(), -sign * e3);
+  }
+}
 
 namespace {
 
@@ -136,6 +190,7 @@ void finish_hinge(Card& card, ElementInfo& info, const Hinge& e) {
   HingeFriction<Hinge> f;
   static_cast<Hinge&>(f) = e;
   f.radius = card.real("average radius");
+  if (!(f.radius > 0)) card.fail("the average radius of friction must be positive");
   f.friction = read_friction(card);
   add_element(card.builder(), info, f);
 }

@@ -39,6 +39,7 @@ struct RevolutePin : NamedData<RevolutePin> {
     r.own(3, e3.dot(e2) / u.c());
     r.own(4, e3.dot(e1) / u.c());
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   double angle(const Local<double>& u) const {
     return vector_of_rotation<double>(R0.transpose() * u.R(0) * a.Rh)(2);
   }
@@ -72,6 +73,8 @@ struct RevoluteAxes : TwoAttachments {
     r.own(row + 1, e3.dot(e1) / u.c());
     return e2.cross(e3) * u.own(row) + e3.cross(e1) * u.own(row + 1);
   }
+  /// Linearization of the moments ∓MT and of the two rows.
+  void constrain_tangent(const Local<double>& u, Tangent& t, int row) const;
   double angle(const Local<double>& u) const { return vector_of_rotation(relative_rotation(u))(2); }
   double unwrapped_angle(const Local<double>& u) const {
     return UnwrappedAngle::value(u, 0, angle(u));
@@ -112,6 +115,7 @@ struct RevoluteHinge : RevoluteAxes, NamedData<RevoluteHinge> {
     r.load(0, -F, -d1.cross(F) - MT);
     r.load(1, F, d2.cross(F) + MT);
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void start(Start& s) const;
   void output_columns(const Local<double>& u, OutputRow& row) const;
   void output(const Local<double>& u, OutputRow& row) const {
@@ -144,6 +148,7 @@ struct RevoluteRotation : RevoluteAxes, NamedData<RevoluteRotation> {
     r.moment(0, -MT);
     r.moment(1, MT);
   }
+  void tangent(const Local<double>& u, Tangent& t) const { constrain_tangent(u, t, 0); }
   void start(Start& s) const { start_angle(s); }
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
@@ -186,6 +191,7 @@ struct AxialRotation : RevoluteAxes, NamedData<AxialRotation> {
     r.moment(1, M);
     r.own(5, u.drive(omega) - e3.dot(u.w(1) - u.w(0)));
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   /// The velocity constraint acts at the rate level; its position level is M₃ = 0.
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;
   void start(Start& s) const { start_angle(s); }

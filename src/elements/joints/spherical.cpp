@@ -1,21 +1,8 @@
 #include "elements/joints/spherical.h"
 
+#include "elements/joints/joint_tangent.h"
+
 namespace mbcosim {
-
-namespace {
-
-/// A point at d from node k that is held: the node gets sign·(F, d × F), the rows −sign·(x + d)/c.
-void hold_point(const Local<double>& u, Tangent& t, int k, const Vec3& d, double sign) {
-  const Mat3 Fx = cross<double>(u.own3(0)), dx = cross<double>(d);
-  const int rows = t.row_node(k), own = t.row_own(0), columns = t.col_own(0);
-  t.block(rows, columns) -= sign * Mat3::Identity();
-  t.block(rows + 3, columns) -= sign * dx;
-  t.add_orientation(rows + 3, k, sign * Fx * dx);
-  t.add_position(own, k, -sign / u.c() * Mat3::Identity());
-  t.add_orientation(own, k, sign / u.c() * dx);
-}
-
-}  // namespace
 
 void SphericalHinge::tangent(const Local<double>& u, Tangent& t) const {
   hold_point(u, t, 0, arm_a(u), -1);

@@ -152,6 +152,7 @@ struct TotalJoint : NamedData<TotalJoint> {
     constraint.rows<T>(u, r, m.position - xd, m.velocity - xd, rotation_error(u, m),
                        m.spin - u.drive(constraint.angle));
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;
   void start(Start& s) const;
   void after_convergence(const Local<double>& u, State& state) const;
@@ -228,6 +229,7 @@ struct TotalPinJoint : NamedData<TotalPinJoint> {
     constraint.rows<T>(u, r, m.position - xd, m.velocity - xd, rotation_error(u, m),
                        spin(u) - u.drive(constraint.angle));
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;
   void start(Start& s) const;
   void after_convergence(const Local<double>& u, State& state) const;
