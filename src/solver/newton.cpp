@@ -17,6 +17,33 @@ double row_factor(const Model& model, const NewtonSettings& settings, std::size_
   return model.is_constraint_row[row] ? scale * settings.constraint_factor : scale;
 }
 
+/// A root of f near 0 by bracketing, f(0) given; NaN when there is no change of sign within reach.
+template <class Function>
+double root_near(Function&& f, double at_zero, double tolerance) {
+  double a = 0, fa = at_zero, b = 0, fb = 0;
+  bool found = false;
+  for (double reach = 1e-3 * std::abs(at_zero); !found && reach < 1e6 * std::abs(at_zero); reach *= 4)
+    for (const double side : {reach, -reach}) {
+      b = side;
+      fb = f(b);
+      found = fa * fb <= 0;
+      if (found) break;
+    }
+  if (!found) return NAN;
+  for (int k = 0; k < 100 && std::abs(fb) > tolerance; ++k) {  // regula falsi of the Illinois kind, with bisection
+    const double x = k % 3 == 2 ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa), fx = f(x);
+    if (fx * fb < 0) {
+      a = b;
+      fa = fb;
+    } else {
+      fa *= 0.5;
+    }
+    b = x;
+    fb = fx;
+  }
+  return b;
+}
+
 class Newton {
  public:
   Newton(const Model& model, Phase phase, double c, double ca, const NewtonSettings& settings, const NewtonHooks& hooks, State& state,
@@ -56,6 +83,8 @@ class Newton {
   /// One linear solve and update; false (with the outcome set) when the matrix cannot be factored
   /// or the line search gives up.
   bool correct(NewtonReport& report) {
+    const bool cycling = !settings_.line_search && cycles();
+    if (cycling) eliminate_worst();
     const bool factored = factor(report.iterations);
     ++report.iterations;
     if (!factored) {
@@ -67,7 +96,7 @@ class Newton {
     ws_.solver.solve(ws_.delta.data());
     if (!settings_.line_search) {
       // Full steps that cycle (dry friction, contacts) are shortened; a search without success goes on from where it ended.
-      if (cycles()) (void)search_along(model_, phase_, c_, ca_, rescue_, state_, ws_);
+      if (cycling) (void)search_along(model_, phase_, c_, ca_, rescue_, state_, ws_);
       else apply_correction(model_, ws_.delta, c_, ca_, state_);
     } else if (!search_along(model_, phase_, c_, ca_, *settings_.line_search, state_, ws_)) {
       finish(report, NewtonOutcome::not_converged);
@@ -87,6 +116,28 @@ class Newton {
     const auto recent = errors.end() - kPatience;
     return !(*std::min_element(recent, errors.end()) < *std::min_element(errors.begin(), recent));
   }
+  /// Nonlinear elimination: when one equation of a differential unknown makes up the residual (the state of dry friction at
+  /// a kink of its law), that equation is solved for its own unknown before the next step.
+  void eliminate_worst() {
+    const std::vector<double>& r = ws_.residual;
+    const auto worst = std::max_element(r.begin(), r.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+    const int row = static_cast<int>(worst - r.begin());
+    const double all = test_value(ResidualTest::norm, r);
+    if (model_.kinds[row] != UnknownKind::differential || std::abs(*worst) < 0.9 * all || !std::isfinite(all)) return;
+    const State start = state_;
+    const double at_start = *worst;
+    const auto value = [&](double correction) {
+      std::fill(ws_.delta.begin(), ws_.delta.end(), 0.0);
+      ws_.delta[row] = correction;
+      state_ = start;
+      apply_correction(model_, ws_.delta, c_, ca_, state_);
+      (void)residual();
+      return ws_.residual[row];
+    };
+    const double solution = root_near(value, at_start, 0.1 * settings_.tolerance);
+    (void)value(std::isfinite(solution) ? solution : 0.0);
+  }
+
   static LineSearchSettings rescue_settings() {
     LineSearchSettings s;
     s.lambda_min = 1e-3;
