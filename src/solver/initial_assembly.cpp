@@ -2,8 +2,11 @@
 
 #include <Eigen/Sparse>
 #include <Eigen/SparseLU>
+#include <map>
 
 #include "solver/newton.h"
+#include "solver/null_space.h"
+#include "solver/singularity.h"
 
 namespace mbcosim {
 
@@ -56,6 +59,7 @@ class Assembly {
         rows_.push_back(node.equilibrium + i);
         columns_.push_back(node.first + i);
       }
+    node_rows_ = static_cast<int>(rows_.size());
     for (const ElementRef& e : elements_)
       for (int k = 0; k < e.set->unknowns(e.index); ++k) {
         rows_.push_back(e.set->first_own(e.index) + k);
@@ -111,7 +115,8 @@ class Assembly {
     return std::sqrt(r2 / x2);
   }
 
-  bool correct() {
+  /// −∂r/∂δ, with ε on the diagonal of the elements' own rows.
+  Eigen::SparseMatrix<double> matrix(double regularization) const {
     std::vector<ElementSet::Triplet> entries;
     add_springs(entries);
     const EvalContext c = context();
@@ -121,14 +126,24 @@ class Assembly {
       const int row = row_of_[t.row], column = to_local_[t.column];
       if (row >= 0 && column >= 0) triplets.emplace_back(row, column, t.value);
     }
-    Eigen::SparseMatrix<double> matrix(2 * size_, 2 * size_);
-    matrix.setFromTriplets(triplets.begin(), triplets.end());
-    Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix);
+    if (regularization > 0)
+      for (int a = node_rows_; a < size_; ++a)
+        for (const int row : {a, size_ + a}) triplets.emplace_back(row, row, regularization);
+    Eigen::SparseMatrix<double> m(2 * size_, 2 * size_);
+    m.setFromTriplets(triplets.begin(), triplets.end());
+    return m;
+  }
+
+  bool correct(double regularization = 0) {
+    Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix(regularization));
     if (lu.info() != Eigen::Success) return false;
     VecX rhs(2 * size_);
     for (int a = 0; a < size_; ++a) {
       rhs(a) = r_[rows_[a]];
       rhs(size_ + a) = r_rate_[rows_[a]];
+      if (a < node_rows_) continue;
+      rhs(a) -= regularization * state_.y[columns_[a]];
+      rhs(size_ + a) -= regularization * state_.yp[columns_[a]];
     }
     const VecX delta = lu.solve(rhs) * model_.control.assembly_epsilon;
     if (!delta.allFinite()) return false;
@@ -169,7 +184,7 @@ class Assembly {
     }
   }
 
-  Error failure(ErrorKind kind, const AssemblyReport& report) const {
+  Error failure(ErrorKind kind, const AssemblyReport& report) {
     Error e;
     e.kind = kind;
     e.reason = kind == ErrorKind::singular ? "ASSEMBLY_SINGULAR" : "ASSEMBLY_NOT_CONVERGED";
@@ -179,20 +194,82 @@ class Assembly {
     e.failure.iteration = report.iterations;
     e.failure.residual_history = {report.error};
     e.failure.worst = worst_equations(model_, worst);
-    e.message = kind == ErrorKind::singular
-                    ? "initial assembly: the matrix is singular; constraints are redundant or nothing determines a node"
-                    : "initial assembly: error " + std::to_string(report.error) + " after " + std::to_string(report.iterations) +
-                          " iterations, tolerance " + std::to_string(model_.control.assembly_tolerance);
-    for (const WorstEquation& w : e.failure.worst)
-      if (w.residual != 0) e.message += "\n  " + w.owner + ", " + w.equation + ": " + std::to_string(w.residual);
+    char text[160];
+    std::snprintf(text, sizeof text, "initial assembly: error %.6g after %d iterations, tolerance %.6g", report.error,
+                  report.iterations, model_.control.assembly_tolerance);
+    e.message = kind == ErrorKind::singular ? "initial assembly: the matrix is singular" : text;
+    const std::string reason = diagnosis();
+    if (!reason.empty()) {
+      e.message += "\n  " + reason;
+      return e;
+    }
+    for (const WorstEquation& w : e.failure.worst) {
+      std::snprintf(text, sizeof text, "%.6g", w.residual);
+      if (w.residual != 0) e.message += "\n  " + w.owner + ", " + w.equation + ": " + text;
+    }
     return e;
+  }
+
+  /// Why the assembly failed: constraints that contradict each other, or that follow from each other; empty when neither is
+  /// found. Looks for the configuration that violates the constraints least, with compliant constraints.
+  std::string diagnosis() {
+    constexpr double kCompliance = 1e-6;
+    const int iterations = size_ > 20000 ? 10 : 60;
+    state_ = start_;
+    double change = HUGE_VAL;
+    compute_residual();
+    for (int k = 0; k < iterations && change > 1e-9; ++k) {
+      const std::vector<double> before = state_.y;
+      if (!correct(kCompliance)) return {};
+      compute_residual();
+      change = 0;
+      for (int a = 0; a < node_rows_; ++a) change = std::max(change, std::abs(state_.y[columns_[a]] - before[columns_[a]]));
+    }
+    const std::string fight = contradictions();
+    if (!fight.empty()) return fight;
+    const NullSpace null = find_null_space(matrix(0), 1e-12);
+    if (null.rank_loss == 0) {
+      return change > 1e-9 ? std::string()
+                           : "the constraints can be met from here: allow more `max initial iterations`, or give positions "
+                             "nearer to the assembled ones";
+    }
+    return "these constraints follow from each other: " + joined(owners_of(model_, by_model_row(null.left), 6)) +
+           "\n  hint: remove the redundant ones, or regularize a joint: `joint regularization: <label>, tikhonov, 1e-8;`";
+  }
+
+  /// The constraints that stay violated, largest violation of each element first.
+  std::string contradictions() const {
+    std::map<std::string, std::pair<double, std::string>> by_owner;
+    double largest = 0;
+    for (int a = node_rows_; a < size_; ++a) {
+      const double violation = std::abs(r_[rows_[a]]);
+      const auto [owner, equation] = model_.row_text(rows_[a]);
+      largest = std::max(largest, violation);
+      auto& worst = by_owner[owner];
+      if (violation >= worst.first) worst = {violation, equation};
+    }
+    if (!(largest > 1e-4)) return {};
+    std::string s = "these constraints contradict each other; the least violation that was found leaves";
+    for (const auto& [owner, worst] : by_owner) {
+      if (worst.first < 1e-2 * largest) continue;
+      char text[32];
+      std::snprintf(text, sizeof text, "%.3g", worst.first);
+      s += "\n  " + owner + ", " + worst.second + ": off by " + text;
+    }
+    return s;
+  }
+
+  VecX by_model_row(const VecX& local) const {
+    VecX r = VecX::Zero(n_);
+    for (int a = 0; a < size_; ++a) r(rows_[a]) = std::max(std::abs(local(a)), std::abs(local(size_ + a)));
+    return r;
   }
 
   const Model& model_;
   State& state_;
   const State start_;
   int n_;
-  int size_ = 0;
+  int size_ = 0, node_rows_ = 0;               ///< local rows of one level, those of nodes among them
   std::vector<ElementRef> elements_;
   std::vector<int> rows_, columns_;            ///< local index -> model row, column
   std::vector<int> to_local_, row_of_;         ///< model column, row (rate level: + n) -> local index

@@ -1,27 +1,46 @@
 #include "solver/singularity.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <numeric>
-#include <set>
+
+#include "solver/null_space.h"
 
 namespace mbcosim {
 
 namespace {
 
-constexpr int kDenseLimit = 2000;
-constexpr double kRankThreshold = 1e-13;  ///< relative to the largest pivot, on rows scaled to unit maximum
+constexpr double kRankThreshold = 1e-13, kNearThreshold = 1e-10;
+constexpr int kNearLimit = 400;
+constexpr int kNamed = 6;  ///< equations that a message names
 
-/// Owners of the rows where |v| is large, at most `count`.
-std::vector<WorstEquation> owners(const Model& model, const VecX& v, int count) {
-  std::vector<int> order(v.size());
+Eigen::SparseMatrix<double> sparse(const Model& model, const std::vector<double>& values) {
+  const int n = model.unknowns;
+  return Eigen::Map<const Eigen::SparseMatrix<double>>(n, n, static_cast<int>(model.row_index.size()), model.column_start.data(),
+                                                       model.row_index.data(), values.data());
+}
+
+Singularity look(const Model& model, const std::vector<double>& values, double threshold) {
+  Singularity r;
+  if (values.size() != model.row_index.size()) return r;
+  const NullSpace null = find_null_space(sparse(model, values), threshold);
+  r.rank_loss = null.rank_loss;
+  if (r.rank_loss == 0) return r;
+  r.undetermined = owners_of(model, null.right, kNamed);
+  r.redundant = owners_of(model, null.left, kNamed);
+  return r;
+}
+
+}  // namespace
+
+std::vector<WorstEquation> owners_of(const Model& model, const VecX& share, int count) {
+  std::vector<int> order(share.size());
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return std::abs(v(a)) > std::abs(v(b)); });
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return std::abs(share(a)) > std::abs(share(b)); });
   std::vector<WorstEquation> r;
-  for (int k = 0; k < std::min<int>(count, static_cast<int>(order.size())); ++k) {
-    if (std::abs(v(order[k])) < 0.1 * std::abs(v(order[0])) || v(order[k]) == 0) break;
-    const auto [owner, equation] = model.row_text(order[k]);
-    r.push_back({owner, equation, v(order[k])});
+  for (const int row : order) {
+    if (static_cast<int>(r.size()) == count || std::abs(share(row)) < 0.1 * std::abs(share(order[0])) || share(row) == 0) break;
+    const auto [owner, equation] = model.row_text(row);
+    r.push_back({owner, equation, share(row)});
   }
   return r;
 }
@@ -32,8 +51,6 @@ std::string joined(const std::vector<WorstEquation>& list) {
   return s;
 }
 
-}  // namespace
-
 std::string Singularity::text() const {
   std::string s = "the matrix is singular";
   if (rank_loss > 0) s += " (rank loss " + std::to_string(rank_loss) + ")";
@@ -43,30 +60,16 @@ std::string Singularity::text() const {
 }
 
 Singularity find_singularity(const Model& model, const std::vector<double>& values, int column) {
-  Singularity r;
-  const int n = model.unknowns;
-  if (n > kDenseLimit) {
-    if (column >= 0) {
-      const auto [owner, equation] = model.row_text(column);
-      r.undetermined.push_back({owner, equation, 1});
-    }
-    return r;
+  Singularity r = look(model, values, kRankThreshold);
+  if (r.undetermined.empty() && column >= 0) {
+    const auto [owner, equation] = model.row_text(column);
+    r.undetermined.push_back({owner, equation, 1});
   }
-  MatX a = MatX::Zero(n, n);
-  for (int j = 0; j < n; ++j)
-    for (int k = model.column_start[j]; k < model.column_start[j + 1]; ++k) a(model.row_index[k], j) = values[k];
-  if (!a.allFinite()) return r;
-  for (int i = 0; i < n; ++i)
-    if (const double m = a.row(i).cwiseAbs().maxCoeff(); m > 0) a.row(i) /= m;
-  Eigen::FullPivLU<MatX> lu;
-  lu.setThreshold(kRankThreshold);
-  lu.compute(a);
-  r.rank_loss = n - static_cast<int>(lu.rank());
-  if (r.rank_loss == 0) return r;
-  r.undetermined = owners(model, lu.kernel().rowwise().norm(), 4);
-  lu.compute(a.transpose());
-  r.redundant = owners(model, lu.kernel().rowwise().norm(), 4);
   return r;
+}
+
+Singularity find_near_singularity(const Model& model, const std::vector<double>& values) {
+  return model.unknowns > kNearLimit ? Singularity{} : look(model, values, kNearThreshold);
 }
 
 }  // namespace mbcosim

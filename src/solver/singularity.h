@@ -1,4 +1,5 @@
-/// A rank-revealing look at a matrix that could not be factored: which unknowns nothing determines, which equations fight.
+/// A rank-revealing look at a matrix that could not be factored, or with which the iteration did not converge: which unknowns
+/// nothing determines, which equations follow from others.
 #pragma once
 
 #include <string>
@@ -9,14 +10,22 @@
 namespace mbcosim {
 
 struct Singularity {
-  int rank_loss = 0;  ///< n − rank, 0 when not determined
+  int rank_loss = 0;  ///< 0 when the matrix has full rank
   std::vector<WorstEquation> undetermined;  ///< unknowns with the largest share in the null space
   std::vector<WorstEquation> redundant;     ///< equations with the largest share in the left null space
   std::string text() const;
 };
 
-/// Dense LU with full pivoting, for models of up to 2000 unknowns; larger ones are answered by `column`, the column without a
-/// pivot that the sparse factorization met (-1: unknown).
+/// Rank to rounding; `column` is the column without a pivot that the sparse factorization met (-1: unknown).
 Singularity find_singularity(const Model& model, const std::vector<double>& values, int column);
+
+/// Rank of a matrix that could be factored, with a looser threshold; full rank for models of more than 400 unknowns, for
+/// which the look would take long.
+Singularity find_near_singularity(const Model& model, const std::vector<double>& values);
+
+/// The rows where |share| is large, at most `count`, named.
+std::vector<WorstEquation> owners_of(const Model& model, const VecX& share, int count);
+/// "owner, equation; …".
+std::string joined(const std::vector<WorstEquation>& list);
 
 }  // namespace mbcosim

@@ -398,6 +398,10 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
     std::snprintf(text, sizeof text, "%.6g", w.residual);
     e.message += "\n  " + w.owner + ", " + w.equation + ": residual " + text;
   }
+  if (const Singularity cause = find_near_singularity(model_, workspace_.values); cause.rank_loss > 0)
+    e.message += "\n  " + cause.text() +
+                 "\n  hint: remove redundant constraints, or regularize one of their joints: `joint regularization: <label>, "
+                 "tikhonov, 1e-8;`";
   return e;
 }
 

@@ -1,0 +1,129 @@
+/// Initial assembly: what is inconsistent is assembled or named.
+#include <gmock/gmock.h>
+
+#include "deck_run.h"
+
+namespace mbcosim {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+std::string deck(const std::string& nodes, const std::string& elements, int node_count, int joints,
+                 const std::string& control = "") {
+  return initial_value_block(1e-3, 1,
+                             "derivatives tolerance: 1e6; derivatives coefficient: 1e-3;") +
+         "begin: control data; structural nodes: " + std::to_string(node_count) +
+         "; joints: " + std::to_string(joints) + "; rigid bodies: " + std::to_string(node_count) +
+         "; initial tolerance: 1e-8; max initial iterations: 30; " + control +
+         " end: control data;\nbegin: nodes;\n" + nodes + "end: nodes;\nbegin: elements;\n" +
+         elements + "end: elements;\n";
+}
+std::string body(int label) {
+  const std::string n = std::to_string(label);
+  return "body: " + n + ", " + n + ", 1., null, diag, 1.,1.,1.;\n";
+}
+
+/// What the start of a deck fails with.
+std::string failure(const std::string& text) {
+  const LoadReport report = load_deck(BundleSource({{"deck.mbd", text}}), "deck.mbd");
+  EXPECT_TRUE(report.ok()) << (report.diagnostics.empty() ? "" : report.diagnostics[0].text());
+  if (!report.ok()) return {};
+  const auto simulation = Simulation::create(report.model);
+  EXPECT_FALSE(simulation);
+  return simulation ? std::string() : simulation.error().message;
+}
+
+const std::string kTwoNodes =
+    "structural: 1, dynamic, null, eye, null, null;\nstructural: 2, dynamic, 1.,0.,0., eye, null, "
+    "null;\n";
+
+TEST(InitialAssembly, MovesNodesOntoTheirJoints) {
+  // The pin is 0.1 m off, the second body turned by 0.2 rad against its hinge and too fast.
+  DeckRun run(
+      deck("structural: 1, dynamic, .1,0.,0., eye, null, null;\n"
+           "structural: 2, dynamic, 1.,.05,0., vector, .2,0.,0., 0.,1.,0., null;\n",
+           body(1) + body(2) +
+               "joint: 1, spherical pin, 1, null, null;\n"
+               "joint: 2, revolute hinge, 1, 1.,0.,0., 2, null;\n",
+           2, 2));
+  ASSERT_TRUE(run.ready());
+  const NodeState a = run.node(1), b = run.node(2);
+  EXPECT_LT(a.x.norm(), 1e-9);
+  EXPECT_LT((a.x + a.R * Vec3(1, 0, 0) - b.x).norm(), 1e-9);
+  EXPECT_LT((a.R.col(2) - b.R.col(2)).norm(), 1e-9);
+  EXPECT_LT(a.v.norm(), 1e-9);
+  EXPECT_LT((a.v + a.w.cross(a.R * Vec3(1, 0, 0)) - b.v).norm(), 1e-9);
+  EXPECT_GT(b.v.norm(), .1);  // the given speed is kept as far as the joints allow
+}
+
+TEST(InitialAssembly, NamesConstraintsThatFight) {
+  const std::string message =
+      failure(deck(kTwoNodes + "structural: 3, dynamic, 5.,5.,5., eye, null, null;\n",
+                   body(1) + body(2) + body(3) +
+                       "joint: 1, clamp, 1, node, node;\njoint: 2, clamp, 2, node, node;\n"
+                       "joint: 7, distance, 1, 2, const, 1.5;\njoint: 8, clamp, 3, node, node;\n",
+                   3, 4));
+  EXPECT_THAT(message, HasSubstr("contradict each other"));
+  EXPECT_THAT(message, HasSubstr("joint 7 (distance)"));
+  EXPECT_THAT(message, HasSubstr("joint 1 (clamp)"));
+  EXPECT_THAT(message, HasSubstr("joint 2 (clamp)"));
+  EXPECT_THAT(message, Not(HasSubstr("joint 8")));  // has nothing to do with it
+}
+
+TEST(InitialAssembly, NamesTwoPinsOfOneBodyAtTheWrongPlaces) {
+  const std::string message =
+      failure(deck("structural: 1, dynamic, null, eye, null, null;\n",
+                   body(1) + "joint: 1, spherical pin, 1, null, null;\n"
+                             "joint: 2, spherical pin, 1, 1.,0.,0., 1.2,0.,0.;\n",
+                   1, 2));
+  EXPECT_THAT(message,
+              AllOf(HasSubstr("contradict each other"), HasSubstr("joint 1 (spherical pin)"),
+                    HasSubstr("joint 2 (spherical pin)")));
+}
+
+TEST(InitialAssembly, NamesRedundantConstraints) {
+  // Two pins on one axis and a third on the same point; the node starts displaced, so that
+  // iterations are needed.
+  const std::string message = failure(deck("structural: 1, dynamic, .01,0.,0., eye, null, null;\n",
+                                           body(1) + "joint: 1, spherical pin, 1, null, null;\n"
+                                                     "joint: 2, spherical pin, 1, null, null;\n",
+                                           1, 2));
+  EXPECT_THAT(message, HasSubstr("follow from each other"));
+  EXPECT_THAT(message,
+              AllOf(HasSubstr("joint 1 (spherical pin)"), HasSubstr("joint 2 (spherical pin)")));
+  EXPECT_THAT(message, HasSubstr("tikhonov"));
+}
+
+TEST(InitialAssembly, AsksForIterationsWhenTheyAreMissing) {
+  std::string text = deck("structural: 1, dynamic, .1,0.,0., eye, null, null;\n",
+                          body(1) + "joint: 1, spherical pin, 1, .5,0.,0., 0.,0.,.5;\n", 1, 1);
+  const std::string cards = "max initial iterations: 30;";
+  text.replace(text.find(cards), cards.size(), "max initial iterations: 1;");
+  EXPECT_THAT(failure(text),
+              AllOf(HasSubstr("after 1 iterations"), HasSubstr("max initial iterations")));
+}
+
+TEST(InitialAssembly, IsSkippedOnRequest) {
+  DeckRun run(deck("structural: 1, dynamic, .1,0.,0., eye, null, null;\n",
+                   body(1) + "joint: 1, spherical pin, 1, null, null;\n", 1, 1,
+                   "skip initial joint assembly;"));
+  ASSERT_TRUE(run.ready());
+  EXPECT_EQ(run.node(1).x(0), .1);
+}
+
+/// The stiffness decides which of two nodes moves more: displacements as 1/k.
+TEST(InitialAssembly, StiffNodesMoveLess) {
+  DeckRun run(deck(
+      "structural: 1, dynamic, null, eye, null, null, assembly, 3., 1., no;\n"
+      "structural: 2, dynamic, 1.,0.,0., eye, null, null, assembly, 1., 1., no;\n",
+      body(1) + body(2) + "joint: 1, prismatic, 1, 2;\njoint: 2, in plane, 1, null, 1.,0.,0., 2;\n",
+      2, 2));
+  ASSERT_TRUE(run.ready());
+  EXPECT_NEAR(run.node(1).x(0), .25, 1e-9);
+  EXPECT_NEAR(run.node(2).x(0), .25, 1e-9);
+}
+
+}  // namespace
+}  // namespace mbcosim
