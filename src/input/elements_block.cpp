@@ -150,6 +150,18 @@ void warn_of_unused(DeckCard& card, const std::vector<Hint>& hints) {
                    "position-drive3{} and orientation-drive3{} (total joint)");
 }
 
+/// Joints of what the reader added (after `before` elements) between a node and itself.
+void refuse_self_joints(DeckCard& card, Family family, std::size_t before) {
+  const Model& model = card.model();
+  if (family != Family::joint) return;
+  for (std::size_t i = before; i < model.elements.size(); ++i) {
+    const std::vector<int> nodes = model.elements[i].set->nodes(model.elements[i].index);
+    if (nodes.size() != 2 || nodes[0] != nodes[1]) continue;
+    card.fail("both nodes are structural node " + std::to_string(model.structural[nodes[0]].label),
+              "a joint connects two different nodes; to fix a node in space use a pin or `clamp`");
+  }
+}
+
 void read_element(DeckCard& card, Driven* driven = nullptr) {
   const Registry& registry = card.registry();
   const std::string word = card.statement().word;
@@ -175,6 +187,7 @@ void read_element(DeckCard& card, Driven* driven = nullptr) {
   std::vector<HintSample> samples;
   if (driven) card.set_hints(&driven->hints, &samples);
   reader(card, info);
+  refuse_self_joints(card, f, before);
   if (driven) {
     warn_of_unused(card, driven->hints);
     if (!samples.empty()) {

@@ -1,3 +1,5 @@
+#include <Eigen/Eigenvalues>
+
 #include "elements/bodies/body.h"
 #include "elements/bodies/moving_frame.h"
 #include "elements/bodies/readers.h"
@@ -10,6 +12,17 @@ namespace {
 
 constexpr double kGravitationalConstant = 6.67384e-11;  ///< `G, si` [m³/(kg s²)], MBDyn's value
 
+void warn_about_inertia(Card& card, const Mat3& j) {
+  if ((j - j.transpose()).norm() > 1e-9 * j.norm()) card.warn("the inertia matrix is not symmetric");
+  const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(Mat3(0.5 * (j + j.transpose())), Eigen::EigenvaluesOnly).eigenvalues();
+  if (principal(0) < -1e-9 * j.norm()) {
+    char text[120];
+    std::snprintf(text, sizeof text, "the inertia matrix is indefinite: principal moments %.6g, %.6g, %.6g", principal(0), principal(1),
+                  principal(2));
+    card.warn(text, "inertia is given about the centre of mass, not about the node");
+  }
+}
+
 /// mass, centre of mass, inertia about it [, inertial, orientation]: one part of a (condensed) body.
 void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
   const double m = card.real("mass");
@@ -17,7 +30,7 @@ void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
     card.fail("mass must not be negative, got " + std::to_string(m), "write `allow negative mass` before the mass if it is meant");
   const Vec3 x = card.relative_position("centre of mass", node);
   Mat3 j = card.relative_tensor("inertia", node);
-  if ((j - j.transpose()).norm() > 1e-9 * j.norm()) card.warn("the inertia matrix is not symmetric");
+  if (!negative_allowed) warn_about_inertia(card, j);
   if (card.keyword("inertial") && !card.keyword("node")) {
     const Mat3 r = card.relative_orientation("inertial axes", node);
     j = r * j * r.transpose();

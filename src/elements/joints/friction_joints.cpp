@@ -39,6 +39,7 @@ void read_brake(Card& card, ElementInfo& info) {
   if (!card.keyword("friction"))
     card.fail_at(card.next(), "brake: `friction` is missing", "a brake is nothing but friction");
   e.radius = card.real("average radius");
+  if (!(e.radius > 0)) card.fail("the average radius of friction must be positive");
   e.friction = read_friction(card);
   e.force = card.drive("normal force");
   add_element(card.builder(), info, e);

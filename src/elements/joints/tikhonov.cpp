@@ -82,6 +82,9 @@ void read_tikhonov(Card& card, ElementInfo& info) {
   } else {
     std::fill(epsilon.begin(), epsilon.end(), card.real("regularization coefficient"));
   }
+  for (const double e : epsilon)
+    if (!(e >= 0))
+      card.fail("regularization coefficient must not be negative, got " + std::to_string(e));
   TikhonovSet& set = card.builder().set<TikhonovSet>();
   set.add(info, joint, std::move(epsilon));
   card.builder().register_element(set);
