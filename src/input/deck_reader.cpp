@@ -234,6 +234,10 @@ void DeckReader::check_initial_value() {
       s.method.method == Method::third_order || s.method.method == Method::third_order_ad_hoc;
   if (third_order && s.line_search)
     refuse(deck_.method_where, "the third order method has no line search: use newton raphson");
+  if (s.method.method == Method::hope && s.strategy != StepStrategy::no_change)
+    deck_.session.report(deck_.session.diagnostic(
+        Severity::warning, "initial-value", deck_.strategy_where,
+        "method hope supposes equal steps: it loses its order when they vary", "use `method: ms`"));
   if (s.strategy != StepStrategy::change) return;
   double largest = std::numeric_limits<double>::infinity();
   try {
