@@ -76,7 +76,7 @@ class VariableStep : public testing::TestWithParam<OrderCase> {};
 
 TEST_P(VariableStep, KeepsTheOrder) {
   const auto [method, order, with_constraints] = GetParam();
-  const double h = .004;
+  const double h = .008;
   EXPECT_NEAR(std::log2(bouncing_error(method, h) / bouncing_error(method, h / 2)), order, .15);
   EXPECT_NEAR(std::log2(swinging_error(method, h) / swinging_error(method, h / 2)),
               with_constraints, .15);
