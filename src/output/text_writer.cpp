@@ -1,5 +1,6 @@
 #include "output/text_writer.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
@@ -60,6 +61,14 @@ class TextFile {
   bool failed_ = false;
 };
 
+/// Modal joints print elsewhere but have an (empty) file of joints.
+bool has_joint_output(const Model& model) {
+  return std::any_of(model.elements.begin(), model.elements.end(), [](const ElementRef& e) {
+    const ElementInfo& info = e.set->info(e.index);
+    return info.family == Family::joint && info.output;
+  });
+}
+
 class TextWriter : public ResultWriter, private OutputRow {
  public:
   explicit TextWriter(const std::string& prefix) : prefix_(prefix) {
@@ -74,6 +83,7 @@ class TextWriter : public ResultWriter, private OutputRow {
     out_.create();
     log_.create();
     log_.text(model_log(model));
+    if (has_joint_output(model)) files_[static_cast<std::size_t>(OutputFile::jnt)].create();
     if (model.control.output_reference_frames) write_reference_frames(model, *this);
   }
   void derivatives(double time, int iterations, double error) override {

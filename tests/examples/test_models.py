@@ -107,3 +107,8 @@ def test_five_elements_follow_a_slow_load(results):
     (21, [1.648519042e-4, 4.166179450e-3, 0.6168521562], 1e-8), (22, [1.999797474, 4.905467615e-2, 0.6168521562], 1e-6)])
 def test_modal_body_as_in_the_tutorials(results, label, motion, tolerance):
     assert results("modal_body", "mov", label)[100, 1:4] == pytest.approx(motion, rel=1e-6, abs=tolerance)
+
+
+def test_modal_joints_alone_leave_an_empty_file_of_joints(results):
+    assert len(results("modal_body", "mod", "10.1")) == len(results("modal_body", "mov", 11))
+    assert len(results("modal_body", "jnt", 10)) == 0
