@@ -3,7 +3,8 @@
 
 namespace mbcosim {
 
-/// A writer of a self-describing format derives from this besides OutputRow. An element that can choose its fields
+/// A writer of a self-describing format derives from this besides OutputRow. An element that can
+/// choose its fields
 /// (`custom output`) asks for it by dynamic_cast.
 class DetailedRow {
  public:

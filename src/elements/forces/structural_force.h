@@ -10,7 +10,7 @@
 
 namespace mbcosim {
 
-/// Force on one node (spec 03 section 7.1).
+/// Force on one node.
 ///
 ///   f = d(t), or R d(t) for a follower force [N];   m = (R a) × f about the node [N·m]
 struct StructuralForce {
@@ -158,8 +158,7 @@ struct TotalForce {
   void output(const Local<double>& u, OutputRow& row) const;
 };
 
-/// Force and moment between two nodes along axes of the first, acting at a point of the second
-/// (spec 03 section 7.2).
+/// Force and moment between two nodes along axes of the first, acting at a point of the second.
 ///
 ///   F = R₁ Rf d_f,  M = R₁ Rm d_m,  B₂ = R₂ f₂,  B₁ = x₂ + B₂ − x₁
 ///   node 1: F, M + B₁ × F;   node 2: −F, −(M + B₂ × F)

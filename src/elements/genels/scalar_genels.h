@@ -1,5 +1,5 @@
 /// Genels on single degrees of freedom: constraints, springs, masses. MBDyn input manual, "Genel
-/// elements"; spec 03 section 9.1.
+/// elements".
 #pragma once
 
 #include "elements/genels/dof_access.h"

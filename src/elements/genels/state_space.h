@@ -39,7 +39,7 @@ enum class CanonicalForm { controllable, observable };
 LinearSystem companion_system(CanonicalForm form, const std::vector<double>& denominator,
                               const std::vector<double>& numerator);
 
-/// Rows of the states: B u + A x − E ẋ; of each output dof: C x + D u − y (spec 03 section 9.1).
+/// Rows of the states: B u + A x − E ẋ; of each output dof: C x + D u − y.
 class StateSpace : public GeneralElement {
  public:
   StateSpace(LinearSystem system, std::vector<NodeDof> outputs, std::vector<ScalarValue> inputs)

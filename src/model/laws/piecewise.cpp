@@ -70,8 +70,7 @@ template <int N>
 LawPtr<N> read_contact(Card& card) {
   Contact<N> c;
   c.k = card.real("contact stiffness");
-  if (c.k <= 0)
-    card.warn("contact elastic: null or negative stiffness " + std::to_string(c.k));
+  if (c.k <= 0) card.warn("contact elastic: null or negative stiffness " + std::to_string(c.k));
   c.gamma = card.real("contact exponent");
   if (c.gamma < 1)
     card.fail("contact elastic: the exponent must be at least 1, got " + std::to_string(c.gamma));
