@@ -1,4 +1,5 @@
 /// Each joint between two free bodies: numbers of MBDyn 1.7.3.
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -259,6 +260,28 @@ TEST_P(JointReference, AgreesAfterAQuarterOfASecond) {
   for (std::size_t i = 0; i < c.extras.size(); ++i)
     EXPECT_NEAR(last[12 + i], c.extras[i], 2e-6 * std::max(1.0, std::abs(c.extras[i])))
         << "extra column " << i;
+}
+
+/// Forces and moments that drives can read are those that are printed.
+TEST_P(JointReference, PrivateReactionsAreThePrintedOnes) {
+  DeckRun run(reference_deck(GetParam()));
+  ASSERT_TRUE(run.ready());
+  run.step(51);
+  testing::Columns row;
+  const ElementRef e = run.model().find_element(Family::joint, 1);
+  e.set->output(run.context(), e.index, row);
+  const std::vector<std::string> names = e.set->private_data(e.index);
+  for (const std::string& name : names) {
+    const int datum = e.set->private_datum(e.index, name);
+    ASSERT_GE(datum, 0) << name;
+    const double value = e.set->private_value(run.context(), e.index, datum);
+    EXPECT_TRUE(std::isfinite(value)) << name;
+    if (name[0] != 'F' && name[0] != 'M') continue;
+    EXPECT_TRUE(std::any_of(row.v.begin(), row.v.begin() + 12,
+                            [&](double x) { return std::abs(x - value) <= 1e-12; }))
+        << name << " = " << value;
+  }
+  EXPECT_EQ(e.set->private_datum(e.index, "Fw"), -1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Joints, JointReference, ::testing::ValuesIn(kCases),
