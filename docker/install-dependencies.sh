@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs the Debian packages of dependencies.txt that are missing. Usage: install-dependencies.sh [build|run|all]
+# Installs the Debian packages of dependencies.txt that are missing. Usage: install-dependencies.sh [build|run|all|fuzz]
 #   build  what compiles the program          run  what a container needs to run the daemon
-#   all    what builds, tests and shows (default)
+#   all    what builds, tests and shows (default)      fuzz   what builds the fuzz target
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 what=${1:-all}
@@ -9,8 +9,9 @@ what=${1:-all}
 case $what in
   build) wanted='$2 == ""' ;;
   run) wanted='$2 == "run"' ;;
-  all) wanted='$2 != "run"' ;;
-  *) echo "usage: $0 [build|run|all]" >&2; exit 4 ;;
+  all) wanted='$2 != "run" && $2 != "fuzz"' ;;
+  fuzz) wanted='$2 == "" || $2 == "fuzz"' ;;
+  *) echo "usage: $0 [build|run|all|fuzz]" >&2; exit 4 ;;
 esac
 mapfile -t packages < <(sed 's/#.*//' "$here/dependencies.txt" | awk "NF && $wanted {print \$1}")
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, and runs every test. Works on Debian 12 as root or with sudo.
 #
-# usage: tests/run.sh [--asan | --tsan] [--quick] [ctest arguments …]
+# usage: tests/run.sh [--asan | --tsan | --fuzz] [--quick] [ctest arguments …]
 #        tests/run.sh --tidy [REVISION | --all]
 #   --asan   address and undefined-behaviour sanitizers, in build-asan/
 #   --tsan   thread sanitizer, in build-tsan/
+#   --fuzz   fuzzes the deck reader for 60 seconds (clang), in build-fuzz/; no other test
 #   --quick  skips the tests labelled `slow`
 #   --tidy   clang-tidy on the sources changed since REVISION (default: the commit before the last), instead of the tests
 set -euo pipefail
@@ -17,9 +18,10 @@ while [ $# -gt 0 ]; do
   case $1 in
     --asan) preset=asan ;;
     --tsan) preset=tsan ;;
+    --fuzz) exec tests/fuzz/run.sh 60 ;;
     --quick) arguments+=(--label-exclude slow) ;;
     --tidy) tidy=yes ;;
-    -h | --help) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,10s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) arguments+=("$1") ;;
   esac
   shift
