@@ -1,7 +1,9 @@
 #include "simulation/describe.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -60,11 +62,146 @@ std::string title_of(const std::string& type, int label, const std::string& name
   return type + " " + std::to_string(label) + (name.empty() ? "" : " \"" + name + "\"");
 }
 
-nlohmann::json number(double x) { return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(); }
+using Json = nlohmann::ordered_json;
+
+Json number(double x) { return std::isfinite(x) ? Json(x) : Json(); }
+
+/// "node.structural.3.", "joint.7.", "drive.4.": what the names of an entity's variables begin
+/// with.
+std::string prefix_of(std::string family, int label) {
+  std::replace(family.begin(), family.end(), ' ', '_');
+  return family + "." + std::to_string(label) + ".";
+}
+
+/// The same from the name of a variable; empty when it belongs to the whole model.
+std::string prefix_of(const std::string& name) {
+  std::size_t end = name.find('.');
+  for (int k = name.starts_with("node.") ? 0 : 1; k < 2 && end != std::string::npos; ++k)
+    end = name.find('.', end + 1);
+  if (name.starts_with("drive.")) return name + ".";
+  return end == std::string::npos ? "" : name.substr(0, end + 1);
+}
+
+/// Writes the tree; variables are kept by their prefixes.
+class TreeWriter {
+ public:
+  explicit TreeWriter(const ModelDescription& d) : d_(d) {
+    for (const Variable& v : d.variables) by_prefix_[prefix_of(v.name)].push_back(&v);
+  }
+
+  std::string text() {
+    head();
+    nodes();
+    elements();
+    drives();
+    out_ << "symbols (" << d_.symbols.size() << ")\n";
+    for (const auto& s : d_.symbols) out_ << "  " << s.first << " = " << s.second << "\n";
+    out_ << "variables of the model (" << by_prefix_[""].size() << ")\n";
+    variables("", "  ");
+    return out_.str();
+  }
+
+ private:
+  void head() {
+    out_ << "model" << (d_.title.empty() ? "" : " \"" + d_.title + "\"") << "\n  digest "
+         << d_.digest << "\n  time " << d_.initial_time << " to " << d_.final_time << " s, step "
+         << d_.time_step << " s\n  unknowns " << d_.unknowns << "\n";
+  }
+
+  void nodes() {
+    out_ << "nodes (" << d_.nodes.size() << ")\n";
+    for (const NodeDescription& n : d_.nodes) {
+      out_ << "  " << title_of(n.type + " node", n.label, n.name) << ", " << n.kind << ", at";
+      for (const double x : n.value) out_ << " " << x;
+      out_ << "\n";
+      variables(prefix_of("node." + n.type, n.label));
+    }
+  }
+
+  void elements() {
+    out_ << "elements (" << d_.elements.size() << ")\n";
+    for (const ElementDescription& e : d_.elements) {
+      out_ << "  " << title_of(e.family, e.label, e.name);
+      if (!e.type.empty() && e.type != e.family) out_ << ", " << e.type;
+      for (std::size_t i = 0; i < e.nodes.size(); ++i)
+        out_ << (i == 0 ? ", nodes " : " ") << e.nodes[i];
+      out_ << (e.driven ? ", driven" : "") << "\n";
+      variables(prefix_of(e.family, e.label));
+    }
+  }
+
+  void drives() {
+    out_ << "drives (" << d_.drives.size() << ")\n";
+    for (const DriveDescription& drive : d_.drives) {
+      out_ << "  " << title_of("drive caller", drive.label, drive.name) << "\n";
+      variables(prefix_of("drive", drive.label));
+    }
+  }
+
+  void variables(const std::string& prefix, const char* blanks = "    ") {
+    const auto found = by_prefix_.find(prefix);
+    if (found == by_prefix_.end()) return;
+    for (const Variable* v : found->second) {
+      out_ << blanks << v->name;
+      if (v->size > 1) out_ << "[" << v->size << "]";
+      if (!v->unit.empty()) out_ << " [" << v->unit << "]";
+      if (!v->frame.empty()) out_ << ", " << v->frame;
+      out_ << ", " << causality_name(v->causality) << ": " << v->description << "\n";
+    }
+    if (!prefix.empty()) by_prefix_.erase(found);  // a second entity of the same prefix has none
+  }
+
+  const ModelDescription& d_;
+  std::map<std::string, std::vector<const Variable*>> by_prefix_;
+  std::ostringstream out_;
+};
+
+Json to_json(const NodeDescription& n) {
+  return {{"family", n.type}, {"kind", n.kind},         {"label", n.label},      {"name", n.name},
+          {"value", n.value}, {"private_data", n.data}, {"unknowns", n.unknowns}};
+}
+
+Json to_json(const ElementDescription& e) {
+  return {{"family", e.family},     {"type", e.type},    {"label", e.label},
+          {"name", e.name},         {"nodes", e.nodes},  {"private_data", e.data},
+          {"unknowns", e.unknowns}, {"driven", e.driven}};
+}
+
+Json to_json(const DriveDescription& d) {
+  return {{"label", d.label}, {"name", d.name}, {"has_derivative", d.has_derivative}};
+}
+
+Json to_json(const Variable& v) {
+  return {{"name", v.name},   {"size", v.size},
+          {"shape", v.shape}, {"unit", v.unit},
+          {"frame", v.frame}, {"causality", causality_name(v.causality)},
+          {"owner", v.owner}, {"description", v.description}};
+}
+
+template <class T>
+Json list(const std::vector<T>& items) {
+  Json array = Json::array();
+  for (const T& item : items) array.push_back(to_json(item));
+  return array;
+}
 
 }  // namespace
 
-ModelDescription describe(const Model& model) {
+const char* causality_name(Causality causality) {
+  switch (causality) {
+    case Causality::input:
+      return "input";
+    case Causality::output:
+      return "output";
+    case Causality::parameter:
+      return "parameter";
+    case Causality::state:
+      return "state";
+  }
+  return "";
+}
+
+ModelDescription describe(const Model& model, std::vector<Variable> variables) {
   ModelDescription d;
   d.title = model.title;
   d.digest = hexadecimal(model.digest);
@@ -78,72 +215,30 @@ ModelDescription describe(const Model& model) {
   for (const NamedDrive& n : model.drives)
     d.drives.push_back({n.label, n.name, n.drive->has_derivative()});
   for (const ReferenceFrame& f : model.frames) d.frames.push_back(f.label);
-  d.variables = model.symbols;
+  d.symbols = model.symbols;
+  d.variables = std::move(variables);
   return d;
 }
 
-std::string to_text(const ModelDescription& d) {
-  std::ostringstream out;
-  out << "model" << (d.title.empty() ? "" : " \"" + d.title + "\"") << "\n  digest " << d.digest
-      << "\n  time " << d.initial_time << " to " << d.final_time << " s, step " << d.time_step
-      << " s\n  unknowns " << d.unknowns << "\n";
-  out << "nodes (" << d.nodes.size() << ")\n";
-  for (const NodeDescription& n : d.nodes) {
-    out << "  " << title_of(n.type + " node", n.label, n.name) << ", " << n.kind << ", at";
-    for (const double x : n.value) out << " " << x;
-    out << "\n";
-  }
-  out << "elements (" << d.elements.size() << ")\n";
-  for (const ElementDescription& e : d.elements) {
-    out << "  " << title_of(e.family, e.label, e.name);
-    if (!e.type.empty() && e.type != e.family) out << ", " << e.type;
-    for (std::size_t i = 0; i < e.nodes.size(); ++i)
-      out << (i == 0 ? ", nodes " : " ") << e.nodes[i];
-    out << (e.driven ? ", driven" : "") << "\n";
-  }
-  out << "drives (" << d.drives.size() << ")\n";
-  for (const DriveDescription& drive : d.drives)
-    out << "  " << title_of("drive caller", drive.label, drive.name) << "\n";
-  out << "variables (" << d.variables.size() << ")\n";
-  for (const auto& v : d.variables) out << "  " << v.first << " = " << v.second << "\n";
-  return out.str();
-}
+std::string to_text(const ModelDescription& d) { return TreeWriter(d).text(); }
 
 std::string to_json(const ModelDescription& d) {
-  nlohmann::json j = {{"title", d.title},
-                      {"digest", d.digest},
-                      {"initialTime", number(d.initial_time)},
-                      {"finalTime", number(d.final_time)},
-                      {"timeStep", number(d.time_step)},
-                      {"unknowns", d.unknowns},
-                      {"nodes", nlohmann::json::array()},
-                      {"elements", nlohmann::json::array()},
-                      {"drives", nlohmann::json::array()},
-                      {"frames", d.frames},
-                      {"variables", nlohmann::json::array()}};
-  for (const NodeDescription& n : d.nodes)
-    j["nodes"].push_back({{"type", n.type},
-                          {"kind", n.kind},
-                          {"label", n.label},
-                          {"name", n.name},
-                          {"value", n.value},
-                          {"privateData", n.data},
-                          {"unknowns", n.unknowns}});
-  for (const ElementDescription& e : d.elements)
-    j["elements"].push_back({{"family", e.family},
-                             {"type", e.type},
-                             {"label", e.label},
-                             {"name", e.name},
-                             {"nodes", e.nodes},
-                             {"privateData", e.data},
-                             {"unknowns", e.unknowns},
-                             {"driven", e.driven}});
-  for (const DriveDescription& drive : d.drives)
-    j["drives"].push_back(
-        {{"label", drive.label}, {"name", drive.name}, {"hasDerivative", drive.has_derivative}});
-  for (const auto& v : d.variables)
-    j["variables"].push_back({{"declaration", v.first}, {"value", v.second}});
-  return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+  Json symbols = Json::array();
+  for (const auto& s : d.symbols)
+    symbols.push_back({{"declaration", s.first}, {"value", s.second}});
+  const Json j = {{"title", d.title},
+                  {"digest", d.digest},
+                  {"unknowns", d.unknowns},
+                  {"initial_time", number(d.initial_time)},
+                  {"final_time", number(d.final_time)},
+                  {"time_step", number(d.time_step)},
+                  {"nodes", list(d.nodes)},
+                  {"elements", list(d.elements)},
+                  {"drives", list(d.drives)},
+                  {"frames", d.frames},
+                  {"symbols", symbols},
+                  {"variables", list(d.variables)}};
+  return j.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace mbcosim

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "model/model.h"
+#include "simulation/variable.h"
 
 namespace mbcosim {
 
@@ -45,14 +46,18 @@ struct ModelDescription {
   std::vector<NodeDescription> nodes;
   std::vector<ElementDescription> elements;
   std::vector<DriveDescription> drives;
-  std::vector<int> frames;                                     ///< labels of reference frames
-  std::vector<std::pair<std::string, std::string>> variables;  ///< ("real L", "0.5")
+  std::vector<int> frames;                                   ///< labels of reference frames
+  std::vector<std::pair<std::string, std::string>> symbols;  ///< of `set` cards: ("real L", "0.5")
+  std::vector<Variable> variables;                           ///< what can be read and written
 };
 
-ModelDescription describe(const Model& model);
-/// A tree of lines with two blanks per level.
+/// `variables` of a simulation of the model; may be left out.
+ModelDescription describe(const Model& model, std::vector<Variable> variables = {});
+/// A tree of lines with two blanks per level: variables stand below what they belong to.
 std::string to_text(const ModelDescription& description);
-/// One JSON object; infinite numbers are null.
+/// One JSON object; infinite numbers are null, what is not UTF-8 is replaced.
 std::string to_json(const ModelDescription& description);
+
+const char* causality_name(Causality causality);
 
 }  // namespace mbcosim

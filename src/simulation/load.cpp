@@ -44,6 +44,14 @@ std::int64_t count_unknowns(const Model& model) {
   return n;
 }
 
+Diagnostic full_note(const Limits& limits) {
+  Diagnostic d;
+  d.severity = Severity::note;
+  d.code = "limit-errors";
+  d.message = "reading stops after " + std::to_string(limits.errors) + " errors (limit `errors`)";
+  return d;
+}
+
 /// Reads into `session`; the model, or null with the reason in the session's diagnostics.
 ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnostic>& extra) {
   Deck deck(session, builder, full_registry());
@@ -55,7 +63,7 @@ ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnos
   if (const std::int64_t n = count_unknowns(model); n > session.limits.unknowns) {
     extra.push_back(plain_error("limit-unknowns", session.file(0).name,
                                 "the model has " + std::to_string(n) + " unknowns; the limit is " +
-                                    std::to_string(session.limits.unknowns)));
+                                    std::to_string(session.limits.unknowns) + " (limit `unknowns`)"));
     return nullptr;
   }
   model.digest = digest(session, deck.data_files);
@@ -78,9 +86,10 @@ LoadReport load_deck(const FileSource& files, const std::string& main_file, cons
     Session session(files, limits, &builder);
     const Result<int> opened = session.open_file(main_file);
     if (!opened) {
+      const bool limit = opened.error().kind == ErrorKind::limit;
       report.diagnostics.push_back(
-          plain_error(opened.error().kind == ErrorKind::limit ? "limit-deck-bytes" : "no-file",
-                      main_file, opened.error().message));
+          plain_error(limit ? "limit-deck-bytes" : "no-file", main_file,
+                      opened.error().message + (limit ? " (limit `deck-bytes`)" : "")));
       return report;
     }
     std::vector<Diagnostic> extra;
@@ -88,6 +97,7 @@ LoadReport load_deck(const FileSource& files, const std::string& main_file, cons
     report.printed = session.printed;
     report.diagnostics = session.take_diagnostics();
     report.diagnostics.insert(report.diagnostics.end(), extra.begin(), extra.end());
+    if (session.errors() >= limits.errors) report.diagnostics.push_back(full_note(limits));
   } catch (const std::exception& error) {
     report.model = nullptr;
     report.diagnostics.push_back(plain_error(

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "simulation/units.h"
+
 namespace mbcosim {
 
 namespace {
@@ -99,7 +101,7 @@ void Variables::add_element(const Model& model, int element) {
   const std::string prefix = element_prefix(e.set->info(e.index)) + ".", owner = model.element_text(e);
   for (const std::string& name : e.set->private_data(e.index)) {
     const int datum = e.set->private_datum(e.index, name);
-    if (datum >= 0) add({prefix + name, 1, {}, "", "", Causality::output, "private datum " + name, owner}, {Source::element_datum, element, datum});
+    if (datum >= 0) add({prefix + name, 1, {}, unit_of_datum(e.set->info(e.index).family, name), "", Causality::output, "private datum " + name, owner}, {Source::element_datum, element, datum});
   }
 }
 

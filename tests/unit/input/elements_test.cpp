@@ -3,6 +3,7 @@
 
 #include "deck_fixture.h"
 #include "simulation/describe.h"
+#include "simulation/units.h"
 
 #include <nlohmann/json.hpp>
 
@@ -150,8 +151,50 @@ TEST(Describe, ListsWhatTheModelHas) {
   EXPECT_NE(text.find("\n  real L = 0.5\n"), std::string::npos);
   const nlohmann::json json = nlohmann::json::parse(to_json(description));
   EXPECT_EQ(json["elements"][0]["type"], "clamp");
-  EXPECT_TRUE(json["finalTime"].is_null());
+  EXPECT_TRUE(json["final_time"].is_null());
   EXPECT_EQ(json["nodes"].size(), 3u);
+}
+
+TEST(Describe, PutsVariablesBelowTheirOwners) {
+  DeckText d = elements(
+      "joint: 7, clamp, 2, node, node; body: 3, 1, 2., null, eye; drive caller: 4, name, \"ramp\", "
+      "2.;",
+      "hydraulic: 5, value, 2.;");
+  const ModelPtr model = model_of(d);
+  ASSERT_TRUE(model);
+  const auto simulation = Simulation::create(model);
+  ASSERT_TRUE(simulation) << simulation.error().message;
+  const ModelDescription description = describe(*model, (*simulation)->variables());
+  const std::string text = to_text(description);
+  for (const char* lines :
+       {"\n  structural node 2 \"base\", static, at 0 0 0\n    node.structural.2.X[3] [m], global, "
+        "state: "
+        "position\n",
+        "\n  hydraulic node 5, algebraic, at 2\n    node.hydraulic.5.x [Pa], state: "
+        "value\nelements (2)\n",
+        "\n  joint 7, clamp, nodes 2\n    joint.7.Fx [N], output: private datum Fx\n",
+        "\n    joint.7.Mz [N m], output: private datum Mz\n",
+        "\n    body.3.E [J], output: private datum E\n",
+        "\n  drive caller 4 \"ramp\"\n    drive.4, output: value of the drive caller\nsymbols (",
+        "\nvariables of the model (2)\n  time [s], output: simulation time\n  step, output: number "
+        "of the "
+        "last accepted step\n"})
+    EXPECT_NE(text.find(lines), std::string::npos) << lines << "\nin\n" << text;
+  const nlohmann::json json = nlohmann::json::parse(to_json(description));
+  EXPECT_EQ(json["variables"].size(), description.variables.size());
+  EXPECT_EQ(json["drives"][0]["name"], "ramp");
+  EXPECT_EQ(json["nodes"][0]["family"], "structural");
+}
+
+TEST(Describe, KnowsTheUnitsOfPrivateData) {
+  const std::tuple<Family, const char*, const char*> cases[] = {
+      {Family::beam, "pI.ex", ""},           {Family::beam, "pII.kPz", "1/(m s)"},
+      {Family::beam, "pI.Fx", "N"},          {Family::joint, "LPrime", "m/s"},
+      {Family::joint, "wz", "rad/s"},        {Family::joint, "constitutiveLaw.F", ""},
+      {Family::inertia, "J[1,2]", "kg m^2"}, {Family::body, "V", "J"},
+      {Family::electric, "i", "A"},          {Family::genel, "x[1]", ""}};
+  for (const auto& [family, name, unit] : cases)
+    EXPECT_EQ(unit_of_datum(family, name), unit) << name;
 }
 
 }  // namespace
