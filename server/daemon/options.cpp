@@ -21,6 +21,12 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   add("--limit-bundle-files", limits.bundle_files, "Files of one uploaded deck");
   add("--limit-deck-bytes", limits.engine.deck_bytes, "Bytes of one deck with all its files");
   add("--limit-include-depth", limits.engine.include_depth, "Nested includes");
+  add("--limit-include-count", limits.engine.include_count, "Included files of one deck");
+  add("--limit-statements", limits.engine.statements, "Statements of one deck, every pass counted");
+  add("--limit-loop-iterations", limits.engine.loop_iterations, "Passes of one loop of a deck");
+  add("--limit-expression-depth", limits.engine.expression_depth, "Nested parts of an expression");
+  add("--limit-nesting-depth", limits.engine.nesting_depth,
+      "Nested `for` and `if`, nested brackets of a statement");
   add("--limit-unknowns", limits.engine.unknowns, "Unknowns of one model");
   add("--limit-message-bytes", limits.message_bytes, "Bytes of one message");
   add("--limit-open-calls", limits.open_calls, "Calls and streams at once");

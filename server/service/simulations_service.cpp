@@ -135,6 +135,11 @@ grpc::Status SimulationsService::GetServerInfo(Context context, const v1::GetSer
     add_limit(reply, "lease_seconds", limits.lease.count());
     add_limit(reply, "deck_bytes", limits.engine.deck_bytes);
     add_limit(reply, "include_depth", limits.engine.include_depth);
+    add_limit(reply, "include_count", limits.engine.include_count);
+    add_limit(reply, "statements", limits.engine.statements);
+    add_limit(reply, "loop_iterations", limits.engine.loop_iterations);
+    add_limit(reply, "expression_depth", limits.engine.expression_depth);
+    add_limit(reply, "nesting_depth", limits.engine.nesting_depth);
     add_limit(reply, "unknowns", limits.engine.unknowns);
     reply->set_identity(caller.identity);
     reply->set_role(role_name(caller.role));

@@ -192,8 +192,21 @@ void read_hydraulic_fluid(DeckCard& card) {
   deck.fluids[label] = {std::move(fluid), card.head()};
 }
 
+/// Read for its form; only aerodynamic elements would use it.
 void read_c81_data(DeckCard& card) {
-  card.fail_at(card.head(), "\"c81 data\" (aerodynamic data) is not supported yet");
+  const int label = new_label(card, card.deck().c81_data, "c81 data");
+  card.optional_name();
+  card.file_contents("file of c81 data", nullptr);
+  if (card.keyword("tolerance")) card.real_above("tolerance", 0, false);
+  card.one_of({"fc511", "nrel", "free format"});
+  card.keyword("flip");
+  if (card.keyword("echo")) {
+    card.quoted("file of the echo");
+    card.keyword("free format");
+  }
+  card.expect_end();
+  card.deck().c81_data[label] = {true, card.head()};
+  card.warn("without effect: aerodynamic elements are not supported yet");
 }
 void read_module_load(DeckCard& card) {
   card.fail_at(card.head(),

@@ -9,6 +9,10 @@ void fail_unknown_card(DeckCard& card, const std::vector<std::string>& accepted)
                suggestion(card.statement().word, accepted));
 }
 
+void warn_old_name(DeckCard& card, SourceSpan where, std::string_view present) {
+  card.warn_at(where, "deprecated: write \"" + std::string(present) + "\"");
+}
+
 void ignore_rest(DeckCard& card, const std::string& why) {
   while (card.more()) card.skip();
   card.note(why);

@@ -17,6 +17,9 @@ void read_node_card(DeckCard& card);
 void read_driver_card(DeckCard& card);
 void read_element_card(DeckCard& card);
 
+/// Family of a statement head that MBDyn counts as an element, served here or not; null: none.
+const Family* family_of_head(std::string_view word);
+
 /// The words that `read_initial_value_card` and `read_control_card` accept.
 std::vector<std::string> initial_value_words();
 std::vector<std::string> control_words();
@@ -27,6 +30,8 @@ void read_scalar_node(DeckCard& card, ScalarKind kind, ScalarNode node);
 
 /// Refuses the card itself: `unknown card "mx iterations"`, with the nearest of `accepted`.
 [[noreturn]] void fail_unknown_card(DeckCard& card, const std::vector<std::string>& accepted);
+/// Warns that a word is an old name, or an old form, of `present`.
+void warn_old_name(DeckCard& card, SourceSpan where, std::string_view present);
 /// Skips the rest of a statement that is accepted and has no effect here.
 void ignore_rest(DeckCard& card, const std::string& why);
 /// `output, { yes | no | default | <bool> }`, when it is there.

@@ -323,8 +323,7 @@ bool read_count(DeckCard& card) {
   if (!kind || *kind == kind_of(Family::gravity) || *kind == kind_of(Family::air_properties))
     return false;
   if (card.statement().word == "rotors" || card.statement().word == "rtaioutput")
-    card.warn_at(card.head(),
-                 "old name of the card \"" + std::string(kind_names(*kind).card) + "\"");
+    warn_old_name(card, card.head(), kind_names(*kind).card);
   card.deck().counts[static_cast<int>(*kind)].declared = card.more() ? card.count("count") : 0;
   return true;
 }
@@ -355,6 +354,7 @@ void read_control_card(DeckCard& card) {
   if (found == kReaders.end()) {
     fail_unknown_card(card, control_words());
   }
+  if (found->first == "solver") warn_old_name(card, card.head(), "linear solver");
   found->second(card);
   card.expect_end();
 }

@@ -1,5 +1,7 @@
 #include "input/deck.h"
 
+#include <charconv>
+
 #include "input/deck_card.h"
 
 namespace mbcosim {
@@ -11,10 +13,21 @@ void Deck::damage(const std::string& kind, int label) {
     damaged[kind].insert(label);
 }
 
-void Deck::undefined(DeckCard& card, std::string_view kind, int label) {
+bool Deck::was_refused(std::string_view message) const {
+  constexpr std::string_view end = " is not defined";
+  if (!message.ends_with(end)) return false;
+  message.remove_suffix(end.size());
+  const std::size_t blank = message.rfind(' ');
+  if (blank == std::string_view::npos) return false;
+  const std::string_view kind = message.substr(0, blank), digits = message.substr(blank + 1);
+  int label = -1;
+  const auto [rest, error] = std::from_chars(digits.begin(), digits.end(), label);
+  if (error != std::errc() || rest != digits.end()) return false;
   const auto found = damaged.find(kind);
-  if (damaged_kinds.count(kind) || (found != damaged.end() && found->second.count(label)))
-    session.set_damaged(true);
+  return damaged_kinds.count(kind) || (found != damaged.end() && found->second.count(label));
+}
+
+void Deck::undefined(DeckCard& card, std::string_view kind, int label) {
   card.fail(std::string(kind) + " " + std::to_string(label) + " is not defined");
 }
 

@@ -74,6 +74,7 @@ struct Deck {
   LabelMap<TplDrivePtr<3, 3>> drives33;
   LabelMap<TplDrivePtr<6, 6>> drives66;
   LabelMap<FluidPtr> fluids;
+  LabelMap<bool> c81_data;
   LabelMap<FileDriverPtr> file_drivers;
   std::map<std::string, SourceSpan, std::less<>> function_places;
   std::set<int> bound_parameters;  ///< indices of parameter nodes that a `bind` card feeds
@@ -82,6 +83,8 @@ struct Deck {
   std::map<std::string, std::set<int>, std::less<>> damaged;
   std::set<std::string, std::less<>> damaged_kinds;  ///< a definition without a readable label
   void damage(const std::string& kind, int label);
+  /// Does "<kind> <label> is not defined" follow from a definition that was refused?
+  bool was_refused(std::string_view message) const;
   [[noreturn]] void undefined(DeckCard& card, std::string_view kind, int label);
   [[noreturn]] void redefined(DeckCard& card, std::string_view kind, int label, SourceSpan before);
 

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "input/deck.h"
 #include "input/suggest.h"
@@ -21,6 +22,17 @@ bool same_word(std::string_view found, std::string_view word) {
     ++i;
   }
   return i == found.size();
+}
+
+/// Stable identifier of an error of a card, by the few wordings that all cards share.
+const char* code_of(std::string_view message) {
+  if (message.ends_with(" is not defined")) return "undefined";
+  if (message.find(" already defined at ") != std::string_view::npos) return "redefinition";
+  if (message.starts_with("unknown ")) return "unknown-word";
+  if (message.starts_with("unexpected argument")) return "unexpected-argument";
+  if (message.ends_with(" missing")) return "missing-argument";
+  if (message.find(" expected") != std::string_view::npos) return "wrong-argument";
+  return "card";
 }
 
 std::string text_of(double x) {
@@ -64,6 +76,16 @@ void DeckCard::skip() {
   consumed();
 }
 
+void DeckCard::accept_word() {
+  const std::string_view text = next_text();
+  const Symbol* const symbol = std::as_const(deck_.session.symbols).find(text);
+  if (symbol && symbol->role == SymbolRole::plain && !symbol->predefined)
+    warn_at(next(),
+            "\"" + symbol->name + "\" is a keyword here; the variable of this name is hidden",
+            "write (" + symbol->name + ") for the variable");
+  skip();
+}
+
 void DeckCard::consumed() { has_peeked_ = false; }
 
 // ----------------------------------------------------------------------------------------------
@@ -80,7 +102,7 @@ std::string DeckCard::peek_word() {
 bool DeckCard::keyword(std::string_view word) {
   if (!has_peeked_) peek_word();
   if (peeked_.empty() || !same_word(peeked_, word)) return false;
-  skip();
+  accept_word();
   return true;
 }
 
@@ -90,7 +112,7 @@ int DeckCard::one_of(std::initializer_list<std::string_view> words) {
   int index = 0;
   for (const std::string_view word : words) {
     if (same_word(peeked_, word)) {
-      skip();
+      accept_word();
       return index;
     }
     ++index;
@@ -128,7 +150,9 @@ DeckCard::Nesting::Nesting(DeckCard& card) : card_(card) {
   if (++card_.nesting_ <= card_.deck_.session.limits.expression_depth) return;
   --card_.nesting_;
   card_.deck_.session.fail_limit(card_.last(), "expression-depth",
-                                 "drives, laws or functions are nested too deeply");
+                                 "drives, laws or functions are nested deeper than " +
+                                     std::to_string(card_.deck_.session.limits.expression_depth) +
+                                     " levels");
 }
 
 void DeckCard::need_numbers(std::string_view what, std::int64_t count) {
@@ -255,7 +279,26 @@ void DeckCard::fail_at(SourceSpan where, const std::string& message, const std::
   std::string text = message;
   if (!type_.empty() && text.starts_with(type_ + ": ")) text.erase(0, type_.size() + 2);
   if (!subject_.empty()) text = subject_ + ": " + text;
-  deck_.session.fail(where, std::move(text), hint);
+  if (deck_.was_refused(message)) deck_.session.set_damaged(true);
+  deck_.session.fail(where, std::move(text), hint, code_of(message));
+}
+
+void DeckCard::fail_unsupported(SourceSpan where, const std::string& word,
+                                const std::string& what) {
+  deck_.session.fail(where,
+                     (subject_.empty() ? "" : subject_ + ": ") + "\"" + word + "\" (" + what +
+                         ") is not supported yet",
+                     "", "not-supported");
+}
+
+void DeckCard::refuse_unsupported(SourceSpan where, const std::string& context,
+                                  const std::string& word) {
+  const auto group = registry().not_supported.find(context);
+  if (group == registry().not_supported.end()) return;
+  const auto entry = group->second.find(word);
+  if (entry == group->second.end()) return;
+  const auto shown = registry().display.find(word);
+  fail_unsupported(where, shown == registry().display.end() ? word : shown->second, entry->second);
 }
 
 void DeckCard::warn_at(SourceSpan where, const std::string& message, const std::string& hint) {

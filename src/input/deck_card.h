@@ -51,8 +51,10 @@ class DeckCard final : public Card {
   Mat3 orientation(std::string_view what) override;
   OrientationDescription orientation_description() override;
 
-  Vec3 absolute_position(std::string_view what, int context = -1, const OtherNode* other = nullptr) override;
-  Mat3 absolute_orientation(std::string_view what, int context = -1, const OtherNode* other = nullptr) override;
+  Vec3 absolute_position(std::string_view what, int context = -1,
+                         const OtherNode* other = nullptr) override;
+  Mat3 absolute_orientation(std::string_view what, int context = -1,
+                            const OtherNode* other = nullptr) override;
   Vec3 absolute_velocity(std::string_view what, const Vec3& at) override;
   Vec3 absolute_angular_velocity(std::string_view what) override;
   Vec3 absolute_vector(std::string_view what) override;
@@ -120,6 +122,12 @@ class DeckCard final : public Card {
   void read_function_definition();         ///< `"<name>", <definition>` of a `scalar function` card
   /// Refuses arguments that nobody read.
   void expect_end();
+  /// Refuses a word of the language that this program does not serve: "`rotor` (induced velocity
+  /// element) is not supported yet".
+  [[noreturn]] void fail_unsupported(SourceSpan where, const std::string& word,
+                                     const std::string& what);
+  /// The same, when `word` is registered as such in `context` ("elements", "joint", "drive", ...).
+  void refuse_unsupported(SourceSpan where, const std::string& context, const std::string& word);
   /// For `driven`: what follows, as a statement of its own.
   Statement rest_as_statement() { return cursor_.rest_as_statement(); }
   Hint hint();  ///< reads a quoted hint
@@ -177,6 +185,8 @@ class DeckCard final : public Card {
   };
 
   void need_argument(std::string_view what);
+  /// Consumes a keyword; a variable of the deck with the same name is hidden by it, with a warning.
+  void accept_word();
   /// Refuses a matrix with more entries than the card can hold.
   void need_numbers(std::string_view what, std::int64_t count);
   void consumed();

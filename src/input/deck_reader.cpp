@@ -142,6 +142,7 @@ void DeckReader::begin(DeckCard& card) {
     done_ = false;
   }
   const std::string word = name == "multistep" ? "initialvalue" : name;
+  if (name == "multistep") warn_old_name(card, card.last(), "initial value");
   Block block = Block::foreign;
   for (int b = 1; b <= static_cast<int>(Block::elements); ++b)
     if (normalized(kBlockNames[b]) == word) block = static_cast<Block>(b);
@@ -226,9 +227,10 @@ void DeckReader::check_parameters() {
 
 /// What the cards of the initial value block must agree on, in whatever order they stand.
 void DeckReader::check_initial_value() {
-  const InitialValueSettings& s = deck_.builder.model().initial_value;
+  InitialValueSettings& s = deck_.builder.model().initial_value;
   const auto refuse = [&](SourceSpan where, const std::string& message) {
-    deck_.session.report(deck_.session.diagnostic(Severity::error, "initial-value", where, message));
+    deck_.session.report(
+        deck_.session.diagnostic(Severity::error, "initial-value", where, message));
   };
   const bool third_order =
       s.method.method == Method::third_order || s.method.method == Method::third_order_ad_hoc;
@@ -238,6 +240,14 @@ void DeckReader::check_initial_value() {
     deck_.session.report(deck_.session.diagnostic(
         Severity::warning, "initial-value", deck_.strategy_where,
         "method hope supposes equal steps: it loses its order when they vary", "use `method: ms`"));
+  if (s.strategy == StepStrategy::factor) {
+    if (s.max_iterations_factor == 0) s.max_iterations_factor = s.max_iterations;
+    if (s.max_iterations_factor <= s.min_iterations)
+      refuse(deck_.strategy_where, "strategy factor: max iterations (" +
+                                       std::to_string(s.max_iterations_factor) +
+                                       ") must be greater than min iterations (" +
+                                       std::to_string(s.min_iterations) + ")");
+  }
   if (s.strategy != StepStrategy::change) return;
   double largest = std::numeric_limits<double>::infinity();
   try {

@@ -9,7 +9,6 @@ namespace mbcosim {
 
 namespace {
 
-/// Every statement head that MBDyn counts as an element, served here or not.
 const std::map<std::string, Family, std::less<>>& families_by_head() {
   static const std::map<std::string, Family, std::less<>> kHeads = {
       {"body", Family::body},
@@ -59,22 +58,11 @@ struct Driven {
   int label = -1;
 };
 
-std::string quoted_display(const Registry& registry, const std::string& word) {
-  const auto shown = registry.display.find(word);
-  return "\"" + (shown == registry.display.end() ? word : shown->second) + "\"";
-}
-
 [[noreturn]] void fail_unknown_head(DeckCard& card) {
   const Registry& registry = card.registry();
   std::vector<std::string> accepted = {"driven", "bind", "output"};
   for (const auto& head : registry.heads) accepted.push_back(registry.display.at(head.first));
-  const auto group = registry.not_supported.find("elements");
-  if (group != registry.not_supported.end()) {
-    const std::string& word = card.statement().word;
-    if (const auto entry = group->second.find(word); entry != group->second.end())
-      card.fail_at(card.head(), quoted_display(registry, word) + " (" + entry->second +
-                                    ") is not supported yet");
-  }
+  card.refuse_unsupported(card.head(), "elements", card.statement().word);
   fail_unknown_card(card, accepted);
 }
 
@@ -94,10 +82,7 @@ const Registry::ElementReader& typed_reader(DeckCard& card, const Registry::Head
     return reader->second;
   }
   if (type.empty()) card.fail_at(where, what + " expected");
-  if (const auto group = registry.not_supported.find(word); group != registry.not_supported.end())
-    if (group->second.count(type))
-      card.fail_at(where, quoted_display(registry, type) + " (" + group->second.at(type) +
-                              ") is not supported yet");
+  card.refuse_unsupported(where, word, type);
   std::vector<std::string> accepted;
   for (const auto& t : head.types) accepted.push_back(registry.display.at(t.first));
   card.fail_at(where, "unknown " + what + " \"" + type + "\"", suggestion(type, accepted));
@@ -165,10 +150,10 @@ void refuse_self_joints(DeckCard& card, Family family, std::size_t before) {
 void read_element(DeckCard& card, Driven* driven = nullptr) {
   const Registry& registry = card.registry();
   const std::string word = card.statement().word;
-  const auto family = families_by_head().find(word);
+  const Family* const family = family_of_head(word);
   const auto head = registry.heads.find(word);
-  if (head == registry.heads.end() && family == families_by_head().end()) fail_unknown_head(card);
-  const Family f = head != registry.heads.end() ? head->second.family : family->second;
+  if (head == registry.heads.end() && !family) fail_unknown_head(card);
+  const Family f = head != registry.heads.end() ? head->second.family : *family;
   const bool has_label =
       head != registry.heads.end() ? head->second.has_label : f != Family::air_properties;
   ElementInfo info;
@@ -243,9 +228,8 @@ void read_driven(DeckCard& card) {
     drive_existing(inner, driven);
     return;
   }
-  if (const auto family = families_by_head().find(inner.statement().word);
-      family != families_by_head().end())
-    card.set_defining(family_name(family->second), driven.label);
+  if (const Family* const family = family_of_head(inner.statement().word))
+    card.set_defining(family_name(*family), driven.label);
   read_element(inner, &driven);
 }
 
@@ -325,13 +309,18 @@ DrivePtr read_datum(DeckCard& card, ElementRef e, const ScalarNode& node) {
 void read_bind(DeckCard& card) {
   card.set_subject("bind");
   if (card.peek_word() == "airproperties")
-    card.fail_at(card.next(), "\"air properties\" (aerodynamics) is not supported yet");
+    card.fail_unsupported(card.next(), "air properties", "aerodynamics");
   const int label = card.label("element label");
   const Family family = card.element_family("element type");
   const ElementRef e = card.model().find_element(family, label);
-  if (!e.set) card.deck().undefined(card, family_name(family), label);
+  const SourceSpan where = card.last();
   const int index = card.scalar_node(ScalarKind::parameter);
   ScalarNode& node = card.model().scalars[index];
+  if (!e.set) {
+    card.deck().bound_parameters.insert(index);
+    card.fail_at(
+        where, std::string(family_name(family)) + " " + std::to_string(label) + " is not defined");
+  }
   if (!node.bound_to_element)
     card.fail("parameter node " + std::to_string(node.label) + " is not of kind \"element\"",
               "declare it as: parameter: " + std::to_string(node.label) + ", element");
@@ -367,6 +356,11 @@ void read_output_card(DeckCard& card) {
 }
 
 }  // namespace
+
+const Family* family_of_head(std::string_view word) {
+  const auto found = families_by_head().find(word);
+  return found == families_by_head().end() ? nullptr : &found->second;
+}
 
 void read_element_card(DeckCard& card) {
   const std::string& word = card.statement().word;

@@ -67,10 +67,8 @@ void read_strategy(DeckCard& card) {
   s.raise = card.real_above("raise factor", 1, true);
   s.steps_before_raise = card.integer_at_least("steps before raise", 1);
   s.min_iterations = card.integer_at_least("min iterations", 1);
-  if (!card.more()) card.fail("strategy factor: the largest number of iterations is missing");
-  s.max_iterations_factor = card.integer_at_least("max iterations", 1);
-  if (s.max_iterations_factor <= s.min_iterations)
-    card.fail("max iterations must be greater than min iterations");
+  s.max_iterations_factor = card.more() ? card.integer_at_least("max iterations", 1)
+                                        : 0;  // that of the card `max iterations`
 }
 
 // ------------------------------------------------------------------------------------------------
@@ -232,7 +230,9 @@ void read_newton(DeckCard& card, int default_every) {
   s.jacobian_every = card.more() || default_every == 0
                          ? card.integer_at_least("iterations between Jacobians", 1)
                          : default_every;
-  s.keep_jacobian = card.one_of({"keep jacobian matrix", "keep jacobian"}) >= 0;
+  const int keep = card.one_of({"keep jacobian matrix", "keep jacobian"});
+  s.keep_jacobian = keep >= 0;
+  if (keep == 1) warn_old_name(card, card.last(), "keep jacobian matrix");
   card.keyword("honor element requests");
 }
 
@@ -321,7 +321,8 @@ void read_matrix_free(DeckCard& card) {
         card.integer("steps");
         break;
       case 4:
-        card.required("preconditioner", {"full jacobian matrix", "full jacobian"});
+        if (card.required("preconditioner", {"full jacobian matrix", "full jacobian"}) == 1)
+          warn_old_name(card, card.last(), "full jacobian matrix");
         if (card.keyword("steps")) card.integer("steps");
         card.keyword("honor element requests");
         break;
@@ -414,8 +415,10 @@ void read_abort_after(DeckCard& card) {
   using Abort = InitialValueSettings::AbortAfter;
   constexpr Abort kinds[] = {Abort::input, Abort::assembly, Abort::derivatives, Abort::dummy_steps,
                              Abort::dummy_steps};
-  settings(card).abort_after = kinds[card.required(
-      "phase", {"input", "assembly", "derivatives", "dummy steps", "fictitious steps"})];
+  const int kind = card.required(
+      "phase", {"input", "assembly", "derivatives", "dummy steps", "fictitious steps"});
+  if (kind == 4) warn_old_name(card, card.last(), "dummy steps");
+  settings(card).abort_after = kinds[kind];
 }
 
 void read_eigen_times(DeckCard& card, EigenSettings& e) {
@@ -476,7 +479,8 @@ void read_eigen_option(DeckCard& card, EigenSettings& e) {
     case 11:
       e.suffix_format = card.quoted("suffix format");
       if (!SuffixFormat::parse(e.suffix_format))
-        card.fail("suffix format \"" + e.suffix_format + "\" is not a format of one integer", "\"%02d\" or \"%0*d\", for instance");
+        card.fail("suffix format \"" + e.suffix_format + "\" is not a format of one integer",
+                  "\"%02d\" or \"%0*d\", for instance");
       break;
     case 12:
       e.solver = EigenSettings::Solver::lapack;
@@ -574,6 +578,7 @@ MethodSettings read_method(DeckCard& card) {
     case 2:
     case 3:
     case 4:
+      if (kind == 3) warn_old_name(card, card.last(), "ms");
       m.method = kind == 4 ? Method::hope : Method::multistep;
       m.rho = card.drive("differential radius");
       m.rho_algebraic = card.more() ? card.drive("algebraic radius") : m.rho;
@@ -630,13 +635,17 @@ void read_linear_solver(DeckCard& card) {
 void read_data_card(DeckCard& card) {
   const std::string& word = card.statement().word;
   if (word != "problem" && word != "integrator") fail_unknown_card(card, {"problem"});
+  if (word == "integrator") warn_old_name(card, card.head(), "problem");
   switch (card.required(
       "problem", {"initial value", "multistep", "inverse dynamics", "parallel initial value"})) {
     case 2:
       card.deck().inverse_dynamics = true;
-      card.fail("\"inverse dynamics\" (problem) is not supported yet");
+      card.fail_unsupported(card.last(), "inverse dynamics", "problem");
     case 3:
-      card.fail("\"parallel initial value\" (problem) is not supported yet");
+      card.fail_unsupported(card.last(), "parallel initial value", "problem");
+    case 1:
+      warn_old_name(card, card.last(), "initial value");
+      [[fallthrough]];
     default:
       card.deck().inverse_dynamics = false;
   }
@@ -659,6 +668,12 @@ void read_initial_value_card(DeckCard& card) {
   if (found == kReaders.end()) {
     fail_unknown_card(card, initial_value_words());
   }
+  constexpr std::string_view fictitious = "fictitious";
+  if (found->first.starts_with(fictitious))
+    warn_old_name(card, card.head(), "dummy" + card.card_name().substr(fictitious.size()));
+  if (found->first == "solver") warn_old_name(card, card.head(), "linear solver");
+  if (found->first == "newtonraphson")
+    warn_old_name(card, card.head(), "nonlinear solver: newton raphson");
   found->second(card);
   card.expect_end();
 }

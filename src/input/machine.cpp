@@ -349,7 +349,8 @@ class Machine {
     const std::string right = in.from == ValueType::string ? pop_text() : text_of(in.from);
     --top_;
     frame_.texts.back() += right;
-    if (frame_.texts.back().size() > kLongestText) throw EvaluationError("string longer than 1 MB");
+    if (frame_.texts.back().size() > kLongestText)
+      throw EvaluationError("string longer than 1048576 bytes (limit `string-bytes`)");
   }
   static constexpr std::size_t kLongestText = 1 << 20;
 
@@ -445,7 +446,7 @@ class Machine {
         seed(static_cast<std::uint32_t>(top_->i));
         break;
       case FunctionId::print:
-        print();
+        print(in);
         break;
       case FunctionId::stop:
         stop();
@@ -470,8 +471,10 @@ class Machine {
     top_->i = 0;
   }
 
-  void print() {
-    if (frame_.session) frame_.session->printed += printed(value_of(top_->r)) + '\n';
+  void print(const Instruction& in) {
+    if (frame_.session)
+      frame_.session->print(frame_.session->expression_span(in.where, in.length),
+                            printed(value_of(top_->r)) + '\n');
     top_->i = 0;
   }
 

@@ -1,4 +1,5 @@
 /// Nodes, their degrees of freedom and elements named by label.
+#include "input/cards.h"
 #include "input/deck.h"
 #include "input/deck_card.h"
 #include "input/suggest.h"
@@ -116,6 +117,10 @@ Family DeckCard::element_family(std::string_view what) {
   if (head != registry().heads.end()) {
     skip();
     return head->second.family;
+  }
+  if (const Family* const family = family_of_head(w)) {
+    skip();
+    return *family;
   }
   std::vector<std::string> accepted;
   for (int f = 0; f < static_cast<int>(Family::count); ++f)

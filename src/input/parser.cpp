@@ -129,7 +129,7 @@ class Parser {
       if (++p->nesting_ > p->limits_.expression_depth)
         fail(where, 1,
              "expression nested deeper than " + std::to_string(p->limits_.expression_depth) +
-                 " levels",
+                 " levels (limit `expression-depth`)",
              "", "limit-expression-depth");
     }
     ~Nesting() { --parser->nesting_; }

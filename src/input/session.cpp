@@ -16,6 +16,7 @@ Session::Session(const FileSource& source, Limits limits_in, ModelBuilder* build
       options(options_in),
       source_(source),
       builder_(builder),
+      read_until_(std::chrono::steady_clock::now() + options_in.read_time),
       empty_context_(std::make_unique<EvalContext>()),
       scratch_(std::make_unique<ExpressionScratch>()) {
   empty_context_->phase = Phase::input;
@@ -193,7 +194,7 @@ Diagnostic Session::diagnostic(Severity severity, std::string code, SourceSpan w
 }
 
 void Session::report(Diagnostic d) {
-  if (damaged_ || exited || is_known(d)) return;
+  if (damaged_ || exited || is_known(d) || is_repeated_refusal(d)) return;
   if (d.severity == Severity::error) {
     if (errors_ >= limits.errors) return;
     ++errors_;
@@ -210,6 +211,18 @@ bool Session::is_known(const Diagnostic& d) const {
     return other.line == d.line && other.column == d.column && other.severity == d.severity &&
            other.file == d.file && other.message == d.message;
   });
+}
+
+/// A card that is not supported is refused once by name; further ones of its kind are counted, so
+/// that they do not hide other errors.
+bool Session::is_repeated_refusal(const Diagnostic& d) {
+  if (d.code != "not-supported") return false;
+  const std::string word = d.message.substr(std::min(d.message.find('"'), d.message.size()));
+  const auto [entry, is_new] = refusals_.try_emplace(word, Refusal{diagnostics_.size()});
+  if (is_new || errors_ >= limits.errors) return !is_new;
+  diagnostics_[entry->second.first].hint =
+      std::to_string(++entry->second.repeated) + " more of this kind in the deck";
+  return true;
 }
 
 void Session::warn(SourceSpan where, std::string message, std::string hint) {
@@ -236,7 +249,15 @@ void Session::fail(SourceSpan where, std::string message, std::string hint,
 }
 
 void Session::fail_limit(SourceSpan where, std::string_view name, std::string message) const {
-  fail(where, std::move(message), "", "limit-" + std::string(name));
+  fail(where, std::move(message) + " (limit `" + std::string(name) + "`)", "",
+       "limit-" + std::string(name));
+}
+
+void Session::print(SourceSpan where, std::string_view line) {
+  if (printed.size() + line.size() > options.printed_bytes)
+    fail_limit(where, "printed-bytes",
+               "the deck prints more than " + std::to_string(options.printed_bytes) + " bytes");
+  printed += line;
 }
 
 void Session::fail_read(SourceSpan where, const Error& error, int from) const {

@@ -2,6 +2,7 @@
 /// the model being built.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -43,6 +44,8 @@ struct Trail {
 struct ReaderOptions {
   bool strict = false;    ///< `for` and `if` are unknown cards, absent counts mean 0
   bool redefine = false;  ///< declarations of known variables assign (MBDyn's switch -r)
+  std::chrono::milliseconds read_time = std::chrono::minutes(5);  ///< limit `read-time`
+  std::size_t printed_bytes = 16 << 20;                           ///< limit `printed-bytes`
 };
 
 class Session {
@@ -78,8 +81,11 @@ class Session {
   void warn(SourceSpan where, std::string message, std::string hint = "");
   [[noreturn]] void fail(SourceSpan where, std::string message, std::string hint = "",
                          std::string code = "error") const;
-  /// Refuses with code `limit-<name>`.
+  /// Refuses with code `limit-<name>`; the name stands in the message, too.
   [[noreturn]] void fail_limit(SourceSpan where, std::string_view name, std::string message) const;
+  /// Keeps a line that the deck prints; refused when the deck prints too much.
+  void print(SourceSpan where, std::string_view line);
+  bool out_of_time() const { return std::chrono::steady_clock::now() > read_until_; }
   /// Refuses a file named in file `from` that could not be read.
   [[noreturn]] void fail_read(SourceSpan where, const Error& error, int from) const;
   const std::vector<Diagnostic>& diagnostics() const { return diagnostics_; }
@@ -140,6 +146,7 @@ class Session {
 
   Result<std::string> read_counted(const std::string& name);
   bool is_known(const Diagnostic& d) const;
+  bool is_repeated_refusal(const Diagnostic& d);
   Result<std::string> expand_environment(std::string_view name) const;
 
   const FileSource& source_;
@@ -147,7 +154,13 @@ class Session {
   mutable std::deque<DeckFile> files_;
   std::map<std::string, int> file_index_;
   std::int64_t bytes_ = 0;
+  const std::chrono::steady_clock::time_point read_until_;
   std::vector<Diagnostic> diagnostics_;
+  struct Refusal {
+    std::size_t first = 0;  ///< in diagnostics_
+    int repeated = 0;
+  };
+  std::map<std::string, Refusal> refusals_;  ///< by the words of "... is not supported yet"
   int errors_ = 0, warnings_ = 0;
   bool stopped_ = false, damaged_ = false, model_available_ = false;
   int expression_file_ = -1;

@@ -14,7 +14,8 @@ namespace mbcosim {
 namespace {
 
 /// Does an expression mention what changes during the run?
-bool mentions_run_variables(std::string_view text) {
+bool mentions_run_variables(const SymbolTable& symbols, std::string_view text) {
+  if (text.starts_with('[')) return true;
   const auto is_name = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
   };
@@ -28,6 +29,7 @@ bool mentions_run_variables(std::string_view text) {
     const std::string_view name = text.substr(i, n - i);
     if (name == "Time" || name == "TimeStep" || name == "Step" || name == "Var") return true;
     if (name == "model" && text.substr(n, 2) == "::") return true;
+    if (const Symbol* const symbol = symbols.find(name); symbol && symbol->plugin) return true;
     i = n;
   }
   return false;
@@ -59,15 +61,7 @@ template <class Table>
 void DeckCard::fail_word(std::string_view what, const std::string& word, const Table& table,
                          const std::string& context) {
   const SourceSpan where = next();
-  const auto group = registry().not_supported.find(context);
-  if (group != registry().not_supported.end()) {
-    const auto entry = group->second.find(word);
-    if (entry != group->second.end()) {
-      const auto shown = registry().display.find(word);
-      fail_at(where, "\"" + (shown == registry().display.end() ? word : shown->second) + "\" (" +
-                         entry->second + ") is not supported yet");
-    }
-  }
+  refuse_unsupported(where, context, word);
   fail_at(where, "unknown " + std::string(what) + " \"" + word + "\"",
           suggestion(word, written_words(table, registry())));
 }
@@ -82,7 +76,7 @@ DrivePtr DeckCard::constant_drive(std::string_view what) {
   // A lone word that is neither a drive nor a variable is most likely a mistyped keyword.
   if (!w.empty() && !deck_.session.symbols.find(text))
     fail_word("drive or variable", w, registry().drives, "drive");
-  if (mentions_run_variables(text))
+  if (mentions_run_variables(deck_.session.symbols, text))
     warn_at(where, std::string(what) + ": value frozen at input time; use a string drive");
   return make_constant_drive(real(what));
 }
@@ -112,7 +106,7 @@ DrivePtr DeckCard::drive(std::string_view what) {
   keyword("function");
   const auto reader = registry().drives.find(peek_word());
   if (reader == registry().drives.end()) return constant_drive(what);
-  skip();
+  accept_word();
   return reader->second(*this);
 }
 
@@ -288,7 +282,7 @@ LawPtr<N> DeckCard::law_of() {
   const std::string w = peek_word();
   const auto reader = readers.find(w);
   if (reader != readers.end()) {
-    skip();
+    accept_word();
     return reader->second(*this);
   }
   const auto linear = readers.find("linearelastic");

@@ -105,7 +105,7 @@ void Splitter::recover(std::size_t begin, const End& end) {
     case Trouble::nesting:
       report(end.at, 1,
              "brackets nested deeper than " + std::to_string(session_.limits.nesting_depth) +
-                 " levels",
+                 " levels (limit `nesting-depth`)",
              "limit-nesting-depth");
       at_ = text_.size();
       return;

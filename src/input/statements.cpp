@@ -64,10 +64,14 @@ struct Statements::Impl {
   }
 
   void count_statement(const Statement& s) {
-    if (++statements <= session.limits.statements) return;
-    session.fail_limit(
-        head(s), "statements",
-        "the deck has more than " + std::to_string(session.limits.statements) + " statements");
+    if (++statements > session.limits.statements)
+      session.fail_limit(
+          head(s), "statements",
+          "the deck has more than " + std::to_string(session.limits.statements) + " statements");
+    if (session.out_of_time())
+      session.fail_limit(head(s), "read-time",
+                         "reading the deck takes longer than " +
+                             std::to_string(session.options.read_time.count()) + " ms");
   }
 
   /// The next raw statement of the innermost source.
@@ -164,8 +168,9 @@ struct Statements::Impl {
       if (c.at_empty())
         session.fail(c.next(), "remark: argument " + std::to_string(k) + " is empty");
       line += (k == 1 ? ": " : ", ") + printed(c.expression("expression"));
+      if (line.size() > session.options.printed_bytes) break;
     }
-    session.printed += line + '\n';
+    session.print(where, line + '\n');
   }
 
   void include(const Statement& s) {
@@ -222,9 +227,9 @@ struct Statements::Impl {
     }
     if (!all) return;
     for (const Symbol* symbol : session.symbols.sorted())
-      session.printed += std::string("  ") + (symbol->constant ? "const " : "") +
-                         type_name(type_of(symbol->value)) + ' ' + symbol->name + " = " +
-                         printed(symbol->value) + '\n';
+      session.print(head(s), std::string("  ") + (symbol->constant ? "const " : "") +
+                                 type_name(type_of(symbol->value)) + ' ' + symbol->name + " = " +
+                                 printed(symbol->value) + '\n');
   }
 
   void setenv(const Statement& s) {
@@ -261,9 +266,9 @@ struct Statements::Impl {
 
   void notice(const Statement& s) {
     no_arguments(s, s.word.c_str());
-    session.printed += s.word == "license"
-                           ? "mbcosim is distributed under the Apache License, Version 2.0.\n"
-                           : "mbcosim comes without warranties or conditions of any kind.\n";
+    session.print(head(s), s.word == "license"
+                               ? "mbcosim is distributed under the Apache License, Version 2.0.\n"
+                               : "mbcosim comes without warranties or conditions of any kind.\n");
   }
 
   bool is_true(Cursor& c, const Value& v) const {

@@ -25,7 +25,8 @@ void read_node_output(DeckCard& card, StructuralNode& node) {
   if (card.keyword("output")) {
     if (card.keyword("default")) {
       node.output = deck.output.structural;
-    } else if (card.keyword("accelerations")) {  // old form: output, accelerations
+    } else if (card.keyword("accelerations")) {
+      warn_old_name(card, card.last(), "accelerations, yes");
       node.output = node.accelerations = true;
     } else {
       node.output = card.yes_no("output");

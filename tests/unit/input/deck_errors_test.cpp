@@ -119,8 +119,9 @@ INSTANTIATE_TEST_SUITE_P(
                   "warning: final time is before the initial time: there is nothing to integrate"},
         Malformed{"methodTwice", initial_value("method: ms, .6;\nmethod: bdf;"),
                   "error: method already set at deck.mbd:3"},
-        Malformed{"strategy", initial_value("strategy: factor, .5, 2, 1.1, 10, 5;"),
-                  "error: strategy factor: the largest number of iterations is missing"},
+        Malformed{
+            "strategy", initial_value("strategy: factor, .5, 2, 1.1, 10, 5;"),
+            "error: strategy factor: max iterations (1) must be greater than min iterations (5)"},
         Malformed{"noTest", initial_value("tolerance: null;"),
                   "error: solution tolerance required when the residual test is off"},
         Malformed{"scaleWithoutTest", initial_value("tolerance: 1e-6, scale;"),
@@ -164,6 +165,14 @@ INSTANTIATE_TEST_SUITE_P(
                   elements("joint: 1, clamp, 1, node, node; bind: 1, joint, 3, string, \"foo\";",
                            std::string(kDynamic) + "parameter: 3, element;"),
                   "error: bind: joint 1 (clamp) has no private datum \"foo\""},
+        Malformed{"orderOfAForce",
+                  elements("force: 3, abstract, 1, abstract, algebraic, 1.;", "abstract: 1;"),
+                  "error: force 3 (abstract): order word \"algebraic\" is not accepted here"},
+        Malformed{
+            "orderOfAGenel",
+            elements("genel: 1, spring support, 1, abstract, linear elastic, 1.;", "abstract: 1;"),
+            "error: genel 1 (spring support): \"algebraic\", \"differential\" or \"order\" "
+            "expected after the node's degree of freedom"},
         Malformed{"consequence",
                   elements("body: 1, 2, 1., null, eye; joint: 1, clamp, 2, node, node;",
                            "structural: 2, dynamic, null, null;"),
@@ -176,6 +185,20 @@ TEST(MalformedDeck, SuggestsTheNearestWord) {
   EXPECT_EQ(load(elements("bodi: 1, 2;")).diagnostics.at(0).hint, "did you mean \"body\"?");
   EXPECT_EQ(load(elements("joint: 1, clam, 1, node, node;")).diagnostics.at(0).hint,
             "did you mean \"clamp\"?");
+}
+
+TEST(MalformedDeck, HasACode) {
+  const auto code = [](const DeckText& deck) { return load(deck).diagnostics.at(0).code; };
+  EXPECT_EQ(code(elements("body: 1, 2, 1., null, eye;")), "undefined");
+  EXPECT_EQ(code(nodes(std::string(kDynamic) + kDynamic)), "redefinition");
+  EXPECT_EQ(code(elements("bodi: 1, 2;")), "unknown-word");
+  EXPECT_EQ(code(elements("joint: 1, clam, 1, node, node;")), "unknown-word");
+  EXPECT_EQ(code(nodes("structural: 1, dynamic, null, eye, null, null, 5;")),
+            "unexpected-argument");
+  EXPECT_EQ(code(nodes("structural: 1, dynamic, null, eye, 0.,1.,0.;")), "missing-argument");
+  EXPECT_EQ(code(nodes("structural: 1, null, eye, null, null;")), "wrong-argument");
+  EXPECT_EQ(code(elements("rotor: 1, 2, 3;")), "not-supported");
+  EXPECT_EQ(code(control("rigid bodies: nope;")), "unknown-variable");
 }
 
 TEST(MalformedDeck, IsShownWithItsPlace) {
@@ -192,10 +215,22 @@ TEST(MalformedDeck, IsShownWithItsPlace) {
   EXPECT_FALSE(report.ok());
 }
 
-struct Blocks {
-  const char* text;
-  const char* expected;
-};
+TEST(MalformedDeck, ExcessNamesTheCardOfTheCount) {
+  EXPECT_EQ(load(elements("joint: 2, clamp, 1, node, node;", kDynamic, "joints: 0;"))
+                .diagnostics.at(0)
+                .hint,
+            "see the card \"joints\" of the control data");
+}
+
+TEST(WellFormedDeck, IsReadWhereTheReferenceRefusesOrCrashes) {
+  EXPECT_TRUE(model_of(nodes("abstract: 1, output, no;")));
+  EXPECT_TRUE(model_of(initial_value("max iterations: 20; strategy: factor, .5, 2, 1.1, 10, 5;")));
+  DeckText d;
+  d.before = "drive caller: 1, const, 3.; drive caller: 2, sine, 0., 2.*pi, 1., forever, 0.;\n";
+  EXPECT_TRUE(model_of(d));
+  d.before = "constitutive law: 1, 1, linear elastic, 3.;\n";
+  EXPECT_TRUE(model_of(d));
+}
 
 TEST(Blocks, AreCheckedForOrderAndBalance) {
   const std::string head = "begin: data; end: data;\nbegin: initial value; end: initial value;\n";
@@ -223,7 +258,8 @@ TEST(Blocks, AreCheckedForOrderAndBalance) {
        "error: block \"data\" must stand before block \"initial value\"\n"
        "error: block \"initial value\" occurs twice\n"
        "error: block \"control data\" expected, end of file found"},
-      {"begin: data; end: data;\nbegin: multistep; end: multistep;\n" + control_data, ""},
+      {"begin: data; end: data;\nbegin: multistep; end: multistep;\n" + control_data,
+       "warning: deprecated: write \"initial value\""},
       {"end: nodes;", "error: \"end: nodes\" without its \"begin\""},
       {"time step: 1;", "error: unknown card \"time step\""},
       {"set: integer a = 3;", ""},

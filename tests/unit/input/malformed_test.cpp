@@ -182,7 +182,7 @@ constexpr Case kLoops[] = {
     {"for: integer k = 1, 2, 0; end for;", "1:24: error: for: the step must not be zero"},
     {"for: integer k = 1, 2, 1, 1; end for;", "1:27: error: for: unexpected fourth argument"},
     {"for: integer k = 1, 1000001; remark: k; end for;",
-     "1:1: error: for: 1000001 passes exceed the limit of 1000000"},
+     "1:1: error: for: 1000001 passes exceed the limit of 1000000 (limit `loop-iterations`)"},
     {"for: integer k = 1, 2; set: k = 3; end for;", R"(1:29: error: cannot assign constant "k")"},
     {"set: integer k = 0; for: integer k = 1, 2; remark: k; end for;",
      "1:21: error: for: name \"k\" is already used, declared at deck.mbd:1"},
@@ -263,14 +263,14 @@ TEST(MalformedDeck, StopWithSuccessEndsTheDeckQuietly) {
 TEST(ReaderLimits, BracketsNestedTooDeep) {
   const std::string deck = "remark: " + std::string(1000000, '(');
   EXPECT_THAT(calculate(deck).messages,
-              ElementsAre("1:109: error: brackets nested deeper than 100 levels"));
+              ElementsAre("1:109: error: brackets nested deeper than 100 levels (limit `nesting-depth`)"));
 }
 
 TEST(ReaderLimits, ExpressionNestedTooDeep) {
   std::string deck = "remark: 2";
   for (int k = 0; k < 300; ++k) deck += "^1";
   EXPECT_THAT(calculate(deck + ";").messages,
-              ElementsAre("1:410: error: expression nested deeper than 200 levels"));
+              ElementsAre("1:410: error: expression nested deeper than 200 levels (limit `expression-depth`)"));
 }
 
 TEST(ReaderLimits, LongSumsAreFine) {
@@ -283,7 +283,7 @@ TEST(ReaderLimits, DeckBytes) {
   Limits limits;
   limits.deck_bytes = 60;
   const Calculation c = calculate("include: \"a.inc\";", {{"a.inc", std::string(50, ' ')}}, limits);
-  EXPECT_THAT(c.messages, ElementsAre("1:10: error: the deck and its files exceed 60 bytes"));
+  EXPECT_THAT(c.messages, ElementsAre("1:10: error: the deck and its files exceed 60 bytes (limit `deck-bytes`)"));
 }
 
 TEST(ReaderLimits, IncludeDepthAndCount) {
@@ -294,11 +294,11 @@ TEST(ReaderLimits, IncludeDepthAndCount) {
   Limits limits;
   limits.include_depth = 5;
   EXPECT_THAT(calculate("include: \"f0\";", files, limits).messages,
-              ElementsAre("f4:1:10: error: files included deeper than 5 levels"));
+              ElementsAre("f4:1:10: error: files included deeper than 5 levels (limit `include-depth`)"));
   Limits count;
   count.include_count = 3;
   EXPECT_THAT(calculate("for: integer k = 1, 9; include: \"f10\"; end for;", files, count).messages,
-              ElementsAre("1:33: error: more than 3 files included"));
+              ElementsAre("1:33: error: more than 3 files included (limit `include-count`)"));
 }
 
 TEST(ReaderLimits, StatementsCountEveryPass) {
@@ -306,7 +306,7 @@ TEST(ReaderLimits, StatementsCountEveryPass) {
   limits.statements = 1000;
   const Calculation c = calculate(
       "for: integer i = 1, 1000; for: integer j = 1, 1000; set: 1; end for; end for;", {}, limits);
-  EXPECT_THAT(c.messages, ElementsAre("1:53: error: the deck has more than 1000 statements"));
+  EXPECT_THAT(c.messages, ElementsAre("1:53: error: the deck has more than 1000 statements (limit `statements`)"));
 }
 
 TEST(ReaderLimits, NestedLoops) {
@@ -314,7 +314,44 @@ TEST(ReaderLimits, NestedLoops) {
   for (int k = 0; k < 200; ++k) deck += "if: 1; ";
   const Calculation c = calculate(deck);
   EXPECT_THAT(c.messages,
-              ElementsAre("1:701: error: \"for\" and \"if\" nested deeper than 100 levels"));
+              ElementsAre("1:701: error: \"for\" and \"if\" nested deeper than 100 levels (limit `nesting-depth`)"));
+}
+
+TEST(ReaderLimits, Time) {
+  ReaderOptions options;
+  options.read_time = std::chrono::milliseconds(50);
+  const auto start = std::chrono::steady_clock::now();
+  const Calculation c = calculate(
+      "for: integer i = 1, 100000; for: integer j = 1, 100; set: 1;\nend for; end for;", {}, {},
+      false, options);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+  ASSERT_EQ(c.messages.size(), 1u);
+  EXPECT_THAT(c.messages[0],
+              testing::EndsWith("reading the deck takes longer than 50 ms (limit `read-time`)"));
+}
+
+TEST(ReaderLimits, PrintedText) {
+  ReaderOptions options;
+  options.printed_bytes = 1000;
+  const char* const message =
+      "error: the deck prints more than 1000 bytes (limit `printed-bytes`)";
+  for (const char* deck :
+       {"for: integer i = 1, 1000; remark: i; end for;",
+        "for: integer i = 1, 1000; set: print(i); end for;",
+        "for: integer i = 1, 1000; license; end for;",
+        "set: string a = \"\"; for: integer i = 1, 10; set: a = a + a + \"b\"; end for; remark: a;"}) {
+    const Calculation c = calculate(deck, {}, {}, false, options);
+    ASSERT_EQ(c.messages.size(), 1u) << deck;
+    EXPECT_THAT(c.messages[0], testing::EndsWith(message)) << deck;
+  }
+}
+
+TEST(ReaderLimits, Strings) {
+  EXPECT_THAT(calculate("set: string a = \"0123456789abcdef\"; for: integer i = 1, 100; set: a = a "
+                        "+ a; end for;")
+                  .messages,
+              ElementsAre(
+                  "1:73: error: string longer than 1048576 bytes (limit `string-bytes`)"));
 }
 
 }  // namespace

@@ -299,7 +299,8 @@ TEST(StepControl, EndsWithoutAShortestStepToo) {
 
 TEST(StepControl, RefusesContradictions) {
   for (const char* bad :
-       {"strategy: factor, .5, 1, 1.2, 2, 5;", "strategy: factor, .5, 1, 1.2, 2, 5, 5;",
+       {"max iterations: 5; strategy: factor, .5, 1, 1.2, 2, 5;",
+        "strategy: factor, .5, 1, 1.2, 2, 5, 5;",
         "strategy: factor, 1.5, 1, 1.2, 2, 5, 6;", "strategy: factor, .5, 1, .9, 2, 5, 6;",
         "strategy: factor, .5, 0, 1.2, 2, 5, 6;",
         "strategy: change, const, 1e-2; min time step: .2; max time step: .1;",

@@ -1,0 +1,195 @@
+/// Decks that are read, with a word of warning; and words of the language that are refused by name.
+#include <gtest/gtest.h>
+
+#include "deck_fixture.h"
+#include "elements/registry.h"
+
+namespace mbcosim::testing {
+namespace {
+
+const char* const kNode = "structural: 1, dynamic, null, eye, null, null;";
+
+std::string of_initial_value(const std::string& cards) {
+  DeckText d;
+  d.initial_value = cards;
+  return findings(load(d).diagnostics);
+}
+std::string of_control(const std::string& cards) {
+  DeckText d;
+  d.control = cards;
+  return findings(load(d).diagnostics);
+}
+std::string of_elements(const std::string& cards) {
+  DeckText d;
+  d.nodes = kNode;
+  d.elements = cards;
+  return findings(load(d).diagnostics);
+}
+
+// ------------------------------------------------------------------------------------ frozen
+// values
+
+TEST(FrozenValue, IsNamedInEveryFormThatChangesDuringTheRun) {
+  const std::string frozen =
+      "warning: drive caller 1: drive: value frozen at input time; use a string drive";
+  for (const char* drive : {"2.*Time", "TimeStep + 1.", "Step*2", "Var + 1.", "Time*2.", "(Step)",
+                            "model::position(1)", "X1*2."})
+    EXPECT_EQ(of_elements("set: [node, X1, 1, structural, string=\"X[1]\"]; drive caller: 1, " +
+                          std::string(drive) + ";"),
+              frozen)
+        << drive;
+}
+
+TEST(FrozenValue, IsMeantWhereItIsWrittenAsOne) {
+  for (const char* drive :
+       {"const, Time", "time", "Time", "string, \"Time*2\"", "2.*pi", "(tanh(3.))"})
+    EXPECT_EQ(of_elements("drive caller: 1, " + std::string(drive) + ";"), "") << drive;
+}
+
+// ------------------------------------------------------------------------------------ hidden
+// variables
+
+TEST(HiddenVariable, IsNamedWhereAKeywordTakesItsPlace) {
+  DeckText d;
+  d.nodes = "set: real null = 3.; structural: 1, static, null, eye, null, null;";
+  const LoadReport report = load(d);
+  EXPECT_EQ(findings(report.diagnostics).substr(0, 102),
+            "warning: structural node 1: \"null\" is a keyword here; the variable of this name is "
+            "hidden\nwarning: struc");
+  EXPECT_EQ(report.diagnostics.at(0).hint, "write (null) for the variable");
+  EXPECT_EQ(of_elements("set: real unit = 3.; drive caller: 1, linear, unit, 1.;"), "");
+  EXPECT_EQ(of_elements("set: real tanh = 3.;"), "error: \"tanh\" is a function name");
+  EXPECT_EQ(of_elements("set: real ramp_ = 3.; drive caller: 1, ramp_;"), "");
+  EXPECT_EQ(
+      of_elements("set: real one = 3.; drive caller: 1, one;"),
+      "warning: drive caller 1: \"one\" is a keyword here; the variable of this name is hidden");
+  EXPECT_EQ(of_elements("set: real one = 3.; drive caller: 1, (one); drive caller: 2, one*1.;"),
+            "");
+  EXPECT_EQ(of_elements("set: real one = 3.; drive caller: 1, ONE;"), "");
+}
+
+// ------------------------------------------------------------------------------------ old words
+
+TEST(OldWord, IsReadWithTheWordOfToday) {
+  const auto old = [](const std::string& now) { return "deprecated: write \"" + now + "\""; };
+  const auto warning = [&](const std::string& now) { return "warning: " + old(now); };
+  EXPECT_EQ(of_initial_value("fictitious steps number: 2;"), warning("dummy steps number"));
+  EXPECT_EQ(of_initial_value("Fictitious Steps Ratio: 1e-3;"), warning("dummy Steps Ratio"));
+  EXPECT_EQ(of_initial_value("abort after: fictitious steps;"), warning("dummy steps"));
+  EXPECT_EQ(of_initial_value("solver: umfpack;"), warning("linear solver"));
+  EXPECT_EQ(of_control("solver: umfpack;"), warning("linear solver"));
+  EXPECT_EQ(of_initial_value("newton raphson: modified, 4;"),
+            warning("nonlinear solver: newton raphson"));
+  EXPECT_EQ(of_initial_value("method: nostro, .6;"), warning("ms"));
+  EXPECT_EQ(of_initial_value("nonlinear solver: newton raphson, modified, 5, keep jacobian;"),
+            warning("keep jacobian matrix"));
+  EXPECT_EQ(
+      of_initial_value("nonlinear solver: matrix free, gmres, preconditioner, full jacobian;"),
+      warning("full jacobian matrix"));
+  EXPECT_EQ(of_control("rotors: 0;"), warning("induced velocity elements"));
+  DeckText d;
+  d.nodes = "structural: 1, dynamic, null, eye, null, null, output, accelerations;";
+  EXPECT_EQ(findings(load(d).diagnostics),
+            "warning: structural node 1: " + old("accelerations, yes"));
+}
+
+TEST(OldWord, OfTheFirstBlocks) {
+  EXPECT_EQ(findings(load("begin: data; integrator: multistep; end: data;\n"
+                          "begin: multistep; end: multistep;\n"
+                          "begin: control data; end: control data;")
+                         .diagnostics),
+            "warning: deprecated: write \"problem\"\nwarning: deprecated: write \"initial value\"\n"
+            "warning: deprecated: write \"initial value\"");
+}
+
+// ------------------------------------------------------------------------------------ not
+// supported yet
+
+TEST(NotSupported, EveryRegisteredWordIsRefusedByName) {
+  const Registry& registry = full_registry();
+  int words = 0;
+  for (const auto& [word, what] : registry.not_supported.at("elements")) {
+    if (registry.heads.count(word)) continue;
+    const std::string text =
+        of_elements(word + (word == "airproperties" ? ": 1.;" : ": 1, 1, 2.;"));
+    EXPECT_NE(
+        text.find("\"" + registry.display.at(word) + "\" (" + what + ") is not supported yet"),
+        std::string::npos)
+        << text;
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+    ++words;
+  }
+  for (const char* head : {"joint", "force", "couple", "genel", "electric", "hydraulic"})
+    for (const auto& [word, what] : registry.not_supported.at(head)) {
+      if (registry.heads.at(head).types.count(word)) continue;
+      const std::string text = of_elements(std::string(head) + ": 1, " + word + ", 1;");
+      EXPECT_NE(
+          text.find("\"" + registry.display.at(word) + "\" (" + what + ") is not supported yet"),
+          std::string::npos)
+          << text;
+      ++words;
+    }
+  EXPECT_GT(words, 30);
+}
+
+TEST(NotSupported, DrivesLawsAndDriversAreRefusedByName) {
+  EXPECT_EQ(of_elements("drive caller: 1, octave, 1.;"),
+            "error: drive caller 1: \"octave\" (drive) is not supported yet");
+  EXPECT_EQ(
+      of_elements("constitutive law: 1, 6, neo hookean elastic, 1.;"),
+      "error: constitutive law 1: \"neo hookean elastic\" (constitutive law) is not supported yet");
+  DeckText d;
+  d.before = "begin: data; problem: parallel initial value; end: data;";
+  EXPECT_EQ(findings(load(d).diagnostics).substr(0, 67),
+            "error: \"parallel initial value\" (problem) is not supported yet\nerro");
+}
+
+TEST(NotSupported, IsSaidOncePerKindOfCard) {
+  std::string cards;
+  for (int k = 1; k <= 40; ++k) cards += "rotor: " + std::to_string(k) + ", 1, 2;\n";
+  DeckText d;
+  d.nodes = kNode;
+  d.elements = cards + "body: 1, 7, 1., null, eye;";
+  const LoadReport report = load(d);
+  EXPECT_EQ(findings(report.diagnostics),
+            "error: induced velocity element 1: \"rotor\" (induced velocity element) is not "
+            "supported yet\n"
+            "error: body 1: structural node 7 is not defined");
+  EXPECT_EQ(report.diagnostics.at(0).code, "not-supported");
+  EXPECT_EQ(report.diagnostics.at(0).hint, "39 more of this kind in the deck");
+}
+
+TEST(NotSupported, WhatFollowsFromARefusalIsNotReported) {
+  DeckText d;
+  d.nodes = std::string(kNode) + "parameter: 3, element;";
+  d.elements =
+      "user defined: 5, module, 1; bind: 5, user defined, 3, string, \"x\";\n"
+      "drive caller: 1, element, 5, user defined, string, \"x\", direct;\n"
+      "output: user defined, 5;";
+  EXPECT_EQ(findings(load(d).diagnostics),
+            "error: user defined element 5: \"user defined\" (element of a run-time loaded module) "
+            "is not "
+            "supported yet");
+}
+
+TEST(C81Data, IsReadWithoutEffect) {
+  const auto read = [](const std::string& card) {
+    DeckText d;
+    d.before = card;
+    return findings(load(d.text(), {{"naca.c81", "0012"}}).diagnostics);
+  };
+  const std::string note =
+      "warning: c81 data 1: without effect: aerodynamic elements are not supported yet";
+  EXPECT_EQ(read("c81 data: 1, \"naca.c81\";\n"), note);
+  EXPECT_EQ(
+      read("c81 data: 1, name, \"tip\", \"naca.c81\", tolerance, 1e-4, fc511, flip, echo, \"o\", "
+           "free format;\n"),
+      note);
+  EXPECT_EQ(read("c81 data: 1, \"none.c81\";\n"),
+            "error: cannot open \"none.c81\" (searched in the deck's folder)");
+  EXPECT_EQ(read("c81 data: 1, \"naca.c81\"; c81 data: 1, \"naca.c81\";\n"),
+            note + "\nerror: c81 data 1 already defined at deck.mbd:1");
+}
+
+}  // namespace
+}  // namespace mbcosim::testing
