@@ -340,11 +340,12 @@ void read_output_card(DeckCard& card) {
   read_output_labels(card, [&](int first, int last) {
     if (first == last) {
       const ElementRef e = model.find_element(family, first);
+      const std::string problem =
+          std::string(family_name(family)) + " " + std::to_string(first) + " is not defined";
       if (e.set)
         e.set->info(e.index).output = true;
-      else
-        card.warn(std::string(family_name(family)) + " " + std::to_string(first) +
-                  " is not defined");
+      else if (!card.deck().was_refused(problem))
+        card.warn(problem);
       return;
     }
     for (const ElementRef& e : model.elements) {

@@ -368,18 +368,31 @@ class Machine {
     }
   }
 
+  /// Integers of 32 bits wrap; hardly a deck means that.
+  void warn_of_wrapping(const Instruction& in, std::int32_t result) {
+    if (frame_.session)
+      frame_.session->warn_in_expression(
+          in.where, in.length, "integer overflow: the result wraps to " + std::to_string(result));
+  }
+
+  std::int32_t wrapped(const Instruction& in, std::int64_t exact) {
+    const std::int32_t result = wrap(exact);
+    if (result != exact) warn_of_wrapping(in, result);
+    return result;
+  }
+
   void integer_operation(const Instruction& in) {
     --top_;
     const std::int64_t a = top_->i, b = top_[1].i;
     switch (in.op) {
       case Op::add_integer:
-        top_->i = wrap(a + b);
+        top_->i = wrapped(in, a + b);
         break;
       case Op::subtract_integer:
-        top_->i = wrap(a - b);
+        top_->i = wrapped(in, a - b);
         break;
       case Op::multiply_integer:
-        top_->i = wrap(a * b);
+        top_->i = wrapped(in, a * b);
         break;
       case Op::divide_integer:
         if (b == 0) throw EvaluationError("division by zero");
@@ -393,6 +406,8 @@ class Machine {
         break;
       case Op::power_integer:
         top_->i = integer_power(top_->i, top_[1].i);
+        if (b > 0 && std::pow(static_cast<double>(a), static_cast<double>(b)) != top_->i)
+          warn_of_wrapping(in, top_->i);
         break;
       default:
         break;

@@ -165,7 +165,10 @@ TplDrivePtr<R, C> DeckCard::template_drive(std::string_view what, ReadEntity rea
   need_argument(what);
   std::vector<typename Sum::Term> terms;
   const auto term = [&] {
+    const SourceSpan where = more() ? next() : last();
     const typename Sum::Value entity = read();
+    if (entity.isZero(0))
+      warn_at(where, std::string(what) + ": the direction is null, whatever the drive gives");
     terms.push_back({entity, drive(std::string(what) + ": drive")});
   };
   switch (one_of({"null", "component", "array", "reference", "zero", "single"})) {

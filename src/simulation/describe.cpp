@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "input/symbols.h"
+
 namespace mbcosim {
 
 namespace {
@@ -215,7 +217,10 @@ ModelDescription describe(const Model& model, std::vector<Variable> variables) {
   for (const NamedDrive& n : model.drives)
     d.drives.push_back({n.label, n.name, n.drive->has_derivative()});
   for (const ReferenceFrame& f : model.frames) d.frames.push_back(f.label);
-  d.symbols = model.symbols;
+  const SymbolTable predefined;
+  for (const auto& symbol : model.symbols)
+    if (!predefined.find(symbol.first.substr(symbol.first.rfind(' ') + 1)))
+      d.symbols.push_back(symbol);
   d.variables = std::move(variables);
   return d;
 }

@@ -170,8 +170,8 @@ TEST(Describe, PutsVariablesBelowTheirOwners) {
        {"\n  structural node 2 \"base\", static, at 0 0 0\n    node.structural.2.X[3] [m], global, "
         "state: "
         "position\n",
-        "\n  hydraulic node 5, algebraic, at 2\n    node.hydraulic.5.x [Pa], state: "
-        "value\nelements (2)\n",
+        "\n  thermal node 5, differential, at 2\n    node.thermal.5.x [K], state: value\n"
+        "    node.thermal.5.xP, state: time derivative\nelements (2)\n",
         "\n  joint 7, clamp, nodes 2\n    joint.7.Fx [N], output: private datum Fx\n",
         "\n    joint.7.Mz [N m], output: private datum Mz\n",
         "\n    body.3.E [J], output: private datum E\n",

@@ -262,15 +262,18 @@ TEST(MalformedDeck, StopWithSuccessEndsTheDeckQuietly) {
 
 TEST(ReaderLimits, BracketsNestedTooDeep) {
   const std::string deck = "remark: " + std::string(1000000, '(');
-  EXPECT_THAT(calculate(deck).messages,
-              ElementsAre("1:109: error: brackets nested deeper than 100 levels (limit `nesting-depth`)"));
+  EXPECT_THAT(
+      calculate(deck).messages,
+      ElementsAre("1:109: error: brackets nested deeper than 100 levels (limit `nesting-depth`)"));
 }
 
 TEST(ReaderLimits, ExpressionNestedTooDeep) {
   std::string deck = "remark: 2";
   for (int k = 0; k < 300; ++k) deck += "^1";
-  EXPECT_THAT(calculate(deck + ";").messages,
-              ElementsAre("1:410: error: expression nested deeper than 200 levels (limit `expression-depth`)"));
+  EXPECT_THAT(
+      calculate(deck + ";").messages,
+      ElementsAre(
+          "1:410: error: expression nested deeper than 200 levels (limit `expression-depth`)"));
 }
 
 TEST(ReaderLimits, LongSumsAreFine) {
@@ -283,7 +286,9 @@ TEST(ReaderLimits, DeckBytes) {
   Limits limits;
   limits.deck_bytes = 60;
   const Calculation c = calculate("include: \"a.inc\";", {{"a.inc", std::string(50, ' ')}}, limits);
-  EXPECT_THAT(c.messages, ElementsAre("1:10: error: the deck and its files exceed 60 bytes (limit `deck-bytes`)"));
+  EXPECT_THAT(
+      c.messages,
+      ElementsAre("1:10: error: the deck and its files exceed 60 bytes (limit `deck-bytes`)"));
 }
 
 TEST(ReaderLimits, IncludeDepthAndCount) {
@@ -293,8 +298,9 @@ TEST(ReaderLimits, IncludeDepthAndCount) {
   files["f10"] = "remark: 1;";
   Limits limits;
   limits.include_depth = 5;
-  EXPECT_THAT(calculate("include: \"f0\";", files, limits).messages,
-              ElementsAre("f4:1:10: error: files included deeper than 5 levels (limit `include-depth`)"));
+  EXPECT_THAT(
+      calculate("include: \"f0\";", files, limits).messages,
+      ElementsAre("f4:1:10: error: files included deeper than 5 levels (limit `include-depth`)"));
   Limits count;
   count.include_count = 3;
   EXPECT_THAT(calculate("for: integer k = 1, 9; include: \"f10\"; end for;", files, count).messages,
@@ -306,24 +312,26 @@ TEST(ReaderLimits, StatementsCountEveryPass) {
   limits.statements = 1000;
   const Calculation c = calculate(
       "for: integer i = 1, 1000; for: integer j = 1, 1000; set: 1; end for; end for;", {}, limits);
-  EXPECT_THAT(c.messages, ElementsAre("1:53: error: the deck has more than 1000 statements (limit `statements`)"));
+  EXPECT_THAT(
+      c.messages,
+      ElementsAre("1:53: error: the deck has more than 1000 statements (limit `statements`)"));
 }
 
 TEST(ReaderLimits, NestedLoops) {
   std::string deck;
   for (int k = 0; k < 200; ++k) deck += "if: 1; ";
   const Calculation c = calculate(deck);
-  EXPECT_THAT(c.messages,
-              ElementsAre("1:701: error: \"for\" and \"if\" nested deeper than 100 levels (limit `nesting-depth`)"));
+  EXPECT_THAT(c.messages, ElementsAre("1:701: error: \"for\" and \"if\" nested deeper than 100 "
+                                      "levels (limit `nesting-depth`)"));
 }
 
 TEST(ReaderLimits, Time) {
   ReaderOptions options;
   options.read_time = std::chrono::milliseconds(50);
   const auto start = std::chrono::steady_clock::now();
-  const Calculation c = calculate(
-      "for: integer i = 1, 100000; for: integer j = 1, 100; set: 1;\nend for; end for;", {}, {},
-      false, options);
+  const Calculation c =
+      calculate("for: integer i = 1, 100000; for: integer j = 1, 100; set: 1;\nend for; end for;",
+                {}, {}, false, options);
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
   ASSERT_EQ(c.messages.size(), 1u);
   EXPECT_THAT(c.messages[0],
@@ -333,13 +341,12 @@ TEST(ReaderLimits, Time) {
 TEST(ReaderLimits, PrintedText) {
   ReaderOptions options;
   options.printed_bytes = 1000;
-  const char* const message =
-      "error: the deck prints more than 1000 bytes (limit `printed-bytes`)";
-  for (const char* deck :
-       {"for: integer i = 1, 1000; remark: i; end for;",
-        "for: integer i = 1, 1000; set: print(i); end for;",
-        "for: integer i = 1, 1000; license; end for;",
-        "set: string a = \"\"; for: integer i = 1, 10; set: a = a + a + \"b\"; end for; remark: a;"}) {
+  const char* const message = "error: the deck prints more than 1000 bytes (limit `printed-bytes`)";
+  for (const char* deck : {"for: integer i = 1, 1000; remark: i; end for;",
+                           "for: integer i = 1, 1000; set: print(i); end for;",
+                           "for: integer i = 1, 1000; license; end for;",
+                           "set: string a = \"\"; for: integer i = 1, 10; set: a = a + a + \"b\"; "
+                           "end for; remark: a;"}) {
     const Calculation c = calculate(deck, {}, {}, false, options);
     ASSERT_EQ(c.messages.size(), 1u) << deck;
     EXPECT_THAT(c.messages[0], testing::EndsWith(message)) << deck;
@@ -350,8 +357,7 @@ TEST(ReaderLimits, Strings) {
   EXPECT_THAT(calculate("set: string a = \"0123456789abcdef\"; for: integer i = 1, 100; set: a = a "
                         "+ a; end for;")
                   .messages,
-              ElementsAre(
-                  "1:73: error: string longer than 1048576 bytes (limit `string-bytes`)"));
+              ElementsAre("1:73: error: string longer than 1048576 bytes (limit `string-bytes`)"));
 }
 
 }  // namespace

@@ -46,6 +46,30 @@ TEST(FrozenValue, IsMeantWhereItIsWrittenAsOne) {
     EXPECT_EQ(of_elements("drive caller: 1, " + std::string(drive) + ";"), "") << drive;
 }
 
+TEST(IntegerOverflow, IsNamedWhereItWraps) {
+  const auto of = [](const std::string& expression) {
+    return findings(load("remark: " + expression + ";").diagnostics);
+  };
+  const auto wraps = [](const std::string& result) {
+    return "warning: integer overflow: the result wraps to " + result;
+  };
+  EXPECT_EQ(of("2147483647 + 1"), wraps("-2147483648"));
+  EXPECT_EQ(of("-2147483647 - 2"), wraps("2147483647"));
+  EXPECT_EQ(of("65536*65536"), wraps("0"));
+  EXPECT_EQ(of("2^31"), wraps("-2147483648"));
+  EXPECT_EQ(of("10^10"), wraps("1410065408"));
+  for (const char* fine :
+       {"2^30", "(-3)^3", "2147483647 - 1", "46340*46340", "0^5", "1^2147483647"})
+    EXPECT_EQ(of(fine), "") << fine;
+}
+
+TEST(NullDirection, IsNamed) {
+  EXPECT_EQ(
+      of_elements("gravity: uniform, 0., 0., 0., const, 9.81;"),
+      "warning: gravity: acceleration of gravity: the direction is null, whatever the drive gives");
+  EXPECT_EQ(of_elements("gravity: uniform, null;"), "");
+}
+
 // ------------------------------------------------------------------------------------ hidden
 // variables
 
@@ -53,7 +77,7 @@ TEST(HiddenVariable, IsNamedWhereAKeywordTakesItsPlace) {
   DeckText d;
   d.nodes = "set: real null = 3.; structural: 1, static, null, eye, null, null;";
   const LoadReport report = load(d);
-  EXPECT_EQ(findings(report.diagnostics).substr(0, 102),
+  EXPECT_EQ(findings(report.diagnostics).substr(0, 100),
             "warning: structural node 1: \"null\" is a keyword here; the variable of this name is "
             "hidden\nwarning: struc");
   EXPECT_EQ(report.diagnostics.at(0).hint, "write (null) for the variable");
