@@ -159,7 +159,7 @@ TEST(Describe, PutsVariablesBelowTheirOwners) {
   DeckText d = elements(
       "joint: 7, clamp, 2, node, node; body: 3, 1, 2., null, eye; drive caller: 4, name, \"ramp\", "
       "2.;",
-      "hydraulic: 5, value, 2.;");
+      "thermal: 5, value, 2.;");
   const ModelPtr model = model_of(d);
   ASSERT_TRUE(model);
   const auto simulation = Simulation::create(model);

@@ -79,7 +79,7 @@ TEST(HiddenVariable, IsNamedWhereAKeywordTakesItsPlace) {
   const LoadReport report = load(d);
   EXPECT_EQ(findings(report.diagnostics).substr(0, 100),
             "warning: structural node 1: \"null\" is a keyword here; the variable of this name is "
-            "hidden\nwarning: struc");
+            "hidden\nwarning: s");
   EXPECT_EQ(report.diagnostics.at(0).hint, "write (null) for the variable");
   EXPECT_EQ(of_elements("set: real unit = 3.; drive caller: 1, linear, unit, 1.;"), "");
   EXPECT_EQ(of_elements("set: real tanh = 3.;"), "error: \"tanh\" is a function name");
