@@ -165,9 +165,11 @@ INSTANTIATE_TEST_SUITE_P(
                   elements("joint: 1, clamp, 1, node, node; bind: 1, joint, 3, string, \"foo\";",
                            std::string(kDynamic) + "parameter: 3, element;"),
                   "error: bind: joint 1 (clamp) has no private datum \"foo\""},
-        Malformed{"orderOfAForce",
-                  elements("force: 3, abstract, 1, abstract, algebraic, 1.;", "abstract: 1;"),
-                  "error: force 3 (abstract): order word \"algebraic\" is not accepted here"},
+        Malformed{
+            "orderOfAForce",
+            elements("force: 3, abstract, 1, abstract, algebraic, 1.;", "abstract: 1;"),
+            "error: force 3 (abstract): \"algebraic\" found; no order of the degree of freedom is "
+            "written here"},
         Malformed{
             "orderOfAGenel",
             elements("genel: 1, spring support, 1, abstract, linear elastic, 1.;", "abstract: 1;"),
