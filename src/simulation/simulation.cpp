@@ -7,6 +7,7 @@
 #include "simulation/linearize.h"
 #include "simulation/state_bytes.h"
 #include "simulation/variables.h"
+#include "solver/control.h"
 #include "solver/eigenanalysis.h"
 #include "solver/stepper.h"
 
@@ -36,6 +37,9 @@ struct Simulation::Impl {
   State state;
   Stepper stepper;
   std::shared_ptr<ResultWriter> writer;
+  StepPolicy policy;
+  TimeKeeping time_keeping = TimeKeeping::summed;
+  std::function<void(bool)> attempt_ended;
   mutable std::once_flag variables_once;
   mutable std::unique_ptr<Variables> variables;
 
@@ -59,10 +63,24 @@ struct Simulation::Impl {
     return true;
   }
 
+  bool at_end() const {
+    constexpr double kRounding = 1e-9;  // of a step: exact times leave no step that rounding alone asks for
+    const double margin = state.control.empty() || state.control[control::kExactTime] == 0 ? 0 : kRounding * state.h;
+    return !(state.time < model->initial_value.final_time - margin);
+  }
+
   Status start();
   /// The deck's eigenanalyses with times in (after, until].
   Status analyse_modes(double after, double until);
   StepReport step(const CancelToken* cancel);
+  /// By the deck's strategy, then by the policy. `pieces` counts the parts of the step.
+  PhaseReport advance(int& pieces);
+  PhaseReport advance_by_strategy(double h);
+  PhaseReport advance_in_pieces(double whole, PhaseReport failed, int& pieces);
+  void end_at(const State& start, double whole);
+  void end_attempt(bool accepted) const {
+    if (attempt_ended) attempt_ended(accepted);
+  }
 };
 
 /// Phases before the first step: assembly, derivatives, dummy steps, record of step 0.
@@ -76,6 +94,7 @@ Status Simulation::Impl::start() {
     return ok();
   }
   if (auto status = stepper.assemble(state); !status) return status;
+  state.control[control::kExactTime] = time_keeping == TimeKeeping::exact ? 1 : 0;
   if (s.abort_after == AbortAfter::assembly || s.final_time < s.initial_time) {
     record();
     return ok();
@@ -121,18 +140,89 @@ Status Simulation::Impl::analyse_modes(double after, double until) {
   return ok();
 }
 
+PhaseReport Simulation::Impl::advance_by_strategy(double h) {
+  PhaseReport phase = stepper.step(state, h);
+  while (phase.error && phase.error->kind != ErrorKind::cancelled) {
+    h = stepper.retry_step_size(state, h);
+    if (h <= 0) break;
+    end_attempt(false);
+    phase = stepper.step(state, h);
+  }
+  return phase;
+}
+
+PhaseReport Simulation::Impl::advance(int& pieces) {
+  const double h = stepper.next_step_size(state);
+  const bool accept = policy.kind == StepPolicy::accept;
+  const bool only_attempt = model->initial_value.strategy == StepStrategy::no_change;
+  stepper.accept_unconverged(accept && only_attempt);
+  PhaseReport phase = advance_by_strategy(h);
+  if (!phase.error || phase.error->kind == ErrorKind::cancelled) return phase;
+  if (policy.kind == StepPolicy::cut) return advance_in_pieces(h, std::move(phase), pieces);
+  if (!accept || only_attempt) return phase;
+  end_attempt(false);
+  stepper.accept_unconverged(true);
+  return stepper.step(state, h);
+}
+
+/// Pieces are whole/2^k long and start at multiples of their length; after a success they double again. All carry the
+/// number of the whole step.
+PhaseReport Simulation::Impl::advance_in_pieces(double whole, PhaseReport failed, int& pieces) {
+  constexpr int kFinest = 10;
+  const State start = state;
+  const double shortest = policy.minimum > 0 ? policy.minimum : whole / (1 << kFinest);
+  std::int64_t all = 1;
+  while (all < (std::int64_t{1} << 40) && whole / static_cast<double>(2 * all) >= shortest) all *= 2;
+  PhaseReport phase = std::move(failed);
+  int iterations = 0;
+  pieces = 0;
+  try {
+    for (std::int64_t done = 0, length = all; done < all;) {
+      if (phase.error) {
+        length /= 2;
+        if (length == 0 || phase.error->kind == ErrorKind::cancelled) break;
+      }
+      end_attempt(!phase.error);
+      state.step = start.step;
+      phase = stepper.step(state, whole * (static_cast<double>(length) / static_cast<double>(all)));
+      if (phase.error) continue;
+      ++pieces;
+      iterations += phase.newton.iterations;
+      done += length;
+      if (done % (2 * length) == 0 && 2 * length <= all - done) length *= 2;
+    }
+  } catch (...) {  // from the exchange
+    state = start;
+    throw;
+  }
+  if (phase.error) {
+    state = start;
+    pieces = 1;
+    char text[80];
+    std::snprintf(text, sizeof text, "\n  the step was cut down to pieces of %.6g s", whole / static_cast<double>(all));
+    if (phase.error->kind != ErrorKind::cancelled) phase.error->message += text;
+    return phase;
+  }
+  phase.newton.iterations = iterations;
+  end_at(start, whole);
+  return phase;
+}
+
+/// Time goes on as if the step had been one.
+void Simulation::Impl::end_at(const State& start, double whole) {
+  for (const int slot : {control::kGridStart, control::kGridStep, control::kGridCount})
+    state.control[slot] = start.control[slot];
+  state.time = start.time;
+  control::advance_time(state, whole);
+}
+
 StepReport Simulation::Impl::step(const CancelToken* cancel) {
   StepReport report;
   const double previous_time = state.time;
   const auto begin = std::chrono::steady_clock::now();
   stepper.set_cancelled(cancel);
-  double h = stepper.next_step_size(state);
-  PhaseReport phase = stepper.step(state, h);
-  while (phase.error && phase.error->kind != ErrorKind::cancelled) {
-    h = stepper.retry_step_size(state, h);
-    if (h <= 0) break;
-    phase = stepper.step(state, h);
-  }
+  PhaseReport phase = advance(report.pieces);
+  report.flagged = phase.flagged;
   report.solver_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.step = state.step;
   report.time = state.time;
@@ -158,16 +248,18 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
       return report;
     }
   }
-  if (!(state.time < model->initial_value.final_time)) report.outcome = StepOutcome::finished;
+  if (at_end()) report.outcome = StepOutcome::finished;
   return report;
 }
 
 Simulation::Simulation(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Simulation::~Simulation() = default;
 
-Result<std::unique_ptr<Simulation>> Simulation::create(ModelPtr model, const CancelToken* cancel, std::shared_ptr<ResultWriter> writer) {
+Result<std::unique_ptr<Simulation>> Simulation::create(ModelPtr model, const CancelToken* cancel, std::shared_ptr<ResultWriter> writer,
+                                                       TimeKeeping time_keeping) {
   auto impl = std::make_unique<Impl>(std::move(model));
   impl->writer = std::move(writer);
+  impl->time_keeping = time_keeping;
   impl->stepper.set_cancelled(cancel);
   Status status = ok();
   try {
@@ -194,10 +286,20 @@ double Simulation::next_step_size() const {
 
 bool Simulation::finished() const {
   const InitialValueSettings& s = impl_->model->initial_value;
-  return s.abort_after != InitialValueSettings::AbortAfter::never || !(impl_->state.time < s.final_time);
+  return s.abort_after != InitialValueSettings::AbortAfter::never || impl_->at_end();
 }
 
 void Simulation::set_exchange(std::function<bool(int)> exchange) { impl_->stepper.set_exchange(std::move(exchange)); }
+
+void Simulation::set_attempt_ended(std::function<void(bool)> attempt_ended) { impl_->attempt_ended = std::move(attempt_ended); }
+void Simulation::set_policy(const StepPolicy& policy) { impl_->policy = policy; }
+const StepPolicy& Simulation::policy() const { return impl_->policy; }
+
+void Simulation::set_load_tangents(std::vector<LoadTangent> tangents) {
+  impl_->stepper.set_tangents(tangents.empty() ? nullptr
+                                               : std::make_unique<TangentSolver>(*impl_->model, std::move(tangents)));
+}
+LoadTangent& Simulation::load_tangent(int i) { return impl_->stepper.tangents()->tangent(i); }
 
 StepReport Simulation::step(const CancelToken* cancel) { return step_many(1, cancel); }
 

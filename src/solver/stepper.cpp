@@ -53,6 +53,11 @@ double drive_or(const DrivePtr& drive, const EvalContext& context, double otherw
   return drive ? drive->value(context) : otherwise;
 }
 
+bool is_finite(const State& state) {
+  const auto finite = [](double x) { return std::isfinite(x); };
+  return std::all_of(state.y.begin(), state.y.end(), finite) && std::all_of(state.yp.begin(), state.yp.end(), finite);
+}
+
 bool is_third_order(const MethodSettings& m) { return m.method == Method::third_order || m.method == Method::third_order_ad_hoc; }
 
 }  // namespace
@@ -278,7 +283,7 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     }
     state.h_previous = first ? h : state.h;
     state.h = h;
-    state.time += h;
+    control::advance_time(state, h);
     ++state.step;
     const StepFormula f = formula(state, h, method, first);
     for (const auto& listener : model_.step_listeners)
@@ -289,7 +294,8 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     const EvalContext context = model_.context(state, Phase::step, f.c(), f.c_algebraic());
     for (const auto& set : model_.sets) set->after_predict(context, state);
     report.newton = iterate(state, f, method, first, settings);
-    if (report.newton.outcome == NewtonOutcome::converged) {
+    report.flagged = accept_unconverged_ && report.newton.outcome == NewtonOutcome::not_converged && is_finite(state);
+    if (report.newton.outcome == NewtonOutcome::converged || report.flagged) {
       after_convergence(state, Phase::step, f.c(), f.c_algebraic());
       return report;
     }
@@ -326,7 +332,8 @@ PhaseReport Stepper::step(State& state, double h) {
 double Stepper::next_step_size(State& state) {
   const InitialValueSettings& s = model_.initial_value;
   const double h = state.control[control::kRegularSteps] == 0 ? s.time_step : state.h;
-  if (s.strategy == StepStrategy::no_change || state.control[control::kRegularSteps] < 2) return h;
+  if (s.strategy == StepStrategy::no_change) return s.time_step;  // also after a step in pieces
+  if (state.control[control::kRegularSteps] < 2) return h;
   const EvalContext context = model_.context(state, Phase::step);
   const double largest = s.max_time_step ? s.max_time_step->value(context) : HUGE_VAL;
   const double limit = largest > 0 ? largest : HUGE_VAL;

@@ -17,6 +17,7 @@ namespace mbcosim {
 /// Result of a phase or step that was solved (or not).
 struct PhaseReport {
   NewtonReport newton;
+  bool flagged = false;  ///< did not converge, the last iterate was accepted
   std::optional<Error> error;  ///< set when it failed
 };
 
@@ -30,6 +31,13 @@ class Stepper {
   /// Called before each residual of a step with the number of corrections so far; false: loads from outside have not
   /// settled. May be empty. What it throws leaves the step, and the state is as it was.
   void set_exchange(std::function<bool(int)> exchange) { exchange_ = std::move(exchange); }
+
+  /// Steps that do not converge end at their last iterate, when it is finite, and are flagged.
+  void accept_unconverged(bool accept) { accept_unconverged_ = accept; }
+
+  /// Derivatives of the loads that `exchange` sets; none: nullptr.
+  void set_tangents(std::unique_ptr<TangentSolver> tangents) { workspace_.tangents = std::move(tangents); }
+  TangentSolver* tangents() { return workspace_.tangents.get(); }
 
   /// Initial assembly, momenta. The state comes from make_initial_state.
   Status assemble(State& state);
@@ -68,6 +76,7 @@ class Stepper {
   State backup_;
   const CancelToken* cancel_ = nullptr;
   std::function<bool(int)> exchange_;
+  bool accept_unconverged_ = false;
   NewtonSettings regular_, derivatives_, dummy_;
   double derivatives_coefficient_ = 0;
 };

@@ -1,10 +1,12 @@
 /// Scratch of one thread: residual, matrix, factorization. Never saved; results never depend on what it held before.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "model/model.h"
 #include "solver/linear_solver.h"
+#include "solver/load_tangent.h"
 
 namespace mbcosim {
 
@@ -21,6 +23,7 @@ struct Workspace {
   std::vector<NodeSeeds> seeds;  ///< (structural nodes)
   LinearSolver solver;
   std::vector<double> residual_history;  ///< test values of the last solve
+  std::unique_ptr<TangentSolver> tangents;  ///< takes the place of `solver` when external codes give derivatives
 };
 
 }  // namespace mbcosim
