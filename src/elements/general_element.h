@@ -124,6 +124,8 @@ class GeneralResidual {
   void add3(int row, const Vec3& value) {
     for (int i = 0; i < 3; ++i) add(row + i, value(i));
   }
+  /// An equation of another element, by the model's number.
+  void add_to_equation(int equation, double value) { r_[equation] += value; }
   /// Force [N] and moment about the node [N·m] on the equilibrium rows that start at `row`.
   void load(int row, const Vec3& f, const Vec3& m) {
     add3(row, f);
@@ -213,6 +215,10 @@ class GeneralElementSet final : public ElementSet {
  public:
   void add(ModelBuilder& builder, ElementInfo info, std::unique_ptr<GeneralElement> element);
   const GeneralElement& element(int i) const { return *slots_[i].element; }
+  /// What element i sees.
+  GeneralView view(const EvalContext& context, int i) const {
+    return GeneralView(context, slots_[i].connection, slots_[i].info);
+  }
 
   int size() const override { return static_cast<int>(slots_.size()); }
   const ElementInfo& info(int i) const override { return slots_[i].info; }
@@ -258,9 +264,6 @@ class GeneralElementSet final : public ElementSet {
     GeneralConnection connection;
     std::vector<int> positions;  ///< (size × size), column-major
   };
-  GeneralView view(const EvalContext& context, int i) const {
-    return GeneralView(context, slots_[i].connection, slots_[i].info);
-  }
   std::vector<Slot> slots_;
 };
 

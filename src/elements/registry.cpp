@@ -10,6 +10,7 @@ const Registry& full_registry() {
     register_beams(r);
     register_forces(r);
     register_external_forces(r);
+    register_ports(r);
     register_genels(r);
     register_hydraulics(r);
     register_modal(r);

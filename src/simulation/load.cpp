@@ -52,13 +52,38 @@ Diagnostic full_note(const Limits& limits) {
   return d;
 }
 
+std::uint64_t digest_with(std::uint64_t deck, const std::vector<PortAttachment>& ports) {
+  if (ports.empty()) return deck;
+  Digest all;
+  all.add(std::to_string(deck));
+  for (const PortAttachment& port : ports) {
+    std::string text = port.name + (port.kind == ElementPort::Kind::modal ? " modal " : " motion ") +
+                       std::to_string(port.modal_joint) + (port.positions_only ? " positions" : "");
+    for (const int label : port.node_labels) text += " " + std::to_string(label);
+    all.add(text);
+  }
+  return all.value();
+}
+
+bool attach(ModelBuilder& builder, const std::vector<PortAttachment>& ports, const std::string& file,
+            std::vector<Diagnostic>& extra) {
+  for (const PortAttachment& port : ports)
+    if (const Status status = attach_port(builder, port); !status) {
+      extra.push_back(plain_error("port", file, status.error().message));
+      return false;
+    }
+  return true;
+}
+
 /// Reads into `session`; the model, or null with the reason in the session's diagnostics.
-ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnostic>& extra) {
+ModelPtr read_model(Session& session, ModelBuilder& builder, const std::vector<PortAttachment>& ports,
+                    std::vector<Diagnostic>& extra) {
   Deck deck(session, builder, full_registry());
   Statements statements(session);
   DeckReader(deck, statements).read();
   if (session.errors() == 0) session.bind_strings();
   if (session.errors() > 0) return nullptr;
+  if (!attach(builder, ports, session.file(0).name, extra)) return nullptr;
   Model& model = builder.model();
   if (const std::int64_t n = count_unknowns(model); n > session.limits.unknowns) {
     extra.push_back(plain_error("limit-unknowns", session.file(0).name,
@@ -66,7 +91,7 @@ ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnos
                                     std::to_string(session.limits.unknowns) + " (limit `unknowns`)"));
     return nullptr;
   }
-  model.digest = digest(session, deck.data_files);
+  model.digest = digest_with(digest(session, deck.data_files), ports);
   store_symbols(session, model);
   Result<ModelPtr> finished = builder.finish();
   if (!finished) {
@@ -79,7 +104,8 @@ ModelPtr read_model(Session& session, ModelBuilder& builder, std::vector<Diagnos
 
 }  // namespace
 
-LoadReport load_deck(const FileSource& files, const std::string& main_file, const Limits& limits) {
+LoadReport load_deck(const FileSource& files, const std::string& main_file, const Limits& limits,
+                     const std::vector<PortAttachment>& ports) {
   LoadReport report;
   try {
     ModelBuilder builder;
@@ -93,7 +119,7 @@ LoadReport load_deck(const FileSource& files, const std::string& main_file, cons
       return report;
     }
     std::vector<Diagnostic> extra;
-    report.model = read_model(session, builder, extra);
+    report.model = read_model(session, builder, ports, extra);
     report.printed = session.printed;
     report.diagnostics = session.take_diagnostics();
     report.diagnostics.insert(report.diagnostics.end(), extra.begin(), extra.end());

@@ -48,6 +48,21 @@ Variables::Variables(const Model& model) {
          "force and moment about each point of the port", "port " + port.name},
         {Source::port_loads, static_cast<int>(k), 0});
   }
+  add_ports(model);
+}
+
+void Variables::add_ports(const Model& model) {
+  ports_ = port_elements(model);
+  for (std::size_t k = 0; k < ports_.size(); ++k) {
+    const ElementPort& port = ports_[k].port();
+    const int index = static_cast<int>(k);
+    if (const std::string name = port_input_name(port); !name.empty())
+      add({name, port.input_size, {port.input_size}, "", "global", Causality::input, "what the peer of the port gives", "port " + port.name},
+          {Source::element_input, index, 0});
+    if (const std::string name = port_output_name(port); !name.empty())
+      add({name, port.output_size, {port.output_size}, "", "global", Causality::output, "what the peer of the port gets", "port " + port.name},
+          {Source::element_output, index, 0});
+  }
 }
 
 void Variables::add(Variable v, Entry e) {
@@ -163,6 +178,13 @@ void Variables::get(const EvalContext& context, int handle, std::vector<double>&
       out.insert(out.end(), values, values + port.load_size());
       return;
     }
+    case Source::element_input: {
+      const ElementPort& port = ports_[e.index].port();
+      const double* values = &state.memory[port.memory];
+      out.insert(out.end(), values, values + port.input_size);
+      return;
+    }
+    case Source::element_output: return ports_[e.index].outputs(context, out);
     case Source::drive: return out.push_back(model.drives[e.index].drive->value(context));
   }
 }
@@ -193,6 +215,10 @@ Status Variables::set(const Model& model, State& state, int handle, std::span<co
   }
   if (e.source == Source::port_loads) {
     std::copy(values.begin(), values.end(), state.memory.begin() + model.structural_ports[e.index].memory);
+    return ok();
+  }
+  if (e.source == Source::element_input) {
+    std::copy(values.begin(), values.end(), state.memory.begin() + ports_[e.index].port().memory);
     return ok();
   }
   if (state.external_loads.empty()) state.external_loads.assign(6 * model.structural.size(), 0.0);

@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "elements/ports/port_element.h"
 #include "model/diagnostic.h"
 #include "model/model.h"
 #include "simulation/variable.h"
@@ -24,7 +25,8 @@ class Variables {
  private:
   enum class Source { time, step, node_position, node_rotation, node_orientation, node_velocity, node_omega, node_acceleration,
                       node_angular_acceleration, momentum, momenta_moment, node_load, scalar_value, scalar_rate, parameter,
-                      element_datum, drive, stream, port_loads };
+                      element_datum, drive, stream, port_loads,
+                      element_input, element_output };
   struct Entry {
     Source source;
     int index = 0;   ///< of the node, element, drive, stream or port
@@ -34,9 +36,11 @@ class Variables {
   void add_structural(const Model& model, int node);
   void add_scalar(const Model& model, int node);
   void add_element(const Model& model, int element);
+  void add_ports(const Model& model);
 
   std::vector<Variable> variables_;
   std::vector<Entry> entries_;
+  std::vector<PortElementRef> ports_;  ///< elements that are ports
   std::unordered_map<std::string, int> index_;
 };
 

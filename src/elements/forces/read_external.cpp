@@ -2,6 +2,8 @@
 #include <algorithm>
 
 #include "elements/forces/external_structural.h"
+#include "elements/forces/read_external.h"
+#include "elements/ports/port_element.h"
 #include "elements/registry.h"
 #include "model/card.h"
 
@@ -64,13 +66,6 @@ PortCoupling read_coupling(Card& card) {
   }
 }
 
-void read_timing(Card& card, StructuralPort& port) {
-  if (card.keyword("sleep time")) card.real("sleep time");
-  if (card.keyword("precision") && !card.keyword("default")) card.integer("precision");
-  port.coupling = read_coupling(card);
-  if (card.keyword("send after predict")) card.yes_no("send after predict");
-}
-
 OrientationDescription read_orientation(Card& card) {
   switch (card.required("orientation",
                         {"none", "orientation matrix", "orientation vector", "euler 123"})) {
@@ -81,22 +76,6 @@ OrientationDescription read_orientation(Card& card) {
     default:
       return OrientationDescription::matrix;
   }
-}
-
-void read_options(Card& card, StructuralPort& port) {
-  if (card.keyword("reference node")) port.reference = card.structural_node();
-  if (card.keyword("labels")) card.yes_no("labels");  // the layout of the port always has them
-  if (card.keyword("sorted")) card.yes_no("sorted");
-  if (card.keyword("orientation")) port.orientation = read_orientation(card);
-  if (card.keyword("accelerations")) port.accelerations = card.yes_no("accelerations");
-  port.use_reference_loads = port.reference >= 0;
-  if (!card.keyword("use reference node forces")) return;
-  if (port.reference < 0) card.fail("`use reference node forces` needs a `reference node`");
-  port.use_reference_loads = card.yes_no("use reference node forces");
-  if (port.use_reference_loads && card.keyword("rotate reference node forces") &&
-      !card.yes_no("rotate reference node forces"))
-    card.fail("the loads on the reference node travel in the frame of the others",
-              "leave `rotate reference node forces` out");
 }
 
 void read_points(Card& card, StructuralPort& port) {
@@ -125,15 +104,9 @@ void check_accelerations(Card& card, const StructuralPort& port) {
 
 void read_external_structural(Card& card, ElementInfo& info) {
   StructuralPort port;
-  const SourceSpan where = card.next();
-  port.name = read_communicator(card, info.label);
-  const auto& ports = card.model().structural_ports;
-  if (port.name.empty()) card.fail_at(where, "the name of the port is empty");
-  if (std::any_of(ports.begin(), ports.end(),
-                  [&](const StructuralPort& other) { return other.name == port.name; }))
-    card.fail_at(where, "there is a port named \"" + port.name + "\" already");
-  read_timing(card, port);
-  read_options(card, port);
+  port.name = read_port_name(card, info.label);
+  port.coupling = read_port_timing(card);
+  read_port_options(card, port);
   read_points(card, port);
   check_accelerations(card, port);
   if (card.keyword("echo"))
@@ -147,6 +120,39 @@ void read_external_structural(Card& card, ElementInfo& info) {
 }
 
 }  // namespace
+
+std::string read_port_name(Card& card, int label) {
+  const SourceSpan where = card.next();
+  std::string name = read_communicator(card, label);
+  if (name.empty()) card.fail_at(where, "the name of the port is empty");
+  if (has_port(card.model(), name))
+    card.fail_at(where, "there is a port named \"" + name + "\" already");
+  return name;
+}
+
+PortCoupling read_port_timing(Card& card) {
+  if (card.keyword("sleep time")) card.real("sleep time");
+  if (card.keyword("precision") && !card.keyword("default")) card.integer("precision");
+  const PortCoupling coupling = read_coupling(card);
+  if (card.keyword("send after predict")) card.yes_no("send after predict");
+  return coupling;
+}
+
+void read_port_options(Card& card, StructuralPort& port) {
+  if (card.keyword("reference node")) port.reference = card.structural_node();
+  if (card.keyword("labels")) card.yes_no("labels");  // the layout of the port always has them
+  if (card.keyword("sorted")) card.yes_no("sorted");
+  if (card.keyword("orientation")) port.orientation = read_orientation(card);
+  if (card.keyword("accelerations")) port.accelerations = card.yes_no("accelerations");
+  port.use_reference_loads = port.reference >= 0;
+  if (!card.keyword("use reference node forces")) return;
+  if (port.reference < 0) card.fail("`use reference node forces` needs a `reference node`");
+  port.use_reference_loads = card.yes_no("use reference node forces");
+  if (port.use_reference_loads && card.keyword("rotate reference node forces") &&
+      !card.yes_no("rotate reference node forces"))
+    card.fail("the loads on the reference node travel in the frame of the others",
+              "leave `rotate reference node forces` out");
+}
 
 void register_external_forces(Registry& registry) {
   registry.typed("force", Family::force, {"external structural"}, read_external_structural);
