@@ -20,11 +20,15 @@ struct Agreement {
   double relaxation = 0.5;
   double tolerance = 1e-6;  ///< of the interface, relative
   int maximum_passes = 50;
+  v1::TangentForm tangent = v1::TANGENT_FORM_NONE;
+  std::chrono::milliseconds heartbeat_interval{0};  ///< of the server; 0: none
+  std::chrono::milliseconds heartbeat_timeout{0};   ///< longest silence of the peer; 0: any
   int generation = 0;  ///< number of the handshake on this port
 
   bool is_window() const { return mode == v1::COUPLING_MODE_WINDOW; }
   bool is_tight() const { return mode == v1::COUPLING_MODE_TIGHT; }
   bool is_implicit() const { return is_window() || is_tight(); }
+  bool has_tangent() const { return is_tight() && tangent != v1::TANGENT_FORM_NONE; }
 };
 
 }  // namespace mbcosim::server

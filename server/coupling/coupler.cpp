@@ -25,8 +25,14 @@ class Stopwatch {
 }  // namespace
 
 Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
-                 const Simulation& simulation) {
-  for (const v1::PortDefinition& definition : ports) add({definition, simulation}, simulation);
+                 const Simulation& simulation, Recorder* recorder)
+    : recorder_(recorder) {
+  for (const PortElementRef& element : port_elements(simulation.model())) add({element, simulation}, simulation);
+  for (const v1::PortDefinition& definition : ports) {
+    const bool in_model = definition.kind() == v1::PORT_KIND_MOTION || definition.kind() == v1::PORT_KIND_MODAL;
+    const Port* known = in_model ? find(definition.name()) : nullptr;
+    if (!known || known->model().layout().kind() != definition.kind()) add({definition, simulation}, simulation);
+  }
   for (const StructuralPort& port : simulation.model().structural_ports)
     add({port, simulation}, simulation);
   for (const StreamInput& stream : simulation.model().stream_inputs) {
@@ -45,7 +51,7 @@ void Coupler::add(PortModel model, const Simulation& simulation) {
                                                  simulation.variables()[handle].name +
                                                  "\" is written by another port, too");
   }
-  ports_.push_back(std::make_unique<Port>(std::move(model)));
+  ports_.push_back(std::make_unique<Port>(std::move(model), recorder_));
   lines_.emplace_back().port = ports_.back().get();
 }
 
@@ -55,13 +61,11 @@ Port* Coupler::find(const std::string& name) const {
   return nullptr;
 }
 
-std::string Coupler::waiting_text() const {
-  std::string text;
-  for (const auto& port : ports_) {
-    const std::string one = port->waiting_text();
-    if (!one.empty()) text += (text.empty() ? "" : ", ") + one;
-  }
-  return text;
+std::vector<v1::PortWait> Coupler::waits() const {
+  std::vector<v1::PortWait> all;
+  for (const auto& port : ports_)
+    if (auto wait = port->waiting()) all.push_back(std::move(*wait));
+  return all;
 }
 
 bool Coupler::has_tight() const {
@@ -124,7 +128,7 @@ void Coupler::prepare(const Simulation& simulation) {
 
 void Coupler::take_answer(Line& line, const CancelToken& cancel) {
   line.sent_for = -1;
-  if (const auto answer = line.port->take(cancel)) line.history.add(target_time_, *answer);
+  if (const auto answer = line.port->take(cancel)) line.history.add(target_time_, answer->values);
 }
 
 // All peers compute at the same time: everything is sent before the first answer is awaited.
@@ -168,9 +172,39 @@ void Coupler::start_passes(const Simulation& simulation) {
     if (line.agreement.is_window()) start(line, simulation);
 }
 
-void Coupler::start_iterations(const Simulation& simulation) {
-  for (Line& line : lines_)
-    if (line.agreement.is_tight()) start(line, simulation);
+void Coupler::start_iterations(Simulation& simulation) {
+  announce_tangents(simulation);
+  for (Line& line : lines_) {
+    if (!line.agreement.is_tight()) continue;
+    start(line, simulation);
+    if (line.tangent < 0) continue;
+    LoadTangent& tangent = simulation.load_tangent(line.tangent);
+    tangent.stiffness.resize(0, 0);
+    tangent.damping.resize(0, 0);
+  }
+}
+
+// The pattern of the matrix follows who has tangents; it is made anew only when that changes.
+void Coupler::announce_tangents(Simulation& simulation) {
+  std::vector<std::pair<const Port*, int>> now;
+  for (const Line& line : lines_)
+    if (line.agreement.has_tangent()) now.emplace_back(line.port, line.agreement.generation);
+  if (now == announced_) return;
+  announced_ = std::move(now);
+  std::vector<LoadTangent> tangents;
+  for (Line& line : lines_) {
+    line.tangent = line.agreement.has_tangent() ? static_cast<int>(tangents.size()) : -1;
+    if (line.tangent >= 0) tangents.push_back(line.port->model().tangent(line.agreement));
+  }
+  simulation.set_load_tangents(std::move(tangents));
+}
+
+void Coupler::end_attempt(bool accepted, const Simulation& simulation) {
+  for (Line& line : lines_) {
+    if (!line.agreement.is_tight()) continue;
+    line.port->notify(accepted, simulation.step_number(), simulation.time());
+    start(line, simulation);
+  }
 }
 
 void Coupler::apply_interface(const Line& line, Simulation& simulation) const {
@@ -187,12 +221,27 @@ void Coupler::apply_window(Simulation& simulation) const {
 bool Coupler::take_interface(Line& line, const CancelToken& cancel) {
   const auto answer = line.port->take(cancel);
   if (!answer) return true;  // the policy goes on with what was applied
-  const Eigen::Map<const Eigen::VectorXd> given(answer->data(),
-                                                static_cast<Eigen::Index>(answer->size()));
+  const Eigen::Map<const Eigen::VectorXd> given(answer->values.data(),
+                                                static_cast<Eigen::Index>(answer->values.size()));
   const double change = (given - line.interface).norm();
-  if (change <= line.agreement.tolerance * given.norm() || change == 0) return true;
+  if (change <= line.agreement.tolerance * given.norm() || change == 0) return !answer->unfinished;
   line.interface = line.fixed_point.next(line.interface, given);
   return false;
+}
+
+// The answer belongs to the iterate and its derivatives are in the matrix: the solver's own test tells the end, as in a
+// model that is not cut.
+bool Coupler::take_with_tangent(Line& line, Simulation& simulation, const CancelToken& cancel) {
+  auto answer = line.port->take(cancel);
+  if (!answer) return true;
+  line.interface = Eigen::Map<const Eigen::VectorXd>(answer->values.data(), static_cast<Eigen::Index>(answer->values.size()));
+  apply_interface(line, simulation);
+  if (answer->has_tangent) {
+    LoadTangent& tangent = simulation.load_tangent(line.tangent);
+    tangent.stiffness = std::move(answer->stiffness);
+    tangent.damping = std::move(answer->damping);
+  }
+  return !answer->unfinished;
 }
 
 bool Coupler::exchange_window(const Simulation& simulation, int pass, const CancelToken& cancel) {
@@ -220,7 +269,9 @@ bool Coupler::exchange_iteration(Simulation& simulation, int iteration, const Ca
   }
   bool settled = true;
   for (Line& line : lines_) {
-    if (takes_part(line)) {
+    if (line.tangent >= 0) {
+      line.settled = takes_part(line) && take_with_tangent(line, simulation, cancel);
+    } else if (takes_part(line)) {
       line.settled = take_interface(line, cancel);
       if (!line.settled) apply_interface(line, simulation);
     }

@@ -21,12 +21,13 @@ namespace mbcosim::server {
 /// and `exchange` wait and need none.
 class Coupler {
  public:
+  /// `recorder`: keeps what crosses the ports; may be null.
   Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
-          const Simulation& simulation);
+          const Simulation& simulation, Recorder* recorder = nullptr);
 
   Port* find(const std::string& name) const;
   const std::vector<std::unique_ptr<Port>>& ports() const { return ports_; }
-  std::string waiting_text() const;
+  std::vector<v1::PortWait> waits() const;
   bool has_window() const;
   bool has_tight() const;
 
@@ -46,9 +47,13 @@ class Coupler {
   int maximum_passes() const;
 
   // --- tight ports: take part in the iteration
-  void start_iterations(const Simulation& simulation);
+  void start_iterations(Simulation& simulation);
   /// One exchange at the iterate. True: the loads of all tight ports have settled. Throws PeerLost.
   bool exchange_iteration(Simulation& simulation, int iteration, const CancelToken& cancel);
+
+  /// An attempt at the step failed and another follows, or a piece of it was accepted: tight peers are told, their
+  /// iteration starts again.
+  void end_attempt(bool accepted, const Simulation& simulation);
 
   /// Tells window and tight peers how the step ended.
   void notify(bool accepted, const Simulation& simulation);
@@ -67,6 +72,7 @@ class Coupler {
     FixedPoint fixed_point{v1::ACCELERATION_NONE, 1};
     Eigen::VectorXd interface;  ///< window, tight: values applied
     bool settled = false;       ///< tight: the last answer was what is applied
+    int tangent = -1;           ///< tight: number among the simulation's load tangents; −1: none
   };
   void add(PortModel model, const Simulation& simulation);
   void fill(Line& line, const Simulation& simulation, double target_time, int iteration);
@@ -74,11 +80,15 @@ class Coupler {
   void start(Line& line, const Simulation& simulation);
   void apply_interface(const Line& line, Simulation& simulation) const;
   bool take_interface(Line& line, const CancelToken& cancel);
+  bool take_with_tangent(Line& line, Simulation& simulation, const CancelToken& cancel);
+  void announce_tangents(Simulation& simulation);
 
+  Recorder* const recorder_;
   std::vector<std::unique_ptr<Port>> ports_;
   std::set<int> written_;  ///< handles that ports write
   std::vector<Line> lines_;
-  double target_time_ = 0;  ///< end of the step [s]
+  std::vector<std::pair<const Port*, int>> announced_;  ///< ports with tangents and their handshakes
+  double target_time_ = 0;                              ///< end of the step [s]
   double waited_ = 0;
 };
 

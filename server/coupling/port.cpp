@@ -2,7 +2,6 @@
 
 #include <google/protobuf/util/time_util.h>
 
-#include <cstdio>
 #include <thread>
 
 #include "service/refusal.h"
@@ -28,13 +27,14 @@ void Port::fill(v1::PortLayout* out) const {
       google::protobuf::util::TimeUtil::MillisecondsToDuration(agreement_.timeout.count());
 }
 
-std::string Port::waiting_text() const {
+std::optional<v1::PortWait> Port::waiting() const {
   std::lock_guard guard(mutex_);
-  if (!waiting_since_) return "";
-  char text[64];
-  std::snprintf(text, sizeof text, " since %.1f s",
-                std::chrono::duration<double>(Clock::now() - *waiting_since_).count());
-  return "port " + model_.name() + text;
+  if (!waiting_since_) return std::nullopt;
+  v1::PortWait wait;
+  wait.set_port(model_.name());
+  wait.set_seconds(std::chrono::duration<double>(Clock::now() - *waiting_since_).count());
+  wait.set_has_peer(link_ != nullptr);
+  return wait;
 }
 
 // ------------------------------------------------------------------ the peer's thread
@@ -49,10 +49,12 @@ void Port::reserve(const Agreement& agreement) {
   agreement_.generation = generation;
 }
 
-void Port::attach(PeerLink* link) {
+void Port::attach(PeerLink* link, const v1::Welcome& welcome) {
   {
     std::lock_guard guard(mutex_);
+    if (recorder_) recorder_->attached(model_.name(), welcome);
     link_ = link;
+    heard_.store(Clock::now().time_since_epoch().count());
     index_ = 0;
     awaited_ = false;
     answer_.reset();
@@ -64,13 +66,17 @@ void Port::attach(PeerLink* link) {
 void Port::detach() {
   std::unique_lock guard(mutex_);
   changed_.wait(guard, [&] { return !link_in_use_; });
+  if (recorder_ && link_) recorder_->detached(model_.name());
   link_ = nullptr;
   reserved_ = false;
   guard.unlock();
   changed_.notify_all();
 }
 
+Port::Clock::duration Port::silence() const { return Clock::now() - Clock::time_point(Clock::duration(heard_.load())); }
+
 void Port::receive(const v1::PeerMessage& message) {
+  heard_.store(Clock::now().time_since_epoch().count(), std::memory_order_relaxed);
   if (message.has_heartbeat()) return;
   if (!message.has_exchange())
     throw Refusal(v1::REASON_OUT_OF_TURN,
@@ -87,12 +93,13 @@ void Port::deliver(const v1::PeerExchange& answer) {
                                                "; the last one sent is " + std::to_string(index_)));
     if (answer.index() < index_ || !awaited_) return;
     peer_failure_ = answer.failure();
-    std::vector<double> values;
+    Answer values;
     if (peer_failure_.empty()) {
       const std::string wrong = model_.decode(answer, agreement_, &values);
       if (!wrong.empty()) throw Refusal(v1::REASON_BAD_ARGUMENT, in_port(model_.name(), wrong));
     }
     answer_ = std::move(values);
+    if (recorder_) received_ = answer;
   }
   changed_.notify_all();
 }
@@ -158,10 +165,11 @@ void Port::send(v1::ServerMessage& message, int generation) {
   message.mutable_exchange()->set_index(++index_);
   awaited_ = true;
   answer_.reset();
+  if (recorder_) recorder_->sent(model_.name(), message);
   send_unlocked(guard, message);
 }
 
-std::optional<std::vector<double>> Port::take(const CancelToken& cancel) {
+std::optional<Answer> Port::take(const CancelToken& cancel) {
   std::unique_lock guard(mutex_);
   for (int spin = 0; spin < kSpins && awaited_ && !answer_ && link_ && !link_->pulls(); ++spin) {
     guard.unlock();
@@ -177,12 +185,12 @@ std::optional<std::vector<double>> Port::take(const CancelToken& cancel) {
   const bool answered = awaited_ && answer_.has_value();
   const bool late = awaited_ && !answered && link_;
   awaited_ = false;
+  if (recorder_ && answered) recorder_->received(model_.name(), received_);
   if (!answered)
     return go_on_without(late ? "the peer did not answer in time" : "the peer is gone");
   if (!peer_failure_.empty())
     return go_on_without("the peer failed: " + peer_failure_.substr(0, 500));
-  last_answer_ = *answer_;
-  return last_answer_;
+  return std::move(answer_);
 }
 
 // One look at a link that pulls, without the lock. False: nothing will come through it any more.
@@ -205,12 +213,13 @@ bool Port::pull(std::unique_lock<std::mutex>& guard) {
 
 void Port::lose(const std::string& why) { throw PeerLost{in_port(model_.name(), why)}; }
 
-std::optional<std::vector<double>> Port::go_on_without(const std::string& why) {
+std::optional<Answer> Port::go_on_without(const std::string& why) {
+  if (recorder_) recorder_->lost(model_.name(), why);
   switch (agreement_.policy) {
     case v1::PEER_POLICY_HOLD_LAST:
       return std::nullopt;
     case v1::PEER_POLICY_ZERO:
-      return std::vector<double>(static_cast<std::size_t>(model_.answer_size()), 0.0);
+      return Answer{std::vector<double>(static_cast<std::size_t>(model_.answer_size()), 0.0), false, false, {}, {}};
     default:
       lose(why);
   }
@@ -223,6 +232,7 @@ void Port::notify(bool accepted, std::int64_t step, double time) {
   notice->set_time_s(time);
   std::unique_lock guard(mutex_);
   if (!link_) return;
+  if (recorder_) recorder_->sent(model_.name(), message);
   send_unlocked(guard, message);
 }
 

@@ -1,6 +1,7 @@
 /// Where a stepping session and the stream of a peer meet.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -9,7 +10,9 @@
 
 #include "coupling/input_history.h"
 #include "coupling/port_model.h"
+#include "coupling/recorder.h"
 #include "mbcosim/v1/coupling.pb.h"
+#include "mbcosim/v1/simulations.pb.h"
 #include "service/refusal.h"
 
 namespace mbcosim::server {
@@ -40,19 +43,23 @@ struct PeerLost {
 /// Thread-safe: the session's thread exchanges, the peer's thread attaches, delivers and detaches.
 class Port {
  public:
-  explicit Port(PortModel model) : model_(std::move(model)) {}
+  /// `recorder`: keeps what crosses the port; may be null, outlives the port.
+  Port(PortModel model, Recorder* recorder) : model_(std::move(model)), recorder_(recorder) {}
 
   PortModel& model() { return model_; }
   const PortModel& model() const { return model_; }
   void fill(v1::PortLayout* out) const;
   /// For whom and since when the session waits; empty: for nobody.
-  std::string waiting_text() const;
+  std::optional<v1::PortWait> waiting() const;
 
   // --- the peer's thread
   /// Takes the port for a peer. Throws PORT_TAKEN.
   void reserve(const Agreement& agreement);
-  void attach(PeerLink* link);  ///< after `reserve`; exchanges may start
+  /// After `reserve`; exchanges may start. `welcome`: for the record.
+  void attach(PeerLink* link, const v1::Welcome& welcome);
   void detach();
+  /// How long the peer has sent nothing.
+  std::chrono::steady_clock::duration silence() const;
   /// Any message after `hello`. Throws OUT_OF_TURN or what `deliver` throws.
   void receive(const v1::PeerMessage& message);
   /// Hands over an answer. Throws OUT_OF_TURN or BAD_ARGUMENT; answers to exchanges given up are
@@ -70,7 +77,7 @@ class Port {
   /// `take` tells.
   void send(v1::ServerMessage& message, int generation);
   /// The answer to the last `send`, or nothing when the policy goes on without. Throws PeerLost.
-  std::optional<std::vector<double>> take(const CancelToken& cancel);
+  std::optional<Answer> take(const CancelToken& cancel);
   bool is_waiting() const;  ///< was a message sent whose answer was not taken?
   void forget();            ///< gives up the answer that is on its way
   /// Tells the peer how an implicit step ended.
@@ -81,9 +88,10 @@ class Port {
   void send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message);
   bool pull(std::unique_lock<std::mutex>& guard);
   [[noreturn]] void lose(const std::string& why);
-  std::optional<std::vector<double>> go_on_without(const std::string& why);
+  std::optional<Answer> go_on_without(const std::string& why);
 
   PortModel model_;
+  Recorder* const recorder_;
   mutable std::mutex mutex_;  // protects all below; `model_` too while an answer is decoded
   std::condition_variable changed_;
   Agreement agreement_;
@@ -91,10 +99,11 @@ class Port {
   PeerLink* link_ = nullptr;
   std::int64_t index_ = 0;  ///< of the last exchange on the present stream
   bool awaited_ = false;    ///< its answer is wanted
-  std::optional<std::vector<double>> answer_;
+  v1::PeerExchange received_;  ///< what `answer_` was made of, for the record
+  std::optional<Answer> answer_;
   std::string peer_failure_;  ///< the peer could not compute
-  std::vector<double> last_answer_;
   std::optional<Clock::time_point> waiting_since_;
+  std::atomic<Clock::rep> heard_{0};  ///< when the peer last sent something
   v1::PeerMessage pulled_;  ///< of the session's thread
 };
 

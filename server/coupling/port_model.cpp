@@ -1,67 +1,21 @@
 #include "coupling/port_model.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
+#include <cstdlib>
+#include <map>
 
+#include "coupling/port_numbers.h"
 #include "service/refusal.h"
+#include "simulation/formula.h"
 
 namespace mbcosim::server {
 namespace {
-
-using Numbers = google::protobuf::RepeatedField<double>;
 
 int handle_of(const Simulation& simulation, const std::string& name) {
   const int handle = simulation.find_variable(name);
   if (handle < 0)
     throw Refusal(v1::REASON_NO_SUCH_VARIABLE, "the model has no variable \"" + name + "\"");
   return handle;
-}
-
-Vec3 vector_at(const Simulation& simulation, int handle) {
-  std::vector<double> v;
-  simulation.get(handle, v);
-  return Vec3(v[0], v[1], v[2]);
-}
-
-Mat3 matrix_at(const Simulation& simulation, int handle) {
-  std::vector<double> v;
-  simulation.get(handle, v);
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v.data());
-}
-
-void put(const Vec3& v, Numbers* out) { out->Add(v.data(), v.data() + 3); }
-
-void put_quaternion(const Mat3& R, Numbers* out) {
-  Eigen::Quaterniond q(R);
-  q.normalize();
-  const double sign = q.w() < 0 ? -1 : 1;
-  for (const double component : {q.w(), q.x(), q.y(), q.z()}) out->Add(sign * component);
-}
-
-// R = R_x(a) R_y(b) R_z(c)
-Vec3 euler_123(const Mat3& R) {
-  const double b = std::asin(std::clamp(R(0, 2), -1.0, 1.0));
-  return {std::atan2(-R(1, 2), R(2, 2)), b, std::atan2(-R(0, 1), R(0, 0))};
-}
-
-void put_rotation(const Mat3& R, v1::RotationForm form, Numbers* out) {
-  switch (form) {
-    case v1::ROTATION_FORM_VECTOR:
-      return put(vector_of_rotation(R), out);
-    case v1::ROTATION_FORM_QUATERNION:
-      return put_quaternion(R, out);
-    case v1::ROTATION_FORM_EULER_123:
-      return put(euler_123(R), out);
-    default:
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) out->Add(R(i, j));
-  }
-}
-
-Vec3 triple(const Numbers& numbers, std::size_t i) {
-  return Vec3(numbers.Get(static_cast<int>(3 * i)), numbers.Get(static_cast<int>(3 * i + 1)),
-              numbers.Get(static_cast<int>(3 * i + 2)));
 }
 
 v1::CouplingMode to_mode(PortCoupling coupling) {
@@ -86,21 +40,10 @@ v1::RotationForm to_form(OrientationDescription description) {
   }
 }
 
-std::string check_array(const char* name, const Numbers& numbers, std::size_t size,
-                        bool may_be_empty) {
-  if (may_be_empty && numbers.empty()) return "";
-  if (static_cast<std::size_t>(numbers.size()) != size)
-    return std::string("`") + name + "` must have " + std::to_string(size) + " numbers, got " +
-           std::to_string(numbers.size());
-  for (const double number : numbers)
-    if (!std::isfinite(number))
-      return std::string("`") + name + "` has a number that is not finite";
-  return "";
-}
-
 }  // namespace
 
-PortModel::PortModel(const v1::PortDefinition& definition, const Simulation& simulation) {
+PortModel::PortModel(const v1::PortDefinition& definition, const Simulation& simulation)
+    : model_(&simulation.model()) {
   if (definition.name().empty()) throw Refusal(v1::REASON_BAD_ARGUMENT, "a port must have a name");
   layout_.set_name(definition.name());
   layout_.set_kind(definition.kind());
@@ -114,17 +57,31 @@ PortModel::PortModel(const v1::PortDefinition& definition, const Simulation& sim
     default:
       throw Refusal(v1::REASON_NOT_SERVED,
                     "port \"" + definition.name() +
-                        "\": only structural and signal ports are served by this version");
+                        "\": ports of this kind are attached when the simulation is created");
   }
+}
+
+void PortModel::make_points(const Simulation& simulation, const StructuralPort& port) {
+  const auto label_of = [&](int node) { return model_->structural[node].label; };
+  layout_.set_default_mode(to_mode(port.coupling));
+  layout_.set_default_rotation_form(to_form(port.orientation));
+  layout_.set_default_frame(port.reference < 0 ? v1::PORT_FRAME_GLOBAL : v1::PORT_FRAME_REFERENCE);
+  for (int k = 0; k < port.points(); ++k) {
+    points_.push_back(find_point(simulation, label_of(port.nodes[k])));
+    points_.back().offset = port.offsets[k];
+    layout_.add_node_labels(label_of(port.nodes[k]));
+  }
+  layout_.mutable_point_labels()->Add(port.point_labels.begin(), port.point_labels.end());
+  if (port.reference >= 0) make_reference(simulation, label_of(port.reference));
 }
 
 PortModel::Point PortModel::find_point(const Simulation& simulation, int label) const {
   const std::string prefix = "node.structural." + std::to_string(label) + ".";
   Point point{};
   point.x = handle_of(simulation, prefix + "X");
-  point.R = handle_of(simulation, prefix + "R");
+  point.R = simulation.find_variable(prefix + "R");
   point.v = handle_of(simulation, prefix + "XP");
-  point.w = handle_of(simulation, prefix + "Omega");
+  point.w = simulation.find_variable(prefix + "Omega");
   point.a = simulation.find_variable(prefix + "XPP");
   point.wp = simulation.find_variable(prefix + "OmegaP");
   point.load = simulation.find_variable(prefix + "load");
@@ -165,29 +122,21 @@ void PortModel::make_reference(const Simulation& simulation, int label) {
   layout_.set_reference_node_label(label);
 }
 
-PortModel::PortModel(const StructuralPort& port, const Simulation& simulation) {
-  const auto label_of = [&](int node) { return simulation.model().structural[node].label; };
+PortModel::PortModel(const StructuralPort& port, const Simulation& simulation)
+    : model_(&simulation.model()) {
   layout_.set_name(port.name);
   layout_.set_kind(v1::PORT_KIND_STRUCTURAL);
   layout_.set_from_deck(true);
-  layout_.set_default_mode(to_mode(port.coupling));
-  layout_.set_default_rotation_form(to_form(port.orientation));
-  layout_.set_default_frame(port.reference < 0 ? v1::PORT_FRAME_GLOBAL : v1::PORT_FRAME_REFERENCE);
   layout_.set_reference_loads(port.use_reference_loads);
-  for (int k = 0; k < port.points(); ++k) {
-    points_.push_back(find_point(simulation, label_of(port.nodes[k])));
-    points_.back().offset = port.offsets[k];
-    layout_.add_node_labels(label_of(port.nodes[k]));
-    layout_.add_point_labels(port.point_labels[k]);
-  }
-  if (port.reference >= 0) make_reference(simulation, label_of(port.reference));
+  make_points(simulation, port);
   needs_accelerations_ = port.accelerations;
   deck_loads_ = handle_of(simulation, "port." + port.name + ".loads");
   written_.push_back(deck_loads_);
   answer_size_ = port.load_size();
 }
 
-PortModel::PortModel(const StreamInput& stream, const Simulation& simulation) {
+PortModel::PortModel(const StreamInput& stream, const Simulation& simulation)
+    : model_(&simulation.model()) {
   v1::PortDefinition definition;
   definition.set_name(stream.name);
   definition.set_kind(v1::PORT_KIND_SIGNAL);
@@ -196,6 +145,7 @@ PortModel::PortModel(const StreamInput& stream, const Simulation& simulation) {
   layout_.set_kind(v1::PORT_KIND_SIGNAL);
   layout_.set_from_deck(true);
   layout_.set_optional(true);
+  layout_.set_default_every(stream.every);
   make_signal(definition, simulation);
 }
 
@@ -220,8 +170,45 @@ void PortModel::make_signal(const v1::PortDefinition& definition, const Simulati
     layout_.add_input_names(variable);
     layout_.add_input_units(variables[handle].unit);
   }
-  layout_.set_output_size(output_size);
+  for (const v1::OutputExpression& expression : definition.output_expressions()) make_expression(expression, simulation);
+  layout_.set_output_size(output_size + definition.output_expressions_size());
   layout_.set_input_size(answer_size_);
+}
+
+namespace {
+
+/// "node.structural.1.X[2]": handle of the variable and the component.
+std::pair<int, int> component_of(const Simulation& simulation, const std::string& text) {
+  const std::size_t bracket = text.find('[');
+  const int handle = handle_of(simulation, text.substr(0, bracket));
+  const int size = simulation.variables()[handle].size;
+  if (bracket == std::string::npos) {
+    if (size == 1) return {handle, 0};
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "variable \"" + text + "\" is no single number; write e.g. \"" + text + "[0]\"");
+  }
+  char* end = nullptr;
+  const long k = std::strtol(text.c_str() + bracket + 1, &end, 10);
+  if (std::string(end) != "]" || k < 0 || k >= size)
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "\"" + text + "\": components go from [0] to [" + std::to_string(size - 1) + "]");
+  return {handle, static_cast<int>(k)};
+}
+
+}  // namespace
+
+void PortModel::make_expression(const v1::OutputExpression& definition, const Simulation& simulation) {
+  std::vector<std::string> names;
+  Formula formula;
+  const std::map<std::string, std::string> variables(definition.variables().begin(), definition.variables().end());
+  for (const auto& [argument, variable] : variables) {
+    names.push_back(argument);
+    formula.arguments.push_back(component_of(simulation, variable));
+  }
+  auto compiled = compile_formula(definition.expression(), names);
+  if (!compiled) throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": " + compiled.error().message);
+  formula.expression = *compiled;
+  formulas_.push_back(std::move(formula));
+  layout_.add_output_names(definition.name());
+  layout_.add_output_units(definition.unit());
 }
 
 bool PortModel::offers_accelerations() const {
@@ -230,141 +217,83 @@ bool PortModel::offers_accelerations() const {
   return !has_reference_ || (reference_.a >= 0 && reference_.wp >= 0);
 }
 
-PortModel::Motion PortModel::motion(const Simulation& simulation, const Point& point) const {
-  Motion m{};
-  m.R = matrix_at(simulation, point.R);
-  m.w = vector_at(simulation, point.w);
-  m.arm = m.R * point.offset;
-  m.x = vector_at(simulation, point.x) + m.arm;
-  m.v = vector_at(simulation, point.v) + m.w.cross(m.arm);
-  if (point.a >= 0 && point.wp >= 0) {
-    m.wp = vector_at(simulation, point.wp);
-    m.a = vector_at(simulation, point.a) + m.wp.cross(m.arm) + m.w.cross(m.w.cross(m.arm));
+// ------------------------------------------------------------------ ports that elements are
+
+PortModel::PortModel(const PortElementRef& element, const Simulation& simulation)
+    : element_(element), model_(&simulation.model()) {
+  const ElementPort& port = element.port();
+  layout_.set_name(port.name);
+  layout_.set_from_deck(port.from_deck);
+  layout_.set_default_mode(to_mode(port.coupling));
+  layout_.set_default_every(port.every);
+  if (port.input_size > 0) {
+    deck_loads_ = handle_of(simulation, port_input_name(port));
+    written_.push_back(deck_loads_);
   }
-  return m;
-}
-
-// Relative to the reference node, in its frame: the motion that an observer on it sees.
-void PortModel::make_relative(Motion& m) const {
-  const Motion& r = sent_reference_;
-  const Mat3 to_reference = r.R.transpose();
-  const Vec3 dx = m.x - r.x;
-  const Vec3 dv = m.v - r.v - r.w.cross(dx);
-  m.a = to_reference * (m.a - r.a - r.wp.cross(dx) - r.w.cross(r.w.cross(dx)) - 2 * r.w.cross(dv));
-  m.wp = to_reference * (m.wp - r.wp - r.w.cross(m.w));
-  m.x = to_reference * dx;
-  m.v = to_reference * dv;
-  m.w = to_reference * (m.w - r.w);
-  m.R = to_reference * m.R;
-}
-
-void PortModel::fill(const Simulation& simulation, const Agreement& agreement,
-                     v1::ServerExchange* out) {
-  std::vector<double> values;
-  for (const int handle : outputs_) simulation.get(handle, values);
-  out->mutable_signals()->Add(values.begin(), values.end());
-  if (has_reference_) sent_reference_ = motion(simulation, reference_);
-  sent_.clear();
-  for (const Point& point : points_) {
-    sent_.push_back(motion(simulation, point));
-    Motion m = sent_.back();
-    if (agreement.frame == v1::PORT_FRAME_REFERENCE) make_relative(m);
-    Mat3 turn = Mat3::Identity();  // positions and orientations of the node frame stay global
-    if (agreement.frame == v1::PORT_FRAME_NODE) turn = m.R.transpose();
-    put(m.x, out->mutable_positions_m());
-    put_rotation(m.R, agreement.rotation_form, out->mutable_rotations());
-    put(turn * m.v, out->mutable_velocities_m_s());
-    put(turn * m.w, out->mutable_angular_velocities_rad_s());
-    if (!agreement.accelerations) continue;
-    put(turn * m.a, out->mutable_accelerations_m_s2());
-    put(turn * m.wp, out->mutable_angular_accelerations_rad_s2());
+  answer_size_ = port.input_size;
+  switch (port.kind) {
+    case ElementPort::Kind::motion:
+      make_motion(simulation);
+      break;
+    case ElementPort::Kind::modal:
+      make_modal(simulation);
+      break;
+    case ElementPort::Kind::mapped:
+      make_mapped(simulation);
+      break;
+    case ElementPort::Kind::output:
+      outputs_.push_back(handle_of(simulation, port_output_name(port)));
+      make_output();
+      break;
   }
 }
 
-Mat3 PortModel::to_global(const Agreement& agreement, std::size_t point) const {
-  if (agreement.frame == v1::PORT_FRAME_NODE) return sent_[point].R;
-  if (agreement.frame == v1::PORT_FRAME_REFERENCE) return sent_reference_.R;
-  return Mat3::Identity();
-}
-
-std::string PortModel::decode(const v1::PeerExchange& in, const Agreement& agreement,
-                              std::vector<double>* answer) const {
-  const bool structural = !points_.empty();
-  const std::size_t vectors = 3 * points_.size();
-  if (in.has_tangent()) return "`tangent` is not served by this version; leave it out";
-  std::string wrong = check_array("forces_n", in.forces_n(), vectors, !structural);
-  if (wrong.empty()) wrong = check_loads(in);
-  const std::size_t signals = structural ? 0 : static_cast<std::size_t>(answer_size_);
-  if (wrong.empty()) wrong = check_array("signals", in.signals(), signals, false);
-  if (!wrong.empty()) return wrong;
-  answer->assign(in.signals().begin(), in.signals().end());
-  if (structural) decode_loads(in, agreement, answer);
-  return "";
-}
-
-std::string PortModel::check_loads(const v1::PeerExchange& in) const {
-  std::string wrong = check_array("moments_nm", in.moments_nm(), 3 * points_.size(), true);
-  const std::size_t reference = layout_.reference_loads() ? 3 : 0;
-  if (wrong.empty())
-    wrong = check_array("reference_force_n", in.reference_force_n(), reference, false);
-  if (wrong.empty())
-    wrong = check_array("reference_moment_nm", in.reference_moment_nm(), reference, false);
-  return wrong;
-}
-
-// The moment about the node when the node takes the load; about the point when the deck's element
-// does.
-void PortModel::decode_loads(const v1::PeerExchange& in, const Agreement& agreement,
-                             std::vector<double>* answer) const {
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Mat3 turn = to_global(agreement, i);
-    const Vec3 force = turn * triple(in.forces_n(), i);
-    Vec3 moment = Vec3::Zero();
-    if (deck_loads_ < 0) moment = sent_[i].arm.cross(force);
-    if (!in.moments_nm().empty()) moment += turn * triple(in.moments_nm(), i);
-    answer->insert(answer->end(), force.data(), force.data() + 3);
-    answer->insert(answer->end(), moment.data(), moment.data() + 3);
+void PortModel::make_motion(const Simulation& simulation) {
+  const ElementPort& port = element_->port();
+  layout_.set_kind(v1::PORT_KIND_MOTION);
+  layout_.set_positions_only(port.positions_only);
+  reactions_ = handle_of(simulation, port_output_name(port));
+  for (const int node : port.nodes) {
+    layout_.add_node_labels(model_->structural[node].label);
+    points_.push_back(find_point(simulation, model_->structural[node].label));
   }
-  if (!layout_.reference_loads()) return;
-  Mat3 turn = Mat3::Identity();
-  if (agreement.frame != v1::PORT_FRAME_GLOBAL) turn = sent_reference_.R;
-  for (const Vec3& v : {triple(in.reference_force_n(), 0), triple(in.reference_moment_nm(), 0)}) {
-    const Vec3 global = turn * v;
-    answer->insert(answer->end(), global.data(), global.data() + 3);
-  }
+  *layout_.mutable_point_labels() = layout_.node_labels();
 }
 
-// Several points of one node: their sum.
-std::vector<double> PortModel::node_loads(const std::vector<double>& answer) const {
-  std::vector<double> loads(6 * written_.size(), 0.0);
-  for (std::size_t k = 0; k < points_.size(); ++k) {
-    const auto target = std::find(written_.begin(), written_.end(), points_[k].load);
-    double* load = &loads[6 * static_cast<std::size_t>(target - written_.begin())];
-    for (std::size_t i = 0; i < 6; ++i) load[i] += answer[6 * k + i];
+void PortModel::make_modal(const Simulation& simulation) {
+  const ElementPort& port = element_->port();
+  layout_.set_kind(v1::PORT_KIND_MODAL);
+  layout_.set_modal_joint_label(port.modal_joint);
+  layout_.mutable_mode_numbers()->Add(port.mode_numbers.begin(), port.mode_numbers.end());
+  for (const int node : port.nodes) {
+    layout_.add_node_labels(model_->structural[node].label);
+    points_.push_back(find_point(simulation, model_->structural[node].label));
   }
-  return loads;
+  *layout_.mutable_point_labels() = layout_.node_labels();
+  if (port.output_size > 0) outputs_.push_back(handle_of(simulation, port_output_name(port)));
+  for (const char* name : {"q.", "qP."})
+    for (const int mode : port.mode_numbers) layout_.add_output_names(name + std::to_string(mode));
+  for (const int mode : port.mode_numbers) layout_.add_input_names("f." + std::to_string(mode));
+  layout_.set_output_size(port.output_size);
+  layout_.set_input_size(static_cast<int>(port.mode_numbers.size()));
 }
 
-void PortModel::apply(const std::vector<double>& answer, Simulation& simulation) const {
-  const bool to_nodes = !points_.empty() && deck_loads_ < 0;
-  const std::vector<double> loads = to_nodes ? node_loads(answer) : std::vector<double>();
-  const double* value = to_nodes ? loads.data() : answer.data();
-  for (const int handle : written_) {
-    const auto size = static_cast<std::size_t>(simulation.variables()[handle].size);
-    const auto status = simulation.set(handle, {value, size});
-    if (!status) throw Refusal(status.error());
-    value += size;
-  }
+void PortModel::make_mapped(const Simulation& simulation) {
+  const StructuralPort& points = *element_->element->points();
+  layout_.set_kind(v1::PORT_KIND_STRUCTURAL);
+  make_points(simulation, points);
+  needs_accelerations_ = points.accelerations;
 }
 
-// Part of the state, so that a restored simulation redoes a step from where it started the first
-// time.
-Eigen::VectorXd PortModel::applied(const Simulation& simulation) const {
-  std::vector<double> values;
-  for (const int handle : written_) simulation.get(handle, values);
-  if (static_cast<int>(values.size()) != answer_size_)  // several points of one node
-    return Eigen::VectorXd::Zero(answer_size_);
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), answer_size_);
+void PortModel::make_output() {
+  const ElementPort& port = element_->port();
+  layout_.set_kind(v1::PORT_KIND_SIGNAL);
+  layout_.set_optional(true);
+  for (const std::string& name : port.output_names) {
+    layout_.add_output_names(name);
+    layout_.add_output_units("");
+  }
+  layout_.set_output_size(port.output_size);
 }
 
 }  // namespace mbcosim::server

@@ -2,11 +2,13 @@
 
 namespace mbcosim::server {
 
-Call::Call(CallWatch& watch, grpc::ServerContext& context) : watch_(watch), context_(context) {
-  watch_.add(this);
+Call::Call(CallWatch& watch, grpc::ServerContext& context) : watch_(&watch), context_(&context) {
+  watch_->add(this);
 }
 
-Call::~Call() { watch_.remove(this); }
+Call::~Call() {
+  if (watch_) watch_->remove(this);
+}
 
 void Call::attach(CancelToken* token) {
   std::lock_guard guard(mutex_);
@@ -16,8 +18,8 @@ void Call::attach(CancelToken* token) {
 
 void Call::poll() {
   if (std::chrono::steady_clock::now().time_since_epoch().count() > deadline_.load())
-    context_.TryCancel();
-  if (!cancelled() && context_.IsCancelled()) cancel();
+    context_->TryCancel();
+  if (!cancelled() && context_->IsCancelled()) cancel();
 }
 
 void Call::cancel() {

@@ -20,6 +20,7 @@ class CallWatch;
 class Call {
  public:
   Call(CallWatch& watch, grpc::ServerContext& context);
+  Call() = default;  ///< of nobody: never cancelled from outside
   ~Call();
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
@@ -31,14 +32,18 @@ class Call {
     deadline_.store(deadline.time_since_epoch().count());
   }
   void clear_deadline() { deadline_.store(kNoDeadline); }
+  /// Breaks the call off now.
+  void hang_up() {
+    if (context_) context_->TryCancel();
+  }
 
  private:
   friend class CallWatch;
   void poll();
   void cancel();
 
-  CallWatch& watch_;
-  grpc::ServerContext& context_;
+  CallWatch* watch_ = nullptr;
+  grpc::ServerContext* context_ = nullptr;
   static constexpr auto kNoDeadline = std::chrono::steady_clock::duration::max().count();
   std::atomic<std::chrono::steady_clock::rep> deadline_{kNoDeadline};
   std::atomic<bool> cancelled_{false};

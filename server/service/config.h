@@ -16,6 +16,7 @@ struct ServiceLimits {
   int sessions = 64;
   int snapshots = 64;                       ///< in one simulation
   std::int64_t snapshot_bytes = 1LL << 30;  ///< of all snapshots of one simulation
+  std::int64_t record_bytes = 256LL << 20;  ///< of what crosses the ports of one simulation
   int bundle_files = 10000;
   int message_bytes = 16 << 20;
   int open_calls = 512;              ///< calls and streams at once

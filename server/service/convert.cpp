@@ -150,6 +150,17 @@ void to_proto(const Model& model, v1::ModelDescription* out) {
   }
 }
 
+v1::NonConvergencePolicy to_proto(const StepPolicy& policy) {
+  switch (policy.kind) {
+    case StepPolicy::cut:
+      return v1::NON_CONVERGENCE_POLICY_CUT_STEP;
+    case StepPolicy::accept:
+      return v1::NON_CONVERGENCE_POLICY_ACCEPT_FLAGGED;
+    default:
+      return v1::NON_CONVERGENCE_POLICY_FAIL;
+  }
+}
+
 v1::StepOutcome to_proto(StepOutcome outcome) {
   switch (outcome) {
     case StepOutcome::accepted:

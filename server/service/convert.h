@@ -14,6 +14,7 @@ void to_proto(const Variable& variable, int handle, v1::Variable* out);
 /// Nodes and elements; variables and ports are added by the caller.
 void to_proto(const Model& model, v1::ModelDescription* out);
 v1::StepOutcome to_proto(StepOutcome outcome);
+v1::NonConvergencePolicy to_proto(const StepPolicy& policy);
 std::string digest_text(std::uint64_t digest);  ///< 16 hexadecimal digits
 std::string utf8(const std::string& text);      ///< bytes that are not UTF-8 replaced by '?'
 

@@ -1,104 +1,14 @@
 #include "service/coupling_service.h"
 
-#include <google/protobuf/util/time_util.h>
-
 #include <algorithm>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
 
-#include "service/convert.h"
+#include "coupling/handshake.h"
 
 namespace mbcosim::server {
 namespace {
-
-constexpr int kProtocolVersion = 1;
-
-/// Collects what does not fit in a handshake, so that all of it is told at once.
-class Mismatches {
- public:
-  void expect(bool fits, const char* what, const std::string& text) {
-    if (!fits) found_[what] = text;
-  }
-  void refuse_if_any(const std::string& port) const {
-    if (found_.empty()) return;
-    std::string text = "the handshake does not fit port \"" + port + "\":";
-    for (const auto& [what, detail] : found_) text += " " + what + ": " + detail + ";";
-    text.pop_back();
-    throw Refusal(v1::REASON_PORT_MISMATCH, text, found_);
-  }
-
- private:
-  std::map<std::string, std::string> found_;
-};
-
-template <class Enum>
-Enum chosen(Enum wanted, Enum fallback) {
-  return static_cast<int>(wanted) == 0 ? fallback : wanted;
-}
-
-void check_layout(const v1::Hello& hello, const PortModel& port, const Model& model,
-                  Mismatches& mismatches) {
-  const v1::PortLayout& layout = port.layout();
-  const std::string digest = digest_text(model.digest);
-  mismatches.expect(
-      hello.model_digest().empty() || hello.model_digest() == digest, "model_digest",
-      "the model has " + digest + ", the peer expects " + hello.model_digest().substr(0, 32));
-  mismatches.expect(hello.length_unit().empty() || hello.length_unit() == "m", "length_unit",
-                    "only \"m\" is served");
-  const bool same_nodes = hello.node_labels_size() == 0 ||
-                          std::equal(hello.node_labels().begin(), hello.node_labels().end(),
-                                     layout.node_labels().begin(), layout.node_labels().end());
-  mismatches.expect(same_nodes, "node_labels", "the port has other nodes, or in another order");
-  mismatches.expect(!hello.accelerations() || port.offers_accelerations(), "accelerations",
-                    "not all nodes of the port have them");
-  mismatches.expect(hello.frame() != v1::PORT_FRAME_REFERENCE || layout.has_reference_node_label(),
-                    "frame", "the port has no reference node");
-}
-
-void check_choices(const v1::Hello& hello, Mismatches& mismatches) {
-  mismatches.expect(
-      v1::CouplingMode_IsValid(hello.mode()) && v1::RotationForm_IsValid(hello.rotation_form()) &&
-          v1::PortFrame_IsValid(hello.frame()) && v1::InputHold_IsValid(hello.input_hold()) &&
-          v1::PeerPolicy_IsValid(hello.policy()) && v1::Acceleration_IsValid(hello.acceleration()),
-      "enum", "a choice is unknown to this server");
-  mismatches.expect(hello.every() >= 0, "every", "must not be negative");
-  mismatches.expect(hello.mode() != v1::COUPLING_MODE_WINDOW || hello.every() <= 1, "every",
-                    "must be 1 in mode WINDOW");
-  mismatches.expect(hello.relaxation() >= 0 && hello.relaxation() < 2, "relaxation",
-                    "must be in (0, 2)");
-  mismatches.expect(hello.interface_tolerance() >= 0, "interface_tolerance",
-                    "must not be negative");
-  mismatches.expect(hello.maximum_passes() >= 0, "maximum_passes", "must not be negative");
-}
-
-Agreement agree(const v1::Hello& hello, const Port& port, const Model& model) {
-  const v1::VersionRange& range = hello.protocol();
-  const bool any = range.lowest() == 0 && range.highest() == 0;
-  if (!any && (range.lowest() > kProtocolVersion || range.highest() < kProtocolVersion))
-    throw Refusal(v1::REASON_VERSION_MISMATCH, "the server speaks protocol version 1",
-                  {{"lowest", "1"}, {"highest", "1"}});
-  Mismatches mismatches;
-  check_layout(hello, port.model(), model, mismatches);
-  check_choices(hello, mismatches);
-  mismatches.refuse_if_any(hello.port());
-
-  Agreement agreement;
-  const v1::PortLayout& layout = port.model().layout();
-  agreement.rotation_form = chosen(hello.rotation_form(),
-                                   chosen(layout.default_rotation_form(), agreement.rotation_form));
-  agreement.frame = chosen(hello.frame(), chosen(layout.default_frame(), agreement.frame));
-  agreement.accelerations = hello.accelerations() || port.model().needs_accelerations();
-  agreement.mode = chosen(hello.mode(), chosen(layout.default_mode(), agreement.mode));
-  agreement.every = std::max(hello.every(), 1);
-  agreement.hold = chosen(hello.input_hold(), agreement.hold);
-  agreement.policy = chosen(hello.policy(), agreement.policy);
-  agreement.acceleration = chosen(hello.acceleration(), agreement.acceleration);
-  if (hello.has_peer_timeout())
-    agreement.timeout = std::chrono::milliseconds(
-        google::protobuf::util::TimeUtil::DurationToMilliseconds(hello.peer_timeout()));
-  if (hello.relaxation() > 0) agreement.relaxation = hello.relaxation();
-  if (hello.interface_tolerance() > 0) agreement.tolerance = hello.interface_tolerance();
-  if (hello.maximum_passes() > 0) agreement.maximum_passes = hello.maximum_passes();
-  return agreement;
-}
 
 constexpr auto kHandshake = std::chrono::seconds(10);  // longest wait for its next message
 
@@ -114,10 +24,82 @@ class GrpcStream : public PeerStream {
     call_.clear_deadline();
     return sent;
   }
+  void hang_up() override { call_.hang_up(); }
 
  private:
   CouplingService::Stream* stream_;
   Call& call_;
+};
+
+/// The session's exchanges and the heartbeats of one stream, one message at a time.
+class TurnTaker : public PeerLink {
+ public:
+  using Clock = std::chrono::steady_clock;
+  explicit TurnTaker(PeerStream& stream) : stream_(stream) {}
+  bool send(const v1::ServerMessage& message, Clock::time_point deadline) override {
+    const std::unique_lock guard(mutex_, deadline);
+    return guard.owns_lock() && stream_.send(message, deadline);
+  }
+  bool pulls() const override { return stream_.pulls(); }
+  Pulled pull(v1::PeerMessage* message, Clock::time_point until) override { return stream_.pull(message, until); }
+  void refuse(const Refusal& refusal) override { stream_.refuse(refusal); }
+
+ private:
+  PeerStream& stream_;
+  std::timed_mutex mutex_;  // protects sending
+};
+
+/// Sends `heartbeat` at an even pace and listens for the peer's, from a thread of its own, whatever the simulation does.
+class Heart {
+ public:
+  Heart(TurnTaker& link, PeerStream& stream, const Port& port, const Agreement& agreement)
+      : link_(link), stream_(stream), port_(port), agreement_(agreement) {
+    if (beats() || agreement.heartbeat_timeout > kNever) thread_ = std::thread([this] { run(); });
+  }
+  ~Heart() {
+    {
+      std::lock_guard guard(mutex_);
+      stop_ = true;
+    }
+    changed_.notify_one();
+    if (thread_.joinable()) thread_.join();
+  }
+  Heart(const Heart&) = delete;
+  Heart& operator=(const Heart&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kNever{0}, kLongestSend{500};
+  bool beats() const { return agreement_.heartbeat_interval > kNever; }
+
+  void run() {
+    const auto timeout = agreement_.heartbeat_timeout;
+    const auto listen = std::max<std::chrono::milliseconds>(timeout / 4, std::chrono::milliseconds(1));
+    const auto period = beats() && (timeout == kNever || agreement_.heartbeat_interval < listen) ? agreement_.heartbeat_interval : listen;
+    Clock::time_point next = Clock::now() + agreement_.heartbeat_interval;
+    v1::ServerMessage message;
+    std::unique_lock guard(mutex_);
+    while (!changed_.wait_for(guard, period, [&] { return stop_; })) {
+      guard.unlock();
+      if (timeout > kNever && port_.silence() > timeout) return stream_.hang_up();
+      if (beats() && Clock::now() >= next) {
+        message.mutable_heartbeat()->set_count(++count_);
+        if (!link_.send(message, Clock::now() + kLongestSend) && timeout == kNever) return;
+        next += agreement_.heartbeat_interval;
+      }
+      guard.lock();
+    }
+  }
+
+  TurnTaker& link_;
+  PeerStream& stream_;
+  const Port& port_;
+  const Agreement agreement_;
+  std::int64_t count_ = 0;
+  std::mutex mutex_;  // protects the one below
+  bool stop_ = false;
+  std::condition_variable changed_;
+  std::thread thread_;
 };
 
 /// Keeps the port taken while it lives.
@@ -153,19 +135,23 @@ void CouplingService::serve(PeerStream& stream, const Caller& caller) {
 
 void CouplingService::serve_peer(const v1::Hello& hello, Session& session, PeerStream& stream) {
   Port& port = session.port(hello.port());
-  const Attachment attachment(port, agree(hello, port, session.model()));
-  v1::ServerMessage message;
-  v1::Welcome* welcome = message.mutable_welcome();
   v1::SimulationInfo info;
   session.fill(&info);
+  const Agreement agreement = agree(hello, port.model(), session.model(), info.model_digest(), info.next_step_s());
+  TurnTaker link(stream);
+  const Attachment attachment(port, agreement);
+  v1::ServerMessage message;
+  v1::Welcome* welcome = message.mutable_welcome();
   welcome->set_protocol_version(kProtocolVersion);
   port.fill(welcome->mutable_layout());
   welcome->set_model_digest(info.model_digest());
   welcome->set_step_size_s(info.next_step_s());
   welcome->set_step(info.step());
   welcome->set_time_s(info.time_s());
+  fill_agreed(hello, agreement, welcome->mutable_agreed());
   if (!stream.send(message, std::chrono::steady_clock::now() + kHandshake)) return;
-  port.attach(&stream);
+  port.attach(&link, *welcome);
+  const Heart heart(link, stream, port, agreement);
   v1::PeerMessage in;
   while (stream.read(&in)) port.receive(in);
 }

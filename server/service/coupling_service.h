@@ -11,6 +11,8 @@ class PeerStream : public PeerLink {
  public:
   /// Waits for the next message; false: the peer has ended. Throws what `refuse` was told.
   virtual bool read(v1::PeerMessage* message) = 0;
+  /// The peer counts as gone: ends `read`. From any thread.
+  virtual void hang_up() = 0;
 };
 
 class CouplingService final : public v1::Coupling::Service {

@@ -36,6 +36,7 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_OUT_OF_TURN:
     case v1::REASON_PORT_TAKEN:
     case v1::REASON_PORT_MISMATCH:
+    case v1::REASON_NOT_RECORDING:
       return Code::FAILED_PRECONDITION;
     case v1::REASON_DAMAGED_STATE:
       return Code::DATA_LOSS;

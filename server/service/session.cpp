@@ -18,15 +18,67 @@ constexpr auto kBlockSlice =
 }  // namespace
 
 Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
-                 const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports)
+                 const v1::CreateOptions& options)
     : identity_(std::move(identity)),
       shared_(shared),
       model_(&simulation->model()),
       variables_(&simulation->variables()),
       simulation_(std::move(simulation)),
-      coupler_(ports, *simulation_),
+      recorder_(options.record_ports() ? std::make_unique<Recorder>(shared.limits.record_bytes) : nullptr),
+      coupler_(options.ports(), *simulation_, recorder_.get()),
       last_use_(Clock::now().time_since_epoch().count()) {
+  published_.display_name = identity_.display_name;
+  set_policy(options.non_convergence_policy(), options.minimum_step_s());
   publish();
+  if (recorder_) start_record(options);
+}
+
+void Session::start_record(const v1::CreateOptions& options) {
+  v1::RecordEntry entry;
+  v1::RecordHeader* header = entry.mutable_header();
+  header->set_protocol_version(1);
+  header->set_model_digest(digest_text(model_->digest));
+  header->set_step(simulation_->step_number());
+  header->set_time_s(simulation_->time());
+  *header->mutable_ports() = options.ports();
+  header->set_summed_time(options.summed_time());
+  if (simulation_->step_number() > 0) header->set_state(simulation_->export_state());
+  for (const auto& port : coupler_.ports()) *header->add_layouts() = port->model().layout();
+  header->set_non_convergence_policy(to_proto(published_.policy));
+  header->set_minimum_step_s(published_.policy.minimum);
+  recorder_->add(entry);
+}
+
+// ------------------------------------------------------------------ choices
+
+void Session::set_policy(v1::NonConvergencePolicy kind, double minimum) {
+  if (!v1::NonConvergencePolicy_IsValid(kind)) throw Refusal(v1::REASON_BAD_ARGUMENT, "`non_convergence_policy` is unknown to this server");
+  if (!(minimum >= 0) || std::isinf(minimum))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`minimum_step_s` must be a finite number, at least 0");
+  StepPolicy policy;
+  policy.kind = kind == v1::NON_CONVERGENCE_POLICY_CUT_STEP         ? StepPolicy::cut
+                : kind == v1::NON_CONVERGENCE_POLICY_ACCEPT_FLAGGED ? StepPolicy::accept
+                                                                    : StepPolicy::fail;
+  policy.minimum = minimum;
+  simulation_->set_policy(policy);
+  std::lock_guard guard(published_mutex_);
+  published_.policy = policy;
+}
+
+void Session::update(const v1::UpdateSimulationRequest& request) {
+  std::lock_guard lock(lock_);
+  const StepPolicy now = simulation_->policy();
+  if (request.has_non_convergence_policy() || request.has_minimum_step_s())
+    set_policy(request.has_non_convergence_policy() ? request.non_convergence_policy() : to_proto(now),
+               request.has_minimum_step_s() ? request.minimum_step_s() : now.minimum);
+  std::lock_guard guard(published_mutex_);
+  if (request.has_display_name()) published_.display_name = request.display_name();
+}
+
+const Recorder& Session::record() const {
+  if (!recorder_)
+    throw Refusal(v1::REASON_NOT_RECORDING, "the simulation was created without `record_ports`");
+  return *recorder_;
 }
 
 // ------------------------------------------------------------------ telling
@@ -38,7 +90,9 @@ void Session::fill(v1::SimulationInfo* out) const {
     p = published_;
   }
   out->set_name(identity_.id);
-  out->set_display_name(identity_.display_name);
+  out->set_display_name(p.display_name);
+  out->set_non_convergence_policy(to_proto(p.policy));
+  out->set_minimum_step_s(p.policy.minimum);
   out->set_owner(identity_.owner);
   out->set_state(p.failed           ? v1::SIMULATION_STATE_FAILED
                  : stepping_.load() ? v1::SIMULATION_STATE_STEPPING
@@ -52,7 +106,14 @@ void Session::fill(v1::SimulationInfo* out) const {
   *out->mutable_lease() =
       google::protobuf::util::TimeUtil::MillisecondsToDuration(identity_.lease.count());
   out->set_last_failure(p.last_failure);
-  out->set_waiting_for(coupler_.waiting_text());
+  std::string text;
+  for (v1::PortWait& wait : coupler_.waits()) {
+    char since[64];
+    std::snprintf(since, sizeof since, " since %.1f s", wait.seconds());
+    text += (text.empty() ? "port " : ", port ") + wait.port() + since;
+    *out->add_waits() = std::move(wait);
+  }
+  out->set_waiting_for(text);
 }
 
 void Session::fill(v1::ModelDescription* out, const std::string& variable_prefix) const {
@@ -208,6 +269,7 @@ void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariables
   std::lock_guard lock(lock_);
   if (request.has_expected_step()) check_step(request.expected_step());
   apply_inputs(request.values());
+  if (recorder_) recorder_->inputs(request.values());
   reply->set_step(simulation_->step_number());
 }
 

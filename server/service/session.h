@@ -39,7 +39,7 @@ class Session {
   using Progress = std::function<void()>;  ///< called between slices of a long advance
 
   Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
-          const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports = {});
+          const v1::CreateOptions& options = {});
 
   const Identity& identity() const { return identity_; }
   const Model& model() const { return *model_; }
@@ -51,6 +51,9 @@ class Session {
   void step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
             const Progress& progress = {});
   bool interrupt();  ///< was anything advancing?
+  void update(const v1::UpdateSimulationRequest& request);
+  /// The record of the ports. Throws NOT_RECORDING.
+  const Recorder& record() const;
   void read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply);
   void write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply);
 
@@ -99,7 +102,8 @@ class Session {
     std::int64_t step = 0;
     double time = 0, next_step = 0;
     bool finished = false, failed = false;
-    std::string last_failure;
+    std::string last_failure, display_name;
+    StepPolicy policy;
   };
   struct Advance;  ///< one call of `step` in progress
   class SteppingClaim;
@@ -123,7 +127,10 @@ class Session {
   StepReport attempt_in_slot(Advance& advance);
   void restore_or_fail(const State& state);
   bool condition_holds(const v1::Condition& condition);
+  void set_policy(v1::NonConvergencePolicy kind, double minimum);
+  void start_record(const v1::CreateOptions& options);
   void account(Advance& advance, const StepReport& report);
+  void account_pieces(v1::StepReply& reply, const StepReport& report);
   void take_samples(Advance& advance);
   bool deliver_samples(Advance& advance);
   void finish(Advance& advance);
@@ -145,6 +152,7 @@ class Session {
 
   FairMutex lock_;  // protects the four below
   std::unique_ptr<Simulation> simulation_;
+  const std::unique_ptr<Recorder> recorder_;  // thread-safe; null: nothing is recorded
   Coupler coupler_;  // its ports are thread-safe by themselves
   std::vector<double> scratch_;
   v1::StepReply last_reply_;

@@ -113,6 +113,7 @@ bool Session::begin(Advance& advance) {
   if (replay(request, &advance.reply)) return true;
   if (request.has_expected_step()) check_step(request.expected_step());
   apply_inputs(request.inputs());
+  if (recorder_ && request.inputs().handles_size() > 0) recorder_->inputs(request.inputs());
   advance.started = true;
   advance.reply.set_request_id(request.request_id());
   advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
@@ -165,6 +166,7 @@ void Session::account(Advance& advance, const StepReport& report) {
   reply.set_residual_error(report.residual_error);
   reply.set_solution_error(report.solution_error);
   reply.set_solver_seconds(reply.solver_seconds() + report.solver_seconds);
+  if (recorder_) recorder_->stepped(is_accepted(report.outcome), simulation_->step_number(), simulation_->time());
   publish();
   if (!is_accepted(report.outcome)) {
     advance.ended = true;
@@ -174,12 +176,20 @@ void Session::account(Advance& advance, const StepReport& report) {
     }
     return;
   }
+  account_pieces(reply, report);
   --advance.steps_left;
   if (has_subscribers_.load(std::memory_order_relaxed)) take_samples(advance);
   if (advance.request.has_until() && condition_holds(advance.request.until())) {
     reply.set_condition_met(true);
     advance.ended = true;
   }
+}
+
+void Session::account_pieces(v1::StepReply& reply, const StepReport& report) {
+  reply.set_flagged(report.flagged);
+  reply.set_pieces(report.pieces);
+  if (report.flagged) reply.set_flagged_steps(reply.flagged_steps() + 1);
+  if (report.pieces > 1) reply.set_cut_steps(reply.cut_steps() + 1);
 }
 
 bool Session::condition_holds(const v1::Condition& condition) {
@@ -233,6 +243,7 @@ bool Session::run_coupled_step(Advance& advance) {
 
 void Session::step_coupled(Advance& advance) {
   coupler_.apply(*simulation_);
+  coupler_.start_iterations(*simulation_);
   const StepReport report = coupler_.has_window() ? run_passes(advance) : attempt_in_slot(advance);
   account(advance, report);
   coupler_.notify(is_accepted(report.outcome), *simulation_);
@@ -247,6 +258,7 @@ class Session::ExchangeInStep {
       : simulation_(session.coupler_.has_tight() ? session.simulation_.get() : nullptr) {
     if (!simulation_) return;
     session.coupler_.start_iterations(*simulation_);
+    simulation_->set_attempt_ended([&session](bool accepted) { session.coupler_.end_attempt(accepted, *session.simulation_); });
     simulation_->set_exchange([&session, &advance, &slot](int iteration) {
       slot.reset();
       const bool settled =
@@ -256,7 +268,9 @@ class Session::ExchangeInStep {
     });
   }
   ~ExchangeInStep() {
-    if (simulation_) simulation_->set_exchange({});
+    if (!simulation_) return;
+    simulation_->set_exchange({});
+    simulation_->set_attempt_ended({});
   }
   ExchangeInStep(const ExchangeInStep&) = delete;
   ExchangeInStep& operator=(const ExchangeInStep&) = delete;
@@ -300,7 +314,8 @@ StepReport Session::run_passes(Advance& advance) {
       restore_or_fail(base);
       throw;
     }
-    if (agreed) return report;
+    report.flagged = !agreed && pass == most && simulation_->policy().kind == StepPolicy::accept;
+    if (agreed || report.flagged) return report;
     restore_or_fail(base);
   }
   report.outcome = StepOutcome::not_converged;
@@ -323,6 +338,7 @@ void Session::restore_or_fail(const State& state) {
 void Session::lose_peer(Advance& advance, const std::string& why) {
   std::lock_guard lock(lock_);
   advance.ended = true;
+  if (recorder_) recorder_->stepped(false, simulation_->step_number(), simulation_->time());
   publish();
   if (advance.token.cancelled()) {
     advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);

@@ -90,6 +90,7 @@ void Session::restore(int snapshot) {
   const auto status = simulation_->restore(find_snapshot(snapshot).state);
   if (!status) throw Refusal(status.error());
   coupler_.reset();
+  if (recorder_) recorder_->restored(simulation_->step_number(), simulation_->time());
   last_reply_.Clear();
   {
     std::lock_guard guard(published_mutex_);

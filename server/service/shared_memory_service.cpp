@@ -77,6 +77,7 @@ class SharedMemoryStream : public PeerStream {
       return false;
     }
   }
+  void hang_up() override { channel_.close(); }
   bool pulls() const override { return true; }
   Pulled pull(v1::PeerMessage* message, Clock::time_point until) override {
     try {

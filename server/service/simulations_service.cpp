@@ -28,9 +28,6 @@ void check_protocol(const v1::VersionRange& range) {
 
 void check_options(const v1::CreateOptions& options) {
   check_protocol(options.protocol());
-  if (options.non_convergence_policy() > v1::NON_CONVERGENCE_POLICY_FAIL)
-    throw Refusal(v1::REASON_NOT_SERVED,
-                  "non-convergence policies other than FAIL are not served by this version");
 }
 
 [[noreturn]] void refuse_deck(const LoadReport& report) {
@@ -46,6 +43,7 @@ void check_options(const v1::CreateOptions& options) {
     error.message = utf8(first->file + ":" + std::to_string(first->line) + ":" +
                          std::to_string(first->column) + ": error: " + first->message);
     constexpr std::string_view kLimit = "limit-";
+    if (first->code == "port") throw Refusal(v1::REASON_BAD_ARGUMENT, utf8(first->message));
     if (first->code.compare(0, kLimit.size(), kLimit) == 0) {
       error.kind = ErrorKind::limit;
       error.reason = first->code.substr(kLimit.size());
@@ -131,6 +129,7 @@ grpc::Status SimulationsService::GetServerInfo(Context context, const v1::GetSer
     add_limit(reply, "snapshot_bytes", limits.snapshot_bytes);
     add_limit(reply, "message_bytes", limits.message_bytes);
     add_limit(reply, "bundle_files", limits.bundle_files);
+    add_limit(reply, "record_bytes", limits.record_bytes);
     add_limit(reply, "telemetry_samples", limits.telemetry_samples);
     add_limit(reply, "lease_seconds", limits.lease.count());
     add_limit(reply, "deck_bytes", limits.engine.deck_bytes);
@@ -143,8 +142,6 @@ grpc::Status SimulationsService::GetServerInfo(Context context, const v1::GetSer
     add_limit(reply, "unknowns", limits.engine.unknowns);
     reply->set_identity(caller.identity);
     reply->set_role(role_name(caller.role));
-    for (const char* method : {"Simulations/UpdateSimulation", "Simulations/GetRecord"})
-      reply->add_methods_not_served(method);
   });
 }
 
@@ -174,7 +171,7 @@ SessionPtr SimulationsService::add(const v1::CreateOptions& options, const Calle
                                    std::unique_ptr<Simulation> simulation) {
   auto session = std::make_shared<Session>(
       make_identity(options, caller), std::move(simulation),
-      Session::Shared{parts_.slots, parts_.config.limits, parts_.metrics}, options.ports());
+      Session::Shared{parts_.slots, parts_.config.limits, parts_.metrics}, options);
   parts_.store.add(session);
   return session;
 }
@@ -186,7 +183,8 @@ void SimulationsService::create(const v1::UploadHeader& header, LoadReport repor
   call.attach(&token);
   auto simulation = [&] {
     const auto slot = parts_.slots.acquire(token);
-    return Simulation::create(report.model, &token);
+    const bool summed = header.options().summed_time();
+    return Simulation::create(report.model, &token, nullptr, summed ? TimeKeeping::summed : TimeKeeping::exact);
   }();
   call.attach(nullptr);
   if (!simulation) throw Refusal(simulation.error());
@@ -233,6 +231,29 @@ grpc::Status SimulationsService::GetSimulation(Context context,
     const SessionPtr session = parts_.store.get(request->name(), caller);
     const Session::Use use(*session);
     session->fill(reply);
+  });
+}
+
+grpc::Status SimulationsService::UpdateSimulation(Context context, const v1::UpdateSimulationRequest* request,
+                                                  v1::SimulationInfo* reply) {
+  return serve(parts_, *context, "UpdateSimulation", Role::control, [&](const Caller& caller) {
+    const SessionPtr session = parts_.store.get(request->name(), caller);
+    const Session::Use use(*session);
+    session->update(*request);
+    session->fill(reply);
+  });
+}
+
+grpc::Status SimulationsService::GetRecord(Context context, const v1::GetRecordRequest* request,
+                                           grpc::ServerWriter<v1::GetRecordReply>* writer) {
+  return serve(parts_, *context, "GetRecord", Role::observe, [&](const Caller& caller) {
+    const SessionPtr session = parts_.store.get(request->name(), caller);
+    const Session::Use use(*session);
+    v1::GetRecordReply reply;
+    session->record().read(kChunkBytes, [&](const std::string& piece) {
+      reply.set_data(piece);
+      return writer->Write(reply);
+    });
   });
 }
 

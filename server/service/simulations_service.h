@@ -20,6 +20,10 @@ class SimulationsService final : public v1::Simulations::Service {
   Status ValidateModel(Context, grpc::ServerReader<v1::UploadRequest>*,
                        v1::ValidateModelReply*) override;
   Status GetSimulation(Context, const v1::GetSimulationRequest*, v1::SimulationInfo*) override;
+  Status UpdateSimulation(Context, const v1::UpdateSimulationRequest*,
+                          v1::SimulationInfo*) override;
+  Status GetRecord(Context, const v1::GetRecordRequest*,
+                   grpc::ServerWriter<v1::GetRecordReply>*) override;
   Status ListSimulations(Context, const v1::ListSimulationsRequest*,
                          v1::ListSimulationsReply*) override;
   Status DeleteSimulation(Context, const v1::DeleteSimulationRequest*,

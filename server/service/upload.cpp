@@ -24,7 +24,7 @@ void check_name(const std::string& name) {
   }
 }
 
-LoadReport load_from_root(const std::string& name, const Config& config) {
+LoadReport load_from_root(const std::string& name, const v1::CreateOptions& options, const Config& config) {
   if (config.model_root.empty())
     throw Refusal(v1::REASON_NO_SUCH_MODEL, "the server has no model root; upload a bundle");
   check_name(name);
@@ -38,10 +38,21 @@ LoadReport load_from_root(const std::string& name, const Config& config) {
     throw Refusal(v1::REASON_NO_SUCH_MODEL,
                   "no deck is named \"" + name + "\" under the model root");
   return load_deck(FolderSource(file.parent_path().string()), file.filename().string(),
-                   config.limits.engine);
+                   config.limits.engine, attachments(options));
 }
 
 }  // namespace
+
+std::vector<PortAttachment> attachments(const v1::CreateOptions& options) {
+  std::vector<PortAttachment> found;
+  for (const v1::PortDefinition& port : options.ports()) {
+    const bool motion = port.kind() == v1::PORT_KIND_MOTION;
+    if (!motion && port.kind() != v1::PORT_KIND_MODAL) continue;
+    found.push_back({motion ? ElementPort::Kind::motion : ElementPort::Kind::modal, port.name(),
+                     {port.node_labels().begin(), port.node_labels().end()}, port.positions_only(), port.modal_joint_label()});
+  }
+  return found;
+}
 
 void Bundle::add(const v1::FileChunk& chunk) {
   check_name(chunk.path());
@@ -78,13 +89,13 @@ Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceL
 
 LoadReport load(const Upload& upload, const Config& config) {
   if (upload.header.has_model_root_file())
-    return load_from_root(upload.header.model_root_file(), config);
+    return load_from_root(upload.header.model_root_file(), upload.header.options(), config);
   const std::string& main_file = upload.header.bundle_main_file();
   check_name(main_file);
   if (upload.files.count(main_file) == 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
-  return load_deck(BundleSource(upload.files), main_file, config.limits.engine);
+  return load_deck(BundleSource(upload.files), main_file, config.limits.engine, attachments(upload.header.options()));
 }
 
 }  // namespace mbcosim::server

@@ -34,5 +34,7 @@ Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceL
 /// Reads the deck. Throws Refusal when the model root or the file in it is not to be had; a wrong
 /// deck is in the report.
 LoadReport load(const Upload& upload, const Config& config);
+/// Ports that need equations of their own in the model.
+std::vector<PortAttachment> attachments(const v1::CreateOptions& options);
 
 }  // namespace mbcosim::server

@@ -76,23 +76,33 @@ class Server:
         """Creates a simulation from a deck given as text."""
         return self.load_bundle("deck", {"deck": text.encode()}, **options)
 
-    def load_bundle(self, main, files, *, name="", lease=None, ports=()):
+    def load_bundle(self, main, files, **options):
         """Creates a simulation from files (bytes by name) whose main one is `main`.
 
-        name   for people
-        lease  seconds that the simulation lives without calls; None: the server's default
-        ports  places where peers can couple: structural_port, signal_port
+        name          for people
+        lease         seconds that the simulation lives without calls; None: the server's default
+        ports         places where peers can couple: structural_port, signal_port, motion_port, modal_port
+        policy        what to do when a step does not converge: "fail", "cut_step" or "accept_flagged"
+        minimum_step  shortest piece of "cut_step" [s]; 0: 1/1024 of the step
+        record        keeps what crosses the ports; see Simulation.record
+        summed_time   time is summed from step to step as MBDyn does, instead of t0 + n h
         """
-        return self._create(simulations_pb2.UploadHeader(bundle_main_file=main), files, name, lease, ports)
+        return self._create(simulations_pb2.UploadHeader(bundle_main_file=main), files, **options)
 
-    def load_from_root(self, deck, *, name="", lease=None, ports=()):
-        """Creates a simulation from a deck under the server's model root."""
-        return self._create(simulations_pb2.UploadHeader(model_root_file=deck), {}, name, lease, ports)
+    def load_from_root(self, deck, **options):
+        """Creates a simulation from a deck under the server's model root. For options see load_bundle."""
+        return self._create(simulations_pb2.UploadHeader(model_root_file=deck), {}, **options)
 
-    def _create(self, header, files, name, lease, ports):
+    def _create(self, header, files, *, name="", lease=None, ports=(), policy="fail", minimum_step=0.0, record=False,
+                summed_time=False):
         header.options.request_id = uuid.uuid4().hex
         header.options.display_name = name
         header.options.ports.extend(ports)
+        header.options.non_convergence_policy = simulations_pb2.NonConvergencePolicy.Value(
+            "NON_CONVERGENCE_POLICY_" + policy.upper())
+        header.options.minimum_step_s = minimum_step
+        header.options.record_ports = record
+        header.options.summed_time = summed_time
         if lease is not None:
             header.options.lease.FromMilliseconds(int(lease * 1000))
         with translated():

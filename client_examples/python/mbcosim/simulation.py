@@ -258,6 +258,24 @@ class Simulation:
         self.step_number, self.time = self.info.step, self.info.time_s
         return self.info
 
+    def update(self, *, name=None, policy=None, minimum_step=None):
+        """Changes choices made at creation; see Server.load_bundle."""
+        request = pb.UpdateSimulationRequest(name=self.name)
+        if name is not None:
+            request.display_name = name
+        if policy is not None:
+            request.non_convergence_policy = pb.NonConvergencePolicy.Value("NON_CONVERGENCE_POLICY_" + policy.upper())
+        if minimum_step is not None:
+            request.minimum_step_s = minimum_step
+        self.info = self._call(self._stub.UpdateSimulation, request)
+        return self.info
+
+    def record(self):
+        """All that crossed the ports so far, as bytes for `mbcosim replay`. The simulation must have been created with `record`."""
+        with translated():
+            return b"".join(part.data for part in self._stub.GetRecord(pb.GetRecordRequest(name=self.name),
+                                                                       metadata=self._server.metadata))
+
     def delete(self):
         """Ends the simulation."""
         self._call(self._stub.DeleteSimulation, pb.DeleteSimulationRequest(name=self.name))

@@ -1,0 +1,37 @@
+/// Keeps all that crosses the ports of a session, so that it can be replayed.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+
+#include "mbcosim/v1/record.pb.h"
+
+namespace mbcosim::server {
+
+/// Thread-safe. Entries are kept as a file of delimited messages; at the limit the record ends with `cut_off`.
+class Recorder {
+ public:
+  explicit Recorder(std::int64_t most_bytes) : most_bytes_(most_bytes) {}
+  void add(const v1::RecordEntry& entry);
+  void attached(const std::string& port, const v1::Welcome& welcome);
+  void detached(const std::string& port);
+  void sent(const std::string& port, const v1::ServerMessage& message);
+  void received(const std::string& port, const v1::PeerExchange& answer);
+  void lost(const std::string& port, const std::string& why);
+  void stepped(bool accepted, std::int64_t step, double time);
+  void restored(std::int64_t step, double time);
+  void inputs(const v1::Values& values);
+
+  /// Passes the record on in pieces of about `size` bytes; false from `piece` ends it.
+  void read(std::size_t size, const std::function<bool(const std::string&)>& piece) const;
+
+ private:
+  const std::int64_t most_bytes_;
+  mutable std::mutex mutex_;  // protects the two below
+  std::string bytes_;
+  bool full_ = false;
+};
+
+}  // namespace mbcosim::server
