@@ -36,6 +36,8 @@ int describe(const std::string& deck, bool json);
 int reduce_model(const ReduceCommand& command);
 /// What a FEM data file holds.
 int fem_info(const std::string& file, bool json);
+/// Runs `mbcosim-replay`; returns only when that cannot be started.
+int replay(const std::vector<std::string>& arguments);
 /// The words of the input language, served or refused by name.
 int keywords(bool json);
 

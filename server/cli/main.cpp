@@ -73,6 +73,12 @@ int main(int argc, char** argv) {
   fem_app->add_flag("--json", json, "Print it as JSON");
   fem_app->callback([&] { exit_code = fem_info(deck, json); });
 
+  CLI::App* replay_app = app.add_subcommand(
+      "replay", "Run a model against a record of its ports, or a recorded server against a client");
+  replay_app->prefix_command();
+  replay_app->set_help_flag();
+  replay_app->callback([&] { exit_code = replay(replay_app->remaining()); });
+
   CLI::App* keywords_app = app.add_subcommand(
       "keywords", "List the words of the input language; refused ones are marked");
   keywords_app->add_flag("--json", json, "Print the list as JSON");

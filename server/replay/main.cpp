@@ -1,0 +1,82 @@
+/// mbcosim-replay: `mbcosim replay` hands over to it.
+#include <grpcpp/server_builder.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "replay/model_replay.h"
+#include "replay/record_file.h"
+#include "replay/server_replay.h"
+
+namespace mbcosim::replay {
+namespace {
+
+constexpr int kSame = 0, kRefused = 2, kDiffers = 3;
+
+int tell(const std::string& difference, const std::string& done) {
+  if (difference.empty()) {
+    std::printf("same: %s\n", done.c_str());
+    return kSame;
+  }
+  std::printf("first difference: %s\n", difference.c_str());
+  return kDiffers;
+}
+
+int run_model(const std::string& deck, const std::vector<v1::RecordEntry>& record, double tolerance) {
+  const Outcome outcome = replay_model(deck, record, tolerance);
+  if (!outcome.end.empty()) std::printf("note: the replay ends early: %s\n", outcome.end.c_str());
+  return tell(outcome.difference, std::to_string(outcome.steps) + " steps, " + std::to_string(outcome.exchanges) + " exchanges");
+}
+
+int run_server(const std::string& address, const std::vector<v1::RecordEntry>& record, double tolerance) {
+  RecordedCoupling coupling(record, tolerance);
+  RecordedSimulation simulation(record.front().header());
+  grpc::ServerBuilder builder;
+  builder.AddListeningPort(address, grpc::InsecureServerCredentials());
+  builder.RegisterService(&coupling);
+  builder.RegisterService(&simulation);
+  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  if (!server) throw std::runtime_error("cannot listen on \"" + address + "\"");
+  std::printf("waiting for clients on %s\n", address.c_str());
+  std::fflush(stdout);
+  coupling.wait();
+  server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(1));
+  return tell(coupling.difference(), std::to_string(coupling.exchanges()) + " exchanges");
+}
+
+bool is_local(const std::string& address) {
+  for (const char* prefix : {"unix:", "127.0.0.1:", "localhost:", "[::1]:"})
+    if (address.rfind(prefix, 0) == 0) return true;
+  return false;
+}
+
+}  // namespace
+}  // namespace mbcosim::replay
+
+int main(int argc, char** argv) {
+  using namespace mbcosim::replay;
+  CLI::App app{"Replays what crossed the ports of a simulation and reports the first difference by step and variable. A record is what "
+               "`GetRecord` gives for a simulation that was created with `record_ports`.",
+               "mbcosim replay"};
+  std::string deck, record, address;
+  double tolerance = 0;
+  app.add_option("record", record, "The record")->required();
+  app.add_option("deck", deck, "Main file of the deck: the model is run against the record");
+  app.add_option("--serve", address, "unix:PATH or HOST:PORT of this machine: the recorded server is played to clients");
+  app.add_option("--tolerance", tolerance, "Relative difference of numbers that is let pass; default: none")->check(CLI::NonNegativeNumber);
+  app.footer("Exit code: 0 the same, 2 refused, 3 different.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kSame : kRefused;
+  }
+  try {
+    if (deck.empty() == address.empty()) throw std::runtime_error("give either a deck or --serve");
+    if (!address.empty() && !is_local(address)) throw std::runtime_error("--serve takes addresses of this machine only, got \"" + address + "\"");
+    const auto entries = read_record(record);
+    return address.empty() ? run_model(deck, entries, tolerance) : run_server(address, entries, tolerance);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "mbcosim replay: %s\n", error.what());
+    return kRefused;
+  }
+}
