@@ -18,7 +18,10 @@ void add_reduce(CLI::App& app, mbcosim::cli::ReduceCommand& command, int& exit_c
   reduce_app->add_option("job", command.job,
                          "File of lines `name = value` with the options below; files that it names "
                          "are relative to it");
-  reduce_app->add_option("-o,--output", command.output, "FEM data file to write; the packed form when its name ends with .bin")->required();
+  reduce_app
+      ->add_option("-o,--output", command.output,
+                   "FEM data file to write; the packed form when its name ends with .bin")
+      ->required();
   reduce_app->add_flag("-q,--quiet", command.quiet, "No progress bar and no report");
   for (const mbcosim::ReductionOptionHelp& option : mbcosim::reduction_option_help())
     reduce_app->add_option_function<std::string>(

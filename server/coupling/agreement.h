@@ -23,7 +23,7 @@ struct Agreement {
   v1::TangentForm tangent = v1::TANGENT_FORM_NONE;
   std::chrono::milliseconds heartbeat_interval{0};  ///< of the server; 0: none
   std::chrono::milliseconds heartbeat_timeout{0};   ///< longest silence of the peer; 0: any
-  int generation = 0;  ///< number of the handshake on this port
+  int generation = 0;                               ///< number of the handshake on this port
 
   bool is_window() const { return mode == v1::COUPLING_MODE_WINDOW; }
   bool is_tight() const { return mode == v1::COUPLING_MODE_TIGHT; }

@@ -27,11 +27,14 @@ class Stopwatch {
 Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
                  const Simulation& simulation, Recorder* recorder)
     : recorder_(recorder) {
-  for (const PortElementRef& element : port_elements(simulation.model())) add({element, simulation}, simulation);
+  for (const PortElementRef& element : port_elements(simulation.model()))
+    add({element, simulation}, simulation);
   for (const v1::PortDefinition& definition : ports) {
-    const bool in_model = definition.kind() == v1::PORT_KIND_MOTION || definition.kind() == v1::PORT_KIND_MODAL;
+    const bool in_model =
+        definition.kind() == v1::PORT_KIND_MOTION || definition.kind() == v1::PORT_KIND_MODAL;
     const Port* known = in_model ? find(definition.name()) : nullptr;
-    if (!known || known->model().layout().kind() != definition.kind()) add({definition, simulation}, simulation);
+    if (!known || known->model().layout().kind() != definition.kind())
+      add({definition, simulation}, simulation);
   }
   for (const StructuralPort& port : simulation.model().structural_ports)
     add({port, simulation}, simulation);
@@ -229,12 +232,13 @@ bool Coupler::take_interface(Line& line, const CancelToken& cancel) {
   return false;
 }
 
-// The answer belongs to the iterate and its derivatives are in the matrix: the solver's own test tells the end, as in a
-// model that is not cut.
+// The answer belongs to the iterate and its derivatives are in the matrix: the solver's own test
+// tells the end, as in a model that is not cut.
 bool Coupler::take_with_tangent(Line& line, Simulation& simulation, const CancelToken& cancel) {
   auto answer = line.port->take(cancel);
   if (!answer) return true;
-  line.interface = Eigen::Map<const Eigen::VectorXd>(answer->values.data(), static_cast<Eigen::Index>(answer->values.size()));
+  line.interface = Eigen::Map<const Eigen::VectorXd>(
+      answer->values.data(), static_cast<Eigen::Index>(answer->values.size()));
   apply_interface(line, simulation);
   if (answer->has_tangent) {
     LoadTangent& tangent = simulation.load_tangent(line.tangent);

@@ -51,8 +51,8 @@ class Coupler {
   /// One exchange at the iterate. True: the loads of all tight ports have settled. Throws PeerLost.
   bool exchange_iteration(Simulation& simulation, int iteration, const CancelToken& cancel);
 
-  /// An attempt at the step failed and another follows, or a piece of it was accepted: tight peers are told, their
-  /// iteration starts again.
+  /// An attempt at the step failed and another follows, or a piece of it was accepted: tight peers
+  /// are told, their iteration starts again.
   void end_attempt(bool accepted, const Simulation& simulation);
 
   /// Tells window and tight peers how the step ended.
@@ -87,8 +87,9 @@ class Coupler {
   std::vector<std::unique_ptr<Port>> ports_;
   std::set<int> written_;  ///< handles that ports write
   std::vector<Line> lines_;
-  std::vector<std::pair<const Port*, int>> announced_;  ///< ports with tangents and their handshakes
-  double target_time_ = 0;                              ///< end of the step [s]
+  std::vector<std::pair<const Port*, int>>
+      announced_;           ///< ports with tangents and their handshakes
+  double target_time_ = 0;  ///< end of the step [s]
   double waited_ = 0;
 };
 

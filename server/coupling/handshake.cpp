@@ -12,7 +12,8 @@ namespace mbcosim::server {
 namespace {
 
 std::chrono::milliseconds milliseconds(const google::protobuf::Duration& duration) {
-  return std::chrono::milliseconds(google::protobuf::util::TimeUtil::DurationToMilliseconds(duration));
+  return std::chrono::milliseconds(
+      google::protobuf::util::TimeUtil::DurationToMilliseconds(duration));
 }
 
 /// Collects what does not fit in a handshake, so that all of it is told at once.
@@ -29,7 +30,8 @@ class Mismatches {
     auto metadata = found_;
     const bool versions = found_.count("protocol") > 0;
     if (versions) metadata["lowest"] = metadata["highest"] = std::to_string(kProtocolVersion);
-    throw Refusal(versions ? v1::REASON_VERSION_MISMATCH : v1::REASON_PORT_MISMATCH, text, metadata);
+    throw Refusal(versions ? v1::REASON_VERSION_MISMATCH : v1::REASON_PORT_MISMATCH, text,
+                  metadata);
   }
 
  private:
@@ -48,41 +50,48 @@ bool agrees(const Wanted& wanted, const Have& have) {
   return wanted.empty() || std::equal(wanted.begin(), wanted.end(), have.begin(), have.end());
 }
 
-void check_layout(const v1::Hello& hello, const PortModel& port, const std::string& digest, double step_size,
-                  Mismatches& mismatches) {
+void check_layout(const v1::Hello& hello, const PortModel& port, const std::string& digest,
+                  double step_size, Mismatches& mismatches) {
   const v1::PortLayout& layout = port.layout();
-  mismatches.expect(is(hello.model_digest(), digest.c_str()), "model_digest",
-                    "the model has " + digest + ", the peer expects " + hello.model_digest().substr(0, 32));
+  mismatches.expect(
+      is(hello.model_digest(), digest.c_str()), "model_digest",
+      "the model has " + digest + ", the peer expects " + hello.model_digest().substr(0, 32));
   mismatches.expect(is(hello.length_unit(), "m"), "length_unit", "only \"m\" is served");
   mismatches.expect(is(hello.force_unit(), "N"), "force_unit", "only \"N\" is served");
   mismatches.expect(is(hello.angle_unit(), "rad"), "angle_unit", "only \"rad\" is served");
-  mismatches.expect(hello.kind() == v1::PORT_KIND_UNSPECIFIED || hello.kind() == layout.kind(), "kind",
-                    "the port's is " + v1::PortKind_Name(layout.kind()));
+  mismatches.expect(hello.kind() == v1::PORT_KIND_UNSPECIFIED || hello.kind() == layout.kind(),
+                    "kind", "the port's is " + v1::PortKind_Name(layout.kind()));
   mismatches.expect(agrees(hello.node_labels(), layout.node_labels()), "node_labels",
                     "the port has other nodes, or in another order");
   mismatches.expect(agrees(hello.output_names(), layout.output_names()), "output_names",
                     "the port has other outputs, or in another order");
   mismatches.expect(agrees(hello.input_names(), layout.input_names()), "input_names",
                     "the port has other inputs, or in another order");
-  mismatches.expect(!hello.has_output_size() || hello.output_size() == layout.output_size(), "output_size",
+  mismatches.expect(!hello.has_output_size() || hello.output_size() == layout.output_size(),
+                    "output_size",
                     "the port sends " + std::to_string(layout.output_size()) + " signals");
-  mismatches.expect(!hello.has_input_size() || hello.input_size() == layout.input_size(), "input_size",
+  mismatches.expect(!hello.has_input_size() || hello.input_size() == layout.input_size(),
+                    "input_size",
                     "the port takes " + std::to_string(layout.input_size()) + " signals");
-  mismatches.expect(!(hello.step_size_s() > 0) || std::abs(hello.step_size_s() - step_size) <= 1e-9 * step_size, "step_size_s",
-                    "the next step has " + std::to_string(step_size) + " s");
+  mismatches.expect(
+      !(hello.step_size_s() > 0) || std::abs(hello.step_size_s() - step_size) <= 1e-9 * step_size,
+      "step_size_s", "the next step has " + std::to_string(step_size) + " s");
   mismatches.expect(!hello.accelerations() || port.offers_accelerations(), "accelerations",
                     "not all nodes of the port have them");
   mismatches.expect(hello.frame() != v1::PORT_FRAME_REFERENCE || layout.has_reference_node_label(),
                     "frame", "the port has no reference node");
-  mismatches.expect(!port.is_motion() || hello.frame() <= v1::PORT_FRAME_GLOBAL, "frame", "motion ports count in the global frame");
-  mismatches.expect(!port.is_mapped() || hello.frame() != v1::PORT_FRAME_NODE, "frame", "mapped points have no frame of their own");
+  mismatches.expect(!port.is_motion() || hello.frame() <= v1::PORT_FRAME_GLOBAL, "frame",
+                    "motion ports count in the global frame");
+  mismatches.expect(!port.is_mapped() || hello.frame() != v1::PORT_FRAME_NODE, "frame",
+                    "mapped points have no frame of their own");
 }
 
 void check_choices(const v1::Hello& hello, Mismatches& mismatches) {
   mismatches.expect(
       v1::CouplingMode_IsValid(hello.mode()) && v1::RotationForm_IsValid(hello.rotation_form()) &&
           v1::PortFrame_IsValid(hello.frame()) && v1::InputHold_IsValid(hello.input_hold()) &&
-          v1::PeerPolicy_IsValid(hello.policy()) && v1::Acceleration_IsValid(hello.acceleration()) &&
+          v1::PeerPolicy_IsValid(hello.policy()) &&
+          v1::Acceleration_IsValid(hello.acceleration()) &&
           v1::TangentForm_IsValid(hello.tangent()),
       "enum", "a choice is unknown to this server");
   mismatches.expect(hello.every() >= 0, "every", "must not be negative");
@@ -93,29 +102,36 @@ void check_choices(const v1::Hello& hello, Mismatches& mismatches) {
   mismatches.expect(hello.interface_tolerance() >= 0, "interface_tolerance",
                     "must not be negative");
   mismatches.expect(hello.maximum_passes() >= 0, "maximum_passes", "must not be negative");
-  mismatches.expect(!hello.has_peer_timeout() || milliseconds(hello.peer_timeout()) > std::chrono::milliseconds(0), "peer_timeout",
-                    "must be positive");
+  mismatches.expect(!hello.has_peer_timeout() ||
+                        milliseconds(hello.peer_timeout()) > std::chrono::milliseconds(0),
+                    "peer_timeout", "must be positive");
 }
 
 void check_heartbeats(const v1::Hello& hello, Mismatches& mismatches) {
   constexpr std::chrono::milliseconds kShortest(10);
-  const auto interval = milliseconds(hello.heartbeat_interval()), timeout = milliseconds(hello.heartbeat_timeout());
-  mismatches.expect(!hello.has_heartbeat_interval() || interval >= kShortest, "heartbeat_interval", "must be at least 10 ms");
-  mismatches.expect(!hello.has_heartbeat_timeout() || timeout >= std::max(interval, kShortest), "heartbeat_timeout",
+  const auto interval = milliseconds(hello.heartbeat_interval()),
+             timeout = milliseconds(hello.heartbeat_timeout());
+  mismatches.expect(!hello.has_heartbeat_interval() || interval >= kShortest, "heartbeat_interval",
+                    "must be at least 10 ms");
+  mismatches.expect(!hello.has_heartbeat_timeout() || timeout >= std::max(interval, kShortest),
+                    "heartbeat_timeout",
                     "must be at least 10 ms and not below `heartbeat_interval`");
 }
 
 /// What does not fit together once the defaults are filled in.
-void check_agreement(const Agreement& agreement, const PortModel& port, const Model& model, Mismatches& mismatches) {
-  mismatches.expect(!port.is_motion() || agreement.policy != v1::PEER_POLICY_ZERO, "policy", "motion has no zero; choose HOLD_LAST");
+void check_agreement(const Agreement& agreement, const PortModel& port, const Model& model,
+                     Mismatches& mismatches) {
+  mismatches.expect(!port.is_motion() || agreement.policy != v1::PEER_POLICY_ZERO, "policy",
+                    "motion has no zero; choose HOLD_LAST");
   if (agreement.tangent == v1::TANGENT_FORM_NONE) return;
   const Method method = model.initial_value.method.method;
   mismatches.expect(agreement.is_tight(), "tangent", "belongs to mode TIGHT");
   mismatches.expect(port.takes_tangents(), "tangent", "the port takes none");
   mismatches.expect(agreement.frame == v1::PORT_FRAME_GLOBAL, "tangent", "needs the global frame");
-  mismatches.expect(method != Method::third_order && method != Method::third_order_ad_hoc, "tangent",
-                    "the deck's method does not take one");
-  mismatches.expect(agreement.acceleration == v1::ACCELERATION_NONE, "acceleration", "has no use with a tangent");
+  mismatches.expect(method != Method::third_order && method != Method::third_order_ad_hoc,
+                    "tangent", "the deck's method does not take one");
+  mismatches.expect(agreement.acceleration == v1::ACCELERATION_NONE, "acceleration",
+                    "has no use with a tangent");
 }
 
 Agreement choose(const v1::Hello& hello, const PortModel& port) {
@@ -126,8 +142,10 @@ Agreement choose(const v1::Hello& hello, const PortModel& port) {
   agreement.frame = chosen(hello.frame(), chosen(layout.default_frame(), agreement.frame));
   agreement.accelerations = hello.accelerations() || port.needs_accelerations();
   agreement.mode = chosen(hello.mode(), chosen(layout.default_mode(), agreement.mode));
-  const bool stepwise = agreement.mode == v1::COUPLING_MODE_LOOSE || agreement.mode == v1::COUPLING_MODE_STAGGERED;
-  agreement.every = std::max({hello.every(), hello.every() == 0 && stepwise ? layout.default_every() : 1, 1});
+  const bool stepwise =
+      agreement.mode == v1::COUPLING_MODE_LOOSE || agreement.mode == v1::COUPLING_MODE_STAGGERED;
+  agreement.every =
+      std::max({hello.every(), hello.every() == 0 && stepwise ? layout.default_every() : 1, 1});
   agreement.hold = chosen(hello.input_hold(), agreement.hold);
   agreement.policy = chosen(hello.policy(), agreement.policy);
   agreement.acceleration = chosen(hello.acceleration(), agreement.acceleration);
@@ -143,12 +161,16 @@ Agreement choose(const v1::Hello& hello, const PortModel& port) {
 
 }  // namespace
 
-Agreement agree(const v1::Hello& hello, const PortModel& port, const Model& model, const std::string& digest, double step_size) {
+Agreement agree(const v1::Hello& hello, const PortModel& port, const Model& model,
+                const std::string& digest, double step_size) {
   Mismatches mismatches;
   const v1::VersionRange& range = hello.protocol();
   const bool any = range.lowest() == 0 && range.highest() == 0;
-  mismatches.expect(any || (range.lowest() <= kProtocolVersion && range.highest() >= kProtocolVersion), "protocol",
-                    "the server speaks version 1, the peer " + std::to_string(range.lowest()) + " to " + std::to_string(range.highest()));
+  mismatches.expect(
+      any || (range.lowest() <= kProtocolVersion && range.highest() >= kProtocolVersion),
+      "protocol",
+      "the server speaks version 1, the peer " + std::to_string(range.lowest()) + " to " +
+          std::to_string(range.highest()));
   check_layout(hello, port, digest, step_size, mismatches);
   check_choices(hello, mismatches);
   check_heartbeats(hello, mismatches);

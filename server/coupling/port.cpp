@@ -73,7 +73,9 @@ void Port::detach() {
   changed_.notify_all();
 }
 
-Port::Clock::duration Port::silence() const { return Clock::now() - Clock::time_point(Clock::duration(heard_.load())); }
+Port::Clock::duration Port::silence() const {
+  return Clock::now() - Clock::time_point(Clock::duration(heard_.load()));
+}
 
 void Port::receive(const v1::PeerMessage& message) {
   heard_.store(Clock::now().time_since_epoch().count(), std::memory_order_relaxed);
@@ -219,7 +221,11 @@ std::optional<Answer> Port::go_on_without(const std::string& why) {
     case v1::PEER_POLICY_HOLD_LAST:
       return std::nullopt;
     case v1::PEER_POLICY_ZERO:
-      return Answer{std::vector<double>(static_cast<std::size_t>(model_.answer_size()), 0.0), false, false, {}, {}};
+      return Answer{std::vector<double>(static_cast<std::size_t>(model_.answer_size()), 0.0),
+                    false,
+                    false,
+                    {},
+                    {}};
     default:
       lose(why);
   }

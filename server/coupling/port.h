@@ -97,14 +97,14 @@ class Port {
   Agreement agreement_;
   bool reserved_ = false, link_in_use_ = false;
   PeerLink* link_ = nullptr;
-  std::int64_t index_ = 0;  ///< of the last exchange on the present stream
-  bool awaited_ = false;    ///< its answer is wanted
+  std::int64_t index_ = 0;     ///< of the last exchange on the present stream
+  bool awaited_ = false;       ///< its answer is wanted
   v1::PeerExchange received_;  ///< what `answer_` was made of, for the record
   std::optional<Answer> answer_;
   std::string peer_failure_;  ///< the peer could not compute
   std::optional<Clock::time_point> waiting_since_;
   std::atomic<Clock::rep> heard_{0};  ///< when the peer last sent something
-  v1::PeerMessage pulled_;  ///< of the session's thread
+  v1::PeerMessage pulled_;            ///< of the session's thread
 };
 
 }  // namespace mbcosim::server

@@ -26,7 +26,8 @@ Mat3 matrix_at(const Simulation& simulation, int handle) {
 
 PortModel::Motion PortModel::motion(const Simulation& simulation, const Point& point) const {
   Motion m{};
-  m.R = point.R >= 0 ? matrix_at(simulation, point.R) : Mat3(Mat3::Identity());  // displacement nodes do not turn
+  m.R = point.R >= 0 ? matrix_at(simulation, point.R)
+                     : Mat3(Mat3::Identity());  // displacement nodes do not turn
   m.w = point.w >= 0 ? vector_at(simulation, point.w) : Vec3(Vec3::Zero());
   m.arm = m.R * point.offset;
   m.x = vector_at(simulation, point.x) + m.arm;
@@ -72,7 +73,8 @@ void PortModel::fill(const Simulation& simulation, const Agreement& agreement,
   }
 }
 
-void PortModel::put_motion(const Motion& global, const Agreement& agreement, v1::ServerExchange* out) const {
+void PortModel::put_motion(const Motion& global, const Agreement& agreement,
+                           v1::ServerExchange* out) const {
   Motion m = global;
   if (agreement.frame == v1::PORT_FRAME_REFERENCE) make_relative(m);
   Mat3 turn = Mat3::Identity();  // positions and orientations of the node frame stay global
@@ -118,7 +120,9 @@ void PortModel::fill_mapped(const Agreement& agreement, v1::ServerExchange* out)
     v.segment<3>(at) = m.v;
     a.segment<3>(at) = m.a;
   }
-  const auto put_all = [](const VecX& values, Numbers* numbers) { numbers->Add(values.data(), values.data() + values.size()); };
+  const auto put_all = [](const VecX& values, Numbers* numbers) {
+    numbers->Add(values.data(), values.data() + values.size());
+  };
   put_all(H * x, out->mutable_positions_m());
   put_all(H * v, out->mutable_velocities_m_s());
   if (agreement.accelerations) put_all(H * a, out->mutable_accelerations_m_s2());
@@ -137,26 +141,31 @@ int PortModel::peer_points() const {
   return static_cast<int>(points_.size());
 }
 
-std::string PortModel::decode(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const {
+std::string PortModel::decode(const v1::PeerExchange& in, const Agreement& agreement,
+                              Answer* answer) const {
   answer->unfinished = in.unfinished();
   if (is_motion()) return decode_motion(in, agreement, answer);
   const bool loads = !points_.empty();
   const bool moments = loads && !is_mapped();
-  std::string wrong = check_array("forces_n", in.forces_n(), 3 * static_cast<std::size_t>(peer_points()), !loads);
+  std::string wrong =
+      check_array("forces_n", in.forces_n(), 3 * static_cast<std::size_t>(peer_points()), !loads);
   if (wrong.empty()) wrong = check_loads(in, moments);
   const std::size_t signals = has_signals() ? static_cast<std::size_t>(layout_.input_size()) : 0;
   if (wrong.empty()) wrong = check_array("signals", in.signals(), signals, false);
   if (wrong.empty() && (in.positions_m_size() > 0 || in.rotations_size() > 0))
     wrong = "`positions_m` and `rotations` belong to motion ports";
   if (!wrong.empty()) return wrong;
-  if (loads && !moments) decode_mapped(in, agreement, answer);
-  else if (loads) decode_loads(in, agreement, &answer->values);
+  if (loads && !moments)
+    decode_mapped(in, agreement, answer);
+  else if (loads)
+    decode_loads(in, agreement, &answer->values);
   answer->values.insert(answer->values.end(), in.signals().begin(), in.signals().end());
   return decode_tangent(in, agreement, answer);
 }
 
 std::string PortModel::check_loads(const v1::PeerExchange& in, bool moments) const {
-  std::string wrong = check_array("moments_nm", in.moments_nm(), moments ? 3 * points_.size() : 0, true);
+  std::string wrong =
+      check_array("moments_nm", in.moments_nm(), moments ? 3 * points_.size() : 0, true);
   const std::size_t reference = layout_.reference_loads() ? 3 : 0;
   if (wrong.empty())
     wrong = check_array("reference_force_n", in.reference_force_n(), reference, false);
@@ -166,7 +175,8 @@ std::string PortModel::check_loads(const v1::PeerExchange& in, bool moments) con
 }
 
 // Positions (3) and orientation by rows (9) of each node, as the element keeps them.
-std::string PortModel::decode_motion(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const {
+std::string PortModel::decode_motion(const v1::PeerExchange& in, const Agreement& agreement,
+                                     Answer* answer) const {
   const auto n = points_.size();
   const int size = rotation_size(agreement.rotation_form);
   std::string wrong = check_array("positions_m", in.positions_m(), 3 * n, false);
@@ -178,8 +188,10 @@ std::string PortModel::decode_motion(const v1::PeerExchange& in, const Agreement
   for (std::size_t k = 0; k < n && wrong.empty(); ++k) {
     const Vec3 x = triple(in.positions_m(), k);
     Mat3 R = Mat3::Identity();
-    if (rotations > 0 && !take_rotation(in.rotations(), static_cast<int>(k) * size, agreement.rotation_form, &R))
-      wrong = "`rotations`: the numbers of node " + std::to_string(layout_.node_labels(static_cast<int>(k))) + " are no rotation";
+    if (rotations > 0 &&
+        !take_rotation(in.rotations(), static_cast<int>(k) * size, agreement.rotation_form, &R))
+      wrong = "`rotations`: the numbers of node " +
+              std::to_string(layout_.node_labels(static_cast<int>(k))) + " are no rotation";
     const Mat3 by_rows = R.transpose();
     answer->values.insert(answer->values.end(), x.data(), x.data() + 3);
     answer->values.insert(answer->values.end(), by_rows.data(), by_rows.data() + 9);
@@ -188,7 +200,8 @@ std::string PortModel::decode_motion(const v1::PeerExchange& in, const Agreement
 }
 
 // F = Hᵀ F̂ on the points.
-void PortModel::decode_mapped(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const {
+void PortModel::decode_mapped(const v1::PeerExchange& in, const Agreement& agreement,
+                              Answer* answer) const {
   const MatX& H = *element_->element->mapping();
   const VecX f = H.transpose() * Eigen::Map<const VecX>(in.forces_n().data(), in.forces_n_size());
   for (std::size_t k = 0; k < points_.size(); ++k) {

@@ -170,7 +170,8 @@ void PortModel::make_signal(const v1::PortDefinition& definition, const Simulati
     layout_.add_input_names(variable);
     layout_.add_input_units(variables[handle].unit);
   }
-  for (const v1::OutputExpression& expression : definition.output_expressions()) make_expression(expression, simulation);
+  for (const v1::OutputExpression& expression : definition.output_expressions())
+    make_expression(expression, simulation);
   layout_.set_output_size(output_size + definition.output_expressions_size());
   layout_.set_input_size(answer_size_);
 }
@@ -184,27 +185,32 @@ std::pair<int, int> component_of(const Simulation& simulation, const std::string
   const int size = simulation.variables()[handle].size;
   if (bracket == std::string::npos) {
     if (size == 1) return {handle, 0};
-    throw Refusal(v1::REASON_BAD_ARGUMENT, "variable \"" + text + "\" is no single number; write e.g. \"" + text + "[0]\"");
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "variable \"" + text + "\" is no single number; write e.g. \"" + text + "[0]\"");
   }
   char* end = nullptr;
   const long k = std::strtol(text.c_str() + bracket + 1, &end, 10);
   if (std::string(end) != "]" || k < 0 || k >= size)
-    throw Refusal(v1::REASON_BAD_ARGUMENT, "\"" + text + "\": components go from [0] to [" + std::to_string(size - 1) + "]");
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "\"" + text + "\": components go from [0] to [" + std::to_string(size - 1) + "]");
   return {handle, static_cast<int>(k)};
 }
 
 }  // namespace
 
-void PortModel::make_expression(const v1::OutputExpression& definition, const Simulation& simulation) {
+void PortModel::make_expression(const v1::OutputExpression& definition,
+                                const Simulation& simulation) {
   std::vector<std::string> names;
   Formula formula;
-  const std::map<std::string, std::string> variables(definition.variables().begin(), definition.variables().end());
+  const std::map<std::string, std::string> variables(definition.variables().begin(),
+                                                     definition.variables().end());
   for (const auto& [argument, variable] : variables) {
     names.push_back(argument);
     formula.arguments.push_back(component_of(simulation, variable));
   }
   auto compiled = compile_formula(definition.expression(), names);
-  if (!compiled) throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": " + compiled.error().message);
+  if (!compiled)
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": " + compiled.error().message);
   formula.expression = *compiled;
   formulas_.push_back(std::move(formula));
   layout_.add_output_names(definition.name());

@@ -7,7 +7,6 @@
 
 #include "coupling/agreement.h"
 #include "mbcosim/v1/coupling_types.pb.h"
-#include "elements/ports/port_element.h"
 #include "model/expression.h"
 #include "simulation/simulation.h"
 
@@ -22,8 +21,9 @@ struct Answer {
 };
 
 /// Structural: motion of points xᵢ = x + R fᵢ out; forces F and moments M about the points in,
-/// applied to the nodes as F and M + (R fᵢ) × F. Mapped: H x and H v out, F̂ in, F = Hᵀ F̂. Motion: reactions out, x and R in.
-/// Modal: q, q̇ out, generalized forces in. Signal: any variables out, inputs in. Answers are kept in global components.
+/// applied to the nodes as F and M + (R fᵢ) × F. Mapped: H x and H v out, F̂ in, F = Hᵀ F̂. Motion:
+/// reactions out, x and R in. Modal: q, q̇ out, generalized forces in. Signal: any variables out,
+/// inputs in. Answers are kept in global components.
 class PortModel {
  public:
   /// Resolves labels and names. Throws Refusal that names what does not exist.
@@ -89,11 +89,15 @@ class PortModel {
   void make_output();
   void put_motion(const Motion& m, const Agreement& agreement, v1::ServerExchange* out) const;
   void fill_mapped(const Agreement& agreement, v1::ServerExchange* out) const;
-  std::string decode_motion(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const;
+  std::string decode_motion(const v1::PeerExchange& in, const Agreement& agreement,
+                            Answer* answer) const;
   void decode_mapped(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const;
-  std::string decode_tangent(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const;
+  std::string decode_tangent(const v1::PeerExchange& in, const Agreement& agreement,
+                             Answer* answer) const;
   void move_to_nodes(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const;
-  bool has_signals() const { return layout_.kind() == v1::PORT_KIND_SIGNAL || layout_.kind() == v1::PORT_KIND_MODAL; }
+  bool has_signals() const {
+    return layout_.kind() == v1::PORT_KIND_SIGNAL || layout_.kind() == v1::PORT_KIND_MODAL;
+  }
   int peer_points() const;
   std::vector<double> node_loads(const std::vector<double>& answer) const;
 
@@ -106,8 +110,9 @@ class PortModel {
   std::vector<int> outputs_, inputs_, written_;
   std::vector<Formula> formulas_;  ///< outputs after `outputs_`
   int answer_size_ = 0;
-  int deck_loads_ = -1;  ///< handle of the inputs of a port in the model; negative: loads go to the nodes
-  int reactions_ = -1;   ///< motion: handle of the reactions
+  int deck_loads_ =
+      -1;  ///< handle of the inputs of a port in the model; negative: loads go to the nodes
+  int reactions_ = -1;  ///< motion: handle of the reactions
   std::optional<PortElementRef> element_;
   const Model* model_;
   bool has_reference_ = false, needs_accelerations_ = false;

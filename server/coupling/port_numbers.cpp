@@ -89,7 +89,8 @@ bool take_rotation(const Numbers& numbers, int at, v1::RotationForm form, Mat3* 
       return true;
     }
     case v1::ROTATION_FORM_EULER_123:
-      *R = Eigen::AngleAxisd(v(0), Vec3::UnitX()) * Eigen::AngleAxisd(v(1), Vec3::UnitY()) * Eigen::AngleAxisd(v(2), Vec3::UnitZ());
+      *R = Eigen::AngleAxisd(v(0), Vec3::UnitX()) * Eigen::AngleAxisd(v(1), Vec3::UnitY()) *
+           Eigen::AngleAxisd(v(2), Vec3::UnitZ());
       return true;
     case v1::ROTATION_FORM_QUATERNION: {
       const Eigen::Quaterniond q(n[0], n[1], n[2], n[3]);

@@ -21,6 +21,7 @@ bool take_rotation(const Numbers& numbers, int at, v1::RotationForm form, Mat3* 
 Mat3 nearest_rotation(const Mat3& A);
 Vec3 triple(const Numbers& numbers, std::size_t i);
 /// Empty, or what is wrong with the length or the values of an array.
-std::string check_array(const char* name, const Numbers& numbers, std::size_t size, bool may_be_empty);
+std::string check_array(const char* name, const Numbers& numbers, std::size_t size,
+                        bool may_be_empty);
 
 }  // namespace mbcosim::server

@@ -8,7 +8,8 @@ namespace {
 
 using Mat6x6 = Eigen::Matrix<double, 6, 6>;
 
-/// (x, θ) of a point from (x, θ) of its node: δx_p = δx − a× δθ. Its transpose takes loads about the point to the node.
+/// (x, θ) of a point from (x, θ) of its node: δx_p = δx − a× δθ. Its transpose takes loads about
+/// the point to the node.
 Mat6x6 to_point(const Vec3& arm) {
   Mat6x6 T = Mat6x6::Identity();
   T.topRightCorner<3, 3>() = -cross<double>(arm);
@@ -48,13 +49,15 @@ LoadTangent PortModel::tangent(const Agreement& agreement) const {
   return t;
 }
 
-std::string PortModel::decode_tangent(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const {
+std::string PortModel::decode_tangent(const v1::PeerExchange& in, const Agreement& agreement,
+                                      Answer* answer) const {
   if (!in.has_tangent()) return "";
   if (!agreement.has_tangent()) return "`tangent` was not announced in `hello`";
   const v1::Tangent& tangent = in.tangent();
   const bool blocks = agreement.tangent == v1::TANGENT_FORM_BLOCK_DIAGONAL;
   const bool modal = layout_.kind() == v1::PORT_KIND_MODAL;
-  if (tangent.block_diagonal() != blocks) return "`tangent.block_diagonal` differs from what `hello` announced";
+  if (tangent.block_diagonal() != blocks)
+    return "`tangent.block_diagonal` differs from what `hello` announced";
   const int size = modal ? layout_.input_size() : 6 * static_cast<int>(points_.size());
   const int columns = blocks && !modal ? 6 : size;
   const auto count = static_cast<std::size_t>(size) * static_cast<std::size_t>(columns);
@@ -68,9 +71,11 @@ std::string PortModel::decode_tangent(const v1::PeerExchange& in, const Agreemen
   return "";
 }
 
-// K ← Tᵀ (K T + C W), C ← Tᵀ C T for each pair of points. Loads that are held about the nodes turn with the arms: M = m + a × F, so that
-// F× a× δθ joins; the element of a deck's port has that in its own matrix.
-void PortModel::move_to_nodes(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const {
+// K ← Tᵀ (K T + C W), C ← Tᵀ C T for each pair of points. Loads that are held about the nodes turn
+// with the arms: M = m + a × F, so that F× a× δθ joins; the element of a deck's port has that in
+// its own matrix.
+void PortModel::move_to_nodes(const v1::PeerExchange& in, const Agreement& agreement,
+                              Answer* answer) const {
   const bool blocks = agreement.tangent == v1::TANGENT_FORM_BLOCK_DIAGONAL;
   const int n = static_cast<int>(points_.size());
   if (answer->stiffness.size() == 0) answer->stiffness = MatX::Zero(6 * n, blocks ? 6 : 6 * n);
@@ -87,7 +92,9 @@ void PortModel::move_to_nodes(const v1::PeerExchange& in, const Agreement& agree
       }
       K = load * sum;
       if (i == j && deck_loads_ < 0)
-        K.bottomRightCorner<3, 3>() += cross<double>(triple(in.forces_n(), static_cast<std::size_t>(i))) * cross<double>(sent_[i].arm);
+        K.bottomRightCorner<3, 3>() +=
+            cross<double>(triple(in.forces_n(), static_cast<std::size_t>(i))) *
+            cross<double>(sent_[i].arm);
     }
   }
 }

@@ -10,7 +10,8 @@
 
 namespace mbcosim::server {
 
-/// Thread-safe. Entries are kept as a file of delimited messages; at the limit the record ends with `cut_off`.
+/// Thread-safe. Entries are kept as a file of delimited messages; at the limit the record ends with
+/// `cut_off`.
 class Recorder {
  public:
   explicit Recorder(std::int64_t most_bytes) : most_bytes_(most_bytes) {}

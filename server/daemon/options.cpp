@@ -18,7 +18,8 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   add("--limit-sessions", limits.sessions, "Simulations alive at once");
   add("--limit-snapshots", limits.snapshots, "Snapshots of one simulation");
   add("--limit-snapshot-bytes", limits.snapshot_bytes, "Memory of all snapshots of one simulation");
-  add("--limit-record-bytes", limits.record_bytes, "Memory of the record of one simulation's ports");
+  add("--limit-record-bytes", limits.record_bytes,
+      "Memory of the record of one simulation's ports");
   add("--limit-bundle-files", limits.bundle_files, "Files of one uploaded deck");
   add("--limit-deck-bytes", limits.engine.deck_bytes, "Bytes of one deck with all its files");
   add("--limit-include-depth", limits.engine.include_depth, "Nested includes");

@@ -22,13 +22,16 @@ int tell(const std::string& difference, const std::string& done) {
   return kDiffers;
 }
 
-int run_model(const std::string& deck, const std::vector<v1::RecordEntry>& record, double tolerance) {
+int run_model(const std::string& deck, const std::vector<v1::RecordEntry>& record,
+              double tolerance) {
   const Outcome outcome = replay_model(deck, record, tolerance);
   if (!outcome.end.empty()) std::printf("note: the replay ends early: %s\n", outcome.end.c_str());
-  return tell(outcome.difference, std::to_string(outcome.steps) + " steps, " + std::to_string(outcome.exchanges) + " exchanges");
+  return tell(outcome.difference, std::to_string(outcome.steps) + " steps, " +
+                                      std::to_string(outcome.exchanges) + " exchanges");
 }
 
-int run_server(const std::string& address, const std::vector<v1::RecordEntry>& record, double tolerance) {
+int run_server(const std::string& address, const std::vector<v1::RecordEntry>& record,
+               double tolerance) {
   RecordedCoupling coupling(record, tolerance);
   RecordedSimulation simulation(record.front().header());
   grpc::ServerBuilder builder;
@@ -55,15 +58,21 @@ bool is_local(const std::string& address) {
 
 int main(int argc, char** argv) {
   using namespace mbcosim::replay;
-  CLI::App app{"Replays what crossed the ports of a simulation and reports the first difference by step and variable. A record is what "
-               "`GetRecord` gives for a simulation that was created with `record_ports`.",
-               "mbcosim replay"};
+  CLI::App app{
+      "Replays what crossed the ports of a simulation and reports the first difference by step and "
+      "variable. A record is what "
+      "`GetRecord` gives for a simulation that was created with `record_ports`.",
+      "mbcosim replay"};
   std::string deck, record, address;
   double tolerance = 0;
   app.add_option("record", record, "The record")->required();
   app.add_option("deck", deck, "Main file of the deck: the model is run against the record");
-  app.add_option("--serve", address, "unix:PATH or HOST:PORT of this machine: the recorded server is played to clients");
-  app.add_option("--tolerance", tolerance, "Relative difference of numbers that is let pass; default: none")->check(CLI::NonNegativeNumber);
+  app.add_option(
+      "--serve", address,
+      "unix:PATH or HOST:PORT of this machine: the recorded server is played to clients");
+  app.add_option("--tolerance", tolerance,
+                 "Relative difference of numbers that is let pass; default: none")
+      ->check(CLI::NonNegativeNumber);
   app.footer("Exit code: 0 the same, 2 refused, 3 different.");
   try {
     app.parse(argc, argv);
@@ -72,9 +81,12 @@ int main(int argc, char** argv) {
   }
   try {
     if (deck.empty() == address.empty()) throw std::runtime_error("give either a deck or --serve");
-    if (!address.empty() && !is_local(address)) throw std::runtime_error("--serve takes addresses of this machine only, got \"" + address + "\"");
+    if (!address.empty() && !is_local(address))
+      throw std::runtime_error("--serve takes addresses of this machine only, got \"" + address +
+                               "\"");
     const auto entries = read_record(record);
-    return address.empty() ? run_model(deck, entries, tolerance) : run_server(address, entries, tolerance);
+    return address.empty() ? run_model(deck, entries, tolerance)
+                           : run_server(address, entries, tolerance);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "mbcosim replay: %s\n", error.what());
     return kRefused;

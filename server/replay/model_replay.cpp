@@ -39,7 +39,8 @@ class RecordedPeer : public server::PeerLink {
       return true;
     }
     ++record_.next;
-    if (const auto difference = first_difference(expected->to_peer(), now, tolerance_)) note(*difference);
+    if (const auto difference = first_difference(expected->to_peer(), now, tolerance_))
+      note(*difference);
     if (!now.has_exchange()) return true;
     ++outcome_.exchanges;
     answer();
@@ -48,8 +49,9 @@ class RecordedPeer : public server::PeerLink {
 
  private:
   void skip_greetings() {
-    while (record_.peek() && (record_.peek()->from_peer().has_hello() || record_.peek()->to_peer().has_welcome() ||
-                              record_.peek()->detached() || !record_.peek()->lost().empty()))
+    while (record_.peek() &&
+           (record_.peek()->from_peer().has_hello() || record_.peek()->to_peer().has_welcome() ||
+            record_.peek()->detached() || !record_.peek()->lost().empty()))
       ++record_.next;
   }
   void answer() {
@@ -65,7 +67,8 @@ class RecordedPeer : public server::PeerLink {
   }
   void note(const std::string& what) {
     if (outcome_.difference.empty())
-      outcome_.difference = "step " + std::to_string(outcome_.steps) + ", port \"" + port_.model().name() + "\": " + what;
+      outcome_.difference = "step " + std::to_string(outcome_.steps) + ", port \"" +
+                            port_.model().name() + "\": " + what;
   }
 
   Port& port_;
@@ -74,19 +77,26 @@ class RecordedPeer : public server::PeerLink {
   double tolerance_;
 };
 
-std::unique_ptr<Simulation> load_simulation(const std::string& deck, const v1::CreateOptions& options, const v1::RecordHeader& header) {
+std::unique_ptr<Simulation> load_simulation(const std::string& deck,
+                                            const v1::CreateOptions& options,
+                                            const v1::RecordHeader& header) {
   const std::filesystem::path path(deck);
   const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
-  const LoadReport report = load_deck(FolderSource(folder, /*unrestricted=*/true), path.filename().string(), {}, server::attachments(options));
+  const LoadReport report = load_deck(FolderSource(folder, /*unrestricted=*/true),
+                                      path.filename().string(), {}, server::attachments(options));
   for (const Diagnostic& d : report.diagnostics)
     if (d.severity == Severity::error) throw std::runtime_error(d.text());
   const std::string digest = server::digest_text(report.model->digest);
   if (digest != header.model_digest())
-    throw std::runtime_error("the deck has the digest " + digest + ", the record is of " + header.model_digest());
-  auto simulation = Simulation::create(report.model, nullptr, nullptr, options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact);
+    throw std::runtime_error("the deck has the digest " + digest + ", the record is of " +
+                             header.model_digest());
+  auto simulation =
+      Simulation::create(report.model, nullptr, nullptr,
+                         options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact);
   if (!simulation) throw std::runtime_error(simulation.error().message);
   if (!header.state().empty())
-    if (const Status status = (*simulation)->import_state(header.state()); !status) throw std::runtime_error(status.error().message);
+    if (const Status status = (*simulation)->import_state(header.state()); !status)
+      throw std::runtime_error(status.error().message);
   return std::move(*simulation);
 }
 
@@ -103,9 +113,12 @@ v1::CreateOptions options_of(const v1::RecordHeader& header) {
 class ModelReplay {
  public:
   ModelReplay(const std::string& deck, const std::vector<v1::RecordEntry>& record, double tolerance)
-      : record_(record), tolerance_(tolerance), slots_(1),
-        session_({}, load_simulation(deck, options_of(record.front().header()), record.front().header()), {slots_, limits_, metrics_},
-                 options_of(record.front().header())) {
+      : record_(record),
+        tolerance_(tolerance),
+        slots_(1),
+        session_(
+            {}, load_simulation(deck, options_of(record.front().header()), record.front().header()),
+            {slots_, limits_, metrics_}, options_of(record.front().header())) {
     for (const v1::RecordEntry& entry : record)
       if (!entry.port().empty()) ports_[entry.port()].entries.push_back(&entry);
   }
@@ -116,12 +129,18 @@ class ModelReplay {
   Outcome run() {
     for (const v1::RecordEntry& entry : record_) {
       if (!outcome_.difference.empty() || !outcome_.end.empty()) break;
-      if (entry.from_peer().has_hello()) attach(entry);
-      else if (entry.has_inputs()) write(entry.inputs());
-      else if (entry.detached()) leaving_.push_back(entry.port());
-      else if (entry.has_accepted() || entry.has_failed()) step(entry);
-      else if (entry.has_restored()) outcome_.end = "another state was restored";
-      else if (entry.cut_off()) outcome_.end = "the record met its limit";
+      if (entry.from_peer().has_hello())
+        attach(entry);
+      else if (entry.has_inputs())
+        write(entry.inputs());
+      else if (entry.detached())
+        leaving_.push_back(entry.port());
+      else if (entry.has_accepted() || entry.has_failed())
+        step(entry);
+      else if (entry.has_restored())
+        outcome_.end = "another state was restored";
+      else if (entry.cut_off())
+        outcome_.end = "the record met its limit";
     }
     return outcome_;
   }
@@ -132,7 +151,8 @@ class ModelReplay {
     Port& port = session_.port(entry.port());
     v1::Hello hello = entry.from_peer().hello();
     hello.clear_step_size_s();
-    Agreement agreement = server::agree(hello, port.model(), session_.model(), server::digest_text(session_.model().digest), 0);
+    Agreement agreement = server::agree(hello, port.model(), session_.model(),
+                                        server::digest_text(session_.model().digest), 0);
     agreement.timeout = std::chrono::milliseconds(20);  // who did not answer then does not now
     if (agreement.policy == v1::PEER_POLICY_WAIT) agreement.policy = v1::PEER_POLICY_FAIL_STEP;
     auto& peer = peers_[entry.port()];
@@ -167,9 +187,12 @@ class ModelReplay {
     const bool accepted_now = reply.steps_done() == 1;
     std::string difference;
     if (accepted != accepted_now)
-      difference = accepted ? "accepted then, fails now: " + reply.failure().message() : "failed then, is accepted now";
-    else if (const auto found = first_difference(notice, now, tolerance_)) difference = *found;
-    if (!difference.empty() && outcome_.difference.empty()) outcome_.difference = "step " + std::to_string(outcome_.steps) + ": " + difference;
+      difference = accepted ? "accepted then, fails now: " + reply.failure().message()
+                            : "failed then, is accepted now";
+    else if (const auto found = first_difference(notice, now, tolerance_))
+      difference = *found;
+    if (!difference.empty() && outcome_.difference.empty())
+      outcome_.difference = "step " + std::to_string(outcome_.steps) + ": " + difference;
     leave();
   }
 
@@ -187,7 +210,8 @@ class ModelReplay {
 
 }  // namespace
 
-Outcome replay_model(const std::string& deck, const std::vector<v1::RecordEntry>& record, double tolerance) {
+Outcome replay_model(const std::string& deck, const std::vector<v1::RecordEntry>& record,
+                     double tolerance) {
   try {
     return ModelReplay(deck, record, tolerance).run();
   } catch (const server::Refusal& refusal) {

@@ -17,6 +17,7 @@ struct Outcome {
 };
 
 /// Throws std::runtime_error when the deck is not the record's.
-Outcome replay_model(const std::string& deck, const std::vector<v1::RecordEntry>& record, double tolerance);
+Outcome replay_model(const std::string& deck, const std::vector<v1::RecordEntry>& record,
+                     double tolerance);
 
 }  // namespace mbcosim::replay

@@ -4,7 +4,8 @@
 
 namespace mbcosim::replay {
 
-RecordedCoupling::RecordedCoupling(const std::vector<v1::RecordEntry>& record, double tolerance) : tolerance_(tolerance) {
+RecordedCoupling::RecordedCoupling(const std::vector<v1::RecordEntry>& record, double tolerance)
+    : tolerance_(tolerance) {
   for (const v1::RecordEntry& entry : record) {
     if (entry.port().empty() || entry.from_peer().has_hello()) continue;
     auto& sessions = sessions_[entry.port()];
@@ -29,7 +30,9 @@ grpc::Status RecordedCoupling::Attach(grpc::ServerContext*, Stream* stream) {
     return {grpc::StatusCode::FAILED_PRECONDITION, "the first message must be `hello`"};
   const std::string port = first.hello().port();
   const Entries* entries = next_session(port);
-  if (!entries) return {grpc::StatusCode::NOT_FOUND, "the record has no further session of port \"" + port.substr(0, 100) + "\""};
+  if (!entries)
+    return {grpc::StatusCode::NOT_FOUND,
+            "the record has no further session of port \"" + port.substr(0, 100) + "\""};
   play(port, *entries, stream);
   {
     const std::lock_guard guard(mutex_);
@@ -50,7 +53,9 @@ void RecordedCoupling::play(const std::string& port, const Entries& entries, Str
       const std::lock_guard guard(mutex_);
       step_ = message.exchange().step();
     }
-    const v1::RecordEntry* answer = k + 1 < entries.size() && entries[k + 1]->from_peer().has_exchange() ? entries[k + 1] : nullptr;
+    const v1::RecordEntry* answer =
+        k + 1 < entries.size() && entries[k + 1]->from_peer().has_exchange() ? entries[k + 1]
+                                                                             : nullptr;
     if (!answer) continue;  // nobody answered then
     v1::PeerMessage now;
     do {
@@ -60,7 +65,8 @@ void RecordedCoupling::play(const std::string& port, const Entries& entries, Str
   }
 }
 
-bool RecordedCoupling::compare(const std::string& port, const v1::RecordEntry* recorded, const v1::PeerMessage& now) {
+bool RecordedCoupling::compare(const std::string& port, const v1::RecordEntry* recorded,
+                               const v1::PeerMessage& now) {
   {
     const std::lock_guard guard(mutex_);
     ++exchanges_;
@@ -73,7 +79,8 @@ bool RecordedCoupling::compare(const std::string& port, const v1::RecordEntry* r
 void RecordedCoupling::note(const std::string& port, const std::string& what) {
   {
     const std::lock_guard guard(mutex_);
-    if (difference_.empty()) difference_ = "step " + std::to_string(step_) + ", port \"" + port + "\": " + what;
+    if (difference_.empty())
+      difference_ = "step " + std::to_string(step_) + ", port \"" + port + "\": " + what;
   }
   changed_.notify_all();
 }
@@ -93,7 +100,9 @@ std::int64_t RecordedCoupling::exchanges() const {
   return exchanges_;
 }
 
-grpc::Status RecordedSimulation::GetServerInfo(grpc::ServerContext*, const v1::GetServerInfoRequest*, v1::ServerInfo* reply) {
+grpc::Status RecordedSimulation::GetServerInfo(grpc::ServerContext*,
+                                               const v1::GetServerInfoRequest*,
+                                               v1::ServerInfo* reply) {
   reply->set_version(MBCOSIM_VERSION);
   reply->mutable_protocol()->set_lowest(header_.protocol_version());
   reply->mutable_protocol()->set_highest(header_.protocol_version());
@@ -102,7 +111,9 @@ grpc::Status RecordedSimulation::GetServerInfo(grpc::ServerContext*, const v1::G
   return grpc::Status::OK;
 }
 
-grpc::Status RecordedSimulation::GetSimulation(grpc::ServerContext*, const v1::GetSimulationRequest* request, v1::SimulationInfo* reply) {
+grpc::Status RecordedSimulation::GetSimulation(grpc::ServerContext*,
+                                               const v1::GetSimulationRequest* request,
+                                               v1::SimulationInfo* reply) {
   reply->set_name(request->name());
   reply->set_display_name("a record");
   reply->set_state(v1::SIMULATION_STATE_READY);
@@ -112,7 +123,9 @@ grpc::Status RecordedSimulation::GetSimulation(grpc::ServerContext*, const v1::G
   return grpc::Status::OK;
 }
 
-grpc::Status RecordedSimulation::DescribeSimulation(grpc::ServerContext*, const v1::DescribeSimulationRequest*, v1::ModelDescription* reply) {
+grpc::Status RecordedSimulation::DescribeSimulation(grpc::ServerContext*,
+                                                    const v1::DescribeSimulationRequest*,
+                                                    v1::ModelDescription* reply) {
   reply->set_title("a record");
   reply->set_model_digest(header_.model_digest());
   *reply->mutable_ports() = header_.layouts();

@@ -1,4 +1,5 @@
-/// A recorded server against a client: what the server sent is sent again, what the client answers is compared.
+/// A recorded server against a client: what the server sent is sent again, what the client answers
+/// is compared.
 #pragma once
 
 #include <grpcpp/server_context.h>
@@ -19,7 +20,9 @@ namespace mbcosim::replay {
 class RecordedCoupling final : public v1::Coupling::Service {
  public:
   RecordedCoupling(const std::vector<v1::RecordEntry>& record, double tolerance);
-  grpc::Status Attach(grpc::ServerContext* context, grpc::ServerReaderWriter<v1::ServerMessage, v1::PeerMessage>* stream) override;
+  grpc::Status Attach(
+      grpc::ServerContext* context,
+      grpc::ServerReaderWriter<v1::ServerMessage, v1::PeerMessage>* stream) override;
 
   /// Waits until the sessions of all ports were played, or the first difference.
   void wait();
@@ -31,7 +34,8 @@ class RecordedCoupling final : public v1::Coupling::Service {
   using Entries = std::vector<const v1::RecordEntry*>;
   const Entries* next_session(const std::string& port);
   void play(const std::string& port, const Entries& entries, Stream* stream);
-  bool compare(const std::string& port, const v1::RecordEntry* recorded, const v1::PeerMessage& now);
+  bool compare(const std::string& port, const v1::RecordEntry* recorded,
+               const v1::PeerMessage& now);
   void note(const std::string& port, const std::string& what);
 
   const double tolerance_;
@@ -48,9 +52,12 @@ class RecordedCoupling final : public v1::Coupling::Service {
 class RecordedSimulation final : public v1::Simulations::Service {
  public:
   explicit RecordedSimulation(const v1::RecordHeader& header) : header_(header) {}
-  grpc::Status GetServerInfo(grpc::ServerContext*, const v1::GetServerInfoRequest*, v1::ServerInfo* reply) override;
-  grpc::Status GetSimulation(grpc::ServerContext*, const v1::GetSimulationRequest* request, v1::SimulationInfo* reply) override;
-  grpc::Status DescribeSimulation(grpc::ServerContext*, const v1::DescribeSimulationRequest*, v1::ModelDescription* reply) override;
+  grpc::Status GetServerInfo(grpc::ServerContext*, const v1::GetServerInfoRequest*,
+                             v1::ServerInfo* reply) override;
+  grpc::Status GetSimulation(grpc::ServerContext*, const v1::GetSimulationRequest* request,
+                             v1::SimulationInfo* reply) override;
+  grpc::Status DescribeSimulation(grpc::ServerContext*, const v1::DescribeSimulationRequest*,
+                                  v1::ModelDescription* reply) override;
 
  private:
   const v1::RecordHeader& header_;

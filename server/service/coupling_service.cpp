@@ -37,19 +37,32 @@ class TurnTaker : public PeerLink {
   using Clock = std::chrono::steady_clock;
   explicit TurnTaker(PeerStream& stream) : stream_(stream) {}
   bool send(const v1::ServerMessage& message, Clock::time_point deadline) override {
-    const std::unique_lock guard(mutex_, deadline);
-    return guard.owns_lock() && stream_.send(message, deadline);
+    std::unique_lock guard(mutex_);
+    if (!free_.wait_until(guard, deadline, [&] { return !busy_; })) return false;
+    busy_ = true;
+    guard.unlock();
+    const bool sent = stream_.send(message, deadline);
+    guard.lock();
+    busy_ = false;
+    guard.unlock();
+    free_.notify_one();
+    return sent;
   }
   bool pulls() const override { return stream_.pulls(); }
-  Pulled pull(v1::PeerMessage* message, Clock::time_point until) override { return stream_.pull(message, until); }
+  Pulled pull(v1::PeerMessage* message, Clock::time_point until) override {
+    return stream_.pull(message, until);
+  }
   void refuse(const Refusal& refusal) override { stream_.refuse(refusal); }
 
  private:
   PeerStream& stream_;
-  std::timed_mutex mutex_;  // protects sending
+  std::mutex mutex_;   // protects the one below
+  bool busy_ = false;  ///< somebody sends
+  std::condition_variable free_;
 };
 
-/// Sends `heartbeat` at an even pace and listens for the peer's, from a thread of its own, whatever the simulation does.
+/// Sends `heartbeat` at an even pace and listens for the peer's, from a thread of its own, whatever
+/// the simulation does.
 class Heart {
  public:
   Heart(TurnTaker& link, PeerStream& stream, const Port& port, const Agreement& agreement)
@@ -74,8 +87,11 @@ class Heart {
 
   void run() {
     const auto timeout = agreement_.heartbeat_timeout;
-    const auto listen = std::max<std::chrono::milliseconds>(timeout / 4, std::chrono::milliseconds(1));
-    const auto period = beats() && (timeout == kNever || agreement_.heartbeat_interval < listen) ? agreement_.heartbeat_interval : listen;
+    const auto listen =
+        std::max<std::chrono::milliseconds>(timeout / 4, std::chrono::milliseconds(1));
+    const auto period = beats() && (timeout == kNever || agreement_.heartbeat_interval < listen)
+                            ? agreement_.heartbeat_interval
+                            : listen;
     Clock::time_point next = Clock::now() + agreement_.heartbeat_interval;
     v1::ServerMessage message;
     std::unique_lock guard(mutex_);
@@ -137,7 +153,8 @@ void CouplingService::serve_peer(const v1::Hello& hello, Session& session, PeerS
   Port& port = session.port(hello.port());
   v1::SimulationInfo info;
   session.fill(&info);
-  const Agreement agreement = agree(hello, port.model(), session.model(), info.model_digest(), info.next_step_s());
+  const Agreement agreement =
+      agree(hello, port.model(), session.model(), info.model_digest(), info.next_step_s());
   TurnTaker link(stream);
   const Attachment attachment(port, agreement);
   v1::ServerMessage message;

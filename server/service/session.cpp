@@ -24,7 +24,8 @@ Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shar
       model_(&simulation->model()),
       variables_(&simulation->variables()),
       simulation_(std::move(simulation)),
-      recorder_(options.record_ports() ? std::make_unique<Recorder>(shared.limits.record_bytes) : nullptr),
+      recorder_(options.record_ports() ? std::make_unique<Recorder>(shared.limits.record_bytes)
+                                       : nullptr),
       coupler_(options.ports(), *simulation_, recorder_.get()),
       last_use_(Clock::now().time_since_epoch().count()) {
   published_.display_name = identity_.display_name;
@@ -52,7 +53,8 @@ void Session::start_record(const v1::CreateOptions& options) {
 // ------------------------------------------------------------------ choices
 
 void Session::set_policy(v1::NonConvergencePolicy kind, double minimum) {
-  if (!v1::NonConvergencePolicy_IsValid(kind)) throw Refusal(v1::REASON_BAD_ARGUMENT, "`non_convergence_policy` is unknown to this server");
+  if (!v1::NonConvergencePolicy_IsValid(kind))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`non_convergence_policy` is unknown to this server");
   if (!(minimum >= 0) || std::isinf(minimum))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`minimum_step_s` must be a finite number, at least 0");
   StepPolicy policy;
@@ -69,8 +71,9 @@ void Session::update(const v1::UpdateSimulationRequest& request) {
   std::lock_guard lock(lock_);
   const StepPolicy now = simulation_->policy();
   if (request.has_non_convergence_policy() || request.has_minimum_step_s())
-    set_policy(request.has_non_convergence_policy() ? request.non_convergence_policy() : to_proto(now),
-               request.has_minimum_step_s() ? request.minimum_step_s() : now.minimum);
+    set_policy(
+        request.has_non_convergence_policy() ? request.non_convergence_policy() : to_proto(now),
+        request.has_minimum_step_s() ? request.minimum_step_s() : now.minimum);
   std::lock_guard guard(published_mutex_);
   if (request.has_display_name()) published_.display_name = request.display_name();
 }

@@ -153,7 +153,7 @@ class Session {
   FairMutex lock_;  // protects the four below
   std::unique_ptr<Simulation> simulation_;
   const std::unique_ptr<Recorder> recorder_;  // thread-safe; null: nothing is recorded
-  Coupler coupler_;  // its ports are thread-safe by themselves
+  Coupler coupler_;                           // its ports are thread-safe by themselves
   std::vector<double> scratch_;
   v1::StepReply last_reply_;
 

@@ -166,7 +166,9 @@ void Session::account(Advance& advance, const StepReport& report) {
   reply.set_residual_error(report.residual_error);
   reply.set_solution_error(report.solution_error);
   reply.set_solver_seconds(reply.solver_seconds() + report.solver_seconds);
-  if (recorder_) recorder_->stepped(is_accepted(report.outcome), simulation_->step_number(), simulation_->time());
+  if (recorder_)
+    recorder_->stepped(is_accepted(report.outcome), simulation_->step_number(),
+                       simulation_->time());
   publish();
   if (!is_accepted(report.outcome)) {
     advance.ended = true;
@@ -258,7 +260,9 @@ class Session::ExchangeInStep {
       : simulation_(session.coupler_.has_tight() ? session.simulation_.get() : nullptr) {
     if (!simulation_) return;
     session.coupler_.start_iterations(*simulation_);
-    simulation_->set_attempt_ended([&session](bool accepted) { session.coupler_.end_attempt(accepted, *session.simulation_); });
+    simulation_->set_attempt_ended([&session](bool accepted) {
+      session.coupler_.end_attempt(accepted, *session.simulation_);
+    });
     simulation_->set_exchange([&session, &advance, &slot](int iteration) {
       slot.reset();
       const bool settled =

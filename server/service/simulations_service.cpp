@@ -26,9 +26,7 @@ void check_protocol(const v1::VersionRange& range) {
                 {{"lowest", version}, {"highest", version}});
 }
 
-void check_options(const v1::CreateOptions& options) {
-  check_protocol(options.protocol());
-}
+void check_options(const v1::CreateOptions& options) { check_protocol(options.protocol()); }
 
 [[noreturn]] void refuse_deck(const LoadReport& report) {
   Error error;
@@ -184,7 +182,8 @@ void SimulationsService::create(const v1::UploadHeader& header, LoadReport repor
   auto simulation = [&] {
     const auto slot = parts_.slots.acquire(token);
     const bool summed = header.options().summed_time();
-    return Simulation::create(report.model, &token, nullptr, summed ? TimeKeeping::summed : TimeKeeping::exact);
+    return Simulation::create(report.model, &token, nullptr,
+                              summed ? TimeKeeping::summed : TimeKeeping::exact);
   }();
   call.attach(nullptr);
   if (!simulation) throw Refusal(simulation.error());
@@ -234,7 +233,8 @@ grpc::Status SimulationsService::GetSimulation(Context context,
   });
 }
 
-grpc::Status SimulationsService::UpdateSimulation(Context context, const v1::UpdateSimulationRequest* request,
+grpc::Status SimulationsService::UpdateSimulation(Context context,
+                                                  const v1::UpdateSimulationRequest* request,
                                                   v1::SimulationInfo* reply) {
   return serve(parts_, *context, "UpdateSimulation", Role::control, [&](const Caller& caller) {
     const SessionPtr session = parts_.store.get(request->name(), caller);

@@ -24,7 +24,8 @@ void check_name(const std::string& name) {
   }
 }
 
-LoadReport load_from_root(const std::string& name, const v1::CreateOptions& options, const Config& config) {
+LoadReport load_from_root(const std::string& name, const v1::CreateOptions& options,
+                          const Config& config) {
   if (config.model_root.empty())
     throw Refusal(v1::REASON_NO_SUCH_MODEL, "the server has no model root; upload a bundle");
   check_name(name);
@@ -48,8 +49,11 @@ std::vector<PortAttachment> attachments(const v1::CreateOptions& options) {
   for (const v1::PortDefinition& port : options.ports()) {
     const bool motion = port.kind() == v1::PORT_KIND_MOTION;
     if (!motion && port.kind() != v1::PORT_KIND_MODAL) continue;
-    found.push_back({motion ? ElementPort::Kind::motion : ElementPort::Kind::modal, port.name(),
-                     {port.node_labels().begin(), port.node_labels().end()}, port.positions_only(), port.modal_joint_label()});
+    found.push_back({motion ? ElementPort::Kind::motion : ElementPort::Kind::modal,
+                     port.name(),
+                     {port.node_labels().begin(), port.node_labels().end()},
+                     port.positions_only(),
+                     port.modal_joint_label()});
   }
   return found;
 }
@@ -95,7 +99,8 @@ LoadReport load(const Upload& upload, const Config& config) {
   if (upload.files.count(main_file) == 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
-  return load_deck(BundleSource(upload.files), main_file, config.limits.engine, attachments(upload.header.options()));
+  return load_deck(BundleSource(upload.files), main_file, config.limits.engine,
+                   attachments(upload.header.options()));
 }
 
 }  // namespace mbcosim::server

@@ -10,7 +10,8 @@ void register_joints(Registry& registry);
 void register_beams(Registry& registry);
 void register_forces(Registry& registry);      ///< forces and couples
 void register_external_forces(Registry& registry);  ///< loads from peers on ports
-void register_ports(Registry& registry);            ///< external structural mapping, external modal, stream output
+void register_ports(
+    Registry& registry);  ///< external structural mapping, external modal, stream output
 void register_genels(Registry& registry);      ///< genels and electric elements
 void register_hydraulics(Registry& registry);  ///< elements and fluids
 void register_modal(Registry& registry);       ///< modal joint, modal force

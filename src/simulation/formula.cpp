@@ -17,14 +17,17 @@ Error wrong(const std::string& text, const std::string& why) {
 
 }  // namespace
 
-Result<ExpressionPtr> compile_formula(const std::string& text, const std::vector<std::string>& names) {
+Result<ExpressionPtr> compile_formula(const std::string& text,
+                                      const std::vector<std::string>& names) {
   constexpr std::size_t kMostNames = 12;
-  if (names.size() > kMostNames) return wrong(text, "at most 12 variables are allowed, got " + std::to_string(names.size()));
+  if (names.size() > kMostNames)
+    return wrong(text, "at most 12 variables are allowed, got " + std::to_string(names.size()));
   const BundleSource none(std::map<std::string, std::string>{});
   Session session(none, Limits{});
   try {
     const int file = session.add_text("expression", text);
-    ExpressionPtr compiled = compile_expression(session, text, names, session.span(file, 0, text.size()));
+    ExpressionPtr compiled =
+        compile_expression(session, text, names, session.span(file, 0, text.size()));
     session.bind_strings();
     if (session.errors() == 0) return compiled;
     for (const Diagnostic& d : session.diagnostics())

@@ -57,7 +57,8 @@ std::uint64_t digest_with(std::uint64_t deck, const std::vector<PortAttachment>&
   Digest all;
   all.add(std::to_string(deck));
   for (const PortAttachment& port : ports) {
-    std::string text = port.name + (port.kind == ElementPort::Kind::modal ? " modal " : " motion ") +
+    std::string text = port.name +
+                       (port.kind == ElementPort::Kind::modal ? " modal " : " motion ") +
                        std::to_string(port.modal_joint) + (port.positions_only ? " positions" : "");
     for (const int label : port.node_labels) text += " " + std::to_string(label);
     all.add(text);
@@ -65,8 +66,8 @@ std::uint64_t digest_with(std::uint64_t deck, const std::vector<PortAttachment>&
   return all.value();
 }
 
-bool attach(ModelBuilder& builder, const std::vector<PortAttachment>& ports, const std::string& file,
-            std::vector<Diagnostic>& extra) {
+bool attach(ModelBuilder& builder, const std::vector<PortAttachment>& ports,
+            const std::string& file, std::vector<Diagnostic>& extra) {
   for (const PortAttachment& port : ports)
     if (const Status status = attach_port(builder, port); !status) {
       extra.push_back(plain_error("port", file, status.error().message));
@@ -76,8 +77,8 @@ bool attach(ModelBuilder& builder, const std::vector<PortAttachment>& ports, con
 }
 
 /// Reads into `session`; the model, or null with the reason in the session's diagnostics.
-ModelPtr read_model(Session& session, ModelBuilder& builder, const std::vector<PortAttachment>& ports,
-                    std::vector<Diagnostic>& extra) {
+ModelPtr read_model(Session& session, ModelBuilder& builder,
+                    const std::vector<PortAttachment>& ports, std::vector<Diagnostic>& extra) {
   Deck deck(session, builder, full_registry());
   Statements statements(session);
   DeckReader(deck, statements).read();

@@ -64,8 +64,10 @@ struct Simulation::Impl {
   }
 
   bool at_end() const {
-    constexpr double kRounding = 1e-9;  // of a step: exact times leave no step that rounding alone asks for
-    const double margin = state.control.empty() || state.control[control::kExactTime] == 0 ? 0 : kRounding * state.h;
+    constexpr double kRounding =
+        1e-9;  // of a step: exact times leave no step that rounding alone asks for
+    const double margin =
+        state.control.empty() || state.control[control::kExactTime] == 0 ? 0 : kRounding * state.h;
     return !(state.time < model->initial_value.final_time - margin);
   }
 
@@ -165,14 +167,15 @@ PhaseReport Simulation::Impl::advance(int& pieces) {
   return stepper.step(state, h);
 }
 
-/// Pieces are whole/2^k long and start at multiples of their length; after a success they double again. All carry the
-/// number of the whole step.
+/// Pieces are whole/2^k long and start at multiples of their length; after a success they double
+/// again. All carry the number of the whole step.
 PhaseReport Simulation::Impl::advance_in_pieces(double whole, PhaseReport failed, int& pieces) {
   constexpr int kFinest = 10;
   const State start = state;
   const double shortest = policy.minimum > 0 ? policy.minimum : whole / (1 << kFinest);
   std::int64_t all = 1;
-  while (all < (std::int64_t{1} << 40) && whole / static_cast<double>(2 * all) >= shortest) all *= 2;
+  while (all < (std::int64_t{1} << 40) && whole / static_cast<double>(2 * all) >= shortest)
+    all *= 2;
   PhaseReport phase = std::move(failed);
   int iterations = 0;
   pieces = 0;
@@ -199,7 +202,8 @@ PhaseReport Simulation::Impl::advance_in_pieces(double whole, PhaseReport failed
     state = start;
     pieces = 1;
     char text[80];
-    std::snprintf(text, sizeof text, "\n  the step was cut down to pieces of %.6g s", whole / static_cast<double>(all));
+    std::snprintf(text, sizeof text, "\n  the step was cut down to pieces of %.6g s",
+                  whole / static_cast<double>(all));
     if (phase.error->kind != ErrorKind::cancelled) phase.error->message += text;
     return phase;
   }
@@ -255,7 +259,8 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
 Simulation::Simulation(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Simulation::~Simulation() = default;
 
-Result<std::unique_ptr<Simulation>> Simulation::create(ModelPtr model, const CancelToken* cancel, std::shared_ptr<ResultWriter> writer,
+Result<std::unique_ptr<Simulation>> Simulation::create(ModelPtr model, const CancelToken* cancel,
+                                                       std::shared_ptr<ResultWriter> writer,
                                                        TimeKeeping time_keeping) {
   auto impl = std::make_unique<Impl>(std::move(model));
   impl->writer = std::move(writer);
@@ -291,13 +296,16 @@ bool Simulation::finished() const {
 
 void Simulation::set_exchange(std::function<bool(int)> exchange) { impl_->stepper.set_exchange(std::move(exchange)); }
 
-void Simulation::set_attempt_ended(std::function<void(bool)> attempt_ended) { impl_->attempt_ended = std::move(attempt_ended); }
+void Simulation::set_attempt_ended(std::function<void(bool)> attempt_ended) {
+  impl_->attempt_ended = std::move(attempt_ended);
+}
 void Simulation::set_policy(const StepPolicy& policy) { impl_->policy = policy; }
 const StepPolicy& Simulation::policy() const { return impl_->policy; }
 
 void Simulation::set_load_tangents(std::vector<LoadTangent> tangents) {
-  impl_->stepper.set_tangents(tangents.empty() ? nullptr
-                                               : std::make_unique<TangentSolver>(*impl_->model, std::move(tangents)));
+  impl_->stepper.set_tangents(
+      tangents.empty() ? nullptr
+                       : std::make_unique<TangentSolver>(*impl_->model, std::move(tangents)));
 }
 LoadTangent& Simulation::load_tangent(int i) { return impl_->stepper.tangents()->tangent(i); }
 

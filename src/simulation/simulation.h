@@ -33,12 +33,11 @@ struct LoadReport {
   bool ok() const { return model != nullptr; }
 };
 
-/// Reads a deck. Never throws; `report.model` is null when any diagnostic is an error. A deck without blocks gives an
-/// empty model.
-/// `ports` are attached to the deck as it stands; the model's digest covers them. One that does not fit is a diagnostic with
-/// code "port".
-LoadReport load_deck(const FileSource& files, const std::string& main_file, const Limits& limits = {},
-                     const std::vector<PortAttachment>& ports = {});
+/// Reads a deck. Never throws; `report.model` is null when any diagnostic is an error. A deck
+/// without blocks gives an empty model. `ports` are attached to the deck as it stands; the model's
+/// digest covers them. One that does not fit is a diagnostic with code "port".
+LoadReport load_deck(const FileSource& files, const std::string& main_file,
+                     const Limits& limits = {}, const std::vector<PortAttachment>& ports = {});
 
 enum class StepOutcome { accepted, finished, not_converged, interrupted, peer_lost, limit };
 
@@ -53,8 +52,8 @@ struct StepReport {
   double residual_error = 0;   ///< test value at the end of the last step
   double solution_error = 0;
   std::int64_t total_iterations = 0;
-  int pieces = 1;              ///< in which the last step was solved; more than one when StepPolicy::cut had to
-  bool flagged = false;        ///< the last step did not converge and was accepted by StepPolicy::accept
+  int pieces = 1;  ///< in which the last step was solved; more than one when StepPolicy::cut had to
+  bool flagged = false;  ///< the last step did not converge and was accepted by StepPolicy::accept
   double solver_seconds = 0;   ///< wall time inside the solver
   std::optional<Error> error;  ///< set unless accepted or finished
 };
@@ -62,8 +61,8 @@ struct StepReport {
 /// What to do when a step does not converge and the deck's own strategy has no shorter step.
 struct StepPolicy {
   enum Kind {
-    fail,   ///< the step fails
-    cut,    ///< the step is solved in pieces of 1/2, 1/4, … of its length, not shorter than `minimum`
+    fail,  ///< the step fails
+    cut,  ///< the step is solved in pieces of 1/2, 1/4, … of its length, not shorter than `minimum`
     accept  ///< the last iterate is accepted when it is finite, and the step flagged
   } kind = fail;
   double minimum = 0;  ///< shortest piece [s]; 0: 1/1024 of the step
@@ -81,7 +80,8 @@ class ResultWriter;
 class Simulation {
  public:
   /// Prepares a run: initial values, initial assembly, derivatives phase, dummy steps. With `writer`, results go there.
-  static Result<std::unique_ptr<Simulation>> create(ModelPtr model, const CancelToken* cancel = nullptr,
+  static Result<std::unique_ptr<Simulation>> create(ModelPtr model,
+                                                    const CancelToken* cancel = nullptr,
                                                     std::shared_ptr<ResultWriter> writer = nullptr,
                                                     TimeKeeping time_keeping = TimeKeeping::summed);
   ~Simulation();
@@ -100,13 +100,14 @@ class Simulation {
   /// have not settled and the iteration goes on. What it throws leaves `step`, and the state is that of the last accepted
   /// step. Empty: none.
   void set_exchange(std::function<bool(int)> exchange);
-  /// Called when an attempt at a step failed and another follows (false), and after each piece of a cut step but the last
-  /// (true); state and time are those at which the next attempt starts. Empty: none.
+  /// Called when an attempt at a step failed and another follows (false), and after each piece of a
+  /// cut step but the last (true); state and time are those at which the next attempt starts.
+  /// Empty: none.
   void set_attempt_ended(std::function<void(bool)> attempt_ended);
   void set_policy(const StepPolicy& policy);
   const StepPolicy& policy() const;
-  /// Derivatives of the loads that `exchange` sets; see solver/load_tangent.h. Empty: none. They are filled through
-  /// `load_tangent` from within `exchange`.
+  /// Derivatives of the loads that `exchange` sets; see solver/load_tangent.h. Empty: none. They
+  /// are filled through `load_tangent` from within `exchange`.
   void set_load_tangents(std::vector<LoadTangent> tangents);
   LoadTangent& load_tangent(int i);
   StepReport step_many(std::int64_t count, const CancelToken* cancel = nullptr);

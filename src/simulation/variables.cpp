@@ -57,10 +57,24 @@ void Variables::add_ports(const Model& model) {
     const ElementPort& port = ports_[k].port();
     const int index = static_cast<int>(k);
     if (const std::string name = port_input_name(port); !name.empty())
-      add({name, port.input_size, {port.input_size}, "", "global", Causality::input, "what the peer of the port gives", "port " + port.name},
+      add({name,
+           port.input_size,
+           {port.input_size},
+           "",
+           "global",
+           Causality::input,
+           "what the peer of the port gives",
+           "port " + port.name},
           {Source::element_input, index, 0});
     if (const std::string name = port_output_name(port); !name.empty())
-      add({name, port.output_size, {port.output_size}, "", "global", Causality::output, "what the peer of the port gets", "port " + port.name},
+      add({name,
+           port.output_size,
+           {port.output_size},
+           "",
+           "global",
+           Causality::output,
+           "what the peer of the port gets",
+           "port " + port.name},
           {Source::element_output, index, 0});
   }
 }
@@ -184,7 +198,8 @@ void Variables::get(const EvalContext& context, int handle, std::vector<double>&
       out.insert(out.end(), values, values + port.input_size);
       return;
     }
-    case Source::element_output: return ports_[e.index].outputs(context, out);
+    case Source::element_output:
+      return ports_[e.index].outputs(context, out);
     case Source::drive: return out.push_back(model.drives[e.index].drive->value(context));
   }
 }

@@ -23,10 +23,29 @@ class Variables {
   Status set(const Model& model, State& state, int handle, std::span<const double> values) const;
 
  private:
-  enum class Source { time, step, node_position, node_rotation, node_orientation, node_velocity, node_omega, node_acceleration,
-                      node_angular_acceleration, momentum, momenta_moment, node_load, scalar_value, scalar_rate, parameter,
-                      element_datum, drive, stream, port_loads,
-                      element_input, element_output };
+  enum class Source {
+    time,
+    step,
+    node_position,
+    node_rotation,
+    node_orientation,
+    node_velocity,
+    node_omega,
+    node_acceleration,
+    node_angular_acceleration,
+    momentum,
+    momenta_moment,
+    node_load,
+    scalar_value,
+    scalar_rate,
+    parameter,
+    element_datum,
+    drive,
+    stream,
+    port_loads,
+    element_input,
+    element_output
+  };
   struct Entry {
     Source source;
     int index = 0;   ///< of the node, element, drive, stream or port

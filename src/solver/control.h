@@ -25,7 +25,8 @@ enum Slot {
   kCount
 };
 
-/// Ends a step of length h. Exact: time is start + n h while the length stays, never a sum, so that it does not drift.
+/// Ends a step of length h. Exact: time is start + n h while the length stays, never a sum, so that
+/// it does not drift.
 inline void advance_time(State& state, double h) {
   std::vector<double>& c = state.control;
   if (c[kExactTime] == 0) {

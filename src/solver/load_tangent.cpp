@@ -7,9 +7,14 @@ namespace mbcosim {
 
 namespace {
 
-/// Rows that loads of a node enter and columns of its motion; −1 for what a displacement node lacks.
-int load_row(const StructuralNode& node, int i) { return i < node.position_unknowns() ? node.equilibrium + i : -1; }
-int motion_column(const StructuralNode& node, int i) { return i < node.position_unknowns() ? node.first + i : -1; }
+/// Rows that loads of a node enter and columns of its motion; −1 for what a displacement node
+/// lacks.
+int load_row(const StructuralNode& node, int i) {
+  return i < node.position_unknowns() ? node.equilibrium + i : -1;
+}
+int motion_column(const StructuralNode& node, int i) {
+  return i < node.position_unknowns() ? node.first + i : -1;
+}
 
 }  // namespace
 
@@ -23,7 +28,8 @@ TangentSolver::TangentSolver(const Model& model, std::vector<LoadTangent> tangen
 void TangentSolver::make_pattern() {
   std::vector<std::set<int>> rows(model_.unknowns);
   for (int j = 0; j < model_.unknowns; ++j)
-    rows[j].insert(model_.row_index.begin() + model_.column_start[j], model_.row_index.begin() + model_.column_start[j + 1]);
+    rows[j].insert(model_.row_index.begin() + model_.column_start[j],
+                   model_.row_index.begin() + model_.column_start[j + 1]);
   const auto each_entry = [&](const Block& block, auto&& visit) {
     const LoadTangent& t = tangents_[block.tangent];
     if (t.modes > 0) {
@@ -31,7 +37,8 @@ void TangentSolver::make_pattern() {
         for (int i = 0; i < t.modes; ++i) visit(t.first_mode_row + i, t.first_amplitude + j);
       return;
     }
-    const StructuralNode &row = model_.structural[t.nodes[block.row_node]], &column = model_.structural[t.nodes[block.column_node]];
+    const StructuralNode &row = model_.structural[t.nodes[block.row_node]],
+                         &column = model_.structural[t.nodes[block.column_node]];
     for (int j = 0; j < 6; ++j)
       for (int i = 0; i < 6; ++i) visit(load_row(row, i), motion_column(column, j));
   };
@@ -52,17 +59,22 @@ void TangentSolver::make_pattern() {
     column_start_.push_back(static_cast<int>(row_index_.size()));
   }
   for (int j = 0; j < model_.unknowns; ++j)
-    for (int k = model_.column_start[j]; k < model_.column_start[j + 1]; ++k) own_.push_back(position(model_.row_index[k], j));
+    for (int k = model_.column_start[j]; k < model_.column_start[j + 1]; ++k)
+      own_.push_back(position(model_.row_index[k], j));
   for (Block& block : blocks_)
-    each_entry(block, [&](int row, int column) { block.positions.push_back(row < 0 || column < 0 ? -1 : position(row, column)); });
+    each_entry(block, [&](int row, int column) {
+      block.positions.push_back(row < 0 || column < 0 ? -1 : position(row, column));
+    });
 }
 
 int TangentSolver::position(int row, int column) const {
-  const auto first = row_index_.begin() + column_start_[column], last = row_index_.begin() + column_start_[column + 1];
+  const auto first = row_index_.begin() + column_start_[column],
+             last = row_index_.begin() + column_start_[column + 1];
   return static_cast<int>(std::lower_bound(first, last, row) - row_index_.begin());
 }
 
-void TangentSolver::add_nodes(const Block& block, double seed, const std::vector<NodeSeeds>& seeds) {
+void TangentSolver::add_nodes(const Block& block, double seed,
+                              const std::vector<NodeSeeds>& seeds) {
   const LoadTangent& t = tangents_[block.tangent];
   const NodeSeeds& s = seeds[t.nodes[block.column_node]];
   const auto part = [&](const MatX& m) -> Eigen::Matrix<double, 6, 6> {
@@ -81,19 +93,24 @@ void TangentSolver::add_modes(const Block& block, double seed) {
   const LoadTangent& t = tangents_[block.tangent];
   const int square = t.modes * t.modes;
   for (int k = 0; k < square; ++k) {
-    if (t.stiffness.size() > 0) values_[block.positions[k]] -= seed * t.stiffness(k % t.modes, k / t.modes);
-    if (t.damping.size() > 0) values_[block.positions[square + k]] -= seed * t.damping(k % t.modes, k / t.modes);
+    if (t.stiffness.size() > 0)
+      values_[block.positions[k]] -= seed * t.stiffness(k % t.modes, k / t.modes);
+    if (t.damping.size() > 0)
+      values_[block.positions[square + k]] -= seed * t.damping(k % t.modes, k / t.modes);
   }
 }
 
-LinearSolver::Outcome TangentSolver::factor(double seed, const std::vector<NodeSeeds>& seeds, const std::vector<double>& values) {
+LinearSolver::Outcome TangentSolver::factor(double seed, const std::vector<NodeSeeds>& seeds,
+                                            const std::vector<double>& values) {
   std::fill(values_.begin(), values_.end(), 0.0);
   for (std::size_t k = 0; k < own_.size(); ++k) values_[own_[k]] = values[k];
   for (const Block& block : blocks_) {
     const LoadTangent& t = tangents_[block.tangent];
     if (t.stiffness.size() == 0 && t.damping.size() == 0) continue;
-    if (t.modes > 0) add_modes(block, seed);
-    else add_nodes(block, seed, seeds);
+    if (t.modes > 0)
+      add_modes(block, seed);
+    else
+      add_nodes(block, seed, seeds);
   }
   return solver_->analyze(values_.data());
 }

@@ -9,31 +9,36 @@
 
 namespace mbcosim {
 
-/// Loads L of one external code depend on the motion of what they act on. For n structural nodes, L = (F, M) of each, global
-/// components, moments about the nodes:
+/// Loads L of one external code depend on the motion of what they act on. For n structural nodes, L
+/// = (F, M) of each, global components, moments about the nodes:
 ///
-///   δL = K (δx, δθ) + C (δv, δω)                                 K, C: 6n × 6n; R + δR = (1 + δθ×) R
+///   δL = K (δx, δθ) + C (δv, δω)                                 K, C: 6n × 6n; R + δR = (1 + δθ×)
+///   R
 ///
-/// or, for N amplitudes q of a modal joint, δL = K δq + C δq̇ (N × N). With δ the Newton corrections of the rates, δx = c δ, δv = δ, δθ = A δ,
-/// δω = B δ (NodeSeeds), so that the matrix J = −∂r/∂δ gets −(K [c, A] + C [1, B]).
+/// or, for N amplitudes q of a modal joint, δL = K δq + C δq̇ (N × N). With δ the Newton corrections
+/// of the rates, δx = c δ, δv = δ, δθ = A δ, δω = B δ (NodeSeeds), so that the matrix J = −∂r/∂δ
+/// gets −(K [c, A] + C [1, B]).
 struct LoadTangent {
-  std::vector<int> nodes;         ///< structural nodes (n)
-  int first_mode_row = -1;        ///< or: equation of the first mode,
-  int first_amplitude = -1;       ///< unknown of its amplitude, its velocity being `modes` further
-  int modes = 0;                  ///< and their number N
-  bool block_diagonal = false;    ///< only the 6 × 6 blocks of the nodes are given, one below the other (6n × 6)
+  std::vector<int> nodes;    ///< structural nodes (n)
+  int first_mode_row = -1;   ///< or: equation of the first mode,
+  int first_amplitude = -1;  ///< unknown of its amplitude, its velocity being `modes` further
+  int modes = 0;             ///< and their number N
+  bool block_diagonal =
+      false;  ///< only the 6 × 6 blocks of the nodes are given, one below the other (6n × 6)
 
   MatX stiffness, damping;  ///< K, C; empty: zero
 };
 
-/// Factors the model's matrix with tangents, which may couple unknowns that the model's own pattern keeps apart.
+/// Factors the model's matrix with tangents, which may couple unknowns that the model's own pattern
+/// keeps apart.
 class TangentSolver {
  public:
   TangentSolver(const Model& model, std::vector<LoadTangent> tangents);
   LoadTangent& tangent(int i) { return tangents_[i]; }
-  /// `values`: the model's matrix in its own pattern; `seeds` by structural node. Pivots are chosen on each matrix, so that the result
-  /// depends on nothing else.
-  LinearSolver::Outcome factor(double seed, const std::vector<NodeSeeds>& seeds, const std::vector<double>& values);
+  /// `values`: the model's matrix in its own pattern; `seeds` by structural node. Pivots are chosen
+  /// on each matrix, so that the result depends on nothing else.
+  LinearSolver::Outcome factor(double seed, const std::vector<NodeSeeds>& seeds,
+                               const std::vector<double>& values);
   void solve(double* rhs) { solver_->solve(rhs); }
   int singular_column() const { return solver_->singular_column(); }
 

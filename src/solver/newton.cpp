@@ -88,13 +88,16 @@ class Newton {
     const bool factored = factor(report.iterations);
     ++report.iterations;
     if (!factored) {
-      report.singular_column = ws_.tangents ? ws_.tangents->singular_column() : ws_.solver.singular_column();
+      report.singular_column =
+          ws_.tangents ? ws_.tangents->singular_column() : ws_.solver.singular_column();
       finish(report, NewtonOutcome::singular);
       return false;
     }
     std::copy(ws_.residual.begin(), ws_.residual.end(), ws_.delta.begin());
-    if (ws_.tangents && phase_ == Phase::step) ws_.tangents->solve(ws_.delta.data());
-    else ws_.solver.solve(ws_.delta.data());
+    if (ws_.tangents && phase_ == Phase::step)
+      ws_.tangents->solve(ws_.delta.data());
+    else
+      ws_.solver.solve(ws_.delta.data());
     if (!settings_.line_search) {
       // Full steps that cycle (dry friction, contacts) are shortened; a search without success goes on from where it ended.
       if (cycling) (void)search_along(model_, phase_, c_, ca_, rescue_, state_, ws_);

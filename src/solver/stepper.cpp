@@ -55,7 +55,8 @@ double drive_or(const DrivePtr& drive, const EvalContext& context, double otherw
 
 bool is_finite(const State& state) {
   const auto finite = [](double x) { return std::isfinite(x); };
-  return std::all_of(state.y.begin(), state.y.end(), finite) && std::all_of(state.yp.begin(), state.yp.end(), finite);
+  return std::all_of(state.y.begin(), state.y.end(), finite) &&
+         std::all_of(state.yp.begin(), state.yp.end(), finite);
 }
 
 bool is_third_order(const MethodSettings& m) { return m.method == Method::third_order || m.method == Method::third_order_ad_hoc; }
@@ -294,7 +295,8 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     const EvalContext context = model_.context(state, Phase::step, f.c(), f.c_algebraic());
     for (const auto& set : model_.sets) set->after_predict(context, state);
     report.newton = iterate(state, f, method, first, settings);
-    report.flagged = accept_unconverged_ && report.newton.outcome == NewtonOutcome::not_converged && is_finite(state);
+    report.flagged = accept_unconverged_ && report.newton.outcome == NewtonOutcome::not_converged &&
+                     is_finite(state);
     if (report.newton.outcome == NewtonOutcome::converged || report.flagged) {
       after_convergence(state, Phase::step, f.c(), f.c_algebraic());
       return report;

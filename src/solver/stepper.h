@@ -17,7 +17,7 @@ namespace mbcosim {
 /// Result of a phase or step that was solved (or not).
 struct PhaseReport {
   NewtonReport newton;
-  bool flagged = false;  ///< did not converge, the last iterate was accepted
+  bool flagged = false;        ///< did not converge, the last iterate was accepted
   std::optional<Error> error;  ///< set when it failed
 };
 
@@ -36,7 +36,9 @@ class Stepper {
   void accept_unconverged(bool accept) { accept_unconverged_ = accept; }
 
   /// Derivatives of the loads that `exchange` sets; none: nullptr.
-  void set_tangents(std::unique_ptr<TangentSolver> tangents) { workspace_.tangents = std::move(tangents); }
+  void set_tangents(std::unique_ptr<TangentSolver> tangents) {
+    workspace_.tangents = std::move(tangents);
+  }
   TangentSolver* tangents() { return workspace_.tangents.get(); }
 
   /// Initial assembly, momenta. The state comes from make_initial_state.

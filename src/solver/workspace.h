@@ -23,7 +23,8 @@ struct Workspace {
   std::vector<NodeSeeds> seeds;  ///< (structural nodes)
   LinearSolver solver;
   std::vector<double> residual_history;  ///< test values of the last solve
-  std::unique_ptr<TangentSolver> tangents;  ///< takes the place of `solver` when external codes give derivatives
+  std::unique_ptr<TangentSolver>
+      tangents;  ///< takes the place of `solver` when external codes give derivatives
 };
 
 }  // namespace mbcosim

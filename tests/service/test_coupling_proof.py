@@ -175,6 +175,28 @@ def test_restore_redoes_a_window_bit_for_bit(server):
         assert simulation["node.structural.1.X"].tobytes() == first
 
 
+# ---------------------------------------------------------------- explicit coupling: its limit
+
+@pytest.mark.parametrize("mode", ["loose", "staggered"])
+def test_explicit_coupling_is_stable_up_to_its_limit(server, mode):
+    """The force at the end of a step h is that of its start: a spring K with a damper C loses K h of its damping, and is stable for h < C/K."""
+    K, C = 400.0, 1.0
+    limit = C / K
+
+    def growth(h):
+        with oscillator(server, repr(h)) as simulation:
+            with simulation.couple("spring", lambda m: -K * m.x - C * m.v, mode=mode):
+                simulation.run_until(1.0)
+                energy = []
+                for end in (1.0, 6.0):
+                    simulation.run_until(end)
+                    x, v = simulation["node.structural.1.X"], simulation["node.structural.1.XP"]
+                    energy.append(K * x @ x + v @ v)
+        return np.log(energy[1] / energy[0]) / 5.0
+
+    assert growth(0.7 * limit) < -0.1 and growth(1.4 * limit) > 0.1
+
+
 # ---------------------------------------------------------------- policies and deaths
 
 def test_wait_goes_on_with_a_peer_that_comes_back(server):

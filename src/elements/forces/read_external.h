@@ -8,8 +8,8 @@
 
 namespace mbcosim {
 
-/// `grpc, port, "name"`, or the words of a socket, which are read and left: then the port is named "external<label>". Refuses names
-/// that are taken.
+/// `grpc, port, "name"`, or the words of a socket, which are read and left: then the port is named
+/// "external<label>". Refuses names that are taken.
 std::string read_port_name(Card& card, int label);
 /// `[sleep time, …] [precision, …] [coupling, …] [send after predict, …]`
 PortCoupling read_port_timing(Card& card);

@@ -41,7 +41,9 @@ Status attach_motion(ModelBuilder& builder, const PortAttachment& a) {
     const int node = model.find_structural(label);
     if (node < 0) return refusal(a, "there is no structural node " + std::to_string(label));
     const StructuralNode& n = model.structural[node];
-    if (n.is_dummy()) return refusal(a, "no motion can be imposed on " + model.node_text(node) + ", which is a dummy node");
+    if (n.is_dummy())
+      return refusal(
+          a, "no motion can be imposed on " + model.node_text(node) + ", which is a dummy node");
     if (!n.has_rotation() && !a.positions_only)
       return refusal(a, model.node_text(node) + " has no orientation; impose positions only");
     if (std::find(port.nodes.begin(), port.nodes.end(), node) != port.nodes.end())
@@ -67,7 +69,8 @@ Status attach_modal(ModelBuilder& builder, const PortAttachment& a) {
   port.from_deck = false;
   port.memory = builder.allocate_memory(port.input_size);
   const ElementInfo info = info_of(model, a, Family::force, "external modal");
-  add_general_element(builder, info, std::make_unique<ExternalModal>(std::move(port), joints, ref.index));
+  add_general_element(builder, info,
+                      std::make_unique<ExternalModal>(std::move(port), joints, ref.index));
   return ok();
 }
 
@@ -75,8 +78,10 @@ Status attach_modal(ModelBuilder& builder, const PortAttachment& a) {
 
 Status attach_port(ModelBuilder& builder, const PortAttachment& attachment) {
   if (attachment.name.empty()) return refusal(attachment, "a port must have a name");
-  if (has_port(builder.model(), attachment.name)) return refusal(attachment, "there is a port of this name already");
-  return attachment.kind == ElementPort::Kind::modal ? attach_modal(builder, attachment) : attach_motion(builder, attachment);
+  if (has_port(builder.model(), attachment.name))
+    return refusal(attachment, "there is a port of this name already");
+  return attachment.kind == ElementPort::Kind::modal ? attach_modal(builder, attachment)
+                                                     : attach_motion(builder, attachment);
 }
 
 }  // namespace mbcosim

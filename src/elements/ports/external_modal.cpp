@@ -2,7 +2,8 @@
 
 namespace mbcosim {
 
-ElementPort modal_port(const Model&, const ModalJointSet& joints, int joint, bool rigid, bool modal) {
+ElementPort modal_port(const Model&, const ModalJointSet& joints, int joint, bool rigid,
+                       bool modal) {
   const ModalJoint& j = joints.joint(joint);
   ElementPort port;
   port.kind = ElementPort::Kind::modal;
@@ -39,7 +40,8 @@ void ExternalModal::output(const GeneralView& u, OutputRow& row) const {
   const std::string label = std::to_string(u.label());
   if (has_node()) {
     const double* load = &u.state().memory[port_.memory];
-    row.begin_text(OutputFile::frc, label + "#" + std::to_string(u.model().structural[port_.nodes.front()].label));
+    row.begin_text(OutputFile::frc,
+                   label + "#" + std::to_string(u.model().structural[port_.nodes.front()].label));
     row.vec3("F", "N", Vec3(load[0], load[1], load[2]));
     row.vec3("M", "N m", Vec3(load[3], load[4], load[5]));
     row.end();

@@ -1,4 +1,5 @@
-/// Generalized forces from an external code on the modes of a modal joint, and loads on its modal node: `force: …, external modal`.
+/// Generalized forces from an external code on the modes of a modal joint, and loads on its modal
+/// node: `force: …, external modal`.
 #pragma once
 
 #include "elements/general_element.h"
@@ -31,7 +32,9 @@ class ExternalModal : public GeneralElement, public PortElement {
 
  private:
   bool has_node() const { return !port_.nodes.empty(); }
-  const double* modal_forces(const State& state) const { return &state.memory[port_.memory + (has_node() ? 6 : 0)]; }
+  const double* modal_forces(const State& state) const {
+    return &state.memory[port_.memory + (has_node() ? 6 : 0)];
+  }
   int modes() const { return static_cast<int>(port_.mode_numbers.size()); }
 
   ElementPort port_;
@@ -40,7 +43,9 @@ class ExternalModal : public GeneralElement, public PortElement {
   int row_ = -1;  ///< first local row of the modal node
 };
 
-/// A port on a modal joint: on its modal node (if it has one and `rigid`) and its modes (if `modal`).
-ElementPort modal_port(const Model& model, const ModalJointSet& joints, int joint, bool rigid, bool modal);
+/// A port on a modal joint: on its modal node (if it has one and `rigid`) and its modes (if
+/// `modal`).
+ElementPort modal_port(const Model& model, const ModalJointSet& joints, int joint, bool rigid,
+                       bool modal);
 
 }  // namespace mbcosim

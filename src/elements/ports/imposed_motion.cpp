@@ -4,7 +4,9 @@ namespace mbcosim {
 
 namespace {
 
-Vec3 axial(const Mat3& A) { return 0.5 * Vec3(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1)); }
+Vec3 axial(const Mat3& A) {
+  return 0.5 * Vec3(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1));
+}
 
 }  // namespace
 
@@ -24,7 +26,8 @@ void ImposedMotion::pattern(GeneralPattern& p) const {
 
 ImposedMotion::Target ImposedMotion::target(const State& state, int k) const {
   const double* v = &state.memory[port_.memory + kInputs * k];
-  return {Vec3(v[0], v[1], v[2]), Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v + 3)};
+  return {Vec3(v[0], v[1], v[2]),
+          Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v + 3)};
 }
 
 void ImposedMotion::start(const GeneralView& u, State& state) const {
@@ -56,7 +59,8 @@ void ImposedMotion::jacobian(const GeneralView& u, GeneralJacobian& j) const {
     j.translation(own, rows_[k], Mat3::Identity() / u.c(), zero);
     if (port_.positions_only) continue;
     const Mat3 A = u.node(port_.nodes[k]).R * target(u.state(), k).R.transpose();
-    j.rotation(own + 3, rows_[k] + 3, port_.nodes[k], 0.5 / u.c() * (A.trace() * Mat3::Identity() - A), zero);
+    j.rotation(own + 3, rows_[k] + 3, port_.nodes[k],
+               0.5 / u.c() * (A.trace() * Mat3::Identity() - A), zero);
   }
 }
 
@@ -68,8 +72,8 @@ void ImposedMotion::outputs(const GeneralView& u, std::vector<double>& out) cons
 
 std::string ImposedMotion::row_name(int own) const {
   const int n = rows_of_node(), i = own % n;
-  return std::string(i < 3 ? "imposed position" : "imposed orientation") + ", point " + std::to_string(own / n + 1) +
-         ", axis " + std::to_string(i % 3 + 1);
+  return std::string(i < 3 ? "imposed position" : "imposed orientation") + ", point " +
+         std::to_string(own / n + 1) + ", axis " + std::to_string(i % 3 + 1);
 }
 
 }  // namespace mbcosim

@@ -6,13 +6,16 @@
 
 namespace mbcosim {
 
-/// Nodes k follow positions x̄_k and orientations R̄_k, global frame, which are held in State::memory. λ_k [N] and μ_k [N·m] are the force
-/// and the moment that the model exerts on the external side:
+/// Nodes k follow positions x̄_k and orientations R̄_k, global frame, which are held in
+/// State::memory. λ_k [N] and μ_k [N·m] are the force and the moment that the model exerts on the
+/// external side:
 ///
 ///   on node k     −λ_k,  −μ_k
-///   constraint    (x_k − x̄_k)/c = 0,   ax(R_k R̄_kᵀ)/c = 0       ax A: axial vector of the skew part
+///   constraint    (x_k − x̄_k)/c = 0,   ax(R_k R̄_kᵀ)/c = 0       ax A: axial vector of the skew
+///   part
 ///
-/// Until something is written, the nodes stay where the initial assembly left them. Takes no part in the assembly.
+/// Until something is written, the nodes stay where the initial assembly left them. Takes no part
+/// in the assembly.
 class ImposedMotion : public GeneralElement, public PortElement {
  public:
   static constexpr int kInputs = 12;  ///< x̄ (3), R̄ by rows (9)

@@ -1,4 +1,5 @@
-/// Cards of ports besides `external structural`: its mapping, `external modal`, `stream output`, `stream motion output`.
+/// Cards of ports besides `external structural`: its mapping, `external modal`, `stream output`,
+/// `stream motion output`.
 #include <sstream>
 
 #include "elements/forces/read_external.h"
@@ -21,7 +22,8 @@ void read_mapped_points(Card& card, StructuralPort& port) {
   if (!card.keyword("points number")) card.fail_at(card.next(), "`points number` expected");
   const int count = card.integer("number of points");
   if (count < 1 || count > kMostPoints)
-    card.fail("the number of points must be from 1 to " + std::to_string(kMostPoints) + ", got " + std::to_string(count));
+    card.fail("the number of points must be from 1 to " + std::to_string(kMostPoints) + ", got " +
+              std::to_string(count));
   while (port.points() < count) {
     const int node = card.structural_node();
     if (!card.keyword("offset")) card.fail_at(card.next(), "`offset` expected after the node");
@@ -47,7 +49,8 @@ std::vector<double> read_numbers(Card& card, const std::string& text, std::size_
     for (std::string word; words >> word;) {
       char* end = nullptr;
       numbers.push_back(std::strtod(word.c_str(), &end));
-      if (*end != 0 || !std::isfinite(numbers.back())) card.fail("mapping file: \"" + word.substr(0, 40) + "\" is no number");
+      if (*end != 0 || !std::isfinite(numbers.back()))
+        card.fail("mapping file: \"" + word.substr(0, 40) + "\" is no number");
     }
     *lines += numbers.size() > before ? 1 : 0;
   }
@@ -58,30 +61,38 @@ std::vector<double> read_numbers(Card& card, const std::string& text, std::size_
 MatX read_matrix(Card& card, bool sparse, int rows, int columns, double threshold) {
   std::string name;
   std::size_t lines = 0;
-  const std::vector<double> numbers = read_numbers(card, card.file_contents("mapping file", &name), &lines);
-  const auto refuse = [&](const std::string& what) { card.fail("mapping file \"" + name + "\": " + what); };
+  const std::vector<double> numbers =
+      read_numbers(card, card.file_contents("mapping file", &name), &lines);
+  const auto refuse = [&](const std::string& what) {
+    card.fail("mapping file \"" + name + "\": " + what);
+  };
   if (!sparse && rows < 0) rows = static_cast<int>(lines);
   if (sparse && numbers.size() != 3 * lines) refuse("each line must have row, column and value");
   if (sparse && rows < 0)
-    for (std::size_t k = 0; k < numbers.size(); k += 3) rows = std::max(rows, (static_cast<int>(numbers[k]) + 2) / 3 * 3);
-  if (rows < 3 || rows % 3 != 0 || rows > 3 * kMostPoints) refuse("the matrix must have three rows for each mapped point");
+    for (std::size_t k = 0; k < numbers.size(); k += 3)
+      rows = std::max(rows, (static_cast<int>(numbers[k]) + 2) / 3 * 3);
+  if (rows < 3 || rows % 3 != 0 || rows > 3 * kMostPoints)
+    refuse("the matrix must have three rows for each mapped point");
   MatX H = MatX::Zero(rows, columns);
   if (!sparse) {
     if (numbers.size() != static_cast<std::size_t>(rows) * columns)
-      refuse("the matrix must be " + std::to_string(rows) + " by " + std::to_string(columns) + ", found " +
-             std::to_string(numbers.size()) + " numbers");
+      refuse("the matrix must be " + std::to_string(rows) + " by " + std::to_string(columns) +
+             ", found " + std::to_string(numbers.size()) + " numbers");
     for (std::size_t k = 0; k < numbers.size(); ++k) H(k / columns, k % columns) = numbers[k];
   }
   for (std::size_t k = 0; sparse && k < numbers.size(); k += 3) {
     const double i = numbers[k], j = numbers[k + 1];
-    if (!(i >= 1 && i <= rows && j >= 1 && j <= columns && i == std::floor(i) && j == std::floor(j)))
-      refuse("entry " + std::to_string(k / 3 + 1) + " lies outside of " + std::to_string(rows) + " by " + std::to_string(columns));
+    if (!(i >= 1 && i <= rows && j >= 1 && j <= columns && i == std::floor(i) &&
+          j == std::floor(j)))
+      refuse("entry " + std::to_string(k / 3 + 1) + " lies outside of " + std::to_string(rows) +
+             " by " + std::to_string(columns));
     H(static_cast<int>(i) - 1, static_cast<int>(j) - 1) = numbers[k + 2];
   }
   return H.unaryExpr([&](double x) { return std::abs(x) < threshold ? 0.0 : x; });
 }
 
-/// `mapped points number, {from file | n}, {full | sparse} mapping file, [threshold, t,] "file" [, labels]`
+/// `mapped points number, {from file | n}, {full | sparse} mapping file, [threshold, t,] "file" [,
+/// labels]`
 MatX read_mapping(Card& card, StructuralPort& port) {
   const int columns = 3 * port.points();
   if (!card.keyword("mapped points number")) return MatX::Identity(columns, columns);
@@ -89,7 +100,8 @@ MatX read_mapping(Card& card, StructuralPort& port) {
   if (!card.keyword("from file")) {
     const int count = card.integer("number of mapped points");
     if (count < 1 || count > kMostPoints)
-      card.fail("the number of mapped points must be from 1 to " + std::to_string(kMostPoints) + ", got " + std::to_string(count));
+      card.fail("the number of mapped points must be from 1 to " + std::to_string(kMostPoints) +
+                ", got " + std::to_string(count));
     rows = 3 * count;
   }
   const bool sparse = card.required("mapping", {"full mapping file", "sparse mapping file"}) == 1;
@@ -100,13 +112,16 @@ MatX read_mapping(Card& card, StructuralPort& port) {
   if (card.keyword("mapped labels file")) {
     std::string name;
     std::size_t lines = 0;
-    for (const double label : read_numbers(card, card.file_contents("labels of mapped points", &name), &lines))
+    for (const double label :
+         read_numbers(card, card.file_contents("labels of mapped points", &name), &lines))
       port.point_labels.push_back(static_cast<int>(label));
     if (static_cast<int>(port.point_labels.size()) != mapped)
-      card.fail("\"" + name + "\" has " + std::to_string(port.point_labels.size()) + " labels for " + std::to_string(mapped) + " mapped points");
+      card.fail("\"" + name + "\" has " + std::to_string(port.point_labels.size()) +
+                " labels for " + std::to_string(mapped) + " mapped points");
   } else {
     const bool given = card.more() && card.peek_word() != "echo";
-    for (int k = 0; k < mapped; ++k) port.point_labels.push_back(given ? card.label("label of a mapped point") : k + 1);
+    for (int k = 0; k < mapped; ++k)
+      port.point_labels.push_back(given ? card.label("label of a mapped point") : k + 1);
   }
   return H;
 }
@@ -120,10 +135,12 @@ void read_external_mapping(Card& card, ElementInfo& info) {
     card.fail("the peer of a mapping gives forces on its points, none on the reference node",
               "write `use reference node forces, no`");
   read_mapped_points(card, points);
-  if (card.keyword("membrane")) card.fail("`membrane` is not supported", "give the matrix in a mapping file");
+  if (card.keyword("membrane"))
+    card.fail("`membrane` is not supported", "give the matrix in a mapping file");
   MatX H = read_mapping(card, points);
   if (card.keyword("echo"))
-    card.fail("`echo` is not supported", "leave it out; DescribeSimulation tells the port's layout");
+    card.fail("`echo` is not supported",
+              "leave it out; DescribeSimulation tells the port's layout");
   ElementPort port;
   port.kind = ElementPort::Kind::mapped;
   port.name = points.name;
@@ -131,7 +148,9 @@ void read_external_mapping(Card& card, ElementInfo& info) {
   port.nodes = points.nodes;
   port.input_size = 6 * points.points();
   port.memory = points.memory = card.builder().allocate_memory(port.input_size);
-  add_general_element(card.builder(), info, std::make_unique<MappedStructural>(std::move(points), std::move(port), std::move(H)));
+  add_general_element(
+      card.builder(), info,
+      std::make_unique<MappedStructural>(std::move(points), std::move(port), std::move(H)));
 }
 
 // ------------------------------------------------------------------ external modal
@@ -146,7 +165,9 @@ void read_external_modal(Card& card, ElementInfo& info) {
   } else {
     const ElementRef ref = card.element(Family::joint);
     joints = dynamic_cast<const ModalJointSet*>(ref.set);
-    if (!joints) card.fail("external modal: joint " + std::to_string(ref.set->info(ref.index).label) + " is not a modal joint");
+    if (!joints)
+      card.fail("external modal: joint " + std::to_string(ref.set->info(ref.index).label) +
+                " is not a modal joint");
     joint = ref.index;
     node = joints->joint(joint).node;
   }
@@ -155,7 +176,8 @@ void read_external_modal(Card& card, ElementInfo& info) {
   int type = joints ? (node >= 0 ? 2 : 1) : 0;
   if (card.keyword("type")) {
     type = card.required("type", {"rigid", "modal", "all"});
-    if (type != 1 && node < 0) card.fail("external modal: this type needs a modal node; the joint is clamped");
+    if (type != 1 && node < 0)
+      card.fail("external modal: this type needs a modal node; the joint is clamped");
     if (type != 0 && !joints) card.fail("external modal: this type needs a modal joint");
   }
   ElementPort port;
@@ -169,7 +191,8 @@ void read_external_modal(Card& card, ElementInfo& info) {
   port.name = name;
   port.coupling = coupling;
   port.memory = card.builder().allocate_memory(port.input_size);
-  add_general_element(card.builder(), info, std::make_unique<ExternalModal>(std::move(port), joints, joint));
+  add_general_element(card.builder(), info,
+                      std::make_unique<ExternalModal>(std::move(port), joints, joint));
 }
 
 // ------------------------------------------------------------------ stream output
@@ -177,29 +200,34 @@ void read_external_modal(Card& card, ElementInfo& info) {
 /// What stands before the content: name, address (without meaning here) and flags.
 ElementPort read_stream_head(Card& card) {
   ElementPort port;
-  if (card.one_of({"stream name", "name"}) < 0) card.fail_at(card.next(), "stream output: `stream name` expected");
+  if (card.one_of({"stream name", "name"}) < 0)
+    card.fail_at(card.next(), "stream output: `stream name` expected");
   const SourceSpan where = card.next();
   port.name = card.quoted("stream name");
   if (port.name.empty()) card.fail_at(where, "the name of the stream is empty");
-  if (has_port(card.model(), port.name)) card.fail_at(where, "there is a port named \"" + port.name + "\" already");
+  if (has_port(card.model(), port.name))
+    card.fail_at(where, "there is a port named \"" + port.name + "\" already");
   if (card.keyword("create")) card.yes_no("create");
   if (!card.keyword("grpc")) {
-    if (card.one_of({"local", "path"}) >= 0) card.quoted("path");
+    if (card.one_of({"local", "path"}) >= 0)
+      card.quoted("path");
     else {
       if (card.keyword("port")) card.integer("port");
       if (card.keyword("host")) card.quoted("host");
     }
   }
   if (card.keyword("socket type")) card.required("socket type", {"tcp", "udp"});
-  while (card.one_of({"signal", "no signal", "blocking", "non blocking", "send first", "no send first", "abort if broken",
-                      "do not abort if broken"}) >= 0) {
+  while (card.one_of({"signal", "no signal", "blocking", "non blocking", "send first",
+                      "no send first", "abort if broken", "do not abort if broken"}) >= 0) {
   }
   if (card.keyword("output every")) {
     port.every = card.integer("steps between two outputs");
-    if (port.every < 1) card.fail("stream output: the steps between two outputs must be at least 1");
+    if (port.every < 1)
+      card.fail("stream output: the steps between two outputs must be at least 1");
   }
   if (card.keyword("echo"))
-    card.fail("stream output: `echo` is not supported", "leave it out; the service's telemetry and records tell what is sent");
+    card.fail("stream output: `echo` is not supported",
+              "leave it out; the service's telemetry and records tell what is sent");
   return port;
 }
 
@@ -207,10 +235,12 @@ std::vector<StreamOutput::Value> read_stream_values(Card& card, ElementPort& por
   constexpr int kMost = 65536;
   const int count = card.integer("number of channels");
   if (count < 1 || count > kMost)
-    card.fail("stream output: the number of channels must be from 1 to " + std::to_string(kMost) + ", got " + std::to_string(count));
+    card.fail("stream output: the number of channels must be from 1 to " + std::to_string(kMost) +
+              ", got " + std::to_string(count));
   std::vector<StreamOutput::Value> values(count);
   for (int k = 0; k < count; ++k) {
-    if (card.keyword("drive")) values[k].drive = card.drive("stream output");
+    if (card.keyword("drive"))
+      values[k].drive = card.drive("stream output");
     else {
       card.keyword("nodedof");
       values[k].dof = card.node_dof(true);
@@ -222,15 +252,18 @@ std::vector<StreamOutput::Value> read_stream_values(Card& card, ElementPort& por
 
 std::vector<StreamOutput::Motion> read_motion_flags(Card& card) {
   using Motion = StreamOutput::Motion;
-  constexpr Motion kKinds[] = {Motion::position, Motion::orientation, Motion::transposed_orientation, Motion::velocity,
+  constexpr Motion kKinds[] = {Motion::position, Motion::orientation,
+                               Motion::transposed_orientation, Motion::velocity,
                                Motion::angular_velocity};
   const auto next = [&] {
-    return card.one_of({"position", "orientation matrix", "orientation matrix transpose", "velocity", "angular velocity"});
+    return card.one_of({"position", "orientation matrix", "orientation matrix transpose",
+                        "velocity", "angular velocity"});
   };
   if (!card.keyword("output flags")) return {Motion::position};
   std::vector<Motion> motion;
   for (int kind = next(); kind >= 0; kind = next()) motion.push_back(kKinds[kind]);
-  if (motion.empty()) card.fail_at(card.next(), "stream output: `output flags` must be followed by what is sent");
+  if (motion.empty())
+    card.fail_at(card.next(), "stream output: `output flags` must be followed by what is sent");
   return motion;
 }
 
@@ -246,14 +279,16 @@ std::vector<int> read_motion_nodes(Card& card) {
   return nodes;
 }
 
-void name_motion(const Model& model, const std::vector<StreamOutput::Motion>& motion, const std::vector<int>& nodes, ElementPort& port) {
+void name_motion(const Model& model, const std::vector<StreamOutput::Motion>& motion,
+                 const std::vector<int>& nodes, ElementPort& port) {
   constexpr const char* kNames[] = {"X", "R", "Rt", "XP", "Omega"};
   for (const int node : nodes)
     for (const StreamOutput::Motion kind : motion) {
-      const bool matrix = kind == StreamOutput::Motion::orientation || kind == StreamOutput::Motion::transposed_orientation;
+      const bool matrix = kind == StreamOutput::Motion::orientation ||
+                          kind == StreamOutput::Motion::transposed_orientation;
       for (int i = 0; i < (matrix ? 9 : 3); ++i)
-        port.output_names.push_back("node." + std::to_string(model.structural[node].label) + "." + kNames[static_cast<int>(kind)] +
-                                    "." + std::to_string(i + 1));
+        port.output_names.push_back("node." + std::to_string(model.structural[node].label) + "." +
+                                    kNames[static_cast<int>(kind)] + "." + std::to_string(i + 1));
     }
 }
 
@@ -271,10 +306,12 @@ void read_stream_output(Card& card, ElementInfo& info, bool only_motion) {
     values = read_stream_values(card, port);
   }
   if (card.keyword("modifier") && card.required("modifier", {"copy", "copy cast"}) == 1)
-    card.fail("stream output: `copy cast` is not supported", "messages of the service carry real numbers; leave the modifier out");
+    card.fail("stream output: `copy cast` is not supported",
+              "messages of the service carry real numbers; leave the modifier out");
   port.output_size = static_cast<int>(port.output_names.size());
   add_general_element(card.builder(), info,
-                      std::make_unique<StreamOutput>(std::move(port), std::move(values), std::move(motion), std::move(nodes)));
+                      std::make_unique<StreamOutput>(std::move(port), std::move(values),
+                                                     std::move(motion), std::move(nodes)));
 }
 
 }  // namespace
@@ -283,7 +320,9 @@ void register_ports(Registry& registry) {
   registry.typed("force", Family::force, {"external structural mapping"}, read_external_mapping);
   registry.typed("force", Family::force, {"external modal"}, read_external_modal);
   const auto stream = [](Card& card, ElementInfo& info) { read_stream_output(card, info, false); };
-  const auto stream_motion = [](Card& card, ElementInfo& info) { read_stream_output(card, info, true); };
+  const auto stream_motion = [](Card& card, ElementInfo& info) {
+    read_stream_output(card, info, true);
+  };
   registry.typed("output element", Family::output_element, {"stream"}, stream);
   registry.element("stream output", Family::output_element, stream);
   registry.element("stream motion output", Family::output_element, stream_motion);

@@ -7,8 +7,8 @@
 
 namespace mbcosim {
 
-/// One number after the other: dofs of nodes, drives, and the motion of structural nodes. Adds nothing to the equations. Source: MBDyn input
-/// manual, output elements.
+/// One number after the other: dofs of nodes, drives, and the motion of structural nodes. Adds
+/// nothing to the equations. Source: MBDyn input manual, output elements.
 class StreamOutput : public GeneralElement, public PortElement {
  public:
   struct Value {
@@ -17,8 +17,12 @@ class StreamOutput : public GeneralElement, public PortElement {
   };
   enum class Motion { position, orientation, transposed_orientation, velocity, angular_velocity };
 
-  StreamOutput(ElementPort port, std::vector<Value> values, std::vector<Motion> motion, std::vector<int> nodes)
-      : port_(std::move(port)), values_(std::move(values)), motion_(std::move(motion)), nodes_(std::move(nodes)) {}
+  StreamOutput(ElementPort port, std::vector<Value> values, std::vector<Motion> motion,
+               std::vector<int> nodes)
+      : port_(std::move(port)),
+        values_(std::move(values)),
+        motion_(std::move(motion)),
+        nodes_(std::move(nodes)) {}
   const ElementPort& port() const override { return port_; }
   void outputs(const GeneralView& u, std::vector<double>& out) const override;
 

@@ -25,11 +25,13 @@ class Imposed : public testing::TestWithParam<bool> {
     bench_.finish();
     bench_.generic_state(0.3);
     for (int k = 0; k < 2; ++k) {  // targets near the nodes
-      const NodeState node = bench_.model->node_state(bench_.context(bench_.state), k == 0 ? bench_.first : bench_.second);
+      const NodeState node = bench_.model->node_state(bench_.context(bench_.state),
+                                                      k == 0 ? bench_.first : bench_.second);
       double* v = &bench_.state.memory[memory_ + ImposedMotion::kInputs * k];
       const Vec3 x = node.x + Vec3(0.1, -0.2, 0.3);
       std::copy(x.data(), x.data() + 3, v);
-      Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v + 3) = cgr_rotation(Vec3(0.1, 0.2, -0.1)) * node.R;
+      Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v + 3) =
+          cgr_rotation(Vec3(0.1, 0.2, -0.1)) * node.R;
     }
   }
   conformance::Bench bench_;
@@ -45,16 +47,20 @@ TEST_P(Imposed, JacobianMatchesCentralDifferences) {
 
 INSTANTIATE_TEST_SUITE_P(WithAndWithoutRotations, Imposed, testing::Bool());
 
-// ------------------------------------------------------------------ the engine's side of tight coupling
+// ------------------------------------------------------------------ the engine's side of tight
+// coupling
 
 constexpr double kStiffness = 900;
 
 std::string oscillator(const std::string& spring) {
   const std::string settings = "method: ms, 0.6; tolerance: 1.e-10; max iterations: 20;";
   return initial_value_block(1e-2, 10, settings) +
-         "begin: control data; structural nodes: 2; rigid bodies: 1; joints: " + (spring.empty() ? "1" : "2") +
-         "; end: control data;\nbegin: nodes; structural: 1, static, null, eye, null, null; structural: 2, dynamic, 1., 0., 0., eye, 0., 3., "
-         "0., null; end: nodes;\nbegin: elements; joint: 1, clamp, 1, node, node; body: 1, 2, 1., null, eye; " +
+         "begin: control data; structural nodes: 2; rigid bodies: 1; joints: " +
+         (spring.empty() ? "1" : "2") +
+         "; end: control data;\nbegin: nodes; structural: 1, static, null, eye, null, null; "
+         "structural: 2, dynamic, 1., 0., 0., eye, 0., 3., "
+         "0., null; end: nodes;\nbegin: elements; joint: 1, clamp, 1, node, node; body: 1, 2, 1., "
+         "null, eye; " +
          spring + " end: elements;\n";
 }
 
@@ -66,7 +72,8 @@ TEST(LoadTangents, TakeTheIterationsOfTheModelThatIsNotCut) {
   LoadTangent tangent;
   tangent.nodes = {cut.model().find_structural(2)};
   s.set_load_tangents({tangent});
-  const int x = s.find_variable("node.structural.2.X"), load = s.find_variable("node.structural.2.load");
+  const int x = s.find_variable("node.structural.2.X"),
+            load = s.find_variable("node.structural.2.load");
   s.set_exchange([&](int) {
     std::vector<double> v;
     s.get(x, v);
@@ -76,7 +83,8 @@ TEST(LoadTangents, TakeTheIterationsOfTheModelThatIsNotCut) {
     const std::vector<double> loads{f(0), f(1), f(2), 0, 0, 0};
     EXPECT_TRUE(s.set(load, loads));
     MatX K = MatX::Zero(6, 6);
-    K.topLeftCorner<3, 3>() = -kStiffness * (e * e.transpose() + (1 - 0.8 / l) * (Mat3::Identity() - e * e.transpose()));
+    K.topLeftCorner<3, 3>() =
+        -kStiffness * (e * e.transpose() + (1 - 0.8 / l) * (Mat3::Identity() - e * e.transpose()));
     s.load_tangent(0).stiffness = K;
     return true;
   });
@@ -92,8 +100,10 @@ TEST(LoadTangents, TakeTheIterationsOfTheModelThatIsNotCut) {
 
 std::string spinning(const std::string& settings) {
   return initial_value_block(0.05, 10, settings) +
-         "begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;\nbegin: nodes; structural: 1, dynamic, null, eye, null, "
-         "5., 60., 5.; end: nodes;\nbegin: elements; body: 1, 1, 1., null, diag, 1., 2., 3.; end: elements;\n";
+         "begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;\nbegin: "
+         "nodes; structural: 1, dynamic, null, eye, null, "
+         "5., 60., 5.; end: nodes;\nbegin: elements; body: 1, 1, 1., null, diag, 1., 2., 3.; end: "
+         "elements;\n";
 }
 
 TEST(StepPolicies, PiecesEndWhereTheStepWouldHave) {
@@ -122,7 +132,8 @@ TEST(StepPolicies, AFailedCutLeavesTheState) {
   s.set_policy({StepPolicy::cut, 0.01});
   const StepReport report = s.step();
   ASSERT_TRUE(report.error);
-  EXPECT_NE(report.error->message.find("cut down to pieces of 0.0125 s"), std::string::npos) << report.error->message;
+  EXPECT_NE(report.error->message.find("cut down to pieces of 0.0125 s"), std::string::npos)
+      << report.error->message;
   EXPECT_EQ(s.export_state(), before);
 }
 
@@ -136,7 +147,8 @@ TEST(StepPolicies, AcceptedStepsAreFlagged) {
 }
 
 TEST(TimeKeeping, ExactTimeDoesNotDrift) {
-  const std::map<std::string, std::string> files{{"deck", spinning("tolerance: 1.e-8; max iterations: 50;")}};
+  const std::map<std::string, std::string> files{
+      {"deck", spinning("tolerance: 1.e-8; max iterations: 50;")}};
   const LoadReport report = load_deck(BundleSource(files), "deck");
   ASSERT_TRUE(report.ok());
   auto exact = Simulation::create(report.model, nullptr, nullptr, TimeKeeping::exact);
@@ -163,7 +175,8 @@ TEST(Attachments, AreRefusedWithTheirReason) {
   const auto motion = ElementPort::Kind::motion;
   EXPECT_NE(refusal({motion, "a", {5}, false, 0}).find("no structural node 5"), std::string::npos);
   EXPECT_NE(refusal({motion, "a", {1, 1}, false, 0}).find("listed twice"), std::string::npos);
-  EXPECT_NE(refusal({ElementPort::Kind::modal, "a", {}, false, 2}).find("no modal joint 2"), std::string::npos);
+  EXPECT_NE(refusal({ElementPort::Kind::modal, "a", {}, false, 2}).find("no modal joint 2"),
+            std::string::npos);
 }
 
 }  // namespace
