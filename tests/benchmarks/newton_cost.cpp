@@ -35,16 +35,19 @@ double now() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/// Shortest time of one call [s].
-double shortest(const std::function<void()>& call) {
-  double best = HUGE_VAL;
+/// Median time of one call [s]. The shortest would flatter small models: a short call finds a
+/// moment in which nobody else uses the caches, a long one never does.
+double typical(const std::function<void()>& call) {
+  std::vector<double> times;
   const double end = now() + 1;
-  for (int k = 0; k < 5 || (k < 20000 && now() < end); ++k) {
+  while (times.size() < 7 || (times.size() < 100000 && now() < end)) {
     const double start = now();
     call();
-    best = std::min(best, now() - start);
+    times.push_back(now() - start);
   }
-  return best;
+  const auto middle = times.begin() + times.size() / 2;
+  std::nth_element(times.begin(), middle, times.end());
+  return *middle;
 }
 
 bool measure(int elements, Cost& cost) {
@@ -62,10 +65,10 @@ bool measure(int elements, Cost& cost) {
   if (workspace.solver.analyze(workspace.values.data()) != LinearSolver::Outcome::ok) return false;
   cost.elements = elements;
   cost.unknowns = model.unknowns;
-  cost.part[0] = shortest([&] { compute_residual(context, workspace.residual); });
-  cost.part[1] = shortest([&] { compute_jacobian(context, workspace); });
-  cost.part[2] = shortest([&] { (void)workspace.solver.factor(workspace.values.data()); });
-  cost.part[3] = shortest([&] {
+  cost.part[0] = typical([&] { compute_residual(context, workspace.residual); });
+  cost.part[1] = typical([&] { compute_jacobian(context, workspace); });
+  cost.part[2] = typical([&] { (void)workspace.solver.factor(workspace.values.data()); });
+  cost.part[3] = typical([&] {
     std::copy(workspace.residual.begin(), workspace.residual.end(), workspace.delta.begin());
     workspace.solver.solve(workspace.delta.data());
   });
