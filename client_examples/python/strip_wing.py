@@ -17,7 +17,7 @@ STRIPS = SPAN / 8 * np.array([1, 1, 1, 1, 1, 1, 1, 0.5])[:, None]  # widths [m]
 DENSITY = 1.225                        # [kg/m^3]
 GUST, FROM, UNTIL = 5.0, 0.1, 0.3      # upwards, 1 - cosine [m/s], [s]
 TIP = "node.structural.9.X"
-SPEEDS = [50.0, 75.0, 90.0]           # [m/s]
+SPEEDS = [40.0, 60.0, 90.0]            # [m/s]
 EPSILON = 1e-6                         # of the differences that give the tangent
 
 
@@ -88,8 +88,7 @@ def main():
     picture, axes = example.figure(figsize=(8, 4))
     for speed, (times, heights, _) in runs.items():
         axes[0, 0].plot(times, 1000 * heights, label=f"{speed:g} m/s")
-    limit = 3000 * np.abs(runs[SPEEDS[1]][1]).max()
-    axes[0, 0].set(xlabel="time [s]", ylabel="height of the tip [mm]", title="A wing after a gust", ylim=(-limit, limit))
+    axes[0, 0].set(xlabel="time [s]", ylabel="height of the tip [mm]", title="A wing after a gust")
     axes[0, 0].legend()
     example.save(picture, options.plot)
     for speed, (_, heights, exchanges) in runs.items():

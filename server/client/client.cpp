@@ -63,6 +63,11 @@ Outcome to_outcome(v1::StepOutcome outcome) {
   }
 }
 
+std::shared_ptr<grpc::ChannelCredentials> channel_credentials(const Credentials& credentials) {
+  if (credentials.server_ca.empty()) return grpc::InsecureChannelCredentials();
+  return grpc::SslCredentials({credentials.server_ca, credentials.key, credentials.certificate});
+}
+
 }  // namespace
 
 void require(const grpc::Status& status) {
@@ -90,10 +95,11 @@ Server::Server(Server&&) noexcept = default;
 Server& Server::operator=(Server&&) noexcept = default;
 Server::~Server() = default;
 
-Server Server::connect(const std::string& address, double timeout) {
+Server Server::connect(const std::string& address, double timeout, const Credentials& credentials) {
   auto impl = std::make_shared<Impl>();
   impl->address = address;
-  impl->channel = grpc::CreateChannel(address, grpc::InsecureChannelCredentials());
+  if (!credentials.token.empty()) impl->authorization = "Bearer " + credentials.token;
+  impl->channel = grpc::CreateChannel(address, channel_credentials(credentials));
   impl->simulations = v1::Simulations::NewStub(impl->channel);
   impl->coupling = v1::Coupling::NewStub(impl->channel);
   const auto deadline = std::chrono::system_clock::now() +
@@ -105,7 +111,7 @@ Server Server::connect(const std::string& address, double timeout) {
 }
 
 std::string Server::version() const {
-  grpc::ClientContext context;
+  CallContext context(*impl_);
   v1::ServerInfo info;
   require(impl_->simulations->GetServerInfo(&context, {}, &info));
   return info.version();
@@ -126,7 +132,7 @@ Simulation Server::load_text(const std::string& deck, const LoadOptions& options
 struct Simulation::Impl {
   Impl(std::shared_ptr<Server::Impl> connection, const v1::SimulationInfo& simulation, bool is_ours)
       : server(std::move(connection)), info(simulation), owned(is_ours) {
-    grpc::ClientContext context;
+    CallContext context(*server);
     v1::DescribeSimulationRequest request;
     request.set_name(info.name());
     v1::ModelDescription description;
@@ -146,7 +152,7 @@ struct Simulation::Impl {
     throw Error("the model has no variable \"" + name + "\"", 5, "NO_SUCH_VARIABLE", {});
   }
   StepResult advance(const v1::StepRequest& request) {
-    grpc::ClientContext context;
+    CallContext context(*server);
     v1::StepReply reply;
     require(server->simulations->Step(&context, request, &reply));
     StepResult result;
@@ -164,7 +170,7 @@ struct Simulation::Impl {
 
 Simulation Server::create(const std::string& main, const std::map<std::string, std::string>& files,
                           const LoadOptions& options) {
-  grpc::ClientContext context;
+  CallContext context(*impl_);
   v1::CreateSimulationReply reply;
   const auto upload = impl_->simulations->CreateSimulation(&context, &reply);
   v1::UploadRequest message;
@@ -187,7 +193,7 @@ Simulation Server::create(const std::string& main, const std::map<std::string, s
 }
 
 Simulation Server::find(const std::string& name) {
-  grpc::ClientContext context;
+  CallContext context(*impl_);
   v1::GetSimulationRequest request;
   request.set_name(name);
   v1::SimulationInfo info;
@@ -201,7 +207,7 @@ Simulation& Simulation::operator=(Simulation&&) noexcept = default;
 
 Simulation::~Simulation() {
   if (!impl_ || !impl_->owned) return;
-  grpc::ClientContext context;
+  CallContext context(*impl_->server);
   v1::DeleteSimulationRequest request;
   request.set_name(impl_->info.name());
   v1::DeleteSimulationReply reply;
@@ -225,7 +231,7 @@ StepResult Simulation::run_until(double time) {
 }
 
 std::vector<double> Simulation::read(const std::string& variable) const {
-  grpc::ClientContext context;
+  CallContext context(*impl_->server);
   v1::ReadVariablesRequest request;
   request.set_simulation(name());
   request.add_handles(impl_->variable(variable).handle());
@@ -235,7 +241,7 @@ std::vector<double> Simulation::read(const std::string& variable) const {
 }
 
 void Simulation::write(const std::string& variable, const std::vector<double>& values) {
-  grpc::ClientContext context;
+  CallContext context(*impl_->server);
   v1::WriteVariablesRequest request;
   request.set_simulation(name());
   request.mutable_values()->add_handles(impl_->variable(variable).handle());

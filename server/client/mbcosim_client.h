@@ -139,6 +139,9 @@ struct PeerOptions {
   /// The library sends a sign of life three times in so long [s], also while the peer computes;
   /// when none comes the server takes the peer for dead. 0: no such promise.
   double heartbeat_timeout = 0;
+  /// The same promise of the server: when it is silent for so long [s] while the peer waits for it,
+  /// the peer ends. 0: the peer waits for as long as the connection stands.
+  double server_timeout = 0;
   Transport transport = Transport::stream;
   StepEnded step_ended = {};  ///< called by the thread that reads: `next`, or the peer's own
 };
@@ -195,13 +198,21 @@ class Simulation {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Who the client is, and how it knows the server. Texts of PEM files, not their names.
+struct Credentials {
+  std::string token = {};      ///< bearer token
+  std::string server_ca = {};  ///< authority of the server's certificate: the connection uses TLS
+  std::string certificate = {}, key = {};  ///< of the client, for servers that want one
+};
+
 /// A connection.
 class Server {
  public:
   struct Impl;  // of the library
 
   /// "unix:PATH" or "HOST:PORT"; waits until the server answers, at most `timeout` seconds.
-  static Server connect(const std::string& address, double timeout = 10);
+  static Server connect(const std::string& address, double timeout = 10,
+                        const Credentials& credentials = {});
   Server(Server&&) noexcept;
   Server& operator=(Server&&) noexcept;
   ~Server();

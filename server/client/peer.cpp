@@ -2,6 +2,9 @@
 
 #include <google/protobuf/util/time_util.h>
 
+#include <algorithm>
+#include <chrono>
+
 namespace mbcosim::client {
 namespace {
 
@@ -99,6 +102,10 @@ google::protobuf::Duration to_duration(double seconds) {
       static_cast<std::int64_t>(seconds * 1000));
 }
 
+std::int64_t nanoseconds_now() {
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 using Numbers = google::protobuf::RepeatedField<double>;
 
 void take(const Numbers& numbers, std::vector<double>& out) {
@@ -166,6 +173,8 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   hello.set_tangent(to_proto(options.tangent));
   if (options.heartbeat_timeout > 0)
     *hello.mutable_heartbeat_timeout() = to_duration(options.heartbeat_timeout);
+  if (options.server_timeout > 0)
+    *hello.mutable_heartbeat_interval() = to_duration(options.server_timeout / 3);
   hello.set_policy(to_proto(options.policy));
   hello.set_acceleration(to_proto(options.acceleration));
   hello.set_relaxation(options.relaxation);
@@ -179,7 +188,7 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
                                         const v1::Hello& hello, const PeerOptions& options) {
   auto impl = std::make_unique<Peer::Impl>();
   impl->wire = options.transport == Transport::shared_memory
-                   ? open_shared_memory(server->address, options.timeout)
+                   ? open_shared_memory(*server, options.timeout)
                    : open_stream(*server);
   impl->server = std::move(server);
   impl->step_ended = options.step_ended;
@@ -187,7 +196,7 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
   *first.mutable_hello() = hello;
   if (impl->wire->write(first) && impl->wire->read(&impl->in)) {
     impl->tangent = options.tangent;
-    if (options.heartbeat_timeout > 0) impl->keep_beating(options.heartbeat_timeout / 3);
+    impl->start_heart(options);
     return impl;
   }
   impl->open = false;
@@ -197,7 +206,7 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
 }
 
 bool Peer::Impl::next(Motion& motion) {
-  while (wire->read(&in)) {
+  while (read()) {
     if (in.has_exchange()) {
       take(in.exchange(), motion);
       ++exchanges;
@@ -222,18 +231,33 @@ void Peer::Impl::write(const v1::PeerMessage& message) {
   wire->write(message);
 }
 
-void Peer::Impl::keep_beating(double period) {
-  heart = std::thread([this, period] {
+// Sends the peer's signs of life, and looks whether the server gives some.
+void Peer::Impl::start_heart(const PeerOptions& options) {
+  const double beats = options.heartbeat_timeout, limit = options.server_timeout;
+  if (beats <= 0 && limit <= 0) return;
+  const double period =
+      (beats > 0 && limit > 0 ? std::min(beats, limit) : std::max(beats, limit)) / 3;
+  heart = std::thread([this, beats, limit, period] {
     v1::PeerMessage beat;
     std::unique_lock guard(heart_mutex);
     while (!stop.wait_for(guard, std::chrono::duration<double>(period), [&] { return stopping; })) {
+      const std::int64_t since = reading_since.load();
+      if (limit > 0 && since > 0 && nanoseconds_now() - since > 1e9 * limit) wire->cancel();
+      if (beats <= 0) continue;
       beat.mutable_heartbeat()->set_count(beat.heartbeat().count() + 1);
       write(beat);
     }
   });
 }
 
-void Peer::Impl::stop_beating() {
+bool Peer::Impl::read() {
+  reading_since.store(nanoseconds_now());
+  const bool open_still = wire->read(&in);
+  reading_since.store(0);
+  return open_still;
+}
+
+void Peer::Impl::stop_heart() {
   {
     const std::lock_guard guard(heart_mutex);
     stopping = true;
@@ -266,7 +290,7 @@ void Peer::Impl::close() {
   if (!open) return;
   open = false;
   wire->cancel();  // ends a read that is under way
-  stop_beating();
+  stop_heart();
   if (thread.joinable()) thread.join();
   wire->finish();
 }

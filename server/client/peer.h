@@ -21,9 +21,10 @@ struct Peer::Impl {
   bool next(Motion& motion);
   void answer(const Loads& loads);
   void fail(const std::string& why);
-  void serve(Answer answer);         ///< in a thread of its own
-  void keep_beating(double period);  ///< [s], in a thread of its own
-  void stop_beating();
+  void serve(Answer answer);  ///< in a thread of its own
+  void start_heart(const PeerOptions& options);
+  void stop_heart();
+  bool read();
   void write(const v1::PeerMessage& message);
   void close();
 
@@ -35,6 +36,7 @@ struct Peer::Impl {
   v1::ServerMessage in;
   v1::PeerMessage out;
   std::thread thread, heart;
+  std::atomic<std::int64_t> reading_since{0};  ///< clock's count of nanoseconds; 0: nobody reads
   std::mutex heart_mutex;
   std::condition_variable stop;
   bool stopping = false;

@@ -1,6 +1,5 @@
 #include "client/wire.h"
 
-#include <grpcpp/client_context.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -18,14 +17,15 @@ constexpr auto kLook = std::chrono::seconds(1);  // rounds of an endless wait
 
 class GrpcWire : public Wire {
  public:
-  explicit GrpcWire(Server::Impl& server) : stream_(server.coupling->Attach(&context_)) {}
+  explicit GrpcWire(Server::Impl& server)
+      : context_(server), stream_(server.coupling->Attach(&context_)) {}
   bool write(const v1::PeerMessage& message) override { return stream_->Write(message); }
   bool read(v1::ServerMessage* message) override { return stream_->Read(message); }
   void cancel() override { context_.TryCancel(); }
   grpc::Status finish() override { return stream_->Finish(); }
 
  private:
-  grpc::ClientContext context_;
+  CallContext context_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::PeerMessage, v1::ServerMessage>> stream_;
 };
 
@@ -98,15 +98,16 @@ std::unique_ptr<Wire> open_stream(Server::Impl& server) {
   return std::make_unique<GrpcWire>(server);
 }
 
-std::unique_ptr<Wire> open_shared_memory(const std::string& address, double timeout) {
-  const std::string path = shm::rendezvous_path(address);
+std::unique_ptr<Wire> open_shared_memory(const Server::Impl& server, double timeout) {
+  const std::string path = shm::rendezvous_path(server.address);
   if (path.empty())
-    throw Error("shared memory needs a server at unix:PATH on this host, not " + address,
+    throw Error("shared memory needs a server at unix:PATH on this host, not " + server.address,
                 static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT), "", {});
   try {
     shm::Descriptor socket = connect_to(path);
     shm::Status refusal;
-    std::optional<shm::Segment> segment = shm::request_segment(socket.get(), {}, &refusal);
+    std::optional<shm::Segment> segment =
+        shm::request_segment(socket.get(), {server.authorization}, &refusal);
     if (!segment) require(SharedMemoryWire::to_grpc(refusal));
     if (!segment) fail("the server refused without a reason");
     return std::make_unique<SharedMemoryWire>(std::move(socket), std::move(*segment), timeout);

@@ -23,6 +23,6 @@ class Wire {
 std::unique_ptr<Wire> open_stream(Server::Impl& server);
 /// Over shared memory, on the server's host; `timeout` [s] bounds a write that the server does not
 /// read. Throws Error.
-std::unique_ptr<Wire> open_shared_memory(const std::string& address, double timeout);
+std::unique_ptr<Wire> open_shared_memory(const Server::Impl& server, double timeout);
 
 }  // namespace mbcosim::client

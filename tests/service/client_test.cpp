@@ -13,7 +13,10 @@ namespace {
 
 constexpr double kStiffness = 400;
 
-Server connect() { return Server::connect(std::getenv("MBCOSIM_ADDRESS")); }
+Server connect() {
+  const char* token = std::getenv("MBCOSIM_TOKEN");
+  return Server::connect(std::getenv("MBCOSIM_ADDRESS"), 10, {.token = token ? token : ""});
+}
 
 /// A unit mass that starts along y with 1 m/s.
 std::string body(const char* step = "1.e-3") {

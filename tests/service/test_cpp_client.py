@@ -11,6 +11,19 @@ def test_the_library(daemon):
     assert run.returncode == 0, run.stdout
 
 
+def test_tokens(start_daemon, tmp_path):
+    """Over both transports: with the token all goes well, without it nothing does."""
+    tokens = tmp_path / "tokens"
+    tokens.write_text("s3cret control ann\n")
+    daemon = start_daemon("--tokens", str(tokens))
+    command = [os.path.join(BIN, "client_tests"), "--gtest_brief=1", "--gtest_filter=*SynchronousPeer*"]
+    for token, code in [("s3cret", 0), ("guess", 1), ("", 1)]:
+        run = subprocess.run(command, timeout=60, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                             env={**os.environ, "MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_TOKEN": token})
+        assert run.returncode == code, run.stdout
+        assert code == 0 or "bearer token" in run.stdout
+
+
 def test_the_example(daemon, tumbling):
     run = subprocess.run([os.path.join(BIN, "spring_peer"), daemon.address, tumbling, "1", "20"], timeout=60, text=True,
                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT)

@@ -9,6 +9,7 @@
 """
 import queue
 import threading
+import time
 
 import grpc
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
 from . import exchange
-from .errors import from_rpc_error
+from .errors import Unavailable, from_rpc_error
 
 
 def structural_port(name, nodes, *, offsets=None, reference=None):
@@ -64,14 +65,17 @@ class Peer:
     mode       "loose", "staggered", "tight" or "window"; None: the port's own, "loose" unless its deck says otherwise
     frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
     tangent    "dense" or "block_diagonal" when answers are Loads with derivatives
+    server_timeout      the server gives signs of life; when none comes for so long [s], the peer ends with an error
     heartbeat_timeout   the peer shows signs of life at least that often [s], also while it computes; the library sends them
     After the end `error` has what ended the stream, None when it ended in good order.
     """
 
-    def __init__(self, simulation, port, answer=None, *, rotation="matrix", heartbeat_timeout=None, **options):
+    def __init__(self, simulation, port, answer=None, *, rotation="matrix", heartbeat_timeout=None, server_timeout=None, **options):
         self._function, self._rotation = answer, rotation
         self._out = queue.SimpleQueue()
-        self._out.put(exchange.hello(simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout, **options))
+        self._out.put(exchange.hello(
+            simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout,
+            heartbeat_interval=None if server_timeout is None else server_timeout / 3, **options))
         server = simulation._server
         self._stream = open_stream(server._channel)(iter(self._out.get, None), metadata=server.metadata)
         try:
@@ -84,8 +88,9 @@ class Peer:
         self.rejected = []  # (step, time) to go back to, of those that failed
         self._index = 0
         self._closing = threading.Event()
-        if heartbeat_timeout is not None:
-            threading.Thread(target=self._beat, args=(heartbeat_timeout / 3,), daemon=True).start()
+        self._waiting_since = None
+        if heartbeat_timeout is not None or server_timeout is not None:
+            threading.Thread(target=self._beat, args=(heartbeat_timeout, server_timeout), daemon=True).start()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         if answer is not None:
             self._thread.start()
@@ -107,7 +112,12 @@ class Peer:
     def __iter__(self):
         """Every Motion until the stream ends."""
         try:
-            for data in self._stream:
+            while True:
+                self._waiting_since = time.monotonic()
+                data = next(self._stream, None)
+                self._waiting_since = None
+                if data is None:
+                    break
                 name, content = exchange.receive(data)
                 if name == "exchange":
                     self._index = exchange.index(content)
@@ -118,7 +128,7 @@ class Peer:
                     self.rejected.append((content.step, content.time_s))
         except grpc.RpcError as error:
             if error.code() != grpc.StatusCode.CANCELLED:
-                self.error = from_rpc_error(error)
+                self.error = self.error or from_rpc_error(error)
 
     def answer(self, value):
         """Answers the last motion."""
@@ -130,11 +140,18 @@ class Peer:
         self._out.put(exchange.failure(self._index, error))
         self.exchanges += 1
 
-    def _beat(self, period):
+    def _beat(self, own, servers):
+        """Sends signs of life, and looks for those of the server."""
         count = 0
-        while not self._closing.wait(period):
-            count += 1
-            self._out.put(pb.PeerMessage(heartbeat=pb.Heartbeat(count=count)))
+        while not self._closing.wait(min(t for t in (own, servers) if t is not None) / 3):
+            since = self._waiting_since
+            if servers is not None and since is not None and time.monotonic() - since > servers:
+                self.error = Unavailable(f"the server was silent for {servers} s", grpc.StatusCode.UNAVAILABLE)
+                self._stream.cancel()
+                return
+            if own is not None:
+                count += 1
+                self._out.put(pb.PeerMessage(heartbeat=pb.Heartbeat(count=count)))
 
     def _serve(self):
         for motion in self:
