@@ -215,21 +215,22 @@ Coupled couple_in_process(v1::CouplingMode mode, int numbers, int count) {
   server::CallWatch watch;
   const mbcosim::LoadReport loaded = mbcosim::load_deck(
       mbcosim::BundleSource(std::map<std::string, std::string>{{"deck", deck(numbers)}}), "deck");
-  google::protobuf::RepeatedPtrField<v1::PortDefinition> ports;
-  v1::PortDefinition* definition = ports.Add();
+  v1::CreateOptions session_options;
+  v1::PortDefinition* definition = session_options.add_ports();
   definition->set_name("loop");
   definition->set_kind(v1::PORT_KIND_SIGNAL);
   definition->add_output_variables("stream.wide");
   definition->add_input_variables("stream.wide");
   auto simulation = mbcosim::Simulation::create(loaded.model);
-  server::Session session({}, std::move(*simulation), {slots, config.limits, metrics}, ports);
+  server::Session session({}, std::move(*simulation), {slots, config.limits, metrics},
+                          session_options);
   server::Port& port = session.port("loop");
   server::Agreement agreement;
   agreement.mode = mode;
   port.reserve(agreement);
   Intervals intervals(mode == v1::COUPLING_MODE_TIGHT);
   DirectLink link(port, intervals, numbers);
-  port.attach(&link);
+  port.attach(&link, {});
   v1::StepRequest request;
   request.set_steps(count);
   v1::StepReply reply;
