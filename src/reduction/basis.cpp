@@ -126,9 +126,10 @@ void BasisBuilder::add_modes(Structure& structure, BasisShapes& basis) {
   if (modes.residual > std::max(kPoorResidual * eigen.tolerance, kPoorRounding * modes.rounding))
     warnings_.push_back("the normal modes satisfy their equation only to " +
                         std::to_string(modes.residual));
-  if (options_.check_completeness && count > 0) check_count(structure, modes);
   basis.eigen_residual = modes.residual;
   basis.factor_nonzeros = structure.factor_nonzeros();
+  if (&structure == omitted_.get()) structure.release_factor();  // the count makes another one
+  if (options_.check_completeness && count > 0) check_count(structure, modes);
   for (const double square : modes.squares) basis.normal_frequencies.push_back(hertz(square));
   const auto before = basis.shapes.cols();
   basis.shapes.conservativeResize(model_.rows(), before + count);
@@ -250,6 +251,7 @@ BasisShapes BasisBuilder::build() {
       add_modes(options_.normal == ReductionNormal::omitted ? omitted() : attached(), basis);
       break;
   }
+  omitted_.reset();
   return basis;
 }
 

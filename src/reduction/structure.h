@@ -79,6 +79,7 @@ class Structure {
   NormalModes modes(int count, const EigenOptions& options, const ReductionProgress& progress);
   /// Number of elastic modes with ω² below `square`.
   int count_modes_below(double square) const;
+  void release_factor() { factor_.reset(); }  ///< gives its memory back; made anew when needed
   long factor_nonzeros() const { return factor_ ? factor_->nonzeros() : 0; }
 
   /// Shapes of this structure as shapes of the model: held rows are zero.
