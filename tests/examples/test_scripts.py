@@ -73,3 +73,16 @@ def test_stiff_peer(address, tmp_path):
     _, plain, aitken, quasi_newton = run("stiff_peer.py", address, tmp_path, "--steps", "60")
     assert plain == [0, 0] and aitken[0] == quasi_newton[0] == 60
     assert 2 < quasi_newton[1] < 5 < aitken[1]
+
+
+def test_strip_wing(address, tmp_path):
+    """Below the flutter speed a gust dies out, above it does not; the tangent saves exchanges and changes nothing."""
+    slow, _, fast, plain = run("strip_wing.py", address, tmp_path, "--steps", "350")
+    assert slow[0] == 40 and slow[1] > 20 and slow[2] < 0.2 * slow[1] and fast[0] == 90 and fast[2] > 3 * slow[2]
+    assert slow[3] < 0.8 * plain[0] and plain[1] < 1e-6
+
+
+def test_two_daemons(address, tmp_path):
+    """The halves fall as the whole does."""
+    (fall, difference, exchanges), = run("two_daemons.py", address, tmp_path, "--steps", "60")
+    assert fall > 0.3 and difference < 1e-7 and exchanges < 20

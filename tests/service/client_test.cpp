@@ -241,6 +241,78 @@ TEST_P(Coupled, AnAnswerOfTheWrongLengthEndsThePeer) {
   EXPECT_EQ(simulation.step(0).step, 0);
 }
 
+TEST_P(Coupled, DerivativesSaveIterations) {
+  Server server = connect();
+  std::int64_t exchanges[2];
+  std::vector<double> found[2];
+  for (const bool with_tangent : {false, true}) {
+    Simulation simulation = server.load_text(body("1.e-2"), with_port());
+    PeerOptions options = this->options();
+    options.mode = Mode::tight;
+    options.tolerance = 1e-12;
+    if (with_tangent) options.tangent = Tangent::block_diagonal;
+    const auto answer = [&](const Motion& motion) {
+      Loads loads = spring(motion);
+      if (!with_tangent) return loads;
+      loads.stiffness.assign(36, 0.0);
+      for (std::size_t i = 0; i < 3; ++i) loads.stiffness[7 * i] = -kStiffness;
+      return loads;
+    };
+    const Peer peer = simulation.couple("spring", answer, options);
+    ASSERT_TRUE(simulation.step(20).ok());
+    exchanges[with_tangent] = peer.exchanges();
+    found[with_tangent] = simulation.read("node.structural.1.X");
+  }
+  EXPECT_LT(exchanges[true], exchanges[false]);
+  EXPECT_NEAR(found[true].at(1), found[false].at(1), 1e-9);
+}
+
+TEST_P(Coupled, MotionIsImposed) {
+  Server server = connect();
+  LoadOptions load;
+  load.ports = {{.name = "hand", .nodes = {1}, .kind = PortKind::motion, .positions_only = true}};
+  Simulation simulation = server.load_text(body(), load);
+  const auto hand = [](const Motion& motion) {
+    EXPECT_EQ(motion.forces.size(), 3u);
+    return Loads{.positions = {0, motion.target_time, 0}};
+  };
+  const Peer peer = simulation.couple("hand", hand, options());
+  const StepResult result = simulation.step(20);
+  ASSERT_TRUE(result.ok()) << result.failure;
+  EXPECT_NEAR(simulation.read("node.structural.1.X").at(1), 0.02, 1e-9);
+}
+
+TEST_P(Coupled, HeartbeatsKeepASlowPeerAlive) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  PeerOptions options = this->options();
+  options.heartbeat_timeout = 0.9;
+  const auto slow = [](const Motion& motion) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    return spring(motion);
+  };
+  const Peer peer = simulation.couple("spring", slow, options);
+  const StepResult result = simulation.step();
+  EXPECT_TRUE(result.ok()) << result.failure;
+}
+
+TEST_P(Coupled, ASilentServerEndsThePeerThatWantsSignsOfLife) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  PeerOptions options = this->options();
+  options.server_timeout = 0.3;
+  Peer peer = simulation.attach("spring", options);
+  const auto step = [&] {
+    std::this_thread::sleep_for(std::chrono::seconds(1));  // longer than the limit
+    EXPECT_TRUE(simulation.step().ok());
+  };
+  std::thread stepper(step);
+  Motion motion;
+  EXPECT_TRUE(peer.next(motion)) << "the server gave no signs of life";
+  peer.answer(spring(motion));
+  stepper.join();
+}
+
 TEST_P(Coupled, SignalsOfManyNumbers) {
   constexpr int kNumbers =
       65536;  // twice as many go out: more than the shared memory holds at once

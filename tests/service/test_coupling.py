@@ -246,3 +246,17 @@ def test_the_loop_of_the_readme(daemon, tmp_path):
     run = subprocess.run([sys.executable, "-c", "\n".join(lines)], cwd=tmp_path, text=True, timeout=60, stdout=subprocess.PIPE,
                          stderr=subprocess.PIPE, env={**os.environ, "MBCOSIM_ADDRESS": daemon.address})
     assert run.returncode == 0 and int(run.stdout) >= 1, run.stderr
+
+
+def test_a_peer_may_want_signs_of_life(start_daemon):
+    """An idle server gives them; one that is stopped does not, and the peer ends."""
+    import signal
+    daemon = start_daemon()
+    with daemon.connect() as server, oscillator(server) as simulation:
+        with simulation.couple("spring", spring, server_timeout=0.5) as peer:
+            time.sleep(1.5)
+            assert peer.error is None and simulation.step().step == 1
+            daemon.process.send_signal(signal.SIGSTOP)
+            wait_for(lambda: peer.error is not None, 5)
+            daemon.process.send_signal(signal.SIGCONT)
+            assert "silent" in str(peer.error)
