@@ -1,9 +1,15 @@
 """Policies for steps that do not converge: fail, cut, accept."""
+import queue
+import re
+import threading
+
 import pytest
 
 import decks
 import mbcosim
 from conftest import wait_for
+from mbcosim import exchange
+from mbcosim.coupling import open_stream
 from test_coupling import PORT, position, spring
 
 STEP = 0.05
@@ -114,6 +120,53 @@ def test_tight_peers_see_the_pieces_of_a_cut_step(server):
         times = [time for _, time in peer.accepted]
         assert times == sorted(times) and times[-1] == STEP
         assert {step for step, _ in events} == {1}
+
+
+def trace(server, simulation, forces, steps, **options):
+    """The order of messages of a peer: w welcome, x exchange, a accepted, r rejected."""
+    out, names = queue.SimpleQueue(), []
+    out.put(exchange.hello(simulation, "spring", **options))
+    stream = open_stream(server._channel)(iter(out.get, None), metadata=server.metadata)
+
+    def listen():
+        for data in stream:
+            name, content = exchange.receive(data)
+            names.append("x" if name == "exchange" else name[0])
+            if name == "exchange":
+                out.put(exchange.answer(exchange.index(content), [[next(forces), 0, 0]], 1))
+
+    thread = threading.Thread(target=listen)
+    thread.start()
+    try:
+        for _ in range(steps):
+            simulation.step()
+    except mbcosim.StepFailed:
+        pass
+    wait_for(lambda: names and names[-1] in "ar")
+    out.put(None)
+    thread.join(10)
+    return "".join(names)
+
+
+def test_golden_traces_of_failed_and_cut_steps(server):
+    def numbers():
+        value = 1.0
+        while True:
+            yield value
+            value += 1.0
+
+    def constant():
+        while True:
+            yield 1.0
+
+    with server.load_text(decks.body(spin="null"), ports=PORT) as simulation:
+        assert trace(server, simulation, numbers(), 1, mode="window", maximum_passes=3) == "wxxxr"
+        assert trace(server, simulation, constant(), 2, mode="window") in ("wxxaxa", "wxxaxxa")
+    with fast_spin(server, ports=PORT) as simulation:
+        assert re.fullmatch("wx+r", trace(server, simulation, constant(), 1, mode="tight"))
+    with fast_spin(server, ports=PORT, policy="cut_step") as simulation:
+        order = trace(server, simulation, constant(), 1, mode="tight")
+        assert re.fullmatch("wx+r(x+[ra])*x+a", order) and order.count("a") > 1
 
 
 def test_windows_see_whole_steps_and_accept_the_last_pass(server):

@@ -210,6 +210,8 @@ def test_wait_goes_on_with_a_peer_that_comes_back(server):
         thread.start()
         wait_for(lambda: "port spring since" in simulation.refresh().waiting_for)
         assert not result
+        (wait,) = simulation.refresh().waits
+        assert wait.port == "spring" and wait.seconds >= 0 and not wait.has_peer
         with simulation.couple("spring", spring):
             thread.join(10)
             assert result["done"].step == 10
