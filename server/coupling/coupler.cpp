@@ -25,8 +25,9 @@ class Stopwatch {
 }  // namespace
 
 Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
-                 const Simulation& simulation, Recorder* recorder)
-    : recorder_(recorder) {
+                 const Simulation& simulation, std::chrono::milliseconds longest_wait,
+                 Recorder* recorder)
+    : longest_wait_(longest_wait), recorder_(recorder) {
   for (const PortElementRef& element : port_elements(simulation.model()))
     add({element, simulation}, simulation);
   for (const v1::PortDefinition& definition : ports) {
@@ -54,7 +55,7 @@ void Coupler::add(PortModel model, const Simulation& simulation) {
                                                  simulation.variables()[handle].name +
                                                  "\" is written by another port, too");
   }
-  ports_.push_back(std::make_unique<Port>(std::move(model), recorder_));
+  ports_.push_back(std::make_unique<Port>(std::move(model), longest_wait_, recorder_));
   lines_.emplace_back().port = ports_.back().get();
 }
 

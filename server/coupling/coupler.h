@@ -21,9 +21,11 @@ namespace mbcosim::server {
 /// and `exchange` wait and need none.
 class Coupler {
  public:
-  /// `recorder`: keeps what crosses the ports; may be null.
+  /// `longest_wait`: for peers with policy WAIT. `recorder`: keeps what crosses the ports; may be
+  /// null.
   Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
-          const Simulation& simulation, Recorder* recorder = nullptr);
+          const Simulation& simulation, std::chrono::milliseconds longest_wait,
+          Recorder* recorder = nullptr);
 
   Port* find(const std::string& name) const;
   const std::vector<std::unique_ptr<Port>>& ports() const { return ports_; }
@@ -83,6 +85,7 @@ class Coupler {
   bool take_with_tangent(Line& line, Simulation& simulation, const CancelToken& cancel);
   void announce_tangents(Simulation& simulation);
 
+  const std::chrono::milliseconds longest_wait_;
   Recorder* const recorder_;
   std::vector<std::unique_ptr<Port>> ports_;
   std::set<int> written_;  ///< handles that ports write

@@ -10,7 +10,6 @@ namespace mbcosim::server {
 namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(10);  // how soon a cancelled step is noticed
-constexpr std::chrono::milliseconds kLongestWait = std::chrono::minutes(60);  // of policy WAIT
 constexpr int kSpins = 200;  // looks before sleeping: quick peers answer within them
 
 std::string in_port(const std::string& name, const std::string& text) {
@@ -141,7 +140,7 @@ void Port::await_peer(const CancelToken& cancel) {
   const bool idle = model_.layout().optional() && agreement_.generation == 0;
   if (link_ || !patient || idle) return;
   const bool forever = agreement_.policy == v1::PEER_POLICY_WAIT;
-  const Clock::time_point deadline = Clock::now() + (forever ? kLongestWait : agreement_.timeout);
+  const Clock::time_point deadline = Clock::now() + (forever ? longest_wait_ : agreement_.timeout);
   waiting_since_ = Clock::now();
   while (!link_ && Clock::now() < deadline && !cancel.cancelled()) changed_.wait_for(guard, kLook);
   waiting_since_.reset();
@@ -179,7 +178,7 @@ std::optional<Answer> Port::take(const CancelToken& cancel) {
     guard.lock();
   }
   const bool forever = agreement_.policy == v1::PEER_POLICY_WAIT;
-  const Clock::time_point deadline = Clock::now() + (forever ? kLongestWait : agreement_.timeout);
+  const Clock::time_point deadline = Clock::now() + (forever ? longest_wait_ : agreement_.timeout);
   waiting_since_ = Clock::now();
   while (awaited_ && !answer_ && link_ && Clock::now() < deadline && !cancel.cancelled())
     if (!link_->pulls() || !pull(guard)) changed_.wait_for(guard, kLook);

@@ -43,8 +43,10 @@ struct PeerLost {
 /// Thread-safe: the session's thread exchanges, the peer's thread attaches, delivers and detaches.
 class Port {
  public:
-  /// `recorder`: keeps what crosses the port; may be null, outlives the port.
-  Port(PortModel model, Recorder* recorder) : model_(std::move(model)), recorder_(recorder) {}
+  /// `longest_wait`: of policy WAIT. `recorder`: keeps what crosses the port; may be null, outlives
+  /// the port.
+  Port(PortModel model, std::chrono::milliseconds longest_wait, Recorder* recorder)
+      : model_(std::move(model)), longest_wait_(longest_wait), recorder_(recorder) {}
 
   PortModel& model() { return model_; }
   const PortModel& model() const { return model_; }
@@ -91,6 +93,7 @@ class Port {
   std::optional<Answer> go_on_without(const std::string& why);
 
   PortModel model_;
+  const std::chrono::milliseconds longest_wait_;
   Recorder* const recorder_;
   mutable std::mutex mutex_;  // protects all below; `model_` too while an answer is decoded
   std::condition_variable changed_;

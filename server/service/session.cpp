@@ -26,7 +26,7 @@ Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shar
       simulation_(std::move(simulation)),
       recorder_(options.record_ports() ? std::make_unique<Recorder>(shared.limits.record_bytes)
                                        : nullptr),
-      coupler_(options.ports(), *simulation_, recorder_.get()),
+      coupler_(options.ports(), *simulation_, identity_.lease, recorder_.get()),
       last_use_(Clock::now().time_since_epoch().count()) {
   published_.display_name = identity_.display_name;
   set_policy(options.non_convergence_policy(), options.minimum_step_s());

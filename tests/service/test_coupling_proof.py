@@ -217,6 +217,18 @@ def test_wait_goes_on_with_a_peer_that_comes_back(server):
             assert result["done"].step == 10
 
 
+def test_wait_ends_with_the_lease(server):
+    with server.load_text(decks.body(spin="null"), ports=PORT, lease=1.0) as simulation:
+        with simulation.couple("spring", spring, policy="wait"):
+            simulation.step()
+        wait_for(lambda: not simulation.describe().ports[0].has_peer)
+        start = time.monotonic()
+        with pytest.raises(mbcosim.StepFailed, match="the peer is gone"):
+            simulation.step()
+        assert 0.9 < time.monotonic() - start < 6
+        simulation.refresh()
+
+
 PEER = """
 import sys, time
 import mbcosim
