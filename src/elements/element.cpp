@@ -2,7 +2,8 @@
 
 namespace mbcosim::detail {
 
-void gather(const EvalContext& context, const Connection& c, const ElementInfo& info, bool parameters, Local<double>& u) {
+void gather(const EvalContext& context, const Connection& c, const ElementInfo& info,
+            bool parameters, Local<double>& u) {
   const Model& model = *context.model;
   u.context = &context;
   u.connection = &c;
@@ -39,7 +40,8 @@ void gather(const EvalContext& context, const Connection& c, const ElementInfo& 
   for (int i = 0; i < c.scalar_count; ++i) {
     const ScalarNode& node = model.scalars[c.scalar[i]];
     if (node.kind == ScalarKind::parameter) {
-      u.scalar_values[i] = node.binding ? node.binding->value(context, context.time) : state.memory[node.memory];
+      u.scalar_values[i] =
+          node.binding ? node.binding->value(context, context.time) : state.memory[node.memory];
       u.scalar_rates[i] = 0;
     } else if (input) {
       u.scalar_values[i] = node.value;
@@ -57,7 +59,8 @@ void gather(const EvalContext& context, const Connection& c, const ElementInfo& 
 
 std::string default_row_name(int k) { return "equation " + std::to_string(k + 1); }
 
-void fill_rows_columns(const Model& model, const Connection& c, bool momentum, std::vector<int>& rows, std::vector<int>& columns) {
+void fill_rows_columns(const Model& model, const Connection& c, bool momentum,
+                       std::vector<int>& rows, std::vector<int>& columns) {
   for (int k = 0; k < c.node_count; ++k) {
     const StructuralNode& node = model.structural[c.node[k]];
     const int count = node.position_unknowns();

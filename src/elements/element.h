@@ -1,37 +1,37 @@
-/// The element pattern: a small struct of parameters with one templated residual becomes a set that the solver can use.
+/// The element pattern: a small struct of parameters with one templated residual becomes a set that
+/// the solver can use.
 ///
 ///   struct SphericalHinge {
 ///     int first, second;                       // structural node indices
 ///     Vec3 p, q;                               // in the node frames [m]
-///     static constexpr int width = 15;         // local columns: 6 per node + scalar dofs + own unknowns
-///     static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-///     void connect(Connector& c) { c.node(first); c.node(second); c.algebraic(3); }
-///     template <class T>
+///     static constexpr int width = 15;         // local columns: 6 per node + scalar dofs + own
+///     unknowns static constexpr AssemblyRole assembly = AssemblyRole::holonomic; void
+///     connect(Connector& c) { c.node(first); c.node(second); c.algebraic(3); } template <class T>
 ///     void residual(const Local<T>& u, Residual<T>& r) const {
 ///       const Vec<T> arm1 = u.R(0) * p, arm2 = u.R(1) * q;     // nodes by order of connection
 ///       const Vec<T> lambda = u.own3(0);
-///       r.load(0, -lambda, -arm1.cross(lambda));               // force [N], moment about the node [N·m]
-///       r.load(1, lambda, arm2.cross(lambda));
-///       r.own3(0, (u.x(0) + arm1 - u.x(1) - arm2) / u.c());
+///       r.load(0, -lambda, -arm1.cross(lambda));               // force [N], moment about the node
+///       [N·m] r.load(1, lambda, arm2.cross(lambda)); r.own3(0, (u.x(0) + arm1 - u.x(1) - arm2) /
+///       u.c());
 ///     }
 ///   };
 ///
-/// T is double (residual), Dual<n> (Jacobian) or TimeDual (initial assembly: value and time derivative).
-/// Optional members, found by name:
+/// T is double (residual), Dual<n> (Jacobian) or TimeDual (initial assembly: value and time
+/// derivative). Optional members, found by name:
 ///   void tangent(const Local<double>&, Tangent&) const        closed form of −∂r/∂δ … see Tangent
 ///   void start(Start&) const                                  initial own unknowns and memory
 ///   void after_predict(const Local<double>&, State&) const    once a step, after the prediction
 ///   void after_convergence(const Local<double>&, State&) const
-///   void output(const Local<double>&, OutputRow&) const       the line(s) of the element, with begin(…, u.label())
-///   std::string log(const Model&, int label) const            line of .log
-///   int private_datum(std::string_view) const; std::vector<std::string> private_data() const;
-///   double private_value(const Local<double>&, int) const
-///   std::string row_name(int k) const                         meaning of own row k
-///   void add_inertia(const Local<double>&, int node, Inertia&) const;  Inertia about structural node `node`
-///   static constexpr bool momentum_rows = true                rows 1–6 of dynamic nodes: r.momentum(k, …)
-///   static constexpr bool rotation_parameters = true          u.g(k), u.gp(k) are gathered
-///   template <class T> void assembly_residual(const Local<T>&, Residual<T>&) const   instead of residual() in the assembly
-///   AssemblyRole assembly_role() const                         when it depends on the element
+///   void output(const Local<double>&, OutputRow&) const       the line(s) of the element, with
+///   begin(…, u.label()) std::string log(const Model&, int label) const            line of .log int
+///   private_datum(std::string_view) const; std::vector<std::string> private_data() const; double
+///   private_value(const Local<double>&, int) const std::string row_name(int k) const meaning of
+///   own row k void add_inertia(const Local<double>&, int node, Inertia&) const;  Inertia about
+///   structural node `node` static constexpr bool momentum_rows = true                rows 1–6 of
+///   dynamic nodes: r.momentum(k, …) static constexpr bool rotation_parameters = true u.g(k),
+///   u.gp(k) are gathered template <class T> void assembly_residual(const Local<T>&, Residual<T>&)
+///   const   instead of residual() in the assembly AssemblyRole assembly_role() const when it
+///   depends on the element
 #pragma once
 
 #include <algorithm>
@@ -55,18 +55,20 @@ constexpr int kMaxScalars = 8;
 constexpr int kMaxOwn = 24;
 constexpr int kMaxLocal = 6 * kMaxNodes + kMaxScalars + kMaxOwn;
 
-/// Where an element is attached. Local columns and equilibrium rows: 6 (3) per node, 1 per scalar dof, then own unknowns.
+/// Where an element is attached. Local columns and equilibrium rows: 6 (3) per node, 1 per scalar
+/// dof, then own unknowns.
 struct Connection {
   int node_count = 0, scalar_count = 0, own_count = 0;
-  int node[kMaxNodes];          ///< structural node index
-  int scalar[kMaxScalars];      ///< scalar node index
+  int node[kMaxNodes];      ///< structural node index
+  int scalar[kMaxScalars];  ///< scalar node index
   bool own_differential[kMaxOwn] = {};
-  int own = -1;                 ///< first own unknown
-  int memory = -1;              ///< offset in State::memory
+  int own = -1;     ///< first own unknown
+  int memory = -1;  ///< offset in State::memory
   int memory_count = 0;
 };
 
-/// Handle of a scalar degree of freedom inside an element: a scalar node, or one component of a connected structural node.
+/// Handle of a scalar degree of freedom inside an element: a scalar node, or one component of a
+/// connected structural node.
 struct LocalDof {
   int scalar = -1;  ///< local scalar index, or
   int node = -1;    ///< local node index and
@@ -96,8 +98,10 @@ class Connector {
     LocalDof l;
     l.order = d.order;
     l.component = d.component;
-    if (d.structural) l.node = node(d.node);
-    else l.scalar = scalar(d.node);
+    if (d.structural)
+      l.node = node(d.node);
+    else
+      l.scalar = scalar(d.node);
     return l;
   }
   void algebraic(int count) { own(count, false); }
@@ -121,7 +125,8 @@ template <class T>
 struct LocalNode {
   Vec<T> x, v, w;
   Mat<T> R;
-  Vec<T> g, gp;  ///< rotation parameters of the step and their rates (only with rotation_parameters)
+  Vec<T> g,
+      gp;  ///< rotation parameters of the step and their rates (only with rotation_parameters)
 };
 
 /// What an element sees of the state.
@@ -134,18 +139,21 @@ class Local {
   const Vec<T>& w(int k) const { return nodes[k].w; }  ///< angular velocity, global [rad/s]
   const Vec<T>& g(int k) const { return nodes[k].g; }
   const Vec<T>& gp(int k) const { return nodes[k].gp; }
-  T own(int i) const { return own_values[i]; }           ///< own unknown i
-  T own_rate(int i) const { return own_rates[i]; }       ///< its rate (differential unknowns only)
+  T own(int i) const { return own_values[i]; }      ///< own unknown i
+  T own_rate(int i) const { return own_rates[i]; }  ///< its rate (differential unknowns only)
   Vec<T> own3(int i) const { return Vec<T>(own_values[i], own_values[i + 1], own_values[i + 2]); }
-  T scalar(int k) const { return scalar_values[k]; }     ///< value of local scalar dof k
+  T scalar(int k) const { return scalar_values[k]; }  ///< value of local scalar dof k
   T scalar_rate(int k) const { return scalar_rates[k]; }
-  /// Value or rate (by its order) of a degree of freedom. Rotation components have only a rate: the angular velocity.
+  /// Value or rate (by its order) of a degree of freedom. Rotation components have only a rate: the
+  /// angular velocity.
   T dof(const LocalDof& d) const {
     if (d.scalar >= 0) return d.order == 0 ? scalar(d.scalar) : scalar_rate(d.scalar);
     if (d.component < 3) return d.order == 0 ? x(d.node)(d.component) : v(d.node)(d.component);
     return w(d.node)(d.component - 3);
   }
-  double c() const { return context->c; }  ///< position constraint rows are divided by it (1 in the assembly)
+  double c() const {
+    return context->c;
+  }  ///< position constraint rows are divided by it (1 in the assembly)
   double time() const { return context->time; }
   double memory(int i) const { return context->state->memory[connection->memory + i]; }
   int memory_offset() const { return connection->memory; }
@@ -189,8 +197,10 @@ class Residual {
   }
   void scalar(int k, const T& value) { scalar_rows[k] += value; }
   void dof(const LocalDof& d, const T& value) {
-    if (d.scalar >= 0) scalar(d.scalar, value);
-    else node[d.node][d.component] += value;
+    if (d.scalar >= 0)
+      scalar(d.scalar, value);
+    else
+      node[d.node][d.component] += value;
   }
 
   T node[kMaxNodes][6];
@@ -208,8 +218,8 @@ struct Start {
   double& memory(int i) { return state.memory[u.connection->memory + i]; }
 };
 
-/// Local matrix −∂r/∂δ of a closed-form linearization. Rows: 6 per node (equilibrium), scalars, own rows, then 6 momentum rows
-/// per node; columns: 6 per node (x, g), scalars, own unknowns.
+/// Local matrix −∂r/∂δ of a closed-form linearization. Rows: 6 per node (equilibrium), scalars, own
+/// rows, then 6 momentum rows per node; columns: 6 per node (x, g), scalars, own unknowns.
 class Tangent {
  public:
   using Block = Eigen::Ref<const Mat3>;
@@ -222,16 +232,21 @@ class Tangent {
   int col_own(int i) const { return 6 * nodes + scalars + i; }
   double& at(int row, int column) { return data[column * rows + row]; }
   auto block(int row, int column) {
-    return Eigen::Map<Mat3, 0, Eigen::OuterStride<>>(data + column * rows + row, 3, 3, Eigen::OuterStride<>(rows));
+    return Eigen::Map<Mat3, 0, Eigen::OuterStride<>>(data + column * rows + row, 3, 3,
+                                                     Eigen::OuterStride<>(rows));
   }
   /// Adds to rows row..row+2 the dependence on node k: given ∂r/∂x, ∂r/∂v (3×3).
-  void add_translation(int row, int k, const Mat3& dx, const Mat3& dv) { block(row, col_node(k)) -= c * dx + dv; }
+  void add_translation(int row, int k, const Mat3& dx, const Mat3& dv) {
+    block(row, col_node(k)) -= c * dx + dv;
+  }
   /// The same for ∂r/∂θ, ∂r/∂w (θ: rotation of the node, global components).
   void add_rotation(int row, int k, const Mat3& dtheta, const Mat3& dw) {
     block(row, col_node(k) + 3) -= dtheta * seeds[k].A + dw * seeds[k].B;
   }
   void add_position(int row, int k, const Mat3& dx) { block(row, col_node(k)) -= c * dx; }
-  void add_orientation(int row, int k, const Mat3& dtheta) { block(row, col_node(k) + 3) -= dtheta * seeds[k].A; }
+  void add_orientation(int row, int k, const Mat3& dtheta) {
+    block(row, col_node(k) + 3) -= dtheta * seeds[k].A;
+  }
 
   int nodes = 0, scalars = 0, owns = 0, rows = 0, columns = 0;
   double c = 1;  ///< ∂x/∂δ
@@ -242,51 +257,85 @@ class Tangent {
 namespace detail {
 
 template <class E>
-concept HasTangent = requires(const E& e, const Local<double>& u, Tangent& t) { e.tangent(u, t); };
+concept HasTangent = requires(const E& e, const Local<double>& u, Tangent& t) {
+  e.tangent(u, t);
+};
 template <class E>
-concept HasStart = requires(const E& e, Start& s) { e.start(s); };
+concept HasStart = requires(const E& e, Start& s) {
+  e.start(s);
+};
 template <class E>
-concept HasAfterPredict = requires(const E& e, const Local<double>& u, State& s) { e.after_predict(u, s); };
+concept HasAfterPredict = requires(const E& e, const Local<double>& u, State& s) {
+  e.after_predict(u, s);
+};
 template <class E>
-concept HasAfterConvergence = requires(const E& e, const Local<double>& u, State& s) { e.after_convergence(u, s); };
+concept HasAfterConvergence = requires(const E& e, const Local<double>& u, State& s) {
+  e.after_convergence(u, s);
+};
 template <class E>
-concept HasOutput = requires(const E& e, const Local<double>& u, OutputRow& r) { e.output(u, r); };
+concept HasOutput = requires(const E& e, const Local<double>& u, OutputRow& r) {
+  e.output(u, r);
+};
 template <class E>
-concept HasLog = requires(const E& e, const Model& m) { e.log(m, 0); };
+concept HasLog = requires(const E& e, const Model& m) {
+  e.log(m, 0);
+};
 template <class E>
 concept HasPrivateData = requires(const E& e, const Local<double>& u) {
   e.private_datum(std::string_view());
   e.private_value(u, 0);
 };
 template <class E>
-concept HasPrivateNames = requires(const E& e) { e.private_data(); };
+concept HasPrivateNames = requires(const E& e) {
+  e.private_data();
+};
 template <class E>
-concept HasRowName = requires(const E& e) { e.row_name(0); };
+concept HasRowName = requires(const E& e) {
+  e.row_name(0);
+};
 template <class E>
-concept HasInertia = requires(const E& e, const Local<double>& u, Inertia& i) { e.add_inertia(u, 0, i); };
+concept HasInertia = requires(const E& e, const Local<double>& u, Inertia& i) {
+  e.add_inertia(u, 0, i);
+};
 template <class E>
-concept HasAssemblyResidual = requires(const E& e, const Local<TimeDual>& u, Residual<TimeDual>& r) { e.assembly_residual(u, r); };
+concept HasAssemblyResidual = requires(const E& e, const Local<TimeDual>& u,
+                                       Residual<TimeDual>& r) {
+  e.assembly_residual(u, r);
+};
 template <class E>
-concept HasAssemblyRole = requires(const E& e) { e.assembly_role(); };
+concept HasAssemblyRole = requires(const E& e) {
+  e.assembly_role();
+};
 template <class E>
-concept HasAssembly = requires { E::assembly; };
+concept HasAssembly = requires {
+  E::assembly;
+};
 template <class E>
 constexpr bool uses_momentum() {
-  if constexpr (requires { E::momentum_rows; }) return E::momentum_rows;
-  else return false;
+  if constexpr (requires { E::momentum_rows; })
+    return E::momentum_rows;
+  else
+    return false;
 }
 template <class E>
 constexpr bool uses_parameters() {
-  if constexpr (requires { E::rotation_parameters; }) return E::rotation_parameters;
-  else return false;
+  if constexpr (requires { E::rotation_parameters; })
+    return E::rotation_parameters;
+  else
+    return false;
 }
 /// Dual numbers come in a few widths, so that element types share instantiations.
-constexpr int dual_width(int columns) { return columns <= 6 ? 6 : columns <= 12 ? 12 : columns <= 18 ? 18 : 24; }
+constexpr int dual_width(int columns) {
+  return columns <= 6 ? 6 : columns <= 12 ? 12 : columns <= 18 ? 18 : 24;
+}
 
-void gather(const EvalContext& context, const Connection& c, const ElementInfo& info, bool parameters, Local<double>& u);
+void gather(const EvalContext& context, const Connection& c, const ElementInfo& info,
+            bool parameters, Local<double>& u);
 std::string default_row_name(int k);
-/// rows: 6/node, scalars, own [, momentum 6/node]; columns: 6/node, scalars, own. -1 where there is none.
-void fill_rows_columns(const Model& model, const Connection& c, bool momentum, std::vector<int>& rows, std::vector<int>& columns);
+/// rows: 6/node, scalars, own [, momentum 6/node]; columns: 6/node, scalars, own. -1 where there is
+/// none.
+void fill_rows_columns(const Model& model, const Connection& c, bool momentum,
+                       std::vector<int>& rows, std::vector<int>& columns);
 
 }  // namespace detail
 
@@ -314,10 +363,14 @@ class ElementSetOf final : public ElementSet {
   const ElementInfo& info(int i) const override { return slots_[i].info; }
   ElementInfo& info(int i) override { return slots_[i].info; }
   int unknowns(int i) const override { return slots_[i].connection.own_count; }
-  bool is_differential(int i, int k) const override { return slots_[i].connection.own_differential[k]; }
+  bool is_differential(int i, int k) const override {
+    return slots_[i].connection.own_differential[k];
+  }
   std::string row_name(int i, int k) const override {
-    if constexpr (detail::HasRowName<E>) return slots_[i].element.row_name(k);
-    else return detail::default_row_name(k);
+    if constexpr (detail::HasRowName<E>)
+      return slots_[i].element.row_name(k);
+    else
+      return detail::default_row_name(k);
   }
   std::vector<int> nodes(int i) const override {
     const Connection& c = slots_[i].connection;
@@ -339,7 +392,8 @@ class ElementSetOf final : public ElementSet {
   }
   void collect_pattern(PatternSink& sink) const override {
     for (const Slot& s : slots_)
-      sink.block(&rows_[s.first_row], s.row_count, s.column_count ? &columns_[s.first_column] : nullptr, s.column_count);
+      sink.block(&rows_[s.first_row], s.row_count,
+                 s.column_count ? &columns_[s.first_column] : nullptr, s.column_count);
   }
   void set_positions(const PositionSource& source) override {
     positions_.clear();
@@ -347,7 +401,8 @@ class ElementSetOf final : public ElementSet {
       s.first_position = static_cast<int>(positions_.size());
       for (int j = 0; j < s.column_count; ++j)
         for (int i = 0; i < s.row_count; ++i)
-          positions_.push_back(source.position(rows_[s.first_row + i], columns_[s.first_column + j]));
+          positions_.push_back(
+              source.position(rows_[s.first_row + i], columns_[s.first_column + j]));
     }
   }
 
@@ -389,8 +444,10 @@ class ElementSetOf final : public ElementSet {
         inactive_jacobian(context, s, matrix);
       } else {
         gather(context, s, u);
-        if constexpr (detail::HasTangent<E>) closed_form(context, s, u, seeds, matrix);
-        else dual_jacobian(s, u, seeds, matrix);
+        if constexpr (detail::HasTangent<E>)
+          closed_form(context, s, u, seeds, matrix);
+        else
+          dual_jacobian(s, u, seeds, matrix);
       }
       const int* position = &positions_[s.first_position];
       for (int k = 0; k < entries; ++k)
@@ -398,8 +455,10 @@ class ElementSetOf final : public ElementSet {
     }
   }
 
-  /// Local matrix (row_count × column_count, column-major) by duals, for tests and for types without a closed form.
-  void dual_jacobian(const Slot& s, const Local<double>& u, const NodeSeeds* seeds, double* matrix) const {
+  /// Local matrix (row_count × column_count, column-major) by duals, for tests and for types
+  /// without a closed form.
+  void dual_jacobian(const Slot& s, const Local<double>& u, const NodeSeeds* seeds,
+                     double* matrix) const {
     constexpr int width = detail::dual_width(E::width);
     using D = Dual<width>;
     Local<D> lu;
@@ -411,13 +470,13 @@ class ElementSetOf final : public ElementSet {
       const int last = std::min(width, s.column_count - start);
       for (int j = 0; j < last; ++j) {
         double* column = matrix + (start + j) * s.row_count;
-        store(s, column, [&](const D& x) { return -x.d[j]; }, lr);
+        store(
+            s, column, [&](const D& x) { return -x.d[j]; }, lr);
       }
     }
   }
-  void closed_form(const EvalContext& context, const Slot& s, const Local<double>& u, const NodeSeeds* seeds, double* matrix) const
-    requires detail::HasTangent<E>
-  {
+  void closed_form(const EvalContext& context, const Slot& s, const Local<double>& u,
+                   const NodeSeeds* seeds, double* matrix) const requires detail::HasTangent<E> {
     Tangent t;
     t.nodes = s.connection.node_count;
     t.scalars = s.connection.scalar_count;
@@ -461,11 +520,15 @@ class ElementSetOf final : public ElementSet {
   }
 
   AssemblyRole assembly_role(int i) const override {
-    if constexpr (detail::HasAssemblyRole<E>) return slots_[i].element.assembly_role();
-    else if constexpr (detail::HasAssembly<E>) return E::assembly;
-    else return AssemblyRole::none;
+    if constexpr (detail::HasAssemblyRole<E>)
+      return slots_[i].element.assembly_role();
+    else if constexpr (detail::HasAssembly<E>)
+      return E::assembly;
+    else
+      return AssemblyRole::none;
   }
-  void assembly_residual(const EvalContext& context, int i, double* r, double* r_rate) const override {
+  void assembly_residual(const EvalContext& context, int i, double* r,
+                         double* r_rate) const override {
     const Slot& s = slots_[i];
     Local<double> u;
     gather(context, s, u);
@@ -478,7 +541,8 @@ class ElementSetOf final : public ElementSet {
       r_rate[row] += local[s.row_count + k];
     }
   }
-  void assembly_jacobian(const EvalContext& context, int i, int n, std::vector<Triplet>& out) const override;
+  void assembly_jacobian(const EvalContext& context, int i, int n,
+                         std::vector<Triplet>& out) const override;
 
   void output(const EvalContext& context, int i, OutputRow& row) const override {
     if constexpr (detail::HasOutput<E>) {
@@ -490,16 +554,22 @@ class ElementSetOf final : public ElementSet {
     }
   }
   std::string log_line(const Model& model, int i) const override {
-    if constexpr (detail::HasLog<E>) return slots_[i].element.log(model, slots_[i].info.label);
-    else return (void)model, (void)i, std::string();
+    if constexpr (detail::HasLog<E>)
+      return slots_[i].element.log(model, slots_[i].info.label);
+    else
+      return (void)model, (void)i, std::string();
   }
   int private_datum(int i, std::string_view name) const override {
-    if constexpr (detail::HasPrivateData<E>) return slots_[i].element.private_datum(name);
-    else return (void)i, (void)name, -1;
+    if constexpr (detail::HasPrivateData<E>)
+      return slots_[i].element.private_datum(name);
+    else
+      return (void)i, (void)name, -1;
   }
   std::vector<std::string> private_data(int i) const override {
-    if constexpr (detail::HasPrivateNames<E>) return slots_[i].element.private_data();
-    else return (void)i, std::vector<std::string>();
+    if constexpr (detail::HasPrivateNames<E>)
+      return slots_[i].element.private_data();
+    else
+      return (void)i, std::vector<std::string>();
   }
   double private_value(const EvalContext& context, int i, int datum) const override {
     if constexpr (detail::HasPrivateData<E>) {
@@ -569,7 +639,8 @@ class ElementSetOf final : public ElementSet {
   }
   void scatter(const Slot& s, const Residual<double>& local, double* r) const {
     double flat[kMaxLocal + 6 * kMaxNodes];
-    store(s, flat, [](double x) { return x; }, local);
+    store(
+        s, flat, [](double x) { return x; }, local);
     const int* row = &rows_[s.first_row];
     for (int k = 0; k < s.row_count; ++k)
       if (row[k] >= 0) r[row[k]] += flat[k];
@@ -582,7 +653,8 @@ class ElementSetOf final : public ElementSet {
   }
   /// Values with derivatives with respect to local columns start .. start+width−1.
   template <class D>
-  void lift(const Slot& s, const Local<double>& u, const NodeSeeds* seeds, int start, Local<D>& l) const {
+  void lift(const Slot& s, const Local<double>& u, const NodeSeeds* seeds, int start,
+            Local<D>& l) const {
     const Connection& c = s.connection;
     const double cc = u.context->seed;
     const auto slot_of = [&](int column) {
@@ -644,15 +716,19 @@ class ElementSetOf final : public ElementSet {
   void assembly_local(const Slot& s, const Local<double>& u, double* rows, double* rates) const {
     const Connection& c = s.connection;
     const AssemblyRole role = [&] {
-      if constexpr (detail::HasAssemblyRole<E>) return s.element.assembly_role();
-      else if constexpr (detail::HasAssembly<E>) return E::assembly;
-      else return AssemblyRole::none;
+      if constexpr (detail::HasAssemblyRole<E>)
+        return s.element.assembly_role();
+      else if constexpr (detail::HasAssembly<E>)
+        return E::assembly;
+      else
+        return AssemblyRole::none;
     }();
     if (role == AssemblyRole::elastic) {
       Residual<double> r;
       clear(r, c);
       s.element.residual(u, r);
-      store(s, rows, [](double x) { return x; }, r);
+      store(
+          s, rows, [](double x) { return x; }, r);
       return;
     }
     Local<TimeDual> t;
@@ -682,19 +758,25 @@ class ElementSetOf final : public ElementSet {
     }
     Residual<TimeDual> r;
     clear(r, c);
-    if constexpr (detail::HasAssemblyResidual<E>) s.element.assembly_residual(t, r);
-    else s.element.residual(t, r);
-    store(s, rows, [](const TimeDual& x) { return x.v; }, r);
-    store(s, rates, [](const TimeDual& x) { return x.d[0]; }, r);
+    if constexpr (detail::HasAssemblyResidual<E>)
+      s.element.assembly_residual(t, r);
+    else
+      s.element.residual(t, r);
+    store(
+        s, rows, [](const TimeDual& x) { return x.v; }, r);
+    store(
+        s, rates, [](const TimeDual& x) { return x.d[0]; }, r);
   }
 
   std::vector<Slot> slots_;
   std::vector<int> rows_, columns_, positions_;
 };
 
-/// Central differences on local values: the assembly is done once, and Newton needs no more than these.
+/// Central differences on local values: the assembly is done once, and Newton needs no more than
+/// these.
 template <class E>
-void ElementSetOf<E>::assembly_jacobian(const EvalContext& context, int i, int n, std::vector<Triplet>& out) const {
+void ElementSetOf<E>::assembly_jacobian(const EvalContext& context, int i, int n,
+                                        std::vector<Triplet>& out) const {
   const Slot& s = slots_[i];
   const Connection& c = s.connection;
   Local<double> base;
@@ -720,20 +802,26 @@ void ElementSetOf<E>::assembly_jacobian(const EvalContext& context, int i, int n
   };
   constexpr double kStep = 1e-6;
   const int* column = &columns_[s.first_column];
-  const auto level = [&](int q, bool rate) { return column[q] < 0 ? -1 : column[q] + (rate ? n : 0); };
+  const auto level = [&](int q, bool rate) {
+    return column[q] < 0 ? -1 : column[q] + (rate ? n : 0);
+  };
   for (int k = 0; k < c.node_count; ++k)
     for (int q = 0; q < 3; ++q) {
-      differentiate(level(6 * k + q, false), kStep, [&](Local<double>& u, double e) { u.nodes[k].x(q) += e; });
-      differentiate(level(6 * k + q, true), kStep, [&](Local<double>& u, double e) { u.nodes[k].v(q) += e; });
+      differentiate(level(6 * k + q, false), kStep,
+                    [&](Local<double>& u, double e) { u.nodes[k].x(q) += e; });
+      differentiate(level(6 * k + q, true), kStep,
+                    [&](Local<double>& u, double e) { u.nodes[k].v(q) += e; });
       differentiate(level(6 * k + 3 + q, false), kStep, [&](Local<double>& u, double e) {
         u.nodes[k].R = rotation_of_vector<double>(Vec3::Unit(q) * e) * u.nodes[k].R;
       });
-      differentiate(level(6 * k + 3 + q, true), kStep, [&](Local<double>& u, double e) { u.nodes[k].w(q) += e; });
+      differentiate(level(6 * k + 3 + q, true), kStep,
+                    [&](Local<double>& u, double e) { u.nodes[k].w(q) += e; });
     }
   const int o0 = 6 * c.node_count + c.scalar_count;
   for (int q = 0; q < c.own_count; ++q) {
     const double scale = kStep * std::max(1.0, std::abs(base.own_values[q]));
-    differentiate(level(o0 + q, false), scale, [&](Local<double>& u, double e) { u.own_values[q] += e; });
+    differentiate(level(o0 + q, false), scale,
+                  [&](Local<double>& u, double e) { u.own_values[q] += e; });
     differentiate(level(o0 + q, true), kStep * std::max(1.0, std::abs(base.own_rates[q])),
                   [&](Local<double>& u, double e) { u.own_rates[q] += e; });
   }

@@ -1,4 +1,5 @@
-/// Pieces of .log lines: each number preceded by a blank, six significant digits. Spec 02 section 11.3.
+/// Pieces of .log lines: each number preceded by a blank, six significant digits. Spec 02
+/// section 11.3.
 #pragma once
 
 #include <initializer_list>

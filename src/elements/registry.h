@@ -5,17 +5,16 @@
 
 namespace mbcosim {
 
-void register_bodies(Registry& registry);      ///< body, gravity, inertia, automatic structural
+void register_bodies(Registry& registry);  ///< body, gravity, inertia, automatic structural
 void register_joints(Registry& registry);
 void register_beams(Registry& registry);
-void register_forces(Registry& registry);      ///< forces and couples
+void register_forces(Registry& registry);           ///< forces and couples
 void register_external_forces(Registry& registry);  ///< loads from peers on ports
 void register_ports(
     Registry& registry);  ///< external structural mapping, external modal, stream output
 void register_genels(Registry& registry);      ///< genels and electric elements
 void register_hydraulics(Registry& registry);  ///< elements and fluids
 void register_modal(Registry& registry);       ///< modal joint, modal force
-
 
 void register_unsupported(Registry& registry);  ///< words of the language that are refused by name
 

@@ -1,4 +1,5 @@
-/// Reads the arguments of one raw statement: keywords, expressions, strings. Spec 01 sections 1 to 5.
+/// Reads the arguments of one raw statement: keywords, expressions, strings. Spec 01 sections 1
+/// to 5.
 #pragma once
 
 #include <string>
@@ -9,21 +10,22 @@
 
 namespace mbcosim {
 
-class Session;  // everything that outlives a statement: files, symbols, diagnostics, limits (input/session.h)
+class Session;  // everything that outlives a statement: files, symbols, diagnostics, limits
+                // (input/session.h)
 
 /// One statement as raw text with positions, split off before its meaning is known (section 1.7).
 struct Statement {
-  std::string_view text;   ///< from the first character of the card word to before the `;`
-  int file = 0;            ///< index in Session::files
-  std::size_t offset = 0;  ///< of text in its file
-  std::string word;        ///< normalized card word ("controldata" for `control data`)
+  std::string_view text;       ///< from the first character of the card word to before the `;`
+  int file = 0;                ///< index in Session::files
+  std::size_t offset = 0;      ///< of text in its file
+  std::string word;            ///< normalized card word ("controldata" for `control data`)
   bool has_arguments = false;  ///< a `:` follows the word
   std::size_t arguments = 0;   ///< offset in text of what follows the `:`
-  int trail = -1;          ///< include and loop context, for messages (index in Session)
+  int trail = -1;              ///< include and loop context, for messages (index in Session)
 };
 
-/// Sets word, has_arguments and arguments from the text, which starts with a letter. Returns npos, or the end of the word when
-/// neither `:` nor the end of the statement follows it.
+/// Sets word, has_arguments and arguments from the text, which starts with a letter. Returns npos,
+/// or the end of the word when neither `:` nor the end of the statement follows it.
 std::size_t read_head(Statement* statement);
 
 class Cursor {
@@ -33,18 +35,20 @@ class Cursor {
   bool more();       ///< are there more arguments?
   bool at_string();  ///< is the next argument a quoted string?
   bool at_empty();   ///< is the next argument empty?
-  /// The next argument as a normalized word, when it is one as a whole; empty otherwise. Consumes nothing.
+  /// The next argument as a normalized word, when it is one as a whole; empty otherwise. Consumes
+  /// nothing.
   std::string peek_word();
-  void skip();                            ///< consumes the next argument unread
+  void skip();                              ///< consumes the next argument unread
   std::string word(std::string_view what);  ///< consumes the next argument as a word, normalized
-  /// Evaluates the next argument as one expression statement. An empty argument is an error here: check `at_empty` first.
+  /// Evaluates the next argument as one expression statement. An empty argument is an error here:
+  /// check `at_empty` first.
   Value expression(std::string_view what);
   std::string quoted(std::string_view what);  ///< a quoted argument, escapes decoded (section 1.6)
   /// The inside of a quoted argument as a statement of its own, characters as they are written.
   Statement quoted_statement(std::string_view what);
   /// For `driven`: the rest of the statement from the next argument on, as a statement of its own.
   Statement rest_as_statement();
-  SourceSpan next();  ///< span of the next argument
+  SourceSpan next();        ///< span of the next argument
   SourceSpan last() const;  ///< span of the argument consumed last
   [[noreturn]] void fail(SourceSpan where, std::string message, std::string hint = "");
   void warn(SourceSpan where, std::string message, std::string hint = "");

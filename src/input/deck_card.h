@@ -131,7 +131,8 @@ class DeckCard final : public Card {
   /// For `driven`: what follows, as a statement of its own.
   Statement rest_as_statement() { return cursor_.rest_as_statement(); }
   Hint hint();  ///< reads a quoted hint
-  /// For the card inside a `driven` card; the hints outlive it. What they sample is appended to `samples`.
+  /// For the card inside a `driven` card; the hints outlive it. What they sample is appended to
+  /// `samples`.
   void set_hints(std::vector<Hint>* hints, std::vector<HintSample>* samples);
   /// A count: an integer >= 0, 0 when empty.
   int count(std::string_view what);

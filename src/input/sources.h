@@ -8,17 +8,18 @@
 
 namespace mbcosim {
 
-/// Reads files by name. Names are relative to the deck's folder, with `/`; readers resolve includes before they ask.
+/// Reads files by name. Names are relative to the deck's folder, with `/`; readers resolve includes
+/// before they ask.
 class FileSource {
  public:
   virtual ~FileSource() = default;
-  /// Text of a file; ErrorKind::io with a message without host paths ("cannot open \"a.inc\"", "not a regular file",
-  /// "outside the allowed folder").
+  /// Text of a file; ErrorKind::io with a message without host paths ("cannot open \"a.inc\"", "not
+  /// a regular file", "outside the allowed folder").
   virtual Result<std::string> read(const std::string& name) const = 0;
 };
 
-/// Files below one folder. Refuses absolute names, `..` that leaves the folder and links that lead out, unless
-/// `unrestricted` (the command line on the user's own files).
+/// Files below one folder. Refuses absolute names, `..` that leaves the folder and links that lead
+/// out, unless `unrestricted` (the command line on the user's own files).
 class FolderSource : public FileSource {
  public:
   explicit FolderSource(std::string folder, bool unrestricted = false);

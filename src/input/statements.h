@@ -1,5 +1,6 @@
-/// Delivers the statements of a deck one by one: includes opened, `for` and `if` blocks run, and the cards that may stand
-/// anywhere and need no model (`set`, `remark`, `include`, `print symbol table`, `setenv`, ...) done on the way.
+/// Delivers the statements of a deck one by one: includes opened, `for` and `if` blocks run, and
+/// the cards that may stand anywhere and need no model (`set`, `remark`, `include`, `print symbol
+/// table`, `setenv`, ...) done on the way.
 #pragma once
 
 #include <memory>
@@ -13,8 +14,8 @@ class Statements {
  public:
   explicit Statements(Session& session);
   ~Statements();
-  /// The next statement of the deck proper, or nothing at the end. Errors inside go to the session's diagnostics; reading
-  /// goes on with the next statement.
+  /// The next statement of the deck proper, or nothing at the end. Errors inside go to the
+  /// session's diagnostics; reading goes on with the next statement.
   std::optional<Statement> next();
 
  private:

@@ -13,9 +13,9 @@ enum class ValueType { boolean, integer, real, string };
 using Value = std::variant<bool, std::int32_t, double, std::string>;
 
 ValueType type_of(const Value& v);
-const char* type_name(ValueType t);           ///< "bool", "integer", "real", "string"
-std::string printed(const Value& v);          ///< as `remark` prints it (section 5.11)
+const char* type_name(ValueType t);   ///< "bool", "integer", "real", "string"
+std::string printed(const Value& v);  ///< as `remark` prints it (section 5.11)
 std::string printed(double v);
-std::string number_text(double v);            ///< for messages: six digits, no point added
+std::string number_text(double v);  ///< for messages: six digits, no point added
 
 }  // namespace mbcosim

@@ -1,7 +1,7 @@
 /// Forward-mode dual numbers: a value and N directional derivatives.
 ///
-/// Arithmetic follows the chain rule; comparisons look at the value only. `Dual<1>` with the time as its
-/// only direction (`TimeDual`) turns a position constraint into its rate.
+/// Arithmetic follows the chain rule; comparisons look at the value only. `Dual<1>` with the time
+/// as its only direction (`TimeDual`) turns a position constraint into its rate.
 #pragma once
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace mbcosim {
 template <int N>
 struct Dual {
   static constexpr int directions = N;
-  double v = 0;     ///< value
+  double v = 0;      ///< value
   double d[N] = {};  ///< derivatives (N)
 
   Dual() = default;
@@ -153,7 +153,15 @@ struct NumTraits<mbcosim::Dual<N>> : GenericNumTraits<double> {
   using NonInteger = mbcosim::Dual<N>;
   using Nested = mbcosim::Dual<N>;
   using Literal = double;
-  enum { IsComplex = 0, IsInteger = 0, IsSigned = 1, RequireInitialization = 1, ReadCost = N, AddCost = N, MulCost = 3 * N };
+  enum {
+    IsComplex = 0,
+    IsInteger = 0,
+    IsSigned = 1,
+    RequireInitialization = 1,
+    ReadCost = N,
+    AddCost = N,
+    MulCost = 3 * N
+  };
 };
 template <int N, class Op>
 struct ScalarBinaryOpTraits<mbcosim::Dual<N>, double, Op> {

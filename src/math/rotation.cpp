@@ -26,8 +26,14 @@ Vec3 euler321_of_rotation(const Mat3& r) {
   return {a, b, c};
 }
 
-Mat3 rotation_of_euler123(const Vec3& a) { return rotation_x(a(0)) * rotation_y(a(1)) * rotation_z(a(2)); }
-Mat3 rotation_of_euler313(const Vec3& a) { return rotation_z(a(0)) * rotation_x(a(1)) * rotation_z(a(2)); }
-Mat3 rotation_of_euler321(const Vec3& a) { return rotation_z(a(0)) * rotation_y(a(1)) * rotation_x(a(2)); }
+Mat3 rotation_of_euler123(const Vec3& a) {
+  return rotation_x(a(0)) * rotation_y(a(1)) * rotation_z(a(2));
+}
+Mat3 rotation_of_euler313(const Vec3& a) {
+  return rotation_z(a(0)) * rotation_x(a(1)) * rotation_z(a(2));
+}
+Mat3 rotation_of_euler321(const Vec3& a) {
+  return rotation_z(a(0)) * rotation_y(a(1)) * rotation_x(a(2));
+}
 
 }  // namespace mbcosim

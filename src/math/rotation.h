@@ -1,8 +1,9 @@
 /// Rotations: Cayley-Gibbs-Rodrigues (CGR) parameters, rotation vectors, Euler angles.
 ///
-/// CGR parameters g describe the rotation by φ about n as g = 2 tan(φ/2) n (Ghiringhelli, Masarati and
-/// Mantegazza, "Multi-body implementation of finite volume C0 beams", AIAA J. 38(1), 2000).
-/// Angles in radians unless a name says degrees. R maps components in the rotated frame to the fixed one.
+/// CGR parameters g describe the rotation by φ about n as g = 2 tan(φ/2) n (Ghiringhelli, Masarati
+/// and Mantegazza, "Multi-body implementation of finite volume C0 beams", AIAA J. 38(1), 2000).
+/// Angles in radians unless a name says degrees. R maps components in the rotated frame to the
+/// fixed one.
 #pragma once
 
 #include <cmath>
@@ -76,18 +77,20 @@ Mat<T> rotation_of_vector(const Vec<T>& theta) {
   return r;
 }
 
-/// Aᵀ B, each entry summed in the same order: Aᵀ A is symmetric to the last bit, so that equal frames have a relative
-/// rotation vector of exactly zero. (The derivatives phase divides constraint errors by the square of a small number.)
+/// Aᵀ B, each entry summed in the same order: Aᵀ A is symmetric to the last bit, so that equal
+/// frames have a relative rotation vector of exactly zero. (The derivatives phase divides
+/// constraint errors by the square of a small number.)
 template <class T>
 Mat<T> relative_rotation(const Mat<T>& a, const Mat<T>& b) {
   Mat<T> r;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) r(i, j) = (a(0, i) * b(0, j) + a(1, i) * b(1, j)) + a(2, i) * b(2, j);
+    for (int j = 0; j < 3; ++j)
+      r(i, j) = (a(0, i) * b(0, j) + a(1, i) * b(1, j)) + a(2, i) * b(2, j);
   return r;
 }
 
-/// Rotation vector of R, norm in [0, π]; the inverse of `rotation_of_vector`. Also defined for matrices that are not
-/// quite orthogonal. Half turns take the axis from the symmetric part.
+/// Rotation vector of R, norm in [0, π]; the inverse of `rotation_of_vector`. Also defined for
+/// matrices that are not quite orthogonal. Half turns take the axis from the symmetric part.
 template <class T>
 Vec<T> vector_of_rotation(const Mat<T>& r) {
   using std::atan2;
@@ -133,7 +136,8 @@ inline Mat3 rotation_x(double a) { return rotation_of_vector(Vec3(a, 0, 0)); }
 inline Mat3 rotation_y(double a) { return rotation_of_vector(Vec3(0, a, 0)); }
 inline Mat3 rotation_z(double a) { return rotation_of_vector(Vec3(0, 0, a)); }
 
-/// How an orientation is written. Angles are printed in degrees, vectors in radians, matrices by rows.
+/// How an orientation is written. Angles are printed in degrees, vectors in radians, matrices by
+/// rows.
 enum class OrientationDescription { euler123, euler313, euler321, vector, matrix };
 
 Vec3 euler123_of_rotation(const Mat3& r);  ///< (a, b, c) with R = Rx(a) Ry(b) Rz(c) [rad]

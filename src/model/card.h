@@ -1,7 +1,9 @@
-/// The arguments of one statement, read in order: what the readers of elements, drives and laws see of the deck.
+/// The arguments of one statement, read in order: what the readers of elements, drives and laws see
+/// of the deck.
 ///
-/// Every method reads the next argument(s) and throws DeckError, with the place and the remedy, when they do not fit.
-/// Readers check values with `fail`, which points at the argument read last (or at a span taken before).
+/// Every method reads the next argument(s) and throws DeckError, with the place and the remedy,
+/// when they do not fit. Readers check values with `fail`, which points at the argument read last
+/// (or at a span taken before).
 #pragma once
 
 #include <initializer_list>
@@ -19,10 +21,11 @@
 
 namespace mbcosim {
 
-/// First node of a two-node element, for `reference, other node | other position | other orientation`. Spec 01 section 7.5.
+/// First node of a two-node element, for `reference, other node | other position | other
+/// orientation`. Spec 01 section 7.5.
 struct OtherNode {
-  int node = -1;                     ///< index among the structural nodes
-  Vec3 offset = Vec3::Zero();        ///< f_a, in the frame of `node`
+  int node = -1;                        ///< index among the structural nodes
+  Vec3 offset = Vec3::Zero();           ///< f_a, in the frame of `node`
   Mat3 orientation = Mat3::Identity();  ///< R_ha, relative to `node`
 };
 
@@ -31,14 +34,16 @@ class Card {
   virtual ~Card() = default;
 
   // ------------------------------------------------------------------ words
-  /// Consumes the optional keyword `word` when it is the whole next argument (blanks and case do not matter).
+  /// Consumes the optional keyword `word` when it is the whole next argument (blanks and case do
+  /// not matter).
   virtual bool keyword(std::string_view word) = 0;
-  /// Index of the keyword among `words` that is the next argument, consumed; -1 (nothing consumed) when it is none of them.
+  /// Index of the keyword among `words` that is the next argument, consumed; -1 (nothing consumed)
+  /// when it is none of them.
   virtual int one_of(std::initializer_list<std::string_view> words) = 0;
   /// The same, but refused with the list of what is accepted. `what`: "integration method".
   virtual int required(std::string_view what, std::initializer_list<std::string_view> words) = 0;
-  /// The next argument as a normalized word if it looks like one (letters, digits, blanks, ended by `,` or `;`), not
-  /// consumed; empty otherwise.
+  /// The next argument as a normalized word if it looks like one (letters, digits, blanks, ended by
+  /// `,` or `;`), not consumed; empty otherwise.
   virtual std::string peek_word() = 0;
   /// Consumes the next argument as a word and returns it normalized; refused when it is not one.
   virtual std::string word(std::string_view what) = 0;
@@ -47,16 +52,19 @@ class Card {
   /// Is the next argument a quoted string?
   virtual bool at_string() = 0;
 
-  // ------------------------------------------------------------------ scalars (an empty argument takes `fallback`)
+  // ------------------------------------------------------------------ scalars (an empty argument
+  // takes `fallback`)
   virtual double real(std::string_view what, double fallback = 0) = 0;
   virtual int integer(std::string_view what, int fallback = 0) = 0;
-  virtual int label(std::string_view what) = 0;  ///< 0..2147483647
+  virtual int label(std::string_view what) = 0;    ///< 0..2147483647
   virtual bool yes_no(std::string_view what) = 0;  ///< `yes`, `no` or an expression
   virtual std::string quoted(std::string_view what) = 0;
-  /// A file name: quoted, found relative to the file being read; returns the text of the file. `name` gets the name as written.
+  /// A file name: quoted, found relative to the file being read; returns the text of the file.
+  /// `name` gets the name as written.
   virtual std::string file_contents(std::string_view what, std::string* name) = 0;
 
-  // ------------------------------------------------------------------ structured values without frames (spec 01 section 6)
+  // ------------------------------------------------------------------ structured values without
+  // frames (spec 01 section 6)
   virtual Vec3 vec3(std::string_view what) = 0;
   virtual Vec6 vec6(std::string_view what) = 0;
   virtual Mat3 mat3(std::string_view what) = 0;
@@ -67,15 +75,21 @@ class Card {
   virtual Mat3 orientation(std::string_view what) = 0;
   virtual OrientationDescription orientation_description() = 0;
 
-  // ------------------------------------------------------------------ in frames (spec 01 section 7); `node`: structural node index
-  /// `context`: structural node that `reference, node` and `reference, local` mean; -1: the global frame.
-  virtual Vec3 absolute_position(std::string_view what, int context = -1, const OtherNode* other = nullptr) = 0;
-  virtual Mat3 absolute_orientation(std::string_view what, int context = -1, const OtherNode* other = nullptr) = 0;
+  // ------------------------------------------------------------------ in frames (spec 01 section
+  // 7); `node`: structural node index
+  /// `context`: structural node that `reference, node` and `reference, local` mean; -1: the global
+  /// frame.
+  virtual Vec3 absolute_position(std::string_view what, int context = -1,
+                                 const OtherNode* other = nullptr) = 0;
+  virtual Mat3 absolute_orientation(std::string_view what, int context = -1,
+                                    const OtherNode* other = nullptr) = 0;
   virtual Vec3 absolute_velocity(std::string_view what, const Vec3& at) = 0;
   virtual Vec3 absolute_angular_velocity(std::string_view what) = 0;
   virtual Vec3 absolute_vector(std::string_view what) = 0;
-  virtual Vec3 relative_position(std::string_view what, int node, const OtherNode* other = nullptr) = 0;
-  virtual Mat3 relative_orientation(std::string_view what, int node, const OtherNode* other = nullptr) = 0;
+  virtual Vec3 relative_position(std::string_view what, int node,
+                                 const OtherNode* other = nullptr) = 0;
+  virtual Mat3 relative_orientation(std::string_view what, int node,
+                                    const OtherNode* other = nullptr) = 0;
   virtual Vec3 relative_vector(std::string_view what, int node) = 0;
   /// Free vector, normalised; refused when null, warning when its norm was not 1.
   virtual Vec3 relative_unit_vector(std::string_view what, int node) = 0;
@@ -84,7 +98,8 @@ class Card {
 
   // ------------------------------------------------------------------ shared objects
   virtual DrivePtr drive(std::string_view what = "drive") = 0;
-  /// Vector template drive; entities are absolute vectors, or relative to `node`'s frame when node >= 0.
+  /// Vector template drive; entities are absolute vectors, or relative to `node`'s frame when node
+  /// >= 0.
   virtual Vec3DrivePtr vec3_drive(std::string_view what = "vector drive", int node = -1) = 0;
   virtual TplDrivePtr<6> vec6_drive(std::string_view what = "vector drive") = 0;
   virtual LawPtr<1> law1() = 0;
@@ -92,33 +107,41 @@ class Card {
   virtual LawPtr<6> law6() = 0;
   template <int N>
   LawPtr<N> law() {
-    if constexpr (N == 1) return law1();
-    else if constexpr (N == 3) return law3();
-    else return law6();
+    if constexpr (N == 1)
+      return law1();
+    else if constexpr (N == 3)
+      return law3();
+    else
+      return law6();
   }
   virtual ScalarFunctionPtr scalar_function(std::string_view what = "scalar function") = 0;
   virtual FluidPtr fluid() = 0;
   /// A file driver of the `drivers` block, by label.
   virtual FileDriverPtr file_driver() = 0;
-  /// A quoted expression as a function of time, compiled once. Unknown names are reported at the end of the deck.
+  /// A quoted expression as a function of time, compiled once. Unknown names are reported at the
+  /// end of the deck.
   virtual DrivePtr string_expression(const std::string& text) = 0;
-  /// A quoted expression with further variables `names` ("eps" of a symbolic law), whose values are passed at evaluation.
-  virtual ExpressionPtr expression_of(const std::string& text, const std::vector<std::string>& names) = 0;
+  /// A quoted expression with further variables `names` ("eps" of a symbolic law), whose values are
+  /// passed at evaluation.
+  virtual ExpressionPtr expression_of(const std::string& text,
+                                      const std::vector<std::string>& names) = 0;
   /// Sets a symbol that `model::current("L")` sees until the end of this card.
   virtual void set_current(const std::string& name, double value) = 0;
 
-  /// The drive of a `driven` element's datum: `given` as the card has it or, with the hint `<name>{<number>}`, the number
-  /// that the hint's expression had when the element became active.
+  /// The drive of a `driven` element's datum: `given` as the card has it or, with the hint
+  /// `<name>{<number>}`, the number that the hint's expression had when the element became active.
   virtual DrivePtr hinted(std::string_view name, DrivePtr given) = 0;
   /// The same for `<name>{<x>, <y>, <z> [, <drive>]}`; the drive multiplies the vector.
   virtual Vec3DrivePtr hinted(std::string_view name, Vec3DrivePtr given) = 0;
 
-  // ------------------------------------------------------------------ references to nodes and elements
+  // ------------------------------------------------------------------ references to nodes and
+  // elements
   enum class NodeNeed { any, six_dof, dynamic_or_static_displacement, not_dummy };
   /// Index of a structural node read by label. `six_dof`: refuses displacement and dummy nodes.
   virtual int structural_node(NodeNeed need = NodeNeed::six_dof) = 0;
   virtual int scalar_node(ScalarKind kind) = 0;  ///< index among the scalar nodes
-  /// `<label>, <type> [, index] [, order]`; order words are read only when `with_order` and the dof is differential.
+  /// `<label>, <type> [, index] [, order]`; order words are read only when `with_order` and the dof
+  /// is differential.
   virtual NodeDof node_dof(bool with_order) = 0;
   /// `<label>, <element type>` or the family given: an element declared before.
   virtual ElementRef element(Family family) = 0;
@@ -134,9 +157,11 @@ class Card {
   virtual SourceSpan next() = 0;
   /// Refuses the card: `message` without position; `hint` says how to mend it.
   [[noreturn]] void fail(const std::string& message, const std::string& hint = "");
-  [[noreturn]] virtual void fail_at(SourceSpan where, const std::string& message, const std::string& hint = "") = 0;
+  [[noreturn]] virtual void fail_at(SourceSpan where, const std::string& message,
+                                    const std::string& hint = "") = 0;
   virtual void warn(const std::string& message, const std::string& hint = "") = 0;
-  virtual void warn_at(SourceSpan where, const std::string& message, const std::string& hint = "") = 0;
+  virtual void warn_at(SourceSpan where, const std::string& message,
+                       const std::string& hint = "") = 0;
 };
 
 }  // namespace mbcosim

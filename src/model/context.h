@@ -15,7 +15,8 @@ struct EvalContext {
   double time = 0;  ///< end of the step [s]
   double h = 0;     ///< step length [s]
   double c = 1;     ///< coefficient of the step: position constraint rows are divided by it
-  double seed = 1;  ///< ∂y/∂δ of differential unknowns in Jacobians; c except where ∂r/∂y and ∂r/∂ẏ are taken apart
+  double seed = 1;  ///< ∂y/∂δ of differential unknowns in Jacobians; c except where ∂r/∂y and ∂r/∂ẏ
+                    ///< are taken apart
   double c_algebraic = 1;  ///< ∂ẏ/∂y of algebraic unknowns (bookkeeping)
   Phase phase = Phase::step;
   Vec3 uniform_gravity = Vec3::Zero();  ///< [m/s²]; see Model::gravity_at for any point
@@ -23,10 +24,10 @@ struct EvalContext {
 
 /// Position, orientation and velocities of a structural node, global components.
 struct NodeState {
-  Vec3 x = Vec3::Zero();       ///< [m]
-  Mat3 R = Mat3::Identity();   ///< node frame -> global
-  Vec3 v = Vec3::Zero();       ///< [m/s]
-  Vec3 w = Vec3::Zero();       ///< [rad/s]
+  Vec3 x = Vec3::Zero();      ///< [m]
+  Mat3 R = Mat3::Identity();  ///< node frame -> global
+  Vec3 v = Vec3::Zero();      ///< [m/s]
+  Vec3 w = Vec3::Zero();      ///< [rad/s]
 };
 
 struct NodeAcceleration {

@@ -52,8 +52,9 @@ Excerpt excerpt(const std::string& line, int column) {
   const std::size_t at = static_cast<std::size_t>(std::max(column - 1, 0));
   const std::size_t begin = at > kBefore ? std::min(at - kBefore, line.size() - kWidth) : 0;
   const bool cut_before = begin > 0, cut_after = begin + kWidth < line.size();
-  return {(cut_before ? "..." : "") + printable(line.substr(begin, kWidth)) + (cut_after ? "..." : ""),
-          column - static_cast<int>(begin) + (cut_before ? 3 : 0)};
+  return {
+      (cut_before ? "..." : "") + printable(line.substr(begin, kWidth)) + (cut_after ? "..." : ""),
+      column - static_cast<int>(begin) + (cut_before ? 3 : 0)};
 }
 
 /// The blanks that put a caret below `column`; tabs stay tabs, so that both lines indent alike.

@@ -1,4 +1,5 @@
-/// What can be wrong, as values: deck diagnostics with their place, and run-time failures with their kind.
+/// What can be wrong, as values: deck diagnostics with their place, and run-time failures with
+/// their kind.
 #pragma once
 
 #include <stdexcept>
@@ -9,7 +10,8 @@
 
 namespace mbcosim {
 
-/// A piece of deck text. `file` indexes the reader's list of files (0: the deck itself); lines and columns count from 1.
+/// A piece of deck text. `file` indexes the reader's list of files (0: the deck itself); lines and
+/// columns count from 1.
 struct SourceSpan {
   int file = -1;
   int line = 0;
@@ -25,10 +27,12 @@ struct Diagnostic {
   std::string code;  ///< stable identifier, e.g. "unknown-variable", "limit-include-depth"
   std::string file;  ///< name as the user wrote it
   int line = 0, column = 0, length = 0;
-  std::string message;            ///< names the card, entity and label; says what was found and what is accepted
-  std::string source_line;        ///< the offending line of the deck
-  std::string hint;               ///< how to mend it; may be empty
-  std::vector<std::string> trail;  ///< "included from a.mbd:3", "in iteration k = 4 of the loop at b.mbd:7"
+  std::string
+      message;  ///< names the card, entity and label; says what was found and what is accepted
+  std::string source_line;  ///< the offending line of the deck
+  std::string hint;         ///< how to mend it; may be empty
+  std::vector<std::string>
+      trail;  ///< "included from a.mbd:3", "in iteration k = 4 of the loop at b.mbd:7"
 
   /// `file:line:column: error: message`, the line, a caret, the hint and the trail.
   std::string text() const;
@@ -40,13 +44,13 @@ enum class ErrorKind {
   precondition,   ///< the call is not allowed in this state
   not_converged,  ///< Newton did not meet its tolerance; see `failure`
   singular,       ///< the matrix cannot be factored; see `failure`
-  evaluation,     ///< a drive, law or function could not be evaluated (domain error, division by zero)
-  peer,           ///< a coupled peer failed
-  limit,          ///< a configured limit was exceeded; its name is in `reason`
-  cancelled,      ///< cancelled or past its deadline
-  io,             ///< a file could not be read or written
-  data_loss,      ///< bytes to import are damaged
-  internal,       ///< our mistake
+  evaluation,  ///< a drive, law or function could not be evaluated (domain error, division by zero)
+  peer,        ///< a coupled peer failed
+  limit,       ///< a configured limit was exceeded; its name is in `reason`
+  cancelled,   ///< cancelled or past its deadline
+  io,          ///< a file could not be read or written
+  data_loss,   ///< bytes to import are damaged
+  internal,    ///< our mistake
 };
 
 /// One of the worst equations of a failed solve.
@@ -95,14 +99,16 @@ struct Nothing {};
 using Status = Result<Nothing>;
 inline Status ok() { return Nothing{}; }
 
-/// Thrown by readers below the statement level; the statement loop catches it, records it and goes on at the next `;`.
+/// Thrown by readers below the statement level; the statement loop catches it, records it and goes
+/// on at the next `;`.
 class DeckError : public std::runtime_error {
  public:
   explicit DeckError(Diagnostic d) : std::runtime_error(d.message), diagnostic(std::move(d)) {}
   Diagnostic diagnostic;
 };
 
-/// Thrown when a drive, law or function cannot be evaluated; `Simulation` turns it into an `Error` of kind `evaluation`.
+/// Thrown when a drive, law or function cannot be evaluated; `Simulation` turns it into an `Error`
+/// of kind `evaluation`.
 class EvaluationError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

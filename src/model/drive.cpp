@@ -5,11 +5,15 @@
 
 namespace mbcosim {
 
-double Drive::derivative(const EvalContext&, double) const { throw EvaluationError("this drive has no derivative"); }
+double Drive::derivative(const EvalContext&, double) const {
+  throw EvaluationError("this drive has no derivative");
+}
 
 double Drive::value(const EvalContext& context) const { return value(context, context.time); }
 
-double derivative_in_time(const Drive& drive, const EvalContext& context) { return drive.derivative(context, context.time); }
+double derivative_in_time(const Drive& drive, const EvalContext& context) {
+  return drive.derivative(context, context.time);
+}
 
 namespace {
 
@@ -39,6 +43,8 @@ class ConstantVec3Drive : public TplDrive<3, 1> {
 }  // namespace
 
 DrivePtr make_constant_drive(double value) { return std::make_shared<ConstantDrive>(value); }
-Vec3DrivePtr make_constant_vec3_drive(const Vec3& value) { return std::make_shared<ConstantVec3Drive>(value); }
+Vec3DrivePtr make_constant_vec3_drive(const Vec3& value) {
+  return std::make_shared<ConstantVec3Drive>(value);
+}
 
 }  // namespace mbcosim

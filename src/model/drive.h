@@ -10,33 +10,38 @@
 
 namespace mbcosim {
 
-/// A scalar function. Immutable: what a drive remembers (sample and hold, random seeds, filters) lives in `State::memory`
-/// at an offset that it got from `ModelBuilder::allocate_memory`; it advances in `advance`, once a step.
+/// A scalar function. Immutable: what a drive remembers (sample and hold, random seeds, filters)
+/// lives in `State::memory` at an offset that it got from `ModelBuilder::allocate_memory`; it
+/// advances in `advance`, once a step.
 class Drive {
  public:
   virtual ~Drive() = default;
-  /// Value for the argument `t`; throws EvaluationError. `context.time` is the time of the step's end.
+  /// Value for the argument `t`; throws EvaluationError. `context.time` is the time of the step's
+  /// end.
   virtual double value(const EvalContext& context, double t) const = 0;
   virtual bool has_derivative() const { return false; }
   /// Derivative with respect to the argument; only when `has_derivative()`.
   virtual double derivative(const EvalContext& context, double t) const;
 
-  /// Value in time: for t = context.time, unless the drive tells an argument from the time (run-time strings: `Var` is 0).
+  /// Value in time: for t = context.time, unless the drive tells an argument from the time
+  /// (run-time strings: `Var` is 0).
   virtual double value(const EvalContext& context) const;
   /// Value in time as any scalar: a TimeDual carries the derivative when there is one, else zero.
   template <class T>
   T value_as(const EvalContext& context) const;
 };
 
-/// Called once at the start of each step, after time was set to the step's end and before the prediction; also once with
-/// `initial` at the start of the run. Registered with ModelBuilder::on_step.
+/// Called once at the start of each step, after time was set to the step's end and before the
+/// prediction; also once with `initial` at the start of the run. Registered with
+/// ModelBuilder::on_step.
 class StepListener {
  public:
   virtual ~StepListener() = default;
   virtual void advance(const EvalContext& context, State& state, bool initial) const = 0;
 };
 
-/// A vector- or matrix-valued function: Σ entityₖ·driveₖ or one drive per component. Spec 03 section 2.
+/// A vector- or matrix-valued function: Σ entityₖ·driveₖ or one drive per component. Spec 03
+/// section 2.
 template <int R, int C>
 class TplDrive {
  public:
@@ -44,7 +49,8 @@ class TplDrive {
   virtual ~TplDrive() = default;
   virtual Value value(const EvalContext& context) const = 0;
   virtual bool has_derivative() const { return false; }
-  virtual Value derivative(const EvalContext& context) const = 0;  ///< d/dt; zero when there is none
+  virtual Value derivative(
+      const EvalContext& context) const = 0;  ///< d/dt; zero when there is none
 
   /// Value in time as any scalar type (3-vectors); a TimeDual carries the time derivative.
   template <class T>

@@ -51,7 +51,8 @@ struct EigenReport {
   std::complex<double> eigenvalue(int mode) const {
     const double r = solution.alpha_r(mode), i = solution.alpha_i(mode), b = solution.beta(mode);
     const double d = pencil.kappa * ((r + b) * (r + b) + i * i);
-    if (d <= 1e-24 * pencil.kappa * (r * r + i * i + b * b)) return {std::numeric_limits<double>::infinity(), 0};
+    if (d <= 1e-24 * pencil.kappa * (r * r + i * i + b * b))
+      return {std::numeric_limits<double>::infinity(), 0};
     return {(r * r + i * i - b * b) / d, 2 * i * b / d};
   }
 };

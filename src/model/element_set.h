@@ -15,16 +15,37 @@ namespace mbcosim {
 
 class OutputRow;
 
-/// Families that share a label space, in the order in which their unknowns are numbered (spec 02 section 1.1).
+/// Families that share a label space, in the order in which their unknowns are numbered (spec 02
+/// section 1.1).
 enum class Family {
-  joint, joint_regularization, plate, genel, induced_velocity, aerodynamic, aeromodal, electric, thermal, hydraulic, loadable,
+  joint,
+  joint_regularization,
+  plate,
+  genel,
+  induced_velocity,
+  aerodynamic,
+  aeromodal,
+  electric,
+  thermal,
+  hydraulic,
+  loadable,
   // families without unknowns of their own
-  body, beam, force, gravity, inertia, automatic_structural, air_properties, bulk, output_element, count
+  body,
+  beam,
+  force,
+  gravity,
+  inertia,
+  automatic_structural,
+  air_properties,
+  bulk,
+  output_element,
+  count
 };
-const char* family_name(Family family);  ///< "joint", "hydraulic", ... as in private data and messages
+const char* family_name(
+    Family family);  ///< "joint", "hydraulic", ... as in private data and messages
 
-/// A number of a `driven` element that is taken anew from the model's state whenever the element becomes active (`hint`
-/// of `driven`, input manual): State::memory[memory] = source.
+/// A number of a `driven` element that is taken anew from the model's state whenever the element
+/// becomes active (`hint` of `driven`, input manual): State::memory[memory] = source.
 struct HintSample {
   DrivePtr source;
   int memory = -1;
@@ -38,20 +59,21 @@ struct ElementInfo {
   std::string name;
   SourceSpan where;
   bool output = true;
-  DrivePtr driven;       ///< active while non-zero; null: always active
-  int active_memory = -1;  ///< offset of the activity flag in State::memory when driven
-  int order = 0;         ///< declaration order over all elements
+  DrivePtr driven;                ///< active while non-zero; null: always active
+  int active_memory = -1;         ///< offset of the activity flag in State::memory when driven
+  int order = 0;                  ///< declaration order over all elements
   std::vector<HintSample> hints;  ///< of `driven`
 };
 
-/// How dependences of a node's kinematics on its Newton increments enter Jacobians: δx = c δ, δv = δ for the position
-/// unknowns; δθ = A δ, δw = B δ for the rotation unknowns (spec 02 section 6.2).
+/// How dependences of a node's kinematics on its Newton increments enter Jacobians: δx = c δ, δv =
+/// δ for the position unknowns; δθ = A δ, δw = B δ for the rotation unknowns (spec 02 section 6.2).
 struct NodeSeeds {
   Mat3 A;  ///< c G(g)
   Mat3 B;  ///< ∂w/∂δ
 };
 
-/// Collects which rows meet which columns; the answer is where each entry of a dense block lies in the sparse values.
+/// Collects which rows meet which columns; the answer is where each entry of a dense block lies in
+/// the sparse values.
 class PatternSink {
  public:
   virtual ~PatternSink() = default;
@@ -67,9 +89,9 @@ class PositionSource {
 
 /// Mass properties about a node's origin, global frame.
 struct Inertia {
-  double m = 0;             ///< [kg]
-  Vec3 S = Vec3::Zero();    ///< first moment [kg·m]
-  Mat3 J = Mat3::Zero();    ///< second moment [kg·m²]
+  double m = 0;           ///< [kg]
+  Vec3 S = Vec3::Zero();  ///< first moment [kg·m]
+  Mat3 J = Mat3::Zero();  ///< second moment [kg·m²]
 };
 
 enum class AssemblyRole {
@@ -88,44 +110,55 @@ class ElementSet {
   virtual ElementInfo& info(int i) = 0;
 
   // --- unknowns and structure, while the model is being finished
-  virtual int unknowns(int i) const = 0;                              ///< number of own unknowns of element i
-  virtual bool is_differential(int i, int k) const = 0;               ///< kind of own unknown k
-  virtual std::string row_name(int i, int k) const = 0;               ///< meaning of own row k
-  virtual std::vector<int> nodes(int i) const = 0;                    ///< structural nodes it is attached to (indices)
-  virtual int first_own(int i) const = 0;                             ///< first own unknown, as given to bind
-  virtual void bind(const Model& model, int i, int first_own) = 0;    ///< own unknowns start at first_own
+  virtual int unknowns(int i) const = 0;                 ///< number of own unknowns of element i
+  virtual bool is_differential(int i, int k) const = 0;  ///< kind of own unknown k
+  virtual std::string row_name(int i, int k) const = 0;  ///< meaning of own row k
+  virtual std::vector<int> nodes(
+      int i) const = 0;                    ///< structural nodes it is attached to (indices)
+  virtual int first_own(int i) const = 0;  ///< first own unknown, as given to bind
+  virtual void bind(const Model& model, int i,
+                    int first_own) = 0;  ///< own unknowns start at first_own
   virtual void collect_pattern(PatternSink& sink) const = 0;
   virtual void set_positions(const PositionSource& positions) = 0;
 
   // --- evaluation
-  /// Initial values of own unknowns and memory of element i; also when a `driven` element becomes active.
+  /// Initial values of own unknowns and memory of element i; also when a `driven` element becomes
+  /// active.
   virtual void start(const EvalContext& context, State& state, int i) const = 0;
-  /// After an initial assembly that moved something: multipliers restart from zero, the rest from `start`.
+  /// After an initial assembly that moved something: multipliers restart from zero, the rest from
+  /// `start`.
   virtual void after_assembly(const EvalContext& context, State& state, int i) const;
   virtual void residual(const EvalContext& context, double* r) const = 0;  ///< adds to r (n)
   /// Adds −∂r/∂δ to the sparse values; seeds by structural node index.
-  virtual void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const = 0;
+  virtual void jacobian(const EvalContext& context, const NodeSeeds* seeds,
+                        double* values) const = 0;
   virtual void after_predict(const EvalContext& context, State& state) const = 0;
   virtual void after_convergence(const EvalContext& context, State& state) const = 0;
 
-  // --- initial assembly: state.y, yp hold positions and rates, multipliers λ and λ′ (spec 02 section 9)
+  // --- initial assembly: state.y, yp hold positions and rates, multipliers λ and λ′ (spec 02
+  // section 9)
   virtual AssemblyRole assembly_role(int i) const = 0;
-  /// Adds to position-level rows r (n) and rate-level rows r_rate (n), both in the model's row numbering.
-  virtual void assembly_residual(const EvalContext& context, int i, double* r, double* r_rate) const = 0;
+  /// Adds to position-level rows r (n) and rate-level rows r_rate (n), both in the model's row
+  /// numbering.
+  virtual void assembly_residual(const EvalContext& context, int i, double* r,
+                                 double* r_rate) const = 0;
   /// Appends −∂(r, r_rate)/∂(y, yp) of element i: row and column numbers ≥ n mean the rate level.
   struct Triplet {
     int row, column;
     double value;
   };
-  virtual void assembly_jacobian(const EvalContext& context, int i, int n, std::vector<Triplet>& out) const = 0;
+  virtual void assembly_jacobian(const EvalContext& context, int i, int n,
+                                 std::vector<Triplet>& out) const = 0;
 
   // --- results
   virtual void output(const EvalContext& context, int i, OutputRow& row) const = 0;
-  virtual std::string log_line(const Model& model, int i) const = 0;  ///< line of .log without newline; may be empty
+  virtual std::string log_line(const Model& model,
+                               int i) const = 0;  ///< line of .log without newline; may be empty
   virtual int private_datum(int i, std::string_view name) const = 0;  ///< index, or -1
   virtual std::vector<std::string> private_data(int i) const = 0;     ///< names, for describe
   virtual double private_value(const EvalContext& context, int i, int datum) const = 0;
-  /// Adds the inertia that element i attaches to structural node `node` (global frame, about the node).
+  /// Adds the inertia that element i attaches to structural node `node` (global frame, about the
+  /// node).
   virtual void add_inertia(const EvalContext& context, int i, int node, Inertia& inertia) const = 0;
   /// Adds the momentum of element i to the initial momentum of its nodes.
   virtual void add_momentum(const EvalContext& context, int i, State& state) const = 0;

@@ -8,7 +8,8 @@ namespace {
 
 Vec3 at(const std::vector<double>& y, int i) { return Vec3(y[i], y[i + 1], y[i + 2]); }
 
-/// Position and motion of a `relative frame` dummy: `n` seen from frame (r, f, H). Spec 02 section 6.4.
+/// Position and motion of a `relative frame` dummy: `n` seen from frame (r, f, H). Spec 02
+/// section 6.4.
 NodeState relative_state(const NodeState& n, const NodeState& r, const Vec3& f, const Mat3& h) {
   const Mat3 t = h.transpose() * r.R.transpose();
   NodeState s;
@@ -26,8 +27,9 @@ NodeState attached_state(const NodeState& r, const Vec3& f, const Mat3& h) {
 }
 
 /// Second time derivative of `relative_state`.
-NodeAcceleration relative_acceleration(const NodeState& n, const NodeAcceleration& an, const NodeState& r,
-                                       const NodeAcceleration& ar, const Mat3& h) {
+NodeAcceleration relative_acceleration(const NodeState& n, const NodeAcceleration& an,
+                                       const NodeState& r, const NodeAcceleration& ar,
+                                       const Mat3& h) {
   const Mat3 t = h.transpose() * r.R.transpose();
   const Vec3 d = n.x - r.x, v = n.v - r.v;
   return {t * (an.a - ar.a - ar.wp.cross(d) - 2 * r.w.cross(v) + r.w.cross(r.w.cross(d))),
@@ -35,34 +37,56 @@ NodeAcceleration relative_acceleration(const NodeState& n, const NodeAcceleratio
 }
 
 /// Acceleration of a point at `arm` (global axes) on the rigid frame r.
-NodeAcceleration attached_acceleration(const NodeState& r, const NodeAcceleration& ar, const Vec3& arm) {
+NodeAcceleration attached_acceleration(const NodeState& r, const NodeAcceleration& ar,
+                                       const Vec3& arm) {
   return {ar.a + ar.wp.cross(arm) + r.w.cross(r.w.cross(arm)), ar.wp};
 }
 
-NodeAcceleration dummy_acceleration(const Model& model, const EvalContext& context, const StructuralNode& n) {
+NodeAcceleration dummy_acceleration(const Model& model, const EvalContext& context,
+                                    const StructuralNode& n) {
   const NodeState base = model.node_state(context, n.base);
   const NodeAcceleration a = model.node_acceleration(context, n.base);
-  if (n.kind == StructuralKind::dummy_offset) return attached_acceleration(base, a, base.R * n.offset);
+  if (n.kind == StructuralKind::dummy_offset)
+    return attached_acceleration(base, a, base.R * n.offset);
   const NodeState reference = model.node_state(context, n.reference);
-  NodeAcceleration s = relative_acceleration(base, a, reference, model.node_acceleration(context, n.reference), n.orientation);
+  NodeAcceleration s = relative_acceleration(
+      base, a, reference, model.node_acceleration(context, n.reference), n.orientation);
   if (n.pivot < 0) return s;
   // The relative motion again, carried by the pivot's frame p: a = p̈ + Coriolis + P s̈.
   const NodeState relative = relative_state(base, reference, n.offset, n.orientation);
   const NodeState pivot = model.node_state(context, n.pivot);
   const NodeState p = attached_state(pivot, n.pivot_offset, n.pivot_orientation);
-  const NodeAcceleration carried = attached_acceleration(pivot, model.node_acceleration(context, n.pivot),
-                                                         pivot.R * n.pivot_offset + p.R * relative.x);
+  const NodeAcceleration carried =
+      attached_acceleration(pivot, model.node_acceleration(context, n.pivot),
+                            pivot.R * n.pivot_offset + p.R * relative.x);
   const Vec3 spin = p.R * relative.w;
-  return {carried.a + 2 * p.w.cross(p.R * relative.v) + p.R * s.a, carried.wp + p.w.cross(spin) + p.R * s.wp};
+  return {carried.a + 2 * p.w.cross(p.R * relative.v) + p.R * s.a,
+          carried.wp + p.w.cross(spin) + p.R * s.wp};
 }
 
 }  // namespace
 
 const char* family_name(Family family) {
-  static constexpr const char* kNames[] = {"joint", "joint regularization", "plate", "genel", "induced velocity element",
-                                           "aerodynamic element", "aeromodal", "electric element", "thermal element",
-                                           "hydraulic element", "user defined element", "body", "beam", "force", "gravity",
-                                           "inertia", "automatic structural", "air properties", "bulk element", "output element"};
+  static constexpr const char* kNames[] = {"joint",
+                                           "joint regularization",
+                                           "plate",
+                                           "genel",
+                                           "induced velocity element",
+                                           "aerodynamic element",
+                                           "aeromodal",
+                                           "electric element",
+                                           "thermal element",
+                                           "hydraulic element",
+                                           "user defined element",
+                                           "body",
+                                           "beam",
+                                           "force",
+                                           "gravity",
+                                           "inertia",
+                                           "automatic structural",
+                                           "air properties",
+                                           "bulk element",
+                                           "output element"};
   return kNames[static_cast<int>(family)];
 }
 
@@ -70,10 +94,12 @@ NodeState Model::node_state(const EvalContext& context, int node) const {
   const StructuralNode& n = structural[node];
   if (n.is_dummy()) {
     const NodeState base = node_state(context, n.base);
-    if (n.kind == StructuralKind::dummy_offset) return attached_state(base, n.offset, n.orientation);
+    if (n.kind == StructuralKind::dummy_offset)
+      return attached_state(base, n.offset, n.orientation);
     NodeState s = relative_state(base, node_state(context, n.reference), n.offset, n.orientation);
     if (n.pivot < 0) return s;
-    const NodeState p = attached_state(node_state(context, n.pivot), n.pivot_offset, n.pivot_orientation);
+    const NodeState p =
+        attached_state(node_state(context, n.pivot), n.pivot_offset, n.pivot_orientation);
     NodeState r = attached_state(p, s.x, s.R);
     r.v += p.R * s.v;
     r.w += p.R * s.w;
@@ -100,14 +126,16 @@ NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) 
   if (n.kind == StructuralKind::modal) return {at(yp, n.first + 6), at(yp, n.first + 9)};
   if (!n.has_momentum()) return r;
   Inertia inertia;
-  for (const ElementRef& body : node_bodies[node]) body.set->add_inertia(context, body.index, node, inertia);
+  for (const ElementRef& body : node_bodies[node])
+    body.set->add_inertia(context, body.index, node, inertia);
   if (inertia.m <= 0) return r;
   if (n.is_displacement()) {
     r.a = at(yp, n.first + 3) / inertia.m;
     return r;
   }
   const NodeState s = node_state(context, node);
-  const Vec3 b = at(context.state->y, n.first + 6), bp = at(yp, n.first + 6), gp = at(yp, n.first + 9);
+  const Vec3 b = at(context.state->y, n.first + 6), bp = at(yp, n.first + 6),
+             gp = at(yp, n.first + 9);
   const Vec3 x = inertia.S / inertia.m;
   const Mat3 jc = inertia.J + cross<double>(x) * cross<double>(inertia.S);
   const Vec3 torque = gp - x.cross(bp) - s.w.cross(jc * s.w) + s.v.cross(b);
@@ -166,13 +194,17 @@ double Model::dof_value(const EvalContext& context, const NodeDof& dof) const {
     return dof.component < 3 ? a.a(dof.component) : a.wp(dof.component - 3);
   }
   if (dof.component >= 6) {  // modal nodes: v and w are unknowns of their own
-    if (context.phase == Phase::input) return dof.component < 9 ? n.v(dof.component - 6) : n.w(dof.component - 9);
-    return dof.order == 0 ? context.state->y[n.first + dof.component] : context.state->yp[n.first + dof.component];
+    if (context.phase == Phase::input)
+      return dof.component < 9 ? n.v(dof.component - 6) : n.w(dof.component - 9);
+    return dof.order == 0 ? context.state->y[n.first + dof.component]
+                          : context.state->yp[n.first + dof.component];
   }
   const NodeState s = node_state(context, dof.node);
   if (dof.component < 3) return dof.order == 0 ? s.x(dof.component) : s.v(dof.component);
   if (dof.order == 0)
-    throw EvaluationError(node_text(dof.node) + ": the value of a rotation degree of freedom is not defined; use its derivative");
+    throw EvaluationError(
+        node_text(dof.node) +
+        ": the value of a rotation degree of freedom is not defined; use its derivative");
   return s.w(dof.component - 3);
 }
 
@@ -215,15 +247,19 @@ std::pair<std::string, std::string> Model::row_text(int row) const {
     const int j = definition ? i : row - n.equilibrium;
     const std::string axis = kAxis[j % 3];
     if (definition) {
-      if (n.kind == StructuralKind::modal) return {node_text(static_cast<int>(k)), "velocity definition " + std::to_string(j + 1)};
-      return {node_text(static_cast<int>(k)), (j < 3 ? "momentum definition " : "momenta moment definition ") + axis};
+      if (n.kind == StructuralKind::modal)
+        return {node_text(static_cast<int>(k)), "velocity definition " + std::to_string(j + 1)};
+      return {node_text(static_cast<int>(k)),
+              (j < 3 ? "momentum definition " : "momenta moment definition ") + axis};
     }
     return {node_text(static_cast<int>(k)), (j < 3 ? "force balance " : "moment balance ") + axis};
   }
-  static constexpr const char* kScalar[] = {"abstract", "electric", "hydraulic", "thermal", "parameter"};
+  static constexpr const char* kScalar[] = {"abstract", "electric", "hydraulic", "thermal",
+                                            "parameter"};
   for (const ScalarNode& n : scalars)
     if (n.unknown == row)
-      return {std::string(kScalar[static_cast<int>(n.kind)]) + " node " + std::to_string(n.label), "balance"};
+      return {std::string(kScalar[static_cast<int>(n.kind)]) + " node " + std::to_string(n.label),
+              "balance"};
   for (const ElementRef& e : elements) {
     const int first = e.set->first_own(e.index);
     if (first >= 0 && row >= first && row < first + e.set->unknowns(e.index))

@@ -1,4 +1,5 @@
-/// Model: everything that is fixed once a deck is read. Immutable and shared between sessions and threads.
+/// Model: everything that is fixed once a deck is read. Immutable and shared between sessions and
+/// threads.
 #pragma once
 
 #include <array>
@@ -24,7 +25,8 @@
 
 namespace mbcosim {
 
-/// A run-time function of the state that is evaluated at every use, bound to a name in run-time strings (plugin variables).
+/// A run-time function of the state that is evaluated at every use, bound to a name in run-time
+/// strings (plugin variables).
 struct NamedDrive {
   int label = 0;
   std::string name;
@@ -34,16 +36,18 @@ struct NamedDrive {
 
 /// Gravity field: uniform (vector drive) or central.
 struct Gravity {
-  Vec3DrivePtr uniform;            ///< acceleration, global [m/s²]; null for central gravity
-  Vec3 origin = Vec3::Zero();      ///< central: centre [m]
-  double mass_g = 0;               ///< central: M·G [m³/s²]
+  Vec3DrivePtr uniform;        ///< acceleration, global [m/s²]; null for central gravity
+  Vec3 origin = Vec3::Zero();  ///< central: centre [m]
+  double mass_g = 0;           ///< central: M·G [m³/s²]
   bool output = false;
   int label = 0;
 };
 
-/// `rigid body kinematics`: motion of the relative frame in which the model is written. Null drives are zero.
+/// `rigid body kinematics`: motion of the relative frame in which the model is written. Null drives
+/// are zero.
 struct FrameMotion {
-  Vec3DrivePtr position, orientation, velocity, angular_velocity, acceleration, angular_acceleration;
+  Vec3DrivePtr position, orientation, velocity, angular_velocity, acceleration,
+      angular_acceleration;
 };
 
 /// A `reference` card, kept for `.rfm` output.
@@ -76,7 +80,8 @@ class Model {
   ControlSettings control;
 
   std::vector<StructuralNode> structural;
-  std::vector<ScalarNode> scalars;  ///< electric, thermal, abstract, hydraulic, parameter nodes in declaration order
+  std::vector<ScalarNode>
+      scalars;  ///< electric, thermal, abstract, hydraulic, parameter nodes in declaration order
   std::vector<std::unique_ptr<ElementSet>> sets;
   std::vector<ElementRef> elements;  ///< in declaration order
   std::vector<NamedDrive> drives;    ///< `drive caller` cards
@@ -100,22 +105,24 @@ class Model {
   }();
 
   // --- numbering, set by ModelBuilder::finish
-  bool has_driven = false;  ///< is any element `driven`?
-  int unknowns = 0;                     ///< n
-  std::vector<UnknownKind> kinds;       ///< (n)
-  std::vector<double> row_scale;        ///< (n) scale of the owner, for `tolerance ..., scale`
+  bool has_driven = false;         ///< is any element `driven`?
+  int unknowns = 0;                ///< n
+  std::vector<UnknownKind> kinds;  ///< (n)
+  std::vector<double> row_scale;   ///< (n) scale of the owner, for `tolerance ..., scale`
   std::vector<std::uint8_t> is_constraint_row;  ///< (n)
   // sparse matrix, compressed columns (n)
   std::vector<int> column_start, row_index;
-  std::vector<int> diagonal;  ///< position of each diagonal entry, -1 if absent (n)
+  std::vector<int> diagonal;     ///< position of each diagonal entry, -1 if absent (n)
   NodeEquations node_equations;  ///< rows that nodes contribute themselves
   std::vector<std::vector<ElementRef>> node_bodies;  ///< bodies attached to each structural node
 
   // --- kinematics
-  NodeState node_state(const EvalContext& context, int node) const;  ///< any structural node, also dummy ones
+  NodeState node_state(const EvalContext& context,
+                       int node) const;  ///< any structural node, also dummy ones
   /// Acceleration of dynamic, modal and dummy nodes (spec 02 section 6.5); zero for others.
   NodeAcceleration node_acceleration(const EvalContext& context, int node) const;
-  Vec3 gravity_at(const EvalContext& context, const Vec3& x) const;  ///< [m/s²], zero without gravity
+  Vec3 gravity_at(const EvalContext& context,
+                  const Vec3& x) const;  ///< [m/s²], zero without gravity
   Mat3 gravity_gradient(const EvalContext& context, const Vec3& x) const;  ///< ∂a/∂x [1/s²]
   /// A context for `state` as it stands; evaluates a uniform gravity field once.
   EvalContext context(const State& state, Phase phase, double c = 1, double c_algebraic = 1) const;
@@ -126,7 +133,8 @@ class Model {
   int find_structural(int label) const;  ///< index or -1
   int find_scalar(ScalarKind kind, int label) const;
   ElementRef find_element(Family family, int label) const;  ///< set == nullptr when absent
-  /// Private datum of a node: index or -1. Structural names: spec 01 section 11.2; scalar nodes "x", "xP".
+  /// Private datum of a node: index or -1. Structural names: spec 01 section 11.2; scalar nodes
+  /// "x", "xP".
   int structural_datum(int node, std::string_view name) const;
   double structural_datum_value(const EvalContext& context, int node, int datum) const;
   static std::vector<std::string> structural_data_names(const StructuralNode& node);
@@ -135,7 +143,7 @@ class Model {
   MatX dense(const std::vector<double>& values) const;
 
   // --- diagnosis
-  std::string node_text(int node) const;     ///< "structural node 7"
+  std::string node_text(int node) const;         ///< "structural node 7"
   std::string element_text(ElementRef e) const;  ///< "joint 7 (revolute hinge)"
   /// Owner and meaning of a row, e.g. ("joint 7 (revolute hinge)", "constraint 2").
   std::pair<std::string, std::string> row_text(int row) const;
@@ -149,7 +157,8 @@ class Model {
 
 using ModelPtr = std::shared_ptr<const Model>;
 
-/// Fills a Model while a deck is read. Duplicate labels are refused by the card readers, which know the places.
+/// Fills a Model while a deck is read. Duplicate labels are refused by the card readers, which know
+/// the places.
 class ModelBuilder {
  public:
   ModelBuilder();
@@ -174,7 +183,9 @@ class ModelBuilder {
 
   int allocate_memory(int count, double initial = 0);  ///< offset in State::memory
   void set_memory(int offset, double value) { model_->initial_memory[offset] = value; }
-  void on_step(std::shared_ptr<const StepListener> listener) { model_->step_listeners.push_back(std::move(listener)); }
+  void on_step(std::shared_ptr<const StepListener> listener) {
+    model_->step_listeners.push_back(std::move(listener));
+  }
 
   /// A context for evaluations while the deck is read: input configuration, initial time.
   const EvalContext& input_context();
@@ -191,8 +202,8 @@ class ModelBuilder {
   EvalContext input_context_;
 };
 
-/// Initial State: input configuration of nodes, initial values of elements and memory. Rates of node positions are the
-/// velocities; multipliers zero unless an element says otherwise.
+/// Initial State: input configuration of nodes, initial values of elements and memory. Rates of
+/// node positions are the velocities; multipliers zero unless an element says otherwise.
 State make_initial_state(const Model& model);
 
 }  // namespace mbcosim

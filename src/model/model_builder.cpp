@@ -42,8 +42,10 @@ int ModelBuilder::allocate_memory(int count, double initial) {
 
 const EvalContext& ModelBuilder::input_context() {
   input_state_.time = model_->initial_value.initial_time;
-  if (input_state_.memory.size() != model_->initial_memory.size()) input_state_.memory = model_->initial_memory;
-  if (input_state_.variables.size() != model_->initial_variables.size()) input_state_.variables = model_->initial_variables;
+  if (input_state_.memory.size() != model_->initial_memory.size())
+    input_state_.memory = model_->initial_memory;
+  if (input_state_.variables.size() != model_->initial_variables.size())
+    input_state_.variables = model_->initial_variables;
   input_context_ = EvalContext{};
   input_context_.model = model_.get();
   input_context_.state = &input_state_;
@@ -113,7 +115,8 @@ void number_unknowns(Model& model) {
     node.equilibrium = n + node.unknowns() - node.position_unknowns();
     take(node.unknowns(), UnknownKind::differential, node.scale);
   }
-  for (const ScalarKind kind : {ScalarKind::electric, ScalarKind::thermal, ScalarKind::abstract, ScalarKind::hydraulic})
+  for (const ScalarKind kind :
+       {ScalarKind::electric, ScalarKind::thermal, ScalarKind::abstract, ScalarKind::hydraulic})
     for (ScalarNode& node : model.scalars) {
       if (node.kind != kind) continue;
       node.unknown = n;
@@ -125,7 +128,8 @@ void number_unknowns(Model& model) {
       const int own = e.set->unknowns(e.index);
       for (int k = 0; k < own; ++k) {
         const bool differential = e.set->is_differential(e.index, k);
-        take(1, differential ? UnknownKind::differential : UnknownKind::algebraic, model.family_scale[family]);
+        take(1, differential ? UnknownKind::differential : UnknownKind::algebraic,
+             model.family_scale[family]);
         model.is_constraint_row.back() = !differential;
       }
       e.set->bind(model, e.index, n - own);

@@ -11,28 +11,41 @@
 
 namespace mbcosim {
 
-enum class StructuralKind { static_, dynamic, modal, static_displacement, dynamic_displacement, dummy_offset, dummy_relative };
+enum class StructuralKind {
+  static_,
+  dynamic,
+  modal,
+  static_displacement,
+  dynamic_displacement,
+  dummy_offset,
+  dummy_relative
+};
 
 /// As the deck writes it: "dynamic", "static displacement", ...
 constexpr const char* kind_name(StructuralKind kind) {
-  constexpr const char* kNames[] = {"static", "dynamic", "modal", "static displacement", "dynamic displacement",
-                                    "dummy offset", "dummy relative frame"};
+  constexpr const char* kNames[] = {"static",
+                                    "dynamic",
+                                    "modal",
+                                    "static displacement",
+                                    "dynamic displacement",
+                                    "dummy offset",
+                                    "dummy relative frame"};
   return kNames[static_cast<int>(kind)];
 }
 
-/// Structural node. Unknowns (spec 02 section 1.1), from `first`: x(3), g(3) [not for displacement nodes], then b, g_m
-/// (dynamic) or v, w (modal). Equilibrium rows start at `equilibrium`.
+/// Structural node. Unknowns (spec 02 section 1.1), from `first`: x(3), g(3) [not for displacement
+/// nodes], then b, g_m (dynamic) or v, w (modal). Equilibrium rows start at `equilibrium`.
 struct StructuralNode {
   int label = 0;
   std::string name;
   SourceSpan where;
   StructuralKind kind = StructuralKind::static_;
-  Vec3 x = Vec3::Zero();            ///< input position, global [m]
-  Mat3 R = Mat3::Identity();        ///< input orientation, node frame -> global
-  Vec3 v = Vec3::Zero();            ///< input velocity, global [m/s]
-  Vec3 w = Vec3::Zero();            ///< input angular velocity, global [rad/s]
-  Vec3 b_rate = Vec3::Zero();       ///< initial ḃ [N] (automatic structural)
-  Vec3 g_rate = Vec3::Zero();       ///< initial ġ_m [N·m]
+  Vec3 x = Vec3::Zero();       ///< input position, global [m]
+  Mat3 R = Mat3::Identity();   ///< input orientation, node frame -> global
+  Vec3 v = Vec3::Zero();       ///< input velocity, global [m/s]
+  Vec3 w = Vec3::Zero();       ///< input angular velocity, global [rad/s]
+  Vec3 b_rate = Vec3::Zero();  ///< initial ḃ [N] (automatic structural)
+  Vec3 g_rate = Vec3::Zero();  ///< initial ġ_m [N·m]
   OrientationDescription description = OrientationDescription::euler123;
   double assembly_position_stiffness = 1, assembly_velocity_stiffness = 1;
   bool omega_rotates = false;
@@ -50,18 +63,23 @@ struct StructuralNode {
   int first = -1;        ///< first unknown, -1 for dummy nodes
   int equilibrium = -1;  ///< first equilibrium row (force rows, then moment rows)
 
-  bool is_dummy() const { return kind == StructuralKind::dummy_offset || kind == StructuralKind::dummy_relative; }
+  bool is_dummy() const {
+    return kind == StructuralKind::dummy_offset || kind == StructuralKind::dummy_relative;
+  }
   bool is_displacement() const {
-    return kind == StructuralKind::static_displacement || kind == StructuralKind::dynamic_displacement;
+    return kind == StructuralKind::static_displacement ||
+           kind == StructuralKind::dynamic_displacement;
   }
   bool has_rotation() const { return !is_dummy() && !is_displacement(); }
-  bool has_momentum() const { return kind == StructuralKind::dynamic || kind == StructuralKind::dynamic_displacement; }
+  bool has_momentum() const {
+    return kind == StructuralKind::dynamic || kind == StructuralKind::dynamic_displacement;
+  }
   int position_unknowns() const { return is_dummy() ? 0 : is_displacement() ? 3 : 6; }
   int unknowns() const {
-    return kind == StructuralKind::dynamic || kind == StructuralKind::modal ? 12
-           : kind == StructuralKind::static_ || kind == StructuralKind::dynamic_displacement
-               ? 6
-               : kind == StructuralKind::static_displacement ? 3 : 0;
+    return kind == StructuralKind::dynamic || kind == StructuralKind::modal                  ? 12
+           : kind == StructuralKind::static_ || kind == StructuralKind::dynamic_displacement ? 6
+           : kind == StructuralKind::static_displacement                                     ? 3
+                                                                                             : 0;
   }
 };
 
@@ -73,7 +91,8 @@ constexpr const char* kind_name(ScalarKind kind) {
   return kNames[static_cast<int>(kind)];
 }
 
-/// Node with one scalar degree of freedom. Parameter nodes have a value (in State::memory) but no unknown.
+/// Node with one scalar degree of freedom. Parameter nodes have a value (in State::memory) but no
+/// unknown.
 struct ScalarNode {
   ScalarKind kind = ScalarKind::abstract;
   int label = 0;
@@ -84,11 +103,13 @@ struct ScalarNode {
   double scale = 1;
   bool output = true;
   // parameter nodes
-  bool bound_to_element = false;  ///< `element` or `beam strain gage`: its value comes from a `bind` card
+  bool bound_to_element =
+      false;  ///< `element` or `beam strain gage`: its value comes from a `bind` card
   int gage = 0;
   double gage_y = 0, gage_z = 0;
-  int memory = -1;  ///< parameter nodes: offset of the value in State::memory
-  DrivePtr binding;  ///< parameter nodes: where the value comes from (`bind`), evaluated at every use; null: the memory
+  int memory = -1;   ///< parameter nodes: offset of the value in State::memory
+  DrivePtr binding;  ///< parameter nodes: where the value comes from (`bind`), evaluated at every
+                     ///< use; null: the memory
 
   int unknown = -1;  ///< index of unknown and row; -1 for parameter nodes
 };
@@ -96,9 +117,9 @@ struct ScalarNode {
 /// Reference to one scalar degree of freedom of a node. Spec 01 section 6.9.
 struct NodeDof {
   bool structural = false;
-  int node = -1;       ///< index among the structural or the scalar nodes
-  int component = 0;   ///< structural: 0..2 position, 3..5 rotation (more for modal nodes)
-  int order = 0;       ///< 0: value, 1: time derivative, 2: second derivative (dynamic structural nodes)
+  int node = -1;      ///< index among the structural or the scalar nodes
+  int component = 0;  ///< structural: 0..2 position, 3..5 rotation (more for modal nodes)
+  int order = 0;  ///< 0: value, 1: time derivative, 2: second derivative (dynamic structural nodes)
   bool differential = true;  ///< kind of the dof itself
 };
 

@@ -7,9 +7,27 @@ namespace mbcosim {
 
 namespace {
 
-enum Group { kX, kXP, kOmega, kx, kxP, komega, kPhi, kE, kE313, kE321, kPE, kXPP, kOmegaP, kxPP, komegaP, kGroups };
-constexpr std::array<const char*, kGroups> kNames = {"X", "XP", "Omega", "x", "xP", "omega", "Phi", "E", "E313", "E321", "PE",
-                                                     "XPP", "OmegaP", "xPP", "omegaP"};
+enum Group {
+  kX,
+  kXP,
+  kOmega,
+  kx,
+  kxP,
+  komega,
+  kPhi,
+  kE,
+  kE313,
+  kE321,
+  kPE,
+  kXPP,
+  kOmegaP,
+  kxPP,
+  komegaP,
+  kGroups
+};
+constexpr std::array<const char*, kGroups> kNames = {"X",     "XP",  "Omega",  "x",    "xP",
+                                                     "omega", "Phi", "E",      "E313", "E321",
+                                                     "PE",    "XPP", "OmegaP", "xPP",  "omegaP"};
 constexpr int kSlots = 4;  ///< datum = group·kSlots + component
 
 bool needs_acceleration(int group) { return group >= kXPP; }
@@ -17,19 +35,31 @@ bool needs_acceleration(int group) { return group >= kXPP; }
 Vec3 vector_datum(const Model& model, const EvalContext& context, int node, int group) {
   const NodeState s = model.node_state(context, node);
   switch (group) {
-    case kX: return s.x;
-    case kXP: return s.v;
-    case kOmega: return s.w;
-    case kx: return s.R.transpose() * s.x;
-    case kxP: return s.R.transpose() * s.v;
-    case komega: return s.R.transpose() * s.w;
-    case kPhi: return vector_of_rotation(s.R);
-    case kE: return euler123_of_rotation(s.R);
-    case kE313: return euler313_of_rotation(s.R);
-    case kE321: return euler321_of_rotation(s.R);
-    default: break;
+    case kX:
+      return s.x;
+    case kXP:
+      return s.v;
+    case kOmega:
+      return s.w;
+    case kx:
+      return s.R.transpose() * s.x;
+    case kxP:
+      return s.R.transpose() * s.v;
+    case komega:
+      return s.R.transpose() * s.w;
+    case kPhi:
+      return vector_of_rotation(s.R);
+    case kE:
+      return euler123_of_rotation(s.R);
+    case kE313:
+      return euler313_of_rotation(s.R);
+    case kE321:
+      return euler321_of_rotation(s.R);
+    default:
+      break;
   }
-  // Unknown to the derivatives phase until it is over: as drive arguments accelerations start from zero.
+  // Unknown to the derivatives phase until it is over: as drive arguments accelerations start from
+  // zero.
   if (context.phase == Phase::derivatives) return Vec3::Zero();
   const NodeAcceleration a = model.node_acceleration(context, node);
   const Vec3 global = group == kXPP || group == kxPP ? a.a : a.wp;
@@ -47,7 +77,9 @@ int Model::structural_datum(int node, std::string_view name) const {
   for (int g = 0; g < kGroups; ++g) {
     if (word != kNames[g]) continue;
     const StructuralNode& n = structural[node];
-    if (needs_acceleration(g) && !n.has_momentum() && n.kind != StructuralKind::modal && !n.is_dummy()) return -1;
+    if (needs_acceleration(g) && !n.has_momentum() && n.kind != StructuralKind::modal &&
+        !n.is_dummy())
+      return -1;
     if (g == kPE) return index >= 0 && index <= 3 ? g * kSlots + index : -1;
     return index >= 1 && index <= 3 ? g * kSlots + index - 1 : -1;
   }
@@ -65,10 +97,12 @@ double Model::structural_datum_value(const EvalContext& context, int node, int d
 
 std::vector<std::string> Model::structural_data_names(const StructuralNode& node) {
   std::vector<std::string> names;
-  const bool accelerations = node.has_momentum() || node.kind == StructuralKind::modal || node.is_dummy();
+  const bool accelerations =
+      node.has_momentum() || node.kind == StructuralKind::modal || node.is_dummy();
   for (int g = 0; g < kGroups; ++g) {
     if (needs_acceleration(g) && !accelerations) continue;
-    for (int i = g == kPE ? 0 : 1; i <= 3; ++i) names.push_back(std::string(kNames[g]) + "[" + std::to_string(i) + "]");
+    for (int i = g == kPE ? 0 : 1; i <= 3; ++i)
+      names.push_back(std::string(kNames[g]) + "[" + std::to_string(i) + "]");
   }
   return names;
 }

@@ -47,7 +47,8 @@ void NodeEquations::set_positions(const PositionSource& source) {
     if (!row.rotation) continue;
     for (const int start : {row.first, row.first + 6})
       for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < 3; ++i) positions_.push_back(source.position(row.first + 9 + i, start + j));
+        for (int i = 0; i < 3; ++i)
+          positions_.push_back(source.position(row.first + 9 + i, start + j));
   }
 }
 

@@ -1,11 +1,13 @@
-/// Rows that structural nodes contribute themselves: momentum definitions and balances of dynamic nodes.
+/// Rows that structural nodes contribute themselves: momentum definitions and balances of dynamic
+/// nodes.
 ///
 ///   rows 1–3:   b   − Σ(m v + w × S)   = 0      (the sums are the bodies')
 ///   rows 4–6:   g_m − Σ(J w + S × v)   = 0
 ///   rows 7–9:   −ḃ + Σ f               = 0
 ///   rows 10–12: −(ġ_m + v × b) + Σ m   = 0      moments about the node
 ///
-/// Displacement nodes have rows 1–3 and 7–9 only. Source: MBDyn input manual, structural nodes; spec 02 section 6.3.
+/// Displacement nodes have rows 1–3 and 7–9 only. Source: MBDyn input manual, structural nodes;
+/// spec 02 section 6.3.
 #pragma once
 
 #include <vector>
@@ -26,9 +28,9 @@ class NodeEquations {
 
  private:
   struct Row {
-    int first;       ///< first unknown of the node
-    bool rotation;   ///< 6 or 3 position unknowns
-    int position;    ///< in positions_
+    int first;      ///< first unknown of the node
+    bool rotation;  ///< 6 or 3 position unknowns
+    int position;   ///< in positions_
   };
   std::vector<Row> rows_;
   std::vector<int> positions_;

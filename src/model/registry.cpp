@@ -8,14 +8,16 @@ std::string normalized(std::string_view word) {
   std::string r;
   r.reserve(word.size());
   for (const char c : word)
-    if (!std::isspace(static_cast<unsigned char>(c))) r += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (!std::isspace(static_cast<unsigned char>(c)))
+      r += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return r;
 }
 
 namespace {
 
 template <class Words, class Table, class Reader>
-void enter(std::map<std::string, std::string>& display, Table& table, const Words& words, const Reader& reader) {
+void enter(std::map<std::string, std::string>& display, Table& table, const Words& words,
+           const Reader& reader) {
   for (const auto word : words) {
     table[normalized(word)] = reader;
     display[normalized(word)] = std::string(word);
@@ -32,21 +34,32 @@ void Registry::element(std::string_view head, Family family, ElementReader reade
   display[normalized(head)] = std::string(head);
 }
 
-void Registry::typed(std::string_view head, Family family, std::initializer_list<std::string_view> words, ElementReader reader) {
+void Registry::typed(std::string_view head, Family family,
+                     std::initializer_list<std::string_view> words, ElementReader reader) {
   Head& h = heads[normalized(head)];
   h.family = family;
   display[normalized(head)] = std::string(head);
   enter(display, h.types, words, reader);
 }
 
-void Registry::drive(std::initializer_list<std::string_view> words, DriveReader reader) { enter(display, drives, words, reader); }
-void Registry::law1(std::initializer_list<std::string_view> words, LawReader<1> reader) { enter(display, laws1, words, reader); }
-void Registry::law3(std::initializer_list<std::string_view> words, LawReader<3> reader) { enter(display, laws3, words, reader); }
-void Registry::law6(std::initializer_list<std::string_view> words, LawReader<6> reader) { enter(display, laws6, words, reader); }
+void Registry::drive(std::initializer_list<std::string_view> words, DriveReader reader) {
+  enter(display, drives, words, reader);
+}
+void Registry::law1(std::initializer_list<std::string_view> words, LawReader<1> reader) {
+  enter(display, laws1, words, reader);
+}
+void Registry::law3(std::initializer_list<std::string_view> words, LawReader<3> reader) {
+  enter(display, laws3, words, reader);
+}
+void Registry::law6(std::initializer_list<std::string_view> words, LawReader<6> reader) {
+  enter(display, laws6, words, reader);
+}
 void Registry::function(std::initializer_list<std::string_view> words, FunctionReader reader) {
   enter(display, functions, words, reader);
 }
-void Registry::fluid(std::initializer_list<std::string_view> words, FluidReader reader) { enter(display, fluids, words, reader); }
+void Registry::fluid(std::initializer_list<std::string_view> words, FluidReader reader) {
+  enter(display, fluids, words, reader);
+}
 
 void Registry::file_driver(std::initializer_list<std::string_view> words, FileDriverReader reader) {
   enter(display, file_drivers, words, reader);

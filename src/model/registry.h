@@ -1,4 +1,5 @@
-/// Which keyword makes what. Filled once by `register_elements` and its like; used by the deck reader.
+/// Which keyword makes what. Filled once by `register_elements` and its like; used by the deck
+/// reader.
 #pragma once
 
 #include <functional>
@@ -26,7 +27,8 @@ class Registry {
   /// Reads what follows the type word of a `file` card of the drivers block.
   using FileDriverReader = std::function<FileDriverPtr(Card&)>;
 
-  /// A statement head of the elements block: `body`, `beam3`, `gravity`, or a family with types: `joint`, `force`.
+  /// A statement head of the elements block: `body`, `beam3`, `gravity`, or a family with types:
+  /// `joint`, `force`.
   struct Head {
     Family family;
     bool has_label = true;
@@ -34,9 +36,11 @@ class Registry {
     std::map<std::string, ElementReader> types;  ///< normalized type word -> reader
   };
 
-  /// `words` lists synonyms, e.g. {"revolute hinge", "plane hinge"}; the first is the name used in messages.
+  /// `words` lists synonyms, e.g. {"revolute hinge", "plane hinge"}; the first is the name used in
+  /// messages.
   void element(std::string_view head, Family family, ElementReader reader, bool has_label = true);
-  void typed(std::string_view head, Family family, std::initializer_list<std::string_view> words, ElementReader reader);
+  void typed(std::string_view head, Family family, std::initializer_list<std::string_view> words,
+             ElementReader reader);
   void drive(std::initializer_list<std::string_view> words, DriveReader reader);
   void law1(std::initializer_list<std::string_view> words, LawReader<1> reader);
   void law3(std::initializer_list<std::string_view> words, LawReader<3> reader);
@@ -44,7 +48,8 @@ class Registry {
   void function(std::initializer_list<std::string_view> words, FunctionReader reader);
   void fluid(std::initializer_list<std::string_view> words, FluidReader reader);
   void file_driver(std::initializer_list<std::string_view> words, FileDriverReader reader);
-  /// A keyword of the language that this program does not serve; refused by name: "`rotor` (aerodynamic element) ...".
+  /// A keyword of the language that this program does not serve; refused by name: "`rotor`
+  /// (aerodynamic element) ...".
   void unsupported(std::string_view context, std::string_view word, std::string_view what);
 
   std::map<std::string, Head> heads;
@@ -65,7 +70,8 @@ class Registry {
 
 namespace mbcosim {
 
-void register_drives(Registry& registry);  ///< drives and scalar functions (model/drives, model/functions)
+void register_drives(
+    Registry& registry);  ///< drives and scalar functions (model/drives, model/functions)
 void register_laws(Registry& registry);    ///< constitutive laws (model/laws)
 void register_fluids(Registry& registry);  ///< hydraulic fluids (model/fluids)
 

@@ -1,4 +1,5 @@
-/// Settings of the `initial value` and `control data` blocks, with MBDyn's defaults. Spec 01 sections 9 and 10.
+/// Settings of the `initial value` and `control data` blocks, with MBDyn's defaults. Spec 01
+/// sections 9 and 10.
 #pragma once
 
 #include <optional>
@@ -21,38 +22,40 @@ enum class ResidualTest { none, norm, minmax };
 enum class StepStrategy { no_change, factor, change };
 
 struct LineSearchSettings {
-  double tolerance_x = 1e-7, tolerance_min = 1e-8, alpha = 1e-4, lambda_min = 1e-2, lambda_factor_min = 0.1, max_step = 100,
-         divergence_factor = 1, min_scale = 1e-3;
+  double tolerance_x = 1e-7, tolerance_min = 1e-8, alpha = 1e-4, lambda_min = 1e-2,
+         lambda_factor_min = 0.1, max_step = 100, divergence_factor = 1, min_scale = 1e-3;
   int max_iterations = 200;
-  bool lambda_min_relative = true, zero_gradient_continue = false, divergence_check = true, cubic = true, scale_newton_step = true,
-       abort_at_lambda_min = true, non_negative_slope_continue = false;
+  bool lambda_min_relative = true, zero_gradient_continue = false, divergence_check = true,
+       cubic = true, scale_newton_step = true, abort_at_lambda_min = true,
+       non_negative_slope_continue = false;
 };
 
 struct EigenSettings {
   std::vector<double> times;
   double parameter = 1;
   bool matrices_full = false, matrices_sparse = false, eigenvectors = false, geometry = false;
-  int matrix_precision = 0, results_precision = 0;  ///< 0: default
+  int matrix_precision = 0, results_precision = 0;    ///< 0: default
   double lower_frequency = -1, upper_frequency = -1;  ///< [Hz], negative: no limit
   enum class Solver { lapack, arpack, jdqz } solver = Solver::lapack;
   enum class Balance { no, permute, scale, all } balance = Balance::permute;
   int nev = 0, ncv = 0;
   double tolerance = 0;
-  int suffix_width = -1;  ///< -1: compute
+  int suffix_width = -1;               ///< -1: compute
   std::string suffix_format = "%0*d";  ///< as SuffixFormat reads it
 };
 
 struct InitialValueSettings {
-  double initial_time = 0;  ///< [s]
-  double final_time = 0;    ///< [s]; infinity for `forever`
-  double time_step = 1;     ///< [s]
-  double min_time_step = 0;        ///< 0: none
-  DrivePtr max_time_step;          ///< null: unlimited
+  double initial_time = 0;   ///< [s]
+  double final_time = 0;     ///< [s]; infinity for `forever`
+  double time_step = 1;      ///< [s]
+  double min_time_step = 0;  ///< 0: none
+  DrivePtr max_time_step;    ///< null: unlimited
   bool max_time_step_hard = true;
   StepStrategy strategy = StepStrategy::no_change;
   DrivePtr strategy_change;
   double reduction = 0.5, raise = 1;
-  int steps_before_reduction = 1, steps_before_raise = 1, min_iterations = 1, max_iterations_factor = 0;
+  int steps_before_reduction = 1, steps_before_raise = 1, min_iterations = 1,
+      max_iterations_factor = 0;
 
   double tolerance = 1e-6, solution_tolerance = 0;
   ResidualTest residual_test = ResidualTest::norm, solution_test = ResidualTest::none;
@@ -81,14 +84,22 @@ struct InitialValueSettings {
   bool keep_jacobian = false;
   std::optional<LineSearchSettings> line_search;
 
-  enum class AbortAfter { never, input, assembly, derivatives, dummy_steps } abort_after = AbortAfter::never;
+  enum class AbortAfter {
+    never,
+    input,
+    assembly,
+    derivatives,
+    dummy_steps
+  } abort_after = AbortAfter::never;
   std::vector<EigenSettings> eigenanalyses;
-  bool output_iterations = false, output_residual = false, output_solution = false, output_jacobian = false;
+  bool output_iterations = false, output_residual = false, output_solution = false,
+       output_jacobian = false;
 };
 
 struct ControlSettings {
   bool skip_assembly = false;
-  bool assemble_bodies = false, assemble_gravity = false, assemble_forces = false, assemble_beams = true;
+  bool assemble_bodies = false, assemble_gravity = false, assemble_forces = false,
+       assemble_beams = true;
   double assembly_tolerance = 1e-6;
   int assembly_max_iterations = 1;
   double assembly_epsilon = 1;

@@ -8,8 +8,8 @@
 
 namespace mbcosim {
 
-/// Orientation and angular velocity of one structural node (spec 02 section 6.2); index = structural node index.
-/// Plain arrays (column-major), so that a State is plain data.
+/// Orientation and angular velocity of one structural node (spec 02 section 6.2); index =
+/// structural node index. Plain arrays (column-major), so that a State is plain data.
 struct NodeRotation {
   Mat3 R;      ///< current orientation, node frame -> global
   Mat3 R_ref;  ///< reference (predicted) orientation of this step; R = R(g) R_ref
@@ -20,20 +20,22 @@ struct NodeRotation {
 };
 
 struct State {
-  double time = 0;        ///< time of the last accepted step, or of the step's end while it is being solved [s]
+  double time =
+      0;  ///< time of the last accepted step, or of the step's end while it is being solved [s]
   double h = 0;           ///< length of the last (or current) step [s]
   double h_previous = 0;  ///< length of the step before [s]
   std::int64_t step = 0;  ///< number of the last (or current) step; 0: initial solution
 
-  std::vector<double> y, yp;    ///< unknowns and rates (n); algebraic unknowns keep a running integral in yp
-  std::vector<double> y1, yp1;  ///< at the last accepted step (n)
-  std::vector<double> y2, yp2;  ///< one step earlier (n)
+  std::vector<double> y,
+      yp;  ///< unknowns and rates (n); algebraic unknowns keep a running integral in yp
+  std::vector<double> y1, yp1;         ///< at the last accepted step (n)
+  std::vector<double> y2, yp2;         ///< one step earlier (n)
   std::vector<NodeRotation> rotation;  ///< (structural nodes)
   std::vector<double> memory;          ///< what elements, laws and drives remember
-  std::vector<double> variables;       ///< variables of the deck that run-time strings read or assign
-  std::vector<double> control;         ///< step control and integrator flags (solver)
-  /// Loads that external codes apply to structural nodes: force [N] and moment about the node [N·m], global components
-  /// (6 × structural nodes), or empty when there are none.
+  std::vector<double> variables;  ///< variables of the deck that run-time strings read or assign
+  std::vector<double> control;    ///< step control and integrator flags (solver)
+  /// Loads that external codes apply to structural nodes: force [N] and moment about the node
+  /// [N·m], global components (6 × structural nodes), or empty when there are none.
   std::vector<double> external_loads;
 };
 

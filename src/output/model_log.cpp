@@ -9,7 +9,8 @@ namespace {
 void number(std::string& s, double v) {
   char buffer[32];
   s += ' ';
-  s.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v, std::chars_format::general, 6).ptr);
+  s.append(buffer,
+           std::to_chars(buffer, buffer + sizeof buffer, v, std::chars_format::general, 6).ptr);
 }
 
 void vector(std::string& s, const Vec3& v) {
@@ -18,11 +19,20 @@ void vector(std::string& s, const Vec3& v) {
 
 void orientation(std::string& s, const Mat3& r, OrientationDescription d) {
   switch (d) {
-    case OrientationDescription::euler123: s += " euler123"; return vector(s, euler123_of_rotation(r) * kDegrees);
-    case OrientationDescription::euler313: s += " euler313"; return vector(s, euler313_of_rotation(r) * kDegrees);
-    case OrientationDescription::euler321: s += " euler321"; return vector(s, euler321_of_rotation(r) * kDegrees);
-    case OrientationDescription::vector: s += " phi"; return vector(s, vector_of_rotation(r));
-    case OrientationDescription::matrix: break;
+    case OrientationDescription::euler123:
+      s += " euler123";
+      return vector(s, euler123_of_rotation(r) * kDegrees);
+    case OrientationDescription::euler313:
+      s += " euler313";
+      return vector(s, euler313_of_rotation(r) * kDegrees);
+    case OrientationDescription::euler321:
+      s += " euler321";
+      return vector(s, euler321_of_rotation(r) * kDegrees);
+    case OrientationDescription::vector:
+      s += " phi";
+      return vector(s, vector_of_rotation(r));
+    case OrientationDescription::matrix:
+      break;
   }
   s += " mat";
   for (int i = 0; i < 3; ++i)
@@ -38,8 +48,10 @@ void node_line(std::string& s, const Model& model, int index) {
   if (n.kind == StructuralKind::dummy_relative) s += "relative frame ";
   s += "structural node: " + std::to_string(n.label);
   vector(s, at.x);
-  if (n.is_displacement()) s += ' ';
-  else orientation(s, at.R, n.description);
+  if (n.is_displacement())
+    s += ' ';
+  else
+    orientation(s, at.R, n.description);
   s += '\n';
 }
 
@@ -56,7 +68,9 @@ void list(std::string& s, const Model& model, const char* title, Take take, Valu
 void index_lists(std::string& s, const Model& model) {
   const auto six = [](const StructuralNode& n) { return !n.is_displacement(); };
   const auto all = [](const StructuralNode&) { return true; };
-  const auto six_momentum = [](const StructuralNode& n) { return n.kind == StructuralKind::dynamic; };
+  const auto six_momentum = [](const StructuralNode& n) {
+    return n.kind == StructuralKind::dynamic;
+  };
   const auto momentum = [](const StructuralNode& n) { return n.has_momentum(); };
   const auto first = [](const StructuralNode& n) { return n.first; };
   const auto equilibrium = [](const StructuralNode& n) { return n.equilibrium; };
@@ -76,8 +90,12 @@ void index_lists(std::string& s, const Model& model) {
 }  // namespace
 
 std::string model_log(const Model& model) {
-  std::string s = "output frequency: " + (model.control.output_meter ? std::string("custom") : std::to_string(model.control.output_frequency)) + '\n';
-  for (std::size_t k = 0; k < model.structural.size(); ++k) node_line(s, model, static_cast<int>(k));
+  std::string s = "output frequency: " +
+                  (model.control.output_meter ? std::string("custom")
+                                              : std::to_string(model.control.output_frequency)) +
+                  '\n';
+  for (std::size_t k = 0; k < model.structural.size(); ++k)
+    node_line(s, model, static_cast<int>(k));
   for (const ElementRef& e : model.elements) {
     const std::string line = e.set->log_line(model, e.index);
     if (!line.empty()) s += line + '\n';

@@ -51,7 +51,7 @@ int NetcdfFile::variable(const std::string& name, Type type, const std::vector<i
   int id = -1;
   if (problem_.empty())
     check(nc().def_var(id_, name.c_str(), type == Type::integer ? NC_INT : NC_DOUBLE,
-                     static_cast<int>(dimensions.size()), dimensions.data(), &id));
+                       static_cast<int>(dimensions.size()), dimensions.data(), &id));
   return id;
 }
 
@@ -59,8 +59,8 @@ void NetcdfFile::attribute(int variable, const char* name, const std::string& te
   if (text.empty()) return;
   define();
   if (problem_.empty())
-    check(
-        nc().put_att_text(id_, variable < 0 ? NC_GLOBAL : variable, name, text.size(), text.c_str()));
+    check(nc().put_att_text(id_, variable < 0 ? NC_GLOBAL : variable, name, text.size(),
+                            text.c_str()));
 }
 
 void NetcdfFile::put(int variable, const std::vector<int>& data) {

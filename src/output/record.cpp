@@ -11,11 +11,14 @@ void write_structural(const EvalContext& context, int index, OutputRow& row) {
   const NodeState s = context.model->node_state(context, index);
   row.begin(OutputFile::mov, node.label);
   row.vec3("X", "m", s.x);
-  if (node.is_displacement() && node.description != OrientationDescription::matrix) row.vec3("Phi", "rad", Vec3::Zero());
-  else row.orientation("R", s.R, node.description);
+  if (node.is_displacement() && node.description != OrientationDescription::matrix)
+    row.vec3("Phi", "rad", Vec3::Zero());
+  else
+    row.orientation("R", s.R, node.description);
   row.vec3("XP", "m/s", s.v);
   row.vec3("Omega", "rad/s", s.w);
-  if (node.accelerations && (node.has_momentum() || node.kind == StructuralKind::modal || node.is_dummy())) {
+  if (node.accelerations &&
+      (node.has_momentum() || node.kind == StructuralKind::modal || node.is_dummy())) {
     const NodeAcceleration a = context.model->node_acceleration(context, index);
     row.vec3("XPP", "m/s^2", a.a);
     row.vec3("OmegaP", "rad/s^2", a.wp);
@@ -37,14 +40,16 @@ void write_inertia(const EvalContext& context, int index, OutputRow& row) {
 }
 
 void write_scalar(const EvalContext& context, const ScalarNode& node, OutputRow& row) {
-  static constexpr OutputFile kFile[] = {OutputFile::abs, OutputFile::ele, OutputFile::prs, OutputFile::thn, OutputFile::prm};
+  static constexpr OutputFile kFile[] = {OutputFile::abs, OutputFile::ele, OutputFile::prs,
+                                         OutputFile::thn, OutputFile::prm};
   static constexpr const char* kUnit[] = {"", "V", "Pa", "K", ""};
   const int kind = static_cast<int>(node.kind);
   row.begin(kFile[kind], node.label);
   NodeDof dof;
   dof.node = static_cast<int>(&node - context.model->scalars.data());
   row.scalar("x", kUnit[kind], context.model->dof_value(context, dof));
-  if (node.kind != ScalarKind::parameter && node.kind != ScalarKind::hydraulic && node.differential) {
+  if (node.kind != ScalarKind::parameter && node.kind != ScalarKind::hydraulic &&
+      node.differential) {
     dof.order = 1;
     row.scalar("xP", "", context.model->dof_value(context, dof));
   }
@@ -56,7 +61,8 @@ void write_drives(const EvalContext& context, OutputRow& row) {
     if (!d.output_value && !d.output_derivative) continue;
     row.begin(OutputFile::drv, d.label);
     if (d.output_value) row.scalar("value", "", d.drive->value(context));
-    if (d.output_derivative && d.drive->has_derivative()) row.scalar("derivative", "", derivative_in_time(*d.drive, context));
+    if (d.output_derivative && d.drive->has_derivative())
+      row.scalar("derivative", "", derivative_in_time(*d.drive, context));
     row.end();
   }
 }
@@ -69,12 +75,14 @@ void write_record(const EvalContext& context, OutputRow& row) {
     if (model.structural[k].output) write_structural(context, static_cast<int>(k), row);
   for (std::size_t k = 0; k < model.structural.size(); ++k) {
     const StructuralNode& n = model.structural[k];
-    if (n.output && n.output_inertia && n.has_momentum()) write_inertia(context, static_cast<int>(k), row);
+    if (n.output && n.output_inertia && n.has_momentum())
+      write_inertia(context, static_cast<int>(k), row);
   }
   for (const ScalarNode& node : model.scalars)
     if (node.output) write_scalar(context, node, row);
   for (const ElementRef& e : model.elements)
-    if (e.set->info(e.index).output && e.set->is_active(*context.state, e.index)) e.set->output(context, e.index, row);
+    if (e.set->info(e.index).output && e.set->is_active(*context.state, e.index))
+      e.set->output(context, e.index, row);
   if (model.gravity && model.gravity->output) {
     row.begin(OutputFile::grv, model.gravity->label);
     row.vec3("a", "m/s^2", context.uniform_gravity);
@@ -86,7 +94,8 @@ void write_record(const EvalContext& context, OutputRow& row) {
 void write_reference_frames(const Model& model, OutputRow& row) {
   std::vector<const ReferenceFrame*> frames;
   for (const ReferenceFrame& f : model.frames) frames.push_back(&f);
-  std::sort(frames.begin(), frames.end(), [](const auto* a, const auto* b) { return a->label < b->label; });
+  std::sort(frames.begin(), frames.end(),
+            [](const auto* a, const auto* b) { return a->label < b->label; });
   for (const ReferenceFrame* f : frames) {
     row.begin(OutputFile::rfm, f->label);
     row.vec3("X", "m", f->x);

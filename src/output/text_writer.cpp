@@ -72,7 +72,8 @@ bool has_joint_output(const Model& model) {
 class TextWriter : public ResultWriter, private OutputRow {
  public:
   explicit TextWriter(const std::string& prefix) : prefix_(prefix) {
-    for (std::size_t k = 0; k < files_.size(); ++k) files_[k].open(prefix + "." + extension(static_cast<OutputFile>(k)));
+    for (std::size_t k = 0; k < files_.size(); ++k)
+      files_[k].open(prefix + "." + extension(static_cast<OutputFile>(k)));
     out_.open(prefix + ".out");
     log_.open(prefix + ".log");
   }
@@ -87,13 +88,13 @@ class TextWriter : public ResultWriter, private OutputRow {
     if (model.control.output_reference_frames) write_reference_frames(model, *this);
   }
   void derivatives(double time, int iterations, double error) override {
-    out_.text("# Derivatives solution step at time " + general(time) + " performed in " + std::to_string(iterations) +
-              " iterations with " + general(error) + " error\n");
+    out_.text("# Derivatives solution step at time " + general(time) + " performed in " +
+              std::to_string(iterations) + " iterations with " + general(error) + " error\n");
     if (model_->initial_value.dummy_steps == 0) header();
   }
   void dummy_steps(double time, int iterations, double error) override {
-    out_.text("# Initial solution after dummy steps at time " + general(time) + " performed in " + std::to_string(iterations) +
-              " iterations with " + general(error) + " error\n");
+    out_.text("# Initial solution after dummy steps at time " + general(time) + " performed in " +
+              std::to_string(iterations) + " iterations with " + general(error) + " error\n");
     header();
   }
   void step(const StepLine& s) override {
@@ -126,9 +127,7 @@ class TextWriter : public ResultWriter, private OutputRow {
     file.text(eigen_file(report, *model_));
     if (!file.finish()) failed_ = true;
   }
-  void record(const EvalContext& context) override {
-    write_record(context, *this);
-  }
+  void record(const EvalContext& context) override { write_record(context, *this); }
   Status finish() override {
     bool fine = out_.finish() && log_.finish() && !failed_;
     for (TextFile& f : files_) fine = f.finish() && fine;
@@ -141,14 +140,19 @@ class TextWriter : public ResultWriter, private OutputRow {
   }
 
  private:
-  static constexpr std::size_t kField = 48;  ///< bytes of one field, with margin for the largest precision used
+  static constexpr std::size_t kField =
+      48;  ///< bytes of one field, with margin for the largest precision used
 
   void header() {
-    out_.text("# Key for lines starting with \"Step\":\n# Step Time TStep NIter ResErr SolErr SolConv Out\n");
+    out_.text(
+        "# Key for lines starting with \"Step\":\n# Step Time TStep NIter ResErr SolErr SolConv "
+        "Out\n");
   }
   std::string general(double v) const {
     char buffer[64];
-    return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, v, std::chars_format::general, precision_).ptr);
+    return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, v,
+                                             std::chars_format::general, precision_)
+                                   .ptr);
   }
 
   // OutputRow
@@ -175,7 +179,9 @@ class TextWriter : public ResultWriter, private OutputRow {
   void number(double value) {
     char* p = current_->room(kField + precision_);
     *p++ = ' ';
-    current_->commit(std::to_chars(p, p + kField + precision_ - 1, value, std::chars_format::scientific, precision_).ptr);
+    current_->commit(std::to_chars(p, p + kField + precision_ - 1, value,
+                                   std::chars_format::scientific, precision_)
+                         .ptr);
   }
   void scalar(const char*, const char*, double value) override { number(value); }
   void vec3(const char*, const char*, const Vec3& v) override {
@@ -203,6 +209,8 @@ class TextWriter : public ResultWriter, private OutputRow {
 
 }  // namespace
 
-std::shared_ptr<ResultWriter> make_text_writer(const std::string& prefix) { return std::make_shared<TextWriter>(prefix); }
+std::shared_ptr<ResultWriter> make_text_writer(const std::string& prefix) {
+  return std::make_shared<TextWriter>(prefix);
+}
 
 }  // namespace mbcosim

@@ -8,8 +8,8 @@ namespace mbcosim {
 
 namespace {
 
-/// Of all files read: the deck, what it includes, data files in the order of reading. Names count relative to the deck's
-/// folder.
+/// Of all files read: the deck, what it includes, data files in the order of reading. Names count
+/// relative to the deck's folder.
 std::uint64_t digest(const Session& session, Digest data) {
   const std::string& main = session.file(0).name;
   const std::string folder = main.substr(0, main.rfind('/') + 1);
@@ -89,7 +89,8 @@ ModelPtr read_model(Session& session, ModelBuilder& builder,
   if (const std::int64_t n = count_unknowns(model); n > session.limits.unknowns) {
     extra.push_back(plain_error("limit-unknowns", session.file(0).name,
                                 "the model has " + std::to_string(n) + " unknowns; the limit is " +
-                                    std::to_string(session.limits.unknowns) + " (limit `unknowns`)"));
+                                    std::to_string(session.limits.unknowns) +
+                                    " (limit `unknowns`)"));
     return nullptr;
   }
   model.digest = digest_with(digest(session, deck.data_files), ports);

@@ -24,8 +24,9 @@ Error make_error(ErrorKind kind, std::string reason, std::string message) {
 }
 
 bool same_layout(const State& a, const State& b) {
-  return a.y.size() == b.y.size() && a.rotation.size() == b.rotation.size() && a.memory.size() == b.memory.size() &&
-         a.variables.size() == b.variables.size() && a.control.size() == b.control.size();
+  return a.y.size() == b.y.size() && a.rotation.size() == b.rotation.size() &&
+         a.memory.size() == b.memory.size() && a.variables.size() == b.variables.size() &&
+         a.control.size() == b.control.size();
 }
 
 }  // namespace
@@ -49,7 +50,9 @@ struct Simulation::Impl {
   }
 
   /// After a step: positions are read with the step's context.
-  EvalContext context() const { return model->context(state, state.step == 0 ? Phase::derivatives : Phase::step); }
+  EvalContext context() const {
+    return model->context(state, state.step == 0 ? Phase::derivatives : Phase::step);
+  }
 
   bool meter() const {
     const ControlSettings& c = model->control;
@@ -101,18 +104,21 @@ Status Simulation::Impl::start() {
     record();
     return ok();
   }
-  if (auto status = analyse_modes(-HUGE_VAL, std::nextafter(s.initial_time, -HUGE_VAL)); !status) return status;
+  if (auto status = analyse_modes(-HUGE_VAL, std::nextafter(s.initial_time, -HUGE_VAL)); !status)
+    return status;
   PhaseReport report = stepper.solve_derivatives(state);
   if (report.error) {
     record();
     return *report.error;
   }
-  if (writer) writer->derivatives(state.time, report.newton.iterations, report.newton.residual_error);
+  if (writer)
+    writer->derivatives(state.time, report.newton.iterations, report.newton.residual_error);
   NewtonReport last = report.newton;
   if (s.dummy_steps > 0 && s.abort_after != AbortAfter::derivatives) {
     report = stepper.run_dummy_steps(state);
     if (report.error) return *report.error;
-    if (writer) writer->dummy_steps(state.time, report.newton.iterations, report.newton.residual_error);
+    if (writer)
+      writer->dummy_steps(state.time, report.newton.iterations, report.newton.residual_error);
     last = report.newton;
     state.step = 0;
   }
@@ -128,7 +134,8 @@ Status Simulation::Impl::start() {
 Status Simulation::Impl::analyse_modes(double after, double until) {
   if (!writer) return ok();
   int index = 0, count = 0;
-  for (const EigenSettings& s : model->initial_value.eigenanalyses) count += static_cast<int>(s.times.size());
+  for (const EigenSettings& s : model->initial_value.eigenanalyses)
+    count += static_cast<int>(s.times.size());
   for (const EigenSettings& s : model->initial_value.eigenanalyses)
     for (const double time : s.times) {
       const int position = index++;
@@ -227,7 +234,8 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
   stepper.set_cancelled(cancel);
   PhaseReport phase = advance(report.pieces);
   report.flagged = phase.flagged;
-  report.solver_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.solver_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.step = state.step;
   report.time = state.time;
   report.step_size = state.h;
@@ -236,14 +244,21 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
   report.residual_error = phase.newton.residual_error;
   report.solution_error = phase.newton.solution_error;
   if (phase.error) {
-    report.outcome = phase.error->kind == ErrorKind::cancelled ? StepOutcome::interrupted : StepOutcome::not_converged;
+    report.outcome = phase.error->kind == ErrorKind::cancelled ? StepOutcome::interrupted
+                                                               : StepOutcome::not_converged;
     report.error = std::move(phase.error);
     return report;
   }
   report.steps_done = 1;
   if (writer) {
-    StepLine line{state.step, state.time, state.h, phase.newton.iterations, phase.newton.residual_error, phase.newton.solution_error,
-                  phase.newton.by_solution, false};
+    StepLine line{state.step,
+                  state.time,
+                  state.h,
+                  phase.newton.iterations,
+                  phase.newton.residual_error,
+                  phase.newton.solution_error,
+                  phase.newton.by_solution,
+                  false};
     line.recorded = record();
     writer->step(line);
     if (auto status = analyse_modes(previous_time, state.time); !status) {
@@ -270,7 +285,8 @@ Result<std::unique_ptr<Simulation>> Simulation::create(ModelPtr model, const Can
   try {
     status = impl->start();
   } catch (const EvaluationError& e) {
-    status = make_error(ErrorKind::evaluation, "EVALUATION_FAILED", std::string("before the first step: ") + e.what());
+    status = make_error(ErrorKind::evaluation, "EVALUATION_FAILED",
+                        std::string("before the first step: ") + e.what());
   }
   if (!status) {
     if (impl->writer) (void)impl->writer->finish();
@@ -294,7 +310,9 @@ bool Simulation::finished() const {
   return s.abort_after != InitialValueSettings::AbortAfter::never || impl_->at_end();
 }
 
-void Simulation::set_exchange(std::function<bool(int)> exchange) { impl_->stepper.set_exchange(std::move(exchange)); }
+void Simulation::set_exchange(std::function<bool(int)> exchange) {
+  impl_->stepper.set_exchange(std::move(exchange));
+}
 
 void Simulation::set_attempt_ended(std::function<void(bool)> attempt_ended) {
   impl_->attempt_ended = std::move(attempt_ended);
@@ -347,33 +365,45 @@ StepReport Simulation::run_until(double end, const CancelToken* cancel) {
 }
 
 const std::vector<Variable>& Simulation::variables() const { return impl_->all_variables().list(); }
-int Simulation::find_variable(const std::string& name) const { return impl_->all_variables().find(name); }
-void Simulation::get(int handle, std::vector<double>& out) const { impl_->all_variables().get(impl_->context(), handle, out); }
+int Simulation::find_variable(const std::string& name) const {
+  return impl_->all_variables().find(name);
+}
+void Simulation::get(int handle, std::vector<double>& out) const {
+  impl_->all_variables().get(impl_->context(), handle, out);
+}
 Status Simulation::set(int handle, std::span<const double> values) {
   const Variables& all = impl_->all_variables();
   if (handle < 0 || handle >= static_cast<int>(all.list().size()))
-    return make_error(ErrorKind::argument, "UNKNOWN_HANDLE", "no variable has the handle " + std::to_string(handle));
+    return make_error(ErrorKind::argument, "UNKNOWN_HANDLE",
+                      "no variable has the handle " + std::to_string(handle));
   return all.set(*impl_->model, impl_->state, handle, values);
 }
 
 Status Simulation::restore(const State& state) {
   if (!same_layout(state, impl_->state))
-    return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL", "the state belongs to another model: its layout differs");
+    return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL",
+                      "the state belongs to another model: its layout differs");
   impl_->state = state;
   return ok();
 }
 
-Linearization Simulation::linearize() const { return mbcosim::linearize(*impl_->model, impl_->state); }
+Linearization Simulation::linearize() const {
+  return mbcosim::linearize(*impl_->model, impl_->state);
+}
 
-Result<InputsOutputs> Simulation::linearize(std::span<const int> inputs, std::span<const int> outputs) const {
-  return linearize_inputs_outputs(*impl_->model, impl_->state, impl_->all_variables(), inputs, outputs);
+Result<InputsOutputs> Simulation::linearize(std::span<const int> inputs,
+                                            std::span<const int> outputs) const {
+  return linearize_inputs_outputs(*impl_->model, impl_->state, impl_->all_variables(), inputs,
+                                  outputs);
 }
 
 Result<Spectrum> Simulation::eigen(int count, std::complex<double> shift) const {
   return mbcosim::eigen(linearize(), count, shift);
 }
 
-std::string Simulation::export_state() const { return state_to_bytes(impl_->state, impl_->model->digest); }
+std::string Simulation::export_state() const {
+  return state_to_bytes(impl_->state, impl_->model->digest);
+}
 
 Status Simulation::import_state(std::string_view bytes) {
   auto state = state_from_bytes(bytes, impl_->model->digest);
@@ -384,7 +414,8 @@ Status Simulation::import_state(std::string_view bytes) {
 std::unique_ptr<Simulation> Simulation::fork() const {
   auto impl = std::make_unique<Impl>(impl_->model);
   impl->state = impl_->state;
-  // The pivots are chosen on the matrix of the derivatives phase, as in every simulation of this model.
+  // The pivots are chosen on the matrix of the derivatives phase, as in every simulation of this
+  // model.
   State start = make_initial_state(*impl->model);
   if (impl->stepper.assemble(start)) (void)impl->stepper.solve_derivatives(start);
   return std::unique_ptr<Simulation>(new Simulation(std::move(impl)));

@@ -1,4 +1,5 @@
-/// Simulation: the one class that users of the library touch. See design promises in src/simulation/README.md.
+/// Simulation: the one class that users of the library touch. See design promises in
+/// src/simulation/README.md.
 #pragma once
 
 #include <atomic>
@@ -45,11 +46,11 @@ enum class StepOutcome { accepted, finished, not_converged, interrupted, peer_lo
 struct StepReport {
   StepOutcome outcome = StepOutcome::accepted;
   std::int64_t steps_done = 0;
-  std::int64_t step = 0;       ///< number of the last accepted step
-  double time = 0;             ///< its time [s]
-  double step_size = 0;        ///< [s]
-  int iterations = 0;          ///< linear solves of the last step
-  double residual_error = 0;   ///< test value at the end of the last step
+  std::int64_t step = 0;      ///< number of the last accepted step
+  double time = 0;            ///< its time [s]
+  double step_size = 0;       ///< [s]
+  int iterations = 0;         ///< linear solves of the last step
+  double residual_error = 0;  ///< test value at the end of the last step
   double solution_error = 0;
   std::int64_t total_iterations = 0;
   int pieces = 1;  ///< in which the last step was solved; more than one when StepPolicy::cut had to
@@ -74,12 +75,14 @@ enum class TimeKeeping {
   exact    ///< t = t₀ + n h while h stays: no drift over any number of steps
 };
 
-/// Writes results while the simulation runs. Implementations: output/text_writer.h, output/netcdf_writer.h.
+/// Writes results while the simulation runs. Implementations: output/text_writer.h,
+/// output/netcdf_writer.h.
 class ResultWriter;
 
 class Simulation {
  public:
-  /// Prepares a run: initial values, initial assembly, derivatives phase, dummy steps. With `writer`, results go there.
+  /// Prepares a run: initial values, initial assembly, derivatives phase, dummy steps. With
+  /// `writer`, results go there.
   static Result<std::unique_ptr<Simulation>> create(ModelPtr model,
                                                     const CancelToken* cancel = nullptr,
                                                     std::shared_ptr<ResultWriter> writer = nullptr,
@@ -95,10 +98,10 @@ class Simulation {
 
   /// One step. On failure the state is that of the last accepted step and `report.error` says why.
   StepReport step(const CancelToken* cancel = nullptr);
-  /// For loads that depend on the iterate: `exchange` is called before each residual of a step with the number of
-  /// corrections so far. `get` then gives values at the iterate and `set` changes inputs of this iteration; false: the loads
-  /// have not settled and the iteration goes on. What it throws leaves `step`, and the state is that of the last accepted
-  /// step. Empty: none.
+  /// For loads that depend on the iterate: `exchange` is called before each residual of a step with
+  /// the number of corrections so far. `get` then gives values at the iterate and `set` changes
+  /// inputs of this iteration; false: the loads have not settled and the iteration goes on. What it
+  /// throws leaves `step`, and the state is that of the last accepted step. Empty: none.
   void set_exchange(std::function<bool(int)> exchange);
   /// Called when an attempt at a step failed and another follows (false), and after each piece of a
   /// cut step but the last (true); state and time are those at which the next attempt starts.
@@ -118,16 +121,17 @@ class Simulation {
   int find_variable(const std::string& name) const;  ///< handle or -1
   /// Appends the values of a variable to `out`.
   void get(int handle, std::vector<double>& out) const;
-  /// Sets an input variable (parameter nodes, attached loads). ErrorKind::argument when it is not writable or of the wrong size.
+  /// Sets an input variable (parameter nodes, attached loads). ErrorKind::argument when it is not
+  /// writable or of the wrong size.
   Status set(int handle, std::span<const double> values);
 
   /// E and A about the current state.
   Linearization linearize() const;
-  /// Derivatives with respect to the inputs and of the outputs (handles) that go with it. ErrorKind::argument when a
-  /// handle is not an input.
+  /// Derivatives with respect to the inputs and of the outputs (handles) that go with it.
+  /// ErrorKind::argument when a handle is not an input.
   Result<InputsOutputs> linearize(std::span<const int> inputs, std::span<const int> outputs) const;
-  /// The `count` eigenvalues nearest to `shift` [1/s] about the current state; 0: all finite ones. ErrorKind::limit when
-  /// all of a large model are asked for.
+  /// The `count` eigenvalues nearest to `shift` [1/s] about the current state; 0: all finite ones.
+  /// ErrorKind::limit when all of a large model are asked for.
   Result<Spectrum> eigen(int count = 0, std::complex<double> shift = 0) const;
 
   State snapshot() const { return state(); }

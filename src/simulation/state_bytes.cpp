@@ -18,7 +18,8 @@ Error bad(ErrorKind kind, std::string reason, std::string message) {
   return e;
 }
 
-/// Writes or measures plain values one after another, little-endian as on every machine this runs on.
+/// Writes or measures plain values one after another, little-endian as on every machine this runs
+/// on.
 class Out {
  public:
   template <class T>
@@ -67,7 +68,8 @@ void each_part(Rotation& q, Action action) {
 std::vector<double> flat_rotations(const State& state) {
   std::vector<double> r;
   r.reserve(state.rotation.size() * kRotationDoubles);
-  for (const NodeRotation& q : state.rotation) each_part(q, [&](const double* d, int n) { r.insert(r.end(), d, d + n); });
+  for (const NodeRotation& q : state.rotation)
+    each_part(q, [&](const double* d, int n) { r.insert(r.end(), d, d + n); });
   return r;
 }
 
@@ -83,7 +85,9 @@ void unflatten_rotations(const std::vector<double>& r, State& state) {
 
 template <class StateType, class Visit>
 void each_array(StateType& s, Visit visit) {
-  for (auto* v : {&s.y, &s.yp, &s.y1, &s.yp1, &s.y2, &s.yp2, &s.memory, &s.variables, &s.control, &s.external_loads}) visit(*v);
+  for (auto* v : {&s.y, &s.yp, &s.y1, &s.yp1, &s.y2, &s.yp2, &s.memory, &s.variables, &s.control,
+                  &s.external_loads})
+    visit(*v);
 }
 
 }  // namespace
@@ -110,9 +114,12 @@ std::string state_to_bytes(const State& state, std::uint64_t model_digest) {
 }
 
 Result<State> state_from_bytes(std::string_view bytes, std::uint64_t model_digest) {
-  const Error damaged = bad(ErrorKind::data_loss, "STATE_DAMAGED", "the state's bytes are damaged or cut short");
+  const Error damaged =
+      bad(ErrorKind::data_loss, "STATE_DAMAGED", "the state's bytes are damaged or cut short");
   std::uint64_t checksum = 0, digest = 0;
-  if (bytes.size() < sizeof kMagic + sizeof kVersion + sizeof checksum || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0) return damaged;
+  if (bytes.size() < sizeof kMagic + sizeof kVersion + sizeof checksum ||
+      std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
+    return damaged;
   std::memcpy(&checksum, bytes.data() + bytes.size() - sizeof checksum, sizeof checksum);
   bytes.remove_suffix(sizeof checksum);
   if (fnv1a(bytes) != checksum) return damaged;
@@ -120,15 +127,20 @@ Result<State> state_from_bytes(std::string_view bytes, std::uint64_t model_diges
   std::uint32_t version = 0;
   if (!in.value(version) || !in.value(digest)) return damaged;
   if (version != kVersion)
-    return bad(ErrorKind::precondition, "STATE_VERSION", "the state has format version " + std::to_string(version) + "; this program reads " + std::to_string(kVersion));
+    return bad(ErrorKind::precondition, "STATE_VERSION",
+               "the state has format version " + std::to_string(version) + "; this program reads " +
+                   std::to_string(kVersion));
   if (digest != model_digest) {
     char text[160];
-    std::snprintf(text, sizeof text, "the state belongs to the model with digest %016llx, this model has %016llx",
-                  static_cast<unsigned long long>(digest), static_cast<unsigned long long>(model_digest));
+    std::snprintf(text, sizeof text,
+                  "the state belongs to the model with digest %016llx, this model has %016llx",
+                  static_cast<unsigned long long>(digest),
+                  static_cast<unsigned long long>(model_digest));
     return bad(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL", text);
   }
   State state;
-  bool fine = in.value(state.time) && in.value(state.h) && in.value(state.h_previous) && in.value(state.step);
+  bool fine = in.value(state.time) && in.value(state.h) && in.value(state.h_previous) &&
+              in.value(state.step);
   each_array(state, [&](std::vector<double>& v) { fine = fine && in.array(v); });
   std::vector<double> rotations;
   fine = fine && in.array(rotations) && rotations.size() % kRotationDoubles == 0 && in.empty();

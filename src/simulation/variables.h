@@ -48,7 +48,7 @@ class Variables {
   };
   struct Entry {
     Source source;
-    int index = 0;   ///< of the node, element, drive, stream or port
+    int index = 0;  ///< of the node, element, drive, stream or port
     int datum = 0;
   };
   void add(Variable v, Entry e);

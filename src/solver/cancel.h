@@ -13,7 +13,8 @@ class CancelToken {
   void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
   void set_deadline(std::chrono::steady_clock::time_point t) { deadline_ = t; }
   bool cancelled() const {
-    return cancelled_.load(std::memory_order_relaxed) || (deadline_ && std::chrono::steady_clock::now() > *deadline_);
+    return cancelled_.load(std::memory_order_relaxed) ||
+           (deadline_ && std::chrono::steady_clock::now() > *deadline_);
   }
 
  private:

@@ -11,9 +11,9 @@ namespace mbcosim {
 
 namespace {
 
-constexpr int kSmallest = 64;   ///< order of a tail that pays
-constexpr double kFull = 0.8;   ///< share of entries in a column that is nearly full
-constexpr double kShare = 0.5;  ///< of all operations that the tail must have
+constexpr int kSmallest = 64;         ///< order of a tail that pays
+constexpr double kFull = 0.8;         ///< share of entries in a column that is nearly full
+constexpr double kShare = 0.5;        ///< of all operations that the tail must have
 constexpr double kSuspicious = 1e-3;  ///< pivot ratio over that of the reference: the head is poor
 
 }  // namespace

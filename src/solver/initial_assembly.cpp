@@ -14,7 +14,8 @@ namespace {
 
 class Assembly {
  public:
-  Assembly(const Model& model, State& state) : model_(model), state_(state), start_(state), n_(model.unknowns), to_local_(2 * n_, -1) {
+  Assembly(const Model& model, State& state)
+      : model_(model), state_(state), start_(state), n_(model.unknowns), to_local_(2 * n_, -1) {
     for (const ElementRef& e : model.elements)
       if (takes_part(e)) elements_.push_back(e);
     number();
@@ -27,7 +28,8 @@ class Assembly {
       compute_residual();
       report.error = error();
       if (report.error <= model_.control.assembly_tolerance) return polish(report);
-      if (report.iterations >= model_.control.assembly_max_iterations || !std::isfinite(report.error))
+      if (report.iterations >= model_.control.assembly_max_iterations ||
+          !std::isfinite(report.error))
         return failure(ErrorKind::not_converged, report);
       if (!correct()) return failure(ErrorKind::singular, report);
       report.moved = true;
@@ -35,24 +37,30 @@ class Assembly {
   }
 
  private:
-  /// Nodes that were moved get one more correction: what is left of a violation is divided by the square of a small number in
-  /// the derivatives phase. Consistent input stays as it is.
+  /// Nodes that were moved get one more correction: what is left of a violation is divided by the
+  /// square of a small number in the derivatives phase. Consistent input stays as it is.
   Result<AssemblyReport> polish(AssemblyReport& report) {
     if (report.moved && !correct()) return failure(ErrorKind::singular, report);
     return report;
   }
 
   bool takes_part(const ElementRef& e) const {
-    if (e.set->assembly_role(e.index) == AssemblyRole::none || !e.set->is_active(state_, e.index)) return false;
+    if (e.set->assembly_role(e.index) == AssemblyRole::none || !e.set->is_active(state_, e.index))
+      return false;
     switch (e.set->info(e.index).family) {
-      case Family::body: return model_.control.assemble_bodies;
-      case Family::force: return model_.control.assemble_forces;
-      case Family::beam: return model_.control.assemble_beams;
-      default: return true;
+      case Family::body:
+        return model_.control.assemble_bodies;
+      case Family::force:
+        return model_.control.assemble_forces;
+      case Family::beam:
+        return model_.control.assemble_beams;
+      default:
+        return true;
     }
   }
 
-  /// Local numbering: position level first, then the rate level. Node rows are the equilibrium rows, columns x and g.
+  /// Local numbering: position level first, then the rate level. Node rows are the equilibrium
+  /// rows, columns x and g.
   void number() {
     for (const StructuralNode& node : model_.structural)
       for (int i = 0; i < node.position_unknowns(); ++i) {
@@ -79,7 +87,9 @@ class Assembly {
 
   EvalContext context() const { return model_.context(state_, Phase::assembly); }
 
-  Vec3 rotation_parameters(std::size_t k) const { return cgr_parameters<double>(state_.rotation[k].R * start_.rotation[k].R.transpose()); }
+  Vec3 rotation_parameters(std::size_t k) const {
+    return cgr_parameters<double>(state_.rotation[k].R * start_.rotation[k].R.transpose());
+  }
 
   void compute_residual() {
     std::fill(r_.begin(), r_.end(), 0.0);
@@ -91,18 +101,22 @@ class Assembly {
       const double kp = node.assembly_position_stiffness, kv = node.assembly_velocity_stiffness;
       for (int i = 0; i < 3; ++i) {
         r_[node.equilibrium + i] += kp * (start_.y[node.first + i] - state_.y[node.first + i]);
-        r_rate_[node.equilibrium + i] += kv * (start_.yp[node.first + i] - state_.yp[node.first + i]);
+        r_rate_[node.equilibrium + i] +=
+            kv * (start_.yp[node.first + i] - state_.yp[node.first + i]);
       }
       if (!node.has_rotation()) continue;
       const Vec3 g = rotation_parameters(k);
       const NodeRotation& q = state_.rotation[k];
-      const Vec3 w0 = node.omega_rotates ? Vec3(start_.rotation[k].R * q.R.transpose() * start_.rotation[k].w) : start_.rotation[k].w;
+      const Vec3 w0 = node.omega_rotates
+                          ? Vec3(start_.rotation[k].R * q.R.transpose() * start_.rotation[k].w)
+                          : start_.rotation[k].w;
       for (int i = 0; i < 3; ++i) {
         r_[node.equilibrium + 3 + i] -= kp * g(i);
         r_rate_[node.equilibrium + 3 + i] += kv * (w0(i) - q.w(i));
       }
     }
-    for (const ElementRef& e : elements_) e.set->assembly_residual(c, e.index, r_.data(), r_rate_.data());
+    for (const ElementRef& e : elements_)
+      e.set->assembly_residual(c, e.index, r_.data(), r_rate_.data());
   }
 
   double error() const {
@@ -163,7 +177,8 @@ class Assembly {
       if (!node.has_rotation()) continue;
       const Mat3 g_inverse = cgr_g_inverse(rotation_parameters(k));
       for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) entries.push_back({node.equilibrium + 3 + i, node.first + 3 + j, kp * g_inverse(i, j)});
+        for (int j = 0; j < 3; ++j)
+          entries.push_back({node.equilibrium + 3 + i, node.first + 3 + j, kp * g_inverse(i, j)});
         entries.push_back({n_ + node.equilibrium + 3 + i, n_ + node.first + 3 + i, kv});
       }
     }
@@ -195,7 +210,8 @@ class Assembly {
     e.failure.residual_history = {report.error};
     e.failure.worst = worst_equations(model_, worst);
     char text[160];
-    std::snprintf(text, sizeof text, "initial assembly: error %.6g after %d iterations, tolerance %.6g", report.error,
+    std::snprintf(text, sizeof text,
+                  "initial assembly: error %.6g after %d iterations, tolerance %.6g", report.error,
                   report.iterations, model_.control.assembly_tolerance);
     e.message = kind == ErrorKind::singular ? "initial assembly: the matrix is singular" : text;
     const std::string reason = diagnosis();
@@ -210,8 +226,9 @@ class Assembly {
     return e;
   }
 
-  /// Why the assembly failed: constraints that contradict each other, or that follow from each other; empty when neither is
-  /// found. Looks for the configuration that violates the constraints least, with compliant constraints.
+  /// Why the assembly failed: constraints that contradict each other, or that follow from each
+  /// other; empty when neither is found. Looks for the configuration that violates the constraints
+  /// least, with compliant constraints.
   std::string diagnosis() {
     constexpr double kCompliance = 1e-6;
     const int iterations = size_ > 20000 ? 10 : 60;
@@ -223,18 +240,22 @@ class Assembly {
       if (!correct(kCompliance)) return {};
       compute_residual();
       change = 0;
-      for (int a = 0; a < node_rows_; ++a) change = std::max(change, std::abs(state_.y[columns_[a]] - before[columns_[a]]));
+      for (int a = 0; a < node_rows_; ++a)
+        change = std::max(change, std::abs(state_.y[columns_[a]] - before[columns_[a]]));
     }
     const std::string fight = contradictions();
     if (!fight.empty()) return fight;
     const NullSpace null = find_null_space(matrix(0), 1e-12);
     if (null.rank_loss == 0) {
       return change > 1e-9 ? std::string()
-                           : "the constraints can be met from here: allow more `max initial iterations`, or give positions "
+                           : "the constraints can be met from here: allow more `max initial "
+                             "iterations`, or give positions "
                              "nearer to the assembled ones";
     }
-    return "these constraints follow from each other: " + joined(owners_of(model_, by_model_row(null.left), 6)) +
-           "\n  hint: remove the redundant ones, or regularize a joint: `joint regularization: <label>, tikhonov, 1e-8;`";
+    return "these constraints follow from each other: " +
+           joined(owners_of(model_, by_model_row(null.left), 6)) +
+           "\n  hint: remove the redundant ones, or regularize a joint: `joint regularization: "
+           "<label>, tikhonov, 1e-8;`";
   }
 
   /// The constraints that stay violated, largest violation of each element first.
@@ -249,7 +270,8 @@ class Assembly {
       if (violation >= worst.first) worst = {violation, equation};
     }
     if (!(largest > 1e-4)) return {};
-    std::string s = "these constraints contradict each other; the least violation that was found leaves";
+    std::string s =
+        "these constraints contradict each other; the least violation that was found leaves";
     for (const auto& [owner, worst] : by_owner) {
       if (worst.first < 1e-2 * largest) continue;
       char text[32];
@@ -261,7 +283,8 @@ class Assembly {
 
   VecX by_model_row(const VecX& local) const {
     VecX r = VecX::Zero(n_);
-    for (int a = 0; a < size_; ++a) r(rows_[a]) = std::max(std::abs(local(a)), std::abs(local(size_ + a)));
+    for (int a = 0; a < size_; ++a)
+      r(rows_[a]) = std::max(std::abs(local(a)), std::abs(local(size_ + a)));
     return r;
   }
 
@@ -269,11 +292,11 @@ class Assembly {
   State& state_;
   const State start_;
   int n_;
-  int size_ = 0, node_rows_ = 0;               ///< local rows of one level, those of nodes among them
+  int size_ = 0, node_rows_ = 0;  ///< local rows of one level, those of nodes among them
   std::vector<ElementRef> elements_;
-  std::vector<int> rows_, columns_;            ///< local index -> model row, column
-  std::vector<int> to_local_, row_of_;         ///< model column, row (rate level: + n) -> local index
-  std::vector<double> r_, r_rate_;             ///< by model row (n)
+  std::vector<int> rows_, columns_;     ///< local index -> model row, column
+  std::vector<int> to_local_, row_of_;  ///< model column, row (rate level: + n) -> local index
+  std::vector<double> r_, r_rate_;      ///< by model row (n)
 };
 
 }  // namespace

@@ -1,7 +1,10 @@
-/// Initial assembly: moves nodes, held by weak springs, until position constraints and their rates hold. Spec 02 section 9.
+/// Initial assembly: moves nodes, held by weak springs, until position constraints and their rates
+/// hold. Spec 02 section 9.
 ///
-/// Unknowns: x, θ, v, w of every node, multipliers λ and λ′ of every participating element. Rows of a node:
-///   kp (x₀ − x) + loads,  −kp g(R R₀ᵀ) + moments,  kv (v₀ − v) + load rates,  kv (w₀ − w) + moment rates
+/// Unknowns: x, θ, v, w of every node, multipliers λ and λ′ of every participating element. Rows of
+/// a node:
+///   kp (x₀ − x) + loads,  −kp g(R R₀ᵀ) + moments,  kv (v₀ − v) + load rates,  kv (w₀ − w) + moment
+///   rates
 /// and for each constraint φ = 0, dφ/dt = 0. Newton with the true Jacobian.
 #pragma once
 
@@ -15,8 +18,8 @@ struct AssemblyReport {
   bool moved = false;
 };
 
-/// Changes positions, orientations and velocities of nodes in `state`; ErrorKind::not_converged or ::singular otherwise,
-/// naming the constraints that fight.
+/// Changes positions, orientations and velocities of nodes in `state`; ErrorKind::not_converged or
+/// ::singular otherwise, naming the constraints that fight.
 Result<AssemblyReport> assemble_initially(const Model& model, State& state);
 
 }  // namespace mbcosim

@@ -67,18 +67,23 @@ StepFormula hope(double h, double h_previous, double rho, double rho_algebraic, 
 
 }  // namespace
 
-StepFormula step_formula(Method method, double h, double h_previous, double rho, double rho_algebraic, bool odd) {
+StepFormula step_formula(Method method, double h, double h_previous, double rho,
+                         double rho_algebraic, bool odd) {
   switch (method) {
     case Method::bdf1:
     case Method::third_order:
-    case Method::third_order_ad_hoc: {  // the third-order method's own prediction of the end of the step
+    case Method::third_order_ad_hoc: {  // the third-order method's own prediction of the end of the
+                                        // step
       StepFormula f;
       f.b0 = f.i0 = h;
       return f;
     }
-    case Method::multistep: return multistep(h, h_previous, rho, rho_algebraic);
-    case Method::hope: return hope(h, h_previous, rho, rho_algebraic, odd);
-    case Method::crank_nicolson: break;
+    case Method::multistep:
+      return multistep(h, h_previous, rho, rho_algebraic);
+    case Method::hope:
+      return hope(h, h_previous, rho, rho_algebraic, odd);
+    case Method::crank_nicolson:
+      break;
   }
   return crank_nicolson(h);
 }

@@ -3,12 +3,15 @@
 /// With y₁, ẏ₁ at the last accepted step, y₂, ẏ₂ one step earlier, α = h/h′:
 ///
 ///   differential   y = a1 y₁ + a2 y₂ + b0 ẏ + b1 ẏ₁ + b2 ẏ₂              c = b0
-///   algebraic      I = i0 y + i1 y₁ + i2 y₂ + j1 I₁   (I: running integral, kept in ẏ; used by the predictor only)
+///   algebraic      I = i0 y + i1 y₁ + i2 y₂ + j1 I₁   (I: running integral, kept in ẏ; used by the
+///   predictor only)
 ///
-/// Cubic predictor: ẏ = m0 y₁ + m1 y₂ + n0 ẏ₁ + n1 ẏ₂ (differential), y = n0 y₁ + n1 y₂ − m1 I₁ (algebraic).
+/// Cubic predictor: ẏ = m0 y₁ + m1 y₂ + n0 ẏ₁ + n1 ẏ₂ (differential), y = n0 y₁ + n1 y₂ − m1 I₁
+/// (algebraic).
 ///
-/// Sources: P. Masarati, M. Lanz, P. Mantegazza, "Multistep integration of ordinary, stiff and differential-algebraic
-/// problems for multibody dynamics applications", XVI AIDAA Congress, 2001; MBDyn input manual, "method".
+/// Sources: P. Masarati, M. Lanz, P. Mantegazza, "Multistep integration of ordinary, stiff and
+/// differential-algebraic problems for multibody dynamics applications", XVI AIDAA Congress, 2001;
+/// MBDyn input manual, "method".
 #pragma once
 
 #include "model/settings.h"
@@ -25,8 +28,10 @@ struct StepFormula {
   double c_algebraic() const { return i0; }
 };
 
-/// For the third-order method: the prediction of the end of the step (see solver/third_order.h for the rest).
-/// `odd` is the kind of the `hope` step; rho and rho_algebraic are the asymptotic spectral radii.
-StepFormula step_formula(Method method, double h, double h_previous, double rho, double rho_algebraic, bool odd);
+/// For the third-order method: the prediction of the end of the step (see solver/third_order.h for
+/// the rest). `odd` is the kind of the `hope` step; rho and rho_algebraic are the asymptotic
+/// spectral radii.
+StepFormula step_formula(Method method, double h, double h_previous, double rho,
+                         double rho_algebraic, bool odd);
 
 }  // namespace mbcosim

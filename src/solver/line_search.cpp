@@ -21,7 +21,8 @@ struct Trial {
 };
 
 /// Minimum of the quadratic (first time) or cubic model of f along the direction.
-double next_lambda(const LineSearchSettings& s, bool first, double f0, double slope, const Trial& now, const Trial& before) {
+double next_lambda(const LineSearchSettings& s, bool first, double f0, double slope,
+                   const Trial& now, const Trial& before) {
   if (!s.cubic) return now.lambda * s.lambda_factor_min;
   double r;
   if (first) {
@@ -32,10 +33,14 @@ double next_lambda(const LineSearchSettings& s, bool first, double f0, double sl
     const double a = (g1 - g2) / (now.lambda - before.lambda);
     const double b = (-before.lambda * g1 + now.lambda * g2) / (now.lambda - before.lambda);
     const double disc = b * b - 3 * a * slope;
-    if (a == 0) r = -slope / (2 * b);
-    else if (disc < 0) r = 0.5 * now.lambda;
-    else if (b <= 0) r = (-b + std::sqrt(disc)) / (3 * a);
-    else r = -slope / (b + std::sqrt(disc));
+    if (a == 0)
+      r = -slope / (2 * b);
+    else if (disc < 0)
+      r = 0.5 * now.lambda;
+    else if (b <= 0)
+      r = (-b + std::sqrt(disc)) / (3 * a);
+    else
+      r = -slope / (b + std::sqrt(disc));
   }
   if (!std::isfinite(r)) r = 0.5 * now.lambda;
   return std::max(std::min(r, 0.5 * now.lambda), s.lambda_factor_min * now.lambda);
@@ -52,26 +57,33 @@ void limit_step(const LineSearchSettings& s, const State& state, std::vector<dou
 
 }  // namespace
 
-/// Is the gradient of ½ rᵀr so small that its minimum is a spurious one? J: the matrix in the workspace.
-bool is_local_minimum(const Model& model, const LineSearchSettings& s, const State& state, double f, const Workspace& ws) {
+/// Is the gradient of ½ rᵀr so small that its minimum is a spurious one? J: the matrix in the
+/// workspace.
+bool is_local_minimum(const Model& model, const LineSearchSettings& s, const State& state, double f,
+                      const Workspace& ws) {
   double largest = 0;
   for (int j = 0; j < model.unknowns; ++j) {
     double g = 0;
-    for (int k = model.column_start[j]; k < model.column_start[j + 1]; ++k) g += ws.values[k] * ws.residual[model.row_index[k]];
-    largest = std::max(largest, std::abs(g) * std::max({std::abs(state.y[j]), std::abs(state.yp[j]), 1.0}));
+    for (int k = model.column_start[j]; k < model.column_start[j + 1]; ++k)
+      g += ws.values[k] * ws.residual[model.row_index[k]];
+    largest = std::max(largest,
+                       std::abs(g) * std::max({std::abs(state.y[j]), std::abs(state.yp[j]), 1.0}));
   }
   return largest < s.tolerance_min * std::max(f, 0.5 * model.unknowns);
 }
 
-bool search_along(const Model& model, Phase phase, double c, double c_algebraic, const LineSearchSettings& s, State& state,
-                  Workspace& ws) {
+bool search_along(const Model& model, Phase phase, double c, double c_algebraic,
+                  const LineSearchSettings& s, State& state, Workspace& ws) {
   const State start = state;
   const double f0 = 0.5 * dot(ws.residual, ws.residual);
   if (s.scale_newton_step) limit_step(s, state, ws.delta);
   double t = 0;
   for (int i = 0; i < model.unknowns; ++i)
-    t = std::max(t, std::abs(ws.delta[i]) / std::max({std::abs(state.y[i]), std::abs(state.yp[i]), 1.0}));
-  const double lambda_min = s.lambda_min_relative ? std::max(s.lambda_min, std::min(t > 0 ? s.tolerance_x / t : 1.0, 1.0)) : s.lambda_min;
+    t = std::max(
+        t, std::abs(ws.delta[i]) / std::max({std::abs(state.y[i]), std::abs(state.yp[i]), 1.0}));
+  const double lambda_min =
+      s.lambda_min_relative ? std::max(s.lambda_min, std::min(t > 0 ? s.tolerance_x / t : 1.0, 1.0))
+                            : s.lambda_min;
   const double slope = -2 * f0;
   const std::vector<double> direction = ws.delta;
   Trial now{1, 0}, before;
@@ -88,7 +100,8 @@ bool search_along(const Model& model, Phase phase, double c, double c_algebraic,
       if (!s.zero_gradient_continue && is_local_minimum(model, s, state, now.f, ws)) return false;
       return !s.divergence_check || now.f <= s.divergence_factor * f0;
     }
-    const double next = std::isfinite(now.f) ? next_lambda(s, k == 0, f0, slope, now, before) : 0.5 * now.lambda;
+    const double next =
+        std::isfinite(now.f) ? next_lambda(s, k == 0, f0, slope, now, before) : 0.5 * now.lambda;
     before = now;
     now.lambda = std::max(next, lambda_min);
   }

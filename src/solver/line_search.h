@@ -1,5 +1,6 @@
-/// Backtracking along the Newton direction. Dennis and Schnabel, "Numerical Methods for Unconstrained Optimization and
-/// Nonlinear Equations", algorithm A6.3.1; parameters as in MBDyn's input manual, "line search".
+/// Backtracking along the Newton direction. Dennis and Schnabel, "Numerical Methods for
+/// Unconstrained Optimization and Nonlinear Equations", algorithm A6.3.1; parameters as in MBDyn's
+/// input manual, "line search".
 #pragma once
 
 #include "model/model.h"
@@ -7,9 +8,10 @@
 
 namespace mbcosim {
 
-/// Moves `state` along workspace.delta (scaled in place to the accepted step) so that ½ rᵀr decreases. False when it gives up: the
-/// smallest step is reached without enough decrease (unless the settings accept that), or after too many trials.
-bool search_along(const Model& model, Phase phase, double c, double c_algebraic, const LineSearchSettings& settings, State& state,
-                  Workspace& workspace);
+/// Moves `state` along workspace.delta (scaled in place to the accepted step) so that ½ rᵀr
+/// decreases. False when it gives up: the smallest step is reached without enough decrease (unless
+/// the settings accept that), or after too many trials.
+bool search_along(const Model& model, Phase phase, double c, double c_algebraic,
+                  const LineSearchSettings& settings, State& state, Workspace& workspace);
 
 }  // namespace mbcosim

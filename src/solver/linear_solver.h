@@ -1,8 +1,9 @@
 /// Sparse LU by SuiteSparse KLU: one small class that hides the C library.
 ///
-/// Pivots are chosen once, on a reference matrix (`analyze`), and kept: factorizations of later matrices depend on the
-/// matrix alone, never on what was factored before. A matrix for which the kept pivots are poor gets a
-/// factorization of its own. Results are thus the same bits wherever a state is continued.
+/// Pivots are chosen once, on a reference matrix (`analyze`), and kept: factorizations of later
+/// matrices depend on the matrix alone, never on what was factored before. A matrix for which the
+/// kept pivots are poor gets a factorization of its own. Results are thus the same bits wherever a
+/// state is continued.
 #pragma once
 
 #include <memory>

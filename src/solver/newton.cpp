@@ -22,7 +22,8 @@ template <class Function>
 double root_near(Function&& f, double at_zero, double tolerance) {
   double a = 0, fa = at_zero, b = 0, fb = 0;
   bool found = false;
-  for (double reach = 1e-3 * std::abs(at_zero); !found && reach < 1e6 * std::abs(at_zero); reach *= 4)
+  for (double reach = 1e-3 * std::abs(at_zero); !found && reach < 1e6 * std::abs(at_zero);
+       reach *= 4)
     for (const double side : {reach, -reach}) {
       b = side;
       fb = f(b);
@@ -30,7 +31,8 @@ double root_near(Function&& f, double at_zero, double tolerance) {
       if (found) break;
     }
   if (!found) return NAN;
-  for (int k = 0; k < 100 && std::abs(fb) > tolerance; ++k) {  // regula falsi of the Illinois kind, with bisection
+  for (int k = 0; k < 100 && std::abs(fb) > tolerance;
+       ++k) {  // regula falsi of the Illinois kind, with bisection
     const double x = k % 3 == 2 ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa), fx = f(x);
     if (fx * fb < 0) {
       a = b;
@@ -46,9 +48,16 @@ double root_near(Function&& f, double at_zero, double tolerance) {
 
 class Newton {
  public:
-  Newton(const Model& model, Phase phase, double c, double ca, const NewtonSettings& settings, const NewtonHooks& hooks, State& state,
-         Workspace& workspace)
-      : model_(model), phase_(phase), c_(c), ca_(ca), settings_(settings), hooks_(hooks), state_(state), ws_(workspace) {}
+  Newton(const Model& model, Phase phase, double c, double ca, const NewtonSettings& settings,
+         const NewtonHooks& hooks, State& state, Workspace& workspace)
+      : model_(model),
+        phase_(phase),
+        c_(c),
+        ca_(ca),
+        settings_(settings),
+        hooks_(hooks),
+        state_(state),
+        ws_(workspace) {}
 
   NewtonReport run() {
     ws_.residual_history.clear();
@@ -58,11 +67,15 @@ class Newton {
       const bool settled = hooks_.exchange(report.iterations);
       report.residual_error = residual();
       ws_.residual_history.push_back(report.residual_error);
-      if (const auto verdict = judge_residual(settings_, ws_.residual_history, report.iterations, settled)) return finish(report, *verdict);
-      if (exceeds_residual_limits(model_, settings_, ws_.residual)) return finish(report, NewtonOutcome::not_converged);
+      if (const auto verdict =
+              judge_residual(settings_, ws_.residual_history, report.iterations, settled))
+        return finish(report, *verdict);
+      if (exceeds_residual_limits(model_, settings_, ws_.residual))
+        return finish(report, NewtonOutcome::not_converged);
       if (hooks_.cancelled()) return finish(report, NewtonOutcome::cancelled);
       if (!correct(report)) return report;
-      if (settled && settings_.solution_tolerance > 0 && report.solution_error < settings_.solution_tolerance) {
+      if (settled && settings_.solution_tolerance > 0 &&
+          report.solution_error < settings_.solution_tolerance) {
         report.by_solution = true;
         return finish(report, NewtonOutcome::converged);
       }
@@ -99,9 +112,12 @@ class Newton {
     else
       ws_.solver.solve(ws_.delta.data());
     if (!settings_.line_search) {
-      // Full steps that cycle (dry friction, contacts) are shortened; a search without success goes on from where it ended.
-      if (cycling) (void)search_along(model_, phase_, c_, ca_, rescue_, state_, ws_);
-      else apply_correction(model_, ws_.delta, c_, ca_, state_);
+      // Full steps that cycle (dry friction, contacts) are shortened; a search without success goes
+      // on from where it ended.
+      if (cycling)
+        (void)search_along(model_, phase_, c_, ca_, rescue_, state_, ws_);
+      else
+        apply_correction(model_, ws_.delta, c_, ca_, state_);
     } else if (!search_along(model_, phase_, c_, ca_, *settings_.line_search, state_, ws_)) {
       finish(report, NewtonOutcome::not_converged);
       return false;
@@ -120,14 +136,18 @@ class Newton {
     const auto recent = errors.end() - kPatience;
     return !(*std::min_element(recent, errors.end()) < *std::min_element(errors.begin(), recent));
   }
-  /// Nonlinear elimination: when one equation of a differential unknown makes up the residual (the state of dry friction at
-  /// a kink of its law), that equation is solved for its own unknown before the next step.
+  /// Nonlinear elimination: when one equation of a differential unknown makes up the residual (the
+  /// state of dry friction at a kink of its law), that equation is solved for its own unknown
+  /// before the next step.
   void eliminate_worst() {
     const std::vector<double>& r = ws_.residual;
-    const auto worst = std::max_element(r.begin(), r.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+    const auto worst = std::max_element(
+        r.begin(), r.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
     const int row = static_cast<int>(worst - r.begin());
     const double all = test_value(ResidualTest::norm, r);
-    if (model_.kinds[row] != UnknownKind::differential || std::abs(*worst) < 0.9 * all || !std::isfinite(all)) return;
+    if (model_.kinds[row] != UnknownKind::differential || std::abs(*worst) < 0.9 * all ||
+        !std::isfinite(all))
+      return;
     const State start = state_;
     const double at_start = *worst;
     const auto value = [&](double correction) {
@@ -145,7 +165,8 @@ class Newton {
   static LineSearchSettings rescue_settings() {
     LineSearchSettings s;
     s.lambda_min = 1e-3;
-    s.lambda_min_relative = s.scale_newton_step = s.divergence_check = s.abort_at_lambda_min = false;
+    s.lambda_min_relative = s.scale_newton_step = s.divergence_check = s.abort_at_lambda_min =
+        false;
     s.zero_gradient_continue = true;
     return s;
   }
@@ -194,12 +215,15 @@ class Newton {
 double test_value(ResidualTest test, const std::vector<double>& v) {
   double value = 0;
   for (const double x : v)
-    if (test == ResidualTest::norm) value += x * x;
-    else if (!(std::abs(x) <= value)) value = std::abs(x);  // keeps NaN
+    if (test == ResidualTest::norm)
+      value += x * x;
+    else if (!(std::abs(x) <= value))
+      value = std::abs(x);  // keeps NaN
   return test == ResidualTest::norm ? std::sqrt(value) : value;
 }
 
-double residual_error(const Model& model, const NewtonSettings& settings, const State& state, const std::vector<double>& residual) {
+double residual_error(const Model& model, const NewtonSettings& settings, const State& state,
+                      const std::vector<double>& residual) {
   if (settings.residual_test == ResidualTest::none) return 0;
   double error = 0;
   if (!settings.scale && settings.constraint_factor == 1) {
@@ -207,8 +231,10 @@ double residual_error(const Model& model, const NewtonSettings& settings, const 
   } else {
     for (std::size_t i = 0; i < residual.size(); ++i) {
       const double x = residual[i] * row_factor(model, settings, i);
-      if (settings.residual_test == ResidualTest::norm) error += x * x;
-      else if (!(std::abs(x) <= error)) error = std::abs(x);
+      if (settings.residual_test == ResidualTest::norm)
+        error += x * x;
+      else if (!(std::abs(x) <= error))
+        error = std::abs(x);
     }
     if (settings.residual_test == ResidualTest::norm) error = std::sqrt(error);
   }
@@ -222,7 +248,8 @@ double residual_error(const Model& model, const NewtonSettings& settings, const 
   return error / sum;
 }
 
-bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings, const std::vector<double>& residual) {
+bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings,
+                             const std::vector<double>& residual) {
   if (settings.max_residual <= 0 && settings.max_residual_differential <= 0) return false;
   double all = 0, differential = 0;
   for (int i = 0; i < model.unknowns; ++i) {
@@ -231,30 +258,38 @@ bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings,
     if (!model.is_constraint_row[i]) differential = std::max(differential, x);
   }
   return (settings.max_residual > 0 && all > settings.max_residual) ||
-         (settings.max_residual_differential > 0 && differential > settings.max_residual_differential);
+         (settings.max_residual_differential > 0 &&
+          differential > settings.max_residual_differential);
 }
 
-std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations,
+std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings,
+                                            const std::vector<double>& errors, int iterations,
                                             bool settled) {
   const double error = errors.back();
   if (!std::isfinite(error)) return NewtonOutcome::not_converged;
   const bool tested = settings.residual_test != ResidualTest::none && settings.tolerance > 0;
   if (tested && settled && error < settings.tolerance) return NewtonOutcome::converged;
   if (iterations < settings.max_iterations) return std::nullopt;
-  return settled && settings.at_most && error < errors.front() ? NewtonOutcome::converged : NewtonOutcome::not_converged;
+  return settled && settings.at_most && error < errors.front() ? NewtonOutcome::converged
+                                                               : NewtonOutcome::not_converged;
 }
 
-NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic, const NewtonSettings& settings,
-                          const NewtonHooks& hooks, State& state, Workspace& workspace) {
+NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic,
+                          const NewtonSettings& settings, const NewtonHooks& hooks, State& state,
+                          Workspace& workspace) {
   return Newton(model, phase, c, c_algebraic, settings, hooks, state, workspace).run();
 }
 
-std::vector<WorstEquation> worst_equations(const Model& model, const std::vector<double>& residual, int count) {
+std::vector<WorstEquation> worst_equations(const Model& model, const std::vector<double>& residual,
+                                           int count) {
   std::vector<int> rows(residual.size());
   std::iota(rows.begin(), rows.end(), 0);
   count = std::min<int>(count, static_cast<int>(rows.size()));
-  const auto size = [&](int i) { return std::isfinite(residual[i]) ? std::abs(residual[i]) : HUGE_VAL; };
-  std::partial_sort(rows.begin(), rows.begin() + count, rows.end(), [&](int a, int b) { return size(a) > size(b); });
+  const auto size = [&](int i) {
+    return std::isfinite(residual[i]) ? std::abs(residual[i]) : HUGE_VAL;
+  };
+  std::partial_sort(rows.begin(), rows.begin() + count, rows.end(),
+                    [&](int a, int b) { return size(a) > size(b); });
   std::vector<WorstEquation> worst;
   for (int k = 0; k < count; ++k) {
     const auto [owner, equation] = model.row_text(rows[k]);

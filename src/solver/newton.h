@@ -17,7 +17,8 @@ struct NewtonSettings {
   int max_iterations = 1;
   bool at_most = false;
   int jacobian_every = 1;      ///< > 1: modified Newton
-  bool keep_jacobian = false;  ///< modified Newton counts its iterations across steps; the matrix is kept in the state
+  bool keep_jacobian = false;  ///< modified Newton counts its iterations across steps; the matrix
+                               ///< is kept in the state
   const LineSearchSettings* line_search = nullptr;
   double max_residual = 0, max_residual_differential = 0;  ///< 0: none
   double constraint_factor = 1;  ///< `enforce constraint equations: constraint violations`
@@ -39,12 +40,15 @@ struct NewtonReport {
 /// norm: sqrt(Σ v²); minmax: max |v|, NaN if any is.
 double test_value(ResidualTest test, const std::vector<double>& v);
 /// The residual test with its scales and options.
-double residual_error(const Model& model, const NewtonSettings& settings, const State& state, const std::vector<double>& residual);
+double residual_error(const Model& model, const NewtonSettings& settings, const State& state,
+                      const std::vector<double>& residual);
 /// Is a residual beyond `max residual`?
-bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings, const std::vector<double>& residual);
-/// What the last residual error says after `iterations` solves: an outcome, or nothing to go on. Nothing converges before
-/// loads from outside have `settled`.
-std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings, const std::vector<double>& errors, int iterations,
+bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings,
+                             const std::vector<double>& residual);
+/// What the last residual error says after `iterations` solves: an outcome, or nothing to go on.
+/// Nothing converges before loads from outside have `settled`.
+std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings,
+                                            const std::vector<double>& errors, int iterations,
                                             bool settled);
 
 /// What the phase that iterates adds.
@@ -53,18 +57,21 @@ class NewtonHooks {
   virtual ~NewtonHooks() = default;
   /// After each correction was added to the state (the derivatives phase puts nodes back).
   virtual void after_correction(State&) const {}
-  /// Before each residual: loads from outside may change. False: they have not settled, so that nothing has converged yet.
+  /// Before each residual: loads from outside may change. False: they have not settled, so that
+  /// nothing has converged yet.
   virtual bool exchange(int /*iteration*/) const { return true; }
   /// Asked before each correction; true stops with `cancelled`.
   virtual bool cancelled() const { return false; }
 };
 
-/// Iterates from the state as it stands with the coefficients c, c_a. The state is left at the last iterate. Throws
-/// EvaluationError when a drive or law cannot be evaluated.
-NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic, const NewtonSettings& settings,
-                          const NewtonHooks& hooks, State& state, Workspace& workspace);
+/// Iterates from the state as it stands with the coefficients c, c_a. The state is left at the last
+/// iterate. Throws EvaluationError when a drive or law cannot be evaluated.
+NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic,
+                          const NewtonSettings& settings, const NewtonHooks& hooks, State& state,
+                          Workspace& workspace);
 
 /// The rows with the largest residuals, by owner and meaning.
-std::vector<WorstEquation> worst_equations(const Model& model, const std::vector<double>& residual, int count = 5);
+std::vector<WorstEquation> worst_equations(const Model& model, const std::vector<double>& residual,
+                                           int count = 5);
 
 }  // namespace mbcosim

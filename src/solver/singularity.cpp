@@ -15,8 +15,9 @@ constexpr int kNamed = 6;  ///< equations that a message names
 
 Eigen::SparseMatrix<double> sparse(const Model& model, const std::vector<double>& values) {
   const int n = model.unknowns;
-  return Eigen::Map<const Eigen::SparseMatrix<double>>(n, n, static_cast<int>(model.row_index.size()), model.column_start.data(),
-                                                       model.row_index.data(), values.data());
+  return Eigen::Map<const Eigen::SparseMatrix<double>>(
+      n, n, static_cast<int>(model.row_index.size()), model.column_start.data(),
+      model.row_index.data(), values.data());
 }
 
 Singularity look(const Model& model, const std::vector<double>& values, double threshold) {
@@ -35,10 +36,13 @@ Singularity look(const Model& model, const std::vector<double>& values, double t
 std::vector<WorstEquation> owners_of(const Model& model, const VecX& share, int count) {
   std::vector<int> order(share.size());
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return std::abs(share(a)) > std::abs(share(b)); });
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return std::abs(share(a)) > std::abs(share(b)); });
   std::vector<WorstEquation> r;
   for (const int row : order) {
-    if (static_cast<int>(r.size()) == count || std::abs(share(row)) < 0.1 * std::abs(share(order[0])) || share(row) == 0) break;
+    if (static_cast<int>(r.size()) == count ||
+        std::abs(share(row)) < 0.1 * std::abs(share(order[0])) || share(row) == 0)
+      break;
     const auto [owner, equation] = model.row_text(row);
     r.push_back({owner, equation, share(row)});
   }

@@ -1,5 +1,5 @@
-/// A rank-revealing look at a matrix that could not be factored, or with which the iteration did not converge: which unknowns
-/// nothing determines, which equations follow from others.
+/// A rank-revealing look at a matrix that could not be factored, or with which the iteration did
+/// not converge: which unknowns nothing determines, which equations follow from others.
 #pragma once
 
 #include <string>
@@ -10,17 +10,19 @@
 namespace mbcosim {
 
 struct Singularity {
-  int rank_loss = 0;  ///< 0 when the matrix has full rank
+  int rank_loss = 0;                        ///< 0 when the matrix has full rank
   std::vector<WorstEquation> undetermined;  ///< unknowns with the largest share in the null space
-  std::vector<WorstEquation> redundant;     ///< equations with the largest share in the left null space
+  std::vector<WorstEquation>
+      redundant;  ///< equations with the largest share in the left null space
   std::string text() const;
 };
 
-/// Rank to rounding; `column` is the column without a pivot that the sparse factorization met (-1: unknown).
+/// Rank to rounding; `column` is the column without a pivot that the sparse factorization met (-1:
+/// unknown).
 Singularity find_singularity(const Model& model, const std::vector<double>& values, int column);
 
-/// Rank of a matrix that could be factored, with a looser threshold; full rank for models of more than 400 unknowns, for
-/// which the look would take long.
+/// Rank of a matrix that could be factored, with a looser threshold; full rank for models of more
+/// than 400 unknowns, for which the look would take long.
 Singularity find_near_singularity(const Model& model, const std::vector<double>& values);
 
 /// The rows where |share| is large, at most `count`, named.

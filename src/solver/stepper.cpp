@@ -35,7 +35,8 @@ NewtonSettings regular_settings(const InitialValueSettings& s) {
   return n;
 }
 
-/// The phases before the first step: residual test of the deck's kind, their own tolerance and limit.
+/// The phases before the first step: residual test of the deck's kind, their own tolerance and
+/// limit.
 NewtonSettings start_settings(const InitialValueSettings& s, double tolerance, int max_iterations) {
   NewtonSettings n = regular_settings(s);
   n.tolerance = tolerance;
@@ -59,7 +60,9 @@ bool is_finite(const State& state) {
          std::all_of(state.yp.begin(), state.yp.end(), finite);
 }
 
-bool is_third_order(const MethodSettings& m) { return m.method == Method::third_order || m.method == Method::third_order_ad_hoc; }
+bool is_third_order(const MethodSettings& m) {
+  return m.method == Method::third_order || m.method == Method::third_order_ad_hoc;
+}
 
 }  // namespace
 
@@ -68,7 +71,9 @@ class Stepper::StepHooks : public NewtonHooks {
  public:
   explicit StepHooks(const CancelToken* cancel, const std::function<bool(int)>* exchange = nullptr)
       : cancel_(cancel), exchange_(exchange) {}
-  bool exchange(int iteration) const override { return !exchange_ || !*exchange_ || (*exchange_)(iteration); }
+  bool exchange(int iteration) const override {
+    return !exchange_ || !*exchange_ || (*exchange_)(iteration);
+  }
   bool cancelled() const override { return cancel_ && cancel_->cancelled(); }
 
  private:
@@ -76,11 +81,13 @@ class Stepper::StepHooks : public NewtonHooks {
   const std::function<bool(int)>* exchange_;
 };
 
-/// The derivatives phase holds the kinematics: after each correction positions, orientations and velocities of nodes are
-/// put back to the given values; momenta, multipliers and the rest keep their corrections.
+/// The derivatives phase holds the kinematics: after each correction positions, orientations and
+/// velocities of nodes are put back to the given values; momenta, multipliers and the rest keep
+/// their corrections.
 class Stepper::DerivativesHooks : public NewtonHooks {
  public:
-  DerivativesHooks(const Model& model, const State& start, const CancelToken* cancel) : model_(model), start_(start), cancel_(cancel) {}
+  DerivativesHooks(const Model& model, const State& start, const CancelToken* cancel)
+      : model_(model), start_(start), cancel_(cancel) {}
   void after_correction(State& state) const override {
     for (const StructuralNode& n : model_.structural)
       for (int i = 0; i < n.position_unknowns(); ++i) {
@@ -98,10 +105,13 @@ class Stepper::DerivativesHooks : public NewtonHooks {
 };
 
 Stepper::Stepper(const Model& model)
-    : model_(model), workspace_(model), regular_(regular_settings(model.initial_value)),
+    : model_(model),
+      workspace_(model),
+      regular_(regular_settings(model.initial_value)),
       derivatives_(start_settings(model.initial_value, model.initial_value.derivatives_tolerance,
                                   model.initial_value.derivatives_max_iterations)),
-      dummy_(start_settings(model.initial_value, model.initial_value.dummy_tolerance, model.initial_value.dummy_max_iterations)),
+      dummy_(start_settings(model.initial_value, model.initial_value.dummy_tolerance,
+                            model.initial_value.dummy_max_iterations)),
       derivatives_coefficient_(model.initial_value.derivatives_coefficient) {
   const InitialValueSettings& s = model.initial_value;
   if (is_third_order(s.method) || (s.dummy_method && is_third_order(*s.dummy_method)))
@@ -109,9 +119,11 @@ Stepper::Stepper(const Model& model)
 }
 
 Status Stepper::assemble(State& state) {
-  state.control.assign(control::kCount + (regular_.keep_jacobian ? model_.row_index.size() : 0), 0.0);
+  state.control.assign(control::kCount + (regular_.keep_jacobian ? model_.row_index.size() : 0),
+                       0.0);
   state.h = state.h_previous = model_.initial_value.time_step;
-  for (const auto& listener : model_.step_listeners) listener->advance(model_.context(state, Phase::assembly), state, true);
+  for (const auto& listener : model_.step_listeners)
+    listener->advance(model_.context(state, Phase::assembly), state, true);
   update_activity(model_.context(state, Phase::assembly), state, false);
   auto report = assemble_initially(model_, state);
   if (!report) return report.error();
@@ -135,8 +147,10 @@ PhaseReport Stepper::solve_derivatives(State& state) {
     const EvalContext context = model_.context(state, Phase::derivatives, c, c);
     compute_jacobian(context, workspace_);
     workspace_.solver.analyze(workspace_.values.data());
-    report.newton = solve_newton(model_, Phase::derivatives, c, c, settings, hooks, state, workspace_);
-    if (report.newton.outcome == NewtonOutcome::converged) after_convergence(state, Phase::derivatives, c, c);
+    report.newton =
+        solve_newton(model_, Phase::derivatives, c, c, settings, hooks, state, workspace_);
+    if (report.newton.outcome == NewtonOutcome::converged)
+      after_convergence(state, Phase::derivatives, c, c);
     return report.newton.outcome == NewtonOutcome::converged;
   };
   bool done = attempt_with(derivatives_coefficient_, derivatives_.tolerance);
@@ -158,7 +172,9 @@ PhaseReport Stepper::solve_derivatives(State& state) {
   if (!done) {
     report.error = failure(report.newton, state, "derivatives phase");
     if (report.newton.outcome == NewtonOutcome::not_converged)
-      report.error->message += "\n  hint: change `derivatives coefficient`, `derivatives tolerance` or `derivatives max iterations`";
+      report.error->message +=
+          "\n  hint: change `derivatives coefficient`, `derivatives tolerance` or `derivatives max "
+          "iterations`";
     return report;
   }
   choose_pivots(state);
@@ -171,7 +187,8 @@ void Stepper::choose_pivots(const State& state) {
   workspace_.solver.analyze(workspace_.values.data());
   if (!third_order_) return;
   const InitialValueSettings& s = model_.initial_value;
-  third_order_->choose_pivots(state, third_order(state, is_third_order(s.method) ? s.method : *s.dummy_method), workspace_);
+  third_order_->choose_pivots(
+      state, third_order(state, is_third_order(s.method) ? s.method : *s.dummy_method), workspace_);
 }
 
 PhaseReport Stepper::run_dummy_steps(State& state) {
@@ -188,11 +205,13 @@ PhaseReport Stepper::run_dummy_steps(State& state) {
   return report;
 }
 
-StepFormula Stepper::formula(State& state, double h, const MethodSettings& method, bool first) const {
+StepFormula Stepper::formula(State& state, double h, const MethodSettings& method,
+                             bool first) const {
   if (first) return step_formula(Method::crank_nicolson, h, h, 0, 0, false);
   const EvalContext context = model_.context(state, Phase::step);
   const double rho = drive_or(method.rho, context, 0);
-  const double rho_algebraic = drive_or(method.rho_algebraic ? method.rho_algebraic : method.rho, context, 0);
+  const double rho_algebraic =
+      drive_or(method.rho_algebraic ? method.rho_algebraic : method.rho, context, 0);
   bool odd = false;
   if (method.method == Method::hope) {
     odd = state.control[control::kHopeOdd] == 0;
@@ -206,20 +225,23 @@ ThirdOrderFormula Stepper::third_order(const State& state, const MethodSettings&
   return ThirdOrderFormula::tunable(drive_or(method.rho, model_.context(state, Phase::step), 0));
 }
 
-NewtonReport Stepper::iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first,
-                              NewtonSettings settings) {
+NewtonReport Stepper::iterate(State& state, const StepFormula& f, const MethodSettings& method,
+                              bool first, NewtonSettings settings) {
   const StepHooks hooks(cancel_, &exchange_);
   const InitialValueSettings& s = model_.initial_value;
   if (s.constraint_violations) {
     const double c = !first && is_third_order(method) ? 1 : f.c();
-    settings.constraint_factor = c * (s.constraint_scale > 0 ? s.constraint_scale : 1 / s.time_step);
+    settings.constraint_factor =
+        c * (s.constraint_scale > 0 ? s.constraint_scale : 1 / s.time_step);
   }
-  if (!first && is_third_order(method)) return third_order_->solve(third_order(state, method), settings, hooks, state, workspace_);
-  return solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, hooks, state, workspace_);
+  if (!first && is_third_order(method))
+    return third_order_->solve(third_order(state, method), settings, hooks, state, workspace_);
+  return solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, hooks, state,
+                      workspace_);
 }
 
-/// Values at the last two accepted steps -> prediction at the new time. Rotation unknowns are first rewritten relative to the
-/// last accepted orientation.
+/// Values at the last two accepted steps -> prediction at the new time. Rotation unknowns are first
+/// rewritten relative to the last accepted orientation.
 void Stepper::predict(State& state, const StepFormula& f) const {
   for (std::size_t k = 0; k < model_.structural.size(); ++k) {
     const StructuralNode& n = model_.structural[k];
@@ -230,7 +252,9 @@ void Stepper::predict(State& state, const StepFormula& f) const {
     q.R1 = q.R;
     q.w1 = q.w;
     const Mat3 step = q.R2 * q.R1.transpose();
-    if (is_half_turn(step)) throw EvaluationError(model_.node_text(static_cast<int>(k)) + " turned by half a revolution in one step; use a shorter step");
+    if (is_half_turn(step))
+      throw EvaluationError(model_.node_text(static_cast<int>(k)) +
+                            " turned by half a revolution in one step; use a shorter step");
     const Vec3 g = cgr_parameters(step);
     put(state.y1, n.first + 3, Vec3::Zero());
     put(state.yp1, n.first + 3, q.w1);
@@ -270,7 +294,8 @@ void Stepper::after_convergence(State& state, Phase phase, double c, double ca) 
   for (const auto& set : model_.sets) set->after_convergence(context, state);
 }
 
-PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& method, bool first, const NewtonSettings& settings) {
+PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& method, bool first,
+                             const NewtonSettings& settings) {
   PhaseReport report;
   backup_ = state;
   try {
@@ -320,7 +345,8 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
 
 PhaseReport Stepper::step(State& state, double h) {
   NewtonSettings settings = regular_;
-  if (h <= 2 * model_.initial_value.min_time_step) settings.max_residual = settings.max_residual_differential = 0;
+  if (h <= 2 * model_.initial_value.min_time_step)
+    settings.max_residual = settings.max_residual_differential = 0;
   const bool first = state.control[control::kRegularSteps] == 0;
   PhaseReport report = attempt(state, h, model_.initial_value.method, first, settings);
   if (!report.error) {
@@ -339,7 +365,8 @@ double Stepper::next_step_size(State& state) {
   const EvalContext context = model_.context(state, Phase::step);
   const double largest = s.max_time_step ? s.max_time_step->value(context) : HUGE_VAL;
   const double limit = largest > 0 ? largest : HUGE_VAL;
-  if (s.strategy == StepStrategy::change) return std::max(std::min(s.strategy_change->value(context), limit), s.min_time_step);
+  if (s.strategy == StepStrategy::change)
+    return std::max(std::min(s.strategy_change->value(context), limit), s.min_time_step);
   double& since_reduction = state.control[control::kSinceReduction];
   double& since_raise = state.control[control::kSinceRaise];
   since_reduction += 1;
@@ -349,7 +376,8 @@ double Stepper::next_step_size(State& state) {
     since_reduction = 0;
     return std::max(std::min(h * s.reduction, limit), s.min_time_step);
   }
-  if (iterations <= s.min_iterations && since_reduction > s.steps_before_reduction && since_raise > s.steps_before_raise && h < limit) {
+  if (iterations <= s.min_iterations && since_reduction > s.steps_before_reduction &&
+      since_raise > s.steps_before_raise && h < limit) {
     since_raise = 0;
     return std::min(h * s.raise, limit);
   }
@@ -359,11 +387,13 @@ double Stepper::next_step_size(State& state) {
 double Stepper::retry_step_size(State& state, double h) {
   const InitialValueSettings& s = model_.initial_value;
   if (s.strategy == StepStrategy::change) {
-    const double other = std::max(s.strategy_change->value(model_.context(state, Phase::step)), s.min_time_step);
+    const double other =
+        std::max(s.strategy_change->value(model_.context(state, Phase::step)), s.min_time_step);
     return other < h && other >= s.min_time_step ? other : 0;
   }
   if (s.strategy != StepStrategy::factor || h <= s.min_time_step) return 0;
-  if (h * s.reduction > s.min_time_step && s.reduction < 1 && state.time + h * s.reduction > state.time) {
+  if (h * s.reduction > s.min_time_step && s.reduction < 1 &&
+      state.time + h * s.reduction > state.time) {
     state.control[control::kSinceReduction] = 0;
     return h * s.reduction;
   }
@@ -379,7 +409,8 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
   e.failure.iteration = report.iterations;
   e.failure.residual_history = workspace_.residual_history;
   char where[96];
-  std::snprintf(where, sizeof where, "%s at t = %.9g (step %lld)", phase, state.time, static_cast<long long>(state.step));
+  std::snprintf(where, sizeof where, "%s at t = %.9g (step %lld)", phase, state.time,
+                static_cast<long long>(state.step));
   switch (report.outcome) {
     case NewtonOutcome::cancelled:
       e.kind = ErrorKind::cancelled;
@@ -394,22 +425,26 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
       e.message = std::string(where) + ": " + cause.text();
       return e;
     }
-    default: break;
+    default:
+      break;
   }
   e.kind = ErrorKind::not_converged;
   e.reason = "NOT_CONVERGED";
   e.failure.worst = worst_equations(model_, workspace_.residual);
   char text[160];
-  std::snprintf(text, sizeof text, ": no convergence in %d iterations, residual %.6g, tolerance %.6g", report.iterations,
-                report.residual_error, report.tolerance);
+  std::snprintf(text, sizeof text,
+                ": no convergence in %d iterations, residual %.6g, tolerance %.6g",
+                report.iterations, report.residual_error, report.tolerance);
   e.message = where + std::string(text);
   for (const WorstEquation& w : e.failure.worst) {
     std::snprintf(text, sizeof text, "%.6g", w.residual);
     e.message += "\n  " + w.owner + ", " + w.equation + ": residual " + text;
   }
-  if (const Singularity cause = find_near_singularity(model_, workspace_.values); cause.rank_loss > 0)
+  if (const Singularity cause = find_near_singularity(model_, workspace_.values);
+      cause.rank_loss > 0)
     e.message += "\n  " + cause.text() +
-                 "\n  hint: remove redundant constraints, or regularize one of their joints: `joint regularization: <label>, "
+                 "\n  hint: remove redundant constraints, or regularize one of their joints: "
+                 "`joint regularization: <label>, "
                  "tikhonov, 1e-8;`";
   return e;
 }

@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "model/model.h"
+#include "solver/cancel.h"
 #include "solver/integrator.h"
 #include "solver/newton.h"
-#include "solver/cancel.h"
 #include "solver/third_order.h"
 #include "solver/workspace.h"
 
@@ -28,8 +28,9 @@ class Stepper {
   /// `cancel` is asked between iterations; may be null.
   void set_cancelled(const CancelToken* cancel) { cancel_ = cancel; }
 
-  /// Called before each residual of a step with the number of corrections so far; false: loads from outside have not
-  /// settled. May be empty. What it throws leaves the step, and the state is as it was.
+  /// Called before each residual of a step with the number of corrections so far; false: loads from
+  /// outside have not settled. May be empty. What it throws leaves the step, and the state is as it
+  /// was.
   void set_exchange(std::function<bool(int)> exchange) { exchange_ = std::move(exchange); }
 
   /// Steps that do not converge end at their last iterate, when it is finite, and are flagged.
@@ -58,13 +59,16 @@ class Stepper {
   Workspace& workspace() { return workspace_; }
 
  private:
-  /// Pivots for all regular steps, from the matrix at the initial state: the same in every simulation of a model.
+  /// Pivots for all regular steps, from the matrix at the initial state: the same in every
+  /// simulation of a model.
   void choose_pivots(const State& state);
   class StepHooks;
   class DerivativesHooks;
-  PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first, const NewtonSettings& settings);
+  PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first,
+                      const NewtonSettings& settings);
   /// Newton on the prediction, by the method of the step.
-  NewtonReport iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first, NewtonSettings settings);
+  NewtonReport iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first,
+                       NewtonSettings settings);
   ThirdOrderFormula third_order(const State& state, const MethodSettings& method) const;
   StepFormula formula(State& state, double h, const MethodSettings& method, bool first) const;
   void predict(State& state, const StepFormula& f) const;

@@ -27,7 +27,8 @@ void compute_residual(const EvalContext& context, std::vector<double>& r) {
 }
 
 NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c) {
-  if (g.isZero(0) && gp.isZero(0)) return {c * Mat3::Identity(), Mat3::Identity() - c * cross<double>(w_ref)};
+  if (g.isZero(0) && gp.isZero(0))
+    return {c * Mat3::Identity(), Mat3::Identity() - c * cross<double>(w_ref)};
   NodeSeeds s;
   const Mat3 G = cgr_g(g);
   s.A = c * G;
@@ -45,11 +46,13 @@ void compute_jacobian(const EvalContext& context, Workspace& workspace) {
       continue;
     }
     const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
-    workspace.seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]), state.rotation[k].w_ref, context.seed);
+    workspace.seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]),
+                                    state.rotation[k].w_ref, context.seed);
   }
   std::fill(workspace.values.begin(), workspace.values.end(), 0.0);
   model.node_equations.jacobian(context, workspace.values.data());
-  for (const auto& set : model.sets) set->jacobian(context, workspace.seeds.data(), workspace.values.data());
+  for (const auto& set : model.sets)
+    set->jacobian(context, workspace.seeds.data(), workspace.values.data());
 }
 
 void update_rotations(const Model& model, State& state) {
@@ -65,7 +68,8 @@ void update_rotations(const Model& model, State& state) {
   }
 }
 
-void apply_correction(const Model& model, const std::vector<double>& delta, double c, double c_algebraic, State& state) {
+void apply_correction(const Model& model, const std::vector<double>& delta, double c,
+                      double c_algebraic, State& state) {
   for (int i = 0; i < model.unknowns; ++i) {
     const double d = delta[i];
     if (model.kinds[i] == UnknownKind::differential) {
@@ -87,7 +91,8 @@ void update_activity(const EvalContext& context, State& state, bool restart) {
     const bool active = info.driven->value(context) != 0;
     double& flag = state.memory[info.active_memory];
     if (active && (flag == 0 || !restart))
-      for (const HintSample& hint : info.hints) state.memory[hint.memory] = hint.source->value(context);
+      for (const HintSample& hint : info.hints)
+        state.memory[hint.memory] = hint.source->value(context);
     if (restart && active && flag == 0) e.set->start(context, state, e.index);
     flag = active ? 1 : 0;
   }

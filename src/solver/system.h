@@ -1,4 +1,5 @@
-/// The assembled system F(y, ẏ, t) = 0: residual, Jacobian, and the update of states by a Newton correction.
+/// The assembled system F(y, ẏ, t) = 0: residual, Jacobian, and the update of states by a Newton
+/// correction.
 #pragma once
 
 #include "model/model.h"
@@ -19,9 +20,11 @@ NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c)
 void update_rotations(const Model& model, State& state);
 
 /// Adds δ: differential ẏ += δ, y += c δ; algebraic y += δ, ẏ += c_a δ; then the rotations.
-void apply_correction(const Model& model, const std::vector<double>& delta, double c, double c_algebraic, State& state);
+void apply_correction(const Model& model, const std::vector<double>& delta, double c,
+                      double c_algebraic, State& state);
 
-/// Evaluates the drives of `driven` elements; with `restart`, elements that become active get their start values.
+/// Evaluates the drives of `driven` elements; with `restart`, elements that become active get their
+/// start values.
 void update_activity(const EvalContext& context, State& state, bool restart);
 
 }  // namespace mbcosim

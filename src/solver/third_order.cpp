@@ -158,7 +158,8 @@ NewtonReport ThirdOrderSolver::solve(const ThirdOrderFormula& f, const NewtonSet
     if (const auto verdict =
             judge_residual(settings, workspace.residual_history, report.iterations, settled))
       return finish(*verdict);
-    if (exceeds_residual_limits(model_, settings, workspace.residual) || exceeds_residual_limits(model_, settings, stage_residual_))
+    if (exceeds_residual_limits(model_, settings, workspace.residual) ||
+        exceeds_residual_limits(model_, settings, stage_residual_))
       return finish(NewtonOutcome::not_converged);
     if (hooks.cancelled()) return finish(NewtonOutcome::cancelled);
     if (settings.jacobian_every <= 1 || report.iterations % settings.jacobian_every == 0) {
@@ -179,7 +180,8 @@ NewtonReport ThirdOrderSolver::solve(const ThirdOrderFormula& f, const NewtonSet
     hooks.after_correction(state);
     if (settings.solution_test == ResidualTest::none) continue;
     report.solution_error = test_value(settings.solution_test, right_);
-    if (settled && settings.solution_tolerance > 0 && report.solution_error < settings.solution_tolerance) {
+    if (settled && settings.solution_tolerance > 0 &&
+        report.solution_error < settings.solution_tolerance) {
       report.by_solution = true;
       return finish(NewtonOutcome::converged);
     }

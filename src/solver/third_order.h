@@ -6,8 +6,8 @@
 ///   y   = y₁ + h (w1 ẏ_ξ + w0 ẏ + w2 ẏ₁)
 ///   y_ξ = p0 y + p1 y₁ + h (q0 ẏ + q1 ẏ₁)
 ///
-/// Rotation parameters are increments of the predicted rotation, with which they are composed: for rotations about
-/// changing axes the method is of second order.
+/// Rotation parameters are increments of the predicted rotation, with which they are composed: for
+/// rotations about changing axes the method is of second order.
 ///
 /// Both residuals are zero, each with constraint rows as they are (c = 1). "tunable": asymptotic
 /// spectral radius ρ, θ = −ρ/(1 + ρ). "ad hoc": Radau IIA, θ = −2/3.

@@ -1,4 +1,5 @@
-/// Scratch of one thread: residual, matrix, factorization. Never saved; results never depend on what it held before.
+/// Scratch of one thread: residual, matrix, factorization. Never saved; results never depend on
+/// what it held before.
 #pragma once
 
 #include <memory>
@@ -12,7 +13,10 @@ namespace mbcosim {
 
 struct Workspace {
   explicit Workspace(const Model& model)
-      : residual(model.unknowns), delta(model.unknowns), values(model.row_index.size()), seeds(model.structural.size()),
+      : residual(model.unknowns),
+        delta(model.unknowns),
+        values(model.row_index.size()),
+        seeds(model.structural.size()),
         solver(model.unknowns, model.column_start, model.row_index) {
     residual_history.reserve(256);
   }

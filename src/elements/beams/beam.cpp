@@ -164,7 +164,8 @@ void Beam<Nodes>::restart(const Local<double>& u, State& state) const {
 template <int Nodes>
 void Beam<Nodes>::start(Start& s) const {
   restart(s.u, s.state);
-  // After an initial assembly, or when a drive switches the beam on, there is no prediction to wait for.
+  // After an initial assembly, or when a drive switches the beam on, there is no prediction to wait
+  // for.
   s.memory(kMemory - 1) = s.u.context->phase == Phase::step || !s.u.model().control.skip_assembly;
 }
 

@@ -30,10 +30,13 @@ void Body::add_inertia(const Local<double>& u, int node_index, Inertia& inertia)
 }
 
 std::string Body::log(const Model& model, int label) const {
-  return "body:" + log_integers({label, model.structural[node].label}) + log_values({m}) + log_vector(S0 / m) + log_matrix(J0);
+  return "body:" + log_integers({label, model.structural[node].label}) + log_values({m}) +
+         log_vector(S0 / m) + log_matrix(J0);
 }
 
-int Body::private_datum(std::string_view name) { return name == "E" ? 0 : name == "V" ? 1 : name == "m" ? 2 : -1; }
+int Body::private_datum(std::string_view name) {
+  return name == "E" ? 0 : name == "V" ? 1 : name == "m" ? 2 : -1;
+}
 
 double Body::private_value(const Local<double>& u, int datum) const {
   const Vec3 S = u.R(0) * S0;
@@ -47,7 +50,8 @@ double Body::private_value(const Local<double>& u, int datum) const {
 
 void PointMass::tangent(const Local<double>& u, Tangent& t) const {
   t.add_translation(t.row_momentum(0), 0, Mat3::Zero(), -m * Mat3::Identity());
-  if (u.model().gravity) t.add_position(t.row_node(0), 0, m * u.model().gravity_gradient(*u.context, u.x(0)));
+  if (u.model().gravity)
+    t.add_position(t.row_node(0), 0, m * u.model().gravity_gradient(*u.context, u.x(0)));
 }
 
 void PointMass::add_inertia(const Local<double>&, int node_index, Inertia& inertia) const {
@@ -55,8 +59,8 @@ void PointMass::add_inertia(const Local<double>&, int node_index, Inertia& inert
 }
 
 std::string PointMass::log(const Model& model, int label) const {
-  return "body:" + log_integers({label, model.structural[node].label}) + log_values({m}) + log_vector(Vec3::Zero()) +
-         log_matrix(Mat3::Zero());
+  return "body:" + log_integers({label, model.structural[node].label}) + log_values({m}) +
+         log_vector(Vec3::Zero()) + log_matrix(Mat3::Zero());
 }
 
 double PointMass::private_value(const Local<double>& u, int datum) const {

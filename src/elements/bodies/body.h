@@ -14,10 +14,10 @@ namespace mbcosim {
 /// On static nodes (`model: static`) only gravity acts.
 struct Body {
   int node = -1;
-  double m = 0;                 ///< [kg]
-  Vec3 S0 = Vec3::Zero();       ///< first moment in the node frame [kg·m]
-  Mat3 J0 = Mat3::Zero();       ///< second moment about the node origin, node frame [kg·m²]
-  int k = 0;                    ///< local index of the node
+  double m = 0;            ///< [kg]
+  Vec3 S0 = Vec3::Zero();  ///< first moment in the node frame [kg·m]
+  Mat3 J0 = Mat3::Zero();  ///< second moment about the node origin, node frame [kg·m²]
+  int k = 0;               ///< local index of the node
 
   static constexpr int width = 6;
   static constexpr bool momentum_rows = true;
@@ -54,7 +54,8 @@ struct PointMass {
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     r.momentum(0, -(u.v(0) * m), Vec<T>::Constant(T(0.0)));
-    if (u.model().gravity) r.force(0, u.model().gravity_at(*u.context, value_of(u.x(0))).template cast<T>() * m);
+    if (u.model().gravity)
+      r.force(0, u.model().gravity_at(*u.context, value_of(u.x(0))).template cast<T>() * m);
   }
   void tangent(const Local<double>& u, Tangent& t) const;
   void add_inertia(const Local<double>& u, int node_index, Inertia& inertia) const;

@@ -13,21 +13,27 @@ namespace {
 constexpr double kGravitationalConstant = 6.67384e-11;  ///< `G, si` [m³/(kg s²)], MBDyn's value
 
 void warn_about_inertia(Card& card, const Mat3& j) {
-  if ((j - j.transpose()).norm() > 1e-9 * j.norm()) card.warn("the inertia matrix is not symmetric");
-  const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(Mat3(0.5 * (j + j.transpose())), Eigen::EigenvaluesOnly).eigenvalues();
+  if ((j - j.transpose()).norm() > 1e-9 * j.norm())
+    card.warn("the inertia matrix is not symmetric");
+  const Vec3 principal =
+      Eigen::SelfAdjointEigenSolver<Mat3>(Mat3(0.5 * (j + j.transpose())), Eigen::EigenvaluesOnly)
+          .eigenvalues();
   if (principal(0) < -1e-9 * j.norm()) {
     char text[120];
-    std::snprintf(text, sizeof text, "the inertia matrix is indefinite: principal moments %.6g, %.6g, %.6g", principal(0), principal(1),
-                  principal(2));
+    std::snprintf(text, sizeof text,
+                  "the inertia matrix is indefinite: principal moments %.6g, %.6g, %.6g",
+                  principal(0), principal(1), principal(2));
     card.warn(text, "inertia is given about the centre of mass, not about the node");
   }
 }
 
-/// mass, centre of mass, inertia about it [, inertial, orientation]: one part of a (condensed) body.
+/// mass, centre of mass, inertia about it [, inertial, orientation]: one part of a (condensed)
+/// body.
 void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
   const double m = card.real("mass");
   if (m < 0 && !negative_allowed)
-    card.fail("mass must not be negative, got " + std::to_string(m), "write `allow negative mass` before the mass if it is meant");
+    card.fail("mass must not be negative, got " + std::to_string(m),
+              "write `allow negative mass` before the mass if it is meant");
   const Vec3 x = card.relative_position("centre of mass", node);
   Mat3 j = card.relative_tensor("inertia", node);
   if (!negative_allowed) warn_about_inertia(card, j);
@@ -52,8 +58,10 @@ void add_body(Card& card, ElementInfo& info, B body) {
 void read_body(Card& card, ElementInfo& info) {
   const int node = card.structural_node(Card::NodeNeed::not_dummy);
   const StructuralNode& n = card.model().structural[node];
-  if (n.kind == StructuralKind::static_displacement || (n.kind == StructuralKind::static_ && !card.model().control.is_static))
-    card.fail("structural node " + std::to_string(n.label) + " is static; a body needs a dynamic node");
+  if (n.kind == StructuralKind::static_displacement ||
+      (n.kind == StructuralKind::static_ && !card.model().control.is_static))
+    card.fail("structural node " + std::to_string(n.label) +
+              " is static; a body needs a dynamic node");
   if (n.is_displacement()) {
     const double m = card.real("mass");
     if (!(m > 0)) card.fail("mass must be positive");
@@ -63,7 +71,8 @@ void read_body(Card& card, ElementInfo& info) {
   int parts = 1;
   if (card.keyword("condense")) {
     parts = card.integer("number of condensed masses");
-    if (parts < 1) card.fail("the number of condensed masses must be at least 1, got " + std::to_string(parts));
+    if (parts < 1)
+      card.fail("the number of condensed masses must be at least 1, got " + std::to_string(parts));
   }
   const bool negative = card.keyword("allow negative mass");
   Body body;
@@ -74,7 +83,8 @@ void read_body(Card& card, ElementInfo& info) {
 }
 
 void read_gravity(Card& card, ElementInfo& info) {
-  if (card.model().gravity) card.fail_at(info.where, "gravity is defined twice; at most one `gravity` card is allowed");
+  if (card.model().gravity)
+    card.fail_at(info.where, "gravity is defined twice; at most one `gravity` card is allowed");
   Gravity g;
   if (card.keyword("central")) {
     if (card.keyword("origin")) g.origin = card.absolute_position("origin");
@@ -86,7 +96,8 @@ void read_gravity(Card& card, ElementInfo& info) {
     if (!(big_g > 0)) card.fail("gravity: G must be positive");
     g.mass_g = mass * big_g;
   } else {
-    if (!card.keyword("uniform")) card.warn_at(card.next(), "gravity: type missing, `uniform` assumed");
+    if (!card.keyword("uniform"))
+      card.warn_at(card.next(), "gravity: type missing, `uniform` assumed");
     g.uniform = card.vec3_drive("acceleration of gravity");
   }
   if (card.keyword("output")) g.output = card.yes_no("output");

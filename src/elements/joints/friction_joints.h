@@ -17,7 +17,8 @@ struct InLineFriction : InLine {
 
   static constexpr int width = 15;
 
-  void tangent(const Local<double>&, Tangent&) const = delete;  ///< that of InLine lacks the friction
+  void tangent(const Local<double>&,
+               Tangent&) const = delete;  ///< that of InLine lacks the friction
   void connect(Connector& c) const {
     InLine::connect(c);
     c.differential(Friction::unknowns);
@@ -62,7 +63,8 @@ struct HingeFriction : Hinge {
   static constexpr int width = Hinge::width + 1;
   static constexpr int state = Hinge::width - 12;  ///< own index of z
 
-  void tangent(const Local<double>&, Tangent&) const = delete;  ///< that of Hinge lacks the friction
+  void tangent(const Local<double>&,
+               Tangent&) const = delete;  ///< that of Hinge lacks the friction
   void connect(Connector& c) const {
     Hinge::connect(c);
     c.differential(Friction::unknowns);

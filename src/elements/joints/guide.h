@@ -138,7 +138,9 @@ struct DriveHinge : TwoAttachments, NamedData<DriveHinge> {
 };
 
 /// The arm of a force without its rate.
-inline Vec<TimeDual> constant_arm(const Vec<TimeDual>& arm) { return value_of(arm).cast<TimeDual>(); }
+inline Vec<TimeDual> constant_arm(const Vec<TimeDual>& arm) {
+  return value_of(arm).cast<TimeDual>();
+}
 
 /// Drive displacement: a point of node 2 stays at the point f₁ + δ of node 1.
 ///
@@ -160,9 +162,11 @@ struct DriveDisplacement : TwoAttachments, NamedData<DriveDisplacement> {
   void residual(const Local<T>& u, Residual<T>& r) const {
     rows(u, r, [](const Vec<T>& v) { return v; });
   }
-  /// Takes the arms of the force as constant: with their rates, a position that has to be corrected would turn the nodes.
-  /// (The reference solver leaves these terms out, too.)
-  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const { rows(u, r, constant_arm); }
+  /// Takes the arms of the force as constant: with their rates, a position that has to be corrected
+  /// would turn the nodes. (The reference solver leaves these terms out, too.)
+  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const {
+    rows(u, r, constant_arm);
+  }
   template <class T, class Arm>
   void rows(const Local<T>& u, Residual<T>& r, Arm load_arm) const {
     const Vec<T> offset = u.drive(delta) + a.f.cast<T>(), p = u.R(0) * offset, f2 = arm_b(u),
@@ -202,9 +206,11 @@ struct DriveDisplacementPin : NamedData<DriveDisplacementPin> {
   void residual(const Local<T>& u, Residual<T>& r) const {
     rows(u, r, [](const Vec<T>& v) { return v; });
   }
-  /// Takes the arms of the force as constant: with their rates, a position that has to be corrected would turn the nodes.
-  /// (The reference solver leaves these terms out, too.)
-  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const { rows(u, r, constant_arm); }
+  /// Takes the arms of the force as constant: with their rates, a position that has to be corrected
+  /// would turn the nodes. (The reference solver leaves these terms out, too.)
+  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const {
+    rows(u, r, constant_arm);
+  }
   template <class T, class Arm>
   void rows(const Local<T>& u, Residual<T>& r, Arm load_arm) const {
     const Vec<T> f = u.R(0) * a.f.cast<T>(), F = u.own3(0);

@@ -228,12 +228,14 @@ TotalConstraint read_total_constraint(Card& card, bool with_drives) {
   if (card.keyword("position constraint")) {
     for (auto& kind : c.translation)
       kind = read_status(card, {"inactive", "active", "position", "velocity"});
-    if (with_drives) c.displacement = card.hinted("position-drive3", card.vec3_drive("imposed displacement"));
+    if (with_drives)
+      c.displacement = card.hinted("position-drive3", card.vec3_drive("imposed displacement"));
   }
   if (card.keyword("orientation constraint")) {
     for (auto& kind : c.rotation)
       kind = read_status(card, {"inactive", "active", "rotation", "angular velocity"});
-    if (with_drives) c.angle = card.hinted("orientation-drive3", card.vec3_drive("imposed rotation"));
+    if (with_drives)
+      c.angle = card.hinted("orientation-drive3", card.vec3_drive("imposed rotation"));
   }
   return c;
 }
@@ -270,8 +272,7 @@ void read_total_pin_joint(Card& card, ElementInfo& info) {
   if (card.keyword("rotation orientation"))
     e.Rr = card.relative_orientation("rotation orientation", e.node);
   const OtherNode position{e.node, e.f, e.Rh}, rotation{e.node, e.f, e.Rr};
-  if (card.keyword("position"))
-    e.Xc = card.absolute_position("pin position", e.node, &position);
+  if (card.keyword("position")) e.Xc = card.absolute_position("pin position", e.node, &position);
   if (card.keyword("position orientation"))
     e.Rc = card.absolute_orientation("position orientation", e.node, &position);
   if (card.keyword("rotation orientation"))

@@ -12,8 +12,10 @@ void LinearLaw<N>::respond(const EvalContext& context, const V& strain, const V&
   if (type_ != LawType::elastic) r.f += b * (damping_ * rate);
   if (!tangent) return;
   r.de = a * stiffness_;
-  if (type_ == LawType::elastic) r.dep.setZero();
-  else r.dep = b * damping_;
+  if (type_ == LawType::elastic)
+    r.dep.setZero();
+  else
+    r.dep = b * damping_;
 }
 
 template class LinearLaw<1>;

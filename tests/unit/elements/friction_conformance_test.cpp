@@ -65,7 +65,8 @@ struct ScrewCase {
 
 struct TotalEquationCase {
   using Element = TotalEquation;
-  static constexpr bool ideal = false, balanced = false;  // loads act through a total internal reaction
+  static constexpr bool ideal = false,
+                        balanced = false;  // loads act through a total internal reaction
   static TotalEquation make(Bench& bench) {
     using Kind = TotalConstraint::Kind;
     const Vec3 point = bench.vec();

@@ -51,7 +51,9 @@ TEST(Dual, FollowsTheChainRule) {
   using D = Dual<2>;
   const D x = D::variable(0.7, 0), y = D::variable(-0.3, 1);
   const D f = sin(x * y) / (x + 2.0) - atan2(y, x) * exp(-y);
-  const auto g = [](double a, double b) { return std::sin(a * b) / (a + 2) - std::atan2(b, a) * std::exp(-b); };
+  const auto g = [](double a, double b) {
+    return std::sin(a * b) / (a + 2) - std::atan2(b, a) * std::exp(-b);
+  };
   const double e = 1e-6;
   EXPECT_NEAR(f.v, g(.7, -.3), 1e-15);
   EXPECT_NEAR(f.d[0], (g(.7 + e, -.3) - g(.7 - e, -.3)) / (2 * e), 1e-9);

@@ -78,8 +78,9 @@ TEST(BeamDecks, LargeStaticDeflection) {
   expect_forces(
       run, 1, "pI.",
       vec6(-26.27918065, 307.6149707, 192.8274733, 28.05034384, -73.86838536, 123.5790197), 1e-6);
-  // The sixth figure of the published table, 29.932, has a digit wrong: equilibrium of the part outboard of the point,
-  // |R3 (30,0,0) + (x3 - xII) x F| = 48.7214646 with the node positions above, allows 29.87223218 only.
+  // The sixth figure of the published table, 29.932, has a digit wrong: equilibrium of the part
+  // outboard of the point, |R3 (30,0,0) + (x3 - xII) x F| = 48.7214646 with the node positions
+  // above, allows 29.87223218 only.
   expect_forces(run, 1, "pII.",
                 vec6(9.599912, 323.3195679, 166.9499889, 29.87223218, -17.45741394, 34.30261731),
                 1e-6);

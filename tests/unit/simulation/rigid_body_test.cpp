@@ -60,7 +60,8 @@ std::unique_ptr<Simulation> start(const BodyCase& s) {
 double kinetic_energy(const Simulation& s) {
   const NodeRotation& q = s.state().rotation[0];
   const std::vector<double>&y = s.state().y, &yp = s.state().yp;
-  return 0.5 * (Vec3(yp[0], yp[1], yp[2]).dot(Vec3(y[6], y[7], y[8])) + q.w.dot(Vec3(y[9], y[10], y[11])));
+  return 0.5 * (Vec3(yp[0], yp[1], yp[2]).dot(Vec3(y[6], y[7], y[8])) +
+                q.w.dot(Vec3(y[9], y[10], y[11])));
 }
 
 TEST(FreeBody, FallsAsInTheTextbook) {
@@ -86,14 +87,16 @@ TEST(FreeBody, TumblingKeepsMomentumAndNearlyKeepsEnergy) {
   s.rho = 1;
   auto simulation = start(s);
   const double energy = kinetic_energy(*simulation);
-  const Vec3 momentum(simulation->state().y[9], simulation->state().y[10], simulation->state().y[11]);
+  const Vec3 momentum(simulation->state().y[9], simulation->state().y[10],
+                      simulation->state().y[11]);
   simulation->run_until(1);
   const std::vector<double>& y = simulation->state().y;
   EXPECT_NEAR((Vec3(y[9], y[10], y[11]) - momentum).norm(), 0, 1e-8);
   EXPECT_NEAR(kinetic_energy(*simulation) / energy, 1, 1e-5);
 }
 
-/// Angle between the orientation after 0.64 s with step h and that with a step 32 times shorter than the finest one used.
+/// Angle between the orientation after 0.64 s with step h and that with a step 32 times shorter
+/// than the finest one used.
 double orientation_error(Method method, double rho, double h) {
   BodyCase s;
   s.inertia = Vec3(1, 2, 3);
@@ -113,13 +116,21 @@ double orientation_error(Method method, double rho, double h) {
 }
 
 TEST(Multistep, IsSecondOrderOnTheTumblingBody) {
-  EXPECT_NEAR(std::log2(orientation_error(Method::multistep, 0.6, 0.02) / orientation_error(Method::multistep, 0.6, 0.01)), 2.0, 0.15);
-  EXPECT_NEAR(std::log2(orientation_error(Method::crank_nicolson, 0, 0.02) / orientation_error(Method::crank_nicolson, 0, 0.01)), 2.0, 0.15);
-  EXPECT_NEAR(std::log2(orientation_error(Method::hope, 0.6, 0.02) / orientation_error(Method::hope, 0.6, 0.01)), 2.0, 0.2);
+  EXPECT_NEAR(std::log2(orientation_error(Method::multistep, 0.6, 0.02) /
+                        orientation_error(Method::multistep, 0.6, 0.01)),
+              2.0, 0.15);
+  EXPECT_NEAR(std::log2(orientation_error(Method::crank_nicolson, 0, 0.02) /
+                        orientation_error(Method::crank_nicolson, 0, 0.01)),
+              2.0, 0.15);
+  EXPECT_NEAR(std::log2(orientation_error(Method::hope, 0.6, 0.02) /
+                        orientation_error(Method::hope, 0.6, 0.01)),
+              2.0, 0.2);
 }
 
 TEST(ImplicitEuler, IsFirstOrderOnTheTumblingBody) {
-  EXPECT_NEAR(std::log2(orientation_error(Method::bdf1, 0, 0.01) / orientation_error(Method::bdf1, 0, 0.005)), 1.0, 0.1);
+  EXPECT_NEAR(std::log2(orientation_error(Method::bdf1, 0, 0.01) /
+                        orientation_error(Method::bdf1, 0, 0.005)),
+              1.0, 0.1);
 }
 
 TEST(FreeBody, ReferenceSolverNumbers) {
@@ -153,7 +164,8 @@ TEST(FreeBody, ReferenceSolverNumbers) {
   add_element(builder, info, body);
   auto simulation = Simulation::create(*builder.finish());
   ASSERT_TRUE(simulation) << simulation.error().message;
-  const auto expect_node = [&](const Vec3& position, const Vec3& angles, const Vec3& velocity, const Vec3& omega) {
+  const auto expect_node = [&](const Vec3& position, const Vec3& angles, const Vec3& velocity,
+                               const Vec3& omega) {
     const State& state = (*simulation)->state();
     EXPECT_NEAR((Vec3(state.y[0], state.y[1], state.y[2]) - position).norm(), 0, 1e-9);
     EXPECT_NEAR((euler123_of_rotation(state.rotation[0].R) * kDegrees - angles).norm(), 0, 2e-7);
@@ -161,14 +173,17 @@ TEST(FreeBody, ReferenceSolverNumbers) {
     EXPECT_NEAR((state.rotation[0].w - omega).norm(), 0, 1e-9);
   };
   (*simulation)->step();
-  expect_node({0.10513859743, 0.19747445815, 0.31015701032}, {6.3196465352, 14.908735266, 17.098775302},
-              {0.52771948602, -0.25510837044, 1.0314020646}, {0.98715963765, 6.0050813127, 0.45954425733});
+  expect_node(
+      {0.10513859743, 0.19747445815, 0.31015701032}, {6.3196465352, 14.908735266, 17.098775302},
+      {0.52771948602, -0.25510837044, 1.0314020646}, {0.98715963765, 6.0050813127, 0.45954425733});
   (*simulation)->step_many(9);
-  expect_node({0.16630455886, 0.17286187233, 0.41292400321}, {13.651777137, 45.768122427, 12.524259942},
-              {0.84988876518, -0.28758634533, 1.2231488691}, {0.83392862964, 6.0496472354, 0.10401702173});
+  expect_node(
+      {0.16630455886, 0.17286187233, 0.41292400321}, {13.651777137, 45.768122427, 12.524259942},
+      {0.84988876518, -0.28758634533, 1.2231488691}, {0.83392862964, 6.0496472354, 0.10401702173});
   (*simulation)->step_many(90);
-  expect_node({1.1002589819, -0.071913114799, 0.89778255475}, {80.993266795, 41.430311456, 60.700704230},
-              {0.68542143784, -0.48700643128, 1.1759561044}, {1.5326022967, 5.7425013870, 2.5544012014});
+  expect_node(
+      {1.1002589819, -0.071913114799, 0.89778255475}, {80.993266795, 41.430311456, 60.700704230},
+      {0.68542143784, -0.48700643128, 1.1759561044}, {1.5326022967, 5.7425013870, 2.5544012014});
 }
 
 TEST(Simulation, ContinuesARestoredStateBitForBit) {
@@ -204,7 +219,8 @@ TEST(Simulation, NamesTheUnknownThatNothingDetermines) {
   const StepReport report = (*simulation)->step();
   ASSERT_TRUE(report.error);
   EXPECT_EQ(report.error->kind, ErrorKind::singular);
-  EXPECT_NE(report.error->message.find("structural node 4"), std::string::npos) << report.error->message;
+  EXPECT_NE(report.error->message.find("structural node 4"), std::string::npos)
+      << report.error->message;
   EXPECT_EQ((*simulation)->step_number(), 0);
 }
 

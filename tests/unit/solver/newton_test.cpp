@@ -88,9 +88,11 @@ TEST(KeptJacobian, IsPartOfTheState) {
   EXPECT_EQ(other.simulation().state().y, expected);
 }
 
-/// The first step is Crank-Nicolson's, the second has other coefficients: its matrix is new, and from there on it is kept.
+/// The first step is Crank-Nicolson's, the second has other coefficients: its matrix is new, and
+/// from there on it is kept.
 TEST(KeptJacobian, IsRenewedWhenTheCoefficientsChange) {
-  DeckRun run(pendulum(std::string(kPlain) + "nonlinear solver: newton raphson, modified, 50, keep jacobian matrix;"));
+  DeckRun run(pendulum(std::string(kPlain) +
+                       "nonlinear solver: newton raphson, modified, 50, keep jacobian matrix;"));
   ASSERT_TRUE(run.ready());
   const auto iterations = [&] { return run.simulation().step().iterations; };
   const auto count = [&] { return run.simulation().state().control[control::kKeptIterations]; };
@@ -139,7 +141,8 @@ TEST(Convergence, MinmaxIsTheLargestEntry) {
 
 TEST(Convergence, ScaleWeighsTheRowsOfTheirOwner) {
   const std::string initial =
-      "time step: 1e-2; max iterations: 1, at most; tolerance: 1e-20, test, minmax, scale; derivatives tolerance: 1.;";
+      "time step: 1e-2; max iterations: 1, at most; tolerance: 1e-20, test, minmax, scale; "
+      "derivatives tolerance: 1.;";
   const double plain = first_steps(initial, 1).residual_error,
                scaled = first_steps(initial, 1, ", assembly, 1., 1., scale, 1e6").residual_error;
   EXPECT_GT(scaled, 100 * plain);
@@ -300,9 +303,8 @@ TEST(StepControl, EndsWithoutAShortestStepToo) {
 TEST(StepControl, RefusesContradictions) {
   for (const char* bad :
        {"max iterations: 5; strategy: factor, .5, 1, 1.2, 2, 5;",
-        "strategy: factor, .5, 1, 1.2, 2, 5, 5;",
-        "strategy: factor, 1.5, 1, 1.2, 2, 5, 6;", "strategy: factor, .5, 1, .9, 2, 5, 6;",
-        "strategy: factor, .5, 0, 1.2, 2, 5, 6;",
+        "strategy: factor, .5, 1, 1.2, 2, 5, 5;", "strategy: factor, 1.5, 1, 1.2, 2, 5, 6;",
+        "strategy: factor, .5, 1, .9, 2, 5, 6;", "strategy: factor, .5, 0, 1.2, 2, 5, 6;",
         "strategy: change, const, 1e-2; min time step: .2; max time step: .1;",
         "strategy: change, const, 1e-2; min time step: .02;",
         "strategy: change, const, 1e-2; max time step: 1e-3;",
