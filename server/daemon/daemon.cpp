@@ -119,6 +119,10 @@ void Daemon::open_shared_memory() {
   for (const std::string& address : config_.listen) {
     const std::string path = shm::rendezvous_path(address);
     if (path.empty()) continue;
+    if (path.size() >= sizeof sockaddr_un::sun_path) {
+      spdlog::warn("no shared memory beside {}: the path of its socket would be too long", address);
+      continue;
+    }
     shared_memory_.push_back(std::make_unique<SharedMemoryService>(path, parts_, coupling_));
     spdlog::info("shared memory for peers through {}", path);
   }

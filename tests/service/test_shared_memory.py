@@ -152,6 +152,18 @@ def test_a_stale_socket_is_replaced_and_nothing_else(tmp_path):
     assert refused.returncode == 4 and "is not a socket" in refused.stderr and path.read_text() == "precious"
 
 
+def test_a_long_path_leaves_no_room_for_it(tmp_path):
+    """The longest path that a socket may have is served without."""
+    folder = str(tmp_path)
+    address = f"unix:{folder}/{'x' * (106 - len(folder))}"
+    daemon = subprocess.Popen([os.path.join(BIN, "mbcosimd"), "--listen", address], stderr=subprocess.PIPE, text=True)
+    with mbcosim.connect(address, timeout=30) as server:
+        assert server.info().version
+    daemon.terminate()
+    _, log = daemon.communicate(timeout=20)
+    assert daemon.returncode == 0 and "no shared memory" in log
+
+
 def test_it_can_be_off(start_daemon):
     daemon = start_daemon("--no-shared-memory")
     with daemon.connect() as server, oscillator(server) as simulation:
