@@ -183,7 +183,6 @@ Agreement agree(const v1::Hello& hello, const PortModel& port, const Model& mode
 void fill_agreed(const v1::Hello& hello, const Agreement& agreement, v1::Hello* out) {
   using google::protobuf::util::TimeUtil;
   *out = hello;
-  out->clear_shared_memory();
   out->mutable_protocol()->set_lowest(kProtocolVersion);
   out->mutable_protocol()->set_highest(kProtocolVersion);
   out->set_rotation_form(agreement.rotation_form);
