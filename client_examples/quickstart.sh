@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 docker/install-dependencies.sh all
-cmake --preset release -DMBCOSIM_TESTS=OFF -DMBCOSIM_BENCHMARKS=OFF >/dev/null
+cmake --preset release >/dev/null
 cmake --build build --parallel "$(nproc)" --target mbcosim mbcosimd mbcosim_python
 
 work=$(mktemp -d)

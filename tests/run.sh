@@ -31,7 +31,7 @@ folder=build
 jobs=$(nproc)
 
 docker/install-dependencies.sh all
-cmake --preset $preset
+cmake --preset $preset -DMBCOSIM_SERVER=ON -DMBCOSIM_TESTS=ON  # also where a build without them stands
 cmake --build $folder --parallel "$jobs"
 [ -z $tidy ] || exec tests/repository/tidy.py . $folder "${arguments[@]}"
 case $preset in  # what bounds on time are multiplied by

@@ -4,7 +4,7 @@
 arrows   folders include only what stands below them
 headers  every header compiles alone: the build shows it for those that their source includes first, the compiler for the
          others; arguments: compiler and its options
-layout   the top level has the agreed entries and no others
+layout   the top level has the agreed entries and no others; the quick start does not switch off what tests/run.sh builds
 format   clang-format would change nothing
 """
 import concurrent.futures
@@ -70,6 +70,8 @@ def headers(root, *compiler):
 
 
 def layout(root):
+    if "-DMBCOSIM_" in (root / "client_examples" / "quickstart.sh").read_text():
+        yield "quickstart.sh sets options of the build folder that tests/run.sh uses, too"
     if not shutil.which("git"):
         return
     listed = subprocess.run(["git", "-C", str(root), "ls-files"], capture_output=True, text=True)
