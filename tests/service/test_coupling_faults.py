@@ -33,7 +33,7 @@ def answer(motion):
             os._exit(0)
         time.sleep(60)
     return [[1.0, 0.0, 0.0]]
-peer = simulation.couple("spring", answer, timeout=0.5, mode=sys.argv[5], heartbeat_interval=0.05)
+peer = simulation.couple("spring", answer, timeout=0.5, mode=sys.argv[5], server_timeout=30)
 print("attached", flush=True)
 for line in sys.stdin:
     if line.strip() == "close":
