@@ -9,7 +9,7 @@ import time
 import pytest
 
 import mbcosim
-from conftest import Daemon, wait_for
+from conftest import TIME_FACTOR, Daemon, wait_for
 from relay import BlackHole, Unreliable
 from test_coupling import PORT, oscillator, spring
 
@@ -109,7 +109,7 @@ def test_peer(server, daemon, processes, hole, blow, when):
         start = time.monotonic()
         with pytest.raises(mbcosim.StepFailed) as caught:
             simulation.step(3)
-        assert time.monotonic() - start < BOUND
+        assert time.monotonic() - start < BOUND * TIME_FACTOR
         assert caught.value.reason == "PEER_LOST"
         assert simulation.refresh().step >= 2
         if simulation.info.step == 2:  # else the blow came after another answer
@@ -177,7 +177,7 @@ def test_daemon(tmp_path_factory, tmp_path, blow, when):
     if blow == "close":
         assert daemon.process.wait(10) == 0
     client.join(5)
-    assert not client.is_alive() and time.monotonic() - start < 8  # a deadline bounds what nobody answers
+    assert not client.is_alive() and time.monotonic() - start < 8 * TIME_FACTOR  # a deadline bounds what nobody answers
     if when == "idle" and blow in ("stop", "black hole"):
         with pytest.raises(Exception):
             simulation._stub.GetSimulation(pb.GetSimulationRequest(name=simulation.name), timeout=0.5)
@@ -233,7 +233,7 @@ def test_heartbeats_come_whatever_a_step_does(server):
                 stepper.start()
             if names.count("heartbeat") == 30:
                 break
-        assert 0.3 < time.monotonic() - start < 5
+        assert 0.3 < time.monotonic() - start < 5 * TIME_FACTOR
         assert names[0] == "welcome" and "exchange" in names  # and heartbeats before and after it
         assert names.index("exchange") < len(names) - 5
         done.set()
@@ -262,7 +262,7 @@ def test_a_silent_peer_is_gone_though_no_step_asks_it(server, processes, daemon)
         beat.clear()
         start = time.monotonic()
         wait_for(lambda: not simulation.describe().ports[0].has_peer)
-        assert 0.15 < time.monotonic() - start < 2
+        assert 0.15 < time.monotonic() - start < 2 * TIME_FACTOR
         stop.set()
 
 
