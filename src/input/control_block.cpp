@@ -172,6 +172,13 @@ void read_output_flags(DeckCard& card) {
   }
 }
 
+void read_default_beam_output(DeckCard& card) {
+  card.deck().beam_output = read_beam_output(card, "default beam output", true);
+  if (card.more())
+    card.fail_at(card.next(), "default beam output: unknown flag",
+                 "accepted: those of a beam's `custom output`, e.g. forces, strains, all");
+}
+
 void read_output_results(DeckCard& card) {
   ControlSettings& c = control(card);
   if (card.required("result format", {"netcdf", "text"}) == 1) return;
@@ -294,7 +301,7 @@ const std::vector<std::pair<const char*, Reader>>& control_cards() {
       {"output meter", read_output_meter},
       {"output precision", read_output_precision},
       {"default orientation", read_default_orientation},
-      {"default beam output", read_output_flags},
+      {"default beam output", read_default_beam_output},
       {"default aerodynamic output", read_output_flags},
       {"output results", read_output_results},
       {"title", read_title},

@@ -13,6 +13,7 @@
 #include "input/counts.h"
 #include "input/digest.h"
 #include "input/session.h"
+#include "model/beam_output.h"
 #include "model/model.h"
 #include "model/registry.h"
 
@@ -52,6 +53,7 @@ struct Deck {
   Counts counts;
   Digest data_files;  ///< of the files that cards read whole
   OutputDefaults output;
+  BeamOutput beam_output;              ///< `default beam output`
   double structural_scale = 1;         ///< `default scale` of nodes
   std::array<double, 5> scalar_scale;  ///< by ScalarKind
   bool method_set = false;

@@ -270,6 +270,8 @@ std::string DeckCard::file_contents(std::string_view what, std::string* name) {
   return std::move(*text);
 }
 
+BeamOutput DeckCard::default_beam_output() const { return deck_.beam_output; }
+
 std::string DeckCard::optional_name() { return keyword("name") ? quoted("name") : std::string(); }
 
 // ----------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "input/cursor.h"
+#include "model/beam_output.h"
 #include "model/card.h"
 #include "model/element_set.h"
 
@@ -23,7 +24,7 @@ struct Hint {
   bool used = false;
 };
 
-class DeckCard final : public Card {
+class DeckCard final : public Card, public BeamOutputDefault {
  public:
   DeckCard(Deck& deck, const Statement& statement);
 
@@ -66,6 +67,8 @@ class DeckCard final : public Card {
   Vec3 relative_unit_vector(std::string_view what, int node) override;
   Vec3 absolute_unit_vector(std::string_view what) override;
   Mat3 relative_tensor(std::string_view what, int node) override;
+
+  BeamOutput default_beam_output() const override;
 
   DrivePtr drive(std::string_view what = "drive") override;
   Vec3DrivePtr vec3_drive(std::string_view what = "vector drive", int node = -1) override;

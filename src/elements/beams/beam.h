@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "elements/element.h"
+#include "model/beam_output.h"
 #include "model/law.h"
 
 namespace mbcosim {
@@ -54,22 +55,6 @@ struct SectionHistory {
   Vector kp_ref;  ///< predicted part of the curvature rate [1/(m s)]
 };
 constexpr int kSectionHistory = 30;  ///< numbers per point
-
-/// What `custom output` chooses.
-struct BeamOutput {
-  enum Field : unsigned {
-    position = 1,
-    orientation = 2,
-    force = 4,
-    moment = 8,
-    strain = 16,
-    curvature = 32,
-    strain_rate = 64,
-    curvature_rate = 128
-  };
-  unsigned chosen = force | moment;
-  OrientationDescription description = OrientationDescription::euler123;
-};
 
 /// Kinematics of one evaluation point.
 template <class T>

@@ -42,6 +42,8 @@ void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
   using Field = BeamOutput::Field;
   const bool free_choice = dynamic_cast<DetailedRow*>(&row) != nullptr;
   const unsigned chosen = free_choice ? fields.chosen : Field::force | Field::moment;
+  const OrientationDescription description =
+      fields.description.value_or(u.model().control.orientation);
   row.begin(OutputFile::act, u.label());
   for (int a = 0; a < points; ++a) {
     const std::string suffix = Nodes == 2 ? "" : a == 0 ? "_I" : "_II";
@@ -52,8 +54,7 @@ void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
     };
     vector(Field::position, "X", "m", s.p);
     if (chosen & Field::orientation)
-      row.orientation((orientation_name(fields.description) + suffix).c_str(), s.R,
-                      fields.description);
+      row.orientation((orientation_name(description) + suffix).c_str(), s.R, description);
     vector(Field::force, "F", "N", f.template head<3>());
     vector(Field::moment, "M", "N m", f.template tail<3>());
     vector(Field::strain, "nu", "-", s.strain.template head<3>());

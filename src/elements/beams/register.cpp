@@ -94,61 +94,13 @@ void read_actuator(Card& card, Beam<Nodes>& beam) {
   }
 }
 
-struct OutputFlag {
-  std::string_view word;
-  unsigned fields;
-};
-using Field = BeamOutput::Field;
-constexpr unsigned kEveryField = 255, kRates = Field::strain_rate | Field::curvature_rate;
-constexpr OutputFlag kOutputFlags[] = {{"position", Field::position},
-                                       {"orientation", Field::orientation},
-                                       {"configuration", Field::position | Field::orientation},
-                                       {"force", Field::force},
-                                       {"moment", Field::moment},
-                                       {"forces", Field::force | Field::moment},
-                                       {"linear strain", Field::strain},
-                                       {"angular strain", Field::curvature},
-                                       {"strains", Field::strain | Field::curvature},
-                                       {"linear strain rate", Field::strain_rate},
-                                       {"angular strain rate", Field::curvature_rate},
-                                       {"strain rates", Field::strain_rate | Field::curvature_rate},
-                                       {"all", kEveryField},
-                                       {"none", 0}};
-
-/// The flag that comes next, null when there is none.
-const OutputFlag* next_output_flag(Card& card) {
-  for (const OutputFlag& flag : kOutputFlags)
-    if (card.keyword(flag.word)) return &flag;
-  return nullptr;
-}
-
-/// Flags that choose the fields of self-describing formats.
+/// Fields of self-describing formats: the beam's own choice or the deck's.
 BeamOutput read_custom_output(Card& card, bool viscoelastic) {
   BeamOutput output;
-  output.description = card.model().control.orientation;
-  if (!card.keyword("custom output")) return output;
-  const auto name = [](const OutputFlag& flag) { return "`" + std::string(flag.word) + "`"; };
-  const OutputFlag* flag = next_output_flag(card);
-  if (!flag) {
-    std::string words;
-    for (const OutputFlag& known : kOutputFlags)
-      words += (words.empty() ? "" : ", ") + std::string(known.word);
-    card.fail_at(card.next(), "custom output: a flag is expected", "accepted: " + words);
-  }
-  output.chosen = 0;
-  unsigned seen = 0;
-  for (; flag; flag = next_output_flag(card)) {
-    const unsigned bit = 1u << (flag - kOutputFlags);
-    if (seen & bit) card.fail("custom output: " + name(*flag) + " is given twice");
-    seen |= bit;
-    output.chosen |= flag->fields;
-    if ((flag->fields & Field::orientation) && flag->fields != kEveryField &&
-        card.keyword("orientation description"))
-      output.description = card.orientation_description();
-    if (!viscoelastic && flag->fields != kEveryField && (flag->fields & kRates))
-      card.warn("custom output: " + name(*flag) + " is ignored, the beam is elastic");
-  }
-  if (!viscoelastic) output.chosen &= ~kRates;
+  if (const auto* deck = dynamic_cast<const BeamOutputDefault*>(&card))
+    output = deck->default_beam_output();
+  if (card.keyword("custom output")) output = read_beam_output(card, "custom output", viscoelastic);
+  if (!viscoelastic) output.chosen &= ~BeamOutput::rates;
   return output;
 }
 

@@ -203,6 +203,53 @@ TEST_F(NetcdfBeams, HoldThePrivateData) {
   }
 }
 
+/// `default beam output` stands for the beams that have no `custom output`.
+class NetcdfDefaultBeams : public NetcdfBeams {
+ protected:
+  std::string deck() const override {
+    std::string text = NetcdfBeams::deck();
+    const std::string card = "output results: netcdf;";
+    text.insert(text.find(card),
+                "default beam output: orientation, orientation description, orientation matrix, "
+                "linear strain, strain rates;\n  ");
+    const std::string own = ", linear elastic, 1., custom output, all";
+    text.replace(text.find(own), own.size(), ", linear elastic, 1.");
+    return text;
+  }
+};
+
+class NetcdfBeamsInAllFields : public NetcdfBeams {
+ protected:
+  std::string deck() const override {
+    std::string text = NetcdfBeams::deck();
+    const std::string card = "output results: netcdf;";
+    text.insert(text.find(card),
+                "default beam output: all, orientation description, orientation vector; ");
+    return text;
+  }
+};
+
+TEST_F(NetcdfBeamsInAllFields, HaveTheOrientationDescriptionThatWasAskedFor) {
+  for (const char* name : {"X_I", "Phi_I", "F_I", "M_I", "nu_I", "k_I", "nuP_I", "kP_I"})
+    EXPECT_TRUE(has(std::string("elem.beam.1.") + name)) << name;
+  EXPECT_FALSE(has("elem.beam.1.E_I"));
+  EXPECT_TRUE(has("elem.beam.2.E_I"));
+}
+
+TEST_F(NetcdfDefaultBeams, HaveTheFieldsOfTheControlCard) {
+  for (const char* name : {"R_I", "nu_I", "nuP_I", "kP_I", "R_II"})
+    EXPECT_TRUE(has(std::string("elem.beam.1.") + name)) << name;
+  for (const char* name : {"X_I", "F_I", "M_I", "k_I", "E_I"})
+    EXPECT_FALSE(has(std::string("elem.beam.1.") + name)) << name;
+  for (const char* name : {"X_I", "E_I", "F_I", "M_I", "nu_I", "k_I", "nuP_I", "kP_II"})
+    EXPECT_TRUE(has(std::string("elem.beam.2.") + name)) << name;
+  EXPECT_TRUE(has("elem.beam.3.Phi"));
+  EXPECT_FALSE(has("elem.beam.3.R"));
+  EXPECT_TRUE(has("elem.beam.4.nu"));
+  EXPECT_FALSE(has("elem.beam.4.nuP"));  // elastic
+  EXPECT_EQ(shape("elem.beam.1.R_I"), (Shape{6, 3, 3}));
+}
+
 TEST_F(NetcdfResults, StandBesideTheTextFiles) {
   EXPECT_TRUE(std::filesystem::exists(prefix_ + ".mov"));
   EXPECT_TRUE(std::filesystem::exists(prefix_ + ".out"));

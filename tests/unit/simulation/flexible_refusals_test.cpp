@@ -234,6 +234,14 @@ TEST(BeamRefusals, SectionsActuatorsAndOutput) {
     SCOPED_TRACE(rest);
     expect_message(beam3(nodes, rest), Severity::error, part);
   }
+  for (const auto& [flags, part] :
+       Cases{{"wobble", "default beam output: a flag is expected"},
+             {"forces, wobble", "default beam output: unknown flag"},
+             {"strains, forces, strains", "default beam output: `strains` is given twice"}}) {
+    std::string deck = beam3(nodes);
+    deck.insert(deck.find("structural nodes"), "default beam output: " + std::string(flags) + "; ");
+    expect_message(deck, Severity::error, part);
+  }
   expect_message(beam3(nodes, ", same, same, custom output, strain rates"), Severity::warning,
                  "`strain rates` is ignored, the beam is elastic");
   expect_message(beam("beam3: 1, " + nodes +
