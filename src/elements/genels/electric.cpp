@@ -1,5 +1,9 @@
 #include "elements/genels/electric.h"
 
+#include <algorithm>
+
+#include "model/detailed_row.h"
+
 namespace mbcosim {
 
 void Accelerometer::start(Start& s) const {
@@ -7,12 +11,30 @@ void Accelerometer::start(Start& s) const {
   s.own(0) = rotational ? e.dot(s.u.w(0)) : e.dot(s.u.v(0) + s.u.w(0).cross(s.u.R(0) * f));
 }
 
-double Motor::private_value(const Local<double>& u, int datum) const {
-  if (datum == 0) return torque(u);
-  return datum == 1 ? (u.R(0) * Rh.col(2)).dot(u.w(1) - u.w(0)) : u.own(0);
+void FilteredAccelerometer::start(Start& s) const { s.own(2) = -(s.u.R(0) * e0).dot(s.u.v(0)); }
+
+int Motor::private_datum(std::string_view name) {
+  const std::vector<std::string> names = private_data();
+  const auto found = std::find(names.begin(), names.end(), name);
+  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
 }
 
+double Motor::private_value(const Local<double>& u, int datum) const {
+  switch (datum) {
+    case 0:
+      return torque(u);
+    case 1:
+      return (u.R(0) * Rh.col(2)).dot(u.w(1) - u.w(0));
+    case 2:
+      return u.own(0);
+    default:
+      return ripple(u, datum == 3 ? M0 : M1);
+  }
+}
+
+/// Only for self-describing formats: the lines of .ele belong to electric nodes.
 void Motor::output(const Local<double>& u, OutputRow& row) const {
+  if (!dynamic_cast<DetailedRow*>(&row)) return;
   row.begin(OutputFile::ele, u.label());
   row.scalar("M", "N m", private_value(u, 0));
   row.scalar("Omega", "rad/s", private_value(u, 1));

@@ -2,6 +2,9 @@
 /// "Electric elements".
 #pragma once
 
+#include <cmath>
+#include <type_traits>
+
 #include "elements/element.h"
 #include "model/drive.h"
 
@@ -38,6 +41,47 @@ struct Accelerometer {
   void start(Start& s) const;
 };
 
+/// Accelerometer with its own dynamics: from the acceleration a of a node along a direction fixed
+/// to it to the abstract node's value y,
+///
+///   y/a = κ τ s / ((1 + τ s)(1 + 2 ζ s/ω + s²/ω²)).
+///
+/// Own differential unknowns X, Y, V with q = e · v, p = (w × e) · v, e = R e₀, thus a = q̇ − p:
+///
+///   own rows   Y − τ Ẋ,   V + q − Ẏ/ω²,   −p − X − (1 + 2ζ/(ωτ)) Y − (1/τ + 2ζω)(V + q) − V̇
+///   row of y   κ Y − y
+///
+/// The third one is divided by 1 + 1/τ + 2|ζ|ω, so that residuals are accelerations and speeds.
+/// It starts at rest: X = Y = 0, V = −q.
+struct FilteredAccelerometer {
+  int node = -1, output_node = -1;
+  Vec3 e0 = Vec3::UnitX();  ///< unit direction, node frame
+  double omega = 1;         ///< ω: natural frequency [rad/s]
+  double tau = 1;           ///< τ: time constant of the high-pass part [s]
+  double zeta = 0;          ///< ζ: damping ratio
+  double kappa = 1;         ///< κ: gain
+
+  static constexpr int width = 12;
+
+  void connect(Connector& c) {
+    c.node(node);
+    c.scalar(output_node);
+    c.differential(3);
+  }
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    const Vec<T> e = u.R(0) * e0;
+    const T velocity = u.own(2) + e.dot(u.v(0)), turning = u.w(0).cross(e).dot(u.v(0));
+    r.own(0, u.own(1) - u.own_rate(0) * tau);
+    r.own(1, velocity - u.own_rate(1) * (1 / (omega * omega)));
+    r.own(2, (-turning - u.own(0) - u.own(1) * (1 + 2 * zeta / (omega * tau)) -
+              velocity * (1 / tau + 2 * zeta * omega) - u.own_rate(2)) *
+                 (1 / (1 + 1 / tau + 2 * std::abs(zeta) * omega)));
+    r.scalar(0, u.own(1) * kappa - u.scalar(0));
+  }
+  void start(Start& s) const;
+};
+
 /// The abstract node's value follows the distance of two points: row |x₂ + R₂ f₂ − x₁ − R₁ f₁| − y
 /// [m].
 struct DisplacementSensor {
@@ -61,18 +105,22 @@ struct DisplacementSensor {
 };
 
 /// Direct current motor between two structural nodes; axis e = R₁ R_h e₃, Ω = e · (w₂ − w₁), own
-/// unknown: the current i.
+/// unknown: the current i. φ is the angle about e from axis 1 of R₁ R_h to axis 1 of node 2; with n
+/// terminal pairs φ_e = n φ modulo 2π, 0 ≤ φ_e < 2π:
 ///
-///   own row          −L i̇ − R(t) i − G Ω + V₂ − V₁        [V]
-///   torque           M = M₀(t) + (G + M₁(t)) i             −M e on node 1, +M e on node 2 [N·m]
-///   electric nodes   −i, +i                                [A]
+///   own row          −L i̇ − R(t) i − G Ω + V₂ − V₁              [V]
+///   torque           M = M₀(φ_e) + (G + M₁(φ_e)) i               −M e on node 1, +M e on node 2
+///   [N·m] electric nodes   −i, +i                                      [A]
+///
+/// Nodes may turn relative to each other about e only; joints see to that.
 struct Motor {
   int first = -1, second = -1, pole1 = -1, pole2 = -1;
   Mat3 Rh = Mat3::Identity();  ///< relative to `first`
   double G = 0;                ///< torque gain [N·m/A]
   double L = 0;                ///< inductance [H]
   DrivePtr R;                  ///< resistance [Ω]
-  DrivePtr M0, M1;             ///< no-load torque [N·m], correction of the gain [N·m/A]
+  DrivePtr M0, M1;  ///< of φ_e: no-load torque [N·m], ripple of the gain [N·m/A]; or null
+  int terminal_pairs = 1;
   double initial_current = 0;  ///< [A]
 
   static constexpr int width = 18;
@@ -97,16 +145,32 @@ struct Motor {
   }
   void start(Start& s) const { s.own(0) = initial_current; }
   void output(const Local<double>& u, OutputRow& row) const;
-  static int private_datum(std::string_view name) {
-    return name == "M" ? 0 : name == "omega" ? 1 : name == "i" ? 2 : -1;
-  }
-  static std::vector<std::string> private_data() { return {"M", "omega", "i"}; }
+  static int private_datum(std::string_view name);
+  static std::vector<std::string> private_data() { return {"M", "omega", "i", "M0", "M1"}; }
   double private_value(const Local<double>& u, int datum) const;
 
  private:
   template <class T>
+  T electrical_angle(const Local<T>& u) const {
+    using std::atan2;
+    const Vec<T> x1 = u.R(0) * Vec3(Rh.col(0)), y1 = u.R(0) * Vec3(Rh.col(1)), x2 = u.R(1).col(0);
+    const T angle = atan2(y1.dot(x2), x1.dot(x2)) * double(terminal_pairs);
+    return angle - 2 * M_PI * std::floor(value_of(angle) / (2 * M_PI));
+  }
+  template <class T>
+  T ripple(const Local<T>& u, const DrivePtr& d) const {
+    if (!d) return T(0.0);
+    const T angle = electrical_angle(u);
+    T r(d->value(*u.context, value_of(angle)));
+    if constexpr (!std::is_same_v<T, double>) {
+      if (d->has_derivative())
+        r += (angle - T(value_of(angle))) * d->derivative(*u.context, value_of(angle));
+    }
+    return r;
+  }
+  template <class T>
   T torque(const Local<T>& u) const {
-    return u.drive(M0) + (u.drive(M1) + G) * u.own(0);
+    return ripple(u, M0) + (ripple(u, M1) + G) * u.own(0);
   }
 };
 

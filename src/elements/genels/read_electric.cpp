@@ -1,3 +1,6 @@
+#include <Eigen/Geometry>
+#include <cmath>
+
 #include "elements/genels/electric.h"
 #include "elements/genels/readers.h"
 
@@ -5,13 +8,32 @@ namespace mbcosim {
 
 namespace {
 
+double read_positive(Card& card, const char* what) {
+  const double value = card.real(what);
+  if (!(value > 0) || !std::isfinite(value))
+    card.fail(std::string("accelerometer: the ") + what + " must be positive, got " +
+              std::to_string(value));
+  return value;
+}
+
+/// <node>, <abstract node>, <direction>, ω, τ, ζ, κ
+void read_filtered_accelerometer(Card& card, ElementInfo& info) {
+  FilteredAccelerometer e;
+  e.node = card.structural_node();
+  e.output_node = card.scalar_node(ScalarKind::abstract);
+  e.e0 = card.relative_unit_vector("measured direction", e.node);
+  e.omega = read_positive(card, "natural frequency");
+  e.tau = read_positive(card, "time constant");
+  e.zeta = card.real("damping ratio");
+  e.kappa = card.real("gain");
+  if (e.zeta < 0) card.warn("accelerometer: a negative damping ratio makes it unstable");
+  add_element(card.builder(), info, std::move(e));
+}
+
 void read_accelerometer(Card& card, ElementInfo& info) {
   Accelerometer e;
   const int kind = card.one_of({"translational", "rotational"});
-  if (kind < 0)
-    card.fail_at(
-        card.next(), "accelerometer: only `translational` and `rotational` ones are supported",
-        "use `translational` and pass its abstract node through `genel: …, scalar filter`");
+  if (kind < 0) return read_filtered_accelerometer(card, info);
   e.rotational = kind == 1;
   e.node = card.structural_node();
   e.output_node = card.scalar_node(ScalarKind::abstract);
@@ -41,20 +63,52 @@ void read_displacement(Card& card, ElementInfo& info) {
   add_element(card.builder(), info, std::move(e));
 }
 
+/// `orientation, <orientation>` whose axis 3 is the motor's, or that axis itself.
+Mat3 read_motor_frame(Card& card, int node, bool* has_frame) {
+  *has_frame = card.keyword("orientation");
+  if (*has_frame) return card.relative_orientation("orientation", node);
+  const Vec3 axis = card.relative_unit_vector("axis", node);
+  return Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis).toRotationMatrix();
+}
+
+/// [M0, <drive>,] [M1, <drive>,] terminal pairs, n
+void read_ripple(Card& card, Motor& e, bool has_frame) {
+  if (card.keyword("M0")) e.M0 = card.drive("no-load torque");
+  if (card.keyword("M1")) e.M1 = card.drive("ripple of the gain");
+  if (!e.M0 && !e.M1) return;
+  if (!has_frame)
+    card.fail("motor: `M0` and `M1` depend on an angle; the motor's axis alone does not define it",
+              "write `orientation, <orientation matrix>` instead of the axis");
+  if (!card.keyword("terminal pairs"))
+    card.fail_at(card.next(), "motor: `terminal pairs` expected after `M0` and `M1`");
+  e.terminal_pairs = card.integer("number of terminal pairs");
+  if (e.terminal_pairs < 1)
+    card.fail("motor: the number of terminal pairs must be at least 1, got " +
+              std::to_string(e.terminal_pairs));
+  const EvalContext& input = card.builder().input_context();
+  const Mat3 R1 = card.model().node_state(input, e.first).R,
+             R2 = card.model().node_state(input, e.second).R;
+  constexpr double kTiny = 1e-6;
+  if ((R1 * e.Rh.col(2)).cross(R2.col(0)).norm() < kTiny)
+    card.fail(
+        "motor: axis 1 of its second node is along the motor's axis; the angle between "
+        "the nodes is measured with it",
+        "turn the frame of the second node");
+}
+
 void read_motor(Card& card, ElementInfo& info) {
   Motor e;
+  bool has_frame = false;
   e.first = card.structural_node();
   e.second = card.structural_node();
-  card.keyword("orientation");
-  e.Rh = card.relative_orientation("orientation", e.first);
+  e.Rh = read_motor_frame(card, e.first, &has_frame);
   e.pole1 = card.scalar_node(ScalarKind::electric);
   e.pole2 = card.scalar_node(ScalarKind::electric);
   e.G = card.real("torque gain");
   e.L = card.real("inductance");
   e.R = card.drive("resistance");
-  e.M0 = card.keyword("M0") ? card.drive("no-load torque") : make_constant_drive(0);
-  e.M1 = card.keyword("M1") ? card.drive("correction of the gain") : make_constant_drive(0);
   if (card.keyword("initial current")) e.initial_current = card.real("initial current");
+  read_ripple(card, e, has_frame);
   add_element(card.builder(), info, std::move(e));
 }
 
@@ -64,7 +118,6 @@ void register_electric_elements(Registry& registry) {
   registry.typed("electric", Family::electric, {"accelerometer"}, read_accelerometer);
   registry.typed("electric", Family::electric, {"displacement"}, read_displacement);
   registry.typed("electric", Family::electric, {"motor"}, read_motor);
-  registry.unsupported("electric", "discrete control", "sampled controller");
 }
 
 }  // namespace mbcosim

@@ -9,6 +9,7 @@ namespace mbcosim {
 void register_scalar_genels(Registry& registry);
 void register_state_spaces(Registry& registry);
 void register_electric_elements(Registry& registry);
+void register_discrete_control(Registry& registry);
 
 /// A degree of freedom with an equation, with its order; `what`: "clamp".
 NodeDof read_genel_dof(Card& card, const char* what);

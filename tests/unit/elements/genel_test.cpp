@@ -120,6 +120,20 @@ struct DisplacementCase {
     return {bench.first, bench.second, scalar_dof(bench).node, bench.vec(), bench.vec(), 0, 0};
   }
 };
+struct FilteredAccelerometerCase {
+  using Element = FilteredAccelerometer;
+  static constexpr bool ideal = false, balanced = false;
+  static Element make(Bench& bench) {
+    return {bench.first, scalar_dof(bench).node, bench.vec().normalized(), 5, 0.3, 0.7, 1.5};
+  }
+};
+/// 0.3 x²
+class QuadraticDrive : public Drive {
+ public:
+  double value(const EvalContext&, double x) const override { return 0.3 * x * x; }
+  bool has_derivative() const override { return true; }
+  double derivative(const EvalContext&, double x) const override { return 0.6 * x; }
+};
 struct MotorCase {
   using Element = Motor;
   static constexpr bool ideal = false, balanced = true;
@@ -133,8 +147,9 @@ struct MotorCase {
     e.G = 0.4;
     e.L = 0.01;
     e.R = make_constant_drive(2);
-    e.M0 = make_constant_drive(0.3);
+    e.M0 = std::make_shared<QuadraticDrive>();
     e.M1 = make_constant_drive(0.2);
+    e.terminal_pairs = 3;
     return e;
   }
 };
@@ -164,6 +179,7 @@ TEST(Genels, JacobiansMatchCentralDifferences) {
   check_jacobian<SwashplateCase>();
   check_jacobian<AccelerometerCase<false>>();
   check_jacobian<AccelerometerCase<true>>();
+  check_jacobian<FilteredAccelerometerCase>();
   check_jacobian<DisplacementCase>();
   check_jacobian<MotorCase>();
 }
