@@ -16,7 +16,8 @@ const Units kMechanical = {
     {"Omega", "rad/s"}, {"a", "m/s^2"}, {"wp", "rad/s^2"}, {"k", "1/m"},      {"eP", "1/s"},
     {"kP", "1/(m s)"},  {"m", "kg"},    {"J", "kg m^2"},   {"JP", "kg m^2"}};
 const Units kBody = {{"E", "J"}, {"V", "J"}, {"m", "kg"}};
-const Units kElectric = {{"M", "N m"}, {"omega", "rad/s"}, {"i", "A"}};
+const Units kElectric = {
+    {"M", "N m"}, {"omega", "rad/s"}, {"i", "A"}, {"M0", "N m"}, {"M1", "N m/A"}};
 
 std::string_view without_axis(std::string_view name) {
   if (const std::size_t dot = name.rfind('.'); dot != std::string_view::npos)

@@ -18,7 +18,8 @@ using Complex = std::complex<double>;
 
 constexpr double kOmega = 20, kTau = .5, kZeta = .7, kKappa = 1.5;
 
-/// κ τ s / ((1 + τ s)(1 + 2 ζ s/ω + s²/ω²))
+/// κ τ s / ((1 + τ s)(1 + 2 ζ s/ω + s²/ω²)), as in MBDyn's input manual. (The reference solver's
+/// step response starts with the slope κ ω² instead of zero.)
 Complex transfer(Complex s) {
   return kKappa * kTau * s /
          ((1. + kTau * s) * (1. + 2 * kZeta * s / kOmega + s * s / (kOmega * kOmega)));
