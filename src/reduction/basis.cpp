@@ -8,6 +8,7 @@ namespace mbcosim {
 
 namespace {
 
+constexpr int kShapesAtOnce = 32;
 constexpr double kNearlyFree = 1e-5;
 constexpr double kPoorResidual = 1e4;  ///< times the tolerance
 constexpr double kPoorRounding = 1e3;
@@ -179,15 +180,19 @@ MatX BasisBuilder::unit_loads(const Structure& structure) const {
 
 /// Ψ = [−K_oo⁻¹ K_op; 1], model rows.
 MatX BasisBuilder::constraint_shapes(Structure& omitted) const {
-  MatX shapes = MatX::Zero(model_.rows(), interface_.size());
-  for (std::size_t k = 0; k < interface_.size(); ++k) {
-    VecX force = VecX::Zero(omitted.size());
-    for (SparseMatrix::InnerIterator it(model_.stiffness, interface_[k]); it; ++it)
-      if (const int row = omitted.position(it.row()); row >= 0) force(row) = -it.value();
-    shapes.col(k) = omitted.embedded(omitted.solve(force));
-    shapes(interface_[k], k) = 1;
-    report("static shapes", double(k + 1) / interface_.size());
+  const int count = static_cast<int>(interface_.size());
+  MatX shapes(model_.rows(), count);
+  for (int done = 0; done < count;) {
+    const int columns = std::min(kShapesAtOnce, count - done);
+    MatX forces = MatX::Zero(omitted.size(), columns);
+    for (int k = 0; k < columns; ++k)
+      for (SparseMatrix::InnerIterator it(model_.stiffness, interface_[done + k]); it; ++it)
+        if (const int row = omitted.position(it.row()); row >= 0) forces(row, k) = -it.value();
+    shapes.middleCols(done, columns) = omitted.embedded(omitted.solve(forces));
+    done += columns;
+    report("static shapes", double(done) / count);
   }
+  for (int k = 0; k < count; ++k) shapes(interface_[k], k) = 1;
   return shapes;
 }
 
@@ -203,14 +208,14 @@ MatX BasisBuilder::relief_shapes() {
     loads -= inertia_load * inertia.solve(x.transpose() * loads);
   }
   Structure& s = attached();
-  return s.embedded(s.solve_all(s.restricted(body_->embedded(loads))));
+  return s.embedded(s.solve(s.restricted(body_->embedded(loads))));
 }
 
 MatX BasisBuilder::flexibility_columns() {
   Structure& s = attached();
   const MatX loads = unit_loads(s);
-  if (s.rigid_count() == 0) return s.embedded(s.solve_all(loads));
-  return s.embedded(s.without_rigid(s.solve_all(s.balanced(loads))));
+  if (s.rigid_count() == 0) return s.embedded(s.solve(loads));
+  return s.embedded(s.without_rigid(s.solve(s.balanced(loads))));
 }
 
 BasisShapes BasisBuilder::build() {
@@ -237,7 +242,7 @@ BasisShapes BasisBuilder::build() {
     case ReductionBasis::complement:
       require_supported("complement shapes");
       report("static shapes", 0);
-      basis.shapes = attached().embedded(attached().solve_all(unit_loads(attached())));
+      basis.shapes = attached().embedded(attached().solve(unit_loads(attached())));
       basis.static_count = static_cast<int>(interface_.size());
       add_modes(options_.normal == ReductionNormal::omitted ? omitted() : attached(), basis);
       break;

@@ -22,8 +22,9 @@ class Flexibility {
   Flexibility(Structure& structure, double shift, const ReductionProgress& progress, int expected)
       : structure_(structure), progress_(progress), expected_(expected) {
     if (shift < 0)
-      shifted_ = SparseFactor::positive(structure.stiffness() - shift * structure.mass(),
-                                        [&](int k) { return structure.row_text(k); });
+      shifted_ =
+          SparseFactor::positive(structure.stiffness() - shift * structure.mass(),
+                                 structure.places(), [&](int k) { return structure.row_text(k); });
   }
   Eigen::Index rows() const { return structure_.size(); }
   Eigen::Index cols() const { return structure_.size(); }

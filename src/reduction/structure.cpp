@@ -9,20 +9,14 @@ namespace mbcosim {
 
 namespace {
 
-constexpr double kNoEnergy = 1e-8;     ///< relative strain of a rigid motion
-constexpr double kSmallPivot = 1e-14;  ///< relative to the diagonal of K
-constexpr int kDenseOrder = 400;       ///< up to here dense eigensolutions
+constexpr double kNoEnergy = 1e-8;  ///< relative strain of a rigid motion
+constexpr int kDenseOrder = 400;    ///< up to here dense eigensolutions
 
 /// √ of the diagonal of K, which makes the strains of different rows comparable.
 VecX row_scales(const SparseMatrix& stiffness) {
   const VecX diagonal = stiffness.diagonal().cwiseMax(0);
   const double mean = std::max(diagonal.mean(), 1e-300);
   return diagonal.unaryExpr([mean](double d) { return std::sqrt(d > 1e-14 * mean ? d : mean); });
-}
-
-[[noreturn]] void fail_singular(const std::string& where) {
-  refuse_reduction("the stiffness matrix is singular or not positive definite at " + where,
-                   "a mechanism, a part that is not connected, or an unstable model");
 }
 
 }  // namespace
@@ -44,26 +38,6 @@ SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<int>& rows,
   return part;
 }
 
-SparseFactor SparseFactor::positive(const SparseMatrix& matrix,
-                                    const std::function<std::string(int)>& row_text) {
-  for (int k = 0; k < matrix.rows(); ++k)
-    if (!(matrix.coeff(k, k) > 0)) fail_singular(row_text(k));
-  SparseFactor f;
-  f.factor_ = std::make_shared<Factor>(matrix);
-  if (f.factor_->info() != Eigen::Success) fail_singular("an unknown place");
-  const VecX pivots = f.factor_->vectorD();
-  const auto& order = f.factor_->permutationP().indices();
-  for (int k = 0; k < matrix.rows(); ++k)
-    if (!(pivots(order(k)) > kSmallPivot * matrix.coeff(k, k))) fail_singular(row_text(k));
-  return f;
-}
-
-int SparseFactor::count_below(const SparseMatrix& stiffness, const SparseMatrix& mass, double mu) {
-  const Factor factor(SparseMatrix(stiffness - mu * mass));
-  if (factor.info() != Eigen::Success) return -1;
-  return static_cast<int>((factor.vectorD().array() < 0).count());
-}
-
 Structure::Structure(const FeModel& model, const std::vector<char>& held)
     : model_(model), position_(model.rows(), -1) {
   for (int r = 0; r < model.rows(); ++r) {
@@ -74,6 +48,8 @@ Structure::Structure(const FeModel& model, const std::vector<char>& held)
   if (rows_.empty()) refuse_reduction("every degree of freedom is held");
   stiffness_ = submatrix(model.stiffness, rows_, rows_);
   mass_ = submatrix(model.mass, rows_, rows_);
+  places_.resize(3, size());
+  for (int k = 0; k < size(); ++k) places_.col(k) = model.positions.col(model.dofs[rows_[k]].node);
   find_rigid_motions();
   hold_determinate_set();
 }
@@ -122,22 +98,14 @@ void Structure::factor() {
   if (factor_) return;
   const SparseMatrix part = submatrix(stiffness_, kept_, kept_);
   factor_ = std::make_unique<SparseFactor>(
-      SparseFactor::positive(part, [this](int k) { return model_.dof_text(rows_[kept_[k]]); }));
+      SparseFactor::positive(part, places_(Eigen::all, kept_),
+                             [this](int k) { return model_.dof_text(rows_[kept_[k]]); }));
 }
 
-VecX Structure::solve(const VecX& f) {
+MatX Structure::solve(const MatX& f) {
   factor();
-  VecX part(kept_.size());
-  for (std::size_t k = 0; k < kept_.size(); ++k) part(k) = f(kept_[k]);
-  part = factor_->solve(part);
-  VecX x = VecX::Zero(size());
-  for (std::size_t k = 0; k < kept_.size(); ++k) x(kept_[k]) = part(k);
-  return x;
-}
-
-MatX Structure::solve_all(const MatX& loads) {
-  MatX x(loads.rows(), loads.cols());
-  for (int j = 0; j < loads.cols(); ++j) x.col(j) = solve(loads.col(j));
+  MatX x = MatX::Zero(size(), f.cols());
+  x(kept_, Eigen::all) = factor_->solve(f(kept_, Eigen::all));
   return x;
 }
 
@@ -195,7 +163,7 @@ void Structure::finish(NormalModes& modes) const {
 }
 
 int Structure::count_modes_below(double square) const {
-  const int below = SparseFactor::count_below(stiffness_, mass_, square);
+  const int below = SparseFactor::count_negative(stiffness_ - square * mass_, places_);
   return below < 0 ? below : below - rigid_count();
 }
 

@@ -11,32 +11,15 @@
 /// statically determinate set of rows; the choice adds rigid motion only, which Pᵀ removes.
 #pragma once
 
-#include <Eigen/SparseCholesky>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "reduction/error.h"
 #include "reduction/fe_model.h"
+#include "reduction/sparse_factor.h"
 
 namespace mbcosim {
-
-/// Sparse LDLᵀ of a symmetric matrix without pivoting.
-class SparseFactor {
- public:
-  /// Throws ReductionError when `matrix` is not positive definite: `row_text` names a row of it.
-  static SparseFactor positive(const SparseMatrix& matrix,
-                               const std::function<std::string(int)>& row_text);
-  /// Number of eigenvalues of K − μ M below zero; -1 when the factorization breaks down.
-  static int count_below(const SparseMatrix& stiffness, const SparseMatrix& mass, double mu);
-
-  VecX solve(const VecX& f) const { return factor_->solve(f); }
-  long nonzeros() const { return factor_->matrixL().nestedExpression().nonZeros(); }
-
- private:
-  using Factor = Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<int>>;
-  std::shared_ptr<Factor> factor_;
-};
 
 /// Normal modes: rows of the structure.
 struct NormalModes {
@@ -63,6 +46,7 @@ class Structure {
   std::string row_text(int k) const { return model_.dof_text(rows_[k]); }
   const SparseMatrix& stiffness() const { return stiffness_; }
   const SparseMatrix& mass() const { return mass_; }
+  const RowPlaces& places() const { return places_; }
   int rigid_count() const { return static_cast<int>(rigid_.cols()); }
   const MatX& rigid() const { return rigid_; }  ///< X_R
   /// Largest strain of the softest combination that is not rigid, relative; small: nearly free.
@@ -72,9 +56,9 @@ class Structure {
   MatX without_rigid(MatX shapes) const {
     return shapes - rigid_ * (mass_rigid_.transpose() * shapes);
   }
-  /// K x = f; for a free body f must be balanced, and rows of a determinate set stay at zero.
-  VecX solve(const VecX& f);
-  MatX solve_all(const MatX& loads);
+  /// K x = f, column by column; for a free body f must be balanced, and rows of a determinate set
+  /// stay at zero.
+  MatX solve(const MatX& f);
   /// The lowest elastic modes.
   NormalModes modes(int count, const EigenOptions& options, const ReductionProgress& progress);
   /// Number of elastic modes with ω² below `square`.
@@ -98,6 +82,7 @@ class Structure {
   const FeModel& model_;
   std::vector<int> rows_, position_;
   SparseMatrix stiffness_, mass_;
+  RowPlaces places_;
   MatX rigid_, mass_rigid_;
   double softest_ = 1;
   std::vector<int> kept_;  ///< rows outside the determinate set

@@ -1,1 +1,1 @@
-set(SOURCES reduce_test.cpp)
+set(SOURCES reduce_test.cpp sparse_factor_test.cpp)
