@@ -5,6 +5,7 @@
 #include <string>
 
 #include "deck_run.h"
+#include "elements/modal_deck.h"
 
 namespace mbcosim {
 namespace {
@@ -148,6 +149,73 @@ end: elements;
     run.step(1);
     EXPECT_NEAR(run.datum(Family::joint, 2, "F"), i % 2 ? 0 : 10, 1e-6) << i;
   }
+}
+
+/// A slender flexible bar along the axis of a spin, hinged to the spinning node at its lower end.
+/// Upright it is in unstable balance: a tilt θ about the hinge grows as θ'' = Ω² sin θ cos θ.
+testing::ModalDeck spinning_bar(double tilt, double tolerance) {
+  FemData bar;
+  bar.name = "bar.fem";
+  bar.labels = {"foot", "middle", "tip"};
+  bar.positions = MatX::Zero(3, 3);
+  bar.positions.row(2) << 0, 1, 2;
+  bar.shapes = MatX::Zero(18, 2);
+  for (int j = 0; j < 2; ++j) bar.shapes(6 + j, j) = .3, bar.shapes(12 + j, j) = 1;
+  bar.lumped = MatX::Zero(6, 3);
+  bar.lumped->topRightCorner<3, 2>().setConstant(1e-3);
+  bar.mass = 1.09e-3 * MatX::Identity(2, 2);
+  bar.stiffness = 1e2 * MatX::Identity(2, 2);
+  bar.initial_amplitudes = bar.initial_velocities = VecX::Zero(2);
+  testing::ModalDeck deck;
+  deck.h = 5e-2;
+  deck.final_time = 40;
+  deck.tolerance = tolerance;
+  deck.initial_value =
+      "method: ms, .6; derivatives tolerance: 1e-6; derivatives max iterations: 20;";
+  deck.control = "structural nodes: 4; joints: 4;";
+  deck.files["bar.fem"] = write_fem_text(bar, {});
+  testing::Placement ground, spin, tilted;
+  spin.w = tilted.w = Vec3(0, 0, 2);
+  tilted.R = Eigen::AngleAxisd(tilt, Vec3::UnitX()).toRotationMatrix();
+  deck.node(1, "static", ground);
+  deck.node(2, "static", spin);
+  deck.node(3, "static", tilted);
+  deck.node(4, "modal", tilted);
+  deck.joints =
+      "joint: 1, clamp, 1, node, node;\n"
+      "joint: 2, axial rotation, 1, null, 2, null, const, 2.;\n"
+      "joint: 3, revolute hinge, 2, null, hinge, 1, 0.,1.,0., 2, 0.,0.,1.,\n"
+      "  3, null, hinge, 1, 0.,1.,0., 2, 0.,0.,1.;\n"
+      "joint: 4, modal, 4, 2, from file, no damping, \"bar.fem\", 1, \"foot\", 3, null;\n";
+  return deck;
+}
+
+/// Tilt of the bar at time t.
+double tilt_of_spinning_bar(double start, double tolerance, double t) {
+  testing::ModalRun run(spinning_bar(start, tolerance));
+  if (!run.ready()) return NAN;
+  run.to(t);
+  return std::asin(run.node(3).R.col(2).head<2>().norm());
+}
+
+// What a residual just below the tolerance leaves behind grows with an unstable motion, so that two
+// solvers, which iterate differently, part although both are right: the result follows the
+// tolerance. Near the unstable balance the tilt grows as cosh Ωt; through the fall and back into
+// the balance the tolerance of 1e-6 ends far from the limit, to which smaller ones converge.
+// (Corpus deck with two modal bodies in a spinning chain, tolerance 1e-6: the reference solver is
+// 8.0e-4 away from its own result with 1e-11, we are 5.0e-5 away from ours; with 1e-11 both agree
+// to 1.6e-8.)
+TEST(ReferenceDifferences, UnstableSpinOfModalBodiesAmplifiesTheTolerance) {
+  EXPECT_NEAR(tilt_of_spinning_bar(1e-5, 1e-10, 4) / (1e-5 * std::cosh(2. * 4)), 1, .15);
+  const double limit = tilt_of_spinning_bar(1e-2, 1e-11, 40);
+  const auto error = [&](double tolerance) {
+    return std::abs(tilt_of_spinning_bar(1e-2, tolerance, 40) - limit);
+  };
+  const double at6 = error(1e-6), at7 = error(1e-7), at8 = error(1e-8), at9 = error(1e-9);
+  EXPECT_GT(at6, 1e-3);
+  EXPECT_LT(at7, .1 * at6);
+  EXPECT_LT(at8, .1 * at7);
+  EXPECT_LT(at9, 1e-7);
 }
 
 }  // namespace
