@@ -34,8 +34,9 @@ int validate(const std::string& deck, bool json);
 int describe(const std::string& deck, bool json);
 /// Reduces a finite element model to a FEM data file, and reports beside it as OUTPUT.json.
 int reduce_model(const ReduceCommand& command);
-/// What a FEM data file holds.
-int fem_info(const std::string& file, bool json);
+/// What a FEM data file holds; `convert`: name of a copy to write, the packed form when it ends
+/// with .bin, or empty.
+int fem_info(const std::string& file, bool json, const std::string& convert);
 /// Runs `mbcosim-replay`; returns only when that cannot be started.
 int replay(const std::vector<std::string>& arguments);
 /// The words of the input language, served or refused by name.

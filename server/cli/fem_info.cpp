@@ -5,8 +5,10 @@
 #include <numbers>
 
 #include "cli/commands.h"
+#include "cli/fem_file.h"
 #include "elements/modal/modal_body.h"
 #include "input/sources.h"
+#include "reduction/error.h"
 
 namespace mbcosim::cli {
 namespace {
@@ -101,7 +103,7 @@ void print(const FemSummary& s) {
 
 }  // namespace
 
-int fem_info(const std::string& file, bool json) {
+int fem_info(const std::string& file, bool json, const std::string& convert) {
   const auto bytes = FolderSource(".", true).read(file);
   if (!bytes) {
     std::fprintf(stderr, "error: %s\n", bytes.error().message.c_str());
@@ -109,6 +111,7 @@ int fem_info(const std::string& file, bool json) {
   }
   try {
     const FemSummary summary = summarize(file, *bytes);
+    if (!convert.empty()) write_fem_file(convert, summary.data, {"copy of " + file});
     if (json) {
       std::printf("%s\n",
                   to_json(summary).dump(1, ' ', false, Json::error_handler_t::replace).c_str());
@@ -118,8 +121,10 @@ int fem_info(const std::string& file, bool json) {
     return kDone;
   } catch (const DeckError& error) {
     std::fprintf(stderr, "%s\n", error.diagnostic.text().c_str());
-    return kDeckRefused;
+  } catch (const ReductionError& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
   }
+  return kDeckRefused;
 }
 
 }  // namespace mbcosim::cli

@@ -74,7 +74,10 @@ int main(int argc, char** argv) {
   CLI::App* fem_app = app.add_subcommand("fem-info", "Tell what a FEM data file holds");
   fem_app->add_option("file", deck, "FEM data file, text or binary")->required();
   fem_app->add_flag("--json", json, "Print it as JSON");
-  fem_app->callback([&] { exit_code = fem_info(deck, json); });
+  std::string convert;
+  fem_app->add_option("--convert", convert,
+                      "Write a copy to this file; the packed form when its name ends with .bin");
+  fem_app->callback([&] { exit_code = fem_info(deck, json, convert); });
 
   CLI::App* replay_app = app.add_subcommand(
       "replay", "Run a model against a record of its ports, or a recorded server against a client");

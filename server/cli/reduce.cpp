@@ -1,9 +1,9 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "cli/commands.h"
+#include "cli/fem_file.h"
 #include "cli/interrupt.h"
 #include "input/sources.h"
 #include "reduction/job.h"
@@ -20,13 +20,6 @@ std::string read_file(const std::string& folder, const std::string& name) {
   const auto text = FolderSource(folder, true).read(name);
   if (!text) throw ReductionError(ErrorKind::io, text.error().message);
   return *text;
-}
-
-void write_file(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw ReductionError(ErrorKind::io, "cannot write " + path);
 }
 
 /// The job file first, then what the command line says.
@@ -98,9 +91,7 @@ int reduce_model(const ReduceCommand& command) {
         });
     bar.clear();
     if (!reduction) return complain(reduction.error());
-    write_file(command.output, command.output.ends_with(".bin")
-                                   ? write_fem_binary(reduction->data)
-                                   : write_fem_text(reduction->data, reduction->comments));
+    write_fem_file(command.output, reduction->data, reduction->comments);
     write_file(command.output + ".json", report_json(*reduction) + "\n");
     if (!command.quiet) std::fputs(report_text(*reduction).c_str(), stdout);
     return kDone;

@@ -88,6 +88,12 @@ void BasisBuilder::find_interface() {
 
 void BasisBuilder::check_options() {
   if (options_.modes < 0) refuse_reduction("the number of normal modes must not be negative");
+  if (!(options_.max_frequency >= 0))
+    refuse_reduction("the highest frequency must not be negative");
+  for (const auto& [label, digits] : options_.interface_components)
+    if (std::find(options_.interface_nodes.begin(), options_.interface_nodes.end(), label) ==
+        options_.interface_nodes.end())
+      refuse_reduction("components are given for node " + label + ", which is no interface node");
   if (is_static(options_.basis) && interface_.empty())
     refuse_reduction(std::string(basis_name(options_.basis)) +
                      " needs interface nodes that can move");

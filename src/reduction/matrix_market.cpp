@@ -73,7 +73,8 @@ class Reader {
     if (rows != columns)
       fail("the matrix is not square: " + std::to_string(rows) + " x " + std::to_string(columns));
     if (rows < 1 || rows > 50'000'000) fail("order " + std::to_string(rows) + " is not accepted");
-    if (count < 0 || static_cast<std::size_t>(count) > rest_.size() / kShortestEntry + 1)
+    if (count < 0) fail("the number of entries is negative: " + std::to_string(count));
+    if (static_cast<std::size_t>(count) > rest_.size() / kShortestEntry + 1)
       fail("the file is too short for " + std::to_string(count) + " entries");
     order_ = static_cast<int>(rows);
     count_ = static_cast<std::size_t>(count);

@@ -147,6 +147,13 @@ def test_packed_form_runs_like_the_text(folder):
     text, packed = (json.loads(mbcosim("fem-info", folder / name, "--json").stdout) for name in ("beam.fem", "beam.bin"))
     assert packed["binary"] and not text["binary"]
     assert {**packed, "binary": 0, "revision": 0} == {**text, "binary": 0, "revision": 0}
+    for source, copy in (("beam.fem", "copy.bin"), ("beam.bin", "copy.fem")):  # either form from the other
+        assert mbcosim("fem-info", folder / source, "--convert", folder / copy).returncode == 0
+    assert (folder / "copy.bin").read_bytes() == (folder / "beam.bin").read_bytes()
+    numbers = [[line for line in (folder / name).read_text().splitlines() if not line.startswith("**")] for name in ("beam.fem", "copy.fem")]
+    assert numbers[0] == numbers[1]
+    nowhere = mbcosim("fem-info", folder / "beam.fem", "--convert", folder / "none" / "copy.fem")
+    assert nowhere.returncode == 2 and "cannot write" in nowhere.stderr
     for name in ("beam.fem", "beam.bin"):
         (folder / f"{name}.deck").write_text(clamped_deck(8, 1e-3).replace("final time: 6.", "final time: .5").replace("beam.fem", name))
         run = mbcosim("run", folder / f"{name}.deck", "-o", folder / f"out_{name}")

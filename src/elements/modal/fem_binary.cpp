@@ -33,8 +33,7 @@ class FemBinaryReader {
     while (true) {
       const int group = take<unsigned char>();
       if (group == kEnd) break;
-      if (group < 2 || group > 13)
-        fail("record group " + std::to_string(group) + " is not supported");
+      if (group < 2 || group > 13) detail::refuse_fem_group(data_.name, 0, group);
       if (have_[group]) fail("record group " + std::to_string(group) + " appears a second time");
       have_[group] = true;
       data_.groups.push_back(group);

@@ -38,6 +38,19 @@ void refuse_fem_data(const std::string& name, int line, const std::string& messa
   throw DeckError(fem_diagnostic(name, line, message, hint));
 }
 
+void refuse_fem_group(const std::string& name, int line, int group) {
+  const std::string what =
+      "record group " + std::to_string(std::max(group, 0)) + " is not supported";
+  if (group == 19)
+    refuse_fem_data(name, line, what + " (geometric stiffness matrices)",
+                    "groups 1 to 13 are read; without it the body does not stiffen under load");
+  if (group >= 14 && group <= 18)
+    refuse_fem_data(name, line, what + " (an inertia invariant)",
+                    "groups 1 to 13 are read; leave out 14 to 18 and give group 11, the lumped "
+                    "inertia, from which they are computed");
+  refuse_fem_data(name, line, what, "groups 1 to 13 are read");
+}
+
 void note_fem_data(FemData& data, int line, const std::string& message, const std::string& hint) {
   Diagnostic d = fem_diagnostic(data.name, line, message, hint);
   d.severity = Severity::warning;

@@ -61,6 +61,8 @@ FemData parse_fem_text(const std::string& name, std::string_view text);
 FemData parse_fem_binary(const std::string& name, std::string_view bytes);
 [[noreturn]] void refuse_fem_data(const std::string& name, int line, const std::string& message,
                                   const std::string& hint = "");
+/// Refuses a group that is not read: 14 to 19 hold what newer programs compute from group 11.
+[[noreturn]] void refuse_fem_group(const std::string& name, int line, int group);
 /// Checks that hold for either form: values finite, labels distinct, inertia not negative.
 void check_fem_data(FemData& data);
 void note_fem_data(FemData& data, int line, const std::string& message,

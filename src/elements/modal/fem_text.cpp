@@ -135,12 +135,7 @@ class FemTextReader {
   }
 
   void read_group() {
-    if (group_ < 1 || group_ > 13) {
-      const int group = group_;
-      group_ = 0;
-      fail("record group " + std::to_string(group) + " is not supported",
-           "groups 1 to 13 are read");
-    }
+    if (group_ < 1 || group_ > 13) detail::refuse_fem_group(data_.name, scan_.line(), group_);
     if (have_[group_]) fail("appears a second time");
     if (group_ != 1 && !have_[1])
       fail("found before record group 1", "the header group must come first");

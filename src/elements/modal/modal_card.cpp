@@ -236,11 +236,14 @@ class ModalJointReader {
     while (card_.one_of({"create binary", "use binary", "update binary"}) >= 0) binary = true;
     if (binary && !data_.binary)
       card_.warn(
-          "modal joint: the named FEM data file is read; no binary copy is written or looked for");
+          "modal joint: the named FEM data file is read; no binary copy is written or looked for",
+          "a packed copy is written by `mbcosim fem-info FILE --convert FILE.bin`, and read when "
+          "it is named");
     if (!card_.keyword("echo")) return;
     card_.quoted("name of the echo file");
     if (card_.keyword("precision")) card_.integer("precision of the echo");
-    card_.warn("modal joint: the echo of the FEM data is not written", "use `mbcosim fem-info`");
+    card_.warn("modal joint: the echo of the FEM data is not written",
+               "use `mbcosim fem-info FILE --convert COPY`");
   }
 
   std::string fem_label() {

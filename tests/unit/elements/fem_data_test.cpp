@@ -98,7 +98,12 @@ TEST(FemText, NamesFileLineAndGroupOfWhatItRefuses) {
   EXPECT_THAT(refusal(body_text({{12, "** RECORD GROUP 9, MASS\n2 0 0\n3\n"}})),
               HasSubstr("record group 9: appears a second time"));
   EXPECT_THAT(refusal(body_text({{12, "** RECORD GROUP 14\n"}})),
-              HasSubstr("record group 14 is not supported"));
+              HasSubstr("record group 14 is not supported (an inertia invariant)"));
+  EXPECT_THAT(refusal(body_text({{12, "** RECORD GROUP 19\n"}})),
+              HasSubstr("record group 19 is not supported (geometric stiffness matrices)"));
+  for (const char* group : {"0", "20", "99"})
+    EXPECT_THAT(refusal(body_text({{12, "** RECORD GROUP " + std::string(group) + "\n"}})),
+                HasSubstr("record group " + std::string(group) + " is not supported"));
   EXPECT_THAT(refusal(body_text({{1, ""}})),
               HasSubstr("record group 2: found before record group 1"));
   EXPECT_THAT(refusal(body_text({{1, "** RECORD GROUP 1\n**\n REV0 1 2 0 0 2\n"}})),

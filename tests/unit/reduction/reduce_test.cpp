@@ -347,6 +347,12 @@ TEST(ReduceRefusals, WhatDoesNotFit) {
   EXPECT_THAT(refusal(beam, o), HasSubstr("choose rigid inertia"));
   EXPECT_THAT(refusal(clamped(beam, "1"), options_of(ReductionBasis::inertia_decoupling, 4, {"9"})),
               HasSubstr("this one is supported"));
+  o = options_of(ReductionBasis::free_modes, 4);
+  o.max_frequency = -5;
+  EXPECT_THAT(refusal(beam, o), HasSubstr("must not be negative"));
+  o = options_of(ReductionBasis::craig_bampton, 4, {"1", "9"});
+  o.interface_components = {{"5", "123"}};
+  EXPECT_THAT(refusal(beam, o), HasSubstr("node 5, which is no interface node"));
 }
 
 TEST(ReduceRefusals, IndefiniteMatrices) {
