@@ -83,6 +83,15 @@ void read_internal_force(Card& card, ElementInfo& info, bool follower) {
   add_element(card.builder(), info, std::move(e));
 }
 
+void read_internal_displacement_force(Card& card, ElementInfo& info) {
+  InternalForce e;
+  e.displacement = true;
+  e.first = card.structural_node(Card::NodeNeed::not_dummy);
+  e.second = card.structural_node(Card::NodeNeed::not_dummy);
+  e.d = card.vec3_drive("force");
+  add_element(card.builder(), info, std::move(e));
+}
+
 /// `[position, <arm>]` of a couple, of no effect but in .log.
 Vec3 read_unused_arm(Card& card, int node) {
   return card.keyword("position") ? card.relative_position("arm", node) : Vec3(Vec3::Zero());
@@ -198,6 +207,7 @@ void register_forces(Registry& registry) {
   force({"absolute displacement"}, read_displacement_force);
   force({"absolute internal", "conservative internal"}, kind(read_internal_force, false));
   force({"follower internal"}, kind(read_internal_force, true));
+  force({"absolute internal displacement"}, read_internal_displacement_force);
   force({"total"}, read_total_force);
   force({"total internal"}, read_total_internal_force);
   force({"abstract"}, kind(read_abstract, false));

@@ -74,7 +74,8 @@ void InternalForce::output(const Local<double>& u, OutputRow& row) const {
 }
 
 std::string InternalForce::log(const Model& model, int label) const {
-  return internal_log(model, "force", follower, label, first, a1, second, a2);
+  return internal_log(model, displacement ? "displacement force" : "force", follower, label, first,
+                      a1, second, a2);
 }
 
 void InternalCouple::output(const Local<double>& u, OutputRow& row) const {

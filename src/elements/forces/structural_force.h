@@ -78,7 +78,8 @@ struct InternalForce {
   Vec3 a1 = Vec3::Zero(), a2 = Vec3::Zero();  ///< arms, node frames [m]
   Vec3DrivePtr d;                             ///< [N]
   bool follower = false;
-  int k1 = 0, k2 = 0;  ///< local nodes
+  bool displacement = false;  ///< `absolute internal displacement`: no arms, also on such nodes
+  int k1 = 0, k2 = 0;         ///< local nodes
 
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;

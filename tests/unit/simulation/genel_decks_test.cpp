@@ -73,6 +73,32 @@ end: elements;
   EXPECT_NEAR(run.own(Family::genel, 2), -3, 1e-12);
 }
 
+void expect_close(const Vec3& value, const Vec3& expected, double tolerance) {
+  EXPECT_LT((value - expected).norm(), tolerance) << value.transpose();
+}
+
+/// Opposite forces on nodes without and with rotations, no moments; the log line is the reference
+/// solver's.
+TEST(GenelDecks, InternalForcesBetweenDisplacementNodes) {
+  DeckRun run(initial_value_block(
+                  .1, 1, "tolerance: 1e-8; max iterations: 20; derivatives tolerance: 1e9;") +
+              R"(
+begin: control data; structural nodes: 2; rigid bodies: 2; forces: 1; end: control data;
+begin: nodes; structural: 1, dynamic, null, eye, null, null; structural: 2, dynamic displacement, 1.,0.,0., null; end: nodes;
+begin: elements; body: 1, 1, 1., null, eye; body: 2, 2, 1.;
+  force: 7, absolute internal displacement, 1, 2, 0.,1.,0., const, 2.;
+end: elements;
+)");
+  ASSERT_TRUE(run.ready());
+  run.step(3);
+  expect_close(run.node(1).x, Vec3(0, .0612962963, 0), 1e-9);
+  expect_close(run.node(2).x, Vec3(1, -.0612962963, 0), 1e-9);
+  EXPECT_EQ(run.node(1).w.norm(), 0);
+  const ElementRef e = run.model().find_element(Family::force, 7);
+  EXPECT_EQ(e.set->log_line(run.model(), e.index),
+            "structural internal absolute displacement force: 7 1 0 0 0 2 0 0 0");
+}
+
 /// Two free bodies under steady loads.
 std::string two_bodies(const std::string& drive, double moment) {
   const std::string load = drive + ";\n";
