@@ -40,6 +40,9 @@ class FemBinaryReader {
       read_group(group);
     }
     finish();
+    if (pos_ < bytes_.size())
+      detail::note_fem_data(
+          data_, 0, std::to_string(bytes_.size() - pos_) + " bytes after the end are ignored");
     return std::move(data_);
   }
 

@@ -168,6 +168,14 @@ TEST(FemBinary, RefusesTruncatedAndInflatedFiles) {
   EXPECT_THAT(refusal(huge), HasSubstr("more than the file can hold"));
 }
 
+TEST(FemBinary, WarnsOfBytesAfterTheEnd) {
+  const std::string bytes = write_fem_binary(testing::hand_made(true));
+  EXPECT_TRUE(parse_fem_data("body.bin", bytes).notes.empty());
+  const FemData d = parse_fem_data("body.bin", bytes + "xyz");
+  ASSERT_EQ(d.notes.size(), 1u);
+  EXPECT_EQ(d.notes[0].message, "3 bytes after the end are ignored");
+}
+
 TEST(ModalBody, InvariantsOfTheHandMadeBody) {
   const auto b = testing::make_body(testing::hand_made(true), true);
   EXPECT_EQ(b->m, 3);
