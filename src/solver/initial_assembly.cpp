@@ -278,7 +278,8 @@ class Assembly {
       std::snprintf(text, sizeof text, "%.3g", worst.first);
       s += "\n  " + owner + ", " + worst.second + ": off by " + text;
     }
-    return s;
+    return s +
+           "\n  hint: correct the positions or orientations given to one of them, or remove one";
   }
 
   VecX by_model_row(const VecX& local) const {

@@ -60,7 +60,18 @@ std::string Singularity::text() const {
   if (rank_loss > 0) s += " (rank loss " + std::to_string(rank_loss) + ")";
   if (!undetermined.empty()) s += "\n  nothing determines: " + joined(undetermined);
   if (!redundant.empty()) s += "\n  redundant or empty equations: " + joined(redundant);
-  return s;
+  return s + (undetermined.empty() ? "" : "\n  hint: " + remedy());
+}
+
+std::string Singularity::remedy() const {
+  const auto of_node = [](const WorstEquation& w) {
+    return w.owner.find(" node ") != std::string::npos;
+  };
+  if (std::all_of(undetermined.begin(), undetermined.end(), of_node))
+    return "no element holds these: give the node a body, a joint (`clamp` for the ground) or "
+           "another element, or remove it";
+  return "remove redundant constraints, or regularize one of their joints: `joint regularization: "
+         "<label>, tikhonov, 1e-8;`";
 }
 
 Singularity find_singularity(const Model& model, const std::vector<double>& values, int column) {

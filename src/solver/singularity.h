@@ -15,6 +15,7 @@ struct Singularity {
   std::vector<WorstEquation>
       redundant;  ///< equations with the largest share in the left null space
   std::string text() const;
+  std::string remedy() const;  ///< what the author of the deck can do
 };
 
 /// Rank to rounding; `column` is the column without a pivot that the sparse factorization met (-1:

@@ -442,10 +442,7 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
   }
   if (const Singularity cause = find_near_singularity(model_, workspace_.values);
       cause.rank_loss > 0)
-    e.message += "\n  " + cause.text() +
-                 "\n  hint: remove redundant constraints, or regularize one of their joints: "
-                 "`joint regularization: <label>, "
-                 "tikhonov, 1e-8;`";
+    e.message += "\n  " + cause.text();
   return e;
 }
 

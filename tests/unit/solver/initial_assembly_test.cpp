@@ -65,7 +65,8 @@ TEST(InitialAssembly, NamesConstraintsThatFight) {
                        "joint: 1, clamp, 1, node, node;\njoint: 2, clamp, 2, node, node;\n"
                        "joint: 7, distance, 1, 2, const, 1.5;\njoint: 8, clamp, 3, node, node;\n",
                    3, 4));
-  EXPECT_THAT(message, HasSubstr("contradict each other"));
+  EXPECT_THAT(message, AllOf(HasSubstr("contradict each other"),
+                             HasSubstr("hint: correct the positions or orientations")));
   EXPECT_THAT(message, HasSubstr("joint 7 (distance)"));
   EXPECT_THAT(message, HasSubstr("joint 1 (clamp)"));
   EXPECT_THAT(message, HasSubstr("joint 2 (clamp)"));
