@@ -68,6 +68,9 @@ void read_body(Card& card, ElementInfo& info) {
     add_body(card, info, PointMass{node, m});
     return;
   }
+  if (card.keyword("variable mass"))
+    card.fail("body: `variable mass` is not supported",
+              "approximate it with a force and a body of constant mass");
   int parts = 1;
   if (card.keyword("condense")) {
     parts = card.integer("number of condensed masses");

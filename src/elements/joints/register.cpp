@@ -3,6 +3,7 @@
 #include "elements/joints/distance.h"
 #include "elements/joints/friction_joints.h"
 #include "elements/joints/guide.h"
+#include "elements/joints/imposed.h"
 #include "elements/joints/invariant.h"
 #include "elements/joints/revolute.h"
 #include "elements/joints/rod.h"
@@ -36,6 +37,9 @@ void register_joints(Registry& registry) {
   joint({"rod with offset"}, read_rod_with_offset);
   joint({"total joint"}, read_total_joint);
   joint({"total pin joint"}, read_total_pin_joint);
+  joint({"imposed displacement"}, read_imposed_displacement);
+  joint({"imposed displacement pin"}, read_imposed_displacement_pin);
+  joint({"imposed orientation"}, read_imposed_orientation);
   joint({"total equation"}, read_total_equation);
   joint({"total internal reaction"}, read_total_reaction);
   joint({"brake"}, read_brake);

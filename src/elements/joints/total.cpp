@@ -1,5 +1,7 @@
 #include "elements/joints/total.h"
 
+#include "elements/joints/imposed.h"
+
 namespace mbcosim {
 
 // ------------------------------------------------------------------ TotalConstraint
@@ -278,6 +280,65 @@ void read_total_pin_joint(Card& card, ElementInfo& info) {
   if (card.keyword("rotation orientation"))
     e.Rcr = card.absolute_orientation("rotation orientation", e.node, &rotation);
   e.constraint = read_total_constraint(card);
+  add_element(card.builder(), info, e);
+}
+
+// ------------------------------------------------------------------ old names
+
+namespace {
+
+/// Constrains the three components of one kind.
+void impose_all(TotalConstraint& c, TotalConstraint::Kind (&kinds)[3], Vec3DrivePtr& drive,
+                Vec3DrivePtr imposed) {
+  c.displacement = c.angle = make_constant_vec3_drive(Vec3::Zero());
+  for (auto& kind : kinds) kind = TotalConstraint::Kind::position;
+  drive = std::move(imposed);
+}
+
+}  // namespace
+
+void read_imposed_displacement(Card& card, ElementInfo& info) {
+  TotalJoint e;
+  const auto offset = [&](int node, const OtherNode* other) {
+    (void)card.keyword("position");
+    return card.relative_position("offset", node, other);
+  };
+  e.first = read_attachment(card).node;
+  e.f1 = offset(e.first, nullptr);
+  e.second = read_attachment(card).node;
+  const OtherNode other{e.first, e.f1, e.R1h};
+  e.f2 = offset(e.second, &other);
+  TotalConstraint& c = e.constraint;
+  impose_all(c, c.translation, c.displacement, card.vec3_drive("imposed displacement"));
+  add_element(card.builder(), info, e);
+}
+
+void read_imposed_displacement_pin(Card& card, ElementInfo& info) {
+  TotalPinJoint e;
+  e.node = read_attachment(card).node;
+  (void)card.keyword("position");
+  e.f = card.relative_position("offset", e.node);
+  const OtherNode position{e.node, e.f, e.Rh};
+  (void)card.keyword("position");
+  e.Xc = card.absolute_position("pin position", e.node, &position);
+  TotalConstraint& c = e.constraint;
+  impose_all(c, c.translation, c.displacement, card.vec3_drive("imposed displacement"));
+  add_element(card.builder(), info, e);
+}
+
+void read_imposed_orientation(Card& card, ElementInfo& info) {
+  TotalJoint e;
+  const auto orientation = [&](int node, const OtherNode* other) {
+    card.one_of({"hinge", "orientation"});
+    return card.relative_orientation("orientation", node, other);
+  };
+  e.first = read_attachment(card).node;
+  e.R1r = orientation(e.first, nullptr);
+  e.second = read_attachment(card).node;
+  const OtherNode other{e.first, e.f1, e.R1r};
+  e.R2r = orientation(e.second, &other);
+  TotalConstraint& c = e.constraint;
+  impose_all(c, c.rotation, c.angle, card.vec3_drive("imposed rotation"));
   add_element(card.builder(), info, e);
 }
 

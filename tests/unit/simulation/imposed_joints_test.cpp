@@ -1,0 +1,56 @@
+/// Old names of total joints do what the total joints do.
+#include "deck_run.h"
+
+namespace mbcosim {
+namespace {
+
+std::string deck(const std::string& joint) {
+  return initial_value_block(1e-3, 1,
+                             "max iterations: 20; tolerance: 1e-8; derivatives tolerance: 1e-3; "
+                             "derivatives max iterations: 10; derivatives coefficient: 1e-3;") +
+         R"(begin: control data; structural nodes: 2; rigid bodies: 1; joints: 2; gravity; end: control data;
+begin: nodes;
+  structural: 1, static, null, eye, null, null;
+  structural: 2, dynamic, .3,.1,-.2, euler, .2,.1,-.3, null, null;
+end: nodes;
+begin: elements;
+  joint: 1, clamp, 1, node, node;
+  body: 2, 2, 2., .05,.02,-.03, diag, .1,.2,.15;
+  gravity: uniform, 0.,0.,-1., const, 9.81;
+  joint: 2, )" +
+         joint + ";\nend: elements;\n";
+}
+
+struct OldName {
+  const char *old, *total;
+};
+
+class ImposedJoints : public testing::TestWithParam<OldName> {};
+
+TEST_P(ImposedJoints, MoveAsTheTotalJoint) {
+  const std::string drive = "single, 1.,0.,2., sine, 0., 10., .01, forever, 0.";
+  DeckRun a(deck(GetParam().old + drive)), b(deck(GetParam().total + drive));
+  ASSERT_TRUE(a.ready() && b.ready());
+  a.step(100);
+  b.step(100);
+  EXPECT_EQ(a.node(2).x, b.node(2).x);
+  EXPECT_EQ(a.node(2).R, b.node(2).R);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(a.own(Family::joint, 2, k), b.own(Family::joint, 2, k));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Names, ImposedJoints,
+    testing::Values(OldName{"imposed displacement, 1, .3,.1,-.2, 2, null, ",
+                            "total joint, 1, position, .3,.1,-.2, 2, position, null, position "
+                            "constraint, active, active, active, "},
+                    OldName{"imposed displacement pin, 2, null, .3,.1,-.2, ",
+                            "total pin joint, 2, position, null, position, .3,.1,-.2, position "
+                            "constraint, active, active, active, "},
+                    OldName{"imposed orientation, 1, eye, 2, reference, global, eye, ",
+                            "total joint, 1, rotation orientation, eye, 2, rotation orientation, "
+                            "reference, global, eye, orientation constraint, active, active, "
+                            "active, "}),
+    [](const auto& info) { return std::to_string(info.index); });
+
+}  // namespace
+}  // namespace mbcosim
