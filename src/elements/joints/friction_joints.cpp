@@ -9,8 +9,9 @@ void InLineFriction::assembly_residual(const Local<TimeDual>& u, Residual<TimeDu
 
 void InLineFriction::output(const Local<double>& u, OutputRow& row) const {
   output_columns(u, row);
-  row.scalar("FFR", "N", friction_force(u));
-  row.scalar("MU", "", coefficient(u));
+  const Contact<double> k = contact(u);
+  row.scalar("FFR", "N", friction.force(u, 2, k));
+  row.scalar("MU", "", friction.coefficient_now(u, 2, k));
   row.end();
 }
 
@@ -21,7 +22,7 @@ void Brake::output(const Local<double>& u, OutputRow& row) const {
   row.reactions(Vec3::Zero(), Vec3(0, 0, M), Vec3::Zero(), H2.col(2) * M);
   row.orientation("E", relative_rotation(u), OrientationDescription::euler123);
   row.vec3("Omega", "rad/s", H2.transpose() * (u.w(1) - u.w(0)));
-  row.scalar("MU", "", coefficient(u));
+  row.scalar("MU", "", friction.coefficient_now(u, 0, contact(u)));
   row.scalar("N", "N", u.drive(force));
   row.end();
 }

@@ -9,9 +9,9 @@ namespace mbcosim {
 
 /// In line with friction along the line.
 ///
-///   additional unknown  z [m] (differential) with row ż(z, v) − ż, v = −e₃(V)·(v₂ + w₂ × q − v₁ −
-///   w₁ × s) additional loads    node 2 (f N e₃, q × f N e₃), node 1 (−f N e₃, −s × f N e₃), N =
-///   max(|(F₁, F₂)|, preload)
+///   additional unknown and row  those of Friction, v = −e₃(V)·(v₂ + w₂ × q − v₁ − w₁ × s),
+///                               N = max(|(F₁, F₂)|, preload)
+///   additional loads            node 2 (Q e₃, q × Q e₃), node 1 (−Q e₃, −s × Q e₃)
 struct InLineFriction : InLine {
   Friction friction;
 
@@ -21,75 +21,74 @@ struct InLineFriction : InLine {
                Tangent&) const = delete;  ///< that of InLine lacks the friction
   void connect(Connector& c) const {
     InLine::connect(c);
-    c.differential(Friction::unknowns);
+    friction.connect(c);
   }
   template <class T>
-  T sliding(const Local<T>& u) const {
+  Contact<T> contact(const Local<T>& u) const {
     const Vec<T> q = arm_b(u), s = u.x(1) + q - u.x(0), e3 = hinge_a(u).col(2);
-    return -e3.dot(u.v(1) + u.w(1).cross(q) - u.v(0) - u.w(0).cross(s));
-  }
-  template <class T>
-  T coefficient(const Local<T>& u) const {
-    return friction.coefficient(friction.force(u.own(2), u.own_rate(2), sliding(u)));
-  }
-  template <class T>
-  T friction_force(const Local<T>& u) const {
-    return coefficient(u) * friction.normal_force<T>(u.own(0) * u.own(0) + u.own(1) * u.own(1));
+    return {-e3.dot(u.v(1) + u.w(1).cross(q) - u.v(0) - u.w(0).cross(s)),
+            friction.normal_force<T>(u.own(0) * u.own(0) + u.own(1) * u.own(1))};
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     InLine::residual(u, r);
+    const Contact<T> k = contact(u);
     const Vec<T> q = arm_b(u), s = u.x(1) + q - u.x(0);
-    const Vec<T> F = hinge_a(u).col(2) * friction_force(u);
+    const Vec<T> F = hinge_a(u).col(2) * friction.force(u, 2, k);
     r.load(0, -F, -s.cross(F));
     r.load(1, F, q.cross(F));
-    r.own(2, friction.rate(u.own(2), sliding(u)) - u.own_rate(2));
+    r.own(2, friction.row(u, 2, 0, k));
+  }
+  void start(Start& s) const { friction.start(s, 0, contact(s.u).v); }
+  void after_convergence(const Local<double>& u, State& state) const {
+    friction.after_convergence(u, state, 2, 0, contact(u));
   }
   /// Friction takes no part in the assembly.
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;
   void output(const Local<double>& u, OutputRow& row) const;
-  std::string row_name(int k) const { return k < 2 ? InLine::row_name(k) : "friction state"; }
+  std::string row_name(int k) const { return k < 2 ? InLine::row_name(k) : friction.row_name(); }
 };
 
 /// Revolute hinge or axial rotation `Hinge` with friction about the axis at the average radius r.
 ///
-///   additional unknown  z [m] (differential) with row ż(z, v) − ż, v = −r e₃·(w₂ − w₁)
-///   additional loads    node 1 (0, −e₃ M), node 2 (0, e₃ M), M = r f N, N = max(|F|, preload)
+///   additional unknown and row  those of Friction, v = −r e₃·(w₂ − w₁), N = max(|F|, preload)
+///   additional loads            node 1 (0, −e₃ M), node 2 (0, e₃ M), M = r Q
 template <class Hinge>
 struct HingeFriction : Hinge {
   Friction friction;
   double radius = 0;  ///< r [m]
 
   static constexpr int width = Hinge::width + 1;
-  static constexpr int state = Hinge::width - 12;  ///< own index of z
+  static constexpr int state = Hinge::width - 12;        ///< own index of the friction
+  static constexpr int memory = UnwrappedAngle::memory;  ///< first slot of the friction
 
   void tangent(const Local<double>&,
                Tangent&) const = delete;  ///< that of Hinge lacks the friction
   void connect(Connector& c) const {
     Hinge::connect(c);
-    c.differential(Friction::unknowns);
+    friction.connect(c);
   }
   template <class T>
-  T sliding(const Local<T>& u) const {
-    const Vec<T> e3 = this->hinge_a(u).col(2);
-    return e3.dot(u.w(1) - u.w(0)) * (-radius);
-  }
-  template <class T>
-  T coefficient(const Local<T>& u) const {
-    return friction.coefficient(friction.force(u.own(state), u.own_rate(state), sliding(u)));
-  }
-  template <class T>
-  T friction_moment(const Local<T>& u) const {
-    const Vec<T> F = u.own3(0);
-    return coefficient(u) * friction.normal_force<T>(F.dot(F)) * radius;
+  Contact<T> contact(const Local<T>& u) const {
+    const Vec<T> e3 = this->hinge_a(u).col(2), F = u.own3(0);
+    return {e3.dot(u.w(1) - u.w(0)) * (-radius), friction.normal_force<T>(F.dot(F))};
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     Hinge::residual(u, r);
-    const Vec<T> M = this->hinge_a(u).col(2) * friction_moment(u);
+    const Contact<T> k = contact(u);
+    const Vec<T> M = this->hinge_a(u).col(2) * (friction.force(u, state, k) * radius);
     r.moment(0, -M);
     r.moment(1, M);
-    r.own(state, friction.rate(u.own(state), sliding(u)) - u.own_rate(state));
+    r.own(state, friction.row(u, state, memory, k));
+  }
+  void start(Start& s) const {
+    Hinge::start(s);
+    friction.start(s, memory, contact(s.u).v);
+  }
+  void after_convergence(const Local<double>& u, State& s) const {
+    Hinge::after_convergence(u, s);
+    friction.after_convergence(u, s, state, memory, contact(u));
   }
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const {
     if constexpr (requires { Hinge::assembly_residual(u, r); })
@@ -100,18 +99,19 @@ struct HingeFriction : Hinge {
   }
   void output(const Local<double>& u, OutputRow& row) const {
     Hinge::output_columns(u, row);
-    row.scalar("MFR", "N m", friction_moment(u));
-    row.scalar("MU", "", coefficient(u));
+    const Contact<double> k = contact(u);
+    row.scalar("MFR", "N m", radius * friction.force(u, state, k));
+    row.scalar("MU", "", friction.coefficient_now(u, state, k));
     row.end();
   }
-  std::string row_name(int k) const { return k < state ? Hinge::row_name(k) : "friction state"; }
+  std::string row_name(int k) const { return k < state ? Hinge::row_name(k) : friction.row_name(); }
 };
 
 /// Brake: friction between two revolving nodes, pressed with the force N(t) at the average radius
 /// r.
 ///
-///   unknown     z [m] (differential);  row ż(z, v) − ż, v = −r e₃(H₁)·(w₂ − w₁)
-///   loads       node 1 (0, −e₃ M), node 2 (0, e₃ M), M = r f max(N, preload)
+///   unknown and row   those of Friction, v = −r e₃(H₁)·(w₂ − w₁), max(N, preload)
+///   loads             node 1 (0, −e₃ M), node 2 (0, e₃ M), M = r Q
 struct Brake : TwoAttachments, NamedData<Brake> {
   Friction friction;
   double radius = 1;
@@ -122,40 +122,38 @@ struct Brake : TwoAttachments, NamedData<Brake> {
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
-    c.differential(Friction::unknowns);
     c.memory(UnwrappedAngle::memory);
+    friction.connect(c);
   }
   template <class T>
-  T sliding(const Local<T>& u) const {
+  Contact<T> contact(const Local<T>& u) const {
     const Vec<T> e3 = hinge_a(u).col(2);
-    return e3.dot(u.w(1) - u.w(0)) * (-radius);
+    return {e3.dot(u.w(1) - u.w(0)) * (-radius),
+            T(std::max(force->value(*u.context), friction.preload))};
   }
-  template <class T>
-  T coefficient(const Local<T>& u) const {
-    return friction.coefficient(friction.force(u.own(0), u.own_rate(0), sliding(u)));
-  }
-  template <class T>
-  T moment(const Local<T>& u) const {
-    const double N = force->value(*u.context);
-    return coefficient(u) * (radius * std::max(N, friction.preload));
-  }
+  double moment(const Local<double>& u) const { return radius * friction.force(u, 0, contact(u)); }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
-    const Vec<T> M = hinge_a(u).col(2) * moment(u);
+    const Contact<T> k = contact(u);
+    const Vec<T> M = hinge_a(u).col(2) * (friction.force(u, 0, k) * radius);
     r.moment(0, -M);
     r.moment(1, M);
-    r.own(0, friction.rate(u.own(0), sliding(u)) - u.own_rate(0));
+    r.own(0, friction.row(u, 0, UnwrappedAngle::memory, k));
   }
   double angle(const Local<double>& u) const { return vector_of_rotation(relative_rotation(u))(2); }
-  void start(Start& s) const { s.memory(0) = angle(s.u); }
+  void start(Start& s) const {
+    s.memory(0) = angle(s.u);
+    friction.start(s, UnwrappedAngle::memory, contact(s.u).v);
+  }
   void after_convergence(const Local<double>& u, State& state) const {
     UnwrappedAngle::accept(u, state, 0, angle(u));
+    friction.after_convergence(u, state, 0, UnwrappedAngle::memory, contact(u));
   }
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const {
     return LogLine("brake", label).add(model, a).add(model, b).str();
   }
-  std::string row_name(int) const { return "friction state"; }
+  std::string row_name(int) const { return friction.row_name(); }
   double private_value(const Local<double>& u, int datum) const;
 };
 

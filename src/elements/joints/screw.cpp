@@ -11,9 +11,10 @@ void Screw::after_convergence(const Local<double>& u, State& state) const {
   UnwrappedAngle::accept(u, state, 0, motion(u).angle);
 }
 
-void Screw::output(const Local<double>& u, OutputRow& row) const {
+void Screw::output_columns(const Local<double>& u, OutputRow& row, double friction_moment) const {
   const Motion<double> m = motion(u);
-  const Vec3 force = m.e * u.own(0), moment = (m.e.cross(m.phi) - m.g) * (lead * u.own(0));
+  const Vec3 force = m.e * u.own(0),
+             moment = (m.e.cross(m.phi) - m.g) * (lead * u.own(0)) + m.e * friction_moment;
   const Mat3 H1 = hinge_a(u);
   row.begin(OutputFile::jnt, u.label());
   row.reactions(force, moment, H1 * force, H1 * moment);
@@ -21,6 +22,16 @@ void Screw::output(const Local<double>& u, OutputRow& row) const {
   row.scalar("advance", "m", m.e.dot(m.d));
   row.vec3("phi", "rad", m.phi);
   row.vec3("d", "m", m.d);
+}
+
+void ScrewFriction::output(const Local<double>& u, OutputRow& row) const {
+  const Contact<double> k = contact(u);
+  const double moment = radius * friction.force(u, 1, k);
+  output_columns(u, row, moment);
+  // Signs as in MBDyn: v with the rotation, the coefficient with the power on the axial load.
+  row.scalar("v", "m/s", -k.v);
+  row.scalar("MU", "", -k.axial_sign * friction.coefficient_now(u, 1, k));
+  row.vec3("MFR", "N m", hinge_a(u).col(2) * moment);
   row.end();
 }
 
@@ -35,8 +46,14 @@ void read_screw(Card& card, ElementInfo& info) {
   if (!card.keyword("pitch"))
     card.fail_at(card.next(), "screw: `pitch` is missing", "give `pitch, <advance per turn>`");
   e.lead = card.real("pitch") / (2 * kPi);
-  if (card.keyword("friction")) card.fail("screw: friction is not supported");
-  add_element(card.builder(), info, e);
+  if (!card.keyword("friction")) {
+    add_element(card.builder(), info, e);
+    return;
+  }
+  ScrewFriction f;
+  static_cast<Screw&>(f) = e;
+  f.friction = read_thread_friction(card, e.lead, f.radius);
+  add_element(card.builder(), info, f);
 }
 
 }  // namespace mbcosim

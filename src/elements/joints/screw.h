@@ -1,6 +1,6 @@
 #pragma once
 
-#include "elements/joints/joint_common.h"
+#include "elements/joints/friction.h"
 
 namespace mbcosim {
 
@@ -74,11 +74,67 @@ struct Screw : TwoAttachments {  // a: p and Rh, b: q
   }
   void start(Start& s) const;
   void after_convergence(const Local<double>& u, State& state) const;
-  void output(const Local<double>& u, OutputRow& row) const;
+  void output_columns(const Local<double>& u, OutputRow& row, double friction_moment) const;
+  void output(const Local<double>& u, OutputRow& row) const {
+    output_columns(u, row, 0);
+    row.end();
+  }
   std::string log(const Model& model, int label) const {
     return LogLine("screw", label).add(model, a).add(model, b).str();
   }
   std::string row_name(int) const { return "screw constraint"; }
+};
+
+/// Screw with friction on its thread of mean radius r; tan a = h/r.
+///
+///   additional unknown and row  those of Friction, v = −r/cos a e·(w₂ − w₁), N = max(|F|, preload)
+///   additional loads            node 1 (0, −e M), node 2 (0, e M), M = r Q
+///
+/// As in MBDyn the half thread angle g stands where the angle normal to the thread would, whose
+/// tangent is cos a tan g.
+struct ScrewFriction : Screw {
+  Friction friction;
+  double radius = 0;  ///< r [m]
+
+  static constexpr int width = 14;
+  static constexpr int memory = UnwrappedAngle::memory;  ///< first slot of the friction
+
+  void connect(Connector& c) const {
+    Screw::connect(c);
+    friction.connect(c);
+  }
+  template <class T>
+  Contact<T> contact(const Local<T>& u) const {
+    const Vec<T> e = hinge_a(u).col(2);
+    const double slope = lead / radius, reach = radius * std::sqrt(1 + slope * slope);
+    const T F = u.own(0);
+    return {e.dot(u.w(1) - u.w(0)) * (-reach), friction.normal_force<T>(F * F),
+            value_of(F) < 0 ? -1.0 : 1.0};
+  }
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    Screw::residual(u, r);
+    const Contact<T> k = contact(u);
+    const Vec<T> M = hinge_a(u).col(2) * (friction.force(u, 1, k) * radius);
+    r.moment(0, -M);
+    r.moment(1, M);
+    r.own(1, friction.row(u, 1, memory, k));
+  }
+  void start(Start& s) const {
+    Screw::start(s);
+    friction.start(s, memory, contact(s.u).v);
+  }
+  void after_convergence(const Local<double>& u, State& s) const {
+    Screw::after_convergence(u, s);
+    friction.after_convergence(u, s, 1, memory, contact(u));
+  }
+  /// Friction takes no part in the assembly.
+  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const {
+    Screw::residual(u, r);
+    r.own(1, TimeDual::variable(-u.own(1).v, 0, -u.own(1).d[0]));
+  }
+  void output(const Local<double>& u, OutputRow& row) const;
+  std::string row_name(int k) const { return k == 0 ? Screw::row_name(k) : friction.row_name(); }
 };
 
 void read_screw(Card& card, ElementInfo& info);

@@ -52,6 +52,39 @@ struct Rubbing {
   }
 };
 
+/// Dry friction that slides: the contacts of the bench move.
+template <class E>
+struct Sliding : Rubbing<E> {
+  static E make(Bench& bench) {
+    E e = Rubbing<E>::make(bench);
+    e.friction.law = Friction::Law::discrete_coulomb;
+    return e;
+  }
+};
+
+/// Dry friction that sticks under a preload beyond all loads.
+template <class E>
+struct Sticking : Sliding<E> {
+  static E make(Bench& bench) {
+    E e = Sliding<E>::make(bench);
+    e.friction.preload = 1e18;
+    return e;
+  }
+};
+
+template <template <class> class Base>
+struct OnThread : Base<ScrewFriction> {
+  static constexpr bool balanced = false;  // as the screw without friction
+  static ScrewFriction make(Bench& bench) {
+    ScrewFriction e = Base<ScrewFriction>::make(bench);
+    e.lead = .15;
+    e.friction.shape = Friction::Shape::thread;
+    e.friction.thread_gain = 1.2;
+    e.friction.thread_slope = .3;
+    return e;
+  }
+};
+
 struct ScrewCase {
   using Element = Screw;
   static constexpr bool ideal = true, balanced = false;  // a thread that mixes frames, as MBDyn's
@@ -86,9 +119,12 @@ struct TotalEquationCase {
   }
 };
 
-using Frictional = testing::Types<Rubbing<InLineFriction>, Rubbing<HingeFriction<RevoluteHinge>>,
-                                  Rubbing<HingeFriction<AxialRotation>>, Rubbing<Brake>, ScrewCase,
-                                  TotalEquationCase>;
+using Hinge = HingeFriction<RevoluteHinge>;
+using Frictional =
+    testing::Types<Rubbing<InLineFriction>, Rubbing<Hinge>, Rubbing<HingeFriction<AxialRotation>>,
+                   Rubbing<Brake>, OnThread<Rubbing>, Sliding<InLineFriction>, Sliding<Hinge>,
+                   Sliding<Brake>, OnThread<Sliding>, Sticking<InLineFriction>, Sticking<Hinge>,
+                   ScrewCase, TotalEquationCase>;
 INSTANTIATE_TYPED_TEST_SUITE_P(Frictional, ElementConformance, Frictional);
 
 }  // namespace

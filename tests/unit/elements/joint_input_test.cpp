@@ -95,8 +95,44 @@ INSTANTIATE_TEST_SUITE_P(
                   "joint: 1, revolute hinge, 1, 1.,0.,0., 2, null, friction, 1., modlugre, 1., 1., "
                   "0., 1.5, \"mu\", simple",
                   "kappa must be smaller than 1"},
+        InputCase{"FrictionModel",
+                  "joint: 1, revolute hinge, 1, 1.,0.,0., 2, null, friction, 1., stribeck",
+                  "friction model expected (modlugre, discrete coulomb)"},
+        InputCase{"FrictionVelocityRatio",
+                  "joint: 1, revolute hinge, 1, 1.,0.,0., 2, null, friction, 1., discrete coulomb, "
+                  "\"mu\", velocity ratio, 0., simple",
+                  "velocity ratio must lie in (0, 1]"},
+        InputCase{"FrictionPreload",
+                  "joint: 1, in line, 1, null, eye, 2, friction, preload, -1., discrete coulomb, "
+                  "\"mu\", simple",
+                  "preload of friction must not be negative"},
+        InputCase{"ThreadElsewhere",
+                  "joint: 1, in line, 1, null, eye, 2, friction, discrete coulomb, \"mu\", screw "
+                  "joint, radius, .1",
+                  "`screw joint` belongs to the joint `screw`"},
+        InputCase{"NoThread",
+                  "joint: 1, screw, 1, null, eye, 2, pitch, .01, friction, discrete coulomb, "
+                  "\"mu\", simple",
+                  "needs the shape function `screw joint`"},
+        InputCase{"ThreadRadius",
+                  "joint: 1, screw, 1, null, eye, 2, pitch, .01, friction, discrete coulomb, "
+                  "\"mu\", screw joint, radius, 0., half thread angle, .5",
+                  "mean radius of the thread must be positive"},
+        InputCase{"ThreadAngle",
+                  "joint: 1, screw, 1, null, eye, 2, pitch, .01, friction, discrete coulomb, "
+                  "\"mu\", screw joint, radius, .1, half thread angle, 30.",
+                  "half thread angle must lie between -pi/2 and pi/2"},
+        InputCase{"ThreadJams",
+                  "joint: 1, screw, 1, null, eye, 2, pitch, 10., friction, discrete coulomb, "
+                  "\"mu\", screw joint, radius, .1, half thread angle, .5",
+                  "the thread jams"},
         InputCase{"RegularizationOfNothing", "joint regularization: 4, tikhonov, 1e-8",
                   "joint 4 is not defined"},
+        InputCase{"ImposedSelf",
+                  "joint: 1, imposed displacement, 1, null, 1, null, 1.,0.,0., const, 1.",
+                  "both nodes are structural node 1"},
+        InputCase{"VariableMass", "body: 1, 1, variable mass, const, 1.",
+                  "`variable mass` is not supported"},
         InputCase{"NegativeMass", "body: 1, 1, -1., null, eye", "mass must not be negative"},
         InputCase{"NoMass", "body: 1, 1, 0., null, eye", "the mass is zero"},
         InputCase{"StaticBody", "body: 1, 3, 1., null, eye", "structural node 3 is static"},
