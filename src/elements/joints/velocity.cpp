@@ -69,8 +69,9 @@ void AngularAcceleration::start(Start& s) const { s.own(0) = (s.u.R(0) * directi
 
 void AngularAcceleration::output(const Local<double>& u, OutputRow& row) const {
   row.begin(OutputFile::jnt, u.label());
-  // The reference solver writes the couple into the columns of the forces.
-  row.reactions(Vec3(u.own(1), 0, 0), Vec3::Zero(), u.R(0) * direction * u.own(1), Vec3::Zero());
+  // The reference solver writes the couple into the columns of the forces, along the direction as
+  // it was read, not as the node has turned it.
+  row.reactions(Vec3(u.own(1), 0, 0), Vec3::Zero(), direction * u.own(1), Vec3::Zero());
   row.scalar("wP", "rad/s^2", u.drive(acceleration));
   row.end();
 }

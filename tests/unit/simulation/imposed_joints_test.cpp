@@ -1,5 +1,6 @@
 /// Old names of total joints do what the total joints do.
 #include "deck_run.h"
+#include "elements/columns.h"
 
 namespace mbcosim {
 namespace {
@@ -25,7 +26,7 @@ struct OldName {
   const char *old, *total;
 };
 
-class ImposedJoints : public testing::TestWithParam<OldName> {};
+class ImposedJoints : public ::testing::TestWithParam<OldName> {};
 
 TEST_P(ImposedJoints, MoveAsTheTotalJoint) {
   const std::string drive = "single, 1.,0.,2., sine, 0., 10., .01, forever, 0.";
@@ -38,18 +39,34 @@ TEST_P(ImposedJoints, MoveAsTheTotalJoint) {
   for (int k = 0; k < 3; ++k) EXPECT_EQ(a.own(Family::joint, 2, k), b.own(Family::joint, 2, k));
 }
 
+/// Motion and columns of the reference solver at t = 0.2 s.
+TEST(AngularAcceleration, WritesTheCoupleAlongTheDirectionAsRead) {
+  std::string text = deck("angular acceleration, 2, 1.,2.,0., sine, 0., 10., .1, forever, 0.");
+  text.replace(text.find("tolerance: 1e-8;"), 16, "tolerance: 1e-9; method: ms, .6;");
+  DeckRun run(text);
+  ASSERT_TRUE(run.ready());
+  run.step(199);
+  testing::Columns row;
+  const ElementRef e = run.model().find_element(Family::joint, 2);
+  e.set->output(run.context(), e.index, row);
+  const std::vector<double> reference = {-1.522358e-02, 0, 0, 0, 0, 0,           -6.808191e-03,
+                                         -1.361638e-02, 0, 0, 0, 0, 9.134134e-02};
+  ASSERT_EQ(row.v.size(), reference.size());
+  for (std::size_t i = 0; i < reference.size(); ++i) EXPECT_NEAR(row.v[i], reference[i], 1e-8) << i;
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Names, ImposedJoints,
-    testing::Values(OldName{"imposed displacement, 1, .3,.1,-.2, 2, null, ",
-                            "total joint, 1, position, .3,.1,-.2, 2, position, null, position "
-                            "constraint, active, active, active, "},
-                    OldName{"imposed displacement pin, 2, null, .3,.1,-.2, ",
-                            "total pin joint, 2, position, null, position, .3,.1,-.2, position "
-                            "constraint, active, active, active, "},
-                    OldName{"imposed orientation, 1, eye, 2, reference, global, eye, ",
-                            "total joint, 1, rotation orientation, eye, 2, rotation orientation, "
-                            "reference, global, eye, orientation constraint, active, active, "
-                            "active, "}),
+    ::testing::Values(OldName{"imposed displacement, 1, .3,.1,-.2, 2, null, ",
+                              "total joint, 1, position, .3,.1,-.2, 2, position, null, position "
+                              "constraint, active, active, active, "},
+                      OldName{"imposed displacement pin, 2, null, .3,.1,-.2, ",
+                              "total pin joint, 2, position, null, position, .3,.1,-.2, position "
+                              "constraint, active, active, active, "},
+                      OldName{"imposed orientation, 1, eye, 2, reference, global, eye, ",
+                              "total joint, 1, rotation orientation, eye, 2, rotation orientation, "
+                              "reference, global, eye, orientation constraint, active, active, "
+                              "active, "}),
     [](const auto& info) { return std::to_string(info.index); });
 
 }  // namespace
