@@ -47,6 +47,7 @@ struct DeformableHinge : HingeMotion, LawUser<DeformableHinge, 3> {
     r.moment(0, M);
     r.moment(1, -M);
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const {
     return LogLine("deformablehinge", label).add(model, a).add(model, b).str();
@@ -72,6 +73,7 @@ struct DeformableDisplacement : HingeMotion, LawUser<DeformableDisplacement, 3> 
     r.load(0, F, s.cross(F));
     r.load(1, -F, -f2.cross(F));
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const {
     return LogLine("deformabledisplacementjoint", label).add(model, a).add(model, b).str();
@@ -105,6 +107,7 @@ struct DeformableJoint : HingeMotion, LawUser<DeformableJoint, 6> {
     r.load(0, F, s.cross(F) + M);
     r.load(1, -F, -f2.cross(F) - M);
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const {
     return LogLine("deformablejoint", label).add(model, a).add(model, b).str();
