@@ -12,7 +12,7 @@ void gather(const EvalContext& context, const Connection& c, const ElementInfo& 
   const State& state = *context.state;
   for (int k = 0; k < c.node_count; ++k) {
     const int index = c.node[k];
-    const StructuralNode& node = model.structural[index];
+    const NodePlace& node = model.places[index];
     LocalNode<double>& n = u.nodes[k];
     if (input || node.is_dummy()) {
       const NodeState s = model.node_state(context, index);
@@ -23,7 +23,7 @@ void gather(const EvalContext& context, const Connection& c, const ElementInfo& 
     const double* yp = &state.yp[node.first];
     n.x = Vec3(y[0], y[1], y[2]);
     n.v = Vec3(yp[0], yp[1], yp[2]);
-    if (node.is_displacement()) {
+    if (!node.has_rotation()) {
       n.w.setZero();
       n.R.setIdentity();
       n.g.setZero();

@@ -30,6 +30,8 @@
 ///     void add_inertia(const Local<double>&, int node, Inertia&) const
 ///     static constexpr bool momentum_rows = true               has r.momentum(k, …): rows 1–6
 ///     static constexpr bool rotation_parameters = true         u.g(k), u.gp(k) are gathered
+///     static constexpr bool constant_structure = true          entries of its matrix that vanish
+///         at one state vanish at all: no branch depends on the state or on a drive
 ///     void assembly_residual(const Local<T>&, Residual<T>&) const   replaces it in the assembly
 ///     AssemblyRole assembly_role() const                       when it depends on the element
 #pragma once
@@ -324,6 +326,13 @@ constexpr bool uses_parameters() {
   else
     return false;
 }
+template <class E>
+constexpr bool has_constant_structure() {
+  if constexpr (requires { E::constant_structure; })
+    return E::constant_structure;
+  else
+    return false;
+}
 /// Dual numbers come in a few widths, so that element types share instantiations.
 constexpr int dual_width(int columns) {
   return columns <= 6 ? 6 : columns <= 12 ? 12 : columns <= 18 ? 18 : 24;
@@ -348,11 +357,11 @@ class ElementSetOf final : public ElementSet {
     Connection connection;
     int first_row = 0, row_count = 0;        ///< in rows_
     int first_column = 0, column_count = 0;  ///< in columns_
-    int first_position = 0;                  ///< in positions_ (column_count × row_count)
+    int first_entry = 0, entry_count = 0;    ///< in entries_
   };
 
   void add(ModelBuilder& builder, ElementInfo info, E element) {
-    Slot s{std::move(element), std::move(info), {}, 0, 0, 0, 0, 0};
+    Slot s{std::move(element), std::move(info), {}, 0, 0, 0, 0, 0, 0};
     Connector connector(s.connection, builder);
     s.element.connect(connector);
     slots_.push_back(std::move(s));
@@ -390,20 +399,29 @@ class ElementSetOf final : public ElementSet {
     rows_.insert(rows_.end(), rows.begin(), rows.end());
     columns_.insert(columns_.end(), columns.begin(), columns.end());
   }
+  void find_structure(const std::vector<StructureProbe>& probes) override {
+    entries_.clear();
+    for (Slot& s : slots_) {
+      s.first_entry = static_cast<int>(entries_.size());
+      std::vector<bool> vanishes;
+      if constexpr (detail::has_constant_structure<E>())
+        if (!probes.empty()) vanishes = vanishing(s, probes);
+      for (int j = 0; j < s.column_count; ++j)
+        for (int i = 0; i < s.row_count; ++i) {
+          const int local = j * s.row_count + i;
+          if (rows_[s.first_row + i] < 0 || columns_[s.first_column + j] < 0) continue;
+          if (vanishes.empty() || !vanishes[local]) entries_.push_back({local, -1});
+        }
+      s.entry_count = static_cast<int>(entries_.size()) - s.first_entry;
+    }
+  }
   void collect_pattern(PatternSink& sink) const override {
-    for (const Slot& s : slots_)
-      sink.block(&rows_[s.first_row], s.row_count,
-                 s.column_count ? &columns_[s.first_column] : nullptr, s.column_count);
+    for_each_entry(entries_, [&](const Entry&, int row, int column) { sink.entry(row, column); });
   }
   void set_positions(const PositionSource& source) override {
-    positions_.clear();
-    for (Slot& s : slots_) {
-      s.first_position = static_cast<int>(positions_.size());
-      for (int j = 0; j < s.column_count; ++j)
-        for (int i = 0; i < s.row_count; ++i)
-          positions_.push_back(
-              source.position(rows_[s.first_row + i], columns_[s.first_column + j]));
-    }
+    for_each_entry(entries_, [&](Entry& e, int row, int column) {
+      e.position = source.position(row, column);
+    });
   }
 
   void start(const EvalContext& context, State& state, int i) const override {
@@ -438,24 +456,24 @@ class ElementSetOf final : public ElementSet {
     double matrix[kMatrix];
     for (const Slot& s : slots_) {
       if (s.row_count == 0 || s.column_count == 0) continue;
-      const int entries = s.row_count * s.column_count;
-      std::memset(matrix, 0, sizeof(double) * entries);
-      if (!active(context, s)) {
-        inactive_jacobian(context, s, matrix);
-      } else {
-        gather(context, s, u);
-        if constexpr (detail::HasTangent<E>)
-          closed_form(context, s, u, seeds, matrix);
-        else
-          dual_jacobian(s, u, seeds, matrix);
-      }
-      const int* position = &positions_[s.first_position];
-      for (int k = 0; k < entries; ++k)
-        if (position[k] >= 0) values[position[k]] += matrix[k];
+      local_jacobian(context, s, seeds, u, matrix);
+      const Entry* entry = &entries_[s.first_entry];
+      for (int k = 0; k < s.entry_count; ++k) values[entry[k].position] += matrix[entry[k].local];
     }
   }
 
-  /// Local matrix (row_count × column_count, column-major) by duals, for tests and for types
+  /// Local matrix (row_count × column_count, column-major); `u` is scratch.
+  void local_jacobian(const EvalContext& context, const Slot& s, const NodeSeeds* seeds,
+                      Local<double>& u, double* matrix) const {
+    std::memset(matrix, 0, sizeof(double) * s.row_count * s.column_count);
+    if (!active(context, s)) return inactive_jacobian(context, s, matrix);
+    gather(context, s, u);
+    if constexpr (detail::HasTangent<E>)
+      closed_form(context, s, u, seeds, matrix);
+    else
+      dual_jacobian(s, u, seeds, matrix);
+  }
+  /// The same by duals, for tests and for types
   /// without a closed form.
   void dual_jacobian(const Slot& s, const Local<double>& u, const NodeSeeds* seeds,
                      double* matrix) const {
@@ -610,6 +628,41 @@ class ElementSetOf final : public ElementSet {
   }
 
  private:
+  /// One entry of a local matrix that may differ from zero, and its place among the sparse values.
+  struct Entry {
+    int local, position;
+  };
+  template <class Entries, class Function>
+  void for_each_entry(Entries& entries, Function function) const {
+    for (const Slot& s : slots_)
+      for (int k = s.first_entry; k < s.first_entry + s.entry_count; ++k)
+        function(entries[k], rows_[s.first_row + entries[k].local % s.row_count],
+                 columns_[s.first_column + entries[k].local / s.row_count]);
+  }
+  /// Entries of the local matrix that vanish at all probes, other than those of an inactive
+  /// element. Empty: a drive of the element has no value there, nothing is known.
+  std::vector<bool> vanishing(const Slot& s, const std::vector<StructureProbe>& probes) const {
+    const int size = s.row_count * s.column_count;
+    std::vector<bool> vanishes(size, true);
+    Local<double> u;
+    double matrix[kMatrix];
+    const auto keep = [&] {
+      for (int k = 0; k < size; ++k)
+        if (matrix[k] != 0) vanishes[k] = false;
+    };
+    try {
+      for (const StructureProbe& probe : probes) {
+        std::memset(matrix, 0, sizeof(double) * size);
+        inactive_jacobian(probe.context, s, matrix);
+        keep();
+        local_jacobian(probe.context, s, probe.seeds.data(), u, matrix);
+        keep();
+      }
+    } catch (const EvaluationError&) {
+      vanishes.clear();
+    }
+    return vanishes;
+  }
   static constexpr int kMatrix = (kMaxLocal + 6 * kMaxNodes) * kMaxLocal;
 
   bool active(const EvalContext& context, const Slot& s) const {
@@ -769,7 +822,8 @@ class ElementSetOf final : public ElementSet {
   }
 
   std::vector<Slot> slots_;
-  std::vector<int> rows_, columns_, positions_;
+  std::vector<int> rows_, columns_;
+  std::vector<Entry> entries_;
 };
 
 /// Central differences on local values: the assembly is done once, and Newton needs no more than

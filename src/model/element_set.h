@@ -72,6 +72,13 @@ struct NodeSeeds {
   Mat3 B;  ///< ∂w/∂δ
 };
 
+/// A state without meaning, of which no coordinate, rate or multiplier is special: what vanishes in
+/// the Jacobian there vanishes everywhere, unless a type branches on its state.
+struct StructureProbe {
+  EvalContext context;
+  std::vector<NodeSeeds> seeds;  ///< (structural nodes)
+};
+
 /// Collects which rows meet which columns; the answer is where each entry of a dense block lies in
 /// the sparse values.
 class PatternSink {
@@ -79,6 +86,7 @@ class PatternSink {
   virtual ~PatternSink() = default;
   /// Announces a dense block (rows × columns). Negative rows and columns are skipped.
   virtual void block(const int* rows, int row_count, const int* columns, int column_count) = 0;
+  virtual void entry(int row, int column) = 0;  ///< a single one, not negative
 };
 class PositionSource {
  public:
@@ -118,6 +126,9 @@ class ElementSet {
   virtual int first_own(int i) const = 0;  ///< first own unknown, as given to bind
   virtual void bind(const Model& model, int i,
                     int first_own) = 0;  ///< own unknowns start at first_own
+  /// Looks which entries of the local matrices can differ from zero; the others stay out of the
+  /// pattern. Without probes none is left out.
+  virtual void find_structure(const std::vector<StructureProbe>& probes);
   virtual void collect_pattern(PatternSink& sink) const = 0;
   virtual void set_positions(const PositionSource& positions) = 0;
 

@@ -20,6 +20,7 @@
 #include "model/node.h"
 #include "model/node_equations.h"
 #include "model/settings.h"
+#include "model/sparse_pattern.h"
 #include "model/state.h"
 #include "model/structural_port.h"
 
@@ -112,8 +113,12 @@ class Model {
   std::vector<std::uint8_t> is_constraint_row;  ///< (n)
   // sparse matrix, compressed columns (n)
   std::vector<int> column_start, row_index;
-  std::vector<int> diagonal;     ///< position of each diagonal entry, -1 if absent (n)
-  NodeEquations node_equations;  ///< rows that nodes contribute themselves
+  /// What elements tie together, entries that always vanish included, hence more than the matrix
+  /// has: the order of elimination is chosen on it.
+  SparsePattern couplings;
+  std::vector<int> diagonal;      ///< position of each diagonal entry, -1 if absent (n)
+  std::vector<NodePlace> places;  ///< (structural nodes)
+  NodeEquations node_equations;   ///< rows that nodes contribute themselves
   std::vector<std::vector<ElementRef>> node_bodies;  ///< bodies attached to each structural node
 
   // --- kinematics

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <random>
 
 #include "model/model.h"
 
@@ -69,16 +70,27 @@ class Pattern : public PatternSink, public PositionSource {
       if (column.size() > 4096) compact(column);
     }
   }
+  void entry(int row, int column) override {
+    std::vector<int>& entries = columns_[column];
+    entries.push_back(row);
+    if (entries.size() > 4096) compact(entries);
+  }
+  SparsePattern compressed() {
+    SparsePattern p;
+    p.column_start.push_back(0);
+    for (std::vector<int>& column : columns_) {
+      compact(column);
+      p.row_index.insert(p.row_index.end(), column.begin(), column.end());
+      p.column_start.push_back(static_cast<int>(p.row_index.size()));
+      std::vector<int>().swap(column);
+    }
+    return p;
+  }
   void finish(Model& model) {
     const int n = static_cast<int>(columns_.size());
-    model.column_start.assign(n + 1, 0);
-    model.row_index.clear();
-    for (int j = 0; j < n; ++j) {
-      compact(columns_[j]);
-      model.row_index.insert(model.row_index.end(), columns_[j].begin(), columns_[j].end());
-      model.column_start[j + 1] = static_cast<int>(model.row_index.size());
-      std::vector<int>().swap(columns_[j]);
-    }
+    SparsePattern p = compressed();
+    model.column_start = std::move(p.column_start);
+    model.row_index = std::move(p.row_index);
     model_ = &model;
     model.diagonal.resize(n);
     for (int j = 0; j < n; ++j) model.diagonal[j] = position(j, j);
@@ -115,6 +127,8 @@ void number_unknowns(Model& model) {
     node.equilibrium = n + node.unknowns() - node.position_unknowns();
     take(node.unknowns(), UnknownKind::differential, node.scale);
   }
+  for (const StructuralNode& node : model.structural)
+    model.places.push_back({node.first, node.equilibrium, node.position_unknowns()});
   for (const ScalarKind kind :
        {ScalarKind::electric, ScalarKind::thermal, ScalarKind::abstract, ScalarKind::hydraulic})
     for (ScalarNode& node : model.scalars) {
@@ -137,15 +151,67 @@ void number_unknowns(Model& model) {
   model.unknowns = n;
 }
 
+/// A state of numbers without meaning, all elements active.
+State meaningless_state(const Model& model, std::mt19937& generator) {
+  const auto number = [&] { return 0.25 + generator() * 0x1p-32; };  // in [0.25, 1.25)
+  const auto vector = [&] {
+    const double x = number(), y = number();
+    return Vec3(x, y, number());
+  };
+  State state;
+  state.y.resize(model.unknowns);
+  state.yp.resize(model.unknowns);
+  for (double& y : state.y) y = number();
+  for (double& yp : state.yp) yp = number();
+  state.rotation.resize(model.structural.size());
+  for (NodeRotation& r : state.rotation) {
+    r.R = r.R_ref = r.R1 = r.R2 = rotation_of_vector<double>(vector());
+    r.w = r.w_ref = r.w1 = r.w2 = vector();
+  }
+  state.memory = model.initial_memory;
+  state.variables = model.initial_variables;
+  for (const ElementRef& e : model.elements)
+    if (const int m = e.set->info(e.index).active_memory; m >= 0) state.memory[m] = 1;
+  return state;
+}
+
+/// Lets every set find which entries of its matrices vanish at states without meaning. The
+/// generator is always the same, hence so is the pattern of a deck.
+void find_structure(Model& model) {
+  std::mt19937 generator(20260101);
+  const State states[] = {meaningless_state(model, generator), meaningless_state(model, generator)};
+  std::vector<StructureProbe> probes;
+  for (const State& state : states) {
+    StructureProbe probe;
+    probe.context.model = &model;
+    probe.context.state = &state;
+    probe.context.time = model.initial_value.initial_time;
+    probe.context.c = probe.context.seed = 0.375;
+    probe.context.uniform_gravity = Vec3(0.5, 0.75, -1.25);
+    for (const NodeRotation& r : state.rotation)
+      probe.seeds.push_back({r.R + Mat3::Constant(0.125), r.R.transpose() + Mat3::Constant(0.625)});
+    probes.push_back(std::move(probe));
+  }
+  for (const auto& set : model.sets) set->find_structure(probes);
+}
+
 }  // namespace
 
 Result<ModelPtr> ModelBuilder::finish() {
   Model& model = *model_;
   number_unknowns(model);
   model.node_equations.bind(model.structural);
+  const auto collect = [&](Pattern& pattern) {
+    model.node_equations.collect_pattern(pattern);
+    for (const auto& set : model.sets) set->collect_pattern(pattern);
+  };
+  for (const auto& set : model.sets) set->find_structure({});
+  Pattern couplings(model.unknowns);
+  collect(couplings);
+  model.couplings = couplings.compressed();
+  find_structure(model);
   Pattern pattern(model.unknowns);
-  model.node_equations.collect_pattern(pattern);
-  for (const auto& set : model.sets) set->collect_pattern(pattern);
+  collect(pattern);
   pattern.finish(model);
   model.node_equations.set_positions(pattern);
   for (const auto& set : model.sets) set->set_positions(pattern);

@@ -83,6 +83,17 @@ struct StructuralNode {
   }
 };
 
+/// Where the unknowns and rows of a structural node are: what every evaluation needs, close
+/// together in memory.
+struct NodePlace {
+  int first = -1;             ///< first unknown, -1 for dummy nodes
+  int equilibrium = -1;       ///< first equilibrium row
+  int position_unknowns = 0;  ///< 6, 3 (displacement nodes) or 0 (dummy nodes)
+
+  bool is_dummy() const { return position_unknowns == 0; }
+  bool has_rotation() const { return position_unknowns == 6; }
+};
+
 enum class ScalarKind { abstract, electric, hydraulic, thermal, parameter };
 
 /// As the deck writes it: "abstract", "hydraulic", ...

@@ -23,12 +23,13 @@ struct KluReference {
   klu_common common;
   klu_symbolic* symbolic = nullptr;
   klu_numeric* numeric = nullptr;
-  KluReference(int n, int* column_start, int* row_index, double* values) {
+  KluReference(int n, int* column_start, int* row_index, double* values, int* rows, int* columns) {
     klu_defaults(&common);
     common.tol = 0.1;
     common.btf = 0;
     common.halt_if_singular = 1;
-    symbolic = klu_analyze(n, column_start, row_index, &common);
+    symbolic = rows ? klu_analyze_given(n, column_start, row_index, rows, columns, &common)
+                    : klu_analyze(n, column_start, row_index, &common);
     if (symbolic) numeric = klu_factor(column_start, row_index, values, symbolic, &common);
   }
   ~KluReference() {
@@ -39,9 +40,9 @@ struct KluReference {
   KluReference& operator=(const KluReference&) = delete;
 };
 
-std::unique_ptr<DenseTail> DenseTail::plan(int n, int* column_start, int* row_index,
-                                           double* values) {
-  KluReference reference(n, column_start, row_index, values);
+std::unique_ptr<DenseTail> DenseTail::plan(int n, int* column_start, int* row_index, double* values,
+                                           int* rows, int* columns) {
+  KluReference reference(n, column_start, row_index, values, rows, columns);
   if (!reference.numeric || reference.symbolic->nblocks != 1) return nullptr;
   std::unique_ptr<DenseTail> tail(new DenseTail(n, column_start, row_index));
   if (!tail->take(reference)) return nullptr;

@@ -21,8 +21,10 @@ struct KluReference;  // in dense_tail.cpp
 
 class DenseTail {
  public:
-  /// Null when the reference matrix has no dense tail worth the trouble.
-  static std::unique_ptr<DenseTail> plan(int n, int* column_start, int* row_index, double* values);
+  /// Null when the reference matrix has no dense tail worth the trouble. rows, columns: order of
+  /// elimination (n); null: AMD of A + Aᵀ.
+  static std::unique_ptr<DenseTail> plan(int n, int* column_start, int* row_index, double* values,
+                                         int* rows = nullptr, int* columns = nullptr);
 
   /// False when pivots of the head are poor against those of the reference matrix.
   bool factor(const double* values);

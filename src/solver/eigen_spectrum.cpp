@@ -77,9 +77,8 @@ class ShiftInvert {
 
  private:
   static LinearSolver make_solver(const Model& m, bool complex) {
-    if (!complex) return LinearSolver(m.unknowns, m.column_start, m.row_index);
-    const DoubledPattern p(m);
-    return LinearSolver(2 * m.unknowns, p.column_start, p.row_index);
+    if (!complex) return LinearSolver(m.unknowns, m.column_start, m.row_index, m.couplings);
+    return doubled_solver(m);
   }
 
   const Linearization& system_;

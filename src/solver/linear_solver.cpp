@@ -2,7 +2,9 @@
 
 #include <klu.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "solver/dense_tail.h"
@@ -18,6 +20,21 @@ constexpr double kSuspicious =
 constexpr double kDenseOperations =
     40;  ///< operations an entry from which a dense tail is looked for
 
+SparsePattern united(int n, const std::vector<int>& column_start, const std::vector<int>& row_index,
+                     const SparsePattern& more) {
+  if (more.column_start.empty()) return {column_start, row_index};
+  SparsePattern p;
+  p.column_start.push_back(0);
+  for (int j = 0; j < n; ++j) {
+    std::set_union(row_index.begin() + column_start[j], row_index.begin() + column_start[j + 1],
+                   more.row_index.begin() + more.column_start[j],
+                   more.row_index.begin() + more.column_start[j + 1],
+                   std::back_inserter(p.row_index));
+    p.column_start.push_back(static_cast<int>(p.row_index.size()));
+  }
+  return p;
+}
+
 }  // namespace
 
 struct LinearSolver::Klu {
@@ -31,10 +48,22 @@ struct LinearSolver::Klu {
   bool by_tail = false;             ///< the last factorization
   bool ordered = false;             ///< both orderings were compared
 
-  Klu() {
+  explicit Klu(double pivot_tolerance) {
     klu_defaults(&common);
-    common.tol = 0.1;  // threshold pivoting: prefer the diagonal unless it is ten times smaller
+    common.tol = pivot_tolerance;
     common.halt_if_singular = 1;
+  }
+  /// Orders by AMD of A + Aᵀ with `couplings` in the place of A. AMD of the matrix itself would
+  /// take multipliers, which have few entries, first, and as their diagonals vanish the pivots
+  /// found off the diagonal would fill the factors beyond all measure.
+  void order(int n, std::vector<int>& column_start, std::vector<int>& row_index,
+             SparsePattern couplings) {
+    klu_symbolic* wide =
+        klu_analyze(n, couplings.column_start.data(), couplings.row_index.data(), &common);
+    if (!wide) return;
+    symbolic =
+        klu_analyze_given(n, column_start.data(), row_index.data(), wide->P, wide->Q, &common);
+    klu_free_symbolic(&wide, &common);
   }
   double operations(klu_symbolic* s, klu_numeric* n) {
     return klu_flops(s, n, &common) ? common.flops : HUGE_VAL;
@@ -80,10 +109,13 @@ struct LinearSolver::Klu {
 };
 
 LinearSolver::LinearSolver(int n, const std::vector<int>& column_start,
-                           const std::vector<int>& row_index)
-    : klu_(std::make_unique<Klu>()), n_(n), column_start_(column_start), row_index_(row_index) {
+                           const std::vector<int>& row_index, const SparsePattern& couplings,
+                           double pivot_tolerance)
+    : n_(n), pivot_tolerance_(pivot_tolerance), column_start_(column_start), row_index_(row_index) {
+  kinds_.push_back({{}, std::make_unique<Klu>(pivot_tolerance)});
+  klu_ = kinds_[0].klu.get();
   if (n > 0)
-    klu_->symbolic = klu_analyze(n, column_start_.data(), row_index_.data(), &klu_->common);
+    klu_->order(n, column_start_, row_index_, united(n, column_start, row_index, couplings));
 }
 
 LinearSolver::~LinearSolver() = default;
@@ -91,6 +123,7 @@ LinearSolver::~LinearSolver() = default;
 LinearSolver::Outcome LinearSolver::analyze(double* values) {
   if (n_ == 0) return Outcome::ok;
   singular_column_ = -1;
+  if (klu_ == kinds_[0].klu.get()) kinds_.resize(1);  // others belong to another first matrix
   if (!klu_->symbolic)
     return klu_->common.status == KLU_SINGULAR ? Outcome::singular : Outcome::failed;
   klu_free_numeric(&klu_->kept, &klu_->common);
@@ -104,12 +137,34 @@ LinearSolver::Outcome LinearSolver::analyze(double* values) {
     klu_rcond(klu_->symbolic, klu_->kept, &klu_->common);
     klu_->kept_ratio = klu_->common.rcond;
     if (klu_->is_dense_in_parts())
-      klu_->tail = DenseTail::plan(n_, column_start_.data(), row_index_.data(), values);
+      klu_->tail = DenseTail::plan(n_, column_start_.data(), row_index_.data(), values,
+                                   klu_->symbolic->P, klu_->symbolic->Q);
     return Outcome::ok;
   }
   if (klu_->common.status != KLU_SINGULAR) return Outcome::failed;
   singular_column_ = klu_->common.singular_col < n_ ? klu_->common.singular_col : -1;
   return Outcome::singular;
+}
+
+bool LinearSolver::select(const std::vector<bool>& kind) {
+  for (const Kind& k : kinds_) {
+    if (k.flags != kind) continue;
+    klu_ = k.klu ? k.klu.get() : kinds_[0].klu.get();
+    return true;
+  }
+  return false;
+}
+
+void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
+  const Klu& first = *kinds_[0].klu;
+  auto klu = std::make_unique<Klu>(pivot_tolerance_);
+  if (n_ > 0 && first.symbolic)
+    klu->symbolic = klu_analyze_given(n_, column_start_.data(), row_index_.data(),
+                                      first.symbolic->P, first.symbolic->Q, &klu->common);
+  klu_ = klu.get();
+  if (analyze(values) != Outcome::ok) klu = nullptr;
+  kinds_.push_back({kind, std::move(klu)});
+  select(kind);
 }
 
 LinearSolver::Outcome LinearSolver::factor(double* values) {

@@ -9,19 +9,34 @@
 #include <memory>
 #include <vector>
 
+#include "model/sparse_pattern.h"
+
 namespace mbcosim {
 
 class LinearSolver {
  public:
-  /// Pattern in compressed columns (n): column_start (n + 1), row_index sorted within columns.
-  LinearSolver(int n, const std::vector<int>& column_start, const std::vector<int>& row_index);
+  /// Pattern in compressed columns (n): column_start (n + 1), row_index sorted within columns. The
+  /// order of elimination is chosen on the union of the pattern and `couplings` (n).
+  LinearSolver(int n, const std::vector<int>& column_start, const std::vector<int>& row_index,
+               const SparsePattern& couplings = {}, double pivot_tolerance = kAccuratePivots);
   ~LinearSolver();
   LinearSolver(const LinearSolver&) = delete;
   LinearSolver& operator=(const LinearSolver&) = delete;
 
+  /// A diagonal that is smaller by this factor than others of its column is no pivot. The first is
+  /// for solutions that stand for themselves, the second for Newton's corrections: what they lack
+  /// the next residual shows, and the factors have fewer entries.
+  static constexpr double kAccuratePivots = 0.1, kNewtonPivots = 1e-3;
+
   enum class Outcome { ok, singular, failed };
-  /// Chooses the pivots on these values.
+  /// Chooses the pivots on these values; for the first kind, all others are forgotten.
   Outcome analyze(double* values);
+  /// Matrices may be of several kinds that do not share pivots, each named by a sequence of flags;
+  /// the empty one is the first. Makes a kind current; false when it is not known.
+  bool select(const std::vector<bool>& kind);
+  /// Adds a kind, with pivots chosen on these values, and makes it current. When the matrix has
+  /// none, matrices of this kind are factored as those of the first.
+  void add_kind(const std::vector<bool>& kind, double* values);
   /// Factors; `values` are in the pattern's order.
   Outcome factor(double* values);
   /// Solves in place with the last factorization.
@@ -31,8 +46,14 @@ class LinearSolver {
 
  private:
   struct Klu;
-  std::unique_ptr<Klu> klu_;
+  struct Kind {
+    std::vector<bool> flags;
+    std::unique_ptr<Klu> klu;  ///< null: that of the first kind
+  };
+  std::vector<Kind> kinds_;
+  Klu* klu_;  ///< of the current kind
   int n_;
+  double pivot_tolerance_;
   std::vector<int> column_start_, row_index_;
   int singular_column_ = -1;
 };

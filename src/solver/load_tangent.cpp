@@ -22,7 +22,8 @@ TangentSolver::TangentSolver(const Model& model, std::vector<LoadTangent> tangen
     : model_(model), tangents_(std::move(tangents)) {
   make_pattern();
   values_.resize(row_index_.size());
-  solver_ = std::make_unique<LinearSolver>(model.unknowns, column_start_, row_index_);
+  solver_ =
+      std::make_unique<LinearSolver>(model.unknowns, column_start_, row_index_, model.couplings);
 }
 
 void TangentSolver::make_pattern() {

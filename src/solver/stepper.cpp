@@ -113,6 +113,12 @@ Stepper::Stepper(const Model& model)
       dummy_(start_settings(model.initial_value, model.initial_value.dummy_tolerance,
                             model.initial_value.dummy_max_iterations)),
       derivatives_coefficient_(model.initial_value.derivatives_coefficient) {
+  constexpr std::size_t kMostDriven = 8;  // each may double the kinds of matrices
+  if (model.has_driven)
+    for (const ElementRef& e : model.elements)
+      if (e.set->info(e.index).driven) driven_.push_back(e);
+  if (driven_.size() > kMostDriven) driven_.clear();
+  activity_.resize(driven_.size());
   const InitialValueSettings& s = model.initial_value;
   if (is_third_order(s.method) || (s.dummy_method && is_third_order(*s.dummy_method)))
     third_order_ = std::make_unique<ThirdOrderSolver>(model);
@@ -185,10 +191,33 @@ void Stepper::choose_pivots(const State& state) {
   const double c = 0.5 * model_.initial_value.time_step;
   compute_jacobian(model_.context(state, Phase::step, c, c), workspace_);
   workspace_.solver.analyze(workspace_.values.data());
+  if (!driven_.empty()) pivot_state_ = state;
   if (!third_order_) return;
   const InitialValueSettings& s = model_.initial_value;
   third_order_->choose_pivots(
       state, third_order(state, is_third_order(s.method) ? s.method : *s.dummy_method), workspace_);
+}
+
+void Stepper::select_pivots(const State& state) {
+  if (pivot_state_.y.empty()) return;
+  bool as_first = true;
+  for (std::size_t k = 0; k < driven_.size(); ++k) {
+    activity_[k] = driven_[k].set->is_active(state, driven_[k].index);
+    as_first =
+        as_first && activity_[k] == driven_[k].set->is_active(pivot_state_, driven_[k].index);
+  }
+  if (workspace_.solver.select(as_first ? std::vector<bool>() : activity_)) return;
+  State other = pivot_state_;
+  const double c = 0.5 * model_.initial_value.time_step;
+  const EvalContext context = model_.context(other, Phase::step, c, c);
+  for (std::size_t k = 0; k < driven_.size(); ++k) {
+    const ElementRef& e = driven_[k];
+    const bool was_active = e.set->is_active(other, e.index);
+    other.memory[e.set->info(e.index).active_memory] = activity_[k] ? 1 : 0;
+    if (activity_[k] && !was_active) e.set->start(context, other, e.index);
+  }
+  compute_jacobian(context, workspace_);
+  workspace_.solver.add_kind(activity_, workspace_.values.data());
 }
 
 PhaseReport Stepper::run_dummy_steps(State& state) {
@@ -319,6 +348,7 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     update_activity(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, true);
     const EvalContext context = model_.context(state, Phase::step, f.c(), f.c_algebraic());
     for (const auto& set : model_.sets) set->after_predict(context, state);
+    select_pivots(state);
     report.newton = iterate(state, f, method, first, settings);
     report.flagged = accept_unconverged_ && report.newton.outcome == NewtonOutcome::not_converged &&
                      is_finite(state);

@@ -62,6 +62,9 @@ class Stepper {
   /// Pivots for all regular steps, from the matrix at the initial state: the same in every
   /// simulation of a model.
   void choose_pivots(const State& state);
+  /// Activity of `driven` elements makes matrices of different kinds: each has pivots from the
+  /// matrix at the initial state with these elements active.
+  void select_pivots(const State& state);
   class StepHooks;
   class DerivativesHooks;
   PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first,
@@ -78,6 +81,9 @@ class Stepper {
 
   const Model& model_;
   Workspace workspace_;
+  State pivot_state_;  ///< the initial state, when there are `driven` elements; else empty
+  std::vector<ElementRef> driven_;
+  std::vector<bool> activity_;                     ///< (driven_)
   std::unique_ptr<ThirdOrderSolver> third_order_;  ///< when a method of the deck needs it
   State backup_;
   const CancelToken* cancel_ = nullptr;

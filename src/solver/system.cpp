@@ -11,9 +11,9 @@ namespace {
 void add_external_loads(const EvalContext& context, std::vector<double>& r) {
   const std::vector<double>& loads = context.state->external_loads;
   if (loads.empty()) return;
-  for (std::size_t k = 0; k < context.model->structural.size(); ++k) {
-    const StructuralNode& n = context.model->structural[k];
-    for (int i = 0; i < n.position_unknowns(); ++i) r[n.equilibrium + i] += loads[6 * k + i];
+  for (std::size_t k = 0; k < context.model->places.size(); ++k) {
+    const NodePlace& n = context.model->places[k];
+    for (int i = 0; i < n.position_unknowns; ++i) r[n.equilibrium + i] += loads[6 * k + i];
   }
 }
 
@@ -39,8 +39,8 @@ NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c)
 void compute_jacobian(const EvalContext& context, Workspace& workspace) {
   const Model& model = *context.model;
   const State& state = *context.state;
-  for (std::size_t k = 0; k < model.structural.size(); ++k) {
-    const StructuralNode& n = model.structural[k];
+  for (std::size_t k = 0; k < model.places.size(); ++k) {
+    const NodePlace& n = model.places[k];
     if (!n.has_rotation()) {
       workspace.seeds[k] = {Mat3::Zero(), Mat3::Zero()};
       continue;
@@ -56,8 +56,8 @@ void compute_jacobian(const EvalContext& context, Workspace& workspace) {
 }
 
 void update_rotations(const Model& model, State& state) {
-  for (std::size_t k = 0; k < model.structural.size(); ++k) {
-    const StructuralNode& n = model.structural[k];
+  for (std::size_t k = 0; k < model.places.size(); ++k) {
+    const NodePlace& n = model.places[k];
     if (!n.has_rotation()) continue;
     NodeRotation& q = state.rotation[k];
     const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];

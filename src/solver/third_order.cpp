@@ -8,15 +8,6 @@
 
 namespace mbcosim {
 
-namespace {
-
-LinearSolver doubled_solver(const Model& model) {
-  const DoubledPattern p(model);
-  return LinearSolver(2 * model.unknowns, p.column_start, p.row_index);
-}
-
-}  // namespace
-
 ThirdOrderFormula ThirdOrderFormula::tunable(double rho) {
   const double t = -rho / (1 + rho), s = 1 + t, q = t * t * (3 + 2 * t);
   if (t == 0)

@@ -17,7 +17,8 @@ struct Workspace {
         delta(model.unknowns),
         values(model.row_index.size()),
         seeds(model.structural.size()),
-        solver(model.unknowns, model.column_start, model.row_index) {
+        solver(model.unknowns, model.column_start, model.row_index, model.couplings,
+               LinearSolver::kNewtonPivots) {
     residual_history.reserve(256);
   }
 

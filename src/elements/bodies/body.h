@@ -20,6 +20,7 @@ struct Body {
   int k = 0;               ///< local index of the node
 
   static constexpr int width = 6;
+  static constexpr bool constant_structure = true;
   static constexpr bool momentum_rows = true;
 
   void connect(Connector& c) { k = c.node(node); }
@@ -48,6 +49,7 @@ struct PointMass {
   double m = 0;  ///< [kg]
 
   static constexpr int width = 6;
+  static constexpr bool constant_structure = true;
   static constexpr bool momentum_rows = true;
 
   void connect(Connector& c) { c.node(node); }

@@ -16,6 +16,7 @@ struct Clamp : NamedData<Clamp> {
   Vec3 F0 = Vec3::Zero(), M0 = Vec3::Zero();  ///< initial reactions
 
   static constexpr int width = 12;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 6> data_names = {"Fx", "Fy", "Fz",
                                                                  "Mx", "My", "Mz"};

@@ -16,6 +16,7 @@ struct InLineFriction : InLine {
   Friction friction;
 
   static constexpr int width = 15;
+  static constexpr bool constant_structure = false;  ///< friction depends on the sliding speed
 
   void tangent(const Local<double>&,
                Tangent&) const = delete;  ///< that of InLine lacks the friction
@@ -59,6 +60,7 @@ struct HingeFriction : Hinge {
   double radius = 0;  ///< r [m]
 
   static constexpr int width = Hinge::width + 1;
+  static constexpr bool constant_structure = false;      ///< friction depends on the speed
   static constexpr int state = Hinge::width - 12;        ///< own index of the friction
   static constexpr int memory = UnwrappedAngle::memory;  ///< first slot of the friction
 

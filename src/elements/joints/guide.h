@@ -14,6 +14,7 @@ namespace mbcosim {
 ///   rows k=1,2  (e_k(Rv)·p − e_k(V)·s)/c
 struct InLine : TwoAttachments, NamedData<InLine> {  // a: p and Rv, b: q
   static constexpr int width = 14;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 3> data_names = {"Fx", "Fy", "Fz"};
 
@@ -53,6 +54,7 @@ struct InPlane : TwoAttachments, NamedData<InPlane> {  // a: p, b: q
   Vec3 normal = Vec3::UnitZ();                         ///< in the frame of node 1
 
   static constexpr int width = 13;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 1> data_names = {"F"};
 
@@ -82,6 +84,7 @@ struct InPlane : TwoAttachments, NamedData<InPlane> {  // a: p, b: q
 ///   rows        −e₃(b)·e₂(a)/c, −e₁(b)·e₃(a)/c, −e₂(b)·e₁(a)/c
 struct Prismatic : TwoAttachments, NamedData<Prismatic> {
   static constexpr int width = 15;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 3> data_names = {"Mx", "My", "Mz"};
 

@@ -20,6 +20,7 @@ struct RevolutePin : NamedData<RevolutePin> {
   bool without_angles = false;  ///< `plane hinge`, the old name, writes no relative orientation
 
   static constexpr int width = 11;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 8> data_names = {"rz", "wz", "Fx", "Fy",
                                                                  "Fz", "Mx", "My", "Mz"};
@@ -98,6 +99,7 @@ struct RevoluteHinge : RevoluteAxes, NamedData<RevoluteHinge> {
   Vec3 F0 = Vec3::Zero(), M0 = Vec3::Zero();  ///< initial reactions
 
   static constexpr int width = 17;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 8> data_names = {"rz", "wz", "Fx", "Fy",
                                                                  "Fz", "Mx", "My", "Mz"};
@@ -134,6 +136,7 @@ struct RevoluteHinge : RevoluteAxes, NamedData<RevoluteHinge> {
 ///   unknowns    M₁, M₂ [N·m] in H₂;  loads node 1 (0, −MT), node 2 (0, MT);  rows of RevoluteAxes
 struct RevoluteRotation : RevoluteAxes, NamedData<RevoluteRotation> {
   static constexpr int width = 14;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 5> data_names = {"rz", "wz", "Mx", "My", "Mz"};
 
@@ -165,6 +168,7 @@ struct AxialRotation : RevoluteAxes, NamedData<AxialRotation> {
   DrivePtr omega;
 
   static constexpr int width = 18;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 8> data_names = {"rz", "wz", "Fx", "Fy",
                                                                  "Fz", "Mx", "My", "Mz"};

@@ -14,6 +14,7 @@ struct SphericalHinge : TwoAttachments, NamedData<SphericalHinge> {
   OrientationDescription description = OrientationDescription::euler123;
 
   static constexpr int width = 15;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 3> data_names = {"Fx", "Fy", "Fz"};
 
@@ -45,6 +46,7 @@ struct SphericalPin : NamedData<SphericalPin> {
   Vec3 X0 = Vec3::Zero();
 
   static constexpr int width = 9;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 3> data_names = {"Fx", "Fy", "Fz"};
 

@@ -91,6 +91,7 @@ struct TotalJoint : NamedData<TotalJoint> {
   TotalConstraint constraint;
 
   static constexpr int width = 18;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr std::array<std::string_view, 24> data_names = {
       "px", "py", "pz", "rx", "ry", "rz", "Fx", "Fy", "Fz", "Mx", "My", "Mz",
@@ -180,6 +181,7 @@ struct TotalPinJoint : NamedData<TotalPinJoint> {
   TotalConstraint constraint;
 
   static constexpr int width = 12;
+  static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
   static constexpr auto data_names = TotalJoint::data_names;
 

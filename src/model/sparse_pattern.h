@@ -1,0 +1,13 @@
+/// Where a sparse matrix has entries.
+#pragma once
+
+#include <vector>
+
+namespace mbcosim {
+
+/// Compressed columns: column_start (columns + 1), rows ascend within a column.
+struct SparsePattern {
+  std::vector<int> column_start, row_index;
+};
+
+}  // namespace mbcosim
