@@ -3,7 +3,6 @@
 //
 // usage: energy DECK [STEPS]
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <vector>
 

@@ -1,4 +1,3 @@
-#include <string>
 
 #include "cli/commands.h"
 #include "cli/deck_report.h"

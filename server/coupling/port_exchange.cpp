@@ -1,7 +1,6 @@
 #include "coupling/port_model.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "coupling/port_numbers.h"

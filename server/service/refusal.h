@@ -7,7 +7,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "mbcosim/v1/common.pb.h"
 #include "model/diagnostic.h"

@@ -1,5 +1,4 @@
 /// Linearization and eigenvalues of a session's current state.
-#include <algorithm>
 #include <complex>
 
 #include "service/refusal.h"

@@ -1,7 +1,5 @@
 #include "input/binder.h"
 
-#include <cmath>
-
 #include "input/model_functions.h"
 #include "input/nearest.h"
 #include "input/plugin.h"

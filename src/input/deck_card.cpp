@@ -3,7 +3,6 @@
 
 #include <cctype>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "input/deck.h"

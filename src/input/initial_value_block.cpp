@@ -1,5 +1,4 @@
 /// Cards of the `data` and `initial value` blocks (MBDyn input manual, "Problems").
-#include <cmath>
 #include <limits>
 #include <map>
 #include <set>

@@ -1,7 +1,5 @@
 #include "input/model_functions.h"
 
-#include <cctype>
-#include <cmath>
 #include <vector>
 
 #include "input/nearest.h"

@@ -1,6 +1,5 @@
 #include "input/plugin.h"
 
-#include <limits>
 #include <vector>
 
 #include "input/evaluate.h"

@@ -4,7 +4,6 @@
 /// Source: MBDyn input manual, "eigenanalysis".
 #pragma once
 
-#include <cmath>
 #include <complex>
 #include <cstdint>
 #include <limits>

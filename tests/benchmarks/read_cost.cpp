@@ -7,7 +7,6 @@
 #include <malloc.h>
 
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 
 #include "simulation/simulation.h"

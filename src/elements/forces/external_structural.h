@@ -1,7 +1,6 @@
 /// Loads from an external code on points of structural nodes: `force: …, external structural`.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "elements/general_element.h"

@@ -1,8 +1,7 @@
 /// Cards of forces that an external code gives: `force: …, external structural`.
-#include <algorithm>
+#include "elements/forces/read_external.h"
 
 #include "elements/forces/external_structural.h"
-#include "elements/forces/read_external.h"
 #include "elements/ports/port_element.h"
 #include "elements/registry.h"
 #include "model/card.h"

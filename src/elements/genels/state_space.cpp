@@ -1,6 +1,5 @@
 #include "elements/genels/state_space.h"
 
-#include <cmath>
 #include <limits>
 
 namespace mbcosim {

@@ -2,7 +2,6 @@
 /// `scalar filter`.
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "elements/general_element.h"

@@ -1,7 +1,6 @@
 #include "elements/hydraulic/pipe_friction.h"
 
 #include "elements/hydraulic/reading.h"
-#include "math/rotation.h"
 
 namespace mbcosim::hydraulic {
 namespace {

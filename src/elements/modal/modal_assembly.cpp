@@ -12,8 +12,6 @@
 /// unknown without inertia. Amplitudes that nothing holds therefore relax to −Kgen⁻¹ C p. Source:
 /// MBDyn technical manual, modal joint.
 
-#include <cmath>
-
 #include <Eigen/Geometry>
 
 #include "elements/modal/modal_joint.h"

@@ -1,11 +1,7 @@
 #include "elements/modal/modal_body.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-
 #include <algorithm>
-
-#include <Eigen/Cholesky>
 
 namespace mbcosim {
 

@@ -1,7 +1,5 @@
 #include "elements/modal/modal_force.h"
 
-#include <algorithm>
-
 #include "elements/modal/modal_cards.h"
 #include "model/card.h"
 #include "model/output_row.h"

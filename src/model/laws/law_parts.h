@@ -2,7 +2,6 @@
 /// prestrain.
 #pragma once
 
-#include <string>
 #include <type_traits>
 
 #include "model/card.h"

@@ -3,7 +3,6 @@
 
 #include <map>
 #include <string>
-#include <vector>
 
 #include "deck_run.h"
 #include "elements/modal_bodies.h"

@@ -1,5 +1,4 @@
 /// Pendulums, rods, variable steps and the initial assembly: numbers of MBDyn 1.7.3.
-#include <cmath>
 
 #include "deck_run.h"
 #include "elements/columns.h"

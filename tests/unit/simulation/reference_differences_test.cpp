@@ -1,7 +1,6 @@
 /// Where we differ from the reference solver on purpose: independent derivations of our numbers.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <string>
 
 #include "deck_run.h"

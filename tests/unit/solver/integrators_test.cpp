@@ -1,7 +1,6 @@
 /// Integrators: numbers of the reference solver, orders of convergence, damping against the
 /// spectral radius.
 #include <cmath>
-#include <utility>
 
 #include <gmock/gmock.h>
 
