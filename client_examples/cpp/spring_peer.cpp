@@ -1,9 +1,10 @@
 // A spring computed outside of the server: hangs the body of a deck on it and prints how it swings.
 //
-// usage: spring_peer ADDRESS DECK NODE [STEPS]     e.g. spring_peer unix:/tmp/mbcosim.sock
-// tumbling.mbd 1
+// usage: spring_peer ADDRESS DECK NODE [STEPS]
 //        spring_peer ADDRESS --join SIMULATION PORT [--shared-memory]
-//                                                  for a simulation that another client steps
+//
+// e.g. spring_peer unix:/tmp/mbcosim.sock tumbling.mbd 1; the second form takes part in a
+// simulation that another client steps.
 #include <cstdio>
 #include <cstdlib>
 #include <string>

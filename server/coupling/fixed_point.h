@@ -13,8 +13,7 @@ namespace mbcosim::server {
 ///   none      x ← x̃
 ///   constant  x ← x + ω r
 ///   Aitken    ω ← −ω (r₋·Δr)/(Δr·Δr),  x ← x + ω r                        (Küttler and Wall 2008)
-///   IQN-ILS   x ← x̃ + ΔX̃ c,  c = argmin |ΔR c + r|                        (Degroote, Bathe and
-///   Vierendeels 2009)
+///   IQN-ILS   x ← x̃ + ΔX̃ c,  c = argmin |ΔR c + r|     (Degroote, Bathe and Vierendeels 2009)
 ///
 /// The first step of Aitken and IQN-ILS is a constant relaxation. `start` begins a new time step.
 class FixedPoint {

@@ -1,13 +1,14 @@
 /// Elements whose size is known only when the deck is read (state spaces, modal joints): one
 /// virtual object per element.
 ///
-///   class Filter : public GeneralElement {
-///     void connect(GeneralConnection& c) override { input_ = c.scalar(node); state_ =
-///     c.differential(n); } void residual(const GeneralView& u, GeneralResidual& r) const override
-///     { r.add(state_, …); } void jacobian(const GeneralView& u, GeneralJacobian& j) const override
-///     { j.value(state_, input_, …); }
-///   };
-///   add_general_element(card.builder(), info, std::make_unique<Filter>(…));
+///     class Filter : public GeneralElement {
+///       void connect(GeneralConnection& c) override;  // input_ = c.scalar(node), …
+///       // r.add(state_, …)
+///       void residual(const GeneralView& u, GeneralResidual& r) const override;
+///       // j.value(state_, input_, …)
+///       void jacobian(const GeneralView& u, GeneralJacobian& j) const override;
+///     };
+///     add_general_element(card.builder(), info, std::make_unique<Filter>(…));
 ///
 /// Local rows and columns share one numbering, in the order of the calls in `connect`: 6 for a
 /// structural node (equilibrium rows; x and rotation columns), all of its unknowns for a whole

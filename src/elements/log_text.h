@@ -1,5 +1,5 @@
-/// Pieces of .log lines: each number preceded by a blank, six significant digits. Spec 02
-/// section 11.3.
+/// Pieces of .log lines (MBDyn input manual, log file): each number preceded by a blank, six
+/// significant digits.
 #pragma once
 
 #include <initializer_list>

@@ -1,5 +1,5 @@
-/// Reads the arguments of one raw statement: keywords, expressions, strings. Spec 01 sections 1
-/// to 5.
+/// Reads the arguments of one raw statement: keywords, expressions, strings. Source: MBDyn input
+/// manual, "general" and "numeric values".
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ namespace mbcosim {
 class Session;  // everything that outlives a statement: files, symbols, diagnostics, limits
                 // (input/session.h)
 
-/// One statement as raw text with positions, split off before its meaning is known (section 1.7).
+/// One statement as raw text with positions, split off before its meaning is known.
 struct Statement {
   std::string_view text;       ///< from the first character of the card word to before the `;`
   int file = 0;                ///< index in Session::files
@@ -43,7 +43,7 @@ class Cursor {
   /// Evaluates the next argument as one expression statement. An empty argument is an error here:
   /// check `at_empty` first.
   Value expression(std::string_view what);
-  std::string quoted(std::string_view what);  ///< a quoted argument, escapes decoded (section 1.6)
+  std::string quoted(std::string_view what);  ///< a quoted argument, escapes decoded
   /// The inside of a quoted argument as a statement of its own, characters as they are written.
   Statement quoted_statement(std::string_view what);
   /// For `driven`: the rest of the statement from the next argument on, as a statement of its own.

@@ -1,4 +1,4 @@
-/// Built-in functions of expressions (spec 01 section 5.5).
+/// Built-in functions of expressions (MBDyn input manual, "numeric values", functions).
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-/// Characters, comments and strings of the deck language (spec 01 section 1), on plain text with
-/// offsets.
+/// Characters, comments and strings of the deck language (MBDyn input manual, "general"), on plain
+/// text with offsets.
 #pragma once
 
 #include <cstddef>
@@ -43,7 +43,7 @@ std::string excerpt(std::string_view text);
 /// `;` is missing.
 bool begins_card(std::string_view text, std::size_t at);
 
-/// Decodes the inside of a quoted argument (section 1.6). On a wrong escape returns its offset in
+/// Decodes the inside of a quoted argument. On a wrong escape returns its offset in
 /// `raw`, else npos.
 std::size_t decode_quoted(std::string_view raw, std::string* decoded);
 /// Decodes the inside of a string literal of an expression: `\c` is c.

@@ -1,5 +1,5 @@
 /// Functions of the namespace `model` and plugin variables: values of nodes, elements and drives
-/// (spec 01 sections 5.6, 5.7).
+/// (MBDyn input manual, "numeric values", namespaces and plugin variables).
 #pragma once
 
 #include <string>

@@ -22,7 +22,9 @@ namespace {
 
 std::string in_quotes(std::string_view s) { return '"' + std::string(s) + '"'; }
 
-/// Recursive descent over the grammar of section 5.1.
+/// Recursive descent. Binding from weak to strong, all to the left but `^`:
+///
+///     = (a statement)     && || ~|     > >= == <= < !=     + -     * / %     ^     one sign or !
 class Parser {
  public:
   Parser(std::string_view text, std::size_t begin, bool is_string, const Limits& limits,

@@ -1,4 +1,4 @@
-/// Plugin variables `[kind, name, ...]` (spec 01 section 5.7).
+/// Plugin variables `[kind, name, ...]` (MBDyn input manual, "numeric values").
 #pragma once
 
 #include <string_view>

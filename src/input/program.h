@@ -1,5 +1,5 @@
-/// Expressions with names bound and types known: a flat program for a stack machine (spec 01
-/// section 5).
+/// Expressions of the deck with names bound and types known: each is a flat program for a stack
+/// machine.
 #pragma once
 
 #include <cstdint>

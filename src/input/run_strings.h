@@ -1,5 +1,5 @@
-/// Run-time strings: expressions of the deck that are evaluated during the run (spec 01
-/// section 5.10).
+/// Run-time strings: expressions of the deck that are evaluated during the run
+/// (MBDyn input manual, "string drive caller").
 ///
 /// A string is parsed once, when its card is read; names are bound at the end of the deck
 /// (`Session::bind_strings`). Variables of enclosing loop passes are captured at once.

@@ -1,4 +1,4 @@
-/// Splits the text of a file into raw statements (spec 01 section 1.7).
+/// Splits the text of a file into raw statements, each up to its `;`.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// Variables and constants of the deck: one flat table for the whole run (spec 01 section 5.3),
+/// Variables and constants of the deck: one flat table for the whole run,
 /// scopes for loop passes only.
 #pragma once
 
@@ -15,7 +15,7 @@
 
 namespace mbcosim {
 
-/// Variables that the run updates (section 5.4); run-time strings read them from the EvalContext.
+/// Variables that the run updates; run-time strings read them from the EvalContext.
 enum class SymbolRole : std::uint8_t { plain, time, time_step, step, var };
 
 struct Symbol {

@@ -1,4 +1,4 @@
-/// Values of the deck's expressions. Spec 01 section 5.2.
+/// Values of the deck's expressions (MBDyn input manual, "numeric values").
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ using Value = std::variant<bool, std::int32_t, double, std::string>;
 
 ValueType type_of(const Value& v);
 const char* type_name(ValueType t);   ///< "bool", "integer", "real", "string"
-std::string printed(const Value& v);  ///< as `remark` prints it (section 5.11)
+std::string printed(const Value& v);  ///< as `remark` prints it
 std::string printed(double v);
 std::string number_text(double v);  ///< for messages: six digits, no point added
 

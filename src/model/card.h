@@ -22,7 +22,7 @@
 namespace mbcosim {
 
 /// First node of a two-node element, for `reference, other node | other position | other
-/// orientation`. Spec 01 section 7.5.
+/// orientation` (MBDyn input manual, "use of reference frames").
 struct OtherNode {
   int node = -1;                        ///< index among the structural nodes
   Vec3 offset = Vec3::Zero();           ///< f_a, in the frame of `node`
@@ -63,8 +63,8 @@ class Card {
   /// `name` gets the name as written.
   virtual std::string file_contents(std::string_view what, std::string* name) = 0;
 
-  // ------------------------------------------------------------------ structured values without
-  // frames (spec 01 section 6)
+  // ------------------------------------------------------------------
+  // structured values without frames
   virtual Vec3 vec3(std::string_view what) = 0;
   virtual Vec6 vec6(std::string_view what) = 0;
   virtual Mat3 mat3(std::string_view what) = 0;
@@ -75,8 +75,8 @@ class Card {
   virtual Mat3 orientation(std::string_view what) = 0;
   virtual OrientationDescription orientation_description() = 0;
 
-  // ------------------------------------------------------------------ in frames (spec 01 section
-  // 7); `node`: structural node index
+  // ------------------------------------------------------------------
+  // in frames; `node`: structural node index
   /// `context`: structural node that `reference, node` and `reference, local` mean; -1: the global
   /// frame.
   virtual Vec3 absolute_position(std::string_view what, int context = -1,

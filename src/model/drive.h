@@ -40,8 +40,8 @@ class StepListener {
   virtual void advance(const EvalContext& context, State& state, bool initial) const = 0;
 };
 
-/// A vector- or matrix-valued function: Σ entityₖ·driveₖ or one drive per component. Spec 03
-/// section 2.
+/// A vector- or matrix-valued function: Σ entityₖ·driveₖ or one drive per component
+/// (MBDyn input manual, "template drive callers").
 template <int R, int C>
 class TplDrive {
  public:

@@ -15,8 +15,8 @@ namespace mbcosim {
 
 class OutputRow;
 
-/// Families that share a label space, in the order in which their unknowns are numbered (spec 02
-/// section 1.1).
+/// Families that share a label space, in the order in which their unknowns are numbered, after
+/// those of the nodes.
 enum class Family {
   joint,
   joint_regularization,
@@ -65,8 +65,8 @@ struct ElementInfo {
   std::vector<HintSample> hints;  ///< of `driven`
 };
 
-/// How dependences of a node's kinematics on its Newton increments enter Jacobians: δx = c δ, δv =
-/// δ for the position unknowns; δθ = A δ, δw = B δ for the rotation unknowns (spec 02 section 6.2).
+/// How dependences of a node's kinematics on its Newton increments enter Jacobians: δx = c δ,
+/// δv = δ for the position unknowns; δθ = A δ, δw = B δ for the rotation unknowns.
 struct NodeSeeds {
   Mat3 A;  ///< c G(g)
   Mat3 B;  ///< ∂w/∂δ
@@ -146,8 +146,8 @@ class ElementSet {
   virtual void after_predict(const EvalContext& context, State& state) const = 0;
   virtual void after_convergence(const EvalContext& context, State& state) const = 0;
 
-  // --- initial assembly: state.y, yp hold positions and rates, multipliers λ and λ′ (spec 02
-  // section 9)
+  // --- initial assembly: state.y, yp hold positions and rates, multipliers λ and λ′
+  // (solver/initial_assembly.h)
   virtual AssemblyRole assembly_role(int i) const = 0;
   /// Adds to position-level rows r (n) and rate-level rows r_rate (n), both in the model's row
   /// numbering.

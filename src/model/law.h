@@ -1,4 +1,4 @@
-/// Constitutive laws in 1, 3 and 6 dimensions: (strain, strain rate) -> force. Spec 03 section 3.
+/// Constitutive laws (MBDyn input manual) in 1, 3 and 6 dimensions: (strain, rate) -> force.
 #pragma once
 
 #include "math/dual.h"

@@ -8,8 +8,8 @@ namespace {
 
 Vec3 at(const std::vector<double>& y, int i) { return Vec3(y[i], y[i + 1], y[i + 2]); }
 
-/// Position and motion of a `relative frame` dummy: `n` seen from frame (r, f, H). Spec 02
-/// section 6.4.
+/// Position and motion of a `relative frame` dummy: `n` seen from frame (r, f, H)
+/// (MBDyn input manual, "structural node", dummy nodes).
 NodeState relative_state(const NodeState& n, const NodeState& r, const Vec3& f, const Mat3& h) {
   const Mat3 t = h.transpose() * r.R.transpose();
   NodeState s;

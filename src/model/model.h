@@ -124,7 +124,7 @@ class Model {
   // --- kinematics
   NodeState node_state(const EvalContext& context,
                        int node) const;  ///< any structural node, also dummy ones
-  /// Acceleration of dynamic, modal and dummy nodes (spec 02 section 6.5); zero for others.
+  /// Acceleration of dynamic, modal and dummy nodes; zero for others.
   NodeAcceleration node_acceleration(const EvalContext& context, int node) const;
   Vec3 gravity_at(const EvalContext& context,
                   const Vec3& x) const;  ///< [m/s²], zero without gravity
@@ -138,7 +138,7 @@ class Model {
   int find_structural(int label) const;  ///< index or -1
   int find_scalar(ScalarKind kind, int label) const;
   ElementRef find_element(Family family, int label) const;  ///< set == nullptr when absent
-  /// Private datum of a node: index or -1. Structural names: spec 01 section 11.2; scalar nodes
+  /// Private datum of a node: index or -1. Structural names: model/node_data.cpp; scalar nodes:
   /// "x", "xP".
   int structural_datum(int node, std::string_view name) const;
   double structural_datum_value(const EvalContext& context, int node, int datum) const;

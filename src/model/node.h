@@ -33,8 +33,8 @@ constexpr const char* kind_name(StructuralKind kind) {
   return kNames[static_cast<int>(kind)];
 }
 
-/// Structural node. Unknowns (spec 02 section 1.1), from `first`: x(3), g(3) [not for displacement
-/// nodes], then b, g_m (dynamic) or v, w (modal). Equilibrium rows start at `equilibrium`.
+/// Structural node. Unknowns, from `first`: x(3), g(3) [not for displacement nodes], then b, g_m
+/// (dynamic) or v, w (modal). Equilibrium rows start at `equilibrium`.
 struct StructuralNode {
   int label = 0;
   std::string name;
@@ -125,7 +125,7 @@ struct ScalarNode {
   int unknown = -1;  ///< index of unknown and row; -1 for parameter nodes
 };
 
-/// Reference to one scalar degree of freedom of a node. Spec 01 section 6.9.
+/// Reference to one scalar dof of a node (MBDyn input manual, "node degrees of freedom").
 struct NodeDof {
   bool structural = false;
   int node = -1;      ///< index among the structural or the scalar nodes

@@ -1,4 +1,4 @@
-/// Private data of structural nodes. Spec 01 section 11.2.
+/// Private data of structural nodes (MBDyn input manual, "structural node", private data).
 #include <array>
 
 #include "model/model.h"

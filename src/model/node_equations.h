@@ -6,8 +6,8 @@
 ///   rows 7–9:   −ḃ + Σ f               = 0
 ///   rows 10–12: −(ġ_m + v × b) + Σ m   = 0      moments about the node
 ///
-/// Displacement nodes have rows 1–3 and 7–9 only. Source: MBDyn input manual, structural nodes;
-/// spec 02 section 6.3.
+/// Displacement nodes have rows 1–3 and 7–9 only. Source: MBDyn input manual and
+/// technical manual, structural nodes.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-/// Named real functions of one real variable. Spec 03 section 6.
+/// Named real functions of one real variable (MBDyn input manual, "scalar functions").
 #pragma once
 
 #include "math/dual.h"

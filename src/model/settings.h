@@ -1,5 +1,5 @@
-/// Settings of the `initial value` and `control data` blocks, with MBDyn's defaults. Spec 01
-/// sections 9 and 10.
+/// Settings of the `initial value` and `control data` blocks, with MBDyn's defaults
+/// (MBDyn input manual).
 #pragma once
 
 #include <optional>

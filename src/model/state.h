@@ -8,8 +8,8 @@
 
 namespace mbcosim {
 
-/// Orientation and angular velocity of one structural node (spec 02 section 6.2); index =
-/// structural node index. Plain arrays (column-major), so that a State is plain data.
+/// Orientation and angular velocity of one structural node; index = structural node index. Plain
+/// arrays (column-major), so that a State is plain data.
 struct NodeRotation {
   Mat3 R;      ///< current orientation, node frame -> global
   Mat3 R_ref;  ///< reference (predicted) orientation of this step; R = R(g) R_ref

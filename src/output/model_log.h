@@ -1,4 +1,4 @@
-/// The `.log` file: the model as read, for post-processors. Spec 02 section 11.3.
+/// The `.log` file: the model as read, for post-processors (MBDyn input manual, log file).
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// MBDyn's text result files: PREFIX.out, .log, .mov, .jnt, ... Spec 02 section 11.
+/// MBDyn's text result files: PREFIX.out, .log, .mov, .jnt, ... (its input manual, results).
 #pragma once
 
 #include <memory>

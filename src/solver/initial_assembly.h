@@ -1,11 +1,11 @@
 /// Initial assembly: moves nodes, held by weak springs, until position constraints and their rates
-/// hold. Spec 02 section 9.
+/// hold (MBDyn input manual, "control data", initial assembly). Newton with the true Jacobian.
 ///
-/// Unknowns: x, θ, v, w of every node, multipliers λ and λ′ of every participating element. Rows of
-/// a node:
-///   kp (x₀ − x) + loads,  −kp g(R R₀ᵀ) + moments,  kv (v₀ − v) + load rates,  kv (w₀ − w) + moment
-///   rates
-/// and for each constraint φ = 0, dφ/dt = 0. Newton with the true Jacobian.
+/// Unknowns: x, θ, v, w of every node, multipliers λ, λ′ of every participating element. Rows:
+///
+///   node        kp (x₀ − x) + loads,        −kp g(R R₀ᵀ) + moments
+///               kv (v₀ − v) + load rates,   kv (w₀ − w) + moment rates
+///   constraint  φ = 0,  dφ/dt = 0
 #pragma once
 
 #include "model/model.h"

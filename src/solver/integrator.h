@@ -1,13 +1,13 @@
-/// Linear multistep formulas for implicit first-order DAEs. Spec 02 section 2.
+/// Linear multistep formulas for implicit first-order DAEs.
 ///
 /// With y₁, ẏ₁ at the last accepted step, y₂, ẏ₂ one step earlier, α = h/h′:
 ///
 ///   differential   y = a1 y₁ + a2 y₂ + b0 ẏ + b1 ẏ₁ + b2 ẏ₂              c = b0
-///   algebraic      I = i0 y + i1 y₁ + i2 y₂ + j1 I₁   (I: running integral, kept in ẏ; used by the
-///   predictor only)
+///   algebraic      I = i0 y + i1 y₁ + i2 y₂ + j1 I₁
 ///
-/// Cubic predictor: ẏ = m0 y₁ + m1 y₂ + n0 ẏ₁ + n1 ẏ₂ (differential), y = n0 y₁ + n1 y₂ − m1 I₁
-/// (algebraic).
+/// I is a running integral, kept in ẏ, that only the cubic predictor uses:
+///   differential   ẏ = m0 y₁ + m1 y₂ + n0 ẏ₁ + n1 ẏ₂
+///   algebraic      y = n0 y₁ + n1 y₂ − m1 I₁
 ///
 /// Sources: P. Masarati, M. Lanz, P. Mantegazza, "Multistep integration of ordinary, stiff and
 /// differential-algebraic problems for multibody dynamics applications", XVI AIDAA Congress, 2001;

@@ -9,11 +9,10 @@
 
 namespace mbcosim {
 
-/// Loads L of one external code depend on the motion of what they act on. For n structural nodes, L
-/// = (F, M) of each, global components, moments about the nodes:
+/// Loads L of one external code depend on the motion of what they act on. For n structural nodes,
+/// L = (F, M) of each, global components, moments about the nodes, and R + δR = (1 + δθ×) R:
 ///
-///   δL = K (δx, δθ) + C (δv, δω)                                 K, C: 6n × 6n; R + δR = (1 + δθ×)
-///   R
+///   δL = K (δx, δθ) + C (δv, δω)         K, C: 6n × 6n
 ///
 /// or, for N amplitudes q of a modal joint, δL = K δq + C δq̇ (N × N). With δ the Newton corrections
 /// of the rates, δx = c δ, δv = δ, δθ = A δ, δω = B δ (NodeSeeds), so that the matrix J = −∂r/∂δ

@@ -1,4 +1,4 @@
-/// Newton iteration on one instant. Spec 02 section 4.
+/// Newton iteration on one instant (MBDyn input manual, "tolerance", "nonlinear solver").
 #pragma once
 
 #include <optional>

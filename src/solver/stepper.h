@@ -1,4 +1,4 @@
-/// Time stepping: the phases of a run and one attempt at a step. Spec 02 sections 2 to 6.
+/// Time stepping: the phases of a run and one attempt at a step.
 #pragma once
 
 #include <functional>

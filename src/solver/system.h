@@ -13,7 +13,7 @@ void compute_residual(const EvalContext& context, std::vector<double>& r);
 /// J = −∂r/∂δ into workspace.values; also computes the node seeds.
 void compute_jacobian(const EvalContext& context, Workspace& workspace);
 
-/// How node rotations depend on the Newton increments: A = c G(g), B = ∂w/∂δ. Spec 02 section 6.2.
+/// How node rotations depend on the Newton increments: A = c G(g), B = ∂w/∂δ.
 NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c);
 
 /// Refreshes R and w of every node from g, ġ and the references.

@@ -1,8 +1,8 @@
 /// Cost of a remote step on an open stream, beside an empty echo on a stream of the same messages
 /// and a step in this process.
 ///
-/// usage: remote_step ADDRESS [Google Benchmark options]      ADDRESS of a running mbcosimd; see
-/// remote_step.sh
+/// usage: remote_step ADDRESS [Google Benchmark options]
+/// ADDRESS is that of a running mbcosimd; see remote_step.sh.
 #include <benchmark/benchmark.h>
 #include <grpcpp/grpcpp.h>
 

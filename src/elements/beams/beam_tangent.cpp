@@ -39,8 +39,8 @@ Mat63 product(const Mat6& K, const Mat3& strain) {
 
 }  // namespace
 
-/// Derivatives of (F, M) at one evaluation point, global frame, with R the section's orientation, K
-/// = ∂(F, M)/∂(ε, κ) and D = ∂(F, M)/∂(ε̇, κ̇) rotated to it, [a]× the skew matrix of a. A node
+/// Derivatives of (F, M) at one evaluation point, global frame, with R the section's orientation,
+/// K = ∂(F, M)/∂(ε, κ) and D = ∂(F, M)/∂(ε̇, κ̇) rotated to it, [a]× the skew matrix of a. A node
 /// enters through its weights N and m N′ alone, so that all but its offset is computed once:
 ///
 ///   R δε = δl + [l]× δθ,   R δκ = δ(G r′) + [G r′]× δθ,   δθ = G δr

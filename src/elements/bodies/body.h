@@ -5,7 +5,7 @@
 
 namespace mbcosim {
 
-/// Rigid body on a six-dof node (MBDyn input manual, "body"; spec 02 section 7.1).
+/// Rigid body on a six-dof node (MBDyn input manual, "body").
 ///
 ///   S = R S₀ [kg·m],  J = R J₀ Rᵀ [kg·m²]  about the node, global axes
 ///   momentum definitions   −(m v + w × S),   −(J w + S × v)

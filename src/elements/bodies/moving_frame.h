@@ -10,9 +10,9 @@ namespace mbcosim {
 /// with ω₀, α₀ = dω₀/dt (components in the moving axes). The inertia loads of a part of mass m,
 /// first moment S and second moment J about the node are
 ///
-///   a_e = a₀ + α₀ × x + ω₀ × (ω₀ × x)                              acceleration of the frame at
-///   the node F  = −m a_e − α₀ × S − ω₀ × (ω₀ × S) − 2 ω₀ × (m v + w × S) M  = −S × a_e − J α₀ − ω₀
-///   × J ω₀ − 2 S × (ω₀ × v) + 2 w × P ω₀,  P = ½ tr(J) I − J = ∫ r rᵀ dm
+///   a_e = a₀ + α₀ × x + ω₀ × (ω₀ × x)         acceleration of the frame at the node
+///   F   = −m a_e − α₀ × S − ω₀ × (ω₀ × S) − 2 ω₀ × (m v + w × S)
+///   M   = −S × a_e − J α₀ − ω₀ × J ω₀ − 2 S × (ω₀ × v) + 2 w × P ω₀,  P = ½ tr(J) I − J = ∫r rᵀdm
 template <class B>
 struct InMovingFrame : B {
   explicit InMovingFrame(B body) : B(std::move(body)) {}

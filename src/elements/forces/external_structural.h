@@ -12,12 +12,12 @@ namespace mbcosim {
 /// force F_k and moment M_k about the point, global components, are held in State::memory while the
 /// equations are solved:
 ///
-///   on node n              F_k,  M_k + a_k × F_k                                  [N, N·m]
-///   on the reference node  F₀ − Σ F_k,  M₀ − Σ (M_k + (x_k − x_r) × F_k)          with `use
-///   reference node forces`
+///   on node n              F_k,  M_k + a_k × F_k                           [N, N·m]
+///   on the reference node  F₀ − Σ F_k,  M₀ − Σ (M_k + (x_k − x_r) × F_k)
 ///
-/// so that the peer then sends the total load of the points as F₀, M₀ and their distribution as
-/// F_k, M_k. Source: MBDyn input manual, structural forces, external.
+/// The second line holds with `use reference node forces`, so that the peer then sends the total
+/// load of the points as F₀, M₀ and their distribution as F_k, M_k. Source: MBDyn input manual,
+/// structural forces, external.
 class ExternalStructural : public GeneralElement {
  public:
   ExternalStructural(StructuralPort port, bool output_kinematics)

@@ -71,8 +71,8 @@ struct StructuralCouple {
 /// Force between two nodes: f = d(t) or R₁ d(t) on the first, −f on the second, each at its own
 /// arm.
 ///
-/// N.B. MBDyn's `absolute internal` takes moment +(R₂ a₁) × f on the second node; this one is −(R₂
-/// a₂) × f.
+/// N.B. MBDyn's `absolute internal` takes the moment +(R₂ a₁) × f on the second node; this one is
+/// −(R₂ a₂) × f.
 struct InternalForce {
   int first = -1, second = -1;
   Vec3 a1 = Vec3::Zero(), a2 = Vec3::Zero();  ///< arms, node frames [m]

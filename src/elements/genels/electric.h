@@ -14,8 +14,8 @@ namespace mbcosim {
 /// direction of its node, or the angular acceleration about it. With the own differential unknown
 /// q:
 ///
-///   translational  q = e · (v + w × R f),   row of y   q̇ − (w × e) · (v + w × R f) − y,   e = R e₀
-///   [m/s²] rotational     q = e · w,               row of y   q̇ − y [rad/s²]
+///   translational  q = e · (v + w × R f),  row of y  q̇ − (w × e) · (v + w × R f) − y  [m/s²]
+///   rotational     q = e · w,              row of y  q̇ − y  [rad/s²];  e = R e₀
 struct Accelerometer {
   int node = -1, output_node = -1;
   Vec3 e0 = Vec3::UnitX();  ///< unit direction, node frame

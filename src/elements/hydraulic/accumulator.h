@@ -13,12 +13,13 @@ namespace mbcosim {
 /// velocity v [m/s].
 ///
 ///   flow out of the node  ρ₀ A v   [kg/s]
-///   (m + w) v̇ − p A + p_g A + F₀ + K s + sgn(v) h/2 ρ₀ A (A/A_p)² v² + stops = 0,   h = h_in if ṡ
-///   > 0, else h_out ṡ − v = 0 p_g = P₀ (S/(S−s))^κ;  P₀ where s < 0,  P_max where s > s_max   (0
-///   without gas)
+///   (m + w) v̇ − p A + p_g A + F₀ + K s + sgn(v) h/2 ρ₀ A (A/A_p)² v² + stops = 0
+///   ṡ − v = 0
+///   p_g = P₀ (S/(S−s))^κ;  P₀ where s < 0,  P_max where s > s_max   (0 without gas)
 ///
-/// with stops at 0 and s_max = 0.999 S − S (P₀/P_max)^{1/κ} (0.999 S without gas). N.B.: `weight` w
-/// is an added mass, not a force. Source: MBDyn input manual, hydraulic accumulator.
+/// with h = h_in if ṡ > 0, else h_out, stops at 0 and s_max = 0.999 S − S (P₀/P_max)^{1/κ} (0.999 S
+/// without gas). N.B.: `weight` w is an added mass, not a force. Source: MBDyn input manual,
+/// hydraulic accumulator.
 struct Accumulator {
   struct Gas {
     double P0, P_max;  ///< [Pa]

@@ -14,10 +14,10 @@ namespace mbcosim {
 ///   d  = x₂ + R₂ f₂ − x₁ − R₁ f₁
 ///   l  = e · d,   l̇ = e · (v₂ + w₂ × R₂ f₂ − v₁ − w₁ × R₁ f₁) + d · (w₁ × e)
 ///   V₁ = A₁ l,    V₂ = A₂ (L − l)
-///   own unknowns  P₁, P₂ [Pa], copies of the node pressures that have rates:  p₁ − P₁ = 0,  p₂ −
-///   P₂ = 0 force on the piston at its node   F = (A₁ p₁ − A₂ p₂) e, moment (R₂ f₂) × F; on the
-///   cylinder −F, −(R₁ f₁) × F flow out of the hydraulic nodes   q₁ = A₁ (ρ₁′ Ṗ₁ l + ρ₁ l̇),  q₂ =
-///   A₂ (ρ₂′ Ṗ₂ (L − l) − ρ₂ l̇)   [kg/s]
+///   own unknowns  P₁, P₂ [Pa], copies of the node pressures that have rates
+///   rows          p₁ − P₁ = 0,  p₂ − P₂ = 0
+///   loads         piston F, (R₂ f₂) × F;  cylinder −F, −(R₁ f₁) × F;  F = (A₁ p₁ − A₂ p₂) e
+///   outflows      q₁ = A₁ (ρ₁′ Ṗ₁ l + ρ₁ l̇),  q₂ = A₂ (ρ₂′ Ṗ₂ (L − l) − ρ₂ l̇)   [kg/s]
 ///
 /// N.B.: the moment on the cylinder uses f₁ only, so moments balance only while the joints make the
 /// nodes slide along e. There are no end stops, friction, leakage or mass. Source: MBDyn input

@@ -18,9 +18,9 @@ namespace mbcosim {
 ///
 ///   node 1     q_m + (A L/8) b₁ (3 Ṗ₁ + Ṗ₂)           flow out of the node
 ///   node 2    −q_m + (A L/8) b₂ (Ṗ₁ + 3 Ṗ₂)
-///   1st half  (L/8)(3 q̇₁ + q̇₂) + q_m²/(ρ₀A) − q₁²/(ρ₁A) + (A/2)(P₂−P₁) + g(¾q₁+¼q₂)/½(ρ₁+ρ₀) = 0
-///   [N] 2nd half  (L/8)(q̇₁ + 3 q̇₂) + q₂²/(ρ₂A) − q_m²/(ρ₀A) + (A/2)(P₂−P₁) + g(¼q₁+¾q₂)/½(ρ₀+ρ₂) =
-///   0 ends      p₁ − P₁ = 0,  p₂ − P₂ = 0
+///   1st half  (L/8)(3q̇₁ + q̇₂) + q_m²/(ρ₀A) − q₁²/(ρ₁A) + (A/2)(P₂−P₁) + g(¾q₁+¼q₂)/½(ρ₁+ρ₀) = 0
+///   2nd half  (L/8)(q̇₁ + 3q̇₂) + q₂²/(ρ₂A) − q_m²/(ρ₀A) + (A/2)(P₂−P₁) + g(¼q₁+¾q₂)/½(ρ₀+ρ₂) = 0
+///   ends      p₁ − P₁ = 0,  p₂ − P₂ = 0                (halves: [N])
 ///
 /// g: PipeGeometry::friction in the regime of q_m. N.B.: an initial flow q₀ means q₁ = q₀ and q₂ =
 /// −q₀, as MBDyn has it. Source: MBDyn input manual, hydraulic dynamic pipe.

@@ -11,8 +11,8 @@ namespace mbcosim {
 ///
 ///   C_c = 0.6005 + 0.1707 r + 0.158 r² − 0.4971 r³ + 0.4855 r⁴
 ///   C_d = 0.98 C_c / √(1 − (C_c r)²)
-///   Δp_cr = A_p Re_cr (μ/(D δ))² / (2 ρᵢ A_d)             ρᵢ at the mean of the declared node
-///   pressures
+///   Δp_cr = A_p Re_cr (μ/(D δ))² / (2 ρᵢ A_d)
+///   ρᵢ = ρ at the mean of the declared node pressures
 ///
 ///   |Δp| < Δp_cr   q = 2 δ² D A_d ρ Δp / μ
 ///   |Δp| ≥ Δp_cr   q = C_d A_d ρ sgn(Δp) √(2 |Δp|/ρ)

@@ -59,11 +59,11 @@ struct PressureValve {
 
 /// Flow control valve; own unknowns as PressureValve.
 ///
-///   q₁₂ = C_d W s sgn(p₁−p₂) √(2 ρ₀ |p₁−p₂|),  q₁₃ = C_d A_d sgn(p₁−p₃) √(2 ρ₀ |p₁−p₃|)   [kg/s],
-///   C_d = 0.6 m v̇ − (p₁ − p₃) A + F₀ + K s + sgn(ṡ) 0.01 ρ₀ (ṡ A/A_p)² + stops = 0 ṡ − v = 0
-///
-/// N.B.: the damping term has no area factor, as in MBDyn. Source: MBDyn input manual, hydraulic
-/// flow valve.
+///   q₁₂ = C_d W s sgn(p₁−p₂) √(2 ρ₀ |p₁−p₂|),  q₁₃ = C_d A_d sgn(p₁−p₃) √(2 ρ₀ |p₁−p₃|)   [kg/s]
+///   m v̇ − (p₁ − p₃) A + F₀ + K s + sgn(ṡ) 0.01 ρ₀ (ṡ A/A_p)² + stops = 0
+///   ṡ − v = 0
+/// with C_d = 0.6. N.B.: the damping term has no area factor, as in MBDyn. Source: MBDyn input
+/// manual, hydraulic flow valve.
 struct FlowValve {
   int node1, node2, node3;
   double damping_area;   ///< A_d [m²]

@@ -10,10 +10,11 @@ namespace mbcosim {
 /// Spool of mass M = 1.175 π D³ ρ_v that a force moves; own unknowns (differential): position s [m]
 /// and velocity v [m/s].
 ///
-///   s > 0:  A₁₂ = A₃₄ = A_min + s W,  A₁₃ = A₂₄ = A_min;    s ≤ 0:  A₁₂ = A₃₄ = A_min,  A₁₃ = A₂₄
-///   = A_min − s W qᵢⱼ = C_d Aᵢⱼ sgn(pᵢ−pⱼ) √(2 ρ₀ |pᵢ−pⱼ|),   A_min = k W s_max,  C_d = 0.611
-///   [kg/s] M v̇ + C ṡ + K s + stops − force(t) = 0,   C = 0.4 D C_d W √(ρ₀ p₁),  K = 0.43 W p₁ ṡ −
-///   v = 0
+///   s > 0:  A₁₂ = A₃₄ = A_min + s W,  A₁₃ = A₂₄ = A_min
+///   s ≤ 0:  A₁₂ = A₃₄ = A_min,        A₁₃ = A₂₄ = A_min − s W
+///   qᵢⱼ = C_d Aᵢⱼ sgn(pᵢ−pⱼ) √(2 ρ₀ |pᵢ−pⱼ|) [kg/s],   A_min = k W s_max,  C_d = 0.611
+///   M v̇ + C ṡ + K s + stops − force(t) = 0,   C = 0.4 D C_d W √(ρ₀ p₁),  K = 0.43 W p₁
+///   ṡ − v = 0
 ///
 /// with stops at ±s_max. N.B.: p₁ enters as it is (10 Pa if it is 0): results depend on the datum
 /// of pressures and p₁ < 0 gives NaN.

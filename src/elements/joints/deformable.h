@@ -55,8 +55,8 @@ struct DeformableHinge : HingeMotion, LawUser<DeformableHinge, 3> {
   double own_datum(const Local<double>& u, int datum) const;
 };
 
-/// Deformable displacement joint: f = law(d, ḋ), F = H₁ f; loads node 1 (F, s × F), node 2 (−F, −f₂
-/// × F).
+/// Deformable displacement joint: f = law(d, ḋ), F = H₁ f;
+/// loads node 1 (F, s × F), node 2 (−F, −f₂ × F).
 struct DeformableDisplacement : HingeMotion, LawUser<DeformableDisplacement, 3> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;

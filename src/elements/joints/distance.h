@@ -6,9 +6,9 @@ namespace mbcosim {
 
 /// Distance: two points stay D(t) apart.
 ///
-///   unknowns    u: unit vector from point 1 to point 2 (3), a: force [N], traction positive;  T =
-///   a u loads       node 1 (T, f₁ × T), node 2 (−T, −f₂ × T) rows        x₁ + f₁ − x₂ − f₂ + D u
-///   [m],  1 − |u|     (not divided by c)
+///   unknowns    u: unit vector from point 1 to point 2 (3), a: force [N], traction positive
+///   loads       T = a u;  node 1 (T, f₁ × T), node 2 (−T, −f₂ × T)
+///   rows        x₁ + f₁ − x₂ − f₂ + D u [m],  1 − |u|     (not divided by c)
 struct Distance : TwoAttachments, NamedData<Distance> {
   DrivePtr length;  ///< D [m]
   bool offsets = false;
@@ -37,8 +37,8 @@ struct Distance : TwoAttachments, NamedData<Distance> {
   }
   void tangent(const Local<double>& u, Tangent& t) const;
   /// The initial assembly holds the length D(t₀): its rate is taken as zero, as in the reference
-  /// solver. Without offsets the rate level is b u on the velocities and (v₁ − v₂)·u = 0, with u′ =
-  /// u as a placeholder.
+  /// solver. Without offsets the rate level is b u on the velocities and (v₁ − v₂)·u = 0; u′ takes
+  /// no part in it, so that its rows are u′ − u = 0.
   void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const;
   void start(Start& s) const;
   void output(const Local<double>& u, OutputRow& row) const;

@@ -48,8 +48,8 @@ struct InLine : TwoAttachments, NamedData<InLine> {  // a: p and Rv, b: q
 
 /// In plane: a point of node 2 stays on the plane through p with normal v = R₁ n.
 ///
-///   s = x₂ + q − x₁;  unknown F [N];  loads node 1 (v F, s × v F), node 2 (−v F, −q × v F);  row
-///   (n·p − v·s)/c
+///   s = x₂ + q − x₁;  unknown F [N];  row (n·p − v·s)/c
+///   loads node 1 (v F, s × v F), node 2 (−v F, −q × v F)
 struct InPlane : TwoAttachments, NamedData<InPlane> {  // a: p, b: q
   Vec3 normal = Vec3::UnitZ();                         ///< in the frame of node 1
 
@@ -147,8 +147,8 @@ inline Vec<TimeDual> constant_arm(const Vec<TimeDual>& arm) {
 
 /// Drive displacement: a point of node 2 stays at the point f₁ + δ of node 1.
 ///
-///   p = R₁(f₁ + δ);  unknowns F [N] global;  loads node 1 (F, p × F), node 2 (−F, −f₂ × F);  rows
-///   −(x₂ + f₂ − x₁ − p)/c
+///   p = R₁(f₁ + δ);  unknowns F [N] global;  rows −(x₂ + f₂ − x₁ − p)/c
+///   loads node 1 (F, p × F), node 2 (−F, −f₂ × F)
 struct DriveDisplacement : TwoAttachments, NamedData<DriveDisplacement> {
   Vec3DrivePtr delta;  ///< in the frame of node 1 [m]
 

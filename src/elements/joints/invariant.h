@@ -46,8 +46,8 @@ struct InvariantMotion : HingeMotion {
   }
 };
 
-/// Invariant deformable hinge: m = law(θ, Ĥᵀ(w₂ − w₁)), M = Ĥ m; loads node 1 (0, M), node 2 (0,
-/// −M).
+/// Invariant deformable hinge: m = law(θ, Ĥᵀ(w₂ − w₁)), M = Ĥ m;
+/// loads node 1 (0, M), node 2 (0, −M).
 struct InvariantHinge : InvariantMotion, LawUser<InvariantHinge, 3> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;

@@ -6,9 +6,10 @@ namespace mbcosim {
 
 /// Screw: advance along an axis of node 1 in proportion to the rotation about it.
 ///
-///   e = axis 3 of H₁ = R₁ Rh, φ = vec(R₁ᵀR₂), θ = e·φ + 2π·turns, d = x₂ + R₂ q − x₁ − R₁ p, h =
-///   pitch/2π unknown     F [N];  row (h θ − e·d)/c loads       node 2 (F e, R₂q × F e − h F g), g
-///   = R₁ Γ⁻ᵀ(φ) e;  node 1: −F e, −s × F e + h F (g − e × φ),  s = x₂ + R₂ q − x₁
+///   e = axis 3 of H₁ = R₁ Rh, φ = vec(R₁ᵀR₂), θ = e·φ + 2π·turns, s = x₂ + R₂ q − x₁, d = s − R₁ p
+///   unknown     F [N];  row (h θ − e·d)/c,  h = pitch/2π
+///   loads       node 2 (F e, R₂q × F e − h F g), node 1 (−F e, −s × F e + h F (g − e × φ))
+///               with g = R₁ Γ⁻ᵀ(φ) e
 ///
 /// As in MBDyn the components of e are global and those of φ are of node 1, so that a node 1 that
 /// is not aligned with the global frame changes the effective pitch; the loads are those that do no

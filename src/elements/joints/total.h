@@ -76,8 +76,8 @@ struct TotalMemory {
 ///
 ///   unknowns    the constrained components of F̃ [N], then of M̃ [N·m]
 ///   loads       node 1 (F, M + s × F), node 2 (−F, −(M + f₂ × F))
-///   rows        position −(Pᵀs − R₁hᵀf₁ − X_d)/c,  velocity −(Pᵀ(s × w₁ + v₂ − f₂ × w₂ − v₁) −
-///   X_d)
+///   rows        position −(Pᵀs − R₁hᵀf₁ − X_d)/c
+///               velocity −(Pᵀ(s × w₁ + v₂ − f₂ × w₂ − v₁) − X_d)
 ///               rotation −vec(Q₁ᵀQ₂ Rot(θ0)ᵀ)/c,   angular velocity −(Q₁ᵀ(w₂ − w₁) − θ_d)
 ///
 /// θ0 = θ_d when all rotations are constrained; otherwise its free components are the remnant of

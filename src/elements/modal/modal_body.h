@@ -5,8 +5,8 @@
 ///
 ///   m = Σ m_i              S0 = Σ m_i f_i              J0 = Σ (J_i − m_i f_i× f_i×)
 ///   Inv3 = Σ m_i U_i       Inv4 = Σ (m_i f_i× U_i + J_i V_i)        Inv5_jk = Σ m_i U_ij × U_ik
-///   Inv8_j = −Σ m_i f_i× U_ij×   Inv9_jk = Σ m_i U_ij× U_ik×   Inv10_j = Σ V_ij× J_i   Inv11 = Σ
-///   J_i V_i
+///   Inv8_j = −Σ m_i f_i× U_ij×               Inv9_jk = Σ m_i U_ij× U_ik×
+///   Inv10_j = Σ V_ij× J_i                    Inv11 = Σ J_i V_i
 ///
 /// Source: MBDyn input manual, modal joint; Masarati, "MBDyn technical manual", modal joint.
 #pragma once

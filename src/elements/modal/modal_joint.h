@@ -8,14 +8,14 @@
 ///
 ///   1–3    v − ẋ = 0                       4–6   w − w(g, ġ) = 0
 ///   force  −R [ m v̇ − S × ẇ + ω × (ω × S) + Inv3 ṗ + 2 ω × Inv3 p ] + m γ − Σ F_k = 0
-///   moment −R [ S × v̇ + J ẇ + ω × J ω + B ṗ + 2 (A8p − A9p) ω + (A10p + A10pᵀ) ω + R (ω × Inv11 p)
-///   ] + S × γ
+///   moment −R [ S × v̇ + J ẇ + ω × J ω + B ṗ + 2 (A8p − A9p) ω + (A10p + A10pᵀ) ω
+///             + R (ω × Inv11 p) ] + S × γ
 ///          − Σ (d_k × F_k + R_k μ_k) = 0     (v̇, ẇ in floating axes inside the brackets)
 ///   q      p − q̇ = 0
 ///   mode j −(Mgen ṗ + C p + Kgen q)_j − Inv3_j·(v̇ − γ) − B_j·ẇ − 2 A5p_j·ω
 ///          + ωᵀ (Inv8_jᵀ − Σ q_k Inv9_jk + Inv10_j) ω − Σ (U_kjᵀ Rᵀ F_k + V_kjᵀ Rᵀ R_k μ_k) = 0
-///   node k (x_k + R_k o_k − x − d_k)/c = 0,   −vec(R_kᵀ R (1 + (V_k q)×))/c = 0,   d_k = R (f_k +
-///   U_k q)
+///   node k (x_k + R_k o_k − x − d_k)/c = 0,   −vec(R_kᵀ R (1 + (V_k q)×))/c = 0
+///          with d_k = R (f_k + U_k q)
 ///
 /// F [N] is the force on the interface node in global axes, μ [N·m] the couple on it in the node's
 /// axes, γ the gravity acceleration. N.B. the factor R before (ω × Inv11 p) is what MBDyn does;

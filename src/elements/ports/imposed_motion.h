@@ -11,11 +11,10 @@ namespace mbcosim {
 /// external side:
 ///
 ///   on node k     −λ_k,  −μ_k
-///   constraint    (x_k − x̄_k)/c = 0,   ax(R_k R̄_kᵀ)/c = 0       ax A: axial vector of the skew
-///   part
+///   constraint    (x_k − x̄_k)/c = 0,   ax(R_k R̄_kᵀ)/c = 0
 ///
-/// Until something is written, the nodes stay where the initial assembly left them. Takes no part
-/// in the assembly.
+/// with ax A the axial vector of the skew part of A. Until something is written, the nodes stay
+/// where the initial assembly left them. Takes no part in the assembly.
 class ImposedMotion : public GeneralElement, public PortElement {
  public:
   static constexpr int kInputs = 12;  ///< x̄ (3), R̄ by rows (9)

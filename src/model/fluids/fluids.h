@@ -28,10 +28,11 @@ class LinearCompressibleFluid final : public Fluid {
 
 /// Liquid that turns into vapour around p_c = 20265 Pa:
 ///
-///   ρ = r₀ + ρ₀/2 (1 + tanh(a (p − p_c))) + [p > p_c] (p − p_c) ρ₀/β,   r₀ = 9.77 kg/m³,  a =
-///   2·10⁻⁵ 1/Pa μ below p_c is 10⁻⁶ of its value above
+///   ρ = r₀ + ρ₀/2 (1 + tanh(a (p − p_c))) + [p > p_c] (p − p_c) ρ₀/β
+///   r₀ = 9.77 kg/m³,  a = 2·10⁻⁵ 1/Pa
 ///
-/// The constants are fixed and the reference pressure has no effect, so ρ(p_ref) is not ρ₀.
+/// μ below p_c is 10⁻⁶ of its value above. The constants are fixed and the reference pressure has
+/// no effect, so ρ(p_ref) is not ρ₀.
 class SuperFluid final : public Fluid {
  public:
   SuperFluid(double rho0, double mu, double bulk_modulus)

@@ -3,15 +3,14 @@
 ///
 /// A family joins with one case per type:
 ///
-///   struct SphericalHingeCase {
-///     using Element = SphericalHinge;
-///     static constexpr bool ideal = true;     // multiplier columns = transposed constraint rows
-///     static constexpr bool balanced = true;  // loads of both nodes are in balance
-///     static Element make(Bench& bench);      // constraints are satisfied in the bench's input
-///     configuration
-///   };
-///   INSTANTIATE_TYPED_TEST_SUITE_P(Joints, ElementConformance, testing::Types<SphericalHingeCase,
-///   ...>);
+///     struct SphericalHingeCase {
+///       using Element = SphericalHinge;
+///       static constexpr bool ideal = true;     // multiplier columns = transposed constraint rows
+///       static constexpr bool balanced = true;  // loads of both nodes are in balance
+///       static Element make(Bench& bench);      // its constraints hold in the bench's state
+///     };
+///     INSTANTIATE_TYPED_TEST_SUITE_P(Joints, ElementConformance,
+///                                    testing::Types<SphericalHingeCase, …>);
 #pragma once
 
 #include <gtest/gtest.h>

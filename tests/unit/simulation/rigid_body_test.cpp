@@ -134,7 +134,7 @@ TEST(ImplicitEuler, IsFirstOrderOnTheTumblingBody) {
 }
 
 TEST(FreeBody, ReferenceSolverNumbers) {
-  // Spec 02 section 15.1: offset mass, nutation, ms .6.
+  // Offset mass, nutation, ms .6; figures of the reference solver.
   BodyCase s;
   s.h = 1e-2;
   s.tolerance = 1e-11;
