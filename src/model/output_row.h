@@ -45,6 +45,9 @@ const char* extension(OutputFile file);  ///< "mov", ...
 class OutputRow {
  public:
   virtual ~OutputRow() = default;
+  /// Does the format name its fields, so that elements may choose them (`custom output`)? The text
+  /// formats have fixed columns.
+  virtual bool has_named_fields() const { return false; }
   /// Starts the line of `label`, right-aligned in 8 columns (not padded in .frc).
   virtual void begin(OutputFile file, int label) = 0;
   /// Starts a line with a composite label that is written as it is, e.g. "      10.1" in .mod,

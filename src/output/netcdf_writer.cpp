@@ -4,7 +4,6 @@
 #include <set>
 #include <unordered_map>
 
-#include "model/detailed_row.h"
 #include "output/netcdf_file.h"
 #include "output/record.h"
 
@@ -54,9 +53,11 @@ struct Field {
   std::vector<std::size_t> shape;
 };
 
-class NetcdfWriter : public ResultWriter, public OutputRow, public DetailedRow {
+class NetcdfWriter : public ResultWriter, public OutputRow {
  public:
   explicit NetcdfWriter(const std::string& prefix) : prefix_(prefix) {}
+
+  bool has_named_fields() const override { return true; }
 
   void begin(const Model& model) override {
     model_ = &model;

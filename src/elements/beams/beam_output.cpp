@@ -2,7 +2,6 @@
 #include <sstream>
 
 #include "elements/beams/beam.h"
-#include "model/detailed_row.h"
 
 namespace mbcosim {
 
@@ -40,8 +39,7 @@ std::string orientation_name(OrientationDescription description) {
 template <int Nodes>
 void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
   using Field = BeamOutput::Field;
-  const bool free_choice = dynamic_cast<DetailedRow*>(&row) != nullptr;
-  const unsigned chosen = free_choice ? fields.chosen : Field::force | Field::moment;
+  const unsigned chosen = row.has_named_fields() ? fields.chosen : Field::force | Field::moment;
   const OrientationDescription description =
       fields.description.value_or(u.model().control.orientation);
   row.begin(OutputFile::act, u.label());
