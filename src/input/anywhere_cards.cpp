@@ -29,7 +29,7 @@ void read_denavit_hartenberg(DeckCard& card, ReferenceFrame& f) {
   if (card.keyword("reference") && !card.keyword("global")) {
     const int l = card.label("reference frame label");
     const auto found = card.deck().frames.find(l);
-    if (found == card.deck().frames.end()) card.deck().undefined(card, "reference frame", l);
+    if (found == card.deck().frames.end()) card.fail_undefined(card.last(), "reference frame", l);
     base = card.model().frames[found->second];
   }
   const double d = card.real("d"), theta = card.real("theta"), a = card.real("a"),
@@ -145,7 +145,8 @@ void read_template_drive_caller(DeckCard& card) {
   else if (shape == "6x6")
     store(deck.drives66, [&] { return card.mat6_drive("matrix drive"); });
   else
-    card.fail("unknown dimension \"" + shape + "\"; accepted: 1, 3, 6, \"3x3\", \"6x6\"");
+    card.fail("unknown dimension \"" + shape + "\"; accepted: 1, 3, 6, \"3x3\", \"6x6\"", "",
+              "unknown-word");
 }
 
 // ------------------------------------------------------------------------------------------------

@@ -28,6 +28,9 @@ struct Named {
 template <class T>
 using LabelMap = std::unordered_map<int, Named<T>>;
 
+/// "joint 3 is not defined"
+std::string undefined_text(const std::string& kind, int label);
+
 /// Which entities write results when their card does not say (`default output`).
 struct OutputDefaults {
   bool structural = true, accelerations = false;
@@ -84,9 +87,8 @@ struct Deck {
   std::map<std::string, std::set<int>, std::less<>> damaged;
   std::set<std::string, std::less<>> damaged_kinds;  ///< a definition without a readable label
   void damage(const std::string& kind, int label);
-  /// Does "<kind> <label> is not defined" follow from a definition that was refused?
-  bool was_refused(std::string_view message) const;
-  [[noreturn]] void undefined(DeckCard& card, std::string_view kind, int label);
+  /// Was the definition of this entity, or one of its kind without a readable label, refused?
+  bool was_refused(const std::string& kind, int label) const;
   [[noreturn]] void redefined(DeckCard& card, std::string_view kind, int label, SourceSpan before);
 
   /// Counts one more entity of `kind`; refused when it is more than the deck declared.

@@ -23,17 +23,6 @@ bool same_word(std::string_view found, std::string_view word) {
   return i == found.size();
 }
 
-/// Stable identifier of an error of a card, by the few wordings that all cards share.
-const char* code_of(std::string_view message) {
-  if (message.ends_with(" is not defined")) return "undefined";
-  if (message.find(" already defined at ") != std::string_view::npos) return "redefinition";
-  if (message.starts_with("unknown ")) return "unknown-word";
-  if (message.starts_with("unexpected argument")) return "unexpected-argument";
-  if (message.ends_with(" missing")) return "missing-argument";
-  if (message.find(" expected") != std::string_view::npos) return "wrong-argument";
-  return "card";
-}
-
 std::string text_of(double x) {
   char text[32];
   std::snprintf(text, sizeof text, "%.12g", x);
@@ -126,10 +115,10 @@ int DeckCard::required(std::string_view what, std::initializer_list<std::string_
   std::string list;
   for (const std::string& w : accepted) list += (list.empty() ? "" : ", ") + w;
   const std::string expected = std::string(what) + " expected (" + list + ")";
-  if (!more()) fail(expected + ", end of the card found");
+  if (!more()) fail(expected + ", end of the card found", "", "wrong-argument");
   const std::string found = peek_word();
-  if (found.empty()) fail_at(next(), expected);
-  fail_at(next(), expected + ", \"" + found + "\" found", suggestion(found, accepted));
+  if (found.empty()) fail_expected(expected);
+  fail_expected(expected + ", \"" + found + "\" found", suggestion(found, accepted));
 }
 
 std::string DeckCard::word(std::string_view what) {
@@ -156,12 +145,12 @@ DeckCard::Nesting::Nesting(DeckCard& card) : card_(card) {
 
 void DeckCard::need_numbers(std::string_view what, std::int64_t count) {
   if (count > static_cast<std::int64_t>(statement_.text.size()))
-    fail(std::string(what) + ": " + std::to_string(count) +
-         " numbers expected; the card has fewer");
+    fail(std::string(what) + ": " + std::to_string(count) + " numbers expected; the card has fewer",
+         "", "wrong-argument");
 }
 
 void DeckCard::need_argument(std::string_view what) {
-  if (!cursor_.more()) fail(std::string(what) + " missing");
+  if (!cursor_.more()) fail(std::string(what) + " missing", "", "missing-argument");
 }
 
 void DeckCard::refuse_word(std::string_view what) {
@@ -175,14 +164,13 @@ void DeckCard::refuse_word(std::string_view what) {
       "forever"};
   if (!kWords.count(w)) return;
   if (deck_.session.symbols.find(next_text())) return;
-  const SourceSpan where = next();
-  fail_at(where, std::string(what) + " expected, keyword \"" + w + "\" found");
+  fail_expected(std::string(what) + " expected, keyword \"" + w + "\" found");
 }
 
 Value DeckCard::value(std::string_view what) {
   need_argument(what);
   refuse_word(what);
-  if (cursor_.at_string()) fail_at(next(), std::string(what) + ": number expected, string found");
+  if (cursor_.at_string()) fail_expected(std::string(what) + ": number expected, string found");
   Value v = cursor_.expression(what);
   consumed();
   return v;
@@ -198,7 +186,7 @@ double DeckCard::real(std::string_view what, double fallback) {
   if (const double* x = std::get_if<double>(&v)) return *x;
   if (const std::int32_t* i = std::get_if<std::int32_t>(&v)) return *i;
   if (const bool* b = std::get_if<bool>(&v)) return *b ? 1 : 0;
-  fail(std::string(what) + ": number expected, string found");
+  fail(std::string(what) + ": number expected, string found", "", "wrong-argument");
 }
 
 int DeckCard::integer(std::string_view what, int fallback) {
@@ -276,12 +264,18 @@ std::string DeckCard::optional_name() { return keyword("name") ? quoted("name") 
 // ----------------------------------------------------------------------------------------------
 // errors and context
 
-void DeckCard::fail_at(SourceSpan where, const std::string& message, const std::string& hint) {
+void DeckCard::fail_at(SourceSpan where, const std::string& message, const std::string& hint,
+                       const char* code) {
   std::string text = message;
   if (!type_.empty() && text.starts_with(type_ + ": ")) text.erase(0, type_.size() + 2);
   if (!subject_.empty()) text = subject_ + ": " + text;
-  if (deck_.was_refused(message)) deck_.session.set_damaged(true);
-  deck_.session.fail(where, std::move(text), hint, code_of(message));
+  deck_.session.fail(where, std::move(text), hint, code);
+}
+
+void DeckCard::fail_undefined(SourceSpan where, const std::string& kind, int label,
+                              const std::string& hint) {
+  if (deck_.was_refused(kind, label)) deck_.session.set_damaged(true);
+  fail_at(where, undefined_text(kind, label), hint, "undefined");
 }
 
 void DeckCard::fail_unsupported(SourceSpan where, const std::string& word,
@@ -335,7 +329,7 @@ void DeckCard::expect_end() {
   const std::string_view text = next_text().substr(0, 40);
   const std::string w = peek_word();
   if (w == "scale") fail_at(where, "\"scale\" must precede \"output\"");
-  fail_at(where, "unexpected argument \"" + std::string(text) + "\"");
+  fail_at(where, "unexpected argument \"" + std::string(text) + "\"", "", "unexpected-argument");
 }
 
 void DeckCard::set_current(const std::string& name, double value) {

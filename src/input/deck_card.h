@@ -97,7 +97,9 @@ class DeckCard final : public Card, public BeamOutputDefault {
   SourceSpan last() const override { return cursor_.last(); }
   SourceSpan next() override { return cursor_.next(); }
   [[noreturn]] void fail_at(SourceSpan where, const std::string& message,
-                            const std::string& hint = "") override;
+                            const std::string& hint = "", const char* code = "card") override;
+  [[noreturn]] void fail_undefined(SourceSpan where, const std::string& kind, int label,
+                                   const std::string& hint = "") override;
   void warn_at(SourceSpan where, const std::string& message, const std::string& hint = "") override;
   void warn(const std::string& message, const std::string& hint = "") override;
 
@@ -233,6 +235,9 @@ class DeckCard final : public Card, public BeamOutputDefault {
   void read_order(NodeDof& dof, bool dynamic);
 
   Hint* take_hint(std::string_view name);
+  /// What `read` makes of the hint `name`, whose first word may be `form`; without one, `given`.
+  template <class Given, class Read>
+  Given from_hint(std::string_view name, std::string_view form, Given given, Read read);
   int sample(DeckCard& arguments, std::string_view what);
 
   Deck& deck_;

@@ -131,7 +131,7 @@ void DeckReader::check_order(DeckCard& card, Block block) {
 
 void DeckReader::begin(DeckCard& card) {
   Session& session = deck_.session;
-  if (!card.more()) card.fail("name of the block missing");
+  if (!card.more()) card.fail("name of the block missing", "", "missing-argument");
   const SourceSpan where = card.next();
   const std::string name = card.word("block");
   if (block_ != Block::none) {
@@ -150,9 +150,10 @@ void DeckReader::begin(DeckCard& card) {
     const Block latest = latest_;
     open(block, name, card.head());
     latest_ = latest;
-    card.fail_at(where, "unknown block \"" + name + "\"",
-                 suggestion(name, {"data", "initial value", "control data", "nodes", "drivers",
-                                   "elements"}));
+    card.fail_at(
+        where, "unknown block \"" + name + "\"",
+        suggestion(name, {"data", "initial value", "control data", "nodes", "drivers", "elements"}),
+        "unknown-word");
   }
   const std::string written = kBlockNames[static_cast<int>(block)];
   const Block latest = latest_;
@@ -164,11 +165,13 @@ void DeckReader::begin(DeckCard& card) {
     throw;
   }
   open(block, written, card.head());
-  if (card.more()) card.fail_at(card.next(), "unexpected argument after \"" + written + "\"");
+  if (card.more())
+    card.fail_at(card.next(), "unexpected argument after \"" + written + "\"", "",
+                 "unexpected-argument");
 }
 
 void DeckReader::end(DeckCard& card) {
-  if (!card.more()) card.fail("name of the block missing");
+  if (!card.more()) card.fail("name of the block missing", "", "missing-argument");
   const std::string name = card.word("block");
   if (block_ == Block::none) card.fail("\"end: " + name + "\" without its \"begin\"");
   const std::string open_name = name_, line = std::to_string(begun_.line);
@@ -181,7 +184,9 @@ void DeckReader::end(DeckCard& card) {
     card.fail_at(where, "block \"" + open_name + "\" (begun at line " + line +
                             ") closed by \"end: " + name + "\"");
   }
-  if (card.more()) card.fail_at(card.next(), "unexpected argument after \"" + open_name + "\"");
+  if (card.more())
+    card.fail_at(card.next(), "unexpected argument after \"" + open_name + "\"", "",
+                 "unexpected-argument");
 }
 
 void DeckReader::warn_about_rest(const Statement& last) {

@@ -72,7 +72,7 @@ const Registry::ElementReader& typed_reader(DeckCard& card, const Registry::Head
   const Registry& registry = card.registry();
   const std::string& word = card.statement().word;
   const std::string what = word + " type";
-  if (!card.more()) card.fail(what + " missing");
+  if (!card.more()) card.fail(what + " missing", "", "missing-argument");
   const SourceSpan where = card.next();
   const std::string type = card.peek_word();
   const auto reader = head.types.find(type);
@@ -81,11 +81,12 @@ const Registry::ElementReader& typed_reader(DeckCard& card, const Registry::Head
     info.type = registry.display.at(type);
     return reader->second;
   }
-  if (type.empty()) card.fail_at(where, what + " expected");
+  if (type.empty()) card.fail_expected(what + " expected");
   card.refuse_unsupported(where, word, type);
   std::vector<std::string> accepted;
   for (const auto& t : head.types) accepted.push_back(registry.display.at(t.first));
-  card.fail_at(where, "unknown " + what + " \"" + type + "\"", suggestion(type, accepted));
+  card.fail_at(where, "unknown " + what + " \"" + type + "\"", suggestion(type, accepted),
+               "unknown-word");
 }
 
 /// Label, duplicates, count and name: what all elements begin with.
@@ -196,7 +197,7 @@ void drive_existing(DeckCard& card, const Driven& driven) {
     card.fail("inner label " + std::to_string(label) + " differs from driven label " +
               std::to_string(driven.label));
   const ElementRef e = card.model().find_element(family, label);
-  if (!e.set) card.deck().undefined(card, family_name(family), label);
+  if (!e.set) card.fail_undefined(card.last(), family_name(family), label);
   ElementInfo& info = e.set->info(e.index);
   if (info.driven)
     card.fail(std::string(family_name(family)) + " " + std::to_string(label) +
@@ -219,7 +220,8 @@ void read_driven(DeckCard& card) {
     while (card.at_string());
   }
   if (!card.more())
-    card.fail("inner element missing", "e.g. driven: 1, <drive>, joint: 1, clamp, ...");
+    card.fail("inner element missing", "e.g. driven: 1, <drive>, joint: 1, clamp, ...",
+              "missing-argument");
   DeckCard inner(card.deck(), card.rest_as_statement());
   if (inner.statement().word == "existing") {
     if (!driven.hints.empty())
@@ -318,8 +320,7 @@ void read_bind(DeckCard& card) {
   ScalarNode& node = card.model().scalars[index];
   if (!e.set) {
     card.deck().bound_parameters.insert(index);
-    card.fail_at(
-        where, std::string(family_name(family)) + " " + std::to_string(label) + " is not defined");
+    card.fail_undefined(where, family_name(family), label);
   }
   if (!node.bound_to_element)
     card.fail("parameter node " + std::to_string(node.label) + " is not of kind \"element\"",
@@ -340,12 +341,10 @@ void read_output_card(DeckCard& card) {
   read_output_labels(card, [&](int first, int last) {
     if (first == last) {
       const ElementRef e = model.find_element(family, first);
-      const std::string problem =
-          std::string(family_name(family)) + " " + std::to_string(first) + " is not defined";
       if (e.set)
         e.set->info(e.index).output = true;
-      else if (!card.deck().was_refused(problem))
-        card.warn(problem);
+      else if (!card.deck().was_refused(family_name(family), first))
+        card.warn(undefined_text(family_name(family), first));
       return;
     }
     for (const ElementRef& e : model.elements) {

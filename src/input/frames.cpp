@@ -25,7 +25,7 @@ DeckCard::Frame DeckCard::node_frame(int node) const {
 DeckCard::Frame DeckCard::frame_of_label() {
   const int l = label("reference frame label");
   const auto found = deck_.frames.find(l);
-  if (found == deck_.frames.end()) deck_.undefined(*this, "reference frame", l);
+  if (found == deck_.frames.end()) fail_undefined(last(), "reference frame", l);
   const ReferenceFrame& f = deck_.builder.model().frames[found->second];
   return {f.x, f.R, f.v, f.w};
 }

@@ -94,10 +94,11 @@ Hint* DeckCard::take_hint(std::string_view name) {
 /// The next argument as an expression that is evaluated at each activation; its place in
 /// State::memory.
 int DeckCard::sample(DeckCard& arguments, std::string_view what) {
-  if (!arguments.more()) arguments.fail(std::string(what) + ": number expected in the hint");
+  if (!arguments.more())
+    arguments.fail(std::string(what) + ": number expected in the hint", "", "wrong-argument");
   if (registry().drives.count(arguments.peek_word()))
-    arguments.fail_at(arguments.next(), std::string(what) + ": a number is expected in the hint",
-                      "a hint sets a value that is constant while the element is active");
+    arguments.fail_expected(std::string(what) + ": a number is expected in the hint",
+                            "a hint sets a value that is constant while the element is active");
   const std::string text(arguments.next_text());
   arguments.skip();
   HintSample sample;
@@ -107,28 +108,31 @@ int DeckCard::sample(DeckCard& arguments, std::string_view what) {
   return sample.memory;
 }
 
-DrivePtr DeckCard::hinted(std::string_view name, DrivePtr given) {
+template <class Given, class Read>
+Given DeckCard::from_hint(std::string_view name, std::string_view form, Given given, Read read) {
   Hint* hint = take_hint(name);
   if (!hint) return given;
   DeckCard arguments(deck_, hint->arguments);
   arguments.set_subject(subject_);
-  arguments.keyword("const");
-  const int memory = sample(arguments, name);
+  arguments.keyword(form);
+  Given sampled = read(arguments);
   arguments.expect_end();
-  return std::make_shared<SampledDrive>(memory);
+  return sampled;
+}
+
+DrivePtr DeckCard::hinted(std::string_view name, DrivePtr given) {
+  return from_hint(name, "const", std::move(given), [&](DeckCard& arguments) {
+    return std::make_shared<SampledDrive>(sample(arguments, name));
+  });
 }
 
 Vec3DrivePtr DeckCard::hinted(std::string_view name, Vec3DrivePtr given) {
-  Hint* hint = take_hint(name);
-  if (!hint) return given;
-  DeckCard arguments(deck_, hint->arguments);
-  arguments.set_subject(subject_);
-  arguments.keyword("single");
-  int memory[3];
-  for (int& m : memory) m = sample(arguments, name);
-  DrivePtr factor = arguments.more() ? arguments.drive() : make_constant_drive(1);
-  arguments.expect_end();
-  return std::make_shared<SampledVec3Drive>(memory, std::move(factor));
+  return from_hint(name, "single", std::move(given), [&](DeckCard& arguments) {
+    int memory[3];
+    for (int& m : memory) m = sample(arguments, name);
+    DrivePtr factor = arguments.more() ? arguments.drive() : make_constant_drive(1);
+    return std::make_shared<SampledVec3Drive>(memory, std::move(factor));
+  });
 }
 
 }  // namespace mbcosim

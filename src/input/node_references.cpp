@@ -9,7 +9,7 @@ namespace mbcosim {
 int DeckCard::structural_node(NodeNeed need) {
   const int l = label("node label");
   const int node = deck_.builder.model().find_structural(l);
-  if (node < 0) deck_.undefined(*this, "structural node", l);
+  if (node < 0) fail_undefined(last(), "structural node", l);
   const StructuralNode& n = deck_.builder.model().structural[node];
   const std::string name = "structural node " + std::to_string(l);
   if (need != NodeNeed::any && n.is_dummy()) fail(name + " is a dummy node: it has no equations");
@@ -22,7 +22,7 @@ int DeckCard::structural_node(NodeNeed need) {
 int DeckCard::scalar_node(ScalarKind kind) {
   const int l = label("node label");
   const int node = deck_.builder.model().find_scalar(kind, l);
-  if (node < 0) deck_.undefined(*this, kind_names(kind_of(kind)).singular, l);
+  if (node < 0) fail_undefined(last(), kind_names(kind_of(kind)).singular, l);
   return node;
 }
 
@@ -40,7 +40,8 @@ void DeckCard::read_order(NodeDof& dof, bool dynamic) {
     default:
       fail_at(where,
               "\"algebraic\", \"differential\" or \"order\" expected after the node's degree of "
-              "freedom");
+              "freedom",
+              "", "wrong-argument");
   }
   dof.order = integer("order of the degree of freedom");
   if (dof.order < 0 || dof.order > (dynamic ? 2 : 1))
@@ -54,7 +55,7 @@ NodeDof DeckCard::structural_dof(int l, SourceSpan where) {
   NodeDof dof;
   dof.structural = true;
   dof.node = deck_.builder.model().find_structural(l);
-  if (dof.node < 0) deck_.undefined(*this, "structural node", l);
+  if (dof.node < 0) fail_undefined(last(), "structural node", l);
   const StructuralNode& n = deck_.builder.model().structural[dof.node];
   if (n.is_dummy())
     fail_at(where, "structural node " + std::to_string(l) +
@@ -85,7 +86,7 @@ NodeDof DeckCard::node_dof(bool with_order) {
   const ScalarKind kind = static_cast<ScalarKind>(type - 1);
   NodeDof dof;
   dof.node = deck_.builder.model().find_scalar(kind, l);
-  if (dof.node < 0) deck_.undefined(*this, kind_names(kind_of(kind)).singular, l);
+  if (dof.node < 0) fail_undefined(last(), kind_names(kind_of(kind)).singular, l);
   dof.differential =
       kind != ScalarKind::parameter && deck_.builder.model().scalars[dof.node].differential;
   if (with_order && dof.differential)
@@ -106,7 +107,7 @@ void DeckCard::refuse_order(const std::string& reason) {
 ElementRef DeckCard::element(Family family) {
   const int l = label("element label");
   const ElementRef e = deck_.builder.model().find_element(family, l);
-  if (!e.set) deck_.undefined(*this, family_name(family), l);
+  if (!e.set) fail_undefined(last(), family_name(family), l);
   return e;
 }
 
@@ -129,7 +130,7 @@ Family DeckCard::element_family(std::string_view what) {
     if (keyword(accepted[f])) return static_cast<Family>(f);
   for (const auto& entry : registry().heads) accepted.push_back(entry.first);
   fail_at(next(), "unknown " + std::string(what) + (w.empty() ? "" : " \"" + w + "\""),
-          suggestion(w, accepted));
+          suggestion(w, accepted), "unknown-word");
 }
 
 }  // namespace mbcosim

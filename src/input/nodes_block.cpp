@@ -76,18 +76,20 @@ void read_output_card(DeckCard& card) {
     node.output = true;
     node.accelerations |= accelerations;
   };
+  const std::string kind =
+      std::string(type == 0 ? "structural" : kind_name(static_cast<ScalarKind>(type - 1))) +
+      " node";
   read_output_labels(card, [&](int first, int last) {
     if (first == last) {
       const int index = type == 0 ? model.find_structural(first)
                                   : model.find_scalar(static_cast<ScalarKind>(type - 1), first);
-      if (index < 0)
-        card.warn(
-            std::string(type == 0 ? "structural" : kind_name(static_cast<ScalarKind>(type - 1))) +
-            " node " + std::to_string(first) + " is not defined");
-      else if (type == 0)
+      if (index < 0) {
+        if (!card.deck().was_refused(kind, first)) card.warn(undefined_text(kind, first));
+      } else if (type == 0) {
         mark_structural(model.structural[index]);
-      else
+      } else {
         model.scalars[index].output = true;
+      }
       return;
     }
     const auto in_range = [&](int label) { return label >= first && label <= last; };

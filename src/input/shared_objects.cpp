@@ -48,10 +48,10 @@ std::vector<std::string> written_words(const Map& table, const Registry& registr
 constexpr int kMostChainedDrives = 1000;  // evaluation recurses along the chain
 
 template <class T>
-const T& labelled(DeckCard& card, const LabelMap<T>& map, std::string_view kind) {
-  const int label = card.label(std::string(kind) + " label");
+const T& labelled(DeckCard& card, const LabelMap<T>& map, const std::string& kind) {
+  const int label = card.label(kind + " label");
   const auto found = map.find(label);
-  if (found == map.end()) card.deck().undefined(card, kind, label);
+  if (found == map.end()) card.fail_undefined(card.last(), kind, label);
   return found->second.object;
 }
 
@@ -63,7 +63,7 @@ void DeckCard::fail_word(std::string_view what, const std::string& word, const T
   const SourceSpan where = next();
   refuse_unsupported(where, context, word);
   fail_at(where, "unknown " + std::string(what) + " \"" + word + "\"",
-          suggestion(word, written_words(table, registry())));
+          suggestion(word, written_words(table, registry())), "unknown-word");
 }
 
 // ----------------------------------------------------------------------------------------------
@@ -84,7 +84,7 @@ DrivePtr DeckCard::constant_drive(std::string_view what) {
 DrivePtr DeckCard::drive_reference() {
   const int label = this->label("drive caller label");
   const auto found = deck_.drives.find(label);
-  if (found == deck_.drives.end()) deck_.undefined(*this, "drive caller", label);
+  if (found == deck_.drives.end()) fail_undefined(last(), "drive caller", label);
   drive_depth_ = std::max(drive_depth_, nesting_ + deck_.drive_depth[label]);
   if (drive_depth_ > kMostChainedDrives)
     fail("the chain of drives behind drive caller " + std::to_string(label) + " is too long");
@@ -98,8 +98,8 @@ DrivePtr DeckCard::drive(std::string_view what) {
     return make_constant_drive(0);
   }
   if (at_string())
-    fail_at(next(), std::string(what) + ": drive expected, string found",
-            "write: string, \"<expression>\"");
+    fail_expected(std::string(what) + ": drive expected, string found",
+                  "write: string, \"<expression>\"");
   const Nesting nesting(*this);
   drive_depth_ = std::max(drive_depth_, nesting_);
   if (keyword("reference")) return drive_reference();
@@ -292,8 +292,8 @@ LawPtr<N> DeckCard::law_of() {
   if (N == 1 && linear != readers.end() && (w.empty() || deck_.session.symbols.find(next_text())))
     return linear->second(*this);
   if (w.empty())
-    fail_at(next(), "constitutive law expected, e.g. " +
-                        std::string(N == 1 ? "linear elastic" : "linear elastic generic"));
+    fail_expected("constitutive law expected, e.g. " +
+                  std::string(N == 1 ? "linear elastic" : "linear elastic generic"));
   refuse_word_of_other_dimension(*this, w, N);
   fail_word("constitutive law", w, readers, "law");
 }
@@ -308,15 +308,16 @@ LawPtr<6> DeckCard::law6() { return law_of<6>(); }
 ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceSpan where) {
   const Nesting nesting(*this);
   if (const auto known = deck_.function_places.find(name); known != deck_.function_places.end())
-    fail_at(where, "scalar function \"" + name + "\" already defined at " +
-                       deck_.session.place(known->second));
+    fail_at(
+        where,
+        "scalar function \"" + name + "\" already defined at " + deck_.session.place(known->second),
+        "", "redefinition");
   const std::string w = peek_word();
   const auto reader = registry().functions.find(w);
   if (reader == registry().functions.end()) {
-    if (!more()) fail("scalar function type missing");
+    if (!more()) fail("scalar function type missing", "", "missing-argument");
     if (w.empty())
-      fail_at(next(),
-              "scalar function type expected, e.g. const, linear, multilinear, cubic spline");
+      fail_expected("scalar function type expected, e.g. const, linear, multilinear, cubic spline");
     fail_word("scalar function", w, registry().functions, "function");
   }
   skip();
@@ -343,13 +344,14 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
     deck_.session.set_damaged(true);
   std::vector<std::string> names;
   for (const auto& f : deck_.session.functions) names.push_back(f.first);
-  fail_at(where, "scalar function \"" + name + "\" is not defined", suggestion(name, names));
+  fail_at(where, "scalar function \"" + name + "\" is not defined", suggestion(name, names),
+          "undefined");
 }
 
 FluidPtr DeckCard::fluid() {
   need_argument("hydraulic fluid");
   if (one_of({"hydraulic fluid", "fluid"}) < 0)
-    fail_at(next(), "the word \"fluid\" expected before the hydraulic fluid");
+    fail_expected("the word \"fluid\" expected before the hydraulic fluid");
   if (keyword("reference")) return labelled(*this, deck_.fluids, "hydraulic fluid");
   return fluid_definition();
 }
@@ -364,8 +366,7 @@ FluidPtr DeckCard::fluid_definition() {
     if (plain != registry().fluids.end() && (w == "density" || w == "viscosity"))
       return plain->second(*this);
     if (w.empty())
-      fail_at(
-          next(),
+      fail_expected(
           "hydraulic fluid expected: \"reference, <label>\" or a type such as linear compressible");
     fail_word("hydraulic fluid", w, registry().fluids, "fluid");
   }

@@ -46,7 +46,7 @@ BeamOutput read_beam_output(Card& card, std::string_view what, bool viscoelastic
     std::string words;
     for (const OutputFlag& known : kOutputFlags)
       words += (words.empty() ? "" : ", ") + std::string(known.word);
-    card.fail_at(card.next(), head + "a flag is expected", "accepted: " + words);
+    card.fail_expected(head + "a flag is expected", "accepted: " + words);
   }
   output.chosen = 0;
   unsigned seen = 0;

@@ -155,10 +155,18 @@ class Card {
   virtual SourceSpan last() const = 0;
   /// Span of the next argument.
   virtual SourceSpan next() = 0;
-  /// Refuses the card: `message` without position; `hint` says how to mend it.
-  [[noreturn]] void fail(const std::string& message, const std::string& hint = "");
+  /// Refuses the card: `message` without position; `hint` says how to mend it; `code` tells
+  /// programs what is wrong (Diagnostic::code).
+  [[noreturn]] void fail(const std::string& message, const std::string& hint = "",
+                         const char* code = "card");
   [[noreturn]] virtual void fail_at(SourceSpan where, const std::string& message,
-                                    const std::string& hint = "") = 0;
+                                    const std::string& hint = "", const char* code = "card") = 0;
+  /// Refuses the next argument: `message` says what is expected in its place.
+  [[noreturn]] void fail_expected(const std::string& message, const std::string& hint = "");
+  /// Refuses a reference to what the deck does not define: "<kind> <label> is not defined". Not
+  /// reported when the definition itself was refused.
+  [[noreturn]] virtual void fail_undefined(SourceSpan where, const std::string& kind, int label,
+                                           const std::string& hint = "") = 0;
   virtual void warn(const std::string& message, const std::string& hint = "") = 0;
   virtual void warn_at(SourceSpan where, const std::string& message,
                        const std::string& hint = "") = 0;

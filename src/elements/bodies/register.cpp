@@ -91,10 +91,10 @@ void read_gravity(Card& card, ElementInfo& info) {
   Gravity g;
   if (card.keyword("central")) {
     if (card.keyword("origin")) g.origin = card.absolute_position("origin");
-    if (!card.keyword("mass")) card.fail_at(card.next(), "gravity: `mass` expected");
+    if (!card.keyword("mass")) card.fail_expected("gravity: `mass` expected");
     const double mass = card.real("mass");
     if (!(mass > 0)) card.fail("gravity: the mass must be positive");
-    if (!card.keyword("G")) card.fail_at(card.next(), "gravity: `G` expected");
+    if (!card.keyword("G")) card.fail_expected("gravity: `G` expected");
     const double big_g = card.keyword("si") ? kGravitationalConstant : card.real("G");
     if (!(big_g > 0)) card.fail("gravity: G must be positive");
     g.mass_g = mass * big_g;

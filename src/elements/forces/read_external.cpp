@@ -32,7 +32,7 @@ std::string read_communicator(Card& card, int label) {
         "write `grpc, port, \"name\"`; the peer attaches to the daemon's port of that name");
   if (card.required("communicator", {"grpc", "socket"}) == 0) {
     if (!card.keyword("port"))
-      card.fail_at(card.next(), "`port` expected after `grpc`", "write `grpc, port, \"name\"`");
+      card.fail_expected("`port` expected after `grpc`", "write `grpc, port, \"name\"`");
     return card.quoted("name of the port");
   }
   skip_socket(card);

@@ -74,7 +74,7 @@ void read_internal_force(Card& card, ElementInfo& info, bool follower) {
   e.a1 = card.relative_position("first arm", e.first);
   e.second = card.structural_node();
   if (position && !card.keyword("position"))
-    card.fail_at(card.next(), "`position` expected after the second node");
+    card.fail_expected("`position` expected after the second node");
   e.a2 = card.relative_position("second arm", e.second);
   if (position)
     e.d = card.vec3_drive("force", drive_frame(follower, e.first));

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "model/detailed_row.h"
-
 namespace mbcosim {
 
 void Accelerometer::start(Start& s) const {
@@ -34,7 +32,7 @@ double Motor::private_value(const Local<double>& u, int datum) const {
 
 /// Only for self-describing formats: the lines of .ele belong to electric nodes.
 void Motor::output(const Local<double>& u, OutputRow& row) const {
-  if (!dynamic_cast<DetailedRow*>(&row)) return;
+  if (!row.has_named_fields()) return;
   row.begin(OutputFile::ele, u.label());
   row.scalar("M", "N m", private_value(u, 0));
   row.scalar("Omega", "rad/s", private_value(u, 1));

@@ -111,7 +111,7 @@ DiscreteControl::Measure read_measure(Card& card) {
 
 void expect(Card& card, const char* word) {
   if (!card.keyword(word))
-    card.fail_at(card.next(), std::string("discrete control: `") + word + "` expected");
+    card.fail_expected(std::string("discrete control: `") + word + "` expected");
 }
 
 void read_discrete_control(Card& card, ElementInfo& info) {

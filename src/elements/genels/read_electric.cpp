@@ -80,7 +80,7 @@ void read_ripple(Card& card, Motor& e, bool has_frame) {
     card.fail("motor: `M0` and `M1` depend on an angle; the motor's axis alone does not define it",
               "write `orientation, <orientation matrix>` instead of the axis");
   if (!card.keyword("terminal pairs"))
-    card.fail_at(card.next(), "motor: `terminal pairs` expected after `M0` and `M1`");
+    card.fail_expected("motor: `terminal pairs` expected after `M0` and `M1`");
   e.terminal_pairs = card.integer("number of terminal pairs");
   if (e.terminal_pairs < 1)
     card.fail("motor: the number of terminal pairs must be at least 1, got " +

@@ -42,7 +42,7 @@ NodeDof read_output(Card& card, const char* what) {
 LinearSystem read_matrices(Card& card, int outputs, int inputs, int n) {
   LinearSystem s;
   const auto expect = [&](const char* word) {
-    if (!card.keyword(word)) card.fail_at(card.next(), std::string("`") + word + "` expected");
+    if (!card.keyword(word)) card.fail_expected(std::string("`") + word + "` expected");
   };
   if (card.keyword("matrix E")) s.E = card.numbers("matrix E", n, n);
   expect("matrix A");

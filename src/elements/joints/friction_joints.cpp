@@ -38,7 +38,8 @@ void read_brake(Card& card, ElementInfo& info) {
   e.a = read_point_and_hinge(card);
   e.b = read_point_and_hinge(card, &e.a);
   if (!card.keyword("friction"))
-    card.fail_at(card.next(), "brake: `friction` is missing", "a brake is nothing but friction");
+    card.fail_at(card.next(), "brake: `friction` is missing", "a brake is nothing but friction",
+                 "missing-argument");
   e.radius = card.real("average radius");
   if (!(e.radius > 0)) card.fail("the average radius of friction must be positive");
   e.friction = read_friction(card);

@@ -44,7 +44,8 @@ void read_screw(Card& card, ElementInfo& info) {
   e.b = read_attachment(card);
   if (card.keyword("offset")) read_offset(card, e.b, &e.a);
   if (!card.keyword("pitch"))
-    card.fail_at(card.next(), "screw: `pitch` is missing", "give `pitch, <advance per turn>`");
+    card.fail_at(card.next(), "screw: `pitch` is missing", "give `pitch, <advance per turn>`",
+                 "missing-argument");
   e.lead = card.real("pitch") / (2 * kPi);
   if (!card.keyword("friction")) {
     add_element(card.builder(), info, e);

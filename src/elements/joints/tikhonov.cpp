@@ -69,8 +69,9 @@ namespace {
 void read_tikhonov(Card& card, ElementInfo& info) {
   const ElementRef joint = card.model().find_element(Family::joint, info.label);
   if (!joint.set)
-    card.fail("joint regularization: joint " + std::to_string(info.label) + " is not defined",
-              "the label of a regularization is that of its joint, which must stand before it");
+    card.fail_undefined(
+        card.last(), "joint", info.label,
+        "the label of a regularization is that of its joint, which must stand before it");
   int count = 0;
   for (int k = 0; k < joint.set->unknowns(joint.index); ++k)
     count += !joint.set->is_differential(joint.index, k);

@@ -73,7 +73,7 @@ void read_total_reaction(Card& card, ElementInfo& info) {
   if (!card.keyword("total equation"))
     card.fail_at(card.next(),
                  "total internal reaction: the equation whose multipliers act here is missing",
-                 "end the card with `total equation, <label>`");
+                 "end the card with `total equation, <label>`", "missing-argument");
   e.equation = card.element(Family::joint);
   auto* equations = dynamic_cast<ElementSetOf<TotalEquation>*>(e.equation.set);
   if (!equations)

@@ -19,14 +19,14 @@ constexpr int kMostPoints = 100000;
 
 /// `points number, P, <node>, offset, [label, l,] f, …, <node>, …`
 void read_mapped_points(Card& card, StructuralPort& port) {
-  if (!card.keyword("points number")) card.fail_at(card.next(), "`points number` expected");
+  if (!card.keyword("points number")) card.fail_expected("`points number` expected");
   const int count = card.integer("number of points");
   if (count < 1 || count > kMostPoints)
     card.fail("the number of points must be from 1 to " + std::to_string(kMostPoints) + ", got " +
               std::to_string(count));
   while (port.points() < count) {
     const int node = card.structural_node();
-    if (!card.keyword("offset")) card.fail_at(card.next(), "`offset` expected after the node");
+    if (!card.keyword("offset")) card.fail_expected("`offset` expected after the node");
     do {
       int label = port.points() + 1;
       if (card.keyword("label")) label = card.label("label of the point");
@@ -201,7 +201,7 @@ void read_external_modal(Card& card, ElementInfo& info) {
 ElementPort read_stream_head(Card& card) {
   ElementPort port;
   if (card.one_of({"stream name", "name"}) < 0)
-    card.fail_at(card.next(), "stream output: `stream name` expected");
+    card.fail_expected("stream output: `stream name` expected");
   const SourceSpan where = card.next();
   port.name = card.quoted("stream name");
   if (port.name.empty()) card.fail_at(where, "the name of the stream is empty");

@@ -83,8 +83,9 @@ std::string listed(const std::vector<std::string>& names) {
 DrivePtr read_scalar_node_drive(Card& card, ScalarKind kind, int label, SourceSpan where) {
   const Model& model = card.model();
   const int node = model.find_scalar(kind, label);
-  const std::string owner = std::string(kind_name(kind)) + " node " + std::to_string(label);
-  if (node < 0) card.fail_at(where, owner + " is not defined");
+  const std::string type = std::string(kind_name(kind)) + " node";
+  if (node < 0) card.fail_undefined(where, type, label);
+  const std::string owner = type + " " + std::to_string(label);
   const bool differential = model.scalars[node].differential && kind != ScalarKind::parameter;
   std::vector<std::string> names{"x"};
   if (differential) names.push_back("xP");
@@ -104,8 +105,8 @@ DrivePtr read_node(Card& card) {
     return read_scalar_node_drive(card, static_cast<ScalarKind>(type - 1), label, where);
   const Model& model = card.model();
   const int node = model.find_structural(label);
+  if (node < 0) card.fail_undefined(where, "structural node", label);
   const std::string owner = "structural node " + std::to_string(label);
-  if (node < 0) card.fail_at(where, owner + " is not defined");
   const std::vector<std::string> names = Model::structural_data_names(model.structural[node]);
   const std::string name = read_datum_name(card, owner, names);
   const int datum = model.structural_datum(node, name);
@@ -120,8 +121,8 @@ DrivePtr read_element(Card& card) {
   const Model& model = card.model();
   const ElementRef element = model.find_element(family, label);
   if (!element.set)
-    card.fail_at(
-        where, std::string(family_name(family)) + " " + std::to_string(label) + " is not defined",
+    card.fail_undefined(
+        where, family_name(family), label,
         "elements must be defined before they are referred to; `postponed` defers a drive");
   const std::string owner = model.element_text(element);
   const std::vector<std::string> names = element.set->private_data(element.index);

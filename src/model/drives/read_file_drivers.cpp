@@ -154,8 +154,7 @@ void read_modifier(Card& card) {
 FileDriverPtr read_stream(Card& card) {
   StreamInput stream;
   stream.where = card.next();
-  if (card.one_of({"name", "stream drive name"}) < 0)
-    card.fail_at(card.next(), "stream: `name` expected");
+  if (card.one_of({"name", "stream drive name"}) < 0) card.fail_expected("stream: `name` expected");
   stream.name = card.quoted("name");
   if (card.keyword("create")) card.yes_no("create");
   skip_address(card);

@@ -149,8 +149,8 @@ LawPtr<1> read_shock_absorber(Card& card) {
   if (card.keyword("metering")) d.metering = read_area(card, "metering area");
   if (card.keyword("orifice")) d.orifice = read_area(card, "orifice area");
   if (!d.metering.positive && !d.orifice.positive)
-    card.fail_at(card.next(), "shock absorber: `metering` or `orifice` expected",
-                 "without an area no fluid can pass");
+    card.fail_expected("shock absorber: `metering` or `orifice` expected",
+                       "without an area no fluid can pass");
   d.fluid_area = card.real("fluid area");
   d.density = card.real("fluid density");
   d.discharge = card.real("discharge coefficient");

@@ -52,7 +52,7 @@ class SymbolicLaw : public Law<N> {
 
 void read_names(Card& card, const char* keyword, int n, std::vector<std::string>& names) {
   if (!card.keyword(keyword))
-    card.fail_at(card.next(), std::string("symbolic law: `") + keyword + "` expected");
+    card.fail_expected(std::string("symbolic law: `") + keyword + "` expected");
   for (int i = 0; i < n; ++i) {
     names.push_back(card.quoted("name of a strain component"));
     for (std::size_t k = 0; k + 1 < names.size(); ++k)
@@ -66,7 +66,7 @@ LawPtr<N> read_symbolic(Card& card) {
   std::vector<std::string> names;
   if (type != LawType::viscous) read_names(card, "epsilon", N, names);
   if (type != LawType::elastic) read_names(card, "epsilon prime", N, names);
-  if (!card.keyword("expression")) card.fail_at(card.next(), "symbolic law: `expression` expected");
+  if (!card.keyword("expression")) card.fail_expected("symbolic law: `expression` expected");
   std::vector<ExpressionPtr> expressions;
   for (int i = 0; i < N; ++i)
     expressions.push_back(card.expression_of(card.quoted("expression"), names));

@@ -178,6 +178,17 @@ INSTANTIATE_TEST_SUITE_P(
         Malformed{"consequence",
                   elements("body: 1, 2, 1., null, eye; joint: 1, clamp, 2, node, node;",
                            "structural: 2, dynamic, null, null;"),
+                  "error: structural node 2: orientation expected, keyword \"null\" found"},
+        Malformed{"consequenceForADrive",
+                  elements("force: 1, absolute, 1, position, null, component, node, 2, structural, "
+                           "string, \"X[1]\", direct, 0., 0.;",
+                           std::string(kDynamic) + "structural: 2, dynamic, null, null;"),
+                  "error: structural node 2: orientation expected, keyword \"null\" found"},
+        Malformed{"consequenceForARegularization",
+                  elements("joint: 1, clam, 1, node, node; joint regularization: 1, tikhonov, 1.;"),
+                  "error: joint 1: unknown joint type \"clam\""},
+        Malformed{"consequenceForOutput",
+                  nodes("structural: 2, dynamic, null, null; output: structural, 2;"),
                   "error: structural node 2: orientation expected, keyword \"null\" found"}),
     [](const auto& info) { return std::string(info.param.name); });
 
@@ -200,6 +211,12 @@ TEST(MalformedDeck, HasACode) {
   EXPECT_EQ(code(nodes("structural: 1, dynamic, null, eye, 0.,1.,0.;")), "missing-argument");
   EXPECT_EQ(code(nodes("structural: 1, null, eye, null, null;")), "wrong-argument");
   EXPECT_EQ(code(elements("rotor: 1, 2, 3;")), "not-supported");
+  EXPECT_EQ(code(elements("joint: 1, brake, 1, null, 1, null;")), "missing-argument");
+  EXPECT_EQ(code(elements("gravity: central, 1.;")), "wrong-argument");
+  EXPECT_EQ(code(elements("gravity: central, mass, -1.;")), "card");
+  EXPECT_EQ(code(elements("bind: 1, joint, 3, string, \"Fx\";",
+                          std::string(kDynamic) + "parameter: 3, element;")),
+            "undefined");
   EXPECT_EQ(code(control("rigid bodies: nope;")), "unknown-variable");
 }
 
