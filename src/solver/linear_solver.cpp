@@ -169,10 +169,7 @@ void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
 
 LinearSolver::Outcome LinearSolver::factor(double* values) {
   if (n_ == 0) return Outcome::ok;
-  if (!klu_->kept) {
-    klu_->ordered = true;  // a single matrix does not repay the comparison
-    return analyze(values);
-  }
+  if (!klu_->kept) return factor_alone(values);
   klu_->by_tail = klu_->tail && klu_->tail->factor(values);
   if (klu_->by_tail) return Outcome::ok;
   klu_common* common = &klu_->common;
@@ -183,7 +180,15 @@ LinearSolver::Outcome LinearSolver::factor(double* values) {
     klu_->current = klu_->kept;
     return Outcome::ok;
   }
+  return factor_alone(values);
+}
+
+LinearSolver::Outcome LinearSolver::factor_alone(double* values) {
+  if (n_ == 0) return Outcome::ok;
+  klu_common* common = &klu_->common;
   singular_column_ = -1;
+  klu_->by_tail = false;
+  if (!klu_->symbolic) return common->status == KLU_SINGULAR ? Outcome::singular : Outcome::failed;
   klu_free_numeric(&klu_->fresh, common);
   klu_->fresh = klu_factor(column_start_.data(), row_index_.data(), values, klu_->symbolic, common);
   klu_->current = klu_->fresh;

@@ -39,6 +39,8 @@ class LinearSolver {
   void add_kind(const std::vector<bool>& kind, double* values);
   /// Factors; `values` are in the pattern's order.
   Outcome factor(double* values);
+  /// Factors with pivots of its own, of which nothing is kept.
+  Outcome factor_alone(double* values);
   /// Solves in place with the last factorization.
   void solve(double* rhs);
   /// After `singular`: the column without a pivot, -1 when unknown.

@@ -113,7 +113,7 @@ LinearSolver::Outcome TangentSolver::factor(double seed, const std::vector<NodeS
     else
       add_nodes(block, seed, seeds);
   }
-  return solver_->analyze(values_.data());
+  return solver_->factor_alone(values_.data());
 }
 
 }  // namespace mbcosim
