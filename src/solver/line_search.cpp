@@ -55,8 +55,6 @@ void limit_step(const LineSearchSettings& s, const State& state, std::vector<dou
   for (double& d : delta) d *= factor;
 }
 
-}  // namespace
-
 /// Is the gradient of ½ rᵀr so small that its minimum is a spurious one? J: the matrix in the
 /// workspace.
 bool is_local_minimum(const Model& model, const LineSearchSettings& s, const State& state, double f,
@@ -72,9 +70,11 @@ bool is_local_minimum(const Model& model, const LineSearchSettings& s, const Sta
   return largest < s.tolerance_min * std::max(f, 0.5 * model.unknowns);
 }
 
+}  // namespace
+
 bool search_along(const Model& model, Phase phase, double c, double c_algebraic,
                   const LineSearchSettings& s, State& state, Workspace& ws) {
-  const State start = state;
+  ws.start = state;
   const double f0 = 0.5 * dot(ws.residual, ws.residual);
   if (s.scale_newton_step) limit_step(s, state, ws.delta);
   double t = 0;
@@ -85,11 +85,11 @@ bool search_along(const Model& model, Phase phase, double c, double c_algebraic,
       s.lambda_min_relative ? std::max(s.lambda_min, std::min(t > 0 ? s.tolerance_x / t : 1.0, 1.0))
                             : s.lambda_min;
   const double slope = -2 * f0;
-  const std::vector<double> direction = ws.delta;
+  ws.direction = ws.delta;
   Trial now{1, 0}, before;
   for (int k = 0;; ++k) {
-    for (std::size_t i = 0; i < direction.size(); ++i) ws.delta[i] = now.lambda * direction[i];
-    state = start;
+    for (std::size_t i = 0; i < ws.delta.size(); ++i) ws.delta[i] = now.lambda * ws.direction[i];
+    state = ws.start;
     apply_correction(model, ws.delta, c, c_algebraic, state);
     compute_residual(model.context(state, phase, c, c_algebraic), ws.residual);
     now.f = 0.5 * dot(ws.residual, ws.residual);

@@ -43,7 +43,7 @@ double root_near(Function&& f, double at_zero, double tolerance) {
     b = x;
     fb = fx;
   }
-  return b;
+  return std::isfinite(fb) ? b : NAN;
 }
 
 class Newton {
@@ -102,12 +102,12 @@ class Newton {
     ++report.iterations;
     if (!factored) {
       report.singular_column =
-          ws_.tangents ? ws_.tangents->singular_column() : ws_.solver.singular_column();
+          by_tangents() ? ws_.tangents->singular_column() : ws_.solver.singular_column();
       finish(report, NewtonOutcome::singular);
       return false;
     }
     std::copy(ws_.residual.begin(), ws_.residual.end(), ws_.delta.begin());
-    if (ws_.tangents && phase_ == Phase::step)
+    if (by_tangents())
       ws_.tangents->solve(ws_.delta.data());
     else
       ws_.solver.solve(ws_.delta.data());
@@ -148,12 +148,12 @@ class Newton {
     if (model_.kinds[row] != UnknownKind::differential || std::abs(*worst) < 0.9 * all ||
         !std::isfinite(all))
       return;
-    const State start = state_;
+    ws_.start = state_;
     const double at_start = *worst;
     const auto value = [&](double correction) {
       std::fill(ws_.delta.begin(), ws_.delta.end(), 0.0);
       ws_.delta[row] = correction;
-      state_ = start;
+      state_ = ws_.start;
       apply_correction(model_, ws_.delta, c_, ca_, state_);
       (void)residual();
       return ws_.residual[row];
@@ -171,6 +171,9 @@ class Newton {
     return s;
   }
 
+  /// Do derivatives of external loads enter the matrix?
+  bool by_tangents() const { return ws_.tangents && phase_ == Phase::step; }
+
   /// Builds and factors the matrix when it is due; false when it cannot be factored.
   bool factor(int iterations) {
     const bool keep = settings_.keep_jacobian;
@@ -184,7 +187,7 @@ class Newton {
     } else {
       return true;
     }
-    if (ws_.tangents && phase_ == Phase::step)
+    if (by_tangents())
       return ws_.tangents->factor(c_, ws_.seeds, ws_.values) == LinearSolver::Outcome::ok;
     return ws_.solver.factor(ws_.values.data()) == LinearSolver::Outcome::ok;
   }

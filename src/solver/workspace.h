@@ -22,10 +22,12 @@ struct Workspace {
     residual_history.reserve(256);
   }
 
-  std::vector<double> residual;  ///< r (n)
-  std::vector<double> delta;     ///< Newton correction (n)
-  std::vector<double> values;    ///< of the sparse Jacobian
-  std::vector<NodeSeeds> seeds;  ///< (structural nodes)
+  std::vector<double> residual;   ///< r (n)
+  std::vector<double> delta;      ///< Newton correction (n)
+  std::vector<double> values;     ///< of the sparse Jacobian
+  std::vector<NodeSeeds> seeds;   ///< (structural nodes)
+  State start;                    ///< from which a search along a line tries its steps
+  std::vector<double> direction;  ///< of that search (n)
   LinearSolver solver;
   std::vector<double> residual_history;  ///< test values of the last solve
   std::unique_ptr<TangentSolver>

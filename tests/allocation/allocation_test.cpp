@@ -40,10 +40,14 @@ long allocations_of(const std::string& deck, int steps) {
   return during;
 }
 
-TEST(Allocation, TumblingBodyStepsWithout) {
+class Allocation : public testing::TestWithParam<const char*> {};
+
+TEST_P(Allocation, TumblingBodyStepsWithout) {
   EXPECT_EQ(
       allocations_of(
-          initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-9; method: ms, .6;") +
+          initial_value_block(
+              1e-3, 1,
+              "max iterations: 20; tolerance: 1e-9; method: ms, .6;" + std::string(GetParam())) +
               "begin: control data; structural nodes: 1; rigid bodies: 1; gravity; end: control "
               "data;"
               "begin: nodes; structural: 1, dynamic, null, eye, null, .01, 2., .01; end: nodes;"
@@ -52,6 +56,10 @@ TEST(Allocation, TumblingBodyStepsWithout) {
           100),
       0);
 }
+
+INSTANTIATE_TEST_SUITE_P(Solvers, Allocation,
+                         testing::Values("", "nonlinear solver: line search;",
+                                         "nonlinear solver: newton raphson, modified, 3;"));
 
 TEST(Allocation, BeamUnderAForceOnAPendulumStepsWithout) {
   EXPECT_EQ(
