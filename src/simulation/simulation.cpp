@@ -1,6 +1,9 @@
 #include "simulation/simulation.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <mutex>
 
 #include "output/result_writer.h"
@@ -78,6 +81,10 @@ struct Simulation::Impl {
   /// The deck's eigenanalyses with times in (after, until].
   Status analyse_modes(double after, double until);
   StepReport step(const CancelToken* cancel);
+  /// What an accepted step writes: its line and record, and the deck's eigenanalyses.
+  Status write(const NewtonReport& newton, double previous_time);
+  /// A step that fails leaves the state, with the counters of the deck's strategy, as it was.
+  PhaseReport advance_or_restore(int& pieces);
   /// By the deck's strategy, then by the policy. `pieces` counts the parts of the step.
   PhaseReport advance(int& pieces);
   PhaseReport advance_by_strategy(double h);
@@ -227,12 +234,46 @@ void Simulation::Impl::end_at(const State& start, double whole) {
   control::advance_time(state, whole);
 }
 
+PhaseReport Simulation::Impl::advance_or_restore(int& pieces) {
+  std::array<double, control::kCount> counters;
+  std::copy_n(state.control.begin(), control::kCount, counters.begin());
+  const auto restore = [&] { std::copy(counters.begin(), counters.end(), state.control.begin()); };
+  PhaseReport phase;
+  try {
+    phase = advance(pieces);
+  } catch (const EvaluationError& e) {  // from a drive of the deck's strategy
+    phase.error = evaluation_failure(state, e);
+  } catch (...) {  // from the exchange
+    restore();
+    throw;
+  }
+  if (phase.error) restore();
+  return phase;
+}
+
+Status Simulation::Impl::write(const NewtonReport& newton, double previous_time) try {
+  if (!writer) return ok();
+  StepLine line{state.step,
+                state.time,
+                state.h,
+                newton.iterations,
+                newton.residual_error,
+                newton.solution_error,
+                newton.by_solution,
+                false};
+  line.recorded = record();
+  writer->step(line);
+  return analyse_modes(previous_time, state.time);
+} catch (const EvaluationError& e) {
+  return evaluation_failure(state, e);
+}
+
 StepReport Simulation::Impl::step(const CancelToken* cancel) {
   StepReport report;
   const double previous_time = state.time;
   const auto begin = std::chrono::steady_clock::now();
   stepper.set_cancelled(cancel);
-  PhaseReport phase = advance(report.pieces);
+  PhaseReport phase = advance_or_restore(report.pieces);
   report.flagged = phase.flagged;
   report.solver_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -250,22 +291,10 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
     return report;
   }
   report.steps_done = 1;
-  if (writer) {
-    StepLine line{state.step,
-                  state.time,
-                  state.h,
-                  phase.newton.iterations,
-                  phase.newton.residual_error,
-                  phase.newton.solution_error,
-                  phase.newton.by_solution,
-                  false};
-    line.recorded = record();
-    writer->step(line);
-    if (auto status = analyse_modes(previous_time, state.time); !status) {
-      report.outcome = StepOutcome::limit;
-      report.error = status.error();
-      return report;
-    }
+  if (auto status = write(phase.newton, previous_time); !status) {
+    report.outcome = StepOutcome::limit;
+    report.error = status.error();
+    return report;
   }
   if (at_end()) report.outcome = StepOutcome::finished;
   return report;
@@ -300,9 +329,11 @@ const State& Simulation::state() const { return impl_->state; }
 std::int64_t Simulation::step_number() const { return impl_->state.step; }
 double Simulation::time() const { return impl_->state.time; }
 
-double Simulation::next_step_size() const {
-  State copy = impl_->state;
-  return impl_->stepper.next_step_size(copy);
+double Simulation::next_step_size() const try {
+  if (impl_->state.control.empty()) return impl_->state.h;  // the deck ends before the first phase
+  return impl_->stepper.peek_step_size(impl_->state);
+} catch (const EvaluationError&) {
+  return impl_->state.h;  // the step itself will say what is wrong
 }
 
 bool Simulation::finished() const {
@@ -369,7 +400,14 @@ int Simulation::find_variable(const std::string& name) const {
   return impl_->all_variables().find(name);
 }
 void Simulation::get(int handle, std::vector<double>& out) const {
-  impl_->all_variables().get(impl_->context(), handle, out);
+  const Variables& all = impl_->all_variables();
+  const std::size_t before = out.size();
+  try {
+    all.get(impl_->context(), handle, out);
+  } catch (const EvaluationError&) {
+    out.resize(before);
+    out.resize(before + all.list()[handle].size, std::numeric_limits<double>::quiet_NaN());
+  }
 }
 Status Simulation::set(int handle, std::span<const double> values) {
   const Variables& all = impl_->all_variables();

@@ -93,7 +93,7 @@ class Simulation {
   const State& state() const;
   std::int64_t step_number() const;  ///< of the last accepted step; 0 after create
   double time() const;               ///< of the last accepted step [s]
-  double next_step_size() const;     ///< [s]
+  double next_step_size() const;     ///< [s]; the last one where the deck's drive has no value
   bool finished() const;             ///< the deck's final time is reached
 
   /// One step. On failure the state is that of the last accepted step and `report.error` says why.
@@ -119,7 +119,7 @@ class Simulation {
 
   const std::vector<Variable>& variables() const;
   int find_variable(const std::string& name) const;  ///< handle or -1
-  /// Appends the values of a variable to `out`.
+  /// Appends the values of a variable to `out`; NaN where a drive or law cannot be evaluated.
   void get(int handle, std::vector<double>& out) const;
   /// Sets an input variable (parameter nodes, attached loads). ErrorKind::argument when it is not
   /// writable or of the wrong size.

@@ -66,6 +66,16 @@ bool is_third_order(const MethodSettings& m) {
 
 }  // namespace
 
+Error evaluation_failure(const State& state, const EvaluationError& cause) {
+  Error error;
+  error.kind = ErrorKind::evaluation;
+  error.reason = "EVALUATION_FAILED";
+  error.message = "t = " + std::to_string(state.time) + ": " + cause.what();
+  error.failure.time = state.time;
+  error.failure.step = static_cast<long>(state.step);
+  return error;
+}
+
 /// Regular steps only ask whether to go on.
 class Stepper::StepHooks : public NewtonHooks {
  public:
@@ -160,11 +170,12 @@ PhaseReport Stepper::solve_derivatives(State& state) {
     return report.newton.outcome == NewtonOutcome::converged;
   };
   bool done = attempt_with(derivatives_coefficient_, derivatives_.tolerance);
-  if (!done && s.derivatives_auto && report.newton.outcome != NewtonOutcome::cancelled) {
+  const auto cancelled = [&] { return report.newton.outcome == NewtonOutcome::cancelled; };
+  if (!done && s.derivatives_auto && !cancelled()) {
     double best = derivatives_coefficient_, best_error = report.newton.residual_error;
     for (int direction = 0; direction < 2 && !done; ++direction) {
       double trial = derivatives_coefficient_;
-      for (int k = 0; k < s.derivatives_auto_iterations && !done; ++k) {
+      for (int k = 0; k < s.derivatives_auto_iterations && !done && !cancelled(); ++k) {
         trial *= direction == 0 ? s.derivatives_auto_factor : 1 / s.derivatives_auto_factor;
         done = attempt_with(trial, derivatives_.tolerance);
         if (!done && report.newton.residual_error < best_error) {
@@ -173,7 +184,7 @@ PhaseReport Stepper::solve_derivatives(State& state) {
         }
       }
     }
-    if (!done) done = attempt_with(best, 1.01 * best_error);
+    if (!done && !cancelled()) done = attempt_with(best, 1.01 * best_error);
   }
   if (!done) {
     report.error = failure(report.newton, state, "derivatives phase");
@@ -358,13 +369,7 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     }
     report.error = failure(report.newton, state, "step");
   } catch (const EvaluationError& e) {
-    Error error;
-    error.kind = ErrorKind::evaluation;
-    error.reason = "EVALUATION_FAILED";
-    error.message = "t = " + std::to_string(state.time) + ": " + e.what();
-    error.failure.time = state.time;
-    error.failure.step = static_cast<long>(state.step);
-    report.error = std::move(error);
+    report.error = evaluation_failure(state, e);
   } catch (...) {  // from the exchange
     state = backup_;
     throw;
@@ -387,7 +392,20 @@ PhaseReport Stepper::step(State& state, double h) {
   return report;
 }
 
-double Stepper::next_step_size(State& state) {
+double Stepper::next_step_size(State& state) const {
+  SinceChange since{state.control[control::kSinceReduction], state.control[control::kSinceRaise]};
+  const double h = step_size(state, since);
+  state.control[control::kSinceReduction] = since.reduction;
+  state.control[control::kSinceRaise] = since.raise;
+  return h;
+}
+
+double Stepper::peek_step_size(const State& state) const {
+  SinceChange since{state.control[control::kSinceReduction], state.control[control::kSinceRaise]};
+  return step_size(state, since);
+}
+
+double Stepper::step_size(const State& state, SinceChange& since) const {
   const InitialValueSettings& s = model_.initial_value;
   const double h = state.control[control::kRegularSteps] == 0 ? s.time_step : state.h;
   if (s.strategy == StepStrategy::no_change) return s.time_step;  // also after a step in pieces
@@ -397,18 +415,16 @@ double Stepper::next_step_size(State& state) {
   const double limit = largest > 0 ? largest : HUGE_VAL;
   if (s.strategy == StepStrategy::change)
     return std::max(std::min(s.strategy_change->value(context), limit), s.min_time_step);
-  double& since_reduction = state.control[control::kSinceReduction];
-  double& since_raise = state.control[control::kSinceRaise];
-  since_reduction += 1;
-  since_raise += 1;
+  since.reduction += 1;
+  since.raise += 1;
   const double iterations = state.control[control::kLastIterations];
   if (iterations > s.max_iterations_factor) {
-    since_reduction = 0;
+    since.reduction = 0;
     return std::max(std::min(h * s.reduction, limit), s.min_time_step);
   }
-  if (iterations <= s.min_iterations && since_reduction > s.steps_before_reduction &&
-      since_raise > s.steps_before_raise && h < limit) {
-    since_raise = 0;
+  if (iterations <= s.min_iterations && since.reduction > s.steps_before_reduction &&
+      since.raise > s.steps_before_raise && h < limit) {
+    since.raise = 0;
     return std::min(h * s.raise, limit);
   }
   return h;

@@ -21,6 +21,9 @@ struct PhaseReport {
   std::optional<Error> error;  ///< set when it failed
 };
 
+/// A drive or law that could not be evaluated, as an error at the state's time and step.
+Error evaluation_failure(const State& state, const EvaluationError& cause);
+
 class Stepper {
  public:
   explicit Stepper(const Model& model);
@@ -49,8 +52,10 @@ class Stepper {
   /// `dummy steps`: short steps before the first regular one.
   PhaseReport run_dummy_steps(State& state);
 
-  /// Length of the next step by the deck's strategy.
-  double next_step_size(State& state);
+  /// Length of the next step by the deck's strategy, whose counters go on.
+  double next_step_size(State& state) const;
+  /// The same without going on.
+  double peek_step_size(const State& state) const;
   /// Tries one step of length h from the accepted `state`. On failure `state` is as it was.
   PhaseReport step(State& state, double h);
   /// A shorter step after a failure, or 0 when the strategy has none.
@@ -72,6 +77,11 @@ class Stepper {
   /// Newton on the prediction, by the method of the step.
   NewtonReport iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first,
                        NewtonSettings settings);
+  /// Steps since the strategy last changed the length.
+  struct SinceChange {
+    double reduction, raise;
+  };
+  double step_size(const State& state, SinceChange& since) const;
   ThirdOrderFormula third_order(const State& state, const MethodSettings& method) const;
   StepFormula formula(State& state, double h, const MethodSettings& method, bool first) const;
   void predict(State& state, const StepFormula& f) const;

@@ -284,10 +284,10 @@ TEST(StepControl, GivesUpAtTheShortestStepAndKeepsTheState) {
       pendulum("time step: .1; max iterations: 1; tolerance: 1e-14; derivatives tolerance: 1e-3; "
                "strategy: factor, .5, 1, 1.2, 100, 1, 2; min time step: .03;"));
   ASSERT_TRUE(run.ready());
-  const std::vector<double> before = run.simulation().state().y;
+  const std::string before = run.simulation().export_state();
   const StepReport report = run.simulation().step();
   ASSERT_TRUE(report.error);
-  EXPECT_EQ(run.simulation().state().y, before);
+  EXPECT_TRUE(run.simulation().export_state() == before);
   EXPECT_EQ(run.simulation().time(), 0);
   EXPECT_NEAR(report.error->failure.time, .03, 1e-12);  // the last chance: the shortest step
 }
