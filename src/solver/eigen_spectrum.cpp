@@ -1,13 +1,13 @@
 #include "solver/eigen_spectrum.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <numeric>
 #include <random>
 
 #include "solver/doubled_pattern.h"
 #include "solver/linear_solver.h"
+#include "solver/shifted_pencil.h"
 
 namespace mbcosim {
 
@@ -17,8 +17,6 @@ using Complex = std::complex<double>;
 using Eigen::MatrixXcd;
 using Eigen::VectorXcd;
 
-constexpr double kDenseShift = 1.2345;    ///< [1/s], any value that is no eigenvalue
-constexpr double kRankTolerance = 1e-12;  ///< relative to the largest pivot of the balanced matrix
 constexpr int kLargestBasis = 1500;
 constexpr int kSmall = 300;            ///< unknowns up to which the dense way is taken anyway
 constexpr int kLargestDense = 3000;    ///< unknowns
@@ -184,33 +182,20 @@ void normalize_columns(MatrixXcd& v) {
 Result<Spectrum> finite_spectrum(const Linearization& system) {
   const int n = system.model->unknowns;
   if (n == 0) return Spectrum{};
-  const MatX e = system.model->dense(system.e), a = system.model->dense(system.a);
-  const Eigen::PartialPivLU<MatX> lu(a - kDenseShift * e);
-  if (!(lu.rcond() > 0))
+  ShiftedPencil pencil(system);
+  if (!pencil.is_regular())
     return eigen_error(ErrorKind::singular,
                        "the linearized system is singular: constraints are redundant or something "
                        "is undetermined");
-  MatX t = lu.solve(e);
-  MatX basis = balance(t).asDiagonal();
-  for (;;) {
-    const Eigen::ColPivHouseholderQR<MatX> qr = [&] {
-      Eigen::ColPivHouseholderQR<MatX> q(t.rows(), t.cols());
-      q.setThreshold(kRankTolerance);
-      q.compute(t);
-      return q;
-    }();
-    const Eigen::Index rank = qr.rank();
-    if (rank == t.rows()) break;
-    const MatX q = MatX(qr.householderQ()).leftCols(rank);
-    basis = (basis * q).eval();
-    t = (q.transpose() * t * q).eval();
-    if (rank == 0) return Spectrum{};
-  }
+  MatX& t = pencil.t;
+  const VecX scale = balance(t);
+  const MatX basis = scale.asDiagonal() * restrict_to_final_range(t);
+  if (t.rows() == 0) return Spectrum{};
   const Eigen::EigenSolver<MatX> solver(t);
   if (solver.info() != Eigen::Success)
     return eigen_error(ErrorKind::not_converged, "the QR iteration did not converge");
   Spectrum result;
-  result.values = (solver.eigenvalues().cwiseInverse().array() + kDenseShift).matrix();
+  result.values = (solver.eigenvalues().cwiseInverse().array() + ShiftedPencil::kShift).matrix();
   result.vectors = basis * solver.eigenvectors();
   normalize_columns(result.vectors);
   return result;

@@ -1,15 +1,13 @@
 #include "solver/state_space.h"
 
-#include <Eigen/QR>
+#include "solver/shifted_pencil.h"
 
 namespace mbcosim {
 
 namespace {
 
-constexpr double kRankTolerance = 1e-12;  ///< relative to the largest pivot
 constexpr double kRateTolerance =
     1e-9;  ///< dependence on the rates of inputs, relative to that on the inputs
-constexpr double kShift = 1.2345;  ///< [1/s], any value that is no eigenvalue
 
 Error state_space_error(ErrorKind kind, std::string message) {
   Error e;
@@ -19,21 +17,7 @@ Error state_space_error(ErrorKind kind, std::string message) {
   return e;
 }
 
-/// Orthonormal basis of the range of tᵏ for k large enough.
-MatX final_range(MatX t) {
-  MatX basis = MatX::Identity(t.rows(), t.rows());
-  while (t.rows() > 0) {
-    Eigen::ColPivHouseholderQR<MatX> qr(t.rows(), t.cols());
-    qr.setThreshold(kRankTolerance);
-    qr.compute(t);
-    const Eigen::Index rank = qr.rank();
-    if (rank == t.rows()) break;
-    const MatX q = MatX(qr.householderQ()).leftCols(rank);
-    basis = (basis * q).eval();
-    t = (q.transpose() * t * q).eval();
-  }
-  return basis;
-}
+MatX final_range(MatX t) { return restrict_to_final_range(t); }
 
 }  // namespace
 
@@ -41,13 +25,13 @@ Result<StateSpace> state_space(const Linearization& system, const InputsOutputs&
   // With T = (A − σE)⁻¹ E and b = (A − σE)⁻¹ B: T ẋ = (1 + σT) x + b u. The space splits into the
   // range of Tᵏ, on which T is regular, and its kernel, on which T is nilpotent: there x = −(1 +
   // σT)⁻¹ b u but for rates of u.
-  const MatX e = system.model->dense(system.e), a = system.model->dense(system.a);
-  const Eigen::PartialPivLU<MatX> lu(a - kShift * e);
-  if (!(lu.rcond() > 0))
+  constexpr double kShift = ShiftedPencil::kShift;
+  const ShiftedPencil pencil(system);
+  if (!pencil.is_regular())
     return state_space_error(ErrorKind::singular,
                              "the linearized system is singular: constraints are redundant or "
                              "something is undetermined");
-  const MatX t = lu.solve(e), b = lu.solve(io.b);
+  const MatX &t = pencil.t, b = pencil.lu.solve(io.b);
   const MatX right = final_range(t), left = final_range(t.transpose());
   const Eigen::PartialPivLU<MatX> cross_basis(left.transpose() * right);
   const MatX regular = cross_basis.solve(left.transpose() * t * right),
