@@ -232,9 +232,7 @@ std::optional<Answer> Port::go_on_without(const std::string& why) {
 
 void Port::notify(bool accepted, std::int64_t step, double time) {
   v1::ServerMessage message;
-  v1::StepNotice* notice = accepted ? message.mutable_accepted() : message.mutable_rejected();
-  notice->set_step(step);
-  notice->set_time_s(time);
+  *(accepted ? message.mutable_accepted() : message.mutable_rejected()) = step_notice(step, time);
   std::unique_lock guard(mutex_);
   if (!link_) return;
   if (recorder_) recorder_->sent(model_.name(), message);

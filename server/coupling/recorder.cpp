@@ -5,6 +5,13 @@
 
 namespace mbcosim::server {
 
+v1::StepNotice step_notice(std::int64_t step, double time) {
+  v1::StepNotice notice;
+  notice.set_step(step);
+  notice.set_time_s(time);
+  return notice;
+}
+
 void Recorder::add(const v1::RecordEntry& entry) {
   const std::lock_guard guard(mutex_);
   if (full_) return;
@@ -58,16 +65,13 @@ void Recorder::lost(const std::string& port, const std::string& why) {
 
 void Recorder::stepped(bool accepted, std::int64_t step, double time) {
   v1::RecordEntry entry;
-  v1::StepNotice* notice = accepted ? entry.mutable_accepted() : entry.mutable_failed();
-  notice->set_step(step);
-  notice->set_time_s(time);
+  *(accepted ? entry.mutable_accepted() : entry.mutable_failed()) = step_notice(step, time);
   add(entry);
 }
 
 void Recorder::restored(std::int64_t step, double time) {
   v1::RecordEntry entry;
-  entry.mutable_restored()->set_step(step);
-  entry.mutable_restored()->set_time_s(time);
+  *entry.mutable_restored() = step_notice(step, time);
   add(entry);
 }
 

@@ -10,6 +10,8 @@
 
 namespace mbcosim::server {
 
+v1::StepNotice step_notice(std::int64_t step, double time);
+
 /// Thread-safe. Entries are kept as a file of delimited messages; at the limit the record ends with
 /// `cut_off`.
 class Recorder {

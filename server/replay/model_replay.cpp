@@ -181,9 +181,7 @@ class ModelReplay {
     v1::StepReply reply;
     server::Call nobody;
     session_.step(request, nobody, &reply);
-    v1::StepNotice now;
-    now.set_step(reply.step());
-    now.set_time_s(reply.time_s());
+    const v1::StepNotice now = server::step_notice(reply.step(), reply.time_s());
     const bool accepted_now = reply.steps_done() == 1;
     std::string difference;
     if (accepted != accepted_now)
