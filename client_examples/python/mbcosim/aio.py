@@ -134,7 +134,7 @@ class Simulation:
         return peer
 
 
-class Peer:
+class Peer(exchange.Course):
     """An attached peer: `async with` keeps it. A task of its own calls `answer(Motion)`; without `answer` iterate:
 
         async for motion in peer:
@@ -142,9 +142,8 @@ class Peer:
     """
 
     def __init__(self, simulation, answer, rotation):
-        self._server, self._function, self._rotation = simulation._server, answer, rotation
-        self.error, self.exchanges, self.accepted, self.rejected = None, 0, [], []
-        self._index, self._task = 0, None
+        super().__init__(rotation)
+        self._server, self._function, self._task = simulation._server, answer, None
 
     async def _attach(self, hello):
         self._stream = open_stream(self._server._channel)(metadata=self._server.metadata)
@@ -189,35 +188,26 @@ class Peer:
                 data = grpc.aio.EOF
             if data is grpc.aio.EOF:
                 break
-            name, content = exchange.receive(data)
-            if name == "exchange":
-                self._index = exchange.index(content)
-                yield exchange.motion(content, self._rotation)
-            elif name == "accepted":
-                self.accepted.append((content.step, content.time_s))
-            elif name == "rejected":
-                self.rejected.append((content.step, content.time_s))
+            motion = self._take(data)
+            if motion is not None:
+                yield motion
         status = await self._status()
         if status.code() not in (grpc.StatusCode.OK, grpc.StatusCode.CANCELLED):
             self.error = from_rpc_error(status)
 
     async def answer(self, value):
         """Answers the last motion."""
-        await self._stream.write(exchange.answer(self._index, value, self.welcome.layout.kind))
-        self.exchanges += 1
+        await self._stream.write(self._answer(value))
 
     async def fail(self, error):
         """The peer cannot answer the last motion; the step fails with this text."""
-        await self._stream.write(exchange.failure(self._index, error))
-        self.exchanges += 1
+        await self._stream.write(self._failure(error))
 
     async def _serve(self):
         async for motion in self:
             try:
                 value = self._function(motion)
-                value = exchange.answer(self._index, await value if inspect.isawaitable(value) else value,
-                                        self.welcome.layout.kind)
+                message = self._answer(await value if inspect.isawaitable(value) else value)
             except Exception as error:  # whatever the user's code raises becomes a failed step with this text
-                value = exchange.failure(self._index, error)
-            await self._stream.write(value)
-            self.exchanges += 1
+                message = self._failure(error)
+            await self._stream.write(message)

@@ -52,7 +52,7 @@ def open_stream(channel):
                                  response_deserializer=None)
 
 
-class Peer:
+class Peer(exchange.Course):
     """An attached peer. A thread of its own calls `answer(Motion)` for each exchange.
 
     answer returns forces (n x 3), or (forces, moments), or the signals, or Loads; an exception in it fails the step. On a port of
@@ -71,7 +71,8 @@ class Peer:
     """
 
     def __init__(self, simulation, port, answer=None, *, rotation="matrix", heartbeat_timeout=None, server_timeout=None, **options):
-        self._function, self._rotation = answer, rotation
+        super().__init__(rotation)
+        self._function = answer
         self._out = queue.SimpleQueue()
         self._out.put(exchange.hello(
             simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout,
@@ -82,11 +83,6 @@ class Peer:
             self.welcome = exchange.receive(next(self._stream))[1]
         except grpc.RpcError as error:
             raise from_rpc_error(error) from None
-        self.error = None
-        self.exchanges = 0
-        self.accepted = []  # (step, time) of the implicit steps that ended
-        self.rejected = []  # (step, time) to go back to, of those that failed
-        self._index = 0
         self._closing = threading.Event()
         self._waiting_since = None
         if heartbeat_timeout is not None or server_timeout is not None:
@@ -118,27 +114,20 @@ class Peer:
                 self._waiting_since = None
                 if data is None:
                     break
-                name, content = exchange.receive(data)
-                if name == "exchange":
-                    self._index = exchange.index(content)
-                    yield exchange.motion(content, self._rotation)
-                elif name == "accepted":
-                    self.accepted.append((content.step, content.time_s))
-                elif name == "rejected":
-                    self.rejected.append((content.step, content.time_s))
+                motion = self._take(data)
+                if motion is not None:
+                    yield motion
         except grpc.RpcError as error:
             if error.code() != grpc.StatusCode.CANCELLED:
                 self.error = self.error or from_rpc_error(error)
 
     def answer(self, value):
         """Answers the last motion."""
-        self._out.put(exchange.answer(self._index, value, self.welcome.layout.kind))
-        self.exchanges += 1
+        self._out.put(self._answer(value))
 
     def fail(self, error):
         """The peer cannot answer the last motion; the step fails with this text."""
-        self._out.put(exchange.failure(self._index, error))
-        self.exchanges += 1
+        self._out.put(self._failure(error))
 
     def _beat(self, own, servers):
         """Sends signs of life, and looks for those of the server."""

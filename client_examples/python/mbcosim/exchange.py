@@ -181,3 +181,38 @@ def _loads(value, kind):
 def failure(number, error):
     """The answer of a peer that cannot compute."""
     return pb.PeerMessage(exchange=pb.PeerExchange(index=number, failure=f"{type(error).__name__}: {error}"))
+
+
+class Course:
+    """What a peer has seen and answered; what blocking and asynchronous peers share.
+
+    error      what ended the stream; None when it ended in good order
+    exchanges  answers given
+    accepted   (step, time) of the implicit steps that ended
+    rejected   (step, time) to go back to, of those that failed
+    """
+
+    def __init__(self, rotation):
+        self.error, self.exchanges, self.accepted, self.rejected = None, 0, [], []
+        self._rotation, self._index = rotation, 0
+
+    def _take(self, data):
+        """The Motion of a message; None when it tells something else, which is noted."""
+        name, content = receive(data)
+        if name == "exchange":
+            self._index = index(content)
+            return motion(content, self._rotation)
+        if name in ("accepted", "rejected"):
+            getattr(self, name).append((content.step, content.time_s))
+        return None
+
+    def _answer(self, value):
+        """The message that answers the last motion."""
+        message = answer(self._index, value, self.welcome.layout.kind)
+        self.exchanges += 1
+        return message
+
+    def _failure(self, error):
+        """The message that says that there is no answer to the last motion."""
+        self.exchanges += 1
+        return failure(self._index, error)
