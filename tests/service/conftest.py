@@ -90,3 +90,27 @@ def wait_for(condition, seconds=10):
     while not condition():
         assert time.monotonic() < end, "waited too long"
         time.sleep(0.01)
+
+
+def redone_alike(simulation, before, steps, look):
+    """Are `steps` steps after a restore those that followed the snapshot? `look()` tells what to compare."""
+    simulation.step(before)
+    saved = simulation.snapshot()
+    simulation.step(steps)
+    first = look()
+    saved.restore()
+    simulation.step(steps)
+    return look() == first
+
+
+def leaves_no_thread(daemon, cycle, first):
+    """After four more cycles the daemon has no more threads than after the first ones."""
+    def threads():
+        return len(os.listdir(f"/proc/{daemon.process.pid}/task"))
+
+    for _ in range(first):
+        cycle()
+    before = threads()
+    for _ in range(4):
+        cycle()
+    wait_for(lambda: threads() <= before + 2)

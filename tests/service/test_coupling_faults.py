@@ -9,7 +9,7 @@ import time
 import pytest
 
 import mbcosim
-from conftest import TIME_FACTOR, Daemon, wait_for
+from conftest import TIME_FACTOR, Daemon, leaves_no_thread, wait_for
 from relay import BlackHole, Unreliable
 from test_coupling import PORT, oscillator, spring
 
@@ -85,10 +85,6 @@ def strike(blow, process, relay, busy=False):
         process.stdin.flush()
     else:
         process.send_signal(signal.SIGKILL if blow == "kill" else signal.SIGSTOP)
-
-
-def threads(daemon):
-    return len(os.listdir(f"/proc/{daemon.process.pid}/task"))
 
 
 @pytest.mark.parametrize("when", MODES)
@@ -203,12 +199,7 @@ def test_nothing_is_left_behind(server, daemon, processes):
             peer.kill()
             wait_for(lambda: not simulation.describe().ports[0].has_peer)
 
-        for _ in range(2):
-            cycle()
-        before = threads(daemon)
-        for _ in range(4):
-            cycle()
-        wait_for(lambda: threads(daemon) <= before + 2)
+        leaves_no_thread(daemon, cycle, 2)
 
 
 # ---------------------------------------------------------------- heartbeats

@@ -7,7 +7,7 @@ import pytest
 
 import decks
 import mbcosim
-from conftest import wait_for
+from conftest import redone_alike, wait_for
 from mbcosim import exchange
 from mbcosim.coupling import open_stream
 from test_coupling import PORT, position, spring
@@ -61,13 +61,7 @@ def test_cut_fails_whole(server):
 
 def test_cut_steps_continue_bit_for_bit_after_a_restore(server):
     with fast_spin(server, policy="cut_step") as simulation:
-        simulation.step(3)
-        saved = simulation.snapshot()
-        simulation.step(5)
-        first = simulation.export_state()
-        saved.restore()
-        simulation.step(5)
-        assert simulation.export_state() == first
+        assert redone_alike(simulation, 3, 5, simulation.export_state)
 
 
 def test_accept_flags_what_did_not_converge(server):

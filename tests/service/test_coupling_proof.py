@@ -1,6 +1,5 @@
 """What coupling promises: the order of events, implicit solutions that equal the uncut model, bounds when a peer dies."""
 import itertools
-import os
 import signal
 import subprocess
 import sys
@@ -13,7 +12,7 @@ import pytest
 
 import decks
 import mbcosim
-from conftest import TIME_FACTOR, Daemon, wait_for
+from conftest import TIME_FACTOR, Daemon, leaves_no_thread, redone_alike, wait_for
 from mbcosim.v1 import simulations_pb2 as pb
 from test_coupling import PORT, oscillator, position, spring
 
@@ -166,13 +165,7 @@ def test_added_mass(server, ratio, acceleration, converges):
 
 def test_restore_redoes_a_window_bit_for_bit(server):
     with oscillator(server) as simulation, simulation.couple("spring", spring, mode="window", acceleration="iqn_ils"):
-        simulation.step(10)
-        saved = simulation.snapshot()
-        simulation.step(20)
-        first = simulation["node.structural.1.X"].tobytes()
-        saved.restore()
-        simulation.step(20)
-        assert simulation["node.structural.1.X"].tobytes() == first
+        assert redone_alike(simulation, 10, 20, lambda: simulation["node.structural.1.X"].tobytes())
 
 
 # ---------------------------------------------------------------- explicit coupling: its limit
@@ -265,10 +258,6 @@ def start_peer(daemon):
         process.wait()
 
 
-def threads(daemon):
-    return len(os.listdir(f"/proc/{daemon.process.pid}/task"))
-
-
 @pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGSTOP])
 @pytest.mark.parametrize("when", ["idle", "in a step"])
 def test_a_peer_that_dies_costs_one_step_within_its_bound(server, start_peer, blow, when):
@@ -298,11 +287,7 @@ def test_peers_leave_no_thread_behind(server, daemon, start_peer):
             peer.kill()
             wait_for(lambda: not simulation.describe().ports[0].has_peer)
 
-        cycle()
-        before = threads(daemon)
-        for _ in range(4):
-            cycle()
-        wait_for(lambda: threads(daemon) <= before + 2)
+        leaves_no_thread(daemon, cycle, 1)
 
 
 def test_several_ports_with_modes_of_their_own(server):

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 import mbcosim
-from conftest import wait_for
+from conftest import redone_alike, wait_for
 
 DECK = """
 begin: data; problem: initial value; end: data;
@@ -110,13 +110,7 @@ def test_blocks_of_the_nodes(server):
 
 def test_restored_steps_are_the_same_bits(server):
     with server.load_text(cut(), ports=PORTS) as simulation, simulation.couple("rod", rod, mode="tight", tangent="dense"):
-        simulation.step(10)
-        saved = simulation.snapshot()
-        simulation.step(10)
-        first = simulation.export_state()
-        saved.restore()
-        simulation.step(10)
-        assert simulation.export_state() == first
+        assert redone_alike(simulation, 10, 10, simulation.export_state)
 
 
 def test_an_unfinished_peer_keeps_the_step_open(server):
