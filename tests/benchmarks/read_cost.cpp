@@ -90,26 +90,12 @@ void read(benchmark::State& state, std::string (*make)(int)) {
   state.counters["model_B_per_node"] = static_cast<double>(used) / n;
 }
 
-BENCHMARK_CAPTURE(read, bodies, bodies)
-    ->Arg(12'500)
-    ->Arg(25'000)
-    ->Arg(50'000)
-    ->Arg(100'000)
-    ->Unit(benchmark::kMillisecond)
-    ->Complexity();
-BENCHMARK_CAPTURE(read, loop, loop)
-    ->Arg(12'500)
-    ->Arg(25'000)
-    ->Arg(50'000)
-    ->Arg(100'000)
-    ->Unit(benchmark::kMillisecond)
-    ->Complexity();
-BENCHMARK_CAPTURE(read, forces_with_strings, forces_with_strings)
-    ->Arg(12'500)
-    ->Arg(25'000)
-    ->Arg(50'000)
-    ->Arg(100'000)
-    ->Unit(benchmark::kMillisecond)
-    ->Complexity();
+void sizes(benchmark::internal::Benchmark* b) {
+  b->ArgsProduct({{12'500, 25'000, 50'000, 100'000}})->Unit(benchmark::kMillisecond)->Complexity();
+}
+
+BENCHMARK_CAPTURE(read, bodies, bodies)->Apply(sizes);
+BENCHMARK_CAPTURE(read, loop, loop)->Apply(sizes);
+BENCHMARK_CAPTURE(read, forces_with_strings, forces_with_strings)->Apply(sizes);
 
 }  // namespace

@@ -224,6 +224,15 @@ class Bench {
   std::uniform_real_distribution<double> uniform_{-1, 1};
 };
 
+/// Attachments of both nodes to the same generic point and frame.
+template <class E>
+void attach(Bench& bench, E& e) {
+  const Vec3 point = bench.vec();
+  const Mat3 frame = bench.rotation();
+  e.a = {bench.first, bench.offset(bench.first, point), bench.relative(bench.first, frame)};
+  e.b = {bench.second, bench.offset(bench.second, point), bench.relative(bench.second, frame)};
+}
+
 inline void expect_near(const Bench& bench, const MatX& a, const MatX& b, double tolerance) {
   const double scale = std::max(1.0, b.cwiseAbs().maxCoeff());
   for (int i = 0; i < a.rows(); ++i)

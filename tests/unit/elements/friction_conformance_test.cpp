@@ -29,14 +29,6 @@ Friction friction(Friction::Shape shape) {
 }
 
 template <class E>
-void attach(Bench& bench, E& e) {
-  const Vec3 point = bench.vec();
-  const Mat3 frame = bench.rotation();
-  e.a = {bench.first, bench.offset(bench.first, point), bench.relative(bench.first, frame)};
-  e.b = {bench.second, bench.offset(bench.second, point), bench.relative(bench.second, frame)};
-}
-
-template <class E>
 struct Rubbing {
   using Element = E;
   static constexpr bool ideal = false, balanced = true;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "deck_digits.h"
 #include "elements/hydraulic_bench.h"
 #include "output/record.h"
 #include "output/result_writer.h"
@@ -119,20 +120,14 @@ inline void expect_table(const CircuitRun& run, const std::vector<TableColumn>& 
   }
 }
 
-inline std::string number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
-
 inline std::string CircuitDeck::text() const {
   return "begin: data; problem: initial value; end: data;\n"
          "begin: initial value;\n  initial time: 0.; final time: " +
-         number(h * steps) + "; time step: " + number(h) + "; method: " + method +
-         ";\n  max iterations: 100; tolerance: " + number(tolerance) +
+         digits(h * steps) + "; time step: " + digits(h) + "; method: " + method +
+         ";\n  max iterations: 100; tolerance: " + digits(tolerance) +
          ";\n  derivatives coefficient: 1.e-6; derivatives max iterations: 50; derivatives "
          "tolerance: " +
-         number(derivatives_tolerance) +
+         digits(derivatives_tolerance) +
          ";\nend: initial value;\n"
          "begin: control data; skip initial joint assembly; " +
          counts +

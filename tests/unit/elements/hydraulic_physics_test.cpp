@@ -10,7 +10,6 @@ namespace {
 using testing::CircuitDeck;
 using testing::CircuitRun;
 using testing::expect_close;
-using testing::number;
 
 constexpr double kDensity = 870, kModulus = 1.7052e9;
 const double kCelerity = std::sqrt(kModulus / kDensity);  // 1400 m/s
@@ -18,7 +17,7 @@ constexpr double kDiameter = .012;
 const double kArea = M_PI / 4 * kDiameter * kDiameter;
 
 std::string thin_fluid(double viscosity) {
-  return "linear compressible, density, 870., 1.7052e9, 1.e5, viscosity, " + number(viscosity);
+  return "linear compressible, density, 870., 1.7052e9, 1.e5, viscosity, " + digits(viscosity);
 }
 
 /// `pipes` dynamic pipes from node 1 to node pipes + 1, all nodes at 1 bar.
@@ -30,8 +29,8 @@ CircuitDeck line_of_pipes(int pipes, double length, double viscosity) {
     deck.nodes += "hydraulic: " + std::to_string(k) + ", 1.e5;\n";
   for (int k = 1; k <= pipes; ++k)
     deck.elements += "hydraulic: " + std::to_string(k) + ", dynamic pipe, " + std::to_string(k) +
-                     ", " + std::to_string(k + 1) + ", " + number(kDiameter) + ", " +
-                     number(length / pipes) + ", fluid, " + thin_fluid(viscosity) + ";\n";
+                     ", " + std::to_string(k + 1) + ", " + digits(kDiameter) + ", " +
+                     digits(length / pipes) + ", fluid, " + thin_fluid(viscosity) + ";\n";
   return deck;
 }
 
@@ -75,7 +74,7 @@ TEST(WaterHammer, ClosedLineSwingsInFourPassages) {
       "genel: 1, clamp, 21, hydraulic, const, 1.e5;\n"  // a pulse of one period fills the first
                                                         // mode
       "force: 1, abstract, 1, hydraulic, sine, 0., 2.*pi/" +
-      number(period) + ", -1.e-2, one, 0.;\n";
+      digits(period) + ", -1.e-2, one, 0.;\n";
   const CircuitRun run(deck);
   std::vector<double> crossings;
   const auto p = [&](std::size_t n) { return run.at(n, "prs", 1, 0) - 1e5; };
@@ -118,7 +117,7 @@ TEST(ClosedCircuit, KeepsItsMassToRoundOff) {
   for (int k = 0; k < 3; ++k)
     deck.elements += "hydraulic: " + std::to_string(k + 1) + ", dynamic pipe, " +
                      std::to_string(k + 1) + ", " + std::to_string((k + 1) % 3 + 1) + ", .012, " +
-                     number(lengths[k]) + ", fluid, " + thin_fluid(.0696) + ";\n";
+                     digits(lengths[k]) + ", fluid, " + thin_fluid(.0696) + ";\n";
   deck.elements +=
       "hydraulic: 4, orifice, 1, 3, .012, 2.e-5, fluid, " + thin_fluid(.0696) + ";\n" +
       "force: 1, abstract internal, 2, hydraulic, 1, hydraulic, sine, 0., 200., .1, forever, 0.;\n";

@@ -16,15 +16,6 @@
 namespace mbcosim::conformance {
 namespace {
 
-/// Attachments of both nodes to the same generic point and frame.
-template <class E>
-void attach(Bench& bench, E& e) {
-  const Vec3 point = bench.vec();
-  const Mat3 frame = bench.rotation();
-  e.a = {bench.first, bench.offset(bench.first, point), bench.relative(bench.first, frame)};
-  e.b = {bench.second, bench.offset(bench.second, point), bench.relative(bench.second, frame)};
-}
-
 /// A joint between two nodes that only needs its attachments.
 template <class E, bool is_ideal = true>
 struct Between {

@@ -4,20 +4,14 @@
 #include <map>
 #include <string>
 
+#include "deck_digits.h"
 #include "deck_run.h"
 #include "elements/modal_bodies.h"
 #include "math/rotation.h"
 
 namespace mbcosim::testing {
 
-inline std::string digits(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
-inline std::string digits(const Vec3& v) {
-  return digits(v(0)) + ", " + digits(v(1)) + ", " + digits(v(2));
-}
+using mbcosim::digits;
 inline std::string digits(const Mat3& m) {
   return "matr, " + digits(Vec3(m.row(0))) + ", " + digits(Vec3(m.row(1))) + ", " +
          digits(Vec3(m.row(2)));

@@ -6,20 +6,12 @@
 #include <cmath>
 #include <string>
 
+#include "deck_digits.h"
 #include "deck_run.h"
 #include "simulation/exact_cantilever.h"
 
 namespace mbcosim {
 namespace {
-
-std::string number(double v) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", v);
-  return text;
-}
-std::string numbers(const Vec3& v) {
-  return number(v(0)) + "," + number(v(1)) + "," + number(v(2));
-}
 
 Vec6 vec6(double a, double b, double c, double d, double e, double f) {
   Vec6 v;
@@ -28,7 +20,7 @@ Vec6 vec6(double a, double b, double c, double d, double e, double f) {
 }
 std::string diagonal(const Vec6& k) {
   std::string text = "diag";
-  for (int i = 0; i < 6; ++i) text += "," + number(k(i));
+  for (int i = 0; i < 6; ++i) text += "," + digits(k(i));
   return text;
 }
 
@@ -68,12 +60,12 @@ struct Line {
             " end: control data;\nbegin: nodes;\n";
     for (int k = 0; k <= tip(); ++k)
       text += " structural: " + std::to_string(k) + (dynamic ? ", dynamic, " : ", static, ") +
-              numbers(position[k]) + ", eye, null, " + numbers(spin) + ";\n";
+              digits(position[k]) + ", eye, null, " + digits(spin) + ";\n";
     text += "end: nodes;\nbegin: elements;\n" + supports;
     for (int k = 0; k <= tip() && dynamic; ++k) text += body(k);
     const std::string law = proportional > 0
                                 ? "linear viscoelastic generic, " + diagonal(stiffness) +
-                                      ", proportional, " + number(proportional)
+                                      ", proportional, " + digits(proportional)
                                 : "linear elastic generic, " + diagonal(stiffness);
     for (int b = 0; b < beams; ++b) {
       text += " beam" + std::to_string(nodes_per_beam) + ": " + std::to_string(b);
@@ -91,9 +83,9 @@ struct Line {
                  right = k == tip() ? 0 : (position[k + 1] - position[k]).norm() / 2,
                  h = left + right;
     const double j = mass * h * h * h / 12;
-    return " body: " + std::to_string(k) + ", " + std::to_string(k) + ", " + number(mass * h) +
-           ", " + number((right - left) / 2) + ", 0., 0., diag, " +
-           number((polar > 0 ? polar : 1e-3 * mass) * h) + "," + number(j) + "," + number(j) +
+    return " body: " + std::to_string(k) + ", " + std::to_string(k) + ", " + digits(mass * h) +
+           ", " + digits((right - left) / 2) + ", 0., 0., diag, " +
+           digits((polar > 0 ? polar : 1e-3 * mass) * h) + "," + digits(j) + "," + digits(j) +
            ";\n";
   }
 };
@@ -127,11 +119,11 @@ class ConstantStrain : public testing::TestWithParam<int> {
     tip_ = line.tip();
     line.orientation = "matr";
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) line.orientation += "," + number(frame_(i, j));
+      for (int j = 0; j < 3; ++j) line.orientation += "," + digits(frame_(i, j));
     line.forces = 2;
     line.loads = " force: 1, absolute, " + std::to_string(tip_) + ", position, null, " +
-                 numbers(frame_ * force) + ", const, 1.;\n couple: 2, absolute, " +
-                 std::to_string(tip_) + ", " + numbers(frame_ * couple) + ", const, 1.;\n";
+                 digits(frame_ * force) + ", const, 1.;\n couple: 2, absolute, " +
+                 std::to_string(tip_) + ", " + digits(frame_ * couple) + ", const, 1.;\n";
     line.initial = "tolerance: 1e-11;";
     DeckRun deck(line.deck());
     if (deck.ready()) deck.step();
@@ -203,7 +195,7 @@ TEST(LargeDeflection, FortyFiveDegreeBend) {
     run.step(static_cast<int>(std::lround(c.force / 15)) -
              static_cast<int>(run.simulation().step_number()));
     const Vec3 tip = run.node(16).x;
-    SCOPED_TRACE("force " + number(c.force));
+    SCOPED_TRACE("force " + digits(c.force));
     expect_near(tip, c.published, .2);
     expect_near(tip, exact.solve({0, 0, c.force}).r, .02);
   }
@@ -225,14 +217,14 @@ TEST(LargeDeflection, PrincetonBeam) {
       line.step = .125;
       line.initial = kQuasiStatic;
       line.loads = " force: 1, absolute, " + std::to_string(line.tip()) + ", position, null, " +
-                   numbers(direction) + ", ramp, 4.448, 0., 3., 0.;\n";
+                   digits(direction) + ", ramp, 4.448, 0., 3., 0.;\n";
       DeckRun run(line.deck());
       ASSERT_TRUE(run.ready());
       for (const double force : {4.448, 8.896, 13.344}) {
         run.step(8);
         const auto exact = ExactCantilever{.508, stiffness}.solve(force * direction);
         const NodeState tip = run.node(line.tip());
-        SCOPED_TRACE("pitch " + number(degrees) + ", force " + number(force));
+        SCOPED_TRACE("pitch " + digits(degrees) + ", force " + digits(force));
         EXPECT_LT(vector_of_rotation<double>(exact.R.transpose() * tip.R).norm(), 2e-4);
         error[elements == 10] = std::max(error[elements == 10], (tip.x - exact.r).norm());
         largest = std::max(largest, exact.r.tail<2>().norm());
@@ -382,7 +374,7 @@ double lateral_stiffness(double load) {
   line.polar = 1e-4;
   line.step = 10;
   line.initial = kQuasiStatic;
-  line.loads = " force: 1, absolute, 20, position, null, 0.,0.,-1., const, " + number(load) + ";\n";
+  line.loads = " force: 1, absolute, 20, position, null, 0.,0.,-1., const, " + digits(load) + ";\n";
   DeckRun run(line.deck());
   if (!run.ready()) return 0;
   run.step(4);
@@ -473,7 +465,7 @@ TEST(Damping, EnergyDecaysAsTheFirstModeSays) {
   line.step = half / 100;
   line.forces = 1;
   line.initial = "method: ms, 1.;";
-  line.loads = " force: 1, absolute, 8, position, null, 0.,1e-3,0., sine, 0., " + number(w) +
+  line.loads = " force: 1, absolute, 8, position, null, 0.,1e-3,0., sine, 0., " + digits(w) +
                ", 1., one, 0.;\n";
   DeckRun run(line.deck());
   ASSERT_TRUE(run.ready());

@@ -6,7 +6,6 @@
 namespace mbcosim {
 namespace {
 
-using reference::digits;
 using reference::extrapolated;
 using reference::problem_block;
 using reference::runge_kutta;

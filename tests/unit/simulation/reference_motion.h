@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <string>
 
+#include "deck_digits.h"
 #include "deck_run.h"
 
 namespace mbcosim::reference {
@@ -28,16 +29,6 @@ auto extrapolated(int steps, Function&& result) {
   const auto coarse = result(steps), fine = result(2 * steps);
   using Value = std::decay_t<decltype(coarse)>;
   return Value(fine + (fine - coarse) / 3);
-}
-
-/// All digits of a number for a deck.
-inline std::string digits(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
-inline std::string digits(const Vec3& v) {
-  return digits(v(0)) + "," + digits(v(1)) + "," + digits(v(2));
 }
 
 /// Data and initial value blocks of a run to `end` in `steps` steps.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "deck_digits.h"
 #include "deck_run.h"
 #include "output/eigen_text.h"
 #include "solver/eigenanalysis.h"
@@ -193,20 +194,15 @@ std::string cantilever(int elements) {
       small_step() + "begin: control data; structural nodes: " + std::to_string(nodes) +
       "; rigid bodies: " + std::to_string(nodes - 1) + "; beams: " + std::to_string(elements) +
       "; joints: 1; end: control data;\nbegin: nodes;\n";
-  const auto number = [](double v) {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.17g", v);
-    return std::string(text);
-  };
   for (int k = 0; k < nodes; ++k)
     deck += "structural: " + std::to_string(k) + (k == 0 ? ", static, " : ", dynamic, ") +
-            number(k * piece) + ",0.,0., eye, null, null;\n";
+            digits(k * piece) + ",0.,0., eye, null, null;\n";
   deck += "end: nodes;\nbegin: elements;\njoint: 1, clamp, 0, node, node;\n";
   for (int k = 1; k < nodes; ++k) {
     const double m = k == nodes - 1 ? piece / 2 : piece, x = k == nodes - 1 ? -piece / 4 : 0;
     const double j = m * std::pow(k == nodes - 1 ? piece / 2 : piece, 2) / 12;
-    deck += "body: " + std::to_string(k) + ", " + std::to_string(k) + ", " + number(m) + ", " +
-            number(x) + ",0.,0., diag, 1e-3," + number(j) + "," + number(j) + ";\n";
+    deck += "body: " + std::to_string(k) + ", " + std::to_string(k) + ", " + digits(m) + ", " +
+            digits(x) + ",0.,0., diag, 1e-3," + digits(j) + "," + digits(j) + ";\n";
   }
   for (int k = 0; k < elements; ++k) {
     deck += "beam3: " + std::to_string(k);

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "deck_digits.h"
 #include "deck_run.h"
 
 namespace mbcosim {
@@ -119,12 +120,10 @@ INSTANTIATE_TEST_SUITE_P(
 
 /// Free tumbling body: orientation after 0.4 s in `steps` steps.
 Mat3 tumbled(const std::string& method, int steps) {
-  char h[40];
-  std::snprintf(h, sizeof h, "%.17g", 0.4 / steps);
   DeckRun run(
       "begin: data; problem: initial value; end: data; begin: initial value; initial time: 0.; "
       "final time: 10.; time step: " +
-      std::string(h) + "; method: " + method +
+      digits(0.4 / steps) + "; method: " + method +
       R"(; max iterations: 20; tolerance: 1e-10; derivatives tolerance: 1e-3;
 end: initial value;
 begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;
@@ -165,13 +164,11 @@ begin: elements; body: 1, 1, 2., null, eye;
 
 /// Mass on an elastic rod that turns and swings; position after 0.4 s in `steps` steps.
 Vec3 swung(const std::string& method, int steps) {
-  char h[40];
-  std::snprintf(h, sizeof h, "%.17g", 0.4 / steps);
   DeckRun run(
       "begin: data; problem: initial value; end: data; begin: initial value; initial time: 0.; "
       "final "
       "time: 10.; time step: " +
-      std::string(h) + "; method: " + method + R"(; max iterations: 20; tolerance: 1e-11;
+      digits(0.4 / steps) + "; method: " + method + R"(; max iterations: 20; tolerance: 1e-11;
 derivatives tolerance: 1.; end: initial value;
 begin: control data; structural nodes: 2; rigid bodies: 1; joints: 2; gravity; end: control data;
 begin: nodes;
