@@ -1,20 +1,14 @@
 #include "input/binder.h"
 
-#include "input/model_functions.h"
-#include "input/nearest.h"
+#include "input/call_binder.h"
 #include "input/plugin.h"
 #include "input/session.h"
-#include "model/drive.h"
-#include "model/model.h"
 
 namespace mbcosim {
 
 namespace {
 
-std::string in_quotes(std::string_view s) { return '"' + std::string(s) + '"'; }
 bool is_int_like(ValueType t) { return t == ValueType::boolean || t == ValueType::integer; }
-bool is_real(ValueType t) { return t == ValueType::real; }
-bool is_text(ValueType t) { return t == ValueType::string; }
 
 constexpr std::string_view kOperatorTexts[] = {"+", "-",  "!",  "+",  "-", "*",  "/",  "%",  "^",
                                                "<", "<=", "==", ">=", ">", "!=", "&&", "||", "~|"};
@@ -34,10 +28,10 @@ double number_of(const Value& v) {
   return 0;
 }
 
-class Binder {
+class Binder : CallBinder {
  public:
   Binder(Session& session, const Syntax& syntax, const BindingRules& rules, Program* program)
-      : session_(session), syntax_(syntax), rules_(rules), out_(*program) {}
+      : CallBinder(session, rules.run_time, *program), syntax_(syntax), rules_(rules) {}
 
   void bind() {
     for (const SyntaxItem& item : syntax_.items) {
@@ -49,13 +43,6 @@ class Binder {
   }
 
  private:
-  /// A value on the stack: its type, and where the code that makes it begins.
-  struct Entry {
-    ValueType type;
-    std::uint32_t start;
-    bool constant;
-  };
-
   void bind_item(const SyntaxItem& item) {
     switch (item.form) {
       case Form::integer:
@@ -94,140 +81,8 @@ class Binder {
     }
   }
 
-  // -------------------------------------------------------------------------------------------------------------
-  // code
-  [[noreturn]] void fail(const std::string& message, const std::string& hint = "",
-                         const std::string& code = "expression") const {
-    throw ExpressionError(item_->where, item_->length, message, hint, code);
-  }
-
-  Instruction& emit(Op op, ValueType type) {
-    Instruction& in = out_.code.emplace_back();
-    in.op = op;
-    in.type = type;
-    in.where = item_->where;
-    in.length = item_->length;
-    return in;
-  }
-  std::uint32_t here() const { return static_cast<std::uint32_t>(out_.code.size()); }
-  void pushed(ValueType type, std::uint32_t start, bool constant) {
-    stack_.push_back({type, start, constant});
-  }
-
-  Instruction& load(Op op, ValueType type) {
-    pushed(type, here(), false);
-    return emit(op, type);
-  }
-  void push_integer(std::int32_t value, ValueType type = ValueType::integer) {
-    pushed(type, here(), true);
-    emit(Op::push, type).integer = value;
-  }
-  void push_real(double value) {
-    pushed(ValueType::real, here(), true);
-    emit(Op::push, ValueType::real).real = value;
-  }
-  void push_text(const std::string& value) {
-    pushed(ValueType::string, here(), true);
-    emit(Op::push_text, ValueType::string).index = static_cast<std::int32_t>(out_.texts.size());
-    out_.texts.push_back(value);
-  }
-  void push_value(const Value& v) {
-    switch (type_of(v)) {
-      case ValueType::boolean:
-        push_integer(std::get<bool>(v), ValueType::boolean);
-        break;
-      case ValueType::integer:
-        push_integer(std::get<std::int32_t>(v));
-        break;
-      case ValueType::real:
-        push_real(std::get<double>(v));
-        break;
-      case ValueType::string:
-        push_text(std::get<std::string>(v));
-        break;
-    }
-  }
-  void load_drive(const DrivePtr& drive) {
-    load(Op::load_drive, ValueType::real).index = static_cast<std::int32_t>(out_.drives.size());
-    out_.drives.push_back(drive);
-  }
-
-  /// Where the code of the value `depth` below the top ends.
-  std::uint32_t code_end(int depth) const {
-    return depth == 0 ? here() : stack_[stack_.size() - depth].start;
-  }
-  ValueType top_type(int depth = 0) const { return stack_[stack_.size() - 1 - depth].type; }
-
-  void convert(int depth, ValueType to, Loss loss = Loss::silent) {
-    Entry& e = stack_[stack_.size() - 1 - depth];
-    if (e.type == to) return;
-    if (is_text(e.type)) fail(std::string("cannot convert string to ") + type_name(to));
-    if (to == ValueType::integer && e.type == ValueType::boolean) {
-      e.type = to;
-      return;
-    }
-    Instruction& first = out_.code[e.start];
-    if (to == ValueType::real && first.op == Op::push && first.type == e.type &&
-        code_end(depth) == e.start + 1) {
-      first.type = e.type = to;  // a literal
-      first.real = first.integer;
-      return;
-    }
-    Instruction& in = emit(Op::convert, to);
-    in.from = e.type;
-    in.depth = static_cast<std::uint8_t>(depth);
-    in.loss = loss;
-    e.type = to;
-  }
-
-  /// Replaces the `count` topmost values by the one that `op` makes of them.
-  Instruction& reduce(int count, Op op, ValueType type) {
-    const std::uint32_t start = count ? stack_[stack_.size() - count].start : here();
-    bool constant = true;
-    for (int k = 0; k < count; ++k) constant = constant && stack_[stack_.size() - 1 - k].constant;
-    stack_.resize(stack_.size() - count);
-    pushed(type, start, constant);
-    return emit(op, type);
-  }
-
-  /// Run-time strings: computes now what does not depend on anything.
-  void fold() {
-    const Entry e = stack_.back();
-    if (!rules_.run_time || !e.constant) return;
-    Program part;
-    part.code.assign(out_.code.begin() + e.start, out_.code.end());
-    part.texts = out_.texts;
-    part.depth = static_cast<int>(part.code.size()) + 1;
-    Frame<double> frame;
-    frame.context = &session_.context();
-    Slot<double> result;
-    try {
-      result = run(part, frame);
-    } catch (const EvaluationError&) {
-      stack_.back().constant = false;  // fails when it is evaluated, if ever
-      return;
-    }
-    out_.code.resize(e.start);
-    stack_.pop_back();
-    if (is_text(e.type))
-      push_text(frame.texts.back());
-    else if (is_real(e.type))
-      push_real(result.r);
-    else
-      push_integer(result.i, e.type);
-  }
-
   // ------------------------------------------------------------------------------------------------------------
   // names
-  void check_space(const SyntaxItem& item, bool is_function) const {
-    if (item.name_space.empty() || item.name_space == "default") return;
-    if (item.name_space != "model")
-      fail("unknown namespace " + in_quotes(item.name_space),
-           "the namespaces are default and model");
-    if (!is_function)
-      fail("namespace model has no variables", "model:: functions need parentheses");
-  }
-
   int find_local(std::string_view name) const {
     for (std::size_t k = 0; k < local_names_.size(); ++k)
       if (local_names_[k] == name) return static_cast<int>(k);
@@ -242,12 +97,12 @@ class Binder {
 
   void load_name(const SyntaxItem& item) {
     check_space(item, false);
-    if (rules_.run_time && load_run_name(item)) return;
+    if (run_time_ && load_run_name(item)) return;
     Symbol* s = session_.symbols.find(item.name);
     if (!s) fail_unknown(item);
     if (s->damaged) session_.set_damaged(true);
     if (s->plugin) return load_drive(s->plugin);
-    if (!rules_.run_time) {
+    if (!run_time_) {
       load(Op::load_symbol, type_of(s->value)).symbol = s;
     } else if (s->role != SymbolRole::plain) {
       load_role(*s);
@@ -333,12 +188,6 @@ class Binder {
     fail(message, hint, "unknown-variable");
   }
 
-  static std::string nearest_text(std::string_view name, const std::string& best) {
-    const bool case_only = Nearest(name).is_case_of(best);
-    return (case_only ? "; names are case sensitive; did you mean " : "; did you mean ") +
-           in_quotes(best) + "?";
-  }
-
   // -----------------------------------------------------------------------------------------
   // declarations, assignment
   void declare(const SyntaxItem& item) {
@@ -349,7 +198,7 @@ class Binder {
       fail(in_quotes(item.name) + " is a word of the language", "", "redefinition");
     if (item.is_constant && !item.has_value)
       fail("constant " + in_quotes(item.name) + " needs a value");
-    if (rules_.run_time) return declare_local(item);
+    if (run_time_) return declare_local(item);
     Symbol* known = session_.symbols.find(item.name);
     if (known) return redeclare(item, known);
     Symbol s;
@@ -444,7 +293,7 @@ class Binder {
 
   void assign(const SyntaxItem& item) {
     check_space(item, false);
-    if (rules_.run_time) return assign_at_run_time(item);
+    if (run_time_) return assign_at_run_time(item);
     Symbol* s = session_.symbols.find(item.name);
     if (!s) fail_undeclared(item);
     if (s->predefined) fail("cannot assign predefined constant " + in_quotes(item.name));
@@ -497,11 +346,11 @@ class Binder {
     stack_.pop_back();
     // Code that computes a constant for nobody; a drop of anything else must stay for what its code
     // does.
-    if (rules_.run_time && e.constant) out_.code.resize(e.start);
+    if (run_time_ && e.constant) out_.code.resize(e.start);
   }
 
   void plugin(const SyntaxItem& item) {
-    if (rules_.run_time)
+    if (run_time_)
       fail("plugin variables are declared by the deck, not inside a run-time string",
            "use a set card before");
     load_drive(declare_plugin(session_, item.name, item.where + 1).plugin);
@@ -601,180 +450,8 @@ class Binder {
     reduce(2, static_cast<Op>(static_cast<int>(Op::less) + k), ValueType::boolean);
   }
 
-  // --------------------------------------------------------------------------------------------------------
-  // functions
-  void call(const SyntaxItem& item) {
-    check_space(item, true);
-    if (item.name_space == "model") return model_call(item);
-    const Function* f = find_function(item.name);
-    if (!f) fail_unknown_function(item, nearest_function(item.name));
-    const int expected = static_cast<int>(std::string_view(f->arguments).size());
-    check_count(item, item.name, expected, expected);
-    if (f->id == FunctionId::sprintf) return call_format();
-    if (f->id >= FunctionId::to_bool) return call_conversion(f->result);
-    for (int k = 0; k < expected; ++k) convert_argument(item.name, k, expected, f->arguments[k]);
-    Instruction& in = reduce(expected, Op::call, f->result);
-    in.function = f->id;
-    in.count = static_cast<std::uint8_t>(expected);
-    if (!f->pure) stack_.back().constant = false;
-    fold();
-  }
-
-  [[noreturn]] void fail_unknown_function(const SyntaxItem& item, const std::string& best) const {
-    std::string message = "unknown function " + in_quotes(item.name);
-    if (!best.empty()) message += nearest_text(item.name, best);
-    fail(message, "", "unknown-function");
-  }
-
-  void check_count(const SyntaxItem& item, std::string_view name, int least, int most) const {
-    if (item.count >= least && item.count <= most) return;
-    std::string expected = std::to_string(least);
-    if (most > least) expected += " or " + std::to_string(most);
-    fail("function " + std::string(name) + " expects " + expected +
-         (most == 1 ? " argument, " : " arguments, ") + std::to_string(item.count) + " given");
-  }
-
-  void convert_argument(std::string_view name, int k, int count, char kind) {
-    const int depth = count - 1 - k;
-    const ValueType t = top_type(depth);
-    if ((kind == 'S') != is_text(t)) {
-      const char* wanted = kind == 'S' ? " must be a string" : " must be a number, string found";
-      fail(std::string(name) + ": argument " + std::to_string(k + 1) + wanted);
-    }
-    if (kind == 'R') convert(depth, ValueType::real);
-    if (kind == 'I') convert(depth, ValueType::integer);
-  }
-
-  void call_format() {
-    if (!is_text(top_type(1))) fail("sprintf: argument 1 must be a string");
-    const ValueType from = top_type();
-    reduce(2, Op::format, ValueType::string).from = from;
-    fold();
-  }
-
-  void call_conversion(ValueType to) {
-    convert(0, to);
-    fold();
-  }
-
-  // ----------------------------------------------------------------------------------------------------------
-  // model::
-  void model_call(const SyntaxItem& item) {
-    if (!session_.model_available())
-      fail("model::" + std::string(item.name) +
-           " is not available before the end of the \"initial value\" block");
-    const std::size_t colons = item.name.find("::");
-    if (colons != std::string_view::npos) {
-      const std::string_view space = item.name.substr(0, colons),
-                             name = item.name.substr(colons + 2);
-      if (space == "sf") return call_scalar_function(item, name);
-      if (space == "node") return call_node_datum(item, name);
-      if (space == "element") return call_element_datum(item, name);
-      fail("unknown namespace \"model::" + std::string(space) + '"',
-           "there are model::sf, model::node and model::element");
-    }
-    if (item.name == "current") return call_current(item);
-    if (item.name == "drive" || item.name == "drivep") return call_drive(item);
-    NodeFunction f;
-    if (!find_node_function(item.name, &f))
-      fail_unknown_function(item, nearest_model_function(item.name));
-    check_count(item, item.name, f.nodes(), f.nodes());
-    for (int k = 0; k < f.nodes(); ++k) convert_argument(item.name, k, f.nodes(), 'I');
-    reduce_model(f.nodes(), Op::node_function).index = f.code();
-  }
-
-  Instruction& reduce_model(int count, Op op) {
-    Instruction& in = reduce(count, op, ValueType::real);
-    in.count = static_cast<std::uint8_t>(count);
-    stack_.back().constant = false;
-    return in;
-  }
-
-  void call_drive(const SyntaxItem& item) {
-    check_count(item, item.name, 2, 2);
-    convert_argument(item.name, 0, 2, 'I');
-    convert_argument(item.name, 1, 2, 'R');
-    reduce_model(2, item.name == "drive" ? Op::drive_value : Op::drive_derivative);
-  }
-
-  void call_current(const SyntaxItem& item) {
-    check_count(item, "current", 1, 1);
-    if (!is_text(top_type()) || out_.code.back().op != Op::push_text)
-      fail("current: the argument must be a string");
-    const std::string name = out_.texts[out_.code.back().index];
-    const auto value = session_.currents.find(name);
-    if (value == session_.currents.end())
-      fail("no value \"" + name + "\" is supplied by the card being read");
-    out_.code.pop_back();
-    stack_.pop_back();
-    push_real(value->second);
-  }
-
-  void call_scalar_function(const SyntaxItem& item, std::string_view name) {
-    check_count(item, item.name, 1, 2);
-    const auto f = session_.functions.find(name);
-    if (f == session_.functions.end())
-      fail("scalar function " + in_quotes(name) + " is not defined");
-    convert_argument(item.name, 0, item.count, 'R');
-    if (item.count == 2) convert_argument(item.name, 1, 2, 'I');
-    reduce_model(item.count, Op::function_value).index =
-        static_cast<std::int32_t>(out_.functions.size());
-    out_.functions.push_back(f->second);
-  }
-
-  void call_node_datum(const SyntaxItem& item, std::string_view name) {
-    const int type = node_type(name);
-    if (type < 0)
-      fail("unknown node type " + in_quotes(name),
-           "structural, abstract, electric, hydraulic, thermal or parameter");
-    check_count(item, item.name, 2, 2);
-    call_datum(item, Op::node_datum, type);
-  }
-
-  void call_element_datum(const SyntaxItem& item, std::string_view name) {
-    Family family;
-    if (!family_of(name, &family)) fail("unknown element type " + in_quotes(name));
-    check_count(item, item.name, 1, 2);
-    call_datum(item, Op::element_datum, static_cast<int>(family));
-  }
-
-  void call_datum(const SyntaxItem& item, Op op, int index) {
-    if (item.count == 2) convert_argument(item.name, 0, 2, 'I');
-    convert_argument(item.name, item.count - 1, item.count, 'S');
-    if (rules_.run_time && bind_datum(item.count, op, index)) return;
-    reduce_model(item.count, op).index = index;
-  }
-
-  /// Label and datum known: looked up once.
-  bool bind_datum(int count, Op op, int index) {
-    const Entry& text = stack_.back();
-    const Entry& first = stack_[stack_.size() - count];
-    if (!text.constant || !first.constant || !session_.builder()) return false;
-    const std::string name = out_.texts[out_.code[text.start].index];
-    const int label = count == 2 ? out_.code[first.start].integer : 0;
-    const Model& model = session_.builder()->model();
-    DrivePtr drive;
-    try {
-      drive = op == Op::node_datum
-                  ? node_datum(model, index, label, name)
-                  : element_datum(model, static_cast<Family>(index), count == 2, label, name);
-    } catch (const ExpressionError&) {
-      throw;
-    } catch (const EvaluationError& e) {
-      fail(e.what());
-    }
-    out_.code.resize(first.start);
-    stack_.resize(stack_.size() - count);
-    load_drive(drive);
-    return true;
-  }
-
-  Session& session_;
   const Syntax& syntax_;
   const BindingRules& rules_;
-  Program& out_;
-  const SyntaxItem* item_ = nullptr;
-  std::vector<Entry> stack_;
   std::vector<std::string_view> local_names_;
   std::vector<std::string_view> constant_locals_;
 };

@@ -36,24 +36,28 @@ void warn_old_name(DeckCard& card, SourceSpan where, std::string_view present);
 void ignore_rest(DeckCard& card, const std::string& why);
 /// `output, { yes | no | default | <bool> }`, when it is there.
 void read_output_option(DeckCard& card, bool default_value, bool& output);
-/// The labels of an `output` card: calls `one(label)` for single labels and range members.
-template <class One>
-void read_output_labels(DeckCard& card, One one) {
+/// The labels of an `output` card: calls `mark(first, last)` for each range; first = last for a
+/// single label.
+template <class Mark>
+void read_output_labels(DeckCard& card, Mark mark) {
   do {
     if (card.keyword("range")) {
       const int first = card.label("first label"), last = card.label("last label");
       if (last < first) card.fail("range: the last label is less than the first");
-      one(first, last);
+      mark(first, last);
     } else {
       const int label = card.label("label");
-      one(label, label);
+      mark(label, label);
     }
   } while (card.more());
 }
 
 /// A method of time integration, as in `method` and `dummy steps method`.
 MethodSettings read_method(DeckCard& card);
+void read_nonlinear_solver(DeckCard& card);
+void read_legacy_newton(DeckCard& card);  ///< the old card `newton raphson`
 /// The arguments of `linear solver`, checked and without effect.
 void read_linear_solver(DeckCard& card);
+void read_eigenanalysis(DeckCard& card);
 
 }  // namespace mbcosim

@@ -20,8 +20,6 @@ bool find_type(std::string_view name, ValueType* type) {
 
 namespace {
 
-std::string in_quotes(std::string_view s) { return '"' + std::string(s) + '"'; }
-
 /// Recursive descent. Binding from weak to strong, all to the left but `^`:
 ///
 ///     = (a statement)     && || ~|     > >= == <= < !=     + -     * / %     ^     one sign or !

@@ -1,6 +1,7 @@
 set(SOURCES
   anywhere_cards.cpp
   binder.cpp
+  call_binder.cpp
   cards.cpp
   control_block.cpp
   counts.cpp
@@ -8,7 +9,9 @@ set(SOURCES
   deck.cpp
   deck_card.cpp
   deck_reader.cpp
+  eigenanalysis_card.cpp
   elements_block.cpp
+  emitter.cpp
   evaluate.cpp
   frames.cpp
   function_values.cpp
@@ -26,6 +29,7 @@ set(SOURCES
   run_strings.cpp
   session.cpp
   shared_objects.cpp
+  solver_cards.cpp
   sources.cpp
   splitter.cpp
   statements.cpp

@@ -28,6 +28,9 @@ class ExpressionError : public EvaluationError {
   std::string hint, code;
 };
 
+/// A piece of an expression as messages show it.
+inline std::string in_quotes(std::string_view s) { return '"' + std::string(s) + '"'; }
+
 enum class Form : std::uint8_t {
   integer,
   real,
