@@ -1,5 +1,7 @@
 /// mbcosim: runs and inspects decks on the command line.
 #include <CLI/CLI.hpp>
+#include <cstdio>
+#include <new>
 
 #include "cli/commands.h"
 #include "reduction/job.h"
@@ -94,6 +96,12 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kRefused;
+  } catch (const std::bad_alloc&) {
+    std::fputs("error: out of memory\n", stderr);
+    return kRefused;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "error: %s\n", e.what());
+    return kNumericalFailure;
   }
   return exit_code;
 }

@@ -57,6 +57,16 @@ def test_numerical_failure_exits_with_3(tmp_path):
     assert run.returncode == 3 and "residual" in run.stderr
 
 
+def test_a_drive_without_a_value_exits_with_3(tmp_path):
+    deck = tmp_path / "deck"
+    for card in ("end: initial value;", "end: control data;"):
+        drive = 'string, "sqrt(0.25 - Time)"'
+        extra = f"strategy: change, {drive}; min time step: 1e-6; " if "initial" in card else f"output meter: {drive}; "
+        deck.write_text(decks.body().replace(card, extra + card))
+        run = mbcosim("run", str(deck))
+        assert run.returncode == 3 and "sqrt: argument" in run.stderr
+
+
 def test_wrong_usage_exits_with_4(deck):
     assert mbcosim().returncode == 4
     assert mbcosim("run").returncode == 4
