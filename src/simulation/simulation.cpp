@@ -247,7 +247,9 @@ PhaseReport Simulation::Impl::advance_or_restore(int& pieces) {
     restore();
     throw;
   }
-  if (phase.error) restore();
+  if (!phase.error) return phase;
+  restore();
+  stepper.explain(phase);
   return phase;
 }
 

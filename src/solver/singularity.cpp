@@ -55,8 +55,10 @@ std::string joined(const std::vector<WorstEquation>& list) {
   return s;
 }
 
-std::string Singularity::text() const {
-  std::string s = "the matrix is singular";
+std::string Singularity::text() const { return "the matrix is singular" + details(); }
+
+std::string Singularity::details() const {
+  std::string s;
   if (rank_loss > 0) s += " (rank loss " + std::to_string(rank_loss) + ")";
   if (!undetermined.empty()) s += "\n  nothing determines: " + joined(undetermined);
   if (!redundant.empty()) s += "\n  redundant or empty equations: " + joined(redundant);

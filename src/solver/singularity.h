@@ -13,9 +13,10 @@ struct Singularity {
   int rank_loss = 0;                        ///< 0 when the matrix has full rank
   std::vector<WorstEquation> undetermined;  ///< unknowns with the largest share in the null space
   std::vector<WorstEquation>
-      redundant;  ///< equations with the largest share in the left null space
-  std::string text() const;
-  std::string remedy() const;  ///< what the author of the deck can do
+      redundant;                ///< equations with the largest share in the left null space
+  std::string text() const;     ///< "the matrix is singular" and the details
+  std::string details() const;  ///< rank loss, unknowns, equations, the remedy
+  std::string remedy() const;   ///< what the author of the deck can do
 };
 
 /// Rank to rounding; `column` is the column without a pivot that the sparse factorization met (-1:

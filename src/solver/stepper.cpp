@@ -188,6 +188,7 @@ PhaseReport Stepper::solve_derivatives(State& state) {
   }
   if (!done) {
     report.error = failure(report.newton, state, "derivatives phase");
+    explain(report);
     if (report.newton.outcome == NewtonOutcome::not_converged)
       report.error->message +=
           "\n  hint: change `derivatives coefficient`, `derivatives tolerance` or `derivatives max "
@@ -238,7 +239,10 @@ PhaseReport Stepper::run_dummy_steps(State& state) {
   if (s.dummy_method) method = *s.dummy_method;
   for (int k = 0; k < s.dummy_steps; ++k) {
     report = attempt(state, s.dummy_ratio * s.time_step, method, k == 0, dummy_);
-    if (report.error) return report;
+    if (report.error) {
+      explain(report);
+      return report;
+    }
   }
   state.h = s.time_step;
   state.h_previous = s.time_step;
@@ -463,14 +467,11 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
       e.reason = "CANCELLED";
       e.message = std::string(where) + ": interrupted between iterations";
       return e;
-    case NewtonOutcome::singular: {
+    case NewtonOutcome::singular:
       e.kind = ErrorKind::singular;
       e.reason = "SINGULAR_MATRIX";
-      const Singularity cause = find_singularity(model_, workspace_.values, report.singular_column);
-      e.failure.worst = cause.undetermined;
-      e.message = std::string(where) + ": " + cause.text();
+      e.message = std::string(where) + ": the matrix is singular";
       return e;
-    }
     default:
       break;
   }
@@ -486,10 +487,21 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
     std::snprintf(text, sizeof text, "%.6g", w.residual);
     e.message += "\n  " + w.owner + ", " + w.equation + ": residual " + text;
   }
-  if (const Singularity cause = find_near_singularity(model_, workspace_.values);
-      cause.rank_loss > 0)
-    e.message += "\n  " + cause.text();
   return e;
+}
+
+void Stepper::explain(PhaseReport& report) const {
+  if (!report.error) return;
+  Error& e = *report.error;
+  if (e.kind == ErrorKind::singular) {
+    const Singularity cause =
+        find_singularity(model_, workspace_.values, report.newton.singular_column);
+    e.failure.worst = cause.undetermined;
+    e.message += cause.details();
+  } else if (e.kind == ErrorKind::not_converged) {
+    const Singularity cause = find_near_singularity(model_, workspace_.values);
+    if (cause.rank_loss > 0) e.message += "\n  " + cause.text();
+  }
 }
 
 }  // namespace mbcosim

@@ -58,6 +58,8 @@ class Stepper {
   double peek_step_size(const State& state) const;
   /// Tries one step of length h from the accepted `state`. On failure `state` is as it was.
   PhaseReport step(State& state, double h);
+  /// Adds what the last matrix tells about a failed step to its error. Takes longer than the step.
+  void explain(PhaseReport& report) const;
   /// A shorter step after a failure, or 0 when the strategy has none.
   double retry_step_size(State& state, double h);
 
