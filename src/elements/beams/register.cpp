@@ -13,16 +13,22 @@ namespace {
 /// Section orientation from the nodes': relative to the second node, interpolated as rotation
 /// parameters.
 template <int Nodes>
-Mat3 interpolated_orientation(const Model& model, const Beam<Nodes>& beam,
+Mat3 interpolated_orientation(Card& card, const Beam<Nodes>& beam,
                               const typename Beam<Nodes>::Orientations& relative, int a) {
   const auto orientation = [&](int k) -> Mat3 {
-    return model.structural[beam.node[k]].R * relative[k];
+    return card.model().structural[beam.node[k]].R * relative[k];
   };
   const Mat3 middle = orientation(1);
   Vec3 r = Vec3::Zero();
-  for (int k = 0; k < Nodes; ++k)
-    if (k != 1)
-      r += BeamShape<Nodes>::n[a][k] * cgr_parameters<double>(middle.transpose() * orientation(k));
+  for (int k = 0; k < Nodes; ++k) {
+    if (k == 1) continue;
+    const Mat3 turn = middle.transpose() * orientation(k);
+    if (is_half_turn(turn))
+      card.fail("beam: its nodes " + std::to_string(k + 1) +
+                    " and 2 are turned by half a revolution against each other",
+                "`from nodes` interpolates rotations; give the orientation of the section");
+    r += BeamShape<Nodes>::n[a][k] * cgr_parameters<double>(turn);
+  }
   return middle * cgr_rotation(r);
 }
 
@@ -43,7 +49,7 @@ template <int Nodes>
 bool read_section_orientation(Card& card, Beam<Nodes>& beam,
                               const typename Beam<Nodes>::Orientations& relative, int a) {
   if (card.one_of({"from nodes", "from node", "node"}) >= 0) {
-    beam.point[a].R0 = interpolated_orientation(card.model(), beam, relative, a);
+    beam.point[a].R0 = interpolated_orientation(card, beam, relative, a);
     return true;
   }
   card.keyword("orientation");
@@ -60,7 +66,7 @@ void read_sections(Card& card, Beam<Nodes>& beam,
     if (!card.keyword("same"))
       read_section_orientation(card, beam, relative, 1);
     else if (from_nodes)
-      beam.point[1].R0 = interpolated_orientation(card.model(), beam, relative, 1);
+      beam.point[1].R0 = interpolated_orientation(card, beam, relative, 1);
     else
       beam.point[1].R0 = beam.point[0].R0;
     if (card.keyword("same"))

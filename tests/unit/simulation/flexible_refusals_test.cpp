@@ -217,6 +217,12 @@ TEST(BeamRefusals, PointsInOnePlaceOrOutOfOrder) {
                  Severity::error, "node label expected, keyword \"eye\" found");
 }
 
+TEST(BeamRefusals, InterpolationOfHalfTurns) {
+  expect_message(beam("beam2: 1, 1, position, null, orientation, 1, 1.,0.,0., 2, 0.,-1.,0., 2, "
+                      "null, from nodes, linear elastic generic, diag, 1.,1.,1.,1.,1.,1."),
+                 Severity::error, "its nodes 1 and 2 are turned by half a revolution");
+}
+
 TEST(BeamRefusals, SectionsActuatorsAndOutput) {
   const std::string nodes = "1, null, 2, null, 3, null";
   for (const auto& [rest, part] :
