@@ -260,20 +260,20 @@ class Assembly {
 
   /// The constraints that stay violated, largest violation of each element first.
   std::string contradictions() const {
-    std::map<std::string, std::pair<double, std::string>> by_owner;
+    const auto violation = [this](int a) { return std::abs(r_[rows_[a]]); };
     double largest = 0;
-    for (int a = node_rows_; a < size_; ++a) {
-      const double violation = std::abs(r_[rows_[a]]);
-      const auto [owner, equation] = model_.row_text(rows_[a]);
-      largest = std::max(largest, violation);
-      auto& worst = by_owner[owner];
-      if (violation >= worst.first) worst = {violation, equation};
-    }
+    for (int a = node_rows_; a < size_; ++a) largest = std::max(largest, violation(a));
     if (!(largest > 1e-4)) return {};
+    std::map<std::string, std::pair<double, std::string>> by_owner;
+    for (int a = node_rows_; a < size_; ++a) {
+      if (violation(a) < 1e-2 * largest) continue;
+      const auto [owner, equation] = model_.row_text(rows_[a]);
+      auto& worst = by_owner[owner];
+      if (violation(a) >= worst.first) worst = {violation(a), equation};
+    }
     std::string s =
         "these constraints contradict each other; the least violation that was found leaves";
     for (const auto& [owner, worst] : by_owner) {
-      if (worst.first < 1e-2 * largest) continue;
       char text[32];
       std::snprintf(text, sizeof text, "%.3g", worst.first);
       s += "\n  " + owner + ", " + worst.second + ": off by " + text;
