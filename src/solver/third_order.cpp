@@ -140,10 +140,8 @@ NewtonReport ThirdOrderSolver::solve(const ThirdOrderFormula& f, const NewtonSet
   };
   for (;;) {
     const bool settled = hooks.exchange(report.iterations);
-    if (!settled) {  // loads from outside changed; both halves of the step take them
-      stage_.external_loads = state.external_loads;
-      stage_.memory = state.memory;
-    }
+    stage_.external_loads = state.external_loads;  // which the exchange may have changed
+    stage_.memory = state.memory;
     report.residual_error = evaluate(settings, state, workspace);
     workspace.residual_history.push_back(report.residual_error);
     if (const auto verdict =

@@ -7,7 +7,6 @@
 namespace mbcosim {
 namespace {
 
-using reference::digits;
 using reference::runge_kutta;
 
 constexpr double kG = 9.81;

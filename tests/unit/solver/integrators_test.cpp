@@ -242,5 +242,31 @@ TEST(SpectralRadius, MayBeADrive) {
   EXPECT_GT((switched.node(2).x - constant.node(2).x).norm(), 1e-6);
 }
 
+/// A load that an exchange sets and at once calls settled acts like one that was there before.
+TEST(ThirdOrder, BothStagesTakeTheLoadsOfAnExchange) {
+  const std::vector<double> load = {1, 2, 3, .1, .2, .3};
+  const auto after_two_steps = [&](bool within) {
+    DeckRun run(initial_value_block(.1, 10,
+                                    "method: third order, .6; tolerance: 1e-9; "
+                                    "max iterations: 20;") +
+                "begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;"
+                "begin: nodes; structural: 1, dynamic, null, eye, null, null; end: nodes;"
+                "begin: elements; body: 1, 1, 1., null, diag, 1., 2., 3.; end: elements;");
+    run.step();  // of Crank and Nicolson
+    Simulation& simulation = run.simulation();
+    const auto push = [&](int) {
+      EXPECT_TRUE(simulation.set(simulation.find_variable("node.structural.1.load"), load));
+      return true;
+    };
+    if (within)
+      simulation.set_exchange(push);
+    else
+      push(0);
+    run.step();
+    return simulation.state().y;
+  };
+  EXPECT_EQ(after_two_steps(true), after_two_steps(false));
+}
+
 }  // namespace
 }  // namespace mbcosim
