@@ -264,13 +264,13 @@ TEST(LargeDeflection, PrincetonBeamAsPublished) {
       line.step = .125;
       line.initial = kQuasiStatic;
       line.loads = " force: 1, absolute, " + std::to_string(line.tip()) + ", position, null, " +
-                   numbers(load.force * Vec3(0, std::sin(pitch), std::cos(pitch))) +
+                   digits(load.force * Vec3(0, std::sin(pitch), std::cos(pitch))) +
                    ", ramp, 1., 0., 1., 0.;\n";
       DeckRun run(line.deck());
       ASSERT_TRUE(run.ready());
       run.step(8);
       const Vec3 tip = run.node(line.tip()).x;
-      SCOPED_TRACE("pitch " + number(15 + 15 * k) + ", force " + number(load.force));
+      SCOPED_TRACE("pitch " + digits(15 + 15 * k) + ", force " + digits(load.force));
       EXPECT_NEAR(tip(2), load.y(k), 3e-3 * load.z(k));
       EXPECT_NEAR(tip(1), load.z(k), 3e-3 * load.z(k));
     }
