@@ -69,7 +69,7 @@ using BeamCases =
     testing::Types<BeamCase<2, LawType::elastic>, BeamCase<3, LawType::elastic>,
                    BeamCase<2, LawType::viscoelastic>, BeamCase<3, LawType::viscoelastic>,
                    PiezoelectricCase<2>, PiezoelectricCase<3>>;
-INSTANTIATE_TYPED_TEST_SUITE_P(Beams, ElementConformance, BeamCases);
+MBCOSIM_CONFORMANCE(Beams, BeamCases);
 
 /// A straight three-node beam along x, clear of prestress, on three nodes with equal orientation.
 class StraightBeam : public testing::Test {

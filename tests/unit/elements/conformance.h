@@ -9,8 +9,9 @@
 ///       static constexpr bool balanced = true;  // loads of both nodes are in balance
 ///       static Element make(Bench& bench);      // its constraints hold in the bench's state
 ///     };
-///     INSTANTIATE_TYPED_TEST_SUITE_P(Joints, ElementConformance,
-///                                    testing::Types<SphericalHingeCase, …>);
+///     MBCOSIM_CONFORMANCE(Joints, testing::Types<SphericalHingeCase, …>);
+///
+/// Each case gets the tests of the properties that its element has, no others.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -254,9 +255,12 @@ class ElementConformance : public testing::Test {
   Bench bench_;
   ElementSetOf<Element>* set_ = nullptr;
 };
-TYPED_TEST_SUITE_P(ElementConformance);
-
-TYPED_TEST_P(ElementConformance, JacobianMatchesCentralDifferences) {
+template <class Case>
+class JacobianMatchesCentralDifferences : public ElementConformance<Case> {
+  void TestBody() override;
+};
+template <class Case>
+void JacobianMatchesCentralDifferences<Case>::TestBody() {
   Bench& bench = this->bench_;
   for (int k = 0; k < 3; ++k) {
     bench.generic_state(0.3);
@@ -266,113 +270,150 @@ TYPED_TEST_P(ElementConformance, JacobianMatchesCentralDifferences) {
   }
 }
 
-TYPED_TEST_P(ElementConformance, ClosedFormMatchesDual) {
-  using Element = typename TypeParam::Element;
-  if constexpr (detail::HasTangent<Element>) {
-    Bench& bench = this->bench_;
-    for (int k = 0; k < 5; ++k) {
-      bench.generic_state(0.3);
-      const EvalContext context = bench.context(bench.state);
-      const auto& slot = this->set_->slot(0);
-      Local<double> u;
-      this->set_->gather(context, slot, u);
-      const std::vector<NodeSeeds> seeds = bench.seeds();
-      MatX closed = MatX::Zero(slot.row_count, slot.column_count), dual = closed;
-      this->set_->closed_form(context, slot, u, seeds.data(), closed.data());
-      this->set_->dual_jacobian(slot, u, seeds.data(), dual.data());
-      const double scale = std::max(1.0, dual.cwiseAbs().maxCoeff());
-      for (int i = 0; i < dual.rows(); ++i)
-        for (int j = 0; j < dual.cols(); ++j)
-          EXPECT_NEAR(closed(i, j), dual(i, j), 1e-11 * scale)
-              << "local row " << i << ", column " << j;
-    }
-  } else {
-    GTEST_SKIP() << "derivatives by dual numbers only";
+template <class Case>
+class ClosedFormMatchesDual : public ElementConformance<Case> {
+  void TestBody() override;
+};
+template <class Case>
+void ClosedFormMatchesDual<Case>::TestBody() {
+  Bench& bench = this->bench_;
+  for (int k = 0; k < 5; ++k) {
+    bench.generic_state(0.3);
+    const EvalContext context = bench.context(bench.state);
+    const auto& slot = this->set_->slot(0);
+    Local<double> u;
+    this->set_->gather(context, slot, u);
+    const std::vector<NodeSeeds> seeds = bench.seeds();
+    MatX closed = MatX::Zero(slot.row_count, slot.column_count), dual = closed;
+    this->set_->closed_form(context, slot, u, seeds.data(), closed.data());
+    this->set_->dual_jacobian(slot, u, seeds.data(), dual.data());
+    const double scale = std::max(1.0, dual.cwiseAbs().maxCoeff());
+    for (int i = 0; i < dual.rows(); ++i)
+      for (int j = 0; j < dual.cols(); ++j)
+        EXPECT_NEAR(closed(i, j), dual(i, j), 1e-11 * scale)
+            << "local row " << i << ", column " << j;
   }
 }
 
 /// Each multiplier's column of loads is a multiple of its constraint's row where the constraints
 /// are satisfied and the nodes are at rest (velocity constraints rotate with their nodes).
-TYPED_TEST_P(ElementConformance, IdealJointDoesNoWork) {
-  if constexpr (!TypeParam::ideal) {
-    GTEST_SKIP() << "not an ideal joint";
-  } else {
-    Bench& bench = this->bench_;
-    bench.input_state();
-    bench.stop();
-    const MatX J = bench.jacobian();
-    const int own = bench.first_own(), count = bench.own_count();
-    for (int k = 0; k < count; ++k) {
-      const VecX load = J.col(own + k).head(own), row = J.row(own + k).head(own).transpose();
-      EXPECT_GT(row.norm(), 1e-6) << "constraint " << k;
-      EXPECT_NEAR(std::abs(load.dot(row)), load.norm() * row.norm(),
-                  1e-9 * load.norm() * row.norm())
-          << "constraint " << k;
-    }
+template <class Case>
+class IdealJointDoesNoWork : public ElementConformance<Case> {
+  void TestBody() override;
+};
+template <class Case>
+void IdealJointDoesNoWork<Case>::TestBody() {
+  Bench& bench = this->bench_;
+  bench.input_state();
+  bench.stop();
+  const MatX J = bench.jacobian();
+  const int own = bench.first_own(), count = bench.own_count();
+  for (int k = 0; k < count; ++k) {
+    const VecX load = J.col(own + k).head(own), row = J.row(own + k).head(own).transpose();
+    EXPECT_GT(row.norm(), 1e-6) << "constraint " << k;
+    EXPECT_NEAR(std::abs(load.dot(row)), load.norm() * row.norm(), 1e-9 * load.norm() * row.norm())
+        << "constraint " << k;
   }
 }
 
-TYPED_TEST_P(ElementConformance, LoadsAreInBalance) {
-  if constexpr (!TypeParam::balanced) {
-    GTEST_SKIP() << "attached to the ground";
-  } else {
-    Bench& bench = this->bench_;
-    bench.input_state();
-    const VecX r = bench.residual(bench.state);
-    Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
-    double size = 0;
-    for (const StructuralNode& node : bench.model->structural) {
-      const Vec3 f(r.data() + node.equilibrium);
-      const Vec3 m = node.has_rotation() ? Vec3(r.data() + node.equilibrium + 3) : Vec3::Zero();
-      const Vec3 x(&bench.state.y[node.first]);
-      force += f;
-      moment += m + x.cross(f);
-      size += f.norm() + m.norm();
-    }
-    EXPECT_GT(size, 1e-6);
-    EXPECT_LT(force.norm(), 1e-12 * size);
-    EXPECT_LT(moment.norm(), 1e-12 * size);
+template <class Case>
+class LoadsAreInBalance : public ElementConformance<Case> {
+  void TestBody() override;
+};
+template <class Case>
+void LoadsAreInBalance<Case>::TestBody() {
+  Bench& bench = this->bench_;
+  bench.input_state();
+  const VecX r = bench.residual(bench.state);
+  Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
+  double size = 0;
+  for (const StructuralNode& node : bench.model->structural) {
+    const Vec3 f(r.data() + node.equilibrium);
+    const Vec3 m = node.has_rotation() ? Vec3(r.data() + node.equilibrium + 3) : Vec3::Zero();
+    const Vec3 x(&bench.state.y[node.first]);
+    force += f;
+    moment += m + x.cross(f);
+    size += f.norm() + m.norm();
   }
+  EXPECT_GT(size, 1e-6);
+  EXPECT_LT(force.norm(), 1e-12 * size);
+  EXPECT_LT(moment.norm(), 1e-12 * size);
 }
 
 /// In the initial assembly the rate rows of a holonomic joint are the time derivatives of its
 /// position rows.
-TYPED_TEST_P(ElementConformance, AssemblyRatesAreTimeDerivatives) {
-  using Element = typename TypeParam::Element;
-  if constexpr (detail::HasAssemblyResidual<Element>) {
-    GTEST_SKIP() << "has its own assembly rows";
-  } else {
-    Bench& bench = this->bench_;
-    if (this->set_->assembly_role(0) != AssemblyRole::holonomic)
-      GTEST_SKIP() << "not a position constraint";
-    bench.generic_state(0.3);
-    const auto rows = [&](double dt, VecX& rate) {
-      State s = bench.state;
-      for (std::size_t k = 0; k < s.rotation.size(); ++k) {
-        const int first = bench.model->structural[k].first;
-        for (int i = 0; i < 3; ++i) s.y[first + i] += dt * s.yp[first + i];
-        s.rotation[k].R = rotation_of_vector<double>(dt * s.rotation[k].w) * s.rotation[k].R;
-      }
-      for (int i = bench.first_own(); i < bench.n; ++i) s.y[i] += dt * s.yp[i];
-      EvalContext c = bench.context(s);
-      c.c = c.seed = 1;
-      c.phase = Phase::assembly;
-      VecX r = VecX::Zero(bench.n);
-      rate = VecX::Zero(bench.n);
-      this->set_->assembly_residual(c, 0, r.data(), rate.data());
-      return r;
-    };
-    VecX rate, unused;
-    rows(0, rate);
-    constexpr double kStep = 1e-5;
-    const VecX difference = (rows(kStep, unused) - rows(-kStep, unused)) / (2 * kStep);
-    for (int i = 0; i < bench.n; ++i)
-      EXPECT_NEAR(rate(i), difference(i), 1e-8 * std::max(1.0, rate.norm())) << "row " << i;
-  }
+template <class Case>
+class AssemblyRatesAreTimeDerivatives : public ElementConformance<Case> {
+  void TestBody() override;
+};
+template <class Case>
+void AssemblyRatesAreTimeDerivatives<Case>::TestBody() {
+  Bench& bench = this->bench_;
+  ASSERT_EQ(this->set_->assembly_role(0), AssemblyRole::holonomic);
+  bench.generic_state(0.3);
+  const auto rows = [&](double dt, VecX& rate) {
+    State s = bench.state;
+    for (std::size_t k = 0; k < s.rotation.size(); ++k) {
+      const int first = bench.model->structural[k].first;
+      for (int i = 0; i < 3; ++i) s.y[first + i] += dt * s.yp[first + i];
+      s.rotation[k].R = rotation_of_vector<double>(dt * s.rotation[k].w) * s.rotation[k].R;
+    }
+    for (int i = bench.first_own(); i < bench.n; ++i) s.y[i] += dt * s.yp[i];
+    EvalContext c = bench.context(s);
+    c.c = c.seed = 1;
+    c.phase = Phase::assembly;
+    VecX r = VecX::Zero(bench.n);
+    rate = VecX::Zero(bench.n);
+    this->set_->assembly_residual(c, 0, r.data(), rate.data());
+    return r;
+  };
+  VecX rate, unused;
+  rows(0, rate);
+  constexpr double kStep = 1e-5;
+  const VecX difference = (rows(kStep, unused) - rows(-kStep, unused)) / (2 * kStep);
+  for (int i = 0; i < bench.n; ++i)
+    EXPECT_NEAR(rate(i), difference(i), 1e-8 * std::max(1.0, rate.norm())) << "row " << i;
 }
 
-REGISTER_TYPED_TEST_SUITE_P(ElementConformance, JacobianMatchesCentralDifferences,
-                            ClosedFormMatchesDual, IdealJointDoesNoWork, LoadsAreInBalance,
-                            AssemblyRatesAreTimeDerivatives);
+/// Is the element a position constraint whose assembly rows follow from its residual?
+template <class Element>
+constexpr bool holonomic() {
+  if constexpr (detail::HasAssemblyResidual<Element>)
+    return false;
+  else if constexpr (detail::HasAssembly<Element>)
+    return Element::assembly == AssemblyRole::holonomic;
+  else
+    return false;
+}
+
+template <class Test, class Case>
+void add_test(const std::string& suite, const char* name) {
+  ::testing::RegisterTest(suite.c_str(), name, nullptr, nullptr, __FILE__, __LINE__,
+                          []() -> ElementConformance<Case>* { return new Test; });
+}
+
+template <class Case>
+void add_case(const std::string& suite) {
+  using Element = typename Case::Element;
+  add_test<JacobianMatchesCentralDifferences<Case>, Case>(suite,
+                                                          "JacobianMatchesCentralDifferences");
+  if constexpr (detail::HasTangent<Element>)
+    add_test<ClosedFormMatchesDual<Case>, Case>(suite, "ClosedFormMatchesDual");
+  if constexpr (Case::ideal)
+    add_test<IdealJointDoesNoWork<Case>, Case>(suite, "IdealJointDoesNoWork");
+  if constexpr (Case::balanced) add_test<LoadsAreInBalance<Case>, Case>(suite, "LoadsAreInBalance");
+  if constexpr (holonomic<Element>())
+    add_test<AssemblyRatesAreTimeDerivatives<Case>, Case>(suite, "AssemblyRatesAreTimeDerivatives");
+}
+
+template <class... Cases>
+bool add_cases(const std::string& name, ::testing::Types<Cases...>) {
+  int index = 0;
+  (add_case<Cases>(name + "/ElementConformance/" + std::to_string(index++)), ...);
+  return true;
+}
+
+#define MBCOSIM_CONFORMANCE(name, cases) \
+  [[maybe_unused]] const bool added_##name = ::mbcosim::conformance::add_cases(#name, cases{})
 
 }  // namespace mbcosim::conformance

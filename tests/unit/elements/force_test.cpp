@@ -99,7 +99,7 @@ using Cases =
                    InternalCase<InternalForce, false, true>,
                    InternalCase<InternalForce, true, true>,
                    InternalCase<InternalCouple, true, true>, TotalCase, TotalInternalCase>;
-INSTANTIATE_TYPED_TEST_SUITE_P(Forces, ElementConformance, Cases);
+MBCOSIM_CONFORMANCE(Forces, Cases);
 
 /// Two nodes and loads of the reference deck.
 class AppliedLoads : public testing::Test {

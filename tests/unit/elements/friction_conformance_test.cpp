@@ -117,7 +117,7 @@ using Frictional =
                    Rubbing<Brake>, OnThread<Rubbing>, Sliding<InLineFriction>, Sliding<Hinge>,
                    Sliding<Brake>, OnThread<Sliding>, Sticking<InLineFriction>, Sticking<Hinge>,
                    ScrewCase, TotalEquationCase>;
-INSTANTIATE_TYPED_TEST_SUITE_P(Frictional, ElementConformance, Frictional);
+MBCOSIM_CONFORMANCE(Frictional, Frictional);
 
 }  // namespace
 }  // namespace mbcosim::conformance

@@ -302,14 +302,14 @@ using Constraints =
                    ImposedAcceleration<LinearAcceleration>,
                    ImposedAcceleration<AngularAcceleration>, Total<full>, Total<partial>,
                    TotalPin<full>, TotalPin<partial>>;
-INSTANTIATE_TYPED_TEST_SUITE_P(Constraints, ElementConformance, Constraints);
+MBCOSIM_CONFORMANCE(Constraints, Constraints);
 
 using Deformables =
     testing::Types<RodCase, Deformable<DeformableHinge, 3>, Deformable<DeformableDisplacement, 3>,
                    Deformable<DeformableJoint, 6>, Deformable<DeformableAxialJoint, 1>,
                    Deformable<InvariantHinge, 3>, Deformable<InvariantDisplacement, 3>,
                    Deformable<InvariantJoint, 6>, ViscousBodyCase>;
-INSTANTIATE_TYPED_TEST_SUITE_P(Deformables, ElementConformance, Deformables);
+MBCOSIM_CONFORMANCE(Deformables, Deformables);
 
 }  // namespace
 }  // namespace mbcosim::conformance
