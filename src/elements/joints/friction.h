@@ -31,7 +31,7 @@ struct Contact {
 /// augmented Lagrangian (P. Alart, A. Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991). ρ > 0
 /// [N·s/m] has no part in the solution; it follows the velocities of the last steps.
 ///
-/// In all this y = v − ε (Q − Q₀)/ρ stands for v, Q₀ the force of the last step, ε = 1e-9: so
+/// In all this y = v − ε (Q − Q₀)/ρ stands for v, Q₀ the force of the last step, ε = 1e-7: so
 /// small, and null under a steady load, that it only shares the load among contacts of which fewer
 /// would do.
 struct Friction {
