@@ -12,13 +12,13 @@ void gather(const EvalContext& context, const Connection& c, const ElementInfo& 
   const State& state = *context.state;
   for (int k = 0; k < c.node_count; ++k) {
     const int index = c.node[k];
-    const NodePlace& node = model.places[index];
     LocalNode<double>& n = u.nodes[k];
-    if (input || node.is_dummy()) {
+    if (input || model.places[index].is_dummy()) {  // while a deck is read there are no places yet
       const NodeState s = model.node_state(context, index);
       n = {s.x, s.v, s.w, s.R, Vec3::Zero(), Vec3::Zero()};
       continue;
     }
+    const NodePlace& node = model.places[index];
     const double* y = &state.y[node.first];
     const double* yp = &state.yp[node.first];
     n.x = Vec3(y[0], y[1], y[2]);
