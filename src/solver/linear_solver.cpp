@@ -162,7 +162,7 @@ void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
     klu->symbolic = klu_analyze_given(n_, column_start_.data(), row_index_.data(),
                                       first.symbolic->P, first.symbolic->Q, &klu->common);
   klu_ = klu.get();
-  if (analyze(values) != Outcome::ok) klu = nullptr;
+  if (!values || analyze(values) != Outcome::ok) klu = nullptr;
   kinds_.push_back({kind, std::move(klu)});
   select(kind);
 }

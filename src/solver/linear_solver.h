@@ -35,7 +35,7 @@ class LinearSolver {
   /// the empty one is the first. Makes a kind current; false when it is not known.
   bool select(const std::vector<bool>& kind);
   /// Adds a kind, with pivots chosen on these values, and makes it current. When the matrix has
-  /// none, matrices of this kind are factored as those of the first.
+  /// none, or without values, matrices of this kind are factored as those of the first.
   void add_kind(const std::vector<bool>& kind, double* values);
   /// Factors; `values` are in the pattern's order.
   Outcome factor(double* values);

@@ -218,18 +218,24 @@ void Stepper::select_pivots(const State& state) {
     as_first =
         as_first && activity_[k] == driven_[k].set->is_active(pivot_state_, driven_[k].index);
   }
-  if (workspace_.solver.select(as_first ? std::vector<bool>() : activity_)) return;
+  const std::vector<bool> first, &now = activity_;  // not copied: steps do not allocate
+  if (workspace_.solver.select(as_first ? first : now)) return;
   State other = pivot_state_;
   const double c = 0.5 * model_.initial_value.time_step;
   const EvalContext context = model_.context(other, Phase::step, c, c);
-  for (std::size_t k = 0; k < driven_.size(); ++k) {
-    const ElementRef& e = driven_[k];
-    const bool was_active = e.set->is_active(other, e.index);
-    other.memory[e.set->info(e.index).active_memory] = activity_[k] ? 1 : 0;
-    if (activity_[k] && !was_active) e.set->start(context, other, e.index);
+  double* values = workspace_.values.data();
+  try {
+    for (std::size_t k = 0; k < driven_.size(); ++k) {
+      const ElementRef& e = driven_[k];
+      const bool was_active = e.set->is_active(other, e.index);
+      other.memory[e.set->info(e.index).active_memory] = activity_[k] ? 1 : 0;
+      if (activity_[k] && !was_active) e.set->start(context, other, e.index);
+    }
+    compute_jacobian(context, workspace_);
+  } catch (const EvaluationError&) {  // at the initial state; the step's own state may be fine
+    values = nullptr;
   }
-  compute_jacobian(context, workspace_);
-  workspace_.solver.add_kind(activity_, workspace_.values.data());
+  workspace_.solver.add_kind(activity_, values);
 }
 
 PhaseReport Stepper::run_dummy_steps(State& state) {

@@ -85,5 +85,20 @@ TEST(Allocation, BeamUnderAForceOnAPendulumStepsWithout) {
       0);
 }
 
+// The clamp lets go in the fourth step: from then on matrices are of another kind than at the
+// start.
+TEST(Allocation, ReleasedBodyStepsWithout) {
+  EXPECT_EQ(allocations_of(
+                initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-9;") +
+                    "begin: control data; structural nodes: 1; rigid bodies: 1; joints: 1; gravity;"
+                    " end: control data;"
+                    "begin: nodes; structural: 1, dynamic, null, eye, null, null; end: nodes;"
+                    "begin: elements; body: 1, 1, 1., null, diag, 1., 2., 3.;"
+                    " driven: 1, string, \"Time < .0035\", joint: 1, clamp, 1, node, node;"
+                    " gravity: uniform, 0., 0., -1., const, 9.81; end: elements;",
+                100),
+            0);
+}
+
 }  // namespace
 }  // namespace mbcosim

@@ -108,9 +108,9 @@ struct DisplacementSensor {
 /// unknown: the current i. φ is the angle about e from axis 1 of R₁ R_h to axis 1 of node 2; with n
 /// terminal pairs φ_e = n φ modulo 2π, 0 ≤ φ_e < 2π:
 ///
-///   own row          −L i̇ − R(t) i − G Ω + V₂ − V₁              [V]
-///   torque           M = M₀(φ_e) + (G + M₁(φ_e)) i               −M e on node 1, +M e on node 2
-///   [N·m] electric nodes   −i, +i                                      [A]
+///     own row          −L i̇ − R(t) i − G Ω + V₂ − V₁                          [V]
+///     torque [N·m]     M = M₀(φ_e) + (G + M₁(φ_e)) i: −M e on node 1, M e on node 2
+///     electric nodes   −i, +i                                                 [A]
 ///
 /// Nodes may turn relative to each other about e only; joints see to that.
 struct Motor {

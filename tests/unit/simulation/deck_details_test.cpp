@@ -296,5 +296,24 @@ end: elements;
   }
 }
 
+// A force that begins to act where its drive is defined: at the initial state, where pivots are
+// looked for, it has no value.
+TEST(Driven, StartsWhereTheInitialStateHasNoMatrix) {
+  DeckRun run(
+      R"deck(begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: 1e-3; method: ms, .6; max iterations: 20;
+  tolerance: 1e-9; end: initial value;
+begin: control data; structural nodes: 1; rigid bodies: 1; forces: 1; end: control data;
+begin: nodes; structural: 2, dynamic, null, eye, 1.,0.,0., null; end: nodes;
+begin: elements;
+  body: 2, 2, 1., null, eye;
+  driven: 1, string, "Time > .0205", force: 1, absolute, 2, position, null, 1.,0.,0., string, "sqrt(Time - .0205)";
+end: elements;
+)deck");
+  ASSERT_TRUE(run.ready());
+  run.step(220);  // x'' = sqrt(t - t0)
+  EXPECT_NEAR(run.node(2).x(0), .22 + std::pow(.22 - .0205, 2.5) * 4 / 15, 1e-5);
+}
+
 }  // namespace
 }  // namespace mbcosim
