@@ -73,6 +73,7 @@ class DeckCard final : public Card, public BeamOutputDefault {
   DrivePtr drive(std::string_view what = "drive") override;
   Vec3DrivePtr vec3_drive(std::string_view what = "vector drive", int node = -1) override;
   TplDrivePtr<6> vec6_drive(std::string_view what = "vector drive") override;
+  TplDrivePtr<3, 3> mat3_drive(std::string_view what = "matrix drive") override;
   LawPtr<1> law1() override;
   LawPtr<3> law3() override;
   LawPtr<6> law6() override;
@@ -148,7 +149,6 @@ class DeckCard final : public Card, public BeamOutputDefault {
   std::string optional_name();
   /// Vector, orientation or number for a `template drive caller`; see template_drive_reader.cpp.
   TplDrivePtr<1> scalar_template_drive();
-  TplDrivePtr<3, 3> mat3_drive(std::string_view what);
   TplDrivePtr<6, 6> mat6_drive(std::string_view what);
   Value value(std::string_view what);
 

@@ -102,6 +102,7 @@ class Card {
   /// >= 0.
   virtual Vec3DrivePtr vec3_drive(std::string_view what = "vector drive", int node = -1) = 0;
   virtual TplDrivePtr<6> vec6_drive(std::string_view what = "vector drive") = 0;
+  virtual TplDrivePtr<3, 3> mat3_drive(std::string_view what = "matrix drive") = 0;
   virtual LawPtr<1> law1() = 0;
   virtual LawPtr<3> law3() = 0;
   virtual LawPtr<6> law6() = 0;

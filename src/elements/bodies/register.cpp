@@ -8,10 +8,6 @@
 
 namespace mbcosim {
 
-namespace {
-
-constexpr double kGravitationalConstant = 6.67384e-11;  ///< `G, si` [m³/(kg s²)], MBDyn's value
-
 void warn_about_inertia(Card& card, const Mat3& j) {
   if ((j - j.transpose()).norm() > 1e-9 * j.norm())
     card.warn("the inertia matrix is not symmetric");
@@ -26,6 +22,10 @@ void warn_about_inertia(Card& card, const Mat3& j) {
     card.warn(text, "inertia is given about the centre of mass, not about the node");
   }
 }
+
+namespace {
+
+constexpr double kGravitationalConstant = 6.67384e-11;  ///< `G, si` [m³/(kg s²)], MBDyn's value
 
 /// mass, centre of mass, inertia about it [, inertial, orientation]: one part of a (condensed)
 /// body.
@@ -57,6 +57,7 @@ void add_body(Card& card, ElementInfo& info, B body) {
 
 void read_body(Card& card, ElementInfo& info) {
   const int node = card.structural_node(Card::NodeNeed::not_dummy);
+  if (card.keyword("variable mass")) return read_variable_body(card, info, node);
   const StructuralNode& n = card.model().structural[node];
   if (n.kind == StructuralKind::static_displacement ||
       (n.kind == StructuralKind::static_ && !card.model().control.is_static))
@@ -68,14 +69,14 @@ void read_body(Card& card, ElementInfo& info) {
     add_body(card, info, PointMass{node, m});
     return;
   }
-  if (card.keyword("variable mass"))
-    card.fail("body: `variable mass` is not supported",
-              "approximate it with a force and a body of constant mass");
   int parts = 1;
   if (card.keyword("condense")) {
     parts = card.integer("number of condensed masses");
     if (parts < 1)
       card.fail("the number of condensed masses must be at least 1, got " + std::to_string(parts));
+    if (card.keyword("variable mass"))
+      card.fail("a body of variable mass cannot be condensed",
+                "write a body for each variable mass; a node may have several");
   }
   const bool negative = card.keyword("allow negative mass");
   Body body;
