@@ -263,6 +263,18 @@ void GeneralElementSet::add_momentum(const EvalContext& context, int i, State& s
   slots_[i].element->add_momentum(view(context, i), state);
 }
 
+std::vector<SampledTable> GeneralElementSet::sampled_tables() const {
+  std::vector<SampledTable> tables;
+  for (const Slot& s : slots_) {
+    SampledTable table;
+    if (!s.element->sampled_table(table)) continue;
+    table.samples += s.connection.memory_;
+    table.first += s.connection.memory_;
+    tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
 ElementRef add_general_element(ModelBuilder& builder, ElementInfo info,
                                std::unique_ptr<GeneralElement> element) {
   auto& set = builder.set<GeneralElementSet>();

@@ -25,6 +25,7 @@
 #include "model/element_set.h"
 #include "model/model.h"
 #include "model/output_row.h"
+#include "model/sampled_table.h"
 
 namespace mbcosim {
 
@@ -209,10 +210,12 @@ class GeneralElement {
   virtual double private_value(const GeneralView&, int /*datum*/) const { return 0; }
   virtual void add_inertia(const GeneralView&, int /*node*/, Inertia&) const {}
   virtual void add_momentum(const GeneralView&, State&) const {}
+  /// Does it write rows of samples? Offsets in `table` count from the element's first memory slot.
+  virtual bool sampled_table(SampledTable&) const { return false; }
 };
 
 /// All general elements of a model.
-class GeneralElementSet final : public ElementSet {
+class GeneralElementSet final : public ElementSet, public SampledTableSource {
  public:
   void add(ModelBuilder& builder, ElementInfo info, std::unique_ptr<GeneralElement> element);
   const GeneralElement& element(int i) const { return *slots_[i].element; }
@@ -257,6 +260,7 @@ class GeneralElementSet final : public ElementSet {
   double private_value(const EvalContext& context, int i, int datum) const override;
   void add_inertia(const EvalContext& context, int i, int node, Inertia& inertia) const override;
   void add_momentum(const EvalContext& context, int i, State& state) const override;
+  std::vector<SampledTable> sampled_tables() const override;
 
  private:
   struct Slot {

@@ -33,6 +33,9 @@ class BothWriters : public ResultWriter {
   void record(const EvalContext& context) override {
     each([&](ResultWriter& w) { w.record(context); });
   }
+  void samples(const EvalContext& context) override {
+    each([&](ResultWriter& w) { w.samples(context); });
+  }
   Status finish() override {
     Status first = first_->finish(), second = second_->finish();
     return first ? second : first;

@@ -33,6 +33,8 @@ class ResultWriter {
   virtual void eigenanalysis(const EigenReport&) {}
   /// One record: everything that has its output switched on, at the state in `context`.
   virtual void record(const EvalContext& context) = 0;
+  /// After the initial solution and every accepted step: rows of elements that took samples.
+  virtual void samples(const EvalContext&) {}
   /// Flushes; ErrorKind::io when something could not be written (now or earlier).
   virtual Status finish() = 0;
 };

@@ -3,63 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cstdio>
 #include <cstring>
 
 #include "output/eigen_text.h"
 #include "output/model_log.h"
 #include "output/record.h"
+#include "output/sample_files.h"
+#include "output/text_file.h"
 
 namespace mbcosim {
 
 namespace {
-
-/// A file that collects text and writes it in large pieces; created with the first byte.
-class TextFile {
- public:
-  static constexpr std::size_t kBuffer = 1 << 16;
-
-  void open(std::string path) { path_ = std::move(path); }
-  ~TextFile() {
-    if (file_) std::fclose(file_);
-  }
-  /// Room for `count` more bytes at the end; `commit` tells how far it was used.
-  char* room(std::size_t count) {
-    if (text_.empty()) text_.resize(kBuffer);
-    if (used_ + count > text_.size()) flush();
-    if (count > text_.size()) text_.resize(2 * count);
-    return text_.data() + used_;
-  }
-  void commit(char* end) { used_ = static_cast<std::size_t>(end - text_.data()); }
-  void text(std::string_view s) {
-    char* p = room(s.size());
-    std::memcpy(p, s.data(), s.size());
-    commit(p + s.size());
-  }
-  bool flush() {
-    if (used_ == 0) return !failed_;
-    if (!file_ && !failed_) file_ = std::fopen(path_.c_str(), "wb");
-    if (!file_ || std::fwrite(text_.data(), 1, used_, file_) != used_) failed_ = true;
-    used_ = 0;
-    return !failed_;
-  }
-  void create() {
-    if (!file_ && !failed_) file_ = std::fopen(path_.c_str(), "wb");
-    if (!file_) failed_ = true;
-  }
-  bool finish() {
-    flush();
-    if (file_ && std::fflush(file_) != 0) failed_ = true;
-    return !failed_;
-  }
-
- private:
-  std::string path_;
-  std::string text_;
-  std::size_t used_ = 0;
-  std::FILE* file_ = nullptr;
-  bool failed_ = false;
-};
 
 /// Modal joints print elsewhere but have an (empty) file of joints.
 bool has_joint_output(const Model& model) {
@@ -86,6 +40,7 @@ class TextWriter : public ResultWriter, private OutputRow {
     log_.text(model_log(model));
     if (has_joint_output(model)) files_[static_cast<std::size_t>(OutputFile::jnt)].create();
     if (model.control.output_reference_frames) write_reference_frames(model, *this);
+    samples_.open(model, prefix_);
   }
   void derivatives(double time, int iterations, double error) override {
     out_.text("# Derivatives solution step at time " + general(time) + " performed in " +
@@ -128,8 +83,9 @@ class TextWriter : public ResultWriter, private OutputRow {
     if (!file.finish()) failed_ = true;
   }
   void record(const EvalContext& context) override { write_record(context, *this); }
+  void samples(const EvalContext& context) override { samples_.write(*context.state); }
   Status finish() override {
-    bool fine = out_.finish() && log_.finish() && !failed_;
+    bool fine = out_.finish() && log_.finish() && samples_.finish() && !failed_;
     for (TextFile& f : files_) fine = f.finish() && fine;
     if (fine) return ok();
     Error e;
@@ -204,6 +160,7 @@ class TextWriter : public ResultWriter, private OutputRow {
   bool failed_ = false;
   std::array<TextFile, static_cast<std::size_t>(OutputFile::count)> files_;
   TextFile out_, log_;
+  SampleFiles samples_;
   TextFile* current_ = nullptr;
 };
 

@@ -129,6 +129,7 @@ Status Simulation::Impl::start() {
     last = report.newton;
     state.step = 0;
   }
+  if (writer) writer->samples(context());
   StepLine line;
   line.time = state.time;
   line.iterations = last.iterations;
@@ -265,6 +266,7 @@ Status Simulation::Impl::write(const NewtonReport& newton, double previous_time)
                 false};
   line.recorded = record();
   writer->step(line);
+  writer->samples(context());
   return analyse_modes(previous_time, state.time);
 } catch (const EvaluationError& e) {
   return evaluation_failure(state, e);

@@ -3,6 +3,7 @@
 #include <sstream>
 
 #include "elements/genels/discrete_control.h"
+#include "elements/genels/discrete_control_cards.h"
 #include "elements/genels/readers.h"
 #include "model/model.h"
 
@@ -11,14 +12,6 @@ namespace mbcosim {
 namespace {
 
 constexpr int kMost = 1000;  ///< signals, order
-
-int read_number(Card& card, const char* what, int least, int most) {
-  const int n = card.integer(what);
-  if (n < least || n > most)
-    card.fail(std::string("discrete control: the ") + what + " must be from " +
-              std::to_string(least) + " to " + std::to_string(most) + ", got " + std::to_string(n));
-  return n;
-}
 
 /// The numbers of a file of control matrices; what stands behind # or % is a comment.
 class MatrixFile {
@@ -59,11 +52,7 @@ class MatrixFile {
   std::size_t next_ = 0;
 };
 
-struct Sizes {
-  int outputs, inputs, order_a, order_b;
-};
-
-DiscreteControl::Gains read_gains(Card& card, const Sizes& s) {
+DiscreteControl::Gains read_gains(Card& card, const ControlSizes& s) {
   std::string name;
   const std::string text = card.file_contents("file of control matrices", &name);
   MatrixFile file(card, name, text);
@@ -84,18 +73,6 @@ DiscreteControl::Gains read_gains(Card& card, const Sizes& s) {
   return gains;
 }
 
-/// `control, "file"`. What the manual calls identification and adaptive control is refused by name.
-DiscreteControl::Gains read_control_data(Card& card, const Sizes& sizes) {
-  const SourceSpan where = card.next();
-  const int kind = card.required("control data", {"control", "identification", "adaptive control"});
-  if (kind > 0)
-    card.fail_at(where,
-                 std::string("discrete control: `") +
-                     (kind == 1 ? "identification" : "adaptive control") + "` is not supported",
-                 "accepted: control, \"<file of the control matrices>\"");
-  return read_gains(card, sizes);
-}
-
 /// {[node dof,] <node dof> | drive, <drive>} [, scale, <drive>]
 DiscreteControl::Measure read_measure(Card& card) {
   DiscreteControl::Measure m;
@@ -109,31 +86,60 @@ DiscreteControl::Measure read_measure(Card& card) {
   return m;
 }
 
-void expect(Card& card, const char* word) {
+void expect(Card& card, const char* word, const char* or_else = "") {
   if (!card.keyword(word))
-    card.fail_expected(std::string("discrete control: `") + word + "` expected");
+    card.fail_expected(std::string("discrete control: `") + word + "`" + or_else + " expected");
+}
+
+/// outputs, <measure>, …, inputs, <node dof>, …
+void read_signals(Card& card, const ControlSizes& sizes, SampledControl::Signals& signals) {
+  for (int k = 0; k < sizes.outputs; ++k) signals.outputs.push_back(read_measure(card));
+  expect(card, "inputs");
+  for (int k = 0; k < sizes.inputs; ++k)
+    signals.inputs.push_back(read_genel_dof(card, "discrete control"));
 }
 
 void read_discrete_control(Card& card, ElementInfo& info) {
-  Sizes s{};
-  s.outputs = read_number(card, "number of outputs", 1, kMost);
-  s.inputs = read_number(card, "number of inputs", 1, kMost);
-  s.order_b = s.order_a = read_number(card, "order of the matrices A", 1, kMost);
-  if (card.keyword("fir")) s.order_b = read_number(card, "order of the matrices B", 0, kMost);
-  const int period = read_number(card, "number of steps between samples", 1, 1000000000);
-  DiscreteControl::Gains gains = read_control_data(card, s);
-  expect(card, "outputs");
-  std::vector<DiscreteControl::Measure> outputs;
-  for (int k = 0; k < s.outputs; ++k) outputs.push_back(read_measure(card));
-  expect(card, "inputs");
-  std::vector<NodeDof> inputs;
-  for (int k = 0; k < s.inputs; ++k) inputs.push_back(read_genel_dof(card, "discrete control"));
-  add_general_element(card.builder(), info,
-                      std::make_unique<DiscreteControl>(std::move(gains), period,
-                                                        std::move(outputs), std::move(inputs)));
+  ControlSizes sizes;
+  SampledControl::Signals signals;
+  sizes.outputs = read_control_number(card, "number of outputs", 1, kMost);
+  sizes.inputs = read_control_number(card, "number of inputs", 1, kMost);
+  sizes.order_b = sizes.order_a = read_control_number(card, "order of the matrices A", 0, kMost);
+  if (card.keyword("fir"))
+    sizes.order_b = read_control_number(card, "order of the matrices B", 0, kMost);
+  signals.period = read_control_number(card, "number of steps between samples", 1, 1000000000);
+  std::unique_ptr<GeneralElement> element;
+  const SourceSpan where = card.next();
+  const int kind = card.required("control data", {"control", "identification", "adaptive control"});
+  if (kind == 2)
+    card.fail_at(where, "discrete control: `adaptive control` is not supported",
+                 "accepted: control, identification");
+  if (kind == 0) {
+    if (sizes.order_a == 0)
+      card.fail("discrete control: the order of the matrices A of `control` must be from 1 to " +
+                std::to_string(kMost) + ", got 0");
+    DiscreteControl::Gains gains = read_gains(card, sizes);
+    expect(card, "outputs");
+    read_signals(card, sizes, signals);
+    element = std::make_unique<DiscreteControl>(std::move(gains), std::move(signals));
+  } else {
+    AdaptiveControl::Settings settings = read_identification(card, sizes);
+    expect(card, "outputs", " (or forgetting factor, excitation, file, each once)");
+    read_signals(card, sizes, signals);
+    element = std::make_unique<AdaptiveControl>(std::move(settings), std::move(signals));
+  }
+  add_general_element(card.builder(), info, std::move(element));
 }
 
 }  // namespace
+
+int read_control_number(Card& card, const char* what, int least, int most) {
+  const int n = card.integer(what);
+  if (n < least || n > most)
+    card.fail(std::string("discrete control: the ") + what + " must be from " +
+              std::to_string(least) + " to " + std::to_string(most) + ", got " + std::to_string(n));
+  return n;
+}
 
 void register_discrete_control(Registry& registry) {
   registry.typed("electric", Family::electric, {"discrete control"}, read_discrete_control);

@@ -1,0 +1,41 @@
+#include "output/sample_files.h"
+
+#include <cstdio>
+
+namespace mbcosim {
+
+void SampleFiles::open(const Model& model, const std::string& prefix) {
+  for (const auto& set : model.sets) {
+    const auto* source = dynamic_cast<const SampledTableSource*>(set.get());
+    if (!source) continue;
+    for (SampledTable& table : source->sampled_tables()) {
+      auto t = std::make_unique<Table>();
+      t->file.open(prefix + "." + table.file);
+      t->source = std::move(table);
+      tables_.push_back(std::move(t));
+    }
+  }
+}
+
+void SampleFiles::write(const State& state) {
+  for (const auto& table : tables_) {
+    const double samples = state.memory[table->source.samples];
+    if (samples == table->written) continue;
+    table->written = samples;
+    const double* row = &state.memory[table->source.first];
+    for (int k = 0; k < table->source.count; ++k) {
+      constexpr int kField = 40;
+      char* p = table->file.room(kField);
+      table->file.commit(p + std::snprintf(p, kField, "%16g", row[k]));
+    }
+    table->file.text("\n");
+  }
+}
+
+bool SampleFiles::finish() {
+  bool fine = true;
+  for (const auto& table : tables_) fine = table->file.finish() && fine;
+  return fine;
+}
+
+}  // namespace mbcosim

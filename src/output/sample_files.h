@@ -1,0 +1,32 @@
+/// Rows of numbers that elements write to files of their own.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "model/model.h"
+#include "model/sampled_table.h"
+#include "output/text_file.h"
+
+namespace mbcosim {
+
+/// PREFIX.<file> for each table of the model: a row for each sample, six digits in fields of 16
+/// columns (MBDyn's format of identified models).
+class SampleFiles {
+ public:
+  void open(const Model& model, const std::string& prefix);
+  /// The rows of the elements that took a sample since the last call.
+  void write(const State& state);
+  bool finish();
+
+ private:
+  struct Table {
+    SampledTable source;
+    double written = 0;  ///< number of samples at the last row
+    TextFile file;
+  };
+  std::vector<std::unique_ptr<Table>> tables_;
+};
+
+}  // namespace mbcosim
