@@ -56,7 +56,7 @@ Laminate laminate(int beam) {
 
 Mat3 pitched(double degrees) { return rotation_of_vector<double>(Vec3(degrees * kPi / 180, 0, 0)); }
 
-/// Displacements u₁ (along the beam), u₂ (sideways), u₃ (up) of the station under 0, 10, …, 500 g.
+/// Displacements u₁ (along the beam), u₂ (sideways), u₃ (up) of the station under 0, 5, …, 500 g.
 class Curve {
  public:
   Curve(int beam, double degrees, int elements_to_station = 10) {
@@ -81,7 +81,7 @@ class Curve {
       u_.push_back(run.node(pieces).x - Vec3(kStation, 0, 0));
     }
   }
-  bool ready() const { return u_.size() == 51; }
+  bool ready() const { return u_.size() == 101; }
   /// At a load in grams.
   Vec3 at(double grams) const {
     const auto k = std::min<std::size_t>(static_cast<std::size_t>(grams / kStep), u_.size() - 2);
@@ -90,7 +90,7 @@ class Curve {
   }
 
  private:
-  static constexpr double kStep = 10;  ///< [g]
+  static constexpr double kStep = 5;  ///< [g]; with twice as much Newton's method may fail, beam 2
   std::vector<Vec3> u_;
 };
 
