@@ -2,8 +2,29 @@
 #pragma once
 
 #include "elements/bodies/body.h"
+#include "elements/bodies/variable_body.h"
+#include "model/card.h"
 
 namespace mbcosim {
+
+/// a₀ of the frame's origin, ω₀ and α₀ of the frame, in its axes.
+template <class T>
+struct FrameState {
+  explicit FrameState(const Local<T>& u) {
+    const FrameMotion& frame = *u.model().frame_motion;
+    const auto drive = [&](const Vec3DrivePtr& d) -> Vec<T> {
+      return (d ? d->value(*u.context) : Vec3(Vec3::Zero())).template cast<T>();
+    };
+    a0 = drive(frame.acceleration);
+    w0 = drive(frame.angular_velocity);
+    alpha = drive(frame.angular_acceleration);
+  }
+  /// Acceleration that a point at rest in the frame has.
+  Vec<T> acceleration(const Vec<T>& x) const {
+    return a0 + alpha.cross(x) + w0.cross(Vec<T>(w0.cross(x)));
+  }
+  Vec<T> a0, w0, alpha;
+};
 
 /// A body or point mass in a model with `rigid body kinematics` (MBDyn input manual, control data):
 /// positions and velocities are relative to a frame whose origin accelerates by a₀ and that turns
@@ -21,13 +42,9 @@ struct InMovingFrame : B {
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     B::residual(u, r);
-    const FrameMotion& frame = *u.model().frame_motion;
-    const auto drive = [&](const Vec3DrivePtr& d) -> Vec<T> {
-      return (d ? d->value(*u.context) : Vec3(Vec3::Zero())).template cast<T>();
-    };
-    const Vec<T> a0 = drive(frame.acceleration), w0 = drive(frame.angular_velocity),
-                 alpha = drive(frame.angular_acceleration);
-    const Vec<T> a = a0 + alpha.cross(u.x(0)) + w0.cross(Vec<T>(w0.cross(u.x(0))));
+    const FrameState<T> frame(u);
+    const Vec<T>&w0 = frame.w0, &alpha = frame.alpha;
+    const Vec<T> a = frame.acceleration(u.x(0));
     const Vec<T> v = u.v(0);
     Vec<T> F = a * T(-this->m) - w0.cross(v) * T(2 * this->m);
     if constexpr (requires(B b) { b.J0; }) {
@@ -45,5 +62,44 @@ struct InMovingFrame : B {
     }
   }
 };
+
+/// A body of variable mass in such a model. About its centre of mass (velocity u in the frame, P of
+/// the inertia J there), which is at x + b:
+///
+///   F = −m (a₀ + α₀ × (x + b) + ω₀ × (ω₀ × (x + b)) + 2 ω₀ × u)
+///   M = b × F − J α₀ − ω₀ × J ω₀ + 2 w × P ω₀ − R J̇_vg Rᵀ ω₀
+template <>
+struct InMovingFrame<VariableBody> : VariableBody {
+  explicit InMovingFrame(VariableBody body) : VariableBody(std::move(body)) {}
+
+  template <class T>
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    VariableBody::residual(u, r);
+    const FrameState<T> frame(u);
+    const Vec<T>& w0 = frame.w0;
+    const VariableInertia p = inertia(*u.context, u.label());
+    const Mat3 J0 = p.J();
+    const Vec<T> arm = u.R(0) * p.b, w = u.w(0);
+    const Vec<T> velocity = u.v(0) + w.cross(arm) + u.R(0) * p.b_rate;
+    const auto turned = [&](const Mat3& j, const Vec<T>& y) -> Vec<T> {
+      return u.R(0) * Vec<T>(j * Vec<T>(u.R(0).transpose() * y));
+    };
+    const Vec<T> a = frame.acceleration(u.x(0) + arm) + w0.cross(velocity) * T(2.0);
+    const Vec<T> F = a * T(-p.m), J_w0 = turned(J0, w0);
+    const Vec<T> P_w0 = w0 * T(0.5 * J0.trace()) - J_w0;
+    r.load(0, F,
+           arm.cross(F) - turned(J0, frame.alpha) - w0.cross(J_w0) + w.cross(P_w0) * T(2.0) -
+               turned(p.J_vg_rate, w0));
+  }
+};
+
+/// Adds a body, with the inertia forces of the moving frame where the model has one.
+template <class B>
+void add_body(Card& card, ElementInfo& info, B body) {
+  if (card.model().frame_motion)
+    add_element(card.builder(), info, InMovingFrame<B>(std::move(body)));
+  else
+    add_element(card.builder(), info, std::move(body));
+}
 
 }  // namespace mbcosim

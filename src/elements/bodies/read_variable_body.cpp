@@ -1,6 +1,6 @@
 /// Reader of `body, …, variable mass`.
+#include "elements/bodies/moving_frame.h"
 #include "elements/bodies/readers.h"
-#include "elements/bodies/variable_body.h"
 #include "model/card.h"
 
 namespace mbcosim {
@@ -37,9 +37,6 @@ void read_variable_body(Card& card, ElementInfo& info, int node) {
   const StructuralNode& n = card.model().structural[node];
   check_node(card, n);
   body.dynamic = n.has_momentum();
-  if (card.model().frame_motion)
-    card.fail("`variable mass` is not supported together with `rigid body kinematics`",
-              "move the model by its joints instead");
   if (card.keyword("allow negative mass"))
     card.fail("a variable mass must be positive", "remove `allow negative mass`");
   const SourceSpan mass = card.more() ? card.next() : card.last();
@@ -60,7 +57,7 @@ void read_variable_body(Card& card, ElementInfo& info, int node) {
     card.fail_at(mass, error.what());
   }
   warn_about_inertia(card, body.initial.J());
-  add_element(card.builder(), info, std::move(body));
+  add_body(card, info, std::move(body));
 }
 
 }  // namespace mbcosim

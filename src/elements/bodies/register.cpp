@@ -47,14 +47,6 @@ void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
   body.J0 += j - m * xx * xx;
 }
 
-template <class B>
-void add_body(Card& card, ElementInfo& info, B body) {
-  if (card.model().frame_motion)
-    add_element(card.builder(), info, InMovingFrame<B>(std::move(body)));
-  else
-    add_element(card.builder(), info, std::move(body));
-}
-
 void read_body(Card& card, ElementInfo& info) {
   const int node = card.structural_node(Card::NodeNeed::not_dummy);
   if (card.keyword("variable mass")) return read_variable_body(card, info, node);

@@ -20,6 +20,7 @@ VariableInertia VariableBody::inertia(const EvalContext& context, int label) con
   p.J_vm = J_vm->value(context);
   p.J_vm_rate = J_vm->derivative(context);
   p.J_vg = J_vg->value(context);
+  p.J_vg_rate = J_vg->derivative(context);
   return p;
 }
 

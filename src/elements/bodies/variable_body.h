@@ -11,7 +11,7 @@ struct VariableInertia {
   double m = 0, m_rate = 0;                            ///< [kg], [kg/s]
   Vec3 b = Vec3::Zero(), b_rate = Vec3::Zero();        ///< centre of mass from the node [m], [m/s]
   Mat3 J_vm = Mat3::Zero(), J_vm_rate = Mat3::Zero();  ///< part that changes with the mass [kg·m²]
-  Mat3 J_vg = Mat3::Zero();                            ///< part that changes with the geometry
+  Mat3 J_vg = Mat3::Zero(), J_vg_rate = Mat3::Zero();  ///< part that changes with the geometry
   Mat3 J() const { return J_vm + J_vg; }               ///< about the centre of mass [kg·m²]
 };
 

@@ -1,6 +1,5 @@
-/// Bodies of variable mass: Jacobian, momenta and loads against what their points of mass have.
-#include "elements/bodies/variable_body.h"
-
+/// Jacobian of bodies of variable mass.
+#include "elements/bodies/moving_frame.h"
 #include "elements/conformance.h"
 #include "model/drives/closed_form_drives.h"
 #include "model/drives/template_drives.h"
@@ -51,9 +50,22 @@ struct VariableBodyCase {
     return variable_body(bench, kind);
   }
 };
-using VariableBodyCases = testing::Types<VariableBodyCase<StructuralKind::dynamic, false>,
-                                         VariableBodyCase<StructuralKind::dynamic, true>,
-                                         VariableBodyCase<StructuralKind::static_, true>>;
+struct MovingFrameCase {
+  using Element = InMovingFrame<VariableBody>;
+  static constexpr bool ideal = false, balanced = false;
+  static Element make(Bench& bench) {
+    FrameMotion frame;
+    frame.acceleration = make_constant_vec3_drive(bench.vec());
+    frame.angular_velocity = make_constant_vec3_drive(bench.vec());
+    frame.angular_acceleration = make_constant_vec3_drive(bench.vec());
+    bench.builder.model().frame_motion = frame;
+    return Element(variable_body(bench, StructuralKind::dynamic));
+  }
+};
+using VariableBodyCases =
+    testing::Types<VariableBodyCase<StructuralKind::dynamic, false>,
+                   VariableBodyCase<StructuralKind::dynamic, true>,
+                   VariableBodyCase<StructuralKind::static_, true>, MovingFrameCase>;
 MBCOSIM_CONFORMANCE(VariableBodies, VariableBodyCases);
 
 }  // namespace

@@ -20,10 +20,10 @@ constexpr double kPi = 3.14159265358979323846;
 
 /// One free node with a body of variable mass; `state`: position, orientation, velocities.
 std::string free_body(const std::string& body, const std::string& state, double h = 1e-3,
-                      const std::string& more = "", const std::string& control = "") {
-  return initial_value_block(h, 10, kTight) +
-         "begin: control data; structural nodes: 1; rigid bodies: 1;" + control +
-         " end: control data;\nbegin: nodes; structural: 1, dynamic, " + state +
+                      const std::string& more = "",
+                      const std::string& control = "rigid bodies: 1;") {
+  return initial_value_block(h, 10, kTight) + "begin: control data; structural nodes: 1;" +
+         control + " end: control data;\nbegin: nodes; structural: 1, dynamic, " + state +
          "; end: nodes;\nbegin: elements; body: 1, 1, variable mass, " + body + ";\n" + more +
          "end: elements;\n";
 }
@@ -60,9 +60,10 @@ TEST(VariableMass, RocketWithoutThrustKeepsItsVelocity) {
 }
 
 TEST(VariableMass, RocketUnderThrust) {
-  DeckRun run(
-      free_body("linear, 3., -.5, null, " + std::string(kConstantInertia), "null, eye, null, null",
-                1e-3, "force: 1, follower, 1, position, null, 0.,0.,1., const, 4.;", "forces: 1;"));
+  DeckRun run(free_body("linear, 3., -.5, null, " + std::string(kConstantInertia),
+                        "null, eye, null, null", 1e-3,
+                        "force: 1, follower, 1, position, null, 0.,0.,1., const, 4.;",
+                        "rigid bodies: 1; forces: 1;"));
   ASSERT_TRUE(run.ready());
   run.step(4000);
   EXPECT_NEAR(run.node(1).v(2), 4 / .5 * std::log(3 / 1.), 1e-5);
@@ -310,6 +311,37 @@ end: elements;
     EXPECT_LT((p.head<3>() - r.b).norm(), 1e-9);
     EXPECT_LT((p.tail<3>() - Vec3(1.77619344998, -1.689369556, 5.10166891703)).norm(), 1e-9);
   }
+}
+
+// The same free body seen from a frame that turns ever faster about the axis e.
+TEST(VariableMass, MovesInATurningFrameAsOutside) {
+  const Vec3 e(.6, 0, .8), x(.5, -.3, .2), v(.2, .4, -.3), w(.4, -.5, 1.5);
+  const std::string body =
+      "linear, 3., -1.5, component, sine, -1., 3., .2, forever, .1, linear, .2, -.3, cosine, -2., "
+      "4., .1, forever, -.3, single, sym, 1., .1, .2, 2., .3, 2.5, linear, 1., -.4, component, "
+      "diag, sine, -1., 5., .1, forever, .2, inactive, linear, 0., .3";
+  const std::string one = "rigid bodies: 1;";
+  double errors[2];
+  for (int k = 0; k < 2; ++k) {
+    const double h = 1e-3 / (1 + k);
+    DeckRun outside(free_body(
+        body,
+        digits(x) + ", eye, " + digits(Vec3(v + .5 * e.cross(x))) + ", " + digits(Vec3(w + .5 * e)),
+        h, "", one));
+    DeckRun inside(free_body(body, digits(x) + ", eye, " + digits(v) + ", " + digits(w), h, "",
+                             one + "rigid body kinematics: drive, angular velocity, single, " +
+                                 digits(e) + ", linear, .5, .8, angular acceleration, single, " +
+                                 digits(e) + ", const, .8;"));
+    ASSERT_TRUE(outside.ready() && inside.ready());
+    outside.step(1000 * (1 + k));
+    inside.step(1000 * (1 + k));
+    const Mat3 frame = rotation_of_vector<double>(e * (.5 + .4));
+    NodeState seen = inside.node(1);
+    seen = {frame * seen.x, frame * seen.R, frame * (seen.v + 1.3 * e.cross(seen.x)),
+            frame * (seen.w + 1.3 * e)};
+    errors[k] = distance(seen, outside.node(1));
+  }
+  expect_second_order(errors, 1e-4);
 }
 
 // `model: static`: the weight follows the mass, nothing else acts.
