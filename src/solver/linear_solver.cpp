@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "solver/dense_tail.h"
+#include "solver/supernodal_lu.h"
 
 namespace mbcosim {
 
@@ -40,13 +41,12 @@ SparsePattern united(int n, const std::vector<int>& column_start, const std::vec
 struct LinearSolver::Klu {
   klu_common common;
   klu_symbolic* symbolic = nullptr;
-  klu_numeric* kept = nullptr;   ///< with the kept pivots
-  klu_numeric* fresh = nullptr;  ///< of the last matrix, when the kept pivots were poor
-  klu_numeric* current = nullptr;
-  double kept_ratio = 0;            ///< smallest to largest pivot of the reference matrix
-  std::unique_ptr<DenseTail> tail;  ///< instead of the kept pivots, when much of the matrix is full
-  bool by_tail = false;             ///< the last factorization
-  bool ordered = false;             ///< both orderings were compared
+  std::unique_ptr<SupernodalLu> kept;  ///< with the kept pivots
+  std::unique_ptr<DenseTail> tail;     ///< as well, when much of the matrix is full
+  klu_numeric* fresh = nullptr;        ///< of the last matrix, when the kept pivots were poor
+  enum class Current { none, kept, tail, fresh } current = Current::none;
+  double kept_ratio = 0;  ///< smallest to largest pivot of the reference matrix
+  bool ordered = false;   ///< both orderings were compared
 
   explicit Klu(double pivot_tolerance) {
     klu_defaults(&common);
@@ -69,40 +69,58 @@ struct LinearSolver::Klu {
     return klu_flops(s, n, &common) ? common.flops : HUGE_VAL;
   }
   /// Looks once whether COLAMD orders the columns for fewer operations than AMD of A + Aᵀ, which
-  /// `kept` was made with, when that filled the factors: chains suit AMD, mechanisms with many
+  /// `numeric` was made with, when that filled the factors: chains suit AMD, mechanisms with many
   /// loops COLAMD.
-  void choose_ordering(int n, int* column_start, int* row_index, double* values) {
+  void choose_ordering(int n, int* column_start, int* row_index, double* values,
+                       klu_numeric*& numeric) {
     constexpr double kFilled = 20,
                      kWorthwhile = 0.8;  // operations an entry of the factors; chains have 10 to 14
     if (ordered) return;
     ordered = true;
-    if (operations(symbolic, kept) < kFilled * (static_cast<double>(kept->lnz) + kept->unz)) return;
+    if (operations(symbolic, numeric) < kFilled * entries(numeric)) return;
     common.ordering = 1;
     klu_symbolic* other = klu_analyze(n, column_start, row_index, &common);
     common.ordering = 0;
     klu_numeric* factors =
         other ? klu_factor(column_start, row_index, values, other, &common) : nullptr;
-    if (factors && operations(other, factors) < kWorthwhile * operations(symbolic, kept)) {
+    if (factors && operations(other, factors) < kWorthwhile * operations(symbolic, numeric)) {
       std::swap(symbolic, other);
-      std::swap(kept, factors);
+      std::swap(numeric, factors);
     }
     klu_free_numeric(&factors, &common);
     klu_free_symbolic(&other, &common);
   }
+  static double entries(const klu_numeric* n) { return static_cast<double>(n->lnz) + n->unz; }
   /// Many operations an entry of the factors: some of them are nearly full.
-  bool is_dense_in_parts() {
-    return klu_flops(symbolic, kept, &common) &&
-           common.flops > kDenseOperations * (static_cast<double>(kept->lnz) + kept->unz);
+  bool is_dense_in_parts(klu_numeric* numeric) {
+    return klu_flops(symbolic, numeric, &common) &&
+           common.flops > kDenseOperations * entries(numeric);
+  }
+  /// Pivots and pattern of factors; the rows of each column are sorted.
+  FactorPattern pattern(klu_numeric* numeric) {
+    FactorPattern p;
+    const int n = symbolic->n;
+    p.lower_start.resize(n + 1);
+    p.upper_start.resize(n + 1);
+    p.row_of.resize(n);
+    p.column_of.resize(n);
+    p.block_start.resize(symbolic->nblocks + 1);
+    p.lower_row.resize(numeric->lnz);
+    p.upper_row.resize(numeric->unz);
+    std::vector<double> lower(numeric->lnz), upper(numeric->unz);
+    klu_sort(symbolic, numeric, &common);
+    klu_extract(numeric, symbolic, p.lower_start.data(), p.lower_row.data(), lower.data(),
+                p.upper_start.data(), p.upper_row.data(), upper.data(), nullptr, nullptr, nullptr,
+                p.row_of.data(), p.column_of.data(), nullptr, p.block_start.data(), &common);
+    return p;
   }
   /// Judges the kept pivots on the matrix just factored. Growth makes some pivots small against
   /// others, which costs little to see; the growth itself is computed only then.
-  bool pivots_are_good(int* column_start, int* row_index, double* values) {
-    if (klu_rcond(symbolic, kept, &common) && common.rcond > kSuspicious * kept_ratio) return true;
-    return klu_rgrowth(column_start, row_index, values, symbolic, kept, &common) &&
-           common.rgrowth > kPoorGrowth;
+  bool pivots_are_good(const double* values) const {
+    return kept->pivot_ratio() > kSuspicious * kept_ratio ||
+           kept->pivot_growth(values) > kPoorGrowth;
   }
   ~Klu() {
-    klu_free_numeric(&kept, &common);
     klu_free_numeric(&fresh, &common);
     klu_free_symbolic(&symbolic, &common);
   }
@@ -126,24 +144,27 @@ LinearSolver::Outcome LinearSolver::analyze(double* values) {
   if (klu_ == kinds_[0].klu.get()) kinds_.resize(1);  // others belong to another first matrix
   if (!klu_->symbolic)
     return klu_->common.status == KLU_SINGULAR ? Outcome::singular : Outcome::failed;
-  klu_free_numeric(&klu_->kept, &klu_->common);
-  klu_->tail.reset();
-  klu_->by_tail = false;
-  klu_->kept =
-      klu_factor(column_start_.data(), row_index_.data(), values, klu_->symbolic, &klu_->common);
-  if (klu_->kept) klu_->choose_ordering(n_, column_start_.data(), row_index_.data(), values);
-  klu_->current = klu_->kept;
-  if (klu_->kept) {
-    klu_rcond(klu_->symbolic, klu_->kept, &klu_->common);
-    klu_->kept_ratio = klu_->common.rcond;
-    if (klu_->is_dense_in_parts())
-      klu_->tail = DenseTail::plan(n_, column_start_.data(), row_index_.data(), values,
-                                   klu_->symbolic->P, klu_->symbolic->Q);
-    return Outcome::ok;
+  Klu& k = *klu_;
+  k.kept.reset();
+  k.tail.reset();
+  k.current = Klu::Current::none;
+  klu_numeric* numeric =
+      klu_factor(column_start_.data(), row_index_.data(), values, k.symbolic, &k.common);
+  if (!numeric) {
+    if (k.common.status != KLU_SINGULAR) return Outcome::failed;
+    singular_column_ = k.common.singular_col < n_ ? k.common.singular_col : -1;
+    return Outcome::singular;
   }
-  if (klu_->common.status != KLU_SINGULAR) return Outcome::failed;
-  singular_column_ = klu_->common.singular_col < n_ ? klu_->common.singular_col : -1;
-  return Outcome::singular;
+  k.choose_ordering(n_, column_start_.data(), row_index_.data(), values, numeric);
+  if (k.is_dense_in_parts(numeric))
+    k.tail = DenseTail::plan(n_, column_start_.data(), row_index_.data(), values, k.symbolic->P,
+                             k.symbolic->Q);
+  k.kept = std::make_unique<SupernodalLu>(column_start_, row_index_, values, k.pattern(numeric));
+  klu_free_numeric(&numeric, &k.common);
+  if (!k.kept->factor(values)) return Outcome::failed;
+  k.kept_ratio = k.kept->pivot_ratio();
+  k.current = Klu::Current::kept;
+  return Outcome::ok;
 }
 
 bool LinearSolver::select(const std::vector<bool>& kind) {
@@ -169,30 +190,28 @@ void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
 
 LinearSolver::Outcome LinearSolver::factor(double* values) {
   if (n_ == 0) return Outcome::ok;
-  if (!klu_->kept) return factor_alone(values);
-  klu_->by_tail = klu_->tail && klu_->tail->factor(values);
-  if (klu_->by_tail) return Outcome::ok;
-  klu_common* common = &klu_->common;
-  if (klu_refactor(column_start_.data(), row_index_.data(), values, klu_->symbolic, klu_->kept,
-                   common) &&
-      common->status == KLU_OK &&
-      klu_->pivots_are_good(column_start_.data(), row_index_.data(), values)) {
-    klu_->current = klu_->kept;
+  Klu& k = *klu_;
+  if (k.tail && k.tail->factor(values)) {
+    k.current = Klu::Current::tail;
     return Outcome::ok;
   }
-  return factor_alone(values);
+  if (!k.kept || !k.kept->factor(values) || !k.pivots_are_good(values)) return factor_alone(values);
+  k.current = Klu::Current::kept;
+  return Outcome::ok;
 }
 
 LinearSolver::Outcome LinearSolver::factor_alone(double* values) {
   if (n_ == 0) return Outcome::ok;
   klu_common* common = &klu_->common;
   singular_column_ = -1;
-  klu_->by_tail = false;
+  klu_->current = Klu::Current::none;
   if (!klu_->symbolic) return common->status == KLU_SINGULAR ? Outcome::singular : Outcome::failed;
   klu_free_numeric(&klu_->fresh, common);
   klu_->fresh = klu_factor(column_start_.data(), row_index_.data(), values, klu_->symbolic, common);
-  klu_->current = klu_->fresh;
-  if (klu_->fresh) return Outcome::ok;
+  if (klu_->fresh) {
+    klu_->current = Klu::Current::fresh;
+    return Outcome::ok;
+  }
   if (common->status != KLU_SINGULAR) return Outcome::failed;
   singular_column_ = common->singular_col < n_ ? common->singular_col : -1;
   return Outcome::singular;
@@ -200,10 +219,19 @@ LinearSolver::Outcome LinearSolver::factor_alone(double* values) {
 
 void LinearSolver::solve(double* rhs) {
   if (n_ == 0) return;
-  if (klu_->by_tail)
-    klu_->tail->solve(rhs);
-  else
-    klu_solve(klu_->symbolic, klu_->current, n_, 1, rhs, &klu_->common);
+  Klu& k = *klu_;
+  switch (k.current) {
+    case Klu::Current::none:
+      break;
+    case Klu::Current::kept:
+      k.kept->solve(rhs);
+      break;
+    case Klu::Current::tail:
+      k.tail->solve(rhs);
+      break;
+    case Klu::Current::fresh:
+      klu_solve(k.symbolic, k.fresh, n_, 1, rhs, &k.common);
+  }
 }
 
 }  // namespace mbcosim

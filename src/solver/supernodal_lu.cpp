@@ -1,0 +1,239 @@
+#include "solver/supernodal_lu.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbcosim {
+
+namespace {
+
+/// x[row(i)] −= Σ_q panel(i, q) u[q] for count rows of a panel.
+template <int Width, class Row>
+inline void subtract_product(const double* panel, std::ptrdiff_t stride, int count, const double* u,
+                             double* x, Row row) {
+  for (int i = 0; i < count; ++i) {
+    double a = panel[i] * u[0];
+    for (int q = 1; q < Width; ++q) a += panel[q * stride + i] * u[q];
+    x[row(i)] -= a;
+  }
+}
+template <class Row>
+inline void subtract_product(const double* panel, std::ptrdiff_t stride, int count, const double* u,
+                             int width, double* x, Row row) {
+  for (; width >= 4; width -= 4, panel += 4 * stride, u += 4)
+    subtract_product<4>(panel, stride, count, u, x, row);
+  if (width == 3) subtract_product<3>(panel, stride, count, u, x, row);
+  if (width == 2) subtract_product<2>(panel, stride, count, u, x, row);
+  if (width == 1) subtract_product<1>(panel, stride, count, u, x, row);
+}
+
+/// u := L⁻¹ u for the unit lower triangle that starts at `panel` (width × width).
+inline void solve_triangle(const double* panel, std::ptrdiff_t stride, double* u, int width) {
+  for (int q = 0; q + 1 < width; ++q, panel += stride + 1)
+    for (int p = 1; p < width - q; ++p) u[q + p] -= panel[p] * u[q];
+}
+
+}  // namespace
+
+SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
+                           const double* values, const FactorPattern& factors)
+    : n_(static_cast<int>(factors.row_of.size())),
+      row_of_(factors.row_of),
+      column_of_(factors.column_of),
+      block_start_(factors.block_start),
+      inverse_scale_(n_),
+      pivots_(n_),
+      work_(n_, 0.0) {
+  std::vector<double> largest(n_, 0.0);
+  for (std::size_t p = 0; p < row_index.size(); ++p)
+    largest[row_index[p]] = std::max(largest[row_index[p]], std::abs(values[p]));
+  for (int k = 0; k < n_; ++k) inverse_scale_[k] = 1 / largest[row_of_[k]];
+  find_supernodes(factors);
+  find_segments(factors);
+  place_matrix(column_start, row_index);
+}
+
+void SupernodalLu::find_supernodes(const FactorPattern& factors) {
+  const std::vector<int>&start = factors.lower_start, &row = factors.lower_row;
+  // Does column k + 1 have the rows of column k but the first?
+  const auto continues = [&](int k) {
+    return start[k + 1] - start[k] == start[k + 2] - start[k + 1] + 1 &&
+           std::equal(row.begin() + start[k] + 1, row.begin() + start[k + 1],
+                      row.begin() + start[k + 1]);
+  };
+  rows_start_.push_back(0);
+  panel_start_.push_back(0);
+  supernode_of_.resize(n_);
+  for (int k = 0; k < n_;) {
+    int end = k + 1;
+    while (end < n_ && continues(end - 1)) ++end;
+    std::fill(supernode_of_.begin() + k, supernode_of_.begin() + end,
+              static_cast<int>(first_.size()));
+    first_.push_back(k);
+    rows_.insert(rows_.end(), row.begin() + start[end - 1] + 1, row.begin() + start[end]);
+    rows_start_.push_back(static_cast<int>(rows_.size()));
+    const std::ptrdiff_t width = end - k, below = start[end] - start[end - 1] - 1;
+    panel_start_.push_back(panel_start_.back() + width * (width + below));
+    k = end;
+  }
+  first_.push_back(n_);
+  panels_.resize(static_cast<std::size_t>(panel_start_.back()));
+}
+
+/// A row of U within a supernode implies all later ones of it, as they are in its column of L.
+void SupernodalLu::find_segments(const FactorPattern& factors) {
+  segment_start_.push_back(0);
+  upper_start_.push_back(0);
+  for (int k = 0; k < n_; ++k) {
+    int last = -1;
+    for (int p = factors.upper_start[k]; p + 1 < factors.upper_start[k + 1]; ++p) {
+      const int row = factors.upper_row[p];
+      if (supernode_of_[row] == last) continue;
+      last = supernode_of_[row];
+      segments_.push_back({last, row, std::min(k, first_[last + 1])});
+    }
+    segment_start_.push_back(static_cast<int>(segments_.size()));
+    upper_row_.insert(upper_row_.end(), factors.upper_row.begin() + factors.upper_start[k],
+                      factors.upper_row.begin() + factors.upper_start[k + 1] - 1);
+    upper_start_.push_back(static_cast<int>(upper_row_.size()));
+  }
+  upper_.resize(upper_row_.size());
+}
+
+void SupernodalLu::place_matrix(const std::vector<int>& column_start,
+                                const std::vector<int>& row_index) {
+  std::vector<int> position(n_), block_first(n_);
+  for (int k = 0; k < n_; ++k) position[row_of_[k]] = k;
+  for (std::size_t b = 0; b + 1 < block_start_.size(); ++b)
+    std::fill(block_first.begin() + block_start_[b], block_first.begin() + block_start_[b + 1],
+              block_start_[b]);
+  entry_start_.push_back(0);
+  above_start_.push_back(0);
+  for (int k = 0; k < n_; ++k) {
+    const int column = column_of_[k];
+    value_start_.push_back(column_start[column]);
+    for (int p = column_start[column]; p < column_start[column + 1]; ++p) {
+      entry_row_.push_back(position[row_index[p]]);
+      if (entry_row_.back() < block_first[k]) above_row_.push_back(entry_row_.back());
+    }
+    entry_start_.push_back(static_cast<int>(entry_row_.size()));
+    above_start_.push_back(static_cast<int>(above_row_.size()));
+  }
+  above_.resize(above_row_.size());
+}
+
+/// Eliminates the rows of a segment from the column in work_.
+void SupernodalLu::update(const Segment& segment) {
+  const int s = segment.supernode, first = first_[s], below = rows_start_[s + 1] - rows_start_[s];
+  const std::ptrdiff_t stride = first_[s + 1] - first + below;
+  const int end = segment.end, skipped = segment.first - first, width = end - segment.first;
+  const double* panel = panels_.data() + panel_start_[s] + skipped * (stride + 1);
+  double* const u = work_.data() + segment.first;
+  if (width > 1) solve_triangle(panel, stride, u, width);
+  if (end < first_[s + 1])
+    subtract_product(panel + width, stride, first_[s + 1] - end, u, width, work_.data() + end,
+                     [](int i) { return i; });
+  const int* const rows = rows_.data() + rows_start_[s];
+  subtract_product(panel + (first_[s + 1] - segment.first), stride, below, u, width, work_.data(),
+                   [rows](int i) { return rows[i]; });
+}
+
+bool SupernodalLu::finish_column(int k, int supernode) {
+  double* const x = work_.data();
+  for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p) {
+    upper_[p] = x[upper_row_[p]];
+    x[upper_row_[p]] = 0;
+  }
+  const double pivot = x[k];
+  x[k] = 0;
+  pivots_[k] = pivot;
+  const int first = first_[supernode], end = first_[supernode + 1];
+  const int below = rows_start_[supernode + 1] - rows_start_[supernode];
+  double* column = panels_.data() + panel_start_[supernode] +
+                   static_cast<std::ptrdiff_t>(k - first) * (end - first + below) + (k - first) + 1;
+  for (int i = k + 1; i < end; ++i, ++column) {
+    *column = x[i] / pivot;
+    x[i] = 0;
+  }
+  const int* const rows = rows_.data() + rows_start_[supernode];
+  for (int i = 0; i < below; ++i, ++column) {
+    *column = x[rows[i]] / pivot;
+    x[rows[i]] = 0;
+  }
+  return std::isfinite(pivot) && pivot != 0;
+}
+
+bool SupernodalLu::factor(const double* values) {
+  double* const x = work_.data();
+  bool fine = true;
+  for (int k = 0; k < n_ && fine; ++k) {
+    const double* value = values + value_start_[k];
+    for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value) x[entry_row_[p]] = *value;
+    for (int p = above_start_[k]; p < above_start_[k + 1]; ++p) {
+      above_[p] = x[above_row_[p]];
+      x[above_row_[p]] = 0;
+    }
+    for (int q = segment_start_[k]; q < segment_start_[k + 1]; ++q) update(segments_[q]);
+    fine = finish_column(k, supernode_of_[k]);
+  }
+  return fine;
+}
+
+void SupernodalLu::solve(double* b) {
+  double* const x = work_.data();
+  for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]];
+  for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
+    const int begin = block_start_[block], end = block_start_[block + 1];
+    for (int s = supernode_of_[begin]; s < supernodes() && first_[s] < end; ++s) {
+      const int first = first_[s], width = first_[s + 1] - first;
+      const int below = rows_start_[s + 1] - rows_start_[s];
+      const int* const rows = rows_.data() + rows_start_[s];
+      const double* const panel = panels_.data() + panel_start_[s];
+      if (width > 1) solve_triangle(panel, width + below, x + first, width);
+      subtract_product(panel + width, width + below, below, x + first, width, x,
+                       [rows](int i) { return rows[i]; });
+    }
+    for (int k = end - 1; k >= begin; --k) {
+      const double xk = x[k] /= pivots_[k];
+      for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
+        x[upper_row_[p]] -= upper_[p] * xk;
+    }
+    for (int k = begin; k < end; ++k)
+      for (int p = above_start_[k]; p < above_start_[k + 1]; ++p)
+        x[above_row_[p]] -= above_[p] * x[k];
+  }
+  for (int k = 0; k < n_; ++k) {
+    b[column_of_[k]] = x[k];
+    x[k] = 0;
+  }
+}
+
+double SupernodalLu::pivot_ratio() const {
+  double smallest = HUGE_VAL, largest = 0;
+  for (int k = 0; k < n_; ++k) {
+    const double pivot = std::abs(pivots_[k] * inverse_scale_[k]);
+    smallest = std::min(smallest, pivot);
+    largest = std::max(largest, pivot);
+  }
+  return n_ > 0 ? smallest / largest : 1;
+}
+
+double SupernodalLu::pivot_growth(const double* values) const {
+  double growth = 1;
+  for (std::size_t block = 0; block + 1 < block_start_.size(); ++block)
+    for (int k = block_start_[block]; k < block_start_[block + 1]; ++k) {
+      double of_matrix = 0, of_factor = std::abs(pivots_[k] * inverse_scale_[k]);
+      for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p) {
+        const int row = entry_row_[p];
+        const double value = values[value_start_[k] + p - entry_start_[k]];
+        if (row >= block_start_[block])
+          of_matrix = std::max(of_matrix, std::abs(value * inverse_scale_[row]));
+      }
+      for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
+        of_factor = std::max(of_factor, std::abs(upper_[p] * inverse_scale_[upper_row_[p]]));
+      growth = std::min(growth, of_matrix / of_factor);
+    }
+  return growth;
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,86 @@
+/// Sparse LU with pivots that are given once, for many matrices of one pattern.
+///
+///   P A Q = L U      block upper triangular, each diagonal block factored on its own
+///
+/// P, Q and the pattern come from a factorization of a reference matrix. Results depend on the
+/// matrix and on these only.
+///
+/// Consecutive columns of L with the same rows below them form a supernode: its values are a dense
+/// panel with one list of rows, and a column is updated by the whole panel at once. Columns are
+/// computed from left to right (Gilbert and Peierls, "Sparse partial pivoting in time proportional
+/// to arithmetic operations", SIAM J. Sci. Stat. Comput. 9(5), 1988; supernodes: Demmel et al., "A
+/// supernodal approach to sparse partial pivoting", SIAM J. Matrix Anal. Appl. 20(3), 1999). L and
+/// U lie apart, each in the order in which it is read: large factors do not fit into the caches,
+/// and a solution costs what reading them costs.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace mbcosim {
+
+/// Pattern of the factors of a reference matrix: compressed columns, rows ascending, with the
+/// diagonals of L and of U, within diagonal blocks only.
+struct FactorPattern {
+  std::vector<int> lower_start, lower_row, upper_start, upper_row;
+  std::vector<int> row_of, column_of;  ///< P, Q: row and column of the matrix by position (n)
+  std::vector<int> block_start;        ///< first position of each diagonal block, then n
+};
+
+class SupernodalLu {
+ public:
+  /// The matrix's pattern in compressed columns; `values`: those of the reference matrix.
+  SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
+               const double* values, const FactorPattern& factors);
+
+  /// False when a pivot vanishes or is not a number: there are no factors then.
+  bool factor(const double* values);
+  /// Solves A x = b in place with the last factorization.
+  void solve(double* b);
+
+  /// Smallest over largest pivot, rows scaled by their largest entries in the reference matrix.
+  double pivot_ratio() const;
+  /// Reciprocal pivot growth: smallest over all columns of max|A| / max|U|, rows scaled likewise.
+  double pivot_growth(const double* values) const;
+  int supernodes() const { return static_cast<int>(first_.size()) - 1; }
+
+ private:
+  /// The rows first .. end − 1 of a column of U: the last ones of a supernode, or those before the
+  /// diagonal.
+  struct Segment {
+    int supernode, first, end;
+  };
+  void find_supernodes(const FactorPattern& factors);
+  void find_segments(const FactorPattern& factors);
+  void place_matrix(const std::vector<int>& column_start, const std::vector<int>& row_index);
+  void update(const Segment& segment);
+  bool finish_column(int k, int supernode);
+
+  int n_;
+  std::vector<int> row_of_, column_of_, block_start_;
+  std::vector<double> inverse_scale_;  ///< of the rows, by position (n)
+
+  // L: panels by columns, leading dimension width + rows below
+  std::vector<int> first_;              ///< first column of each supernode, then n
+  std::vector<int> supernode_of_;       ///< by column (n)
+  std::vector<int> rows_start_, rows_;  ///< rows below the square of each panel, by position
+  std::vector<std::ptrdiff_t> panel_start_;
+  std::vector<double> panels_;
+
+  // U by columns, without the pivots
+  std::vector<int> segment_start_;  ///< (n + 1)
+  std::vector<Segment> segments_;
+  std::vector<int> upper_start_, upper_row_;
+  std::vector<double> upper_;
+  std::vector<double> pivots_;  ///< (n)
+
+  // the matrix: rows of the entries of each column, and entries above its diagonal block
+  std::vector<int> value_start_;              ///< of each column among the matrix's values (n)
+  std::vector<int> entry_start_, entry_row_;  ///< by position
+  std::vector<int> above_start_, above_row_;  ///< by position
+  std::vector<double> above_;
+
+  std::vector<double> work_;  ///< by position; zero between calls
+};
+
+}  // namespace mbcosim

@@ -1,0 +1,214 @@
+/// Kept pivots: solutions against dense ones, the judgement of pivots in closed form.
+#include "solver/supernodal_lu.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "solver/linear_solver.h"
+
+namespace mbcosim {
+namespace {
+
+using Dense = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+struct Sparse {
+  std::vector<int> column_start{0}, row_index;
+  std::vector<double> values;
+  explicit Sparse(const Dense& a) {
+    for (int j = 0; j < a.cols(); ++j) {
+      for (int i = 0; i < a.rows(); ++i)
+        if (a(i, j) != 0) {
+          row_index.push_back(i);
+          values.push_back(a(i, j));
+        }
+      column_start.push_back(static_cast<int>(row_index.size()));
+    }
+  }
+};
+
+/// Pattern of L and U of P A Q without further pivoting, by elimination on a table of flags.
+FactorPattern factor_pattern(const Dense& a, std::vector<int> row_of, std::vector<int> column_of,
+                             std::vector<int> block_start) {
+  const int n = static_cast<int>(a.rows());
+  FactorPattern f{
+      {0}, {}, {0}, {}, std::move(row_of), std::move(column_of), std::move(block_start)};
+  std::vector<std::vector<bool>> filled(n, std::vector<bool>(n));
+  std::vector<int> block(n);
+  for (std::size_t b = 0; b + 1 < f.block_start.size(); ++b)
+    for (int k = f.block_start[b]; k < f.block_start[b + 1]; ++k) block[k] = static_cast<int>(b);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      filled[i][j] = i == j || (block[i] == block[j] && a(f.row_of[i], f.column_of[j]) != 0);
+  for (int k = 0; k < n; ++k)
+    for (int i = k + 1; i < n; ++i)
+      for (int j = k + 1; j < n && filled[i][k]; ++j)
+        if (filled[k][j]) filled[i][j] = true;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      if (filled[i][j] && i >= j) f.lower_row.push_back(i);
+      if (filled[i][j] && i <= j) f.upper_row.push_back(i);
+    }
+    f.lower_start.push_back(static_cast<int>(f.lower_row.size()));
+    f.upper_start.push_back(static_cast<int>(f.upper_row.size()));
+  }
+  return f;
+}
+
+/// Matrices of one pattern, diagonally dominant by columns after the permutation.
+class Family {
+ public:
+  Family(int n, double density, std::vector<int> block_start, unsigned seed)
+      : block_start_(std::move(block_start)), generator_(seed), pattern_(Dense::Zero(n, n)) {
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j)
+        if (i == j || (number(0, 1) < density && block(i) <= block(j))) pattern_(i, j) = 1;
+    row_of_.resize(n);
+    std::iota(row_of_.begin(), row_of_.end(), 0);
+    column_of_ = row_of_;
+    std::shuffle(row_of_.begin(), row_of_.end(), generator_);
+    std::shuffle(column_of_.begin(), column_of_.end(), generator_);
+  }
+  Dense matrix() {
+    const int n = static_cast<int>(pattern_.rows());
+    Dense a = Dense::Zero(n, n);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j)
+        if (pattern_(i, j) != 0)
+          a(row_of_[i], column_of_[j]) = i == j ? n * number(.5, 1) : number(-1, 1);
+    return a;
+  }
+  FactorPattern pattern(const Dense& a) const {
+    return factor_pattern(a, row_of_, column_of_, block_start_);
+  }
+  Vector vector() {
+    return Vector::NullaryExpr(pattern_.rows(), [&] { return number(-1, 1); });
+  }
+  double number(double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(generator_);
+  }
+
+ private:
+  int block(int k) const {
+    return static_cast<int>(std::upper_bound(block_start_.begin(), block_start_.end(), k) -
+                            block_start_.begin());
+  }
+  std::vector<int> block_start_, row_of_, column_of_;
+  std::mt19937 generator_;
+  Dense pattern_;
+};
+
+void expect_solutions(Family& family, const std::string& what) {
+  const Dense reference = family.matrix();
+  const Sparse sparse(reference);
+  SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
+                  family.pattern(reference));
+  for (int k = 0; k < 3; ++k) {
+    const Dense a = family.matrix();
+    ASSERT_TRUE(lu.factor(Sparse(a).values.data())) << what;
+    for (int right = 0; right < 2; ++right) {
+      Vector x = family.vector();
+      const Vector expected = a.partialPivLu().solve(x);
+      lu.solve(x.data());
+      EXPECT_LT((x - expected).norm(), 1e-13 * expected.norm()) << what;
+    }
+  }
+}
+
+TEST(SupernodalLu, SolvesAsDenseEliminationDoes) {
+  for (unsigned seed = 1; seed <= 40; ++seed)
+    for (const double density : {.02, .1, .4, 1.}) {
+      const int n = 1 + static_cast<int>(seed) * 2;
+      Family whole(n, density, {0, n}, seed),
+          parts(n + 12, density, {0, 1, 4, 5, 10, n + 12}, seed);
+      expect_solutions(whole, "one block of " + std::to_string(n));
+      expect_solutions(parts, "blocks of " + std::to_string(n + 12));
+    }
+}
+
+TEST(SupernodalLu, JoinsColumnsWithTheSameRowsBelow) {
+  const auto supernodes = [](const Dense& a) {
+    const int n = static_cast<int>(a.rows());
+    std::vector<int> order(n);
+    std::iota(order.begin(), order.end(), 0);
+    const Sparse s(a);
+    return SupernodalLu(s.column_start, s.row_index, s.values.data(),
+                        factor_pattern(a, order, order, {0, n}))
+        .supernodes();
+  };
+  EXPECT_EQ(supernodes(Dense::Ones(7, 7) + 7 * Dense::Identity(7, 7)), 1);
+  EXPECT_EQ(supernodes(Dense::Identity(7, 7)), 7);
+  Dense arrow = Dense::Identity(7, 7);  // the last two columns are full
+  arrow.row(6).setConstant(.1);
+  arrow.col(6).setOnes();
+  EXPECT_EQ(supernodes(arrow), 6);
+}
+
+/// A matrix without a usable pivot leaves nothing behind.
+TEST(SupernodalLu, RefusesAVanishingPivotAndGoesOn) {
+  Dense a(3, 3);
+  a << 1, 2, 3, 4, 9, 5, 2, 1, 9;
+  const Sparse sparse(a);
+  const FactorPattern pattern = factor_pattern(a, {0, 1, 2}, {0, 1, 2}, {0, 3});
+  SupernodalLu fresh(sparse.column_start, sparse.row_index, sparse.values.data(), pattern);
+  SupernodalLu used = fresh;
+  Dense singular = a, invalid = a;
+  singular(1, 1) = 8;  // second pivot 8 − 4·2
+  invalid(0, 0) = NAN;
+  EXPECT_FALSE(used.factor(Sparse(singular).values.data()));
+  EXPECT_FALSE(used.factor(Sparse(invalid).values.data()));
+  ASSERT_TRUE(used.factor(sparse.values.data()));
+  ASSERT_TRUE(fresh.factor(sparse.values.data()));
+  Vector x = Vector::LinSpaced(3, 1, 2), y = x;
+  used.solve(x.data());
+  fresh.solve(y.data());
+  EXPECT_EQ(x, y);
+}
+
+/// [d 1; 1 3] = [1 0; 1/d 1] [d 1; 0 3 − 1/d]; rows are scaled by 1 and 3, and the largest entries
+/// of the second column of A are 1, 1.
+TEST(SupernodalLu, JudgesPivotsAgainstTheReference) {
+  Dense a(2, 2);
+  a << 1, 1, 1, 3;
+  const Sparse sparse(a);
+  SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
+                  factor_pattern(a, {0, 1}, {0, 1}, {0, 2}));
+  for (const double d : {1e-2, 1e-6, 1e-10}) {
+    a << d, 1, 1, 3;
+    const Sparse poor(a);
+    ASSERT_TRUE(lu.factor(poor.values.data()));
+    const double second = std::abs(3 - 1 / d) / 3;  // its row is scaled by 3
+    EXPECT_NEAR(lu.pivot_ratio(), d / second, 1e-12 * d / second);
+    EXPECT_NEAR(lu.pivot_growth(poor.values.data()), 1 / second, 1e-12 / second);
+  }
+}
+
+/// Through the solver that chooses the pivots: matrices in several blocks, with zeros on the
+/// diagonal, and others of the pattern.
+TEST(LinearSolver, KeepsPivotsForMatricesOfOnePattern) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const int n = 60;
+    Family family(n, .05, {0, 1, 20, 21, n}, seed);
+    Sparse reference(family.matrix());
+    LinearSolver solver(n, reference.column_start, reference.row_index);
+    ASSERT_EQ(solver.analyze(reference.values.data()), LinearSolver::Outcome::ok);
+    for (int k = 0; k < 3; ++k) {
+      const Dense a = family.matrix();
+      Sparse sparse(a);
+      ASSERT_EQ(solver.factor(sparse.values.data()), LinearSolver::Outcome::ok);
+      Vector x = family.vector();
+      const Vector expected = a.partialPivLu().solve(x);
+      solver.solve(x.data());
+      EXPECT_LT((x - expected).norm(), 1e-13 * expected.norm());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mbcosim
