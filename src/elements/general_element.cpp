@@ -150,8 +150,8 @@ void GeneralElementSet::start(const EvalContext& context, State& state, int i) c
   slots_[i].element->start(view(context, i), state);
 }
 
-void GeneralElementSet::residual(const EvalContext& context, double* r) const {
-  for (int i = 0; i < size(); ++i) {
+void GeneralElementSet::residual(const EvalContext& context, double* r, ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i) {
     const GeneralConnection& c = slots_[i].connection;
     if (is_active(*context.state, i)) {
       GeneralResidual local(c.rows_, r);
@@ -163,9 +163,9 @@ void GeneralElementSet::residual(const EvalContext& context, double* r) const {
   }
 }
 
-void GeneralElementSet::jacobian(const EvalContext& context, const NodeSeeds* seeds,
-                                 double* values) const {
-  for (int i = 0; i < size(); ++i) {
+void GeneralElementSet::jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
+                                 ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i) {
     const Slot& s = slots_[i];
     GeneralJacobian local(context, s.connection, seeds, s.positions, values);
     if (is_active(*context.state, i)) {

@@ -240,8 +240,9 @@ class GeneralElementSet final : public ElementSet, public SampledTableSource {
   void collect_pattern(PatternSink& sink) const override;
   void set_positions(const PositionSource& positions) override;
   void start(const EvalContext& context, State& state, int i) const override;
-  void residual(const EvalContext& context, double* r) const override;
-  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const override;
+  void residual(const EvalContext& context, double* r, ElementRange range) const override;
+  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
+                ElementRange range) const override;
   void after_predict(const EvalContext& context, State& state) const override;
   void after_convergence(const EvalContext& context, State& state) const override;
   AssemblyRole assembly_role(int i) const override { return slots_[i].element->assembly_role(); }

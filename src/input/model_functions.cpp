@@ -61,8 +61,8 @@ NodeState previous_state(const EvalContext& context, int node) {
   s.x = Vec3(state.y1[n.first], state.y1[n.first + 1], state.y1[n.first + 2]);
   s.v = Vec3(state.yp1[n.first], state.yp1[n.first + 1], state.yp1[n.first + 2]);
   if (n.has_rotation()) {
-    s.R = state.rotation[node].R1;
-    s.w = state.rotation[node].w1;
+    s.R = state.rotation_history[node].R1;
+    s.w = state.rotation_history[node].w1;
   }
   return s;
 }

@@ -102,6 +102,11 @@ struct Inertia {
   Mat3 J = Mat3::Zero();  ///< second moment [kg·m²]
 };
 
+/// Elements first .. last − 1 of a set.
+struct ElementRange {
+  int first, last;
+};
+
 enum class AssemblyRole {
   none,       ///< takes no part
   holonomic,  ///< rows are position constraints; rates by differentiation in time
@@ -139,10 +144,11 @@ class ElementSet {
   /// After an initial assembly that moved something: multipliers restart from zero, the rest from
   /// `start`.
   virtual void after_assembly(const EvalContext& context, State& state, int i) const;
-  virtual void residual(const EvalContext& context, double* r) const = 0;  ///< adds to r (n)
+  /// Adds to r (n).
+  virtual void residual(const EvalContext& context, double* r, ElementRange range) const = 0;
   /// Adds −∂r/∂δ to the sparse values; seeds by structural node index.
-  virtual void jacobian(const EvalContext& context, const NodeSeeds* seeds,
-                        double* values) const = 0;
+  virtual void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
+                        ElementRange range) const = 0;
   virtual void after_predict(const EvalContext& context, State& state) const = 0;
   virtual void after_convergence(const EvalContext& context, State& state) const = 0;
 
@@ -174,6 +180,7 @@ class ElementSet {
   /// Adds the momentum of element i to the initial momentum of its nodes.
   virtual void add_momentum(const EvalContext& context, int i, State& state) const = 0;
 
+  ElementRange all() const { return {0, size()}; }
   bool is_active(const State& state, int i) const {
     const int m = info(i).active_memory;
     return m < 0 || state.memory[m] != 0;

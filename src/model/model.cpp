@@ -276,13 +276,15 @@ State make_initial_state(const Model& model) {
   state.yp.assign(n, 0.0);
   state.memory = model.initial_memory;
   state.variables = model.initial_variables;
-  state.rotation.resize(model.structural.size());
+  state.rotation.reserve(model.structural.size());
+  state.rotation_history.reserve(model.structural.size());
   const auto put = [](std::vector<double>& y, int i, const Vec3& v) {
     for (int k = 0; k < 3; ++k) y[i + k] = v(k);
   };
   for (std::size_t k = 0; k < model.structural.size(); ++k) {
     const StructuralNode& node = model.structural[k];
-    state.rotation[k] = {node.R, node.R, node.R, node.R, node.w, node.w, node.w, node.w};
+    state.rotation.push_back({node.R, node.w});
+    state.rotation_history.emplace_back(state.rotation.back());
     if (node.is_dummy()) continue;
     put(state.y, node.first, node.x);
     put(state.yp, node.first, node.v);

@@ -165,8 +165,8 @@ State meaningless_state(const Model& model, std::mt19937& generator) {
   for (double& yp : state.yp) yp = number();
   state.rotation.resize(model.structural.size());
   for (NodeRotation& r : state.rotation) {
-    r.R = r.R_ref = r.R1 = r.R2 = rotation_of_vector<double>(vector());
-    r.w = r.w_ref = r.w1 = r.w2 = vector();
+    r = {rotation_of_vector<double>(vector()), vector()};
+    state.rotation_history.emplace_back(r);
   }
   state.memory = model.initial_memory;
   state.variables = model.initial_variables;

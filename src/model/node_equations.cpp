@@ -52,9 +52,10 @@ void NodeEquations::set_positions(const PositionSource& source) {
   }
 }
 
-void NodeEquations::residual(const EvalContext& context, double* r) const {
+void NodeEquations::residual(const EvalContext& context, double* r, ElementRange range) const {
   const std::vector<double>&y = context.state->y, &yp = context.state->yp;
-  for (const Row& row : rows_) {
+  for (int k = range.first; k < range.last; ++k) {
+    const Row& row = rows_[k];
     const int n = row.rotation ? 6 : 3;
     for (int i = 0; i < n; ++i) {
       r[row.first + i] += y[row.first + n + i];
@@ -66,9 +67,10 @@ void NodeEquations::residual(const EvalContext& context, double* r) const {
   }
 }
 
-void NodeEquations::jacobian(const EvalContext& context, double* values) const {
+void NodeEquations::jacobian(const EvalContext& context, double* values, ElementRange range) const {
   const std::vector<double>&y = context.state->y, &yp = context.state->yp;
-  for (const Row& row : rows_) {
+  for (int k = range.first; k < range.last; ++k) {
+    const Row& row = rows_[k];
     const int n = row.rotation ? 6 : 3;
     const int* p = &positions_[row.position];
     for (int i = 0; i < n; ++i) {

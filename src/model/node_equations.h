@@ -23,8 +23,9 @@ class NodeEquations {
   void bind(const std::vector<StructuralNode>& nodes);
   void collect_pattern(PatternSink& sink) const;
   void set_positions(const PositionSource& source);
-  void residual(const EvalContext& context, double* r) const;
-  void jacobian(const EvalContext& context, double* values) const;
+  int size() const { return static_cast<int>(rows_.size()); }
+  void residual(const EvalContext& context, double* r, ElementRange range) const;
+  void jacobian(const EvalContext& context, double* values, ElementRange range) const;
 
  private:
   struct Row {

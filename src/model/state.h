@@ -8,15 +8,24 @@
 
 namespace mbcosim {
 
-/// Orientation and angular velocity of one structural node; index = structural node index. Plain
-/// arrays (column-major), so that a State is plain data.
+/// Orientation and angular velocity of one structural node. Plain arrays (column-major), so that a
+/// State is plain data.
 struct NodeRotation {
-  Mat3 R;      ///< current orientation, node frame -> global
+  Mat3 R;  ///< current orientation, node frame -> global
+  Vec3 w;  ///< current angular velocity, global [rad/s]
+};
+
+/// What the current ones follow from, apart from them: assembly reads only those.
+struct NodeRotationHistory {
   Mat3 R_ref;  ///< reference (predicted) orientation of this step; R = R(g) R_ref
   Mat3 R1;     ///< at the last accepted step
   Mat3 R2;     ///< one step earlier
-  Vec3 w;      ///< current angular velocity, global [rad/s]
   Vec3 w_ref, w1, w2;
+
+  NodeRotationHistory() = default;
+  /// A node that has not moved yet.
+  explicit NodeRotationHistory(const NodeRotation& q)
+      : R_ref(q.R), R1(q.R), R2(q.R), w_ref(q.w), w1(q.w), w2(q.w) {}
 };
 
 struct State {
@@ -28,10 +37,11 @@ struct State {
 
   std::vector<double> y,
       yp;  ///< unknowns and rates (n); algebraic unknowns keep a running integral in yp
-  std::vector<double> y1, yp1;         ///< at the last accepted step (n)
-  std::vector<double> y2, yp2;         ///< one step earlier (n)
-  std::vector<NodeRotation> rotation;  ///< (structural nodes)
-  std::vector<double> memory;          ///< what elements, laws and drives remember
+  std::vector<double> y1, yp1;                        ///< at the last accepted step (n)
+  std::vector<double> y2, yp2;                        ///< one step earlier (n)
+  std::vector<NodeRotation> rotation;                 ///< (structural nodes)
+  std::vector<NodeRotationHistory> rotation_history;  ///< (structural nodes)
+  std::vector<double> memory;                         ///< what elements, laws and drives remember
   std::vector<double> variables;  ///< variables of the deck that run-time strings read or assign
   std::vector<double> control;    ///< step control and integrator flags (solver)
   /// Loads that external codes apply to structural nodes: force [N] and moment about the node

@@ -59,25 +59,27 @@ class In {
 
 constexpr std::size_t kRotationDoubles = 4 * 9 + 4 * 3;
 
-template <class Rotation, class Action>
-void each_part(Rotation& q, Action action) {
-  for (auto* m : {&q.R, &q.R_ref, &q.R1, &q.R2}) action(m->data(), 9);
-  for (auto* v : {&q.w, &q.w_ref, &q.w1, &q.w2}) action(v->data(), 3);
+template <class Rotation, class History, class Action>
+void each_part(Rotation& q, History& past, Action action) {
+  for (auto* m : {&q.R, &past.R_ref, &past.R1, &past.R2}) action(m->data(), 9);
+  for (auto* v : {&q.w, &past.w_ref, &past.w1, &past.w2}) action(v->data(), 3);
 }
 
 std::vector<double> flat_rotations(const State& state) {
   std::vector<double> r;
   r.reserve(state.rotation.size() * kRotationDoubles);
-  for (const NodeRotation& q : state.rotation)
-    each_part(q, [&](const double* d, int n) { r.insert(r.end(), d, d + n); });
+  for (std::size_t k = 0; k < state.rotation.size(); ++k)
+    each_part(state.rotation[k], state.rotation_history[k],
+              [&](const double* d, int n) { r.insert(r.end(), d, d + n); });
   return r;
 }
 
 void unflatten_rotations(const std::vector<double>& r, State& state) {
   state.rotation.resize(r.size() / kRotationDoubles);
+  state.rotation_history.resize(state.rotation.size());
   const double* p = r.data();
-  for (NodeRotation& q : state.rotation)
-    each_part(q, [&](double* d, int n) {
+  for (std::size_t k = 0; k < state.rotation.size(); ++k)
+    each_part(state.rotation[k], state.rotation_history[k], [&](double* d, int n) {
       std::memcpy(d, p, n * sizeof(double));
       p += n;
     });

@@ -312,10 +312,8 @@ Result<AssemblyReport> assemble_initially(const Model& model, State& state) {
     state = input;  // untouched to the last bit
     return report;
   }
-  for (NodeRotation& q : state.rotation) {
-    q.R_ref = q.R1 = q.R2 = q.R;
-    q.w_ref = q.w1 = q.w2 = q.w;
-  }
+  state.rotation_history =
+      std::vector<NodeRotationHistory>(state.rotation.begin(), state.rotation.end());
   for (const StructuralNode& node : model.structural)
     if (node.has_rotation())
       for (int i = 0; i < 3; ++i) state.y[node.first + 3 + i] = 0;

@@ -99,8 +99,8 @@ class Stepper::DerivativesHooks : public NewtonHooks {
   DerivativesHooks(const Model& model, const State& start, const CancelToken* cancel)
       : model_(model), start_(start), cancel_(cancel) {}
   void after_correction(State& state) const override {
-    for (const StructuralNode& n : model_.structural)
-      for (int i = 0; i < n.position_unknowns(); ++i) {
+    for (const NodePlace& n : model_.places)
+      for (int i = 0; i < n.position_unknowns; ++i) {
         state.y[n.first + i] = start_.y[n.first + i];
         state.yp[n.first + i] = start_.yp[n.first + i];
       }
@@ -293,14 +293,15 @@ NewtonReport Stepper::iterate(State& state, const StepFormula& f, const MethodSe
 /// Values at the last two accepted steps -> prediction at the new time. Rotation unknowns are first
 /// rewritten relative to the last accepted orientation.
 void Stepper::predict(State& state, const StepFormula& f) const {
-  for (std::size_t k = 0; k < model_.structural.size(); ++k) {
-    const StructuralNode& n = model_.structural[k];
+  for (std::size_t k = 0; k < model_.places.size(); ++k) {
+    const NodePlace& n = model_.places[k];
     if (!n.has_rotation()) continue;
-    NodeRotation& q = state.rotation[k];
+    const NodeRotation& now = state.rotation[k];
+    NodeRotationHistory& q = state.rotation_history[k];
     q.R2 = q.R1;
     q.w2 = q.w1;
-    q.R1 = q.R;
-    q.w1 = q.w;
+    q.R1 = now.R;
+    q.w1 = now.w;
     const Mat3 step = q.R2 * q.R1.transpose();
     if (is_half_turn(step))
       throw EvaluationError(model_.node_text(static_cast<int>(k)) +
@@ -327,13 +328,14 @@ void Stepper::predict(State& state, const StepFormula& f) const {
 
 /// The predicted rotation becomes the reference; increments restart from zero.
 void Stepper::finish_prediction(State& state) const {
-  for (std::size_t k = 0; k < model_.structural.size(); ++k) {
-    const StructuralNode& n = model_.structural[k];
+  for (std::size_t k = 0; k < model_.places.size(); ++k) {
+    const NodePlace& n = model_.places[k];
     if (!n.has_rotation()) continue;
-    NodeRotation& q = state.rotation[k];
+    NodeRotation& now = state.rotation[k];
+    NodeRotationHistory& q = state.rotation_history[k];
     const Vec3 g = at(state.y, n.first + 3), gp = at(state.yp, n.first + 3);
-    q.R_ref = q.R = cgr_rotation(g) * q.R1;
-    q.w_ref = q.w = cgr_g(g) * gp;
+    q.R_ref = now.R = cgr_rotation(g) * q.R1;
+    q.w_ref = now.w = cgr_g(g) * gp;
     put(state.y, n.first + 3, Vec3::Zero());
     put(state.yp, n.first + 3, Vec3::Zero());
   }

@@ -1,6 +1,9 @@
 #include "solver/system.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
 
 #include "math/rotation_derivative.h"
 
@@ -17,12 +20,29 @@ void add_external_loads(const EvalContext& context, std::vector<double>& r) {
   }
 }
 
+/// Calls action(part, range) for the node equations and all sets, in tiles that fit into a cache:
+/// elements that are close in the deck are close in the model, and what one set has just touched
+/// the next one needs. Small models are one tile.
+template <class Action>
+void each_tile(const Model& model, Action action) {
+  constexpr std::size_t kEntries = 32768;  // of the matrix in one tile: 256 kB
+  const auto tiles = static_cast<std::int64_t>(1 + model.row_index.size() / kEntries);
+  for (std::int64_t tile = 0; tile < tiles; ++tile) {
+    const auto range = [&](std::int64_t size) {
+      return ElementRange{static_cast<int>(size * tile / tiles),
+                          static_cast<int>(size * (tile + 1) / tiles)};
+    };
+    action(model.node_equations, range(model.node_equations.size()));
+    for (const auto& set : model.sets) action(std::as_const(*set), range(set->size()));
+  }
+}
+
 }  // namespace
 
 void compute_residual(const EvalContext& context, std::vector<double>& r) {
   std::fill(r.begin(), r.end(), 0.0);
-  context.model->node_equations.residual(context, r.data());
-  for (const auto& set : context.model->sets) set->residual(context, r.data());
+  each_tile(*context.model,
+            [&](const auto& part, ElementRange range) { part.residual(context, r.data(), range); });
   add_external_loads(context, r);
 }
 
@@ -47,12 +67,15 @@ void compute_jacobian(const EvalContext& context, Workspace& workspace) {
     }
     const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
     workspace.seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]),
-                                    state.rotation[k].w_ref, context.seed);
+                                    state.rotation_history[k].w_ref, context.seed);
   }
   std::fill(workspace.values.begin(), workspace.values.end(), 0.0);
-  model.node_equations.jacobian(context, workspace.values.data());
-  for (const auto& set : model.sets)
-    set->jacobian(context, workspace.seeds.data(), workspace.values.data());
+  each_tile(model, [&](const auto& part, ElementRange range) {
+    if constexpr (std::is_same_v<decltype(part), const NodeEquations&>)
+      part.jacobian(context, workspace.values.data(), range);
+    else
+      part.jacobian(context, workspace.seeds.data(), workspace.values.data(), range);
+  });
 }
 
 void update_rotations(const Model& model, State& state) {
@@ -60,11 +83,12 @@ void update_rotations(const Model& model, State& state) {
     const NodePlace& n = model.places[k];
     if (!n.has_rotation()) continue;
     NodeRotation& q = state.rotation[k];
+    const NodeRotationHistory& past = state.rotation_history[k];
     const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
     const Vec3 g(y[0], y[1], y[2]), gp(yp[0], yp[1], yp[2]);
     const Mat3 r = cgr_rotation(g);
-    q.R = r * q.R_ref;
-    q.w = cgr_g(g) * gp + r * q.w_ref;
+    q.R = r * past.R_ref;
+    q.w = cgr_g(g) * gp + r * past.w_ref;
   }
 }
 

@@ -58,7 +58,7 @@ void ThirdOrderSolver::predict_stage(const ThirdOrderFormula& f, const State& st
     const StructuralNode& node = model_.structural[k];
     if (!node.has_rotation()) continue;
     for (int i = 0; i < 3; ++i) {
-      stage_.y[node.first + 3 + i] = step * state.rotation[k].w1(i);
+      stage_.y[node.first + 3 + i] = step * state.rotation_history[k].w1(i);
       stage_.yp[node.first + 3 + i] = 0;
     }
   }

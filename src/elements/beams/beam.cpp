@@ -101,7 +101,7 @@ typename Beam<Nodes>::template Increment<double> Beam<Nodes>::predicted_incremen
   using Shape = BeamShape<Nodes>;
   Vec3 r[Nodes], rp[Nodes];
   for (int k = 0; k < Nodes; ++k) {
-    const NodeRotation& q = state.rotation[u.connection->node[k]];
+    const NodeRotationHistory& q = state.rotation_history[u.connection->node[k]];
     r[k] = cgr_parameters<double>(q.R_ref * q.R1.transpose());
     rp[k] = cgr_g_inverse(r[k]) * q.w_ref;
   }

@@ -29,16 +29,19 @@ void TikhonovSet::set_positions(const PositionSource& positions) {
   }
 }
 
-void TikhonovSet::residual(const EvalContext& context, double* r) const {
-  for (const Slot& s : slots_) {
+void TikhonovSet::residual(const EvalContext& context, double* r, ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i) {
+    const Slot& s = slots_[i];
     if (!s.joint.set->is_active(*context.state, s.joint.index)) continue;
     for (std::size_t k = 0; k < s.rows.size(); ++k)
       r[s.rows[k]] -= s.epsilon[k] * context.state->y[s.rows[k]];
   }
 }
 
-void TikhonovSet::jacobian(const EvalContext& context, const NodeSeeds*, double* values) const {
-  for (const Slot& s : slots_) {
+void TikhonovSet::jacobian(const EvalContext& context, const NodeSeeds*, double* values,
+                           ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i) {
+    const Slot& s = slots_[i];
     if (!s.joint.set->is_active(*context.state, s.joint.index)) continue;
     for (std::size_t k = 0; k < s.positions.size(); ++k) values[s.positions[k]] += s.epsilon[k];
   }

@@ -25,8 +25,9 @@ class TikhonovSet final : public ElementSet {
   void set_positions(const PositionSource& positions) override;
 
   void start(const EvalContext&, State&, int) const override {}
-  void residual(const EvalContext& context, double* r) const override;
-  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const override;
+  void residual(const EvalContext& context, double* r, ElementRange range) const override;
+  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
+                ElementRange range) const override;
   void after_predict(const EvalContext&, State&) const override {}
   void after_convergence(const EvalContext&, State&) const override {}
 

@@ -87,7 +87,7 @@ void read_total_reaction(Card& card, ElementInfo& info) {
     card.fail("total internal reaction: " + std::to_string(found) +
                   " components are active, but the equation constrains " + std::to_string(wanted),
               "activate the same number of components in both cards");
-  e.equation_label = slot.info.label;
+  e.equation_label = slot.info->label;
   slot.element.reaction = e.joint;
   Connector connector(slot.connection, card.builder());
   connector.distinct_node(e.joint.first);

@@ -45,8 +45,8 @@ void ModalForceSet::set_positions(const PositionSource& positions) {
   }
 }
 
-void ModalForceSet::residual(const EvalContext& context, double* r) const {
-  for (int i = 0; i < size(); ++i) {
+void ModalForceSet::residual(const EvalContext& context, double* r, ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i) {
     if (!is_active(*context.state, i)) continue;
     const ModalForce& force = slots_[i].force;
     const int first = force.joints->first_mode_row(force.joint);
@@ -63,9 +63,9 @@ void ModalForceSet::residual(const EvalContext& context, double* r) const {
   }
 }
 
-void ModalForceSet::jacobian(const EvalContext& context, const NodeSeeds* seeds,
-                             double* values) const {
-  for (int i = 0; i < size(); ++i) {
+void ModalForceSet::jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
+                             ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i) {
     const Slot& s = slots_[i];
     if (s.force.node < 0 || !is_active(*context.state, i)) continue;
     const VecN<6> local = s.force.resultant(context);

@@ -48,8 +48,9 @@ class ModalForceSet final : public ElementSet {
   void collect_pattern(PatternSink& sink) const override;
   void set_positions(const PositionSource& positions) override;
   void start(const EvalContext&, State&, int) const override {}
-  void residual(const EvalContext& context, double* r) const override;
-  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const override;
+  void residual(const EvalContext& context, double* r, ElementRange range) const override;
+  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
+                ElementRange range) const override;
   void after_predict(const EvalContext&, State&) const override {}
   void after_convergence(const EvalContext&, State&) const override {}
   AssemblyRole assembly_role(int) const override { return AssemblyRole::none; }

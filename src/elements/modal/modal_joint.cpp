@@ -116,8 +116,8 @@ void ModalJointSet::start(const EvalContext&, State& state, int i) const {
   }
 }
 
-void ModalJointSet::residual(const EvalContext& context, double* r) const {
-  for (int i = 0; i < size(); ++i) {
+void ModalJointSet::residual(const EvalContext& context, double* r, ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i) {
     const Slot& s = slots_[i];
     if (!is_active(*context.state, i)) {
       inactive_residual(context, s, r);

@@ -108,8 +108,9 @@ class ModalJointSet final : public ElementSet {
   void start(const EvalContext& context, State& state, int i) const override;
   /// Amplitudes and velocities stay as the assembly found them.
   void after_assembly(const EvalContext& context, State& state, int i) const override;
-  void residual(const EvalContext& context, double* r) const override;
-  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values) const override;
+  void residual(const EvalContext& context, double* r, ElementRange range) const override;
+  void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
+                ElementRange range) const override;
   void after_predict(const EvalContext&, State&) const override {}
   void after_convergence(const EvalContext&, State&) const override {}
 

@@ -172,9 +172,9 @@ void ModalJointSet::set_positions(const PositionSource& positions) {
     }
 }
 
-void ModalJointSet::jacobian(const EvalContext& context, const NodeSeeds* seeds,
-                             double* values) const {
-  for (int i = 0; i < size(); ++i) {
+void ModalJointSet::jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
+                             ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i) {
     const Slot& s = slots_[i];
     if (!is_active(*context.state, i)) {
       inactive_jacobian(context, s, seeds, values);

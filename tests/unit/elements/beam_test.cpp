@@ -99,7 +99,7 @@ class StraightBeam : public testing::Test {
              const Vec3& w = Vec3::Zero()) {
     const StructuralNode& node = bench_.model->structural[nodes_[k]];
     const Vec3 gp = cgr_g_inverse(g) * w;
-    bench_.state.rotation[nodes_[k]].w_ref.setZero();
+    bench_.state.rotation_history[nodes_[k]].w_ref.setZero();
     for (int i = 0; i < 3; ++i) {
       bench_.state.y[node.first + i] = x(i);
       bench_.state.y[node.first + 3 + i] = g(i);
@@ -188,8 +188,8 @@ TEST_F(StraightBeam, KeepsItsCurvatureFromStepToStep) {
   State& state = bench_.state;
   set_->after_convergence(bench_.context(state), state);
   for (int k = 0; k < 3; ++k) {
-    NodeRotation& q = state.rotation[nodes_[k]];
-    q.R1 = q.R_ref = q.R;
+    NodeRotationHistory& past = state.rotation_history[nodes_[k]];
+    past.R1 = past.R_ref = state.rotation[nodes_[k]].R;
     place(k, straight_[k], Vec3::Zero());
   }
   set_->after_predict(bench_.context(state), state);

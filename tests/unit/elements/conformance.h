@@ -77,6 +77,7 @@ class Bench {
     state.y.assign(n, 0);
     state.yp.assign(n, 0);
     state.rotation.resize(model->structural.size());
+    state.rotation_history.resize(model->structural.size());
     state.time = 0.7;
     state.h = 1e-2;
     input_state();
@@ -99,8 +100,8 @@ class Bench {
         state.y[s.first + 3 + i] = 0;
         state.yp[s.first + 3 + i] = 0;
       }
-      state.rotation[k].R_ref = s.R;
-      state.rotation[k].w_ref = s.w;
+      state.rotation_history[k].R_ref = s.R;
+      state.rotation_history[k].w_ref = s.w;
     }
     update(state);
   }
@@ -119,7 +120,7 @@ class Bench {
     for (std::size_t k = 0; k < model->structural.size(); ++k) {
       const StructuralNode& s = model->structural[k];
       for (int i = 0; i < s.position_unknowns(); ++i) state.yp[s.first + i] = 0;
-      state.rotation[k].w_ref.setZero();
+      state.rotation_history[k].w_ref.setZero();
     }
     update(state);
   }
@@ -129,9 +130,10 @@ class Bench {
       const StructuralNode& node = model->structural[k];
       if (!node.has_rotation()) continue;
       NodeRotation& r = s.rotation[k];
+      const NodeRotationHistory& past = s.rotation_history[k];
       const Vec3 g(&s.y[node.first + 3]), gp(&s.yp[node.first + 3]);
-      r.R = cgr_rotation(g) * r.R_ref;
-      r.w = cgr_g(g) * gp + cgr_rotation(g) * r.w_ref;
+      r.R = cgr_rotation(g) * past.R_ref;
+      r.w = cgr_g(g) * gp + cgr_rotation(g) * past.w_ref;
     }
   }
   std::vector<NodeSeeds> seeds() const {
@@ -147,7 +149,7 @@ class Bench {
         g(i) = D::variable(state.y[node.first + 3 + i], i, kC);
         gp(i) = D::variable(state.yp[node.first + 3 + i], i, 1);
       }
-      const Vec<D> w = cgr_g(g) * gp + cgr_rotation(g) * state.rotation[k].w_ref.cast<D>();
+      const Vec<D> w = cgr_g(g) * gp + cgr_rotation(g) * state.rotation_history[k].w_ref.cast<D>();
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) all[k].B(i, j) = w(i).d[j];
       all[k].A = kC * cgr_g(value_of(g));
@@ -167,7 +169,7 @@ class Bench {
   VecX residual(const State& s) const {
     VecX r = VecX::Zero(n);
     const EvalContext c = context(s);
-    for (const auto& set : model->sets) set->residual(c, r.data());
+    for (const auto& set : model->sets) set->residual(c, r.data(), set->all());
     return r;
   }
   /// −∂r/∂δ as the elements give it, dense.
@@ -175,7 +177,7 @@ class Bench {
     std::vector<double> values(model->row_index.size(), 0.0);
     const EvalContext c = context(state);
     const std::vector<NodeSeeds> all = seeds();
-    for (const auto& set : model->sets) set->jacobian(c, all.data(), values.data());
+    for (const auto& set : model->sets) set->jacobian(c, all.data(), values.data(), set->all());
     MatX J = MatX::Zero(n, n);
     for (int j = 0; j < n; ++j)
       for (int k = model->column_start[j]; k < model->column_start[j + 1]; ++k)

@@ -64,7 +64,7 @@ class HydraulicBench {
   EvalContext context(double c = 1) const { return model->context(state, Phase::step, c); }
   std::vector<double> residual(double c = 1) const {
     std::vector<double> r(static_cast<std::size_t>(model->unknowns), 0.0);
-    set().residual(context(c), r.data());
+    set().residual(context(c), r.data(), set().all());
     return r;
   }
   /// Mass flow out of hydraulic node k into the element [kg/s].
@@ -97,7 +97,7 @@ inline double HydraulicBench::jacobian_error(double c, double step) {
   seed.B = Mat3::Identity() + 0.2 * cross<double>(Vec3(0.5, 1, -1));
   const std::vector<NodeSeeds> seeds(model->structural.size(), seed);
   std::vector<double> values(model->row_index.size(), 0.0);
-  set().jacobian(context(c), seeds.data(), values.data());
+  set().jacobian(context(c), seeds.data(), values.data(), set().all());
   MatX exact = MatX::Zero(n, n), numeric = MatX::Zero(n, n);
   for (int j = 0; j < n; ++j)
     for (int k = model->column_start[j]; k < model->column_start[j + 1]; ++k)

@@ -68,7 +68,7 @@ struct ModalBench {
   VecX residual() const {
     VecX r = VecX::Zero(model->unknowns);
     const EvalContext at = context();
-    for (const auto& set : model->sets) set->residual(at, r.data());
+    for (const auto& set : model->sets) set->residual(at, r.data(), set->all());
     return r;
   }
 };
@@ -94,7 +94,7 @@ void check_jacobian(ModalBench& bench) {
   const std::vector<NodeSeeds> seeds(model.structural.size(), seed);
   std::vector<double> values(model.row_index.size(), 0.0);
   const EvalContext at = bench.context();
-  for (const auto& set : model.sets) set->jacobian(at, seeds.data(), values.data());
+  for (const auto& set : model.sets) set->jacobian(at, seeds.data(), values.data(), set->all());
   MatX exact = MatX::Zero(n, n), numeric = MatX::Zero(n, n);
   for (int j = 0; j < n; ++j)
     for (int k = model.column_start[j]; k < model.column_start[j + 1]; ++k)

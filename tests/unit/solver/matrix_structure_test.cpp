@@ -72,7 +72,7 @@ class MatrixStructure : public ::testing::Test {
       state.y[k] = number(generator);
       state.yp[k] = number(generator);
     }
-    for (NodeRotation& r : state.rotation) {
+    for (NodeRotationHistory& r : state.rotation_history) {
       r.R_ref =
           rotation_of_vector<double>(Vec3(number(generator), number(generator), number(generator)));
       r.w_ref = Vec3(number(generator), number(generator), number(generator));
