@@ -103,6 +103,25 @@ TEST(Allocation, IdentificationStepsWithout) {
             0);
 }
 
+TEST(Allocation, AdaptiveControlStepsWithout) {
+  EXPECT_EQ(
+      allocations_of(
+          initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-9;") +
+              "begin: control data; abstract nodes: 2; genels: 2; electric elements: 1; end: "
+              "control data; begin: nodes; abstract: 1; abstract: 2; end: nodes;"
+              "begin: elements;"
+              " genel: 1, spring support, 1, abstract, algebraic, linear elastic, 1.;"
+              " genel: 2, state space SISO, 2, abstract, algebraic, node dof, 1, abstract,"
+              "  algebraic, 1, matrix A, -2., matrix B, 1., matrix C, 3.;"
+              " electric: 1, discrete control, 1, 1, 3, 1, adaptive control, armax, periodic, 2,"
+              "  gpc, 60, 40, 0, const, .1, excitation, string, \"sin(1e5*Time^2)\","
+              "  desired output, const, 1.,"
+              "  outputs, 2, abstract, algebraic, inputs, 1, abstract, algebraic;"
+              "end: elements;",
+          100),
+      0);
+}
+
 // The clamp lets go in the fourth step: from then on matrices are of another kind than at the
 // start.
 TEST(Allocation, ReleasedBodyStepsWithout) {

@@ -14,7 +14,8 @@ struct ControlSizes {
 /// An integer from `least` to `most`; `what`: "number of outputs".
 int read_control_number(Card& card, const char* what, int least, int most);
 
-/// What follows `identification`, as far as `outputs`.
+/// What follows `identification` or `adaptive control`, as far as `outputs`.
 AdaptiveControl::Settings read_identification(Card& card, const ControlSizes& sizes);
+AdaptiveControl::Settings read_adaptive_control(Card& card, const ControlSizes& sizes);
 
 }  // namespace mbcosim

@@ -109,11 +109,7 @@ void read_discrete_control(Card& card, ElementInfo& info) {
     sizes.order_b = read_control_number(card, "order of the matrices B", 0, kMost);
   signals.period = read_control_number(card, "number of steps between samples", 1, 1000000000);
   std::unique_ptr<GeneralElement> element;
-  const SourceSpan where = card.next();
   const int kind = card.required("control data", {"control", "identification", "adaptive control"});
-  if (kind == 2)
-    card.fail_at(where, "discrete control: `adaptive control` is not supported",
-                 "accepted: control, identification");
   if (kind == 0) {
     if (sizes.order_a == 0)
       card.fail("discrete control: the order of the matrices A of `control` must be from 1 to " +
@@ -123,8 +119,12 @@ void read_discrete_control(Card& card, ElementInfo& info) {
     read_signals(card, sizes, signals);
     element = std::make_unique<DiscreteControl>(std::move(gains), std::move(signals));
   } else {
-    AdaptiveControl::Settings settings = read_identification(card, sizes);
-    expect(card, "outputs", " (or forgetting factor, excitation, file, each once)");
+    AdaptiveControl::Settings settings =
+        kind == 1 ? read_identification(card, sizes) : read_adaptive_control(card, sizes);
+    expect(card, "outputs",
+           kind == 1 ? " (or forgetting factor, excitation, file, each once)"
+                     : " (or forgetting factor, excitation, trigger, desired output, file, each "
+                       "once)");
     read_signals(card, sizes, signals);
     element = std::make_unique<AdaptiveControl>(std::move(settings), std::move(signals));
   }

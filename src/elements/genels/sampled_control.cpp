@@ -1,6 +1,7 @@
 #include "elements/genels/sampled_control.h"
 
 #include <algorithm>
+#include <charconv>
 
 namespace mbcosim {
 
@@ -37,10 +38,17 @@ void SampledControl::after_convergence(const GeneralView& u, State& state) const
   take(y, inputs, memory);
 }
 
+int SampledControl::place_of(std::string_view name, std::string_view start, int count) {
+  if (name.substr(0, start.size()) != start) return -1;
+  int k = 0;
+  const char *first = name.data() + start.size(), *end = name.data() + name.size();
+  const auto [rest, error] = std::from_chars(first, end, k);
+  if (error != std::errc() || *first == '0' || end - rest != 1 || *rest != ']') return -1;
+  return k >= 1 && k <= count ? k - 1 : -1;
+}
+
 int SampledControl::private_datum(std::string_view name) const {
-  const std::vector<std::string> names = private_data();
-  const auto found = std::find(names.begin(), names.end(), name);
-  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
+  return place_of(name, "u[", input_count());
 }
 
 std::vector<std::string> SampledControl::private_data() const {

@@ -49,6 +49,8 @@ class SampledControl : public GeneralElement {
   /// A sample has been taken. `memory`: the element's in State::memory.
   virtual void take(const double* y, const double* u, double* memory) const = 0;
 
+  /// k − 1 for "<start>k]" with k from 1 to `count`, else −1.
+  static int place_of(std::string_view name, std::string_view start, int count);
   int output_count() const { return static_cast<int>(signals_.outputs.size()); }
   int input_count() const { return static_cast<int>(signals_.inputs.size()); }
   double* control(double* memory) const { return memory + control_; }

@@ -321,7 +321,6 @@ TEST(DiscreteControl, BadCardsAreRefusedAtTheirPlace) {
   refused("1, 1, 1, fir, -1, 1" + tail, "order of the matrices B must be from 0 to 1000, got -1");
   refused("1, 1, 1, 0" + tail, "number of steps between samples must be from 1");
   refused("1, 1, 1, 1, control, \"none.dat\"", "none.dat");
-  refused("1, 1, 1, 1, adaptive control, deadbeat, 1, 1", "`adaptive control` is not supported");
   refused("1, 1, 1, 1, wobble", "control data");
   refused(good,
           "\"gains.dat\" has 1 numbers; 1 matrices A (1 by 1) and 1 matrices B (1 by 1) are 2",
