@@ -12,9 +12,9 @@ template <int Width, class Row>
 inline void subtract_product(const double* panel, std::ptrdiff_t stride, int count, const double* u,
                              double* x, Row row) {
   for (int i = 0; i < count; ++i) {
-    double a = panel[i] * u[0];
-    for (int q = 1; q < Width; ++q) a += panel[q * stride + i] * u[q];
-    x[row(i)] -= a;
+    double a = x[row(i)];
+    for (int q = 0; q < Width; ++q) a -= panel[q * stride + i] * u[q];
+    x[row(i)] = a;
   }
 }
 template <class Row>
@@ -33,6 +33,15 @@ inline void solve_triangle(const double* panel, std::ptrdiff_t stride, double* u
     for (int p = 1; p < width - q; ++p) u[q + p] -= panel[p] * u[q];
 }
 
+/// 1/x, rounded such that x times it is 1 exactly where that is possible: equations whose
+/// coefficients are all alike, as those of kinematics, are then solved without rounding.
+double reciprocal(double x) {
+  const double r = 1 / x;
+  for (const double candidate : {r, std::nextafter(r, 0.0), std::nextafter(r, HUGE_VAL)})
+    if (candidate * x == 1) return candidate;
+  return r;
+}
+
 }  // namespace
 
 SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
@@ -47,7 +56,7 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
   std::vector<double> largest(n_, 0.0);
   for (std::size_t p = 0; p < row_index.size(); ++p)
     largest[row_index[p]] = std::max(largest[row_index[p]], std::abs(values[p]));
-  for (int k = 0; k < n_; ++k) inverse_scale_[k] = 1 / largest[row_of_[k]];
+  for (int k = 0; k < n_; ++k) inverse_scale_[k] = reciprocal(largest[row_of_[k]]);
   find_supernodes(factors);
   find_segments(factors);
   place_matrix(column_start, row_index);
@@ -168,7 +177,8 @@ bool SupernodalLu::factor(const double* values) {
   bool fine = true;
   for (int k = 0; k < n_ && fine; ++k) {
     const double* value = values + value_start_[k];
-    for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value) x[entry_row_[p]] = *value;
+    for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value)
+      x[entry_row_[p]] = *value * inverse_scale_[entry_row_[p]];
     for (int p = above_start_[k]; p < above_start_[k + 1]; ++p) {
       above_[p] = x[above_row_[p]];
       x[above_row_[p]] = 0;
@@ -181,7 +191,7 @@ bool SupernodalLu::factor(const double* values) {
 
 void SupernodalLu::solve(double* b) {
   double* const x = work_.data();
-  for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]];
+  for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]] * inverse_scale_[k];
   for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
     const int begin = block_start_[block], end = block_start_[block + 1];
     for (int s = supernode_of_[begin]; s < supernodes() && first_[s] < end; ++s) {
@@ -211,7 +221,7 @@ void SupernodalLu::solve(double* b) {
 double SupernodalLu::pivot_ratio() const {
   double smallest = HUGE_VAL, largest = 0;
   for (int k = 0; k < n_; ++k) {
-    const double pivot = std::abs(pivots_[k] * inverse_scale_[k]);
+    const double pivot = std::abs(pivots_[k]);
     smallest = std::min(smallest, pivot);
     largest = std::max(largest, pivot);
   }
@@ -222,7 +232,7 @@ double SupernodalLu::pivot_growth(const double* values) const {
   double growth = 1;
   for (std::size_t block = 0; block + 1 < block_start_.size(); ++block)
     for (int k = block_start_[block]; k < block_start_[block + 1]; ++k) {
-      double of_matrix = 0, of_factor = std::abs(pivots_[k] * inverse_scale_[k]);
+      double of_matrix = 0, of_factor = std::abs(pivots_[k]);
       for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p) {
         const int row = entry_row_[p];
         const double value = values[value_start_[k] + p - entry_start_[k]];
@@ -230,7 +240,7 @@ double SupernodalLu::pivot_growth(const double* values) const {
           of_matrix = std::max(of_matrix, std::abs(value * inverse_scale_[row]));
       }
       for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-        of_factor = std::max(of_factor, std::abs(upper_[p] * inverse_scale_[upper_row_[p]]));
+        of_factor = std::max(of_factor, std::abs(upper_[p]));
       growth = std::min(growth, of_matrix / of_factor);
     }
   return growth;

@@ -1,9 +1,9 @@
 /// Sparse LU with pivots that are given once, for many matrices of one pattern.
 ///
-///   P A Q = L U      block upper triangular, each diagonal block factored on its own
+///   P R⁻¹ A Q = L U      block upper triangular, each diagonal block factored on its own
 ///
-/// P, Q and the pattern come from a factorization of a reference matrix. Results depend on the
-/// matrix and on these only.
+/// R scales the rows of a reference matrix so that their largest entries become 1; P, Q and the
+/// pattern come from a factorization of it. Results depend on the matrix and on these only.
 ///
 /// Consecutive columns of L with the same rows below them form a supernode: its values are a dense
 /// panel with one list of rows, and a column is updated by the whole panel at once. Columns are
@@ -38,9 +38,8 @@ class SupernodalLu {
   /// Solves A x = b in place with the last factorization.
   void solve(double* b);
 
-  /// Smallest over largest pivot, rows scaled by their largest entries in the reference matrix.
-  double pivot_ratio() const;
-  /// Reciprocal pivot growth: smallest over all columns of max|A| / max|U|, rows scaled likewise.
+  double pivot_ratio() const;  ///< smallest over largest pivot
+  /// Reciprocal pivot growth: smallest over all columns of max|R⁻¹ A| / max|U|.
   double pivot_growth(const double* values) const;
   int supernodes() const { return static_cast<int>(first_.size()) - 1; }
 
@@ -58,7 +57,7 @@ class SupernodalLu {
 
   int n_;
   std::vector<int> row_of_, column_of_, block_start_;
-  std::vector<double> inverse_scale_;  ///< of the rows, by position (n)
+  std::vector<double> inverse_scale_;  ///< R⁻¹ by position (n)
 
   // L: panels by columns, leading dimension width + rows below
   std::vector<int> first_;              ///< first column of each supernode, then n
