@@ -38,6 +38,9 @@ void AdaptiveControl::obey_law(const GeneralView& u, double* memory) const {
   for (std::size_t k = 0; k < settings_.desired.size(); ++k)
     memory[desired_ + k] = u.drive(settings_.desired[k]);
   const double weight = settings_.control_weight ? u.drive(settings_.control_weight) : 0;
+  if (weight < 0)
+    throw EvaluationError("discrete control " + std::to_string(u.label()) +
+                          ": the weight of the controls is negative");
   law_->control(identifier_, memory + desired_, weight, memory, control(memory));
 }
 

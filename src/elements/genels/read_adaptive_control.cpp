@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kMostCoefficients = 1000;  ///< of one output
 constexpr int kMostWindow = 100000;
+constexpr double kMostKept = 1e6;  ///< numbers of samples
 constexpr int kMostHorizon = 10000;
 constexpr double kMostResponses = 1e5;
 constexpr double kMostControls = 300;
@@ -30,8 +31,15 @@ double read_between(Card& card, const char* what, double least, double most, boo
   return value;
 }
 
+void check_kept(Card& card, const char* what, int samples, int signals) {
+  if (double(samples) * signals > kMostKept)
+    card.fail(std::string("discrete control: the ") + what + " of " + std::to_string(samples) +
+                  " samples keeps " + number(double(samples) * signals) + " numbers",
+              "at most " + number(kMostKept));
+}
+
 /// {const, <d> | dynamic, <n1>, <n2>, <rho>, <fact>, <kref>, <klim>}
-Forgetting read_forgetting(Card& card) {
+Forgetting read_forgetting(Card& card, const ArxModel& model) {
   Forgetting f;
   f.dynamic = card.required("forgetting factor", {"const", "dynamic"}) == 1;
   if (!f.dynamic) {
@@ -39,6 +47,7 @@ Forgetting read_forgetting(Card& card) {
     return f;
   }
   f.long_window = read_control_number(card, "window n1", 1, kMostWindow);
+  check_kept(card, "window n1", f.long_window, model.outputs);
   f.short_window = read_control_number(card, "window n2", 1, kMostWindow);
   if (f.short_window > f.long_window)
     card.fail("discrete control: the window n2 = " + std::to_string(f.short_window) +
@@ -104,7 +113,7 @@ class Options {
 /// The options of both kinds of control data. Was there one?
 bool read_option(Card& card, Options& options, AdaptiveControl::Settings& s) {
   if (options.at("forgetting factor"))
-    s.forgetting = read_forgetting(card);
+    s.forgetting = read_forgetting(card, s.model);
   else if (options.at("excitation"))
     s.excitation = read_drives(card, "excitation", s.model.inputs);
   else if (options.at("file"))
@@ -181,6 +190,7 @@ AdaptiveControl::Settings read_adaptive_control(Card& card, const ControlSizes& 
   check_size(card, s.model);
   const int period =
       card.keyword("periodic") ? read_control_number(card, "periodic factor", 0, kMostWindow) : 0;
+  check_kept(card, "periodic factor", period, 2 * (sizes.outputs + sizes.inputs));
   read_law(card, period, s);
   Options options(card);
   for (;;) {

@@ -307,6 +307,18 @@ TEST(AdaptiveControl, RestoredStatesContinueBitForBit) {
 
 // ---------------------------------------------------------------- refusals
 
+TEST(AdaptiveControl, NegativeWeightsFailTheStep) {
+  DeckRun run = oscillator("gpc, 4, 2, 0, string, \"5.-Time\"", "");
+  ASSERT_TRUE(run.ready());
+  const StepReport report = run.simulation().step_many(100);
+  ASSERT_TRUE(report.error);
+  EXPECT_NE(
+      report.error->message.find("discrete control 99: the weight of the controls is negative"),
+      std::string::npos)
+      << report.error->message;
+  EXPECT_EQ(run.simulation().state().step, 50);
+}
+
 TEST(AdaptiveControl, BadCardsAreRefusedAtTheirPlace) {
   const auto refused = [](const std::string& words, const std::string& part,
                           const std::string& orders = "1, 1, 2, 1") {
@@ -316,6 +328,8 @@ TEST(AdaptiveControl, BadCardsAreRefusedAtTheirPlace) {
   refused(", wobble", "gpc, deadbeat");
   refused(", arx, wobble", "gpc, deadbeat");
   refused(", periodic, -1, deadbeat, 4, 3", "the periodic factor must be from 0 to");
+  refused(", periodic, 100000, deadbeat, 4, 3",
+          "the periodic factor of 100000 samples keeps 1.2e+06 numbers", "2, 4, 1, 1");
   refused(", deadbeat, 0, 1", "the prediction advancing horizon must be from 1 to");
   refused(", deadbeat, 4, 0", "the control advancing horizon must be from 1 to 4, got 0");
   refused(", deadbeat, 4, 5", "the control advancing horizon must be from 1 to 4, got 5");

@@ -238,6 +238,37 @@ TEST(Identification, NumbersOfTheReferenceSolver) {
         1}});
 }
 
+/// A mass on a rod: its velocity from its place, with the two-step method.
+TEST(Identification, StructuralNumbersOfTheReferenceSolver) {
+  DeckRun run(
+      initial_value_block(.02, 2,
+                          "max iterations: 30; tolerance: 1e-10; derivatives tolerance: 1e-3; "
+                          "method: ms, .6;") +
+      R"deck(begin: control data; structural nodes: 2; rigid bodies: 1; joints: 2;
+  electric elements: 1; forces: 1; end: control data;
+begin: nodes; structural: 1, static, null, eye, null, null;
+  structural: 2, dynamic, 1.,0.,0., eye, null, null; end: nodes;
+begin: elements;
+  joint: 1, clamp, 1, node, node;
+  body: 2, 2, 2., null, eye;
+  joint: 2, rod, 1, 2, 1., linear viscoelastic, 200., 3.;
+  force: 1, absolute, 2, position, null, 1.,0.,0., string, "4.*sin(7.*Time)+3.*cos(3.3*Time^2)";
+  electric: 99, discrete control, 1, 1, 1, 1, identification, arx, forgettingfactor, dynamic,
+    20, 5, .9, .6, 1., .3, excitation, string, "10.*sin(31.*Time^2)",
+    outputs, node dof, 2, structural, 1, differential, inputs, 2, structural, 1, algebraic;
+end: elements;
+)deck");
+  ASSERT_TRUE(run.ready());
+  run.step(9);
+  expect_theta(run, {1.07808, 1.84722e-6, .0387025}, 5e-6);
+  run.step(30);
+  expect_theta(run, {.974664, .00579877, -.0117434}, 5e-7);
+  EXPECT_NEAR(factor(run), .867, 1e-12);
+  run.step(61);
+  expect_theta(run, {.98231, .00925319, -.00996171}, 5e-6);
+  EXPECT_NEAR(factor(run), .93, 1e-12);
+}
+
 /// The excitation of the first step after a sample is held; up to the first sample that of the
 /// start.
 TEST(Identification, ExcitationsOfTheReferenceSolver) {
