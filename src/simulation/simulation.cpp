@@ -250,7 +250,7 @@ PhaseReport Simulation::Impl::advance_or_restore(int& pieces) {
   }
   if (!phase.error) return phase;
   restore();
-  stepper.explain(phase);
+  stepper.explain(phase, state);
   return phase;
 }
 

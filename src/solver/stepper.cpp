@@ -60,6 +60,12 @@ bool is_finite(const State& state) {
          std::all_of(state.yp.begin(), state.yp.end(), finite);
 }
 
+/// Does an iteration end far from where it began? Its last matrix then says nothing of the model.
+bool has_diverged(const std::vector<double>& errors) {
+  constexpr double kFar = 1e3;
+  return !errors.empty() && !(errors.back() <= kFar * errors.front());
+}
+
 bool is_third_order(const MethodSettings& m) {
   return m.method == Method::third_order || m.method == Method::third_order_ad_hoc;
 }
@@ -188,7 +194,7 @@ PhaseReport Stepper::solve_derivatives(State& state) {
   }
   if (!done) {
     report.error = failure(report.newton, state, "derivatives phase");
-    explain(report);
+    explain(report, start);
     if (report.newton.outcome == NewtonOutcome::not_converged)
       report.error->message +=
           "\n  hint: change `derivatives coefficient`, `derivatives tolerance` or `derivatives max "
@@ -246,7 +252,7 @@ PhaseReport Stepper::run_dummy_steps(State& state) {
   for (int k = 0; k < s.dummy_steps; ++k) {
     report = attempt(state, s.dummy_ratio * s.time_step, method, k == 0, dummy_);
     if (report.error) {
-      explain(report);
+      explain(report, state);
       return report;
     }
   }
@@ -485,8 +491,14 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
   }
   e.kind = ErrorKind::not_converged;
   e.reason = "NOT_CONVERGED";
-  e.failure.worst = worst_equations(model_, workspace_.residual);
   char text[160];
+  if (!std::isfinite(report.residual_error)) {
+    std::snprintf(text, sizeof text, ": the residual has no value after %d iterations",
+                  report.iterations);
+    e.message = where + std::string(text);
+    return e;
+  }
+  e.failure.worst = worst_equations(model_, workspace_.residual);
   std::snprintf(text, sizeof text,
                 ": no convergence in %d iterations, residual %.6g, tolerance %.6g",
                 report.iterations, report.residual_error, report.tolerance);
@@ -498,18 +510,35 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
   return e;
 }
 
-void Stepper::explain(PhaseReport& report) const {
+void Stepper::explain(PhaseReport& report, const State& state) {
   if (!report.error) return;
   Error& e = *report.error;
-  if (e.kind == ErrorKind::singular) {
-    const Singularity cause =
-        find_singularity(model_, workspace_.values, report.newton.singular_column);
+  if (e.kind != ErrorKind::singular && e.kind != ErrorKind::not_converged) return;
+  const bool far = has_diverged(e.failure.residual_history) && evaluate_matrix(state);
+  Singularity cause;
+  if (e.kind == ErrorKind::singular && !far) {
+    cause = find_singularity(model_, workspace_.values, report.newton.singular_column);
     e.failure.worst = cause.undetermined;
     e.message += cause.details();
-  } else if (e.kind == ErrorKind::not_converged) {
-    const Singularity cause = find_near_singularity(model_, workspace_.values);
-    if (cause.rank_loss > 0) e.message += "\n  " + cause.text();
+    return;
   }
+  cause = find_near_singularity(model_, workspace_.values);
+  if (cause.rank_loss > 0)
+    e.message += "\n  " + cause.text();
+  else if (far)
+    e.message +=
+        "\n  hint: the iteration diverged from a sound state: shorten the time step (`strategy: "
+        "factor` does it when needed), apply loads more slowly, or search along lines "
+        "(`nonlinear solver: line search`)";
+}
+
+/// The matrix at an accepted state; false when it has no value there.
+bool Stepper::evaluate_matrix(const State& state) try {
+  const double c = 0.5 * model_.initial_value.time_step;
+  compute_jacobian(model_.context(state, Phase::step, c, c), workspace_);
+  return true;
+} catch (const EvaluationError&) {
+  return false;
 }
 
 }  // namespace mbcosim

@@ -58,8 +58,9 @@ class Stepper {
   double peek_step_size(const State& state) const;
   /// Tries one step of length h from the accepted `state`. On failure `state` is as it was.
   PhaseReport step(State& state, double h);
-  /// Adds what the last matrix tells about a failed step to its error. Takes longer than the step.
-  void explain(PhaseReport& report) const;
+  /// Adds to the error of a failed step what the last matrix tells, or, after an iteration that
+  /// diverged, that at the accepted `state`. Takes longer than the step.
+  void explain(PhaseReport& report, const State& state);
   /// A shorter step after a failure, or 0 when the strategy has none.
   double retry_step_size(State& state, double h);
 
@@ -89,6 +90,7 @@ class Stepper {
   void predict(State& state, const StepFormula& f) const;
   void finish_prediction(State& state) const;
   void after_convergence(State& state, Phase phase, double c, double ca) const;
+  bool evaluate_matrix(const State& state);
   Error failure(const NewtonReport& report, const State& state, const char* phase) const;
 
   const Model& model_;
