@@ -100,6 +100,10 @@ struct Inertia {
   double m = 0;           ///< [kg]
   Vec3 S = Vec3::Zero();  ///< first moment [kg·m]
   Mat3 J = Mat3::Zero();  ///< second moment [kg·m²]
+  /// Of masses that move relative to the node or change: their share of the momenta about the node,
+  /// and of the momenta's rates what no acceleration of the node gives.
+  Vec3 b = Vec3::Zero(), g = Vec3::Zero();            ///< [kg·m/s], [kg·m²/s]
+  Vec3 b_rate = Vec3::Zero(), g_rate = Vec3::Zero();  ///< [N], [N·m]
 };
 
 /// Elements first .. last − 1 of a set.

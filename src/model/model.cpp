@@ -134,8 +134,8 @@ NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) 
     return r;
   }
   const NodeState s = node_state(context, node);
-  const Vec3 b = at(context.state->y, n.first + 6), bp = at(yp, n.first + 6),
-             gp = at(yp, n.first + 9);
+  const Vec3 b = at(context.state->y, n.first + 6), bp = at(yp, n.first + 6) - inertia.b_rate,
+             gp = at(yp, n.first + 9) - inertia.g_rate;
   const Vec3 x = inertia.S / inertia.m;
   const Mat3 jc = inertia.J + cross<double>(x) * cross<double>(inertia.S);
   const Vec3 torque = gp - x.cross(bp) - s.w.cross(jc * s.w) + s.v.cross(b);

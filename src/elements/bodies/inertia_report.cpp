@@ -9,12 +9,12 @@ namespace mbcosim {
 
 void MassProperties::add(const Inertia& i, const NodeState& node) {
   const Mat3 xx = cross<double>(node.x), sx = cross<double>(i.S);
-  const Vec3 b = i.m * node.v + node.w.cross(i.S);
+  const Vec3 b = i.m * node.v + node.w.cross(i.S) + i.b;
   m += i.m;
   S += i.m * node.x + i.S;
   J += i.J - sx * xx - xx * sx - i.m * xx * xx;
   B += b;
-  G += i.J * node.w + i.S.cross(node.v) + node.x.cross(b);
+  G += i.J * node.w + i.S.cross(node.v) + i.g + node.x.cross(b);
 }
 
 Vec3 MassProperties::angular_velocity() const {

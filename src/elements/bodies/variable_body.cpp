@@ -24,14 +24,39 @@ VariableInertia VariableBody::inertia(const EvalContext& context, int label) con
   return p;
 }
 
+namespace {
+
+/// d²/dt² by a central difference, for output; zero where the drive has no value on one side.
+Vec3 second_derivative(const TplDrive<3, 1>& drive, EvalContext context) {
+  const double time = context.time, delta = context.h > 0 ? 1e-2 * context.h : 1e-6;
+  try {
+    context.time = time + delta;
+    const Vec3 after = drive.derivative(context);
+    context.time = time - delta;
+    return (after - drive.derivative(context)) / (2 * delta);
+  } catch (const EvaluationError&) {
+    return Vec3::Zero();
+  }
+}
+
+}  // namespace
+
 void VariableBody::add_inertia(const Local<double>& u, int node_index, Inertia& sum) const {
   if (node_index != node) return;
   const VariableInertia p = inertia(*u.context, u.label());
   const Vec3 arm = u.R(0) * p.b;
+  const Vec3 relative = u.R(0) * p.b_rate, w = u.w(0), local_w = u.R(0).transpose() * w;
   const Mat3 arm_x = cross<double>(arm);
   sum.m += p.m;
   sum.S += p.m * arm;
   sum.J += u.R(0) * p.J() * u.R(0).transpose() - p.m * arm_x * arm_x;
+  sum.b += p.m * relative;
+  sum.g += p.m * arm.cross(relative);
+  const Vec3 velocity = u.v(0) + w.cross(arm) + relative;
+  const Vec3 rate = p.m_rate * velocity +
+                    p.m * (2 * w.cross(relative) + u.R(0) * second_derivative(*b, *u.context));
+  sum.b_rate += rate;
+  sum.g_rate += u.R(0) * ((p.J_vm_rate + p.J_vg_rate) * local_w) + arm.cross(rate);
 }
 
 std::string VariableBody::log(const Model& model, int label) const {

@@ -219,6 +219,37 @@ TEST(VariableMass, MovesAsTheBodiesOfWhichItConsists) {
   expect_second_order(errors, 1e-4);
 }
 
+// Accelerations are the rates of the velocities, also with a second body on the node; the `inertia`
+// card knows the velocity of the mass that moves.
+TEST(VariableMass, AccelerationsAreTheRatesOfVelocities) {
+  const double h = 1e-3;
+  DeckRun run(free_body(
+      "linear, 3., -1.5, component, sine, -1., 3., .2, forever, .1, parabolic, .2, -.3, .4,"
+      "cosine, -2., 4., .1, forever, -.3, single, sym, 1., .1, .2, 2., .3, 2.5, linear, 1., -.4,"
+      "component, diag, sine, -1., 5., .1, forever, .2, inactive, linear, 0., .1",
+      "1.,2.,3., euler, .3,.4,.5, 1.,-2.,.5, .4,-.5,1.5", h,
+      "body: 2, 1, 1.2, .1,-.2,.3, diag, .3,.2,.4; inertia: 1, body, 1, output, always;\n"
+      "gravity: uniform, 0.,0.,-1., const, 9.81;",
+      "rigid bodies: 2; inertia: 1; gravity;"));
+  ASSERT_TRUE(run.ready());
+  run.step(300);
+  const NodeState before = run.node(1);
+  run.step(1);
+  const NodeAcceleration found = run.acceleration(1);
+  const NodeState now = run.node(1);
+  const double t = run.simulation().time();
+  const Vec3 arm(.1 + .2 * std::sin(3 * t + 3), .2 - .3 * t + .4 * t * t,
+                 -.3 + .1 * (1 - std::cos(4 * t + 8)));
+  const Vec3 arm_rate(.6 * std::cos(3 * t + 3), -.3 + .8 * t, .4 * std::sin(4 * t + 8));
+  const Vec3 u = now.v + now.w.cross(now.R * arm) + now.R * arm_rate;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(run.datum(Family::inertia, 1, "V[" + std::to_string(i + 1) + "]"), u(i), 1e-12);
+  run.step(1);
+  const NodeState after = run.node(1);
+  EXPECT_LT((found.a - (after.v - before.v) / (2 * h)).norm(), 1e-4 * found.a.norm());
+  EXPECT_LT((found.wp - (after.w - before.w) / (2 * h)).norm(), 1e-4 * found.wp.norm());
+}
+
 // A pendulum with an arm that grows and shrinks, in a plane. What is compared here and below leaves
 // out the terms that the reference solver has in another form (README, "Deliberate differences").
 TEST(ReferenceVariableMass, PendulumOfVariableLength) {
