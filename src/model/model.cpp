@@ -127,7 +127,8 @@ NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) 
   if (!n.has_momentum()) return r;
   Inertia inertia;
   for (const ElementRef& body : node_bodies[node])
-    body.set->add_inertia(context, body.index, node, inertia);
+    if (body.set->is_active(*context.state, body.index))
+      body.set->add_inertia(context, body.index, node, inertia);
   if (inertia.m <= 0) return r;
   if (n.is_displacement()) {
     r.a = at(yp, n.first + 3) / inertia.m;

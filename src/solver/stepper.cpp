@@ -150,7 +150,8 @@ Status Stepper::assemble(State& state) {
   auto report = assemble_initially(model_, state);
   if (!report) return report.error();
   const EvalContext context = model_.context(state, Phase::derivatives);
-  for (const ElementRef& e : model_.elements) e.set->add_momentum(context, e.index, state);
+  for (const ElementRef& e : model_.elements)
+    if (e.set->is_active(state, e.index)) e.set->add_momentum(context, e.index, state);
   for (const StructuralNode& n : model_.structural)
     if (n.has_rotation()) put(state.yp, n.first + 3, Vec3::Zero());  // ġ relative to w_ref = w
   return ok();

@@ -252,6 +252,28 @@ end: elements;
   }
 }
 
+// A body that is not there yet has no momentum and does not slow its node; when it comes, the
+// momentum stays.
+TEST(Driven, BodiesThatAreNotActiveHaveNoMomentum) {
+  DeckRun run(
+      deck("final time: 1.; time step: 1e-2; max iterations: 20; tolerance: 1e-9;",
+           "structural nodes: 1; rigid bodies: 2; forces: 1;",
+           R"deck(begin: nodes; structural: 1, dynamic, null, eye, 1.,0.,0., null; end: nodes;
+begin: elements;
+  body: 1, 1, 1., null, eye;
+  driven: 2, ramp, 1., .495, forever, 0., body: 2, 1, 2., null, eye;
+  force: 1, absolute, 1, position, null, 1.,0.,0., const, 6.;
+end: elements;
+)deck"));
+  ASSERT_TRUE(run.ready());
+  EXPECT_NEAR(run.acceleration(1).a(0), 6, 1e-6);
+  run.step(49);
+  EXPECT_NEAR(run.node(1).v(0), 1 + 6 * .49, 1e-6);
+  run.step(51);
+  EXPECT_NEAR(run.node(1).v(0), (1 + 6) / 3., 1e-6);
+  EXPECT_NEAR(run.acceleration(1).a(0), 2, 1e-6);
+}
+
 // A chain that is let go and caught again: each of its three kinds of matrices has pivots of its
 // own, which depend on the deck and on what is active, not on what was factored before.
 TEST(Driven, RestoredStatesContinueBitForBit) {
