@@ -9,6 +9,7 @@
 #include "output/model_log.h"
 #include "output/record.h"
 #include "output/sample_files.h"
+#include "output/scientific.h"
 #include "output/text_file.h"
 
 namespace mbcosim {
@@ -135,9 +136,7 @@ class TextWriter : public ResultWriter, private OutputRow {
   void number(double value) {
     char* p = current_->room(kField + precision_);
     *p++ = ' ';
-    current_->commit(std::to_chars(p, p + kField + precision_ - 1, value,
-                                   std::chars_format::scientific, precision_)
-                         .ptr);
+    current_->commit(write_scientific(p, value, precision_));
   }
   void scalar(const char*, const char*, double value) override { number(value); }
   void vec3(const char*, const char*, const Vec3& v) override {
