@@ -4,9 +4,11 @@ import os
 import sys
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-BUILT = os.path.join(HERE, "..", "..", "build", "python")
-if os.path.isdir(BUILT):
-    sys.path.insert(0, BUILT)
+# The package with its generated stubs: of PYTHONPATH, or of the usual build; not the sources beside this file.
+for folder in [*os.environ.get("PYTHONPATH", "").split(os.pathsep), os.path.join(HERE, "..", "..", "build", "python")]:
+    if os.path.isdir(os.path.join(folder, "mbcosim", "v1")):
+        sys.path.insert(0, folder)
+        break
 
 
 def model(name):
