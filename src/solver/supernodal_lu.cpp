@@ -194,15 +194,8 @@ void SupernodalLu::solve(double* b) {
   for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]] * inverse_scale_[k];
   for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
     const int begin = block_start_[block], end = block_start_[block + 1];
-    for (int s = supernode_of_[begin]; s < supernodes() && first_[s] < end; ++s) {
-      const int first = first_[s], width = first_[s + 1] - first;
-      const int below = rows_start_[s + 1] - rows_start_[s];
-      const int* const rows = rows_.data() + rows_start_[s];
-      const double* const panel = panels_.data() + panel_start_[s];
-      if (width > 1) solve_triangle(panel, width + below, x + first, width);
-      subtract_product(panel + width, width + below, below, x + first, width, x,
-                       [rows](int i) { return rows[i]; });
-    }
+    for (int s = supernode_of_[begin]; s < supernodes() && first_[s] < end; ++s)
+      update({s, first_[s], first_[s + 1]});
     for (int k = end - 1; k >= begin; --k) {
       const double xk = x[k] /= pivots_[k];
       for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)

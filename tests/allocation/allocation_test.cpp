@@ -85,40 +85,36 @@ TEST(Allocation, BeamUnderAForceOnAPendulumStepsWithout) {
       0);
 }
 
+/// Allocations of 100 steps of a discrete control of a process of first order; `card`: from the
+/// order of B on.
+long allocations_of_control(const std::string& card) {
+  return allocations_of(
+      initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-9;") +
+          "begin: control data; abstract nodes: 2; genels: 2; electric elements: 1; end: "
+          "control data; begin: nodes; abstract: 1; abstract: 2; end: nodes;"
+          "begin: elements;"
+          " genel: 1, spring support, 1, abstract, algebraic, linear elastic, 1.;"
+          " genel: 2, state space SISO, 2, abstract, algebraic, node dof, 1, abstract,"
+          "  algebraic, 1, matrix A, -2., matrix B, 1., matrix C, 3.;"
+          " electric: 1, discrete control, 1, 1, 3, " +
+          card +
+          ", outputs, 2, abstract, algebraic, inputs, 1, abstract, algebraic;"
+          "end: elements;",
+      100);
+}
+
 TEST(Allocation, IdentificationStepsWithout) {
-  EXPECT_EQ(allocations_of(
-                initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-9;") +
-                    "begin: control data; abstract nodes: 2; genels: 2; electric elements: 1; end: "
-                    "control data; begin: nodes; abstract: 1; abstract: 2; end: nodes;"
-                    "begin: elements;"
-                    " genel: 1, spring support, 1, abstract, algebraic, linear elastic, 1.;"
-                    " genel: 2, state space SISO, 2, abstract, algebraic, node dof, 1, abstract,"
-                    "  algebraic, 1, matrix A, -2., matrix B, 1., matrix C, 3.;"
-                    " electric: 1, discrete control, 1, 1, 3, 2, identification, armax,"
-                    "  forgetting factor, dynamic, 9, 3, .5, .9, 1., .5,"
-                    "  excitation, string, \"sin(1e5*Time^2)\","
-                    "  outputs, 2, abstract, algebraic, inputs, 1, abstract, algebraic;"
-                    "end: elements;",
-                100),
-            0);
+  EXPECT_EQ(
+      allocations_of_control("2, identification, armax, forgetting factor, dynamic, 9, 3, .5, "
+                             ".9, 1., .5, excitation, string, \"sin(1e5*Time^2)\""),
+      0);
 }
 
 TEST(Allocation, AdaptiveControlStepsWithout) {
   EXPECT_EQ(
-      allocations_of(
-          initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-9;") +
-              "begin: control data; abstract nodes: 2; genels: 2; electric elements: 1; end: "
-              "control data; begin: nodes; abstract: 1; abstract: 2; end: nodes;"
-              "begin: elements;"
-              " genel: 1, spring support, 1, abstract, algebraic, linear elastic, 1.;"
-              " genel: 2, state space SISO, 2, abstract, algebraic, node dof, 1, abstract,"
-              "  algebraic, 1, matrix A, -2., matrix B, 1., matrix C, 3.;"
-              " electric: 1, discrete control, 1, 1, 3, 1, adaptive control, armax, periodic, 2,"
-              "  gpc, 60, 40, 0, const, .1, excitation, string, \"sin(1e5*Time^2)\","
-              "  desired output, const, 1.,"
-              "  outputs, 2, abstract, algebraic, inputs, 1, abstract, algebraic;"
-              "end: elements;",
-          100),
+      allocations_of_control("1, adaptive control, armax, periodic, 2, gpc, 60, 40, 0, const, "
+                             ".1, excitation, string, \"sin(1e5*Time^2)\", desired output, "
+                             "const, 1."),
       0);
 }
 

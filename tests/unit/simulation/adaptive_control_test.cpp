@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "control_decks.h"
-#include "simulation/state_bytes.h"
+#include "simulation/restored_runs.h"
 
 namespace mbcosim {
 namespace {
@@ -286,23 +286,7 @@ TEST(AdaptiveControl, RestoredStatesContinueBitForBit) {
                        std::string(", forgetting factor, dynamic, 7, 3, .9, .5, 1., .5") +
                            kLearnAndObey + ", desired output, string, \"sin(Time)\"") +
                   kOutput);
-  DeckRun run(deck), other(deck);
-  ASSERT_TRUE(run.ready() && other.ready());
-  run.step(50);
-  const State saved = run.simulation().snapshot();
-  const std::string bytes = state_to_bytes(saved, run.model().digest);
-  run.step(31);
-  const State ahead = run.simulation().snapshot();
-  ASSERT_TRUE(run.simulation().restore(saved));
-  run.step(31);
-  EXPECT_EQ(run.simulation().state().y, ahead.y);
-  EXPECT_EQ(run.simulation().state().memory, ahead.memory);
-  const Result<State> read = state_from_bytes(bytes, other.model().digest);
-  ASSERT_TRUE(read);
-  ASSERT_TRUE(other.simulation().restore(*read));
-  other.step(31);
-  EXPECT_EQ(other.simulation().state().y, ahead.y);
-  EXPECT_EQ(other.simulation().state().memory, ahead.memory);
+  expect_restored_runs_continue(deck, 50, 31);
 }
 
 // ---------------------------------------------------------------- refusals

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "deck_run.h"
-#include "simulation/state_bytes.h"
+#include "simulation/restored_runs.h"
 
 namespace mbcosim {
 namespace {
@@ -255,23 +255,7 @@ TEST(DiscreteControl, MassInALoopHasItsDominantPoles) {
 TEST(DiscreteControl, RestoredStatesContinueBitForBit) {
   const std::string card = std::string("1, 1, 3, 4, control, \"gains.dat\", ") + kRamp + kInput;
   const Files files = with_gains(controller_deck(1, card), ".3 -.2 .1 .5 .1 -.7");
-  DeckRun run(files), other(files);
-  ASSERT_TRUE(run.ready() && other.ready());
-  run.step(9);  // between two samples
-  const State saved = run.simulation().snapshot();
-  const std::string bytes = state_to_bytes(saved, run.model().digest);
-  run.step(13);
-  const State ahead = run.simulation().snapshot();
-  ASSERT_TRUE(run.simulation().restore(saved));
-  run.step(13);
-  EXPECT_EQ(run.simulation().state().y, ahead.y);
-  EXPECT_EQ(run.simulation().state().memory, ahead.memory);
-  const Result<State> read = state_from_bytes(bytes, other.model().digest);
-  ASSERT_TRUE(read);
-  ASSERT_TRUE(other.simulation().restore(*read));
-  other.step(13);
-  EXPECT_EQ(other.simulation().state().y, ahead.y);
-  EXPECT_EQ(other.simulation().state().memory, ahead.memory);
+  expect_restored_runs_continue(files, 9, 13);  // between two samples
 }
 
 TEST(DiscreteControl, PrivateDataAreTheControls) {

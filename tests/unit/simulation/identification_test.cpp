@@ -9,7 +9,7 @@
 
 #include "control_decks.h"
 #include "output/result_files.h"
-#include "simulation/state_bytes.h"
+#include "simulation/restored_runs.h"
 
 namespace mbcosim {
 namespace {
@@ -350,23 +350,7 @@ TEST(Identification, RestoredStatesContinueBitForBit) {
               std::string("1, 1, 2, 2, identification, armax, forgettingfactor, dynamic, 7, 3, "
                           ".9, .5, 1., .5, excitation, string, \"sin(23.*Time)\"") +
                   kOutput);
-  DeckRun run(deck), other(deck);
-  ASSERT_TRUE(run.ready() && other.ready());
-  run.step(8);
-  const State saved = run.simulation().snapshot();
-  const std::string bytes = state_to_bytes(saved, run.model().digest);
-  run.step(31);
-  const State ahead = run.simulation().snapshot();
-  ASSERT_TRUE(run.simulation().restore(saved));
-  run.step(31);
-  EXPECT_EQ(run.simulation().state().y, ahead.y);
-  EXPECT_EQ(run.simulation().state().memory, ahead.memory);
-  const Result<State> read = state_from_bytes(bytes, other.model().digest);
-  ASSERT_TRUE(read);
-  ASSERT_TRUE(other.simulation().restore(*read));
-  other.step(31);
-  EXPECT_EQ(other.simulation().state().y, ahead.y);
-  EXPECT_EQ(other.simulation().state().memory, ahead.memory);
+  expect_restored_runs_continue(deck, 8, 31);
 }
 
 // ---------------------------------------------------------------- refusals
