@@ -1,5 +1,5 @@
-/// The words of the language by place: what the feature table of the README and the editor grammar
-/// are checked against.
+/// The words of the language by place: what the feature tables of LANGUAGE.md and the editor
+/// grammar are checked against.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-/// Simulation: the one class that users of the library touch. See design promises in
-/// src/simulation/README.md.
+/// Simulation: the one class that users of the library touch. src/README.md has the way of a deck
+/// through the folders below it.
 #pragma once
 
 #include <atomic>

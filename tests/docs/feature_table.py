@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Holds the feature tables of README.md against what the program serves.
+"""Holds the feature tables of a page against what the program serves.
 
-usage: feature_table.py MBCOSIM README.md [--write]
+usage: feature_table.py MBCOSIM PAGE [--write]
 
 MBCOSIM is the executable; its `keywords --json` is the truth. --write brings the tables up to date: new words are added, words
 that are gone are dropped, notes and the status `partly` stay as they are.
@@ -30,8 +30,8 @@ def parse(text):
     """(status, note) by word, by title of the table."""
     tables, rows = {}, None
     for line in text.splitlines():
-        if line.startswith("### "):
-            rows = tables.setdefault(line[4:], {})
+        if line.startswith("## "):
+            rows = tables.setdefault(line[3:], {})
         elif line.startswith("|") and rows is not None and not re.match(r"\|\s*(-+|Word)\s*\|", line):
             cells = [cell.strip() for cell in line.strip("|").split("|")]
             rows[cells[0].strip("`")] = (cells[1], cells[2] if len(cells) > 2 else "")
@@ -65,7 +65,7 @@ def written(groups, tables):
     """The tables as they should be."""
     lines = []
     for group in groups:
-        lines += [f"### {group['title']}", "", "| Word | Served | Notes |", "|---|---|---|"]
+        lines += [f"## {group['title']}", "", "| Word | Served | Notes |", "|---|---|---|"]
         for word in group["words"]:
             status, note = tables.get(group["title"], {}).get(word["word"], ("", ""))
             if status not in allowed(group, word):
@@ -80,26 +80,26 @@ def written(groups, tables):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("executable")
-    parser.add_argument("readme")
+    parser.add_argument("page")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
 
-    with open(options.readme, encoding="utf-8") as file:
+    with open(options.page, encoding="utf-8") as file:
         text = file.read()
     before, begin, rest = text.partition(BEGIN)
     inside, end, after = rest.partition(END)
     if not begin or not end:
-        sys.exit(f"{options.readme}: the markers of the tables are missing")
+        sys.exit(f"{options.page}: the markers of the tables are missing")
     groups, tables = vocabulary(options.executable), parse(inside)
     if options.write:
-        with open(options.readme, "w", encoding="utf-8") as file:
+        with open(options.page, "w", encoding="utf-8") as file:
             file.write(f"{before}{begin}\n\n{written(groups, tables)}\n{end}{after}")
         return
     found = complaints(groups, tables)
     for sentence in found:
         print(sentence)
     if found:
-        sys.exit("update the tables: tests/docs/feature_table.py build/bin/mbcosim README.md --write")
+        sys.exit(f"update the tables: tests/docs/feature_table.py build/bin/mbcosim {options.page} --write")
     print(f"{sum(len(rows) for rows in tables.values())} words, all in the tables")
 
 

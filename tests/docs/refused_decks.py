@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Holds the README's table of refused decks against the list that the corpus test checks.
+"""Holds a page's table of refused decks against the list that the corpus test checks.
 
-usage: refused_decks.py REFUSED.tsv README.md [--write]
+usage: refused_decks.py REFUSED.tsv PAGE [--write]
 """
 import sys
 
@@ -21,18 +21,18 @@ def table(path):
 
 
 def main():
-    refused, readme = sys.argv[1:3]
-    with open(readme, encoding="utf-8") as file:
+    refused, page = sys.argv[1:3]
+    with open(page, encoding="utf-8") as file:
         text = file.read()
     before, begin, rest = text.partition(BEGIN)
     inside, end, after = rest.partition(END)
     if not begin or not end:
-        sys.exit(f"{readme}: the markers of the table are missing")
+        sys.exit(f"{page}: the markers of the table are missing")
     if "--write" in sys.argv:
-        with open(readme, "w", encoding="utf-8") as file:
+        with open(page, "w", encoding="utf-8") as file:
             file.write(f"{before}{begin}\n\n{table(refused)}\n\n{end}{after}")
     elif inside.strip() != table(refused):
-        sys.exit("the table of refused decks is stale: tests/docs/refused_decks.py tests/corpus/refused.tsv README.md --write")
+        sys.exit(f"the table of refused decks is stale: tests/docs/refused_decks.py tests/corpus/refused.tsv {page} --write")
 
 
 if __name__ == "__main__":

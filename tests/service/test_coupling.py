@@ -224,24 +224,6 @@ def test_bad_ports_are_refused_at_creation(server):
         assert caught.value.reason == reason
 
 
-def test_the_loop_of_the_readme(daemon, tmp_path):
-    """It has ten lines and runs as it stands there."""
-    import os
-    import re
-    import subprocess
-    import sys
-    readme = open(os.path.join(os.path.dirname(__file__), "..", "..", "README.md"), encoding="utf-8").read()
-    block = re.search(r"in Python\n\n((?:(?:    .*)?\n)+)", readme).group(1)
-    lines = [line[4:] for line in block.splitlines() if line.strip()]
-    assert lines[0] == "import mbcosim" and len(lines) <= 10
-    second = "structural: 2, dynamic, null, eye, 0., 1., 0., null; end: nodes; begin: elements; body: 2, 2, 1., null, diag, 1., 1., 1.;"
-    (tmp_path / "beam.mbd").write_text(decks.body(spin="null").replace("structural nodes: 1; rigid bodies: 1", "structural nodes: 2; rigid bodies: 2")
-                                       .replace("end: nodes;\nbegin: elements;", second))
-    run = subprocess.run([sys.executable, "-c", "\n".join(lines)], cwd=tmp_path, text=True, timeout=60, stdout=subprocess.PIPE,
-                         stderr=subprocess.PIPE, env={**os.environ, "MBCOSIM_ADDRESS": daemon.address})
-    assert run.returncode == 0 and int(run.stdout) >= 1, run.stderr
-
-
 def test_a_peer_may_want_signs_of_life(start_daemon):
     """An idle server gives them; one that is stopped does not, and the peer ends."""
     import signal

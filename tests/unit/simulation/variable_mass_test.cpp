@@ -251,7 +251,7 @@ TEST(VariableMass, AccelerationsAreTheRatesOfVelocities) {
 }
 
 // A pendulum with an arm that grows and shrinks, in a plane. What is compared here and below leaves
-// out the terms that the reference solver has in another form (README, "Deliberate differences").
+// out the terms that the reference solver has in another form (src/DIFFERENCES.md).
 TEST(ReferenceVariableMass, PendulumOfVariableLength) {
   DeckRun run(initial_value_block(
                   5e-3, 2, "method: ms, .6; derivatives coefficient: 1e-8;" + std::string(kTight)) +
