@@ -9,6 +9,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -113,6 +114,7 @@ Daemon::Daemon(const Config& config)
     spdlog::info("listening on {}", bound);
   }
   if (config_.shared_memory) open_shared_memory();
+  if (!config_.http.empty()) open_http();
 }
 
 void Daemon::open_shared_memory() {
@@ -126,6 +128,25 @@ void Daemon::open_shared_memory() {
     shared_memory_.push_back(std::make_unique<SharedMemoryService>(path, parts_, coupling_));
     spdlog::info("shared memory for peers through {}", path);
   }
+}
+
+void Daemon::open_http() {
+  http::DoorOptions options;
+  options.address = config_.http;
+  options.insecure = config_.insecure;
+  options.origins = config_.http_origins;
+  options.connections = config_.limits.http_connections;
+  options.streams_per_identity = config_.limits.http_streams;
+  options.message_bytes = static_cast<std::size_t>(config_.limits.message_bytes);
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(-1);  // replies of this very process
+  door_ = std::make_unique<http::Door>(
+      options,
+      http::DoorParts{server_->InProcessChannel(arguments), authenticator_,
+                      [this] { return metrics_.text(); }, [this] { return !watch_.closing(); }});
+  spdlog::info("serving HTTP on {}", door_->address());
+  std::printf("page: %s\n", door_->page_address().c_str());  // not logged: it holds a secret
+  std::fflush(stdout);
 }
 
 Daemon::~Daemon() {
@@ -165,6 +186,7 @@ void Daemon::shut_down() {
   watch_.cancel_all();
   store_.close_all();
   shared_memory_.clear();
+  door_.reset();
   server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace);
   server_.reset();
   spdlog::info("stopped");

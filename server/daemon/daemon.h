@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "http/door.h"
 #include "service/config.h"
 #include "service/coupling_service.h"
 #include "service/reduction_service.h"
@@ -28,6 +29,7 @@ class Daemon {
 
  private:
   void open_shared_memory();
+  void open_http();
   void check_listener(const std::string& address) const;
   std::shared_ptr<grpc::ServerCredentials> credentials_for(const std::string& address) const;
 
@@ -44,6 +46,7 @@ class Daemon {
   ReductionService reduction_;
   std::unique_ptr<grpc::Server> server_;
   std::vector<std::unique_ptr<SharedMemoryService>> shared_memory_;  ///< one for each Unix socket
+  std::unique_ptr<http::Door> door_;
 };
 
 /// Whether a daemon answers at the address: exit code 0 or 1.

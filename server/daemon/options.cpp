@@ -32,6 +32,8 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   add("--limit-unknowns", limits.engine.unknowns, "Unknowns of one model");
   add("--limit-message-bytes", limits.message_bytes, "Bytes of one message");
   add("--limit-open-calls", limits.open_calls, "Calls and streams at once");
+  add("--limit-http-connections", limits.http_connections, "Connections served at once over HTTP");
+  add("--limit-http-streams", limits.http_streams, "Streams of one identity over HTTP");
   add("--limit-telemetry-samples", limits.telemetry_samples,
       "Samples buffered for one subscription");
   add("--lease", lease, "Seconds that a simulation lives without calls, default and longest");
@@ -76,6 +78,11 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--workers", config.workers, "Simulations that step at once; 0: one per core")
       ->capture_default_str();
   app.add_option("--metrics", config.metrics, "HOST:PORT of Prometheus metrics");
+  app.add_option("--http", config.http,
+                 "HOST:PORT of the page, of calls over HTTP (Connect, gRPC-Web) and of /metrics");
+  app.add_option("--http-origin", config.http_origins,
+                 "Web site under which a proxy shows this daemon: https://HOST")
+      ->group("Security");
   app.add_option("--shutdown-grace", grace, "Seconds that open calls get on SIGTERM")
       ->capture_default_str();
   app.add_flag("--reflection,!--no-reflection", config.reflection, "Serve gRPC reflection");

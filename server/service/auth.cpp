@@ -9,14 +9,6 @@
 namespace mbcosim::server {
 namespace {
 
-bool same_text(const std::string& a,
-               const std::string& b) {  // in a time that does not tell where they differ
-  if (a.size() != b.size()) return false;
-  unsigned char difference = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) difference |= static_cast<unsigned char>(a[i] ^ b[i]);
-  return difference == 0;
-}
-
 Role role_of(const std::string& name, int line) {
   for (const Role role : {Role::observe, Role::control, Role::admin})
     if (name == role_name(role)) return role;
@@ -25,6 +17,13 @@ Role role_of(const std::string& name, int line) {
 }
 
 }  // namespace
+
+bool same_text(const std::string& a, const std::string& b) {
+  if (a.size() != b.size()) return false;
+  unsigned char difference = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) difference |= static_cast<unsigned char>(a[i] ^ b[i]);
+  return difference == 0;
+}
 
 const char* role_name(Role role) {
   constexpr const char* kNames[] = {"observe", "control", "admin"};

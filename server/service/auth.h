@@ -12,6 +12,9 @@ namespace mbcosim::server {
 enum class Role { observe, control, admin };
 const char* role_name(Role role);
 
+/// Whether two secrets are equal, in a time that does not tell where they differ.
+bool same_text(const std::string& a, const std::string& b);
+
 struct Caller {
   std::string identity;
   Role role = Role::observe;
@@ -33,6 +36,8 @@ class Authenticator {
   Caller check(const grpc::ServerContext& context, Role required) const;
   /// The same for a caller on this host that gRPC does not know: `authorization` is "Bearer TOKEN".
   Caller check_local(const std::string& authorization, Role required) const;
+  /// Whether callers that gRPC does not know must show a token.
+  bool needs_token() const { return tokens_required_; }
 
  private:
   struct Token {

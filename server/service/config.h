@@ -20,6 +20,8 @@ struct ServiceLimits {
   int bundle_files = 10000;
   int message_bytes = 16 << 20;
   int open_calls = 512;              ///< calls and streams at once
+  int http_connections = 64;         ///< served at once through the HTTP door
+  int http_streams = 16;             ///< of one identity through the HTTP door
   int telemetry_samples = 1 << 16;   ///< buffer of one subscription
   std::chrono::seconds lease{3600};  ///< default and longest
   mbcosim::Limits engine;
@@ -37,6 +39,8 @@ struct Config {
   bool reflection = true;
   bool shared_memory = true;  ///< beside each Unix socket, for peers on this host
   std::string metrics;        ///< HOST:PORT of Prometheus metrics; empty: none
+  std::string http;           ///< HOST:PORT of the page, calls over HTTP and metrics; empty: none
+  std::vector<std::string> http_origins;  ///< web sites that are this daemon: "https://HOST"
   std::string log_level = "info", log_format = "text";
   std::chrono::seconds shutdown_grace{5};
   ServiceLimits limits;

@@ -1,5 +1,7 @@
 #include "service/metrics.h"
 
+#include <prometheus/text_serializer.h>
+
 #include "service/refusal.h"
 
 namespace mbcosim::server {
@@ -35,6 +37,10 @@ Metrics::Metrics()
 void Metrics::expose(const std::string& address) {
   exposer_ = std::make_unique<prometheus::Exposer>(address);
   exposer_->RegisterCollectable(registry_);
+}
+
+std::string Metrics::text() const {
+  return prometheus::TextSerializer().Serialize(registry_->Collect());
 }
 
 void Metrics::count_advance(std::int64_t steps, std::int64_t iterations, double solver_seconds) {

@@ -20,6 +20,8 @@ class Metrics {
   Metrics();
   /// Serves /metrics at "HOST:PORT". Throws std::exception when the address cannot be bound.
   void expose(const std::string& address);
+  /// All of them in Prometheus' text format.
+  std::string text() const;
 
   void count_advance(std::int64_t steps, std::int64_t iterations, double solver_seconds);
   void count_failure(v1::Reason reason);

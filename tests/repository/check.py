@@ -30,7 +30,8 @@ ARROWS = {
     "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "mbcosim", "shared_memory"},
     "server/client": {"mbcosim", "shared_memory"},
     "server/shared_memory": set(),
-    "server/daemon": {"service", "mbcosim"},
+    "server/http": {"service", "mbcosim"},
+    "server/daemon": {"service", "http", "mbcosim"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",
              "tests"}

@@ -1,5 +1,6 @@
 """A real daemon for each test module, and the decks that tests run."""
 import os
+import re
 import signal
 import subprocess
 import time
@@ -22,14 +23,25 @@ class Daemon:
         self.address = f"unix:{folder}/mbcosim.sock"
         self.log_path = os.path.join(folder, "log")
         self._log = open(self.log_path, "ab")
+        self._output_path = os.path.join(folder, "output")
         command = [os.path.join(BIN, "mbcosimd"), "--listen", self.address, "--shutdown-grace", "1", *options]
-        self.process = subprocess.Popen(command, stderr=self._log, stdin=subprocess.DEVNULL)
+        with open(self._output_path, "wb") as output:
+            self.process = subprocess.Popen(command, stdout=output, stderr=self._log, stdin=subprocess.DEVNULL)
 
     def connect(self, **options):
         return mbcosim.connect(self.address, timeout=30, **options)
 
     def alive(self):
         return self.process.poll() is None
+
+    def page(self):
+        """Address of the page, with its token, as the daemon prints it."""
+        def line():
+            with open(self._output_path) as file:
+                return re.search(r"^page: (.*)\n", file.read())
+
+        wait_for(lambda: line() or not self.alive())
+        return line().group(1)
 
     def log(self):
         with open(self.log_path, errors="replace") as file:

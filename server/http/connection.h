@@ -1,0 +1,69 @@
+/// One HTTP request and the connection that it came over: civetweb behind a small face.
+#pragma once
+
+#include <civetweb.h>
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "http/reaper.h"
+
+namespace mbcosim::server::http {
+
+using Headers = std::vector<std::pair<std::string, std::string>>;
+
+/// What the door keeps for a connection while it lives, in civetweb's connection data.
+struct Peer {
+  int socket = -1;  ///< -1: not found
+};
+
+/// Time that a client has to send a request's body, or to read an answer.
+inline constexpr std::chrono::milliseconds kTransferTime{30000};
+
+class Connection {
+ public:
+  Connection(mg_connection* raw, Reaper& reaper);
+
+  std::string_view method() const { return info_->request_method; }
+  std::string_view path() const { return info_->local_uri ? info_->local_uri : ""; }
+  std::string_view query() const { return info_->query_string ? info_->query_string : ""; }
+  /// Empty: the request has none of this name.
+  std::string_view header(const char* name) const;
+  bool has_header(const char* name) const { return mg_get_header(raw_, name) != nullptr; }
+  /// A client asks for a cookie's value; empty: none.
+  std::string_view cookie(std::string_view name) const;
+
+  enum class Body { complete, too_long, broken };
+  Body read_body(std::size_t limit, std::string* body);
+
+  /// Sends a whole answer. Without a body read before, the rest of the request is dropped.
+  void respond(int status, std::string_view content_type, std::string_view body,
+               const Headers& headers = {});
+  /// Starts an answer that comes in pieces; false: the client is gone.
+  bool start_stream(std::string_view content_type, const Headers& headers = {});
+  bool send_piece(std::string_view bytes);
+  void end_stream();
+
+  /// Whether the client has hung up. Cheap.
+  bool gone() const;
+  int status() const { return status_; }
+
+ private:
+  void start_answer(int status, std::string_view content_type, const Headers& headers);
+
+  mg_connection* raw_;
+  const mg_request_info* info_;
+  Reaper& reaper_;
+  int socket_ = -1;
+  int status_ = 500;
+  bool body_read_ = false;
+};
+
+/// The value of `name` in "a=1&b=2", decoded.
+std::optional<std::string> query_value(std::string_view query, const std::string& name);
+
+}  // namespace mbcosim::server::http

@@ -1,0 +1,7 @@
+#include "http/page.h"
+
+namespace mbcosim::server::http {
+
+std::string_view page_document() { return {}; }
+
+}  // namespace mbcosim::server::http

@@ -1,0 +1,52 @@
+#include "http/reaper.h"
+
+#include <sys/socket.h>
+
+namespace mbcosim::server::http {
+namespace {
+
+constexpr std::chrono::milliseconds kLook{100};  // how late a socket may be ended
+
+}  // namespace
+
+Reaper::Reaper() : thread_([this] { loop(); }) {}
+
+Reaper::~Reaper() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  changed_.notify_one();
+  thread_.join();
+}
+
+void Reaper::arm(int socket, std::chrono::milliseconds time) {
+  if (socket < 0) return;
+  const std::lock_guard lock(mutex_);
+  deadlines_[socket] = Clock::now() + time;
+  if (deadlines_.size() == 1) changed_.notify_one();
+}
+
+void Reaper::disarm(int socket) {
+  const std::lock_guard lock(mutex_);
+  deadlines_.erase(socket);
+}
+
+void Reaper::loop() {
+  std::unique_lock lock(mutex_);
+  while (!stop_) {
+    if (deadlines_.empty()) {
+      changed_.wait(lock);
+      continue;
+    }
+    const Clock::time_point now = Clock::now();
+    for (auto entry = deadlines_.begin(); entry != deadlines_.end();) {
+      const bool late = entry->second <= now;
+      if (late) ::shutdown(entry->first, SHUT_RDWR);
+      entry = late ? deadlines_.erase(entry) : std::next(entry);
+    }
+    changed_.wait_for(lock, kLook);
+  }
+}
+
+}  // namespace mbcosim::server::http

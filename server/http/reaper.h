@@ -1,0 +1,37 @@
+/// Ends connections that take too long: whoever sends or reads byte by byte holds no thread for
+/// ever.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <thread>
+
+namespace mbcosim::server::http {
+
+/// Shuts a socket down when its time is over; the thread that reads or writes it then sees its end.
+class Reaper {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  Reaper();
+  ~Reaper();
+  Reaper(const Reaper&) = delete;
+  Reaper& operator=(const Reaper&) = delete;
+
+  /// Replaces the time that the socket had. The caller disarms before the socket is closed.
+  void arm(int socket, std::chrono::milliseconds time);
+  void disarm(int socket);
+
+ private:
+  void loop();
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<int, Clock::time_point> deadlines_;  ///< by socket
+  bool stop_ = false;
+  std::thread thread_;
+};
+
+}  // namespace mbcosim::server::http

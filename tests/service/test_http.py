@@ -1,0 +1,455 @@
+"""The HTTP door: calls by Connect and gRPC-Web as by gRPC, and nobody else comes in."""
+import base64
+import http.client
+import json
+import math
+import socket
+import struct
+import time
+import urllib.parse
+
+import pytest
+from conftest import TIME_FACTOR, wait_for
+from google.protobuf import json_format
+
+from mbcosim.v1 import common_pb2, coupling_pb2, reduction_pb2, simulations_pb2, telemetry_pb2
+
+SERVICES = [file.DESCRIPTOR.services_by_name[name] for file, name in (
+    (simulations_pb2, "Simulations"), (telemetry_pb2, "Telemetry"), (coupling_pb2, "Coupling"), (reduction_pb2, "Reduction"))]
+
+
+class Door:
+    """A client of the door that speaks plain HTTP."""
+
+    def __init__(self, page):
+        address = urllib.parse.urlsplit(page)
+        self.host, self.port = address.hostname, address.port
+        self.token = urllib.parse.parse_qs(address.query).get("token", [""])[0]
+
+    def request(self, method, path, body=None, **headers):
+        """Status, headers and body. Header names have `_` for `-`; a header of None is left out."""
+        given = {"Authorization": f"Bearer {self.token}", **{name.replace("_", "-"): value for name, value in headers.items()}}
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=20 * TIME_FACTOR)
+        try:
+            connection.request(method, path, body, {name: value for name, value in given.items() if value is not None})
+            answer = connection.getresponse()
+            return answer.status, answer.headers, answer.read()
+        finally:
+            connection.close()
+
+    def call(self, method, request=None, **headers):
+        """Status and JSON of a unary call."""
+        given = {"Content_Type": "application/json", **headers}
+        status, _, body = self.request("POST", f"/mbcosim.v1.{method}", json.dumps(request or {}), **given)
+        return status, json.loads(body)
+
+    def stream(self, method, request, content_type="application/connect+json"):
+        """Envelopes (flags, payload) of a call."""
+        body = request if isinstance(request, bytes) else json.dumps(request).encode()
+        status, _, answer = self.request("POST", f"/mbcosim.v1.{method}", envelope(body), Content_Type=content_type)
+        assert status == 200, answer
+        return envelopes(answer)
+
+    def raw(self):
+        return socket.create_connection((self.host, self.port), timeout=20 * TIME_FACTOR)
+
+
+def envelope(payload, flags=0):
+    return struct.pack(">BI", flags, len(payload)) + payload
+
+
+def envelopes(text):
+    found = []
+    while text:
+        flags, length = struct.unpack(">BI", text[:5])
+        found.append((flags, text[5:5 + length]))
+        text = text[5 + length:]
+    return found
+
+
+@pytest.fixture(scope="module")
+def http_daemon(tmp_path_factory):
+    from conftest import MODELS, Daemon
+    running = Daemon(str(tmp_path_factory.mktemp("h")), "--model-root", MODELS, "--http", "127.0.0.1:0", "--limit-http-streams", "3",
+                     "--limit-message-bytes", "1000000")
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def endless(pendulum):
+    """Text of a deck that runs for minutes."""
+    with open(pendulum) as deck:
+        return deck.read().replace("final time: 5.;", "final time: 1.e6;")
+
+
+def state(door, simulation):
+    return door.call("Simulations/GetSimulation", {"name": simulation.name})[1]["state"]
+
+
+@pytest.fixture
+def door(http_daemon):
+    return Door(http_daemon.page())
+
+
+@pytest.fixture
+def server(http_daemon):
+    with http_daemon.connect() as connection:
+        yield connection
+
+
+# ---- calls
+
+
+def test_a_step_over_json_is_the_step_over_grpc(door, server, pendulum):
+    with server.load(pendulum) as ours, server.load(pendulum) as theirs:
+        handle = ours.handles(["node.structural.2.X"])[0]
+        expected = ours.step(10, outputs=["node.structural.2.X"])
+        status, reply = door.call("Simulations/Step", {"simulation": theirs.name, "steps": 10, "outputs": [handle]})
+        assert status == 200
+        assert reply["outcome"] == "STEP_OUTCOME_ACCEPTED" and reply["step"] == "10"
+        assert reply["timeS"] == expected.time and reply["outputs"] == list(expected.values["node.structural.2.X"])
+
+
+def test_binary_messages_are_those_of_grpc(door, server, pendulum):
+    with server.load(pendulum) as simulation:
+        request = simulations_pb2.GetSimulationRequest(name=simulation.name)
+        status, headers, body = door.request("POST", "/mbcosim.v1.Simulations/GetSimulation", request.SerializeToString(),
+                                             Content_Type="application/proto")
+        assert status == 200 and headers["Content-Type"] == "application/proto"
+        assert simulations_pb2.SimulationInfo.FromString(body).name == simulation.name
+
+
+def test_an_infinite_number_has_a_json_form(door, server, tumbling):
+    with server.load(tumbling) as simulation:
+        status, info = door.call("Simulations/GetSimulation", {"name": simulation.name})
+        assert status == 200 and float(info["finalTimeS"]) > 0
+        parsed = json_format.ParseDict(info, simulations_pb2.SimulationInfo())
+        assert parsed.step == 0 and math.isfinite(parsed.time_s)
+
+
+def test_a_run_streams_progress_and_ends_with_done(door, server, pendulum):
+    with server.load(pendulum) as simulation:
+        pieces = door.stream("Simulations/Run", {"step": {"simulation": simulation.name, "steps": 50}})
+        assert [flags for flags, _ in pieces[-2:]] == [0, 2]
+        assert json.loads(pieces[-2][1])["done"]["step"] == "50" and json.loads(pieces[-1][1]) == {}
+
+
+def test_the_error_of_a_stream_stands_in_its_last_envelope(door):
+    pieces = door.stream("Telemetry/Subscribe", {"simulation": "simulations/none"})
+    assert [flags for flags, _ in pieces] == [2]
+    assert json.loads(pieces[0][1])["error"]["code"] == "not_found"
+
+
+def test_grpc_web_carries_messages_and_trailers(door, server, pendulum):
+    with server.load(pendulum) as simulation:
+        request = simulations_pb2.StepRequest(simulation=simulation.name, steps=3).SerializeToString()
+        (flags, reply), (last, trailers) = door.stream("Simulations/Step", request, "application/grpc-web+proto")
+        assert flags == 0 and simulations_pb2.StepReply.FromString(reply).step == 3
+        assert last == 0x80 and trailers == b"grpc-status: 0\r\n"
+
+
+def test_grpc_web_as_text_is_base64(door, server, pendulum):
+    with server.load(pendulum) as simulation:
+        request = simulations_pb2.RunRequest(step=simulations_pb2.StepRequest(simulation=simulation.name, steps=3))
+        status, _, answer = door.request("POST", "/mbcosim.v1.Simulations/Run", base64.b64encode(envelope(request.SerializeToString())),
+                                         Content_Type="application/grpc-web-text")
+        assert status == 200
+        text = answer.decode()  # pieces, each padded for itself
+        pieces = [base64.b64decode(part + "=" * (-len(part) % 4)) for part in text.replace("=", " ").split()]
+        parts = envelopes(b"".join(pieces))
+        assert simulations_pb2.RunReply.FromString(parts[-2][1]).done.step == 3 and parts[-1][0] == 0x80
+
+
+def test_grpc_web_tells_failures_in_trailers_with_details(door):
+    request = simulations_pb2.StepRequest(simulation="simulations/none").SerializeToString()
+    ((flags, trailers),) = door.stream("Simulations/Step", request, "application/grpc-web+proto")
+    fields = dict(line.split(": ", 1) for line in trailers.decode().strip().split("\r\n"))
+    assert flags == 0x80 and fields["grpc-status"] == "5"
+    details = common_pb2.ErrorStatus.FromString(base64.b64decode(fields["grpc-status-details-bin"]))
+    assert common_pb2.ErrorInfo.FromString(details.details[0].value).reason == "NO_SUCH_SIMULATION"
+
+
+def test_errors_tell_code_reason_and_particulars(door, server, pendulum):
+    with server.load(pendulum) as simulation:
+        status, error = door.call("Simulations/Step", {"simulation": simulation.name, "expectedStep": 7})
+        assert status == 400 and error["code"] == "failed_precondition"
+        assert error["details"][0]["type"] == "google.rpc.ErrorInfo"
+        assert error["details"][0]["debug"] == {"reason": "WRONG_STEP", "domain": "mbcosim", "metadata": {"step": "0"}}
+
+
+@pytest.mark.parametrize("service", SERVICES, ids=lambda service: service.name)
+def test_every_method_is_reached_or_says_that_it_takes_a_stream(door, service):
+    from google.protobuf import descriptor_pb2
+    kinds = descriptor_pb2.FileDescriptorProto.FromString(service.file.serialized_pb).service
+    methods = next(found for found in kinds if found.name == service.name).method
+    assert methods
+    for method in methods:
+        name = f"{service.name}/{method.name}"
+        if method.client_streaming:
+            status, error = door.call(name)
+            assert (status, error["code"]) == (501, "unimplemented"), name
+            assert "stream of requests" in error["message"]
+        elif method.server_streaming:
+            last = json.loads(door.stream(name, {})[-1][1])
+            assert last.get("error", {}).get("code") in (None, "not_found", "invalid_argument"), (name, last)
+        else:
+            status, reply = door.call(name)
+            assert status == 200 or reply["code"] in ("not_found", "invalid_argument"), (name, reply)
+
+
+def test_a_deadline_of_the_client_holds(door, server, endless):
+    with server.load_text(endless) as simulation:
+        started = time.monotonic()
+        status, reply = door.call("Simulations/Step", {"simulation": simulation.name, "steps": 100000000}, Connect_Timeout_Ms="200")
+        assert time.monotonic() - started < 10 * TIME_FACTOR
+        assert (status, reply.get("code")) == (504, "deadline_exceeded")
+        wait_for(lambda: state(door, simulation) == "SIMULATION_STATE_READY")
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize("body, complaint", [
+    ("{", "the body is no mbcosim.v1.StepRequest"),
+    ('{"simulatoin": "x"}', "simulatoin"),
+    ('{"simulation": 7, "steps": "many"}', "many"),
+    ("[]", "the body is no mbcosim.v1.StepRequest"),
+])
+def test_json_that_is_not_the_message_is_refused_by_name(door, body, complaint):
+    status, _, answer = door.request("POST", "/mbcosim.v1.Simulations/Step", body, Content_Type="application/json")
+    error = json.loads(answer)
+    assert (status, error["code"]) == (400, "invalid_argument") and complaint in error["message"]
+
+
+@pytest.mark.parametrize("body", [b"", b"\0\0\0", envelope(b"{}") * 2, struct.pack(">BI", 0, 1 << 31) + b"x"])
+def test_envelopes_that_are_none_are_refused(door, body):
+    status, _, answer = door.request("POST", "/mbcosim.v1.Simulations/Run", body, Content_Type="application/connect+json")
+    ((flags, end),) = envelopes(answer)
+    assert status == 200 and flags == 2 and json.loads(end)["error"]["code"] == "invalid_argument"
+
+
+def test_compressed_messages_are_refused(door):
+    status, error = door.call("Simulations/ListSimulations", Content_Encoding="gzip")
+    assert (status, error["code"]) == (501, "unimplemented")
+
+
+def test_other_content_types_are_told_which_there_are(door):
+    for method, kind in (("ListSimulations", "text/plain"), ("ListSimulations", "application/connect+json"), ("Run", "application/json")):
+        status, headers, _ = door.request("POST", f"/mbcosim.v1.Simulations/{method}", "{}", Content_Type=kind)
+        assert status == 415 and "application/json" in headers["Accept-Post"]
+
+
+def test_a_body_over_the_limit_is_refused_with_its_name(door):
+    status, error = door.call("Simulations/ListSimulations", {"pageToken": "x" * 1_000_001})
+    assert (status, error["code"]) == (429, "resource_exhausted")
+    assert error["details"][0]["debug"]["metadata"] == {"limit": "message_bytes", "maximum": "1000000"}
+
+
+@pytest.mark.parametrize("path", ["/mbcosim.v1.Simulations/Nothing", "/mbcosim.v1.Nothing/Step", "/grpc.health.v1.Health/Check", "/etc/passwd",
+                                  "/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/mbcosim.v1./", "/mbcosim.v1.Simulations/", "//"])
+def test_other_paths_lead_nowhere(door, path):
+    assert door.request("POST", path, "{}", Content_Type="application/json")[0] in (400, 404)
+    assert door.request("GET", path)[0] in (400, 404, 405)
+
+
+def test_calls_are_not_made_by_get(door):
+    assert door.request("GET", "/mbcosim.v1.Simulations/ListSimulations")[0] == 405
+
+
+# ---- who comes in
+
+
+def test_no_token_and_a_wrong_one_are_refused(door):
+    for authorization in (None, "Bearer wrong", "Basic abc", "Bearer " + door.token[:-1]):
+        status, error = door.call("Simulations/ListSimulations", Authorization=authorization)
+        assert (status, error["code"]) == (401, "unauthenticated")
+        assert door.request("GET", "/metrics", Authorization=authorization)[0] == 401
+
+
+def test_the_token_in_the_address_becomes_a_cookie_once(door):
+    status, headers, _ = door.request("GET", f"/?token={door.token}", Authorization=None)
+    assert status == 303 and headers["Location"] == "/"
+    cookie, *attributes = headers["Set-Cookie"].split("; ")
+    assert {"HttpOnly", "SameSite=Strict"} <= set(attributes)
+    assert door.call("Simulations/ListSimulations", Authorization=None, Cookie=f"a=b; {cookie}; c=d")[0] == 200
+    assert door.request("GET", "/?token=wrong", Authorization=None)[0] == 401
+
+
+@pytest.mark.parametrize("origin", ["https://evil.example", "http://127.0.0.1:1", "http://localhost", "null"])
+def test_a_foreign_web_site_cannot_call(door, origin):
+    status, error = door.call("Simulations/ListSimulations", Origin=origin)
+    assert status == 403 and origin in error["message"]
+
+
+def test_a_name_that_a_foreign_site_gave_this_host_is_refused(door):
+    assert door.call("Simulations/ListSimulations", Host=f"evil.example:{door.port}")[0] == 403
+
+
+def test_the_own_page_may_call_by_each_name_of_this_host(door):
+    for name in ("127.0.0.1", "localhost", "[::1]"):
+        status, _ = door.call("Simulations/ListSimulations", Host=f"{name}:{door.port}", Origin=f"http://{name}:{door.port}")
+        assert status == 200
+
+
+def test_tokens_and_roles_are_those_of_grpc(start_daemon, tmp_path):
+    tokens = tmp_path / "tokens"
+    tokens.write_text("eye observe watcher\nhand control driver\nold control late 1\n")
+    door = Door(start_daemon("--tokens", str(tokens), "--http", "127.0.0.1:0").page())
+    assert door.token == ""  # none is printed where there are others
+
+    def call(method, token):
+        status, reply = door.call(f"Simulations/{method}", Authorization=f"Bearer {token}")
+        return status, reply.get("code")
+
+    assert door.call("Simulations/GetServerInfo", Authorization="Bearer eye")[1]["identity"] == "watcher"
+    assert call("Step", "eye") == (403, "permission_denied")
+    assert call("Step", "hand") == (404, "not_found")
+    assert call("ListSimulations", "old") == (401, "unauthenticated")
+    assert call("ListSimulations", "") == (401, "unauthenticated")
+
+
+def test_a_proxy_in_front_is_named_by_its_origin(start_daemon):
+    door = Door(start_daemon("--http", "127.0.0.1:0", "--http-origin", "https://sim.example").page())
+    assert door.call("Simulations/ListSimulations", Host="sim.example", Origin="https://sim.example")[0] == 200
+    assert door.call("Simulations/ListSimulations", Host="sim.example", Origin="http://sim.example")[0] == 403
+
+
+@pytest.mark.parametrize("options, complaint", [
+    (["--http", "0.0.0.0:0"], "an address other than loopback needs --insecure"),
+    (["--http", "8080"], "is not HOST:PORT"),
+    (["--http", "127.0.0.1:0", "--http-origin", "sim.example"], "is not of the form https://HOST"),
+])
+def test_bad_options_are_refused_at_start(options, complaint, tmp_path):
+    import os
+    import subprocess
+    from conftest import BIN
+    done = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/s", *options], capture_output=True, text=True,
+                          timeout=20 * TIME_FACTOR)
+    assert done.returncode == 4 and complaint in done.stderr
+
+
+# ---- metrics and health
+
+
+def test_metrics_need_the_token_and_health_does_not(door):
+    status, headers, body = door.request("GET", "/metrics")
+    assert status == 200 and headers["Content-Type"].startswith("text/plain") and b"mbcosim_steps_total" in body
+    assert door.request("GET", "/healthz", Authorization=None)[2] == b"ok\n"
+    assert door.request("GET", "/readyz", Authorization=None)[2] == b"ready\n"
+
+
+# ---- hostile clients
+
+
+def open_stream(door, simulation):
+    """A socket on which telemetry of `simulation` comes, after its first message."""
+    link = door.raw()
+    body = envelope(json.dumps({"simulation": simulation}).encode())
+    link.sendall(f"POST /mbcosim.v1.Telemetry/Subscribe HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nAuthorization: Bearer {door.token}\r\n"
+                 f"Content-Type: application/connect+json\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body)
+    return link, link.recv(65536)
+
+
+def test_streams_of_an_identity_are_capped_and_a_closed_one_makes_room(door, server, pendulum):
+    with server.load(pendulum) as simulation:
+        links = [open_stream(door, simulation.name) for _ in range(3)]
+        assert all(b" 200 " in answer for _, answer in links)
+        end = json.loads(door.stream("Telemetry/Subscribe", {"simulation": simulation.name})[-1][1])
+        assert end["error"]["code"] == "resource_exhausted"
+        links[0][0].close()
+        started = time.monotonic()
+
+        def another():
+            link, answer = open_stream(door, simulation.name)
+            if b"resource_exhausted" in answer + link.recv(65536):
+                link.close()
+                return False
+            links.append((link, answer))
+            return True
+
+        simulation.step(1)  # so that each open stream has something to say
+        wait_for(lambda: simulation.step(1) and another())
+        assert time.monotonic() - started < 10 * TIME_FACTOR
+        for link, _ in links:
+            link.close()
+
+
+def test_slow_senders_disturb_nobody_and_are_cut_off(door, server, pendulum):
+    head = f"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nHost: {door.host}:{door.port}\r\n".encode()
+    slow = []
+    for _ in range(40):
+        link = door.raw()
+        link.sendall(head)
+        slow.append(link)
+    started = time.monotonic()
+    with server.load(pendulum) as simulation:
+        assert simulation.step(100).reply.step == 100
+        assert door.call("Simulations/GetSimulation", {"name": simulation.name})[0] == 200
+    assert time.monotonic() - started < 5 * TIME_FACTOR
+
+    def cut_off(link):
+        try:
+            link.sendall(b"X")
+            link.setblocking(False)
+            return link.recv(1000) is not None
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
+
+    wait_for(lambda: all(cut_off(link) for link in slow), 20)
+    for link in slow:
+        link.close()
+
+
+def test_a_body_that_dribbles_without_a_token_is_cut_off(door):
+    link = door.raw()
+    link.sendall(f"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nContent-Type: application/json\r\n"
+                 "Content-Length: 100000\r\n\r\n{".encode())
+    assert b" 401 " in link.recv(65536)
+    ended = time.monotonic() + 15 * TIME_FACTOR
+    with pytest.raises(OSError):
+        while time.monotonic() < ended:
+            link.sendall(b" ")
+            time.sleep(0.1)
+    link.close()
+
+
+@pytest.mark.parametrize("garbage", [b"\0" * 2000, b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"POST / HTTP/1.1\r\nContent-Length: -5\r\n\r\n",
+                                     b"A" * 100000, b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 5000 + b"\r\n",
+                                     b"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n" * 3])
+def test_garbage_is_answered_or_dropped_and_the_next_caller_served(door, garbage):
+    link = door.raw()
+    try:
+        link.sendall(garbage)
+        link.shutdown(socket.SHUT_WR)
+        while link.recv(65536):
+            pass
+    except OSError:
+        pass
+    link.close()
+    assert door.call("Simulations/ListSimulations")[0] == 200
+
+
+def test_ten_thousand_requests_on_a_few_connections_are_all_answered(door):
+    connections = [http.client.HTTPConnection(door.host, door.port, timeout=20 * TIME_FACTOR) for _ in range(4)]
+    headers = {"Authorization": f"Bearer {door.token}", "Content-Type": "application/json"}
+    for number in range(10_000):
+        connection = connections[number % 4]
+        connection.request("POST", "/mbcosim.v1.Simulations/GetServerInfo", "{}", headers)
+        answer = connection.getresponse()
+        assert answer.status == 200 and answer.read()
+    for connection in connections:
+        connection.close()
+
+
+def test_a_client_that_hangs_up_interrupts_its_run(door, server, endless):
+    with server.load_text(endless) as simulation:
+        link = door.raw()
+        body = envelope(json.dumps({"step": {"simulation": simulation.name, "steps": 100000000}}).encode())
+        link.sendall(f"POST /mbcosim.v1.Simulations/Run HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nAuthorization: Bearer {door.token}\r\n"
+                     f"Content-Type: application/connect+json\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body)
+        wait_for(lambda: state(door, simulation) == "SIMULATION_STATE_STEPPING")
+        link.close()
+        wait_for(lambda: state(door, simulation) == "SIMULATION_STATE_READY")
