@@ -2,7 +2,7 @@
 
 #include "input/call_binder.h"
 #include "input/plugin.h"
-#include "input/session.h"
+#include "input/reading.h"
 
 namespace mbcosim {
 
@@ -30,8 +30,8 @@ double number_of(const Value& v) {
 
 class Binder : CallBinder {
  public:
-  Binder(Session& session, const Syntax& syntax, const BindingRules& rules, Program* program)
-      : CallBinder(session, rules.run_time, *program), syntax_(syntax), rules_(rules) {}
+  Binder(Reading& reading, const Syntax& syntax, const BindingRules& rules, Program* program)
+      : CallBinder(reading, rules.run_time, *program), syntax_(syntax), rules_(rules) {}
 
   void bind() {
     for (const SyntaxItem& item : syntax_.items) {
@@ -98,9 +98,9 @@ class Binder : CallBinder {
   void load_name(const SyntaxItem& item) {
     check_space(item, false);
     if (run_time_ && load_run_name(item)) return;
-    Symbol* s = session_.symbols.find(item.name);
+    Symbol* s = reading_.symbols.find(item.name);
     if (!s) fail_unknown(item);
-    if (s->damaged) session_.set_damaged(true);
+    if (s->damaged) reading_.set_damaged(true);
     if (s->plugin) return load_drive(s->plugin);
     if (!run_time_) {
       load(Op::load_symbol, type_of(s->value)).symbol = s;
@@ -178,11 +178,11 @@ class Binder : CallBinder {
     if (find_function(item.name))
       fail("function " + in_quotes(item.name) + " needs arguments in parentheses", "",
            "unknown-variable");
-    const std::string best = session_.symbols.nearest(item.name);
+    const std::string best = reading_.symbols.nearest(item.name);
     std::string message = "unknown variable " + in_quotes(item.name);
     if (!best.empty()) message += nearest_text(item.name, best);
     std::string hint;
-    if (!session_.model_available() && (item.name == "Time" || item.name == "TimeStep" ||
+    if (!reading_.model_available() && (item.name == "Time" || item.name == "TimeStep" ||
                                         item.name == "Step" || item.name == "Var"))
       hint = in_quotes(item.name) + " exists from the end of the \"initial value\" block on";
     fail(message, hint, "unknown-variable");
@@ -199,14 +199,14 @@ class Binder : CallBinder {
     if (item.is_constant && !item.has_value)
       fail("constant " + in_quotes(item.name) + " needs a value");
     if (run_time_) return declare_local(item);
-    Symbol* known = session_.symbols.find(item.name);
+    Symbol* known = reading_.symbols.find(item.name);
     if (known) return redeclare(item, known);
     Symbol s;
     s.name = item.name;
     s.value = zero_of(item.type);
     s.constant = item.is_constant;
-    s.where = session_.expression_span(item.where, item.length);
-    Symbol& made = session_.symbols.declare(std::move(s));
+    s.where = reading_.expression_span(item.where, item.length);
+    Symbol& made = reading_.symbols.declare(std::move(s));
     if (item.has_value)
       store(item, made);
     else
@@ -222,10 +222,10 @@ class Binder : CallBinder {
     if (known->predefined)
       fail(in_quotes(item.name) + " is a predefined constant", "choose another name",
            "redefinition");
-    const bool may_assign = session_.options.redefine && !known->constant;
+    const bool may_assign = reading_.options.redefine && !known->constant;
     if (!may_assign) {
       std::string message = "variable " + in_quotes(item.name) + " already declared at " +
-                            session_.place(known->where);
+                            reading_.place(known->where);
       if (known->where.file < 0) message = in_quotes(item.name) + " is a variable of the run";
       if (item.has_value && !known->constant)
         message += "; use \"set: " + std::string(item.name) + " = " +
@@ -270,7 +270,7 @@ class Binder : CallBinder {
   }
 
   void declare_local(const SyntaxItem& item) {
-    const bool known = find_local(item.name) >= 0 || session_.symbols.find(item.name);
+    const bool known = find_local(item.name) >= 0 || reading_.symbols.find(item.name);
     if (known && item.if_undefined) {
       if (item.has_value) drop();
       return load_name(item);
@@ -294,7 +294,7 @@ class Binder : CallBinder {
   void assign(const SyntaxItem& item) {
     check_space(item, false);
     if (run_time_) return assign_at_run_time(item);
-    Symbol* s = session_.symbols.find(item.name);
+    Symbol* s = reading_.symbols.find(item.name);
     if (!s) fail_undeclared(item);
     if (s->predefined) fail("cannot assign predefined constant " + in_quotes(item.name));
     if (s->plugin) fail("cannot assign plugin variable " + in_quotes(item.name));
@@ -327,7 +327,7 @@ class Binder : CallBinder {
                          number_of(captured->second.value));
       }
     }
-    const Symbol* s = session_.symbols.find(item.name);
+    const Symbol* s = reading_.symbols.find(item.name);
     if (!s) fail_undeclared(item);
     if (s->role != SymbolRole::plain)
       fail("cannot assign " + in_quotes(item.name) + ", which the run sets");
@@ -353,7 +353,7 @@ class Binder : CallBinder {
     if (run_time_)
       fail("plugin variables are declared by the deck, not inside a run-time string",
            "use a set card before");
-    load_drive(declare_plugin(session_, item.name, item.where + 1).plugin);
+    load_drive(declare_plugin(reading_, item.name, item.where + 1).plugin);
   }
 
   // --------------------------------------------------------------------------------------------------------
@@ -458,9 +458,9 @@ class Binder : CallBinder {
 
 }  // namespace
 
-void bind(Session& session, const Syntax& syntax, const BindingRules& rules, Program* program) {
+void bind(Reading& reading, const Syntax& syntax, const BindingRules& rules, Program* program) {
   program->clear();
-  Binder(session, syntax, rules, program).bind();
+  Binder(reading, syntax, rules, program).bind();
 }
 
 }  // namespace mbcosim

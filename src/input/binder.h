@@ -26,6 +26,6 @@ struct BindingRules {
 };
 
 /// Throws ExpressionError. Declarations of cards enter the symbol table.
-void bind(Session& session, const Syntax& syntax, const BindingRules& rules, Program* program);
+void bind(Reading& reading, const Syntax& syntax, const BindingRules& rules, Program* program);
 
 }  // namespace mbcosim

@@ -2,7 +2,7 @@
 
 #include "input/model_functions.h"
 #include "input/nearest.h"
-#include "input/session.h"
+#include "input/reading.h"
 #include "model/drive.h"
 #include "model/model.h"
 
@@ -71,7 +71,7 @@ void CallBinder::call_conversion(ValueType to) {
 }
 
 void CallBinder::model_call(const SyntaxItem& item) {
-  if (!session_.model_available())
+  if (!reading_.model_available())
     fail("model::" + std::string(item.name) +
          " is not available before the end of the \"initial value\" block");
   const std::size_t colons = item.name.find("::");
@@ -112,8 +112,8 @@ void CallBinder::call_current(const SyntaxItem& item) {
   if (!is_text(top_type()) || out_.code.back().op != Op::push_text)
     fail("current: the argument must be a string");
   const std::string name = out_.texts[out_.code.back().index];
-  const auto value = session_.currents.find(name);
-  if (value == session_.currents.end())
+  const auto value = reading_.currents.find(name);
+  if (value == reading_.currents.end())
     fail("no value \"" + name + "\" is supplied by the card being read");
   out_.code.pop_back();
   stack_.pop_back();
@@ -122,8 +122,8 @@ void CallBinder::call_current(const SyntaxItem& item) {
 
 void CallBinder::call_scalar_function(const SyntaxItem& item, std::string_view name) {
   check_count(item, item.name, 1, 2);
-  const auto f = session_.functions.find(name);
-  if (f == session_.functions.end()) fail("scalar function " + in_quotes(name) + " is not defined");
+  const auto f = reading_.functions.find(name);
+  if (f == reading_.functions.end()) fail("scalar function " + in_quotes(name) + " is not defined");
   convert_argument(item.name, 0, item.count, 'R');
   if (item.count == 2) convert_argument(item.name, 1, 2, 'I');
   reduce_model(item.count, Op::function_value).index =
@@ -157,10 +157,10 @@ void CallBinder::call_datum(const SyntaxItem& item, Op op, int index) {
 bool CallBinder::bind_datum(int count, Op op, int index) {
   const Entry& text = stack_.back();
   const Entry& first = stack_[stack_.size() - count];
-  if (!text.constant || !first.constant || !session_.builder()) return false;
+  if (!text.constant || !first.constant || !reading_.builder()) return false;
   const std::string name = out_.texts[out_.code[text.start].index];
   const int label = count == 2 ? out_.code[first.start].integer : 0;
-  const Model& model = session_.builder()->model();
+  const Model& model = reading_.builder()->model();
   DrivePtr drive;
   try {
     drive = op == Op::node_datum

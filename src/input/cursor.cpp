@@ -5,7 +5,7 @@
 
 #include "input/evaluate.h"
 #include "input/lexer.h"
-#include "input/session.h"
+#include "input/reading.h"
 #include "input/syntax.h"
 #include "model/registry.h"
 
@@ -44,14 +44,14 @@ std::size_t read_head(Statement* s) {
   return s->has_arguments || colon >= s->text.size() ? std::string_view::npos : end;
 }
 
-Cursor::Cursor(Session& session, const Statement& statement)
-    : session_(session),
+Cursor::Cursor(Reading& reading, const Statement& statement)
+    : reading_(reading),
       statement_(statement),
       position_(statement.arguments),
       done_(!statement.has_arguments),
       last_end_(skip_words(statement.text, 0)) {}
 
-Session& Cursor::session() { return session_; }
+Reading& Cursor::reading() { return reading_; }
 
 bool Cursor::more() { return !done_; }
 
@@ -102,7 +102,7 @@ void Cursor::skip() {
 void Cursor::fail_after(std::size_t begin, std::size_t end, std::string_view what) {
   const std::string_view text = statement_.text;
   const auto span = [&](std::size_t from, std::size_t to) {
-    return session_.span(statement_.file, statement_.offset + from, to - from);
+    return reading_.span(statement_.file, statement_.offset + from, to - from);
   };
   if (begins_card(text, end) || begins_card(text, begin)) {
     const int line = span(0, 1).line;
@@ -177,7 +177,7 @@ Value Cursor::expression(std::string_view what) {
   Value value;
   if (plain_number(begin, &value)) return value;
   std::size_t end = begin;
-  value = evaluate_argument(session_, statement_, begin, &end);
+  value = evaluate_argument(reading_, statement_, begin, &end);
   std::size_t last = end;
   while (last > begin && is_blank(text[last - 1])) --last;
   finish_argument(begin, last);
@@ -196,7 +196,7 @@ std::string Cursor::quoted(std::string_view what) {
   std::string decoded;
   const std::size_t wrong = decode_quoted(text.substr(begin + 1, end - begin - 2), &decoded);
   const auto span = [&](std::size_t at, std::size_t length) {
-    return session_.span(statement_.file, statement_.offset + at, length);
+    return reading_.span(statement_.file, statement_.offset + at, length);
   };
   if (wrong != std::string_view::npos)
     fail(span(begin + 1 + wrong, 2), "unknown escape in a quoted argument",
@@ -227,7 +227,7 @@ Statement Cursor::rest_as_statement() {
   if (s.text.empty() || !is_word_start(s.text[0])) fail(next(), "card name expected");
   const std::size_t end = read_head(&s);
   if (end != std::string_view::npos)
-    fail(session_.span(s.file, s.offset + end, 1),
+    fail(reading_.span(s.file, s.offset + end, 1),
          "\":\" expected after \"" + excerpt(s.text.substr(0, end)) + '"');
   done_ = true;
   last_begin_ = begin;
@@ -242,26 +242,26 @@ SourceSpan Cursor::next() {
     // The last character of the statement: what is missing should follow it.
     std::size_t at = text.size();
     while (at > 1 && is_blank(text[at - 1])) --at;
-    return session_.span(statement_.file, statement_.offset + at - 1, 1);
+    return reading_.span(statement_.file, statement_.offset + at - 1, 1);
   }
   const std::size_t begin = skip_blanks(text, position_);
   std::size_t end = std::max(skip_argument(text, begin), begin);
   while (end > begin && is_blank(text[end - 1])) --end;
-  return session_.span(statement_.file, statement_.offset + begin,
+  return reading_.span(statement_.file, statement_.offset + begin,
                        std::max<std::size_t>(end - begin, 1));
 }
 
 SourceSpan Cursor::last() const {
-  return session_.span(statement_.file, statement_.offset + last_begin_,
+  return reading_.span(statement_.file, statement_.offset + last_begin_,
                        std::max<std::size_t>(last_end_ - last_begin_, 1));
 }
 
 void Cursor::fail(SourceSpan where, std::string message, std::string hint) {
-  session_.fail(where, std::move(message), std::move(hint));
+  reading_.fail(where, std::move(message), std::move(hint));
 }
 
 void Cursor::warn(SourceSpan where, std::string message, std::string hint) {
-  session_.warn(where, std::move(message), std::move(hint));
+  reading_.warn(where, std::move(message), std::move(hint));
 }
 
 }  // namespace mbcosim

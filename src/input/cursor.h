@@ -10,18 +10,18 @@
 
 namespace mbcosim {
 
-class Session;  // everything that outlives a statement: files, symbols, diagnostics, limits
-                // (input/session.h)
+class Reading;  // everything that outlives a statement: files, symbols, diagnostics, limits
+                // (input/reading.h)
 
 /// One statement as raw text with positions, split off before its meaning is known.
 struct Statement {
   std::string_view text;       ///< from the first character of the card word to before the `;`
-  int file = 0;                ///< index in Session::files
+  int file = 0;                ///< index in Reading::files
   std::size_t offset = 0;      ///< of text in its file
   std::string word;            ///< normalized card word ("controldata" for `control data`)
   bool has_arguments = false;  ///< a `:` follows the word
   std::size_t arguments = 0;   ///< offset in text of what follows the `:`
-  int trail = -1;              ///< include and loop context, for messages (index in Session)
+  int trail = -1;              ///< include and loop context, for messages (index in Reading)
 };
 
 /// Sets word, has_arguments and arguments from the text, which starts with a letter. Returns npos,
@@ -30,7 +30,7 @@ std::size_t read_head(Statement* statement);
 
 class Cursor {
  public:
-  Cursor(Session& session, const Statement& statement);  ///< stands before the first argument
+  Cursor(Reading& reading, const Statement& statement);  ///< stands before the first argument
 
   bool more();       ///< are there more arguments?
   bool at_string();  ///< is the next argument a quoted string?
@@ -52,14 +52,14 @@ class Cursor {
   SourceSpan last() const;  ///< span of the argument consumed last
   [[noreturn]] void fail(SourceSpan where, std::string message, std::string hint = "");
   void warn(SourceSpan where, std::string message, std::string hint = "");
-  Session& session();
+  Reading& reading();
 
  private:
   void finish_argument(std::size_t begin, std::size_t end);
   [[noreturn]] void fail_after(std::size_t begin, std::size_t end, std::string_view what);
   bool plain_number(std::size_t begin, Value* value);
 
-  Session& session_;
+  Reading& reading_;
   Statement statement_;
   std::size_t position_ = 0;  // of the next argument in statement_.text
   bool done_ = false;

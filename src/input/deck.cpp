@@ -22,14 +22,14 @@ bool Deck::was_refused(const std::string& kind, int label) const {
 
 void Deck::redefined(DeckCard& card, std::string_view kind, int label, SourceSpan before) {
   card.fail(std::string(kind) + " " + std::to_string(label) + " already defined at " +
-                session.place(before),
+                reading.place(before),
             "", "redefinition");
 }
 
-void Deck::take(DeckCard& card, Kind kind, int label) {
+void Deck::count_entity(DeckCard& card, Kind kind, int label) {
   Count& count = counts[static_cast<int>(kind)];
   ++count.found;
-  const int declared = count.declared ? *count.declared : session.options.strict ? 0 : count.found;
+  const int declared = count.declared ? *count.declared : reading.options.strict ? 0 : count.found;
   if (count.found <= declared) return;
   const KindNames& names = kind_names(kind);
   const std::string number = std::to_string(declared);

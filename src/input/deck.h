@@ -11,7 +11,7 @@
 
 #include "input/counts.h"
 #include "input/digest.h"
-#include "input/session.h"
+#include "input/reading.h"
 #include "model/beam_output.h"
 #include "model/model.h"
 #include "model/registry.h"
@@ -44,11 +44,11 @@ struct OutputDefaults {
 };
 
 struct Deck {
-  Deck(Session& s, ModelBuilder& b, const Registry& r) : session(s), builder(b), registry(r) {
+  Deck(Reading& s, ModelBuilder& b, const Registry& r) : reading(s), builder(b), registry(r) {
     scalar_scale.fill(1);
   }
 
-  Session& session;
+  Reading& reading;
   ModelBuilder& builder;
   const Registry& registry;
 
@@ -92,7 +92,7 @@ struct Deck {
   [[noreturn]] void redefined(DeckCard& card, std::string_view kind, int label, SourceSpan before);
 
   /// Counts one more entity of `kind`; refused when it is more than the deck declared.
-  void take(DeckCard& card, Kind kind, int label);
+  void count_entity(DeckCard& card, Kind kind, int label);
 };
 
 }  // namespace mbcosim

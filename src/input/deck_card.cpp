@@ -32,14 +32,14 @@ std::string text_of(double x) {
 }  // namespace
 
 DeckCard::DeckCard(Deck& deck, const Statement& statement)
-    : deck_(deck), statement_(statement), cursor_(deck.session, statement_) {}
+    : deck_(deck), statement_(statement), cursor_(deck.reading, statement_) {}
 
 SourceSpan DeckCard::head() const {
   std::size_t length = statement_.text.find_first_of(":;,");
   if (length == std::string_view::npos) length = statement_.text.size();
   while (length > 1 && std::isspace(static_cast<unsigned char>(statement_.text[length - 1])))
     --length;
-  return deck_.session.span(statement_.file, statement_.offset, length);
+  return deck_.reading.span(statement_.file, statement_.offset, length);
 }
 
 void DeckCard::set_subject(std::string subject, std::string type) {
@@ -55,7 +55,7 @@ void DeckCard::set_defining(std::string kind, int label) {
 std::string_view DeckCard::next_text() {
   if (!cursor_.more()) return {};
   const SourceSpan where = next();
-  const std::size_t start = deck_.session.offset_of(where) - statement_.offset;
+  const std::size_t start = deck_.reading.offset_of(where) - statement_.offset;
   return statement_.text.substr(std::min(start, statement_.text.size()), where.length);
 }
 
@@ -66,7 +66,7 @@ void DeckCard::skip() {
 
 void DeckCard::accept_word() {
   const std::string_view text = next_text();
-  const Symbol* const symbol = std::as_const(deck_.session.symbols).find(text);
+  const Symbol* const symbol = std::as_const(deck_.reading.symbols).find(text);
   if (symbol && symbol->role == SymbolRole::plain && !symbol->predefined)
     warn_at(next(),
             "\"" + symbol->name + "\" is a keyword here; the variable of this name is hidden",
@@ -135,11 +135,11 @@ bool DeckCard::at_string() { return cursor_.more() && cursor_.at_string(); }
 // numbers
 
 DeckCard::Nesting::Nesting(DeckCard& card) : card_(card) {
-  if (++card_.nesting_ <= card_.deck_.session.limits.expression_depth) return;
+  if (++card_.nesting_ <= card_.deck_.reading.limits.expression_depth) return;
   --card_.nesting_;
-  card_.deck_.session.fail_limit(card_.last(), "expression-depth",
+  card_.deck_.reading.fail_limit(card_.last(), "expression-depth",
                                  "drives, laws or functions are nested deeper than " +
-                                     std::to_string(card_.deck_.session.limits.expression_depth) +
+                                     std::to_string(card_.deck_.reading.limits.expression_depth) +
                                      " levels");
 }
 
@@ -163,7 +163,7 @@ void DeckCard::refuse_word(std::string_view what) {
       "single", "array",     "velocity", "angularvelocity", "yes",      "no",          "guess",
       "forever"};
   if (!kWords.count(w)) return;
-  if (deck_.session.symbols.find(next_text())) return;
+  if (deck_.reading.symbols.find(next_text())) return;
   fail_expected(std::string(what) + " expected, keyword \"" + w + "\" found");
 }
 
@@ -250,8 +250,8 @@ std::string DeckCard::quoted(std::string_view what) {
 std::string DeckCard::file_contents(std::string_view what, std::string* name) {
   const std::string written = quoted(what);
   if (name) *name = written;
-  Result<std::string> text = deck_.session.read_data(written, statement_.file);
-  if (!text) deck_.session.fail_read(last(), text.error(), statement_.file);
+  Result<std::string> text = deck_.reading.read_data(written, statement_.file);
+  if (!text) deck_.reading.fail_read(last(), text.error(), statement_.file);
   deck_.data_files.add(written);
   deck_.data_files.add(*text);
   return std::move(*text);
@@ -269,18 +269,18 @@ void DeckCard::fail_at(SourceSpan where, const std::string& message, const std::
   std::string text = message;
   if (!type_.empty() && text.starts_with(type_ + ": ")) text.erase(0, type_.size() + 2);
   if (!subject_.empty()) text = subject_ + ": " + text;
-  deck_.session.fail(where, std::move(text), hint, code);
+  deck_.reading.fail(where, std::move(text), hint, code);
 }
 
 void DeckCard::fail_undefined(SourceSpan where, const std::string& kind, int label,
                               const std::string& hint) {
-  if (deck_.was_refused(kind, label)) deck_.session.set_damaged(true);
+  if (deck_.was_refused(kind, label)) deck_.reading.set_damaged(true);
   fail_at(where, undefined_text(kind, label), hint, "undefined");
 }
 
 void DeckCard::fail_unsupported(SourceSpan where, const std::string& word,
                                 const std::string& what) {
-  deck_.session.fail(where,
+  deck_.reading.fail(where,
                      (subject_.empty() ? "" : subject_ + ": ") + "\"" + word + "\" (" + what +
                          ") is not supported yet",
                      "", "not-supported");
@@ -297,7 +297,7 @@ void DeckCard::refuse_unsupported(SourceSpan where, const std::string& context,
 }
 
 void DeckCard::warn_at(SourceSpan where, const std::string& message, const std::string& hint) {
-  deck_.session.warn(where, subject_.empty() ? message : subject_ + ": " + message, hint);
+  deck_.reading.warn(where, subject_.empty() ? message : subject_ + ": " + message, hint);
 }
 
 void DeckCard::warn(const std::string& message, const std::string& hint) {
@@ -305,8 +305,8 @@ void DeckCard::warn(const std::string& message, const std::string& hint) {
 }
 
 void DeckCard::note(const std::string& message) {
-  deck_.session.report(
-      deck_.session.diagnostic(Severity::note, "note", head(), card_name() + ": " + message));
+  deck_.reading.report(
+      deck_.reading.diagnostic(Severity::note, "note", head(), card_name() + ": " + message));
 }
 
 std::string DeckCard::card_name() const {
@@ -333,7 +333,7 @@ void DeckCard::expect_end() {
 }
 
 void DeckCard::set_current(const std::string& name, double value) {
-  deck_.session.currents[name] = value;
+  deck_.reading.currents[name] = value;
 }
 const Registry& DeckCard::registry() const { return deck_.registry; }
 ModelBuilder& DeckCard::builder() { return deck_.builder; }

@@ -234,7 +234,7 @@ class DeckCard final : public Card, public BeamOutputDefault {
   NodeDof structural_dof(int label, SourceSpan where);
   void read_order(NodeDof& dof, bool dynamic);
 
-  Hint* take_hint(std::string_view name);
+  Hint* use_hint(std::string_view name);
   /// What `read` makes of the hint `name`, whose first word may be `form`; without one, `given`.
   template <class Given, class Read>
   Given from_hint(std::string_view name, std::string_view form, Given given, Read read);

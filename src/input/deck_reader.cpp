@@ -34,38 +34,38 @@ bool has_content(std::string_view text) {
 }  // namespace
 
 void DeckReader::record(const DeckError& error, const DeckCard& card) {
-  deck_.session.report(error.diagnostic);
+  deck_.reading.report(error.diagnostic);
   if (!card.defined_kind().empty()) deck_.damage(card.defined_kind(), card.defined_label());
 }
 
 void DeckReader::read() {
-  Session& session = deck_.session;
-  while (!done_ && !session.full() && !session.exited && !deck_.inverse_dynamics) {
+  Reading& reading = deck_.reading;
+  while (!done_ && !reading.full() && !reading.exited && !deck_.inverse_dynamics) {
     const std::optional<Statement> statement = statements_.next();
     if (!statement) break;
-    session.set_trail(statement->trail);
+    reading.set_trail(statement->trail);
     read_statement(*statement);
     if (done_) warn_about_rest(*statement);
   }
-  session.set_trail(-1);
-  if (!session.full() && !session.exited && !deck_.inverse_dynamics) finish();
+  reading.set_trail(-1);
+  if (!reading.full() && !reading.exited && !deck_.inverse_dynamics) finish();
 }
 
 void DeckReader::read_statement(const Statement& statement) {
-  Session& session = deck_.session;
+  Reading& reading = deck_.reading;
   DeckCard card(deck_, statement);
   try {
     dispatch(card);
   } catch (const DeckError& error) {
     record(error, card);
   } catch (const std::exception& error) {
-    record(DeckError(session.diagnostic(
+    record(DeckError(reading.diagnostic(
                Severity::error, "error", card.last(),
                card.subject().empty() ? error.what() : card.subject() + ": " + error.what())),
            card);
   }
-  session.set_damaged(false);
-  session.currents.clear();
+  reading.set_damaged(false);
+  reading.currents.clear();
 }
 
 void DeckReader::dispatch(DeckCard& card) {
@@ -106,7 +106,7 @@ void DeckReader::open(Block block, const std::string& name, SourceSpan where) {
 
 void DeckReader::close() {
   if (block_ == Block::initial_value)
-    deck_.session.start_run_variables(deck_.builder.model().initial_value.initial_time);
+    deck_.reading.start_run_variables(deck_.builder.model().initial_value.initial_time);
   if (block_ == Block::elements) done_ = true;
   block_ = Block::none;
 }
@@ -122,20 +122,20 @@ void DeckReader::check_order(DeckCard& card, Block block) {
   }
   const Block last_required = std::min(block, Block::nodes);
   for (int b = static_cast<int>(latest_) + 1; b < static_cast<int>(last_required); ++b) {
-    deck_.session.report(
-        deck_.session.diagnostic(Severity::error, "block-order", card.last(),
+    deck_.reading.report(
+        deck_.reading.diagnostic(Severity::error, "block-order", card.last(),
                                  std::string("block \"") + kBlockNames[b] + "\" expected"));
     return;
   }
 }
 
 void DeckReader::begin(DeckCard& card) {
-  Session& session = deck_.session;
+  Reading& reading = deck_.reading;
   if (!card.more()) card.fail("name of the block missing", "", "missing-argument");
   const SourceSpan where = card.next();
   const std::string name = card.word("block");
   if (block_ != Block::none) {
-    session.report(session.diagnostic(
+    reading.report(reading.diagnostic(
         Severity::error, "block", card.head(),
         "block \"" + name_ + "\" begun at line " + std::to_string(begun_.line) + " is not closed"));
     close();
@@ -190,12 +190,12 @@ void DeckReader::end(DeckCard& card) {
 }
 
 void DeckReader::warn_about_rest(const Statement& last) {
-  Session& session = deck_.session;
+  Reading& reading = deck_.reading;
   if (last.file != 0) return;
-  const std::string& text = session.file(0).text;
+  const std::string& text = reading.file(0).text;
   const std::size_t after = std::min(text.find(';', last.offset + last.text.size()), text.size());
   if (after < text.size() && has_content(std::string_view(text).substr(after + 1)))
-    session.warn(session.span(0, last.offset, last.text.size()),
+    reading.warn(reading.span(0, last.offset, last.text.size()),
                  "text after the last block is ignored");
 }
 
@@ -203,7 +203,7 @@ void DeckReader::warn_about_rest(const Statement& last) {
 // end of the deck
 
 void DeckReader::check_counts() {
-  Session& session = deck_.session;
+  Reading& reading = deck_.reading;
   std::string missing;
   for (int k = 0; k < kKinds; ++k) {
     const Count& count = deck_.counts[k];
@@ -214,17 +214,17 @@ void DeckReader::check_counts() {
                (lack == 1 ? names.singular : names.plural);
   }
   if (!missing.empty())
-    session.report(session.diagnostic(Severity::error, "missing-entities", begun_,
+    reading.report(reading.diagnostic(Severity::error, "missing-entities", begun_,
                                       "end of the deck: " + missing + " missing",
                                       "see the counts of the control data"));
 }
 
 void DeckReader::check_parameters() {
-  Session& session = deck_.session;
+  Reading& reading = deck_.reading;
   const std::vector<ScalarNode>& scalars = deck_.builder.model().scalars;
   for (std::size_t i = 0; i < scalars.size(); ++i)
     if (scalars[i].bound_to_element && !deck_.bound_parameters.count(static_cast<int>(i)))
-      session.report(session.diagnostic(
+      reading.report(reading.diagnostic(
           Severity::error, "unbound-parameter", scalars[i].where,
           "parameter node " + std::to_string(scalars[i].label) + " is bound to no element",
           "add a \"bind\" card to the elements"));
@@ -234,15 +234,15 @@ void DeckReader::check_parameters() {
 void DeckReader::check_initial_value() {
   InitialValueSettings& s = deck_.builder.model().initial_value;
   const auto refuse = [&](SourceSpan where, const std::string& message) {
-    deck_.session.report(
-        deck_.session.diagnostic(Severity::error, "initial-value", where, message));
+    deck_.reading.report(
+        deck_.reading.diagnostic(Severity::error, "initial-value", where, message));
   };
   const bool third_order =
       s.method.method == Method::third_order || s.method.method == Method::third_order_ad_hoc;
   if (third_order && s.line_search)
     refuse(deck_.method_where, "the third order method has no line search: use newton raphson");
   if (s.method.method == Method::hope && s.strategy != StepStrategy::no_change)
-    deck_.session.report(deck_.session.diagnostic(
+    deck_.reading.report(deck_.reading.diagnostic(
         Severity::warning, "initial-value", deck_.strategy_where,
         "method hope supposes equal steps: it loses its order when they vary", "use `method: ms`"));
   if (s.strategy == StepStrategy::factor) {
@@ -269,16 +269,16 @@ void DeckReader::check_initial_value() {
 }
 
 void DeckReader::finish() {
-  Session& session = deck_.session;
+  Reading& reading = deck_.reading;
   if (block_ != Block::none) {
-    session.report(session.diagnostic(
+    reading.report(reading.diagnostic(
         Severity::error, "end-of-file", begun_,
         "end of file in block \"" + name_ + "\" begun at line " + std::to_string(begun_.line)));
     return;
   }
   if (latest_ == Block::none) return;  // a deck without blocks: a calculator
   if (latest_ < Block::control_data) {
-    session.report(session.diagnostic(Severity::error, "block-order", begun_,
+    reading.report(reading.diagnostic(Severity::error, "block-order", begun_,
                                       std::string("block \"") +
                                           kBlockNames[static_cast<int>(latest_) + 1] +
                                           "\" expected, end of file found"));
@@ -290,7 +290,7 @@ void DeckReader::finish() {
   Model& model = deck_.builder.model();
   const InitialValueSettings& iv = model.initial_value;
   if (iv.final_time < iv.initial_time && deck_.final_time_where.file >= 0)
-    session.warn(deck_.final_time_where,
+    reading.warn(deck_.final_time_where,
                  "final time is before the initial time: there is nothing to integrate");
   if (model.control.output_drives)
     for (const int d : deck_.drives_without_output) model.drives[d].output_value = true;

@@ -9,7 +9,7 @@ namespace mbcosim {
 class DeckReader {
  public:
   DeckReader(Deck& deck, Statements& statements) : deck_(deck), statements_(statements) {}
-  /// Reads to the end of the deck. What is wrong goes to the session's diagnostics.
+  /// Reads to the end of the deck. What is wrong goes to the reading's diagnostics.
   void read();
 
  private:

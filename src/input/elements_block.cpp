@@ -161,7 +161,7 @@ void read_element(DeckCard& card, Driven* driven = nullptr) {
   read_element_head(card, f, has_label, driven, info);
   const bool counted_later = f == Family::inertia;  // counts only with `output, always`
   const std::string subject = card.subject();
-  if (!counted_later) card.deck().take(card, kind_of(f), info.label);
+  if (!counted_later) card.deck().count_entity(card, kind_of(f), info.label);
   card.set_subject(subject);
   if (head == registry.heads.end()) fail_unknown_head(card);
   info.name = card.optional_name();
@@ -184,7 +184,7 @@ void read_element(DeckCard& card, Driven* driven = nullptr) {
   read_trailing_output(card, f, before);
   card.expect_end();
   if (counted_later && card.model().elements.size() > before)
-    card.deck().take(card, kind_of(f), info.label);
+    card.deck().count_entity(card, kind_of(f), info.label);
 }
 
 // ------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 #include "input/emitter.h"
 
-#include "input/session.h"
+#include "input/reading.h"
 
 namespace mbcosim {
 
@@ -69,7 +69,7 @@ void Emitter::fold() {
   part.texts = out_.texts;
   part.depth = static_cast<int>(part.code.size()) + 1;
   Frame<double> frame;
-  frame.context = &session_.context();
+  frame.context = &reading_.context();
   Slot<double> result;
   try {
     result = run(part, frame);

@@ -17,8 +17,8 @@ inline bool is_text(ValueType t) { return t == ValueType::string; }
 /// and errors get its place.
 class Emitter {
  protected:
-  Emitter(Session& session, bool run_time, Program& program)
-      : session_(session), run_time_(run_time), out_(program) {}
+  Emitter(Reading& reading, bool run_time, Program& program)
+      : reading_(reading), run_time_(run_time), out_(program) {}
 
   /// A value on the stack: its type, and where the code that makes it begins.
   struct Entry {
@@ -69,7 +69,7 @@ class Emitter {
   /// Run-time strings: computes now what does not depend on anything.
   void fold();
 
-  Session& session_;
+  Reading& reading_;
   const bool run_time_;  ///< a run-time string: what is known now is computed now
   Program& out_;
   const SyntaxItem* item_ = nullptr;

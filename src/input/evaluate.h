@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "input/program.h"
-#include "input/session.h"
+#include "input/reading.h"
 #include "input/syntax.h"
 
 namespace mbcosim {
@@ -20,11 +20,11 @@ struct ExpressionScratch {
 
 /// Evaluates the argument at `begin` of the statement's text, which ends there or at a `,` (`end`).
 /// Throws DeckError.
-Value evaluate_argument(Session& session, const Statement& statement, std::size_t begin,
+Value evaluate_argument(Reading& reading, const Statement& statement, std::size_t begin,
                         std::size_t* end);
 
 /// The value of a constant sub-expression that is given as text: labels inside plugin variables.
 /// `where`: its offset in the enclosing expression. Throws ExpressionError.
-Value evaluate_part(Session& session, std::string_view text, std::size_t where);
+Value evaluate_part(Reading& reading, std::string_view text, std::size_t where);
 
 }  // namespace mbcosim

@@ -82,7 +82,7 @@ void DeckCard::set_hints(std::vector<Hint>* hints, std::vector<HintSample>* samp
   samples_ = samples;
 }
 
-Hint* DeckCard::take_hint(std::string_view name) {
+Hint* DeckCard::use_hint(std::string_view name) {
   if (!hints_) return nullptr;
   const auto hint = std::find_if(hints_->begin(), hints_->end(),
                                  [&](const Hint& h) { return !h.used && h.name == name; });
@@ -110,7 +110,7 @@ int DeckCard::sample(DeckCard& arguments, std::string_view what) {
 
 template <class Given, class Read>
 Given DeckCard::from_hint(std::string_view name, std::string_view form, Given given, Read read) {
-  Hint* hint = take_hint(name);
+  Hint* hint = use_hint(name);
   if (!hint) return given;
   DeckCard arguments(deck_, hint->arguments);
   arguments.set_subject(subject_);

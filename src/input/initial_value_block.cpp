@@ -202,7 +202,7 @@ void read_dummy_method(DeckCard& card) {
 void read_method_card(DeckCard& card) {
   Deck& deck = card.deck();
   if (deck.method_set)
-    card.fail_at(card.head(), "method already set at " + deck.session.place(deck.method_where));
+    card.fail_at(card.head(), "method already set at " + deck.reading.place(deck.method_where));
   settings(card).method = read_method(card);
   deck.method_set = true;
   deck.method_where = card.head();

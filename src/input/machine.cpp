@@ -4,7 +4,7 @@
 #include "input/function_values.h"
 #include "input/model_functions.h"
 #include "input/program.h"
-#include "input/session.h"
+#include "input/reading.h"
 #include "input/syntax.h"
 #include "model/drive.h"
 #include "model/scalar_function.h"
@@ -287,7 +287,7 @@ class Machine {
         v = frame_.texts.back();
         break;
     }
-    in.symbol->damaged = frame_.session && frame_.session->is_damaged();
+    in.symbol->damaged = frame_.reading && frame_.reading->is_damaged();
   }
 
   std::string pop_text() {
@@ -299,8 +299,8 @@ class Machine {
   // ------------------------------------------------------------------------------------------------------
   // conversions
   void warn(const Instruction& in, const std::string& message) {
-    if (in.loss == Loss::warn && frame_.session)
-      frame_.session->warn_in_expression(in.where, in.length, message);
+    if (in.loss == Loss::warn && frame_.reading)
+      frame_.reading->warn_in_expression(in.where, in.length, message);
   }
 
   void convert(const Instruction& in) {
@@ -370,8 +370,8 @@ class Machine {
 
   /// Integers of 32 bits wrap; hardly a deck means that.
   void warn_of_wrapping(const Instruction& in, std::int32_t result) {
-    if (frame_.session)
-      frame_.session->warn_in_expression(
+    if (frame_.reading)
+      frame_.reading->warn_in_expression(
           in.where, in.length, "integer overflow: the result wraps to " + std::to_string(result));
   }
 
@@ -473,22 +473,22 @@ class Machine {
   }
 
   std::int32_t random() {
-    if (frame_.session) return frame_.session->random();
+    if (frame_.reading) return frame_.reading->random();
     const std::uint64_t step = static_cast<std::uint64_t>(state().step);
     return hashed_random(frame_.random_key * 0x100000001b3u + step * 1048573u + ++random_calls_);
   }
 
   void seed(std::uint32_t value) {
-    if (frame_.session)
-      frame_.session->seed(value);
+    if (frame_.reading)
+      frame_.reading->seed(value);
     else
       frame_.random_key = value;
     top_->i = 0;
   }
 
   void print(const Instruction& in) {
-    if (frame_.session)
-      frame_.session->print(frame_.session->expression_span(in.where, in.length),
+    if (frame_.reading)
+      frame_.reading->print(frame_.reading->expression_span(in.where, in.length),
                             printed(value_of(top_->r)) + '\n');
     top_->i = 0;
   }
@@ -497,8 +497,8 @@ class Machine {
     const int condition = top_->i, status = top_[1].i;
     top_->i = 0;
     if (condition == 0) return;
-    if (frame_.session && status == 0) frame_.session->exited = true;
-    if (frame_.session) frame_.session->stop();
+    if (frame_.reading && status == 0) frame_.reading->exited = true;
+    if (frame_.reading) frame_.reading->stop();
     throw EvaluationError("stopped by the deck: stop(" + std::to_string(condition) + ", " +
                           std::to_string(status) + ")");
   }

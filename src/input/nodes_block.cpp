@@ -116,7 +116,7 @@ int begin_node(DeckCard& card, Kind kind, Node& node, int existing(const Model&,
   card.set_subject("");
   if (const int index = existing(card.model(), label); index >= 0)
     card.deck().redefined(card, name, label, where(card.model(), index));
-  card.deck().take(card, kind, label);
+  card.deck().count_entity(card, kind, label);
   card.set_subject(std::string(name) + " " + std::to_string(label));
   node.where = card.head();
   node.name = card.optional_name();
@@ -195,7 +195,7 @@ void read_driver_card(DeckCard& card) {
   card.set_defining("file driver", label);
   if (const auto found = deck.file_drivers.find(label); found != deck.file_drivers.end())
     deck.redefined(card, "file driver", label, found->second.where);
-  deck.take(card, Kind::file_driver, label);
+  deck.count_entity(card, Kind::file_driver, label);
   card.set_subject("file driver " + std::to_string(label));
   card.optional_name();
   FileDriverPtr driver = card.file_driver_definition();

@@ -15,15 +15,15 @@ namespace mbcosim {
 class PendingString {
  public:
   /// Parses; throws DeckError.
-  PendingString(Session& session, std::string text, SourceSpan where,
+  PendingString(Reading& reading, std::string text, SourceSpan where,
                 std::vector<std::string> arguments = {});
 
   /// Binds names for good; false when something is wrong, which was reported then.
-  bool bind(Session& session);
+  bool bind(Reading& reading);
   /// The reader is gone.
-  void detach() { session_ = nullptr; }
+  void detach() { reading_ = nullptr; }
   /// Marks the deck's variables that this string assigns with indices from `*count` on.
-  void claim_variables(Session& session, int* count);
+  void claim_variables(Reading& reading, int* count);
   bool assigns() const { return assigns_; }
   SourceSpan where() const { return where_; }
 
@@ -44,12 +44,12 @@ class PendingString {
   double gradient(const EvalContext& context, const double* arguments, double* gradient) const;
   template <class T>
   T result(const Program& program, const Slot<T>& slot) const;
-  void bind_to(Session& session, Program* program) const;
-  void capture(const Session& session);
-  [[noreturn]] void fail(Session& session, const ExpressionError& e) const;
+  void bind_to(Reading& reading, Program* program) const;
+  void capture(const Reading& reading);
+  [[noreturn]] void fail(Reading& reading, const ExpressionError& e) const;
   [[noreturn]] void fail_run(const ExpressionError& e) const;
 
-  Session* session_;
+  Reading* reading_;
   std::string text_;
   SourceSpan where_;
   std::string place_;  ///< "a.mbd:3:12", for messages during the run

@@ -6,7 +6,7 @@
 #include "input/functions.h"
 #include "input/lexer.h"
 #include "input/model_functions.h"
-#include "input/session.h"
+#include "input/reading.h"
 #include "input/syntax.h"
 #include "model/model.h"
 #include "model/registry.h"
@@ -57,8 +57,8 @@ std::string unquoted(std::string_view s) {
 /// Reads the items of one plugin variable in order.
 class Reader {
  public:
-  Reader(Session& session, std::string_view text, std::size_t where)
-      : session_(session), whole_{text, where}, items_(split(text, where)) {}
+  Reader(Reading& reading, std::string_view text, std::size_t where)
+      : reading_(reading), whole_{text, where}, items_(split(text, where)) {}
 
   Symbol& declare() {
     if (items_.size() < 2 || items_[0].text.empty() || items_[1].text.empty())
@@ -70,13 +70,13 @@ class Reader {
     check_name();
     if (items_.size() < 4)
       fail(whole_, "malformed plugin variable: label and type expected after the name");
-    if (!session_.model_available() || !session_.builder())
+    if (!reading_.model_available() || !reading_.builder())
       fail(whole_,
            "plugin variables are not available before the end of the \"initial value\" block");
     Symbol s;
     s.name = items_[1].text;
     s.value = 0.0;
-    s.where = session_.expression_span(items_[1].where, items_[1].text.size());
+    s.where = reading_.expression_span(items_[1].where, items_[1].text.size());
     try {
       s.plugin = kind == "dof" ? dof() : datum(kind == "node");
     } catch (const ExpressionError&) {
@@ -86,7 +86,7 @@ class Reader {
     }
     if (next_ < items_.size())
       fail(items_[next_], "unexpected argument \"" + excerpt(items_[next_].text) + '"');
-    return session_.symbols.declare(std::move(s));
+    return reading_.symbols.declare(std::move(s));
   }
 
  private:
@@ -95,13 +95,13 @@ class Reader {
     if (!is_word_start(name[0]) || skip_identifier(name, 0) != name.size())
       fail(items_[1], "\"" + excerpt(name) + "\" is not a name of a variable");
     if (find_function(name)) fail(items_[1], "\"" + std::string(name) + "\" is a function name");
-    if (const Symbol* known = session_.symbols.find(name))
+    if (const Symbol* known = reading_.symbols.find(name))
       fail(items_[1], "variable \"" + std::string(name) + "\" already declared" +
-                          (known->where.file >= 0 ? " at " + session_.place(known->where) : ""));
+                          (known->where.file >= 0 ? " at " + reading_.place(known->where) : ""));
   }
 
   int integer(const Item& item, const char* what) {
-    const Value v = evaluate_part(session_, item.text, item.where);
+    const Value v = evaluate_part(reading_, item.text, item.where);
     if (const auto* i = std::get_if<std::int32_t>(&v)) return *i;
     fail(item, std::string(what) + " must be an integer");
   }
@@ -126,7 +126,7 @@ class Reader {
     if (order != "algebraic" && order != "differential")
       fail(items_[next_], "\"algebraic\" or \"differential\" expected");
     ++next_;
-    return dof_value(session_.builder()->model(), kind, label, component, order == "differential",
+    return dof_value(reading_.builder()->model(), kind, label, component, order == "differential",
                      previous());
   }
 
@@ -151,7 +151,7 @@ class Reader {
     std::string name;
     int index = 0;
     if (next_ < items_.size()) read_datum_choice(items_[next_++], &name, &index);
-    const Model& model = session_.builder()->model();
+    const Model& model = reading_.builder()->model();
     return is_node ? node_datum(model, kind, label, name, index)
                    : element_datum(model, family, true, label, name, index);
   }
@@ -170,7 +170,7 @@ class Reader {
       *name = unquoted(value.text);
   }
 
-  Session& session_;
+  Reading& reading_;
   Item whole_;
   std::vector<Item> items_;
   std::size_t next_ = 4;
@@ -178,8 +178,8 @@ class Reader {
 
 }  // namespace
 
-Symbol& declare_plugin(Session& session, std::string_view text, std::size_t where) {
-  return Reader(session, text, where).declare();
+Symbol& declare_plugin(Reading& reading, std::string_view text, std::size_t where) {
+  return Reader(reading, text, where).declare();
 }
 
 }  // namespace mbcosim

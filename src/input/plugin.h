@@ -7,10 +7,10 @@
 
 namespace mbcosim {
 
-class Session;
+class Reading;
 
 /// Declares the variable that `text`, the inside of the brackets, describes. `where`: offset of the
 /// text in the expression. Throws ExpressionError.
-Symbol& declare_plugin(Session& session, std::string_view text, std::size_t where);
+Symbol& declare_plugin(Reading& reading, std::string_view text, std::size_t where);
 
 }  // namespace mbcosim

@@ -13,7 +13,7 @@
 
 namespace mbcosim {
 
-class Session;
+class Reading;
 
 enum class Op : std::uint8_t {
   push,       ///< constant of the instruction's type
@@ -117,7 +117,7 @@ struct Slot {
 template <class T>
 struct Frame {
   const EvalContext* context = nullptr;
-  Session* session = nullptr;  ///< while the deck is read; null during the run
+  Reading* reading = nullptr;  ///< while the deck is read; null during the run
   const T* arguments = nullptr;
   double var = 0;                  ///< value of `Var`
   std::uint64_t random_key = 0;    ///< distinguishes the random numbers of different strings

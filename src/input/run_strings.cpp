@@ -69,43 +69,43 @@ std::uint64_t hash(std::string_view s) {
 
 }  // namespace
 
-PendingString::PendingString(Session& session, std::string text, SourceSpan where,
+PendingString::PendingString(Reading& reading, std::string text, SourceSpan where,
                              std::vector<std::string> arguments)
-    : session_(&session),
+    : reading_(&reading),
       text_(std::move(text)),
       where_(where),
-      trail_(session.trail()),
+      trail_(reading.trail()),
       arguments_(std::move(arguments)),
-      currents_(session.currents) {
-  place_ = session.place(where) + ":" + std::to_string(where.column);
+      currents_(reading.currents) {
+  place_ = reading.place(where) + ":" + std::to_string(where.column);
   random_key_ = hash(text_) ^ hash(place_);
   try {
-    parse_string(text_, session.limits, &syntax_);
+    parse_string(text_, reading.limits, &syntax_);
   } catch (const ExpressionError& e) {
-    fail(session, e);
+    fail(reading, e);
   }
-  capture(session);
+  capture(reading);
   for (const SyntaxItem& item : syntax_.items) assigns_ = assigns_ || item.form == Form::assign;
 }
 
 /// Variables of loop passes are replaced by their present values.
-void PendingString::capture(const Session& session) {
+void PendingString::capture(const Reading& reading) {
   for (const SyntaxItem& item : syntax_.items) {
     if (item.form != Form::name && item.form != Form::assign) continue;
-    const Symbol* s = session.symbols.find(item.name);
+    const Symbol* s = reading.symbols.find(item.name);
     if (s && s->scope > 0) captured_[std::string(item.name)] = {s->value, s->plugin};
   }
 }
 
-void PendingString::fail(Session& session, const ExpressionError& e) const {
+void PendingString::fail(Reading& reading, const ExpressionError& e) const {
   // Without escapes the text stands in the file as it is, and the place is exact.
   SourceSpan where = where_;
   if (where.file >= 0) {
-    const std::size_t begin = session.offset_of(where_);
-    if (session.file(where.file).text.compare(begin + 1, text_.size(), text_) == 0)
-      where = session.span(where.file, begin + 1 + e.where, e.length);
+    const std::size_t begin = reading.offset_of(where_);
+    if (reading.file(where.file).text.compare(begin + 1, text_.size(), text_) == 0)
+      where = reading.span(where.file, begin + 1 + e.where, e.length);
   }
-  Diagnostic d = session.diagnostic(Severity::error, e.code, where, e.what(), e.hint);
+  Diagnostic d = reading.diagnostic(Severity::error, e.code, where, e.what(), e.hint);
   d.trail.insert(d.trail.begin(),
                  "at offset " + std::to_string(e.where) + " of the string at " + place_);
   throw DeckError(std::move(d));
@@ -116,52 +116,52 @@ void PendingString::fail_run(const ExpressionError& e) const {
                         " of the string at " + place_ + ")");
 }
 
-void PendingString::bind_to(Session& session, Program* program) const {
+void PendingString::bind_to(Reading& reading, Program* program) const {
   BindingRules rules;
   rules.run_time = true;
   rules.captured = &captured_;
   rules.arguments = &arguments_;
   rules.text = text_;
   std::map<std::string, double, std::less<>> currents = currents_;
-  session.currents.swap(currents);
+  reading.currents.swap(currents);
   struct Restore {
-    Session& session;
+    Reading& reading;
     std::map<std::string, double, std::less<>>& currents;
-    ~Restore() { session.currents.swap(currents); }
-  } restore{session, currents};
-  mbcosim::bind(session, syntax_, rules, program);
+    ~Restore() { reading.currents.swap(currents); }
+  } restore{reading, currents};
+  mbcosim::bind(reading, syntax_, rules, program);
   if (program->type == ValueType::string)
     throw ExpressionError(0, text_.size(),
                           "the value of a run-time string must be a number, string found");
 }
 
-bool PendingString::bind(Session& session) {
-  const int trail = session.trail();
-  session.set_trail(trail_);
+bool PendingString::bind(Reading& reading) {
+  const int trail = reading.trail();
+  reading.set_trail(trail_);
   bool good = true;
   try {
-    bind_to(session, &program_);
+    bind_to(reading, &program_);
   } catch (const ExpressionError& e) {
     good = false;
     try {
-      fail(session, e);
+      fail(reading, e);
     } catch (const DeckError& d) {
-      session.report(d.diagnostic);
+      reading.report(d.diagnostic);
     }
   }
-  session_ = nullptr;
-  session.set_damaged(false);
-  session.set_trail(trail);
+  reading_ = nullptr;
+  reading.set_damaged(false);
+  reading.set_trail(trail);
   return good;
 }
 
-void PendingString::claim_variables(Session& session, int* count) {
+void PendingString::claim_variables(Reading& reading, int* count) {
   for (const SyntaxItem& item : syntax_.items) {
     if (item.form != Form::assign || captured_.count(std::string(item.name))) continue;
     const bool is_local =
         std::any_of(syntax_.declared.begin(), syntax_.declared.end(),
                     [&](const SyntaxItem& d) { return d.name == item.name && !d.if_undefined; });
-    Symbol* s = is_local ? nullptr : session.symbols.find(item.name);
+    Symbol* s = is_local ? nullptr : reading.symbols.find(item.name);
     if (!s || s->constant || s->plugin || s->variable >= 0 || s->role != SymbolRole::plain)
       continue;
     if (type_of(s->value) == ValueType::string) continue;
@@ -183,9 +183,9 @@ T PendingString::evaluate(const EvalContext& context, const T* arguments, double
   frame.random_key = random_key_;
   try {
     if (!program_.code.empty()) return result(program_, run(program_, frame));
-    if (!session_) throw EvaluationError("the string at " + place_ + " was never bound");
+    if (!reading_) throw EvaluationError("the string at " + place_ + " was never bound");
     Program now;  // evaluated while the deck is still being read: with the present meaning of names
-    bind_to(*session_, &now);
+    bind_to(*reading_, &now);
     return result(now, run(now, frame));
   } catch (const ExpressionError& e) {
     fail_run(e);
@@ -239,23 +239,23 @@ void PendingString::commit(const EvalContext& context, std::vector<double>* vari
 // ----------------------------------------------------------------------------------------------------------------
 // reader
 
-DrivePtr compile_string(Session& session, const std::string& text, SourceSpan where) {
-  auto string = std::make_shared<PendingString>(session, text, where);
-  session.add_pending(string);
+DrivePtr compile_string(Reading& reading, const std::string& text, SourceSpan where) {
+  auto string = std::make_shared<PendingString>(reading, text, where);
+  reading.add_pending(string);
   return std::make_shared<StringDrive>(string);
 }
 
-ExpressionPtr compile_expression(Session& session, const std::string& text,
+ExpressionPtr compile_expression(Reading& reading, const std::string& text,
                                  const std::vector<std::string>& names, SourceSpan where) {
   if (names.size() > kMostArguments)
-    session.fail(where, "an expression can have at most " + std::to_string(kMostArguments) +
+    reading.fail(where, "an expression can have at most " + std::to_string(kMostArguments) +
                             " variables of its own, got " + std::to_string(names.size()));
-  auto string = std::make_shared<PendingString>(session, text, where, names);
-  session.add_pending(string);
+  auto string = std::make_shared<PendingString>(reading, text, where, names);
+  reading.add_pending(string);
   return std::make_shared<StringExpression>(string);
 }
 
-void Session::bind_strings() {
+void Reading::bind_strings() {
   int count = 0;
   for (const auto& s : pending_) s->claim_variables(*this, &count);
   std::vector<std::shared_ptr<const PendingString>> assigning;

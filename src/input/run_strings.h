@@ -2,21 +2,21 @@
 /// (MBDyn input manual, "string drive caller").
 ///
 /// A string is parsed once, when its card is read; names are bound at the end of the deck
-/// (`Session::bind_strings`). Variables of enclosing loop passes are captured at once.
+/// (`Reading::bind_strings`). Variables of enclosing loop passes are captured at once.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "input/session.h"
+#include "input/reading.h"
 
 namespace mbcosim {
 
 /// `where`: the quoted argument. Throws DeckError for what is wrong in the text itself.
-DrivePtr compile_string(Session& session, const std::string& text, SourceSpan where);
+DrivePtr compile_string(Reading& reading, const std::string& text, SourceSpan where);
 
 /// The same with further real variables `names`; at most 12.
-ExpressionPtr compile_expression(Session& session, const std::string& text,
+ExpressionPtr compile_expression(Reading& reading, const std::string& text,
                                  const std::vector<std::string>& names, SourceSpan where);
 
 }  // namespace mbcosim

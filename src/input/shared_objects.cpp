@@ -74,9 +74,9 @@ DrivePtr DeckCard::constant_drive(std::string_view what) {
   const SourceSpan where = next();
   const std::string_view text = next_text();
   // A lone word that is neither a drive nor a variable is most likely a mistyped keyword.
-  if (!w.empty() && !deck_.session.symbols.find(text))
+  if (!w.empty() && !deck_.reading.symbols.find(text))
     fail_word("drive or variable", w, registry().drives, "drive");
-  if (mentions_run_variables(deck_.session.symbols, text))
+  if (mentions_run_variables(deck_.reading.symbols, text))
     warn_at(where, std::string(what) + ": value frozen at input time; use a string drive");
   return make_constant_drive(real(what));
 }
@@ -111,12 +111,12 @@ DrivePtr DeckCard::drive(std::string_view what) {
 }
 
 DrivePtr DeckCard::string_expression(const std::string& text) {
-  return compile_string(deck_.session, text, last());
+  return compile_string(deck_.reading, text, last());
 }
 
 ExpressionPtr DeckCard::expression_of(const std::string& text,
                                       const std::vector<std::string>& names) {
-  return compile_expression(deck_.session, text, names, last());
+  return compile_expression(deck_.reading, text, names, last());
 }
 
 // ----------------------------------------------------------------------------------------------
@@ -289,7 +289,7 @@ LawPtr<N> DeckCard::law_of() {
     return reader->second(*this);
   }
   const auto linear = readers.find("linearelastic");
-  if (N == 1 && linear != readers.end() && (w.empty() || deck_.session.symbols.find(next_text())))
+  if (N == 1 && linear != readers.end() && (w.empty() || deck_.reading.symbols.find(next_text())))
     return linear->second(*this);
   if (w.empty())
     fail_expected("constitutive law expected, e.g. " +
@@ -310,7 +310,7 @@ ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceS
   if (const auto known = deck_.function_places.find(name); known != deck_.function_places.end())
     fail_at(
         where,
-        "scalar function \"" + name + "\" already defined at " + deck_.session.place(known->second),
+        "scalar function \"" + name + "\" already defined at " + deck_.reading.place(known->second),
         "", "redefinition");
   const std::string w = peek_word();
   const auto reader = registry().functions.find(w);
@@ -322,7 +322,7 @@ ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceS
   }
   skip();
   ScalarFunctionPtr f = reader->second(*this);
-  deck_.session.functions[name] = f;
+  deck_.reading.functions[name] = f;
   deck_.function_places[name] = where;
   return f;
 }
@@ -338,12 +338,12 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
   const std::string name = quoted(std::string(what) + " name");
   const SourceSpan where = last();
   if (registry().functions.count(peek_word())) return function_definition(name, where);
-  const auto known = deck_.session.functions.find(name);
-  if (known != deck_.session.functions.end()) return known->second;
+  const auto known = deck_.reading.functions.find(name);
+  if (known != deck_.reading.functions.end()) return known->second;
   if (deck_.damaged_kinds.count("scalar function \"" + name + "\""))
-    deck_.session.set_damaged(true);
+    deck_.reading.set_damaged(true);
   std::vector<std::string> names;
-  for (const auto& f : deck_.session.functions) names.push_back(f.first);
+  for (const auto& f : deck_.reading.functions) names.push_back(f.first);
   fail_at(where, "scalar function \"" + name + "\" is not defined", suggestion(name, names),
           "undefined");
 }

@@ -27,7 +27,7 @@ set(SOURCES
   parser.cpp
   plugin.cpp
   run_strings.cpp
-  session.cpp
+  reading.cpp
   shared_objects.cpp
   solver_cards.cpp
   sources.cpp

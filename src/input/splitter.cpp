@@ -3,7 +3,7 @@
 #include <array>
 
 #include "input/lexer.h"
-#include "input/session.h"
+#include "input/reading.h"
 
 namespace mbcosim {
 
@@ -20,15 +20,15 @@ constexpr std::array<bool, 256> kSpecial = [] {
 
 }  // namespace
 
-Splitter::Splitter(Session& session, int file)
-    : session_(session), file_(file), text_(session.file(file).text) {
+Splitter::Splitter(Reading& reading, int file)
+    : reading_(reading), file_(file), text_(reading.file(file).text) {
   if (text_.substr(0, 3) == "\xEF\xBB\xBF") at_ = 3;
 }
 
 void Splitter::report(std::size_t at, std::size_t length, const std::string& message,
                       const char* code) {
-  session_.report(
-      session_.diagnostic(Severity::error, code, session_.span(file_, at, length), message));
+  reading_.report(
+      reading_.diagnostic(Severity::error, code, reading_.span(file_, at, length), message));
 }
 
 /// Past the comment at `at`, or npos.
@@ -36,7 +36,7 @@ std::size_t Splitter::skip_comment(std::size_t at) {
   const std::size_t end = skip_block_comment(text_, at);
   const std::size_t inner = text_.find("/*", at + 2);
   if (end != std::string_view::npos && inner < end - 2)
-    session_.warn(session_.span(file_, inner, 2), "\"/*\" inside a comment",
+    reading_.warn(reading_.span(file_, inner, 2), "\"/*\" inside a comment",
                   "comments do not nest: this one ends at the first \"*/\"");
   return end;
 }
@@ -85,7 +85,7 @@ Splitter::End Splitter::find_end(std::size_t begin, bool brackets) {
       at = end;
     } else {
       if (brackets && (c == '(' || c == '[')) {
-        if (static_cast<int>(open.size()) >= session_.limits.nesting_depth)
+        if (static_cast<int>(open.size()) >= reading_.limits.nesting_depth)
           return {Trouble::nesting, at};
         open.push_back(at);
       }
@@ -104,7 +104,7 @@ void Splitter::recover(std::size_t begin, const End& end) {
       return;
     case Trouble::nesting:
       report(end.at, 1,
-             "brackets nested deeper than " + std::to_string(session_.limits.nesting_depth) +
+             "brackets nested deeper than " + std::to_string(reading_.limits.nesting_depth) +
                  " levels (limit `nesting-depth`)",
              "limit-nesting-depth");
       at_ = text_.size();
@@ -121,7 +121,7 @@ void Splitter::recover(std::size_t begin, const End& end) {
     case Trouble::unbalanced: {
       report(end.at, 1,
              "unbalanced \"" + c + "\" opened at column " +
-                 std::to_string(session_.span(file_, end.at, 1).column));
+                 std::to_string(reading_.span(file_, end.at, 1).column));
       const End plain = find_end(begin, false);
       at_ = plain.trouble == Trouble::none ? plain.at + 1 : text_.size();
       return;
@@ -168,7 +168,7 @@ bool Splitter::finish_statement(std::size_t begin, Statement* s) {
 }
 
 std::optional<Statement> Splitter::next() {
-  while (!session_.full() && skip_to_statement()) {
+  while (!reading_.full() && skip_to_statement()) {
     const std::size_t begin = at_;
     const char c = text_[begin];
     if (is_word_start(c)) {

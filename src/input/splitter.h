@@ -11,9 +11,9 @@ namespace mbcosim {
 /// `( )` and `[ ]`.
 class Splitter {
  public:
-  Splitter(Session& session, int file);
+  Splitter(Reading& reading, int file);
   /// The next statement, or nothing at the end of the file. What is wrong is reported to the
-  /// session and skipped.
+  /// reading and skipped.
   std::optional<Statement> next();
   int file() const { return file_; }
 
@@ -33,7 +33,7 @@ class Splitter {
   void report(std::size_t at, std::size_t length, const std::string& message,
               const char* code = "syntax");
 
-  Session& session_;
+  Reading& reading_;
   int file_;
   std::string_view text_;
   std::size_t at_ = 0;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "input/lexer.h"
-#include "input/session.h"
+#include "input/reading.h"
 #include "input/splitter.h"
 
 namespace mbcosim {
@@ -37,16 +37,16 @@ struct Source {
 }  // namespace
 
 struct Statements::Impl {
-  explicit Impl(Session& s) : session(s) {
-    if (session.file_count() > 0) push_file(0, -1);
+  explicit Impl(Reading& s) : reading(s) {
+    if (reading.file_count() > 0) push_file(0, -1);
   }
 
   // ---------------------------------------------------------------------------------------------------------
   // statements
   std::optional<Statement> next() {
-    while (!sources.empty() && !session.full() && !session.exited) {
-      session.set_damaged(false);
-      session.set_trail(sources.back().trail);
+    while (!sources.empty() && !reading.full() && !reading.exited) {
+      reading.set_damaged(false);
+      reading.set_trail(sources.back().trail);
       std::optional<Statement> s = take();
       if (!s) {
         leave();
@@ -56,21 +56,21 @@ struct Statements::Impl {
         count_statement(*s);
         if (!run(*s)) return s;
       } catch (const DeckError& e) {
-        session.report(e.diagnostic);
+        reading.report(e.diagnostic);
       }
     }
     return std::nullopt;
   }
 
   void count_statement(const Statement& s) {
-    if (++statements > session.limits.statements)
-      session.fail_limit(
+    if (++statements > reading.limits.statements)
+      reading.fail_limit(
           head(s), "statements",
-          "the deck has more than " + std::to_string(session.limits.statements) + " statements");
-    if (session.out_of_time())
-      session.fail_limit(head(s), "read-time",
+          "the deck has more than " + std::to_string(reading.limits.statements) + " statements");
+    if (reading.out_of_time())
+      reading.fail_limit(head(s), "read-time",
                          "reading the deck takes longer than " +
-                             std::to_string(session.options.read_time.count()) + " ms");
+                             std::to_string(reading.options.read_time.count()) + " ms");
   }
 
   /// The next raw statement of the innermost source.
@@ -89,23 +89,23 @@ struct Statements::Impl {
   void leave() {
     Source& source = sources.back();
     if (source.loop) {
-      session.symbols.close_scope();
-      session.forget_trail(source.trail);
+      reading.symbols.close_scope();
+      reading.forget_trail(source.trail);
       if (++source.pass < source.passes) return start_pass(source);
     }
     sources.pop_back();
   }
 
   SourceSpan head(const Statement& s) const {
-    return session.span(s.file, s.offset, skip_words(s.text, 0));
+    return reading.span(s.file, s.offset, skip_words(s.text, 0));
   }
   [[noreturn]] void fail(const Statement& s, std::string message, std::string hint = "") const {
-    session.fail(head(s), std::move(message), std::move(hint));
+    reading.fail(head(s), std::move(message), std::move(hint));
   }
 
   void push_file(int file, int trail) {
     Source source;
-    source.file.emplace(session, file);
+    source.file.emplace(reading, file);
     source.trail = trail;
     sources.push_back(std::move(source));
   }
@@ -121,7 +121,7 @@ struct Statements::Impl {
       include(s);
     else if (w == "remark")
       remark(s);
-    else if (!session.options.strict && is_control(s))
+    else if (!reading.options.strict && is_control(s))
       control(s);
     else if (w == "printsymboltable")
       print_symbol_table(s);
@@ -141,16 +141,16 @@ struct Statements::Impl {
 
   void no_arguments(const Statement& s, const char* card) const {
     if (!s.has_arguments) return;
-    Cursor c(session, s);
-    session.fail(c.next(), std::string(card) + ": unexpected argument");
+    Cursor c(reading, s);
+    reading.fail(c.next(), std::string(card) + ": unexpected argument");
   }
 
   void end_of_card(Cursor& c, const char* card, const char* which) const {
-    if (c.more()) session.fail(c.next(), std::string(card) + ": unexpected " + which + " argument");
+    if (c.more()) reading.fail(c.next(), std::string(card) + ": unexpected " + which + " argument");
   }
 
   void set(const Statement& s) {
-    Cursor c(session, s);
+    Cursor c(reading, s);
     if (!c.more())
       fail(s, "set: expression missing", "write \"set: real a = 1.;\" or \"set: a = 2.;\"");
     c.expression("set: expression");
@@ -159,38 +159,38 @@ struct Statements::Impl {
 
   void remark(const Statement& s) {
     const std::size_t colon = s.offset + (s.has_arguments ? s.arguments - 1 : 0);
-    const SourceSpan where = session.span(s.file, colon, 1);
+    const SourceSpan where = reading.span(s.file, colon, 1);
     std::string line =
-        "line " + std::to_string(where.line) + ", file <" + session.file(s.file).name + ">";
-    Cursor c(session, s);
+        "line " + std::to_string(where.line) + ", file <" + reading.file(s.file).name + ">";
+    Cursor c(reading, s);
     for (int k = 1; c.more(); ++k) {
       if (c.at_empty())
-        session.fail(c.next(), "remark: argument " + std::to_string(k) + " is empty");
+        reading.fail(c.next(), "remark: argument " + std::to_string(k) + " is empty");
       line += (k == 1 ? ": " : ", ") + printed(c.expression("expression"));
-      if (line.size() > session.options.printed_bytes) break;
+      if (line.size() > reading.options.printed_bytes) break;
     }
-    session.print(where, line + '\n');
+    reading.print(where, line + '\n');
   }
 
   void include(const Statement& s) {
-    Cursor c(session, s);
+    Cursor c(reading, s);
     const std::string name = c.quoted("file name");
     const SourceSpan where = c.last();
     end_of_card(c, "include", "second");
-    if (++includes > session.limits.include_count)
-      session.fail_limit(
+    if (++includes > reading.limits.include_count)
+      reading.fail_limit(
           where, "include-count",
-          "more than " + std::to_string(session.limits.include_count) + " files included");
-    const Result<std::string> path = session.resolve(name, s.file);
-    if (!path) session.fail(where, path.error().message, "", "file");
-    const Result<int> file = session.open_file(*path);
-    if (!file) session.fail_read(where, file.error(), s.file);
+          "more than " + std::to_string(reading.limits.include_count) + " files included");
+    const Result<std::string> path = reading.resolve(name, s.file);
+    if (!path) reading.fail(where, path.error().message, "", "file");
+    const Result<int> file = reading.open_file(*path);
+    if (!file) reading.fail_read(where, file.error(), s.file);
     check_chain(*file, where);
     Trail t;
     t.parent = s.trail;
     t.file = s.file;
-    t.line = session.span(s.file, s.offset, 1).line;
-    push_file(*file, session.add_trail(std::move(t)));
+    t.line = reading.span(s.file, s.offset, 1).line;
+    push_file(*file, reading.add_trail(std::move(t)));
   }
 
   /// Refuses recursion and chains that are too long.
@@ -202,37 +202,37 @@ struct Statements::Impl {
       if (!source.file) continue;
       ++depth;
       open = open || source.file->file() == file;
-      if (open) chain += session.file(source.file->file()).name + " -> ";
+      if (open) chain += reading.file(source.file->file()).name + " -> ";
     }
-    const std::string& name = session.file(file).name;
+    const std::string& name = reading.file(file).name;
     if (open)
-      session.fail(where, "recursive include of \"" + name + "\"; chain: " + chain + name, "",
+      reading.fail(where, "recursive include of \"" + name + "\"; chain: " + chain + name, "",
                    "recursive-include");
-    if (depth > session.limits.include_depth)
-      session.fail_limit(
+    if (depth > reading.limits.include_depth)
+      reading.fail_limit(
           where, "include-depth",
-          "files included deeper than " + std::to_string(session.limits.include_depth) + " levels");
+          "files included deeper than " + std::to_string(reading.limits.include_depth) + " levels");
   }
 
   void print_symbol_table(const Statement& s) {
-    Cursor c(session, s);
+    Cursor c(reading, s);
     bool all = !c.more();
     while (c.more()) {
       const std::string space = c.word("namespace");
       if (space == "all" || space == "default")
         all = true;
       else if (space != "model")
-        session.warn(c.last(), "unknown namespace \"" + space + "\" ignored");
+        reading.warn(c.last(), "unknown namespace \"" + space + "\" ignored");
     }
     if (!all) return;
-    for (const Symbol* symbol : session.symbols.sorted())
-      session.print(head(s), std::string("  ") + (symbol->constant ? "const " : "") +
+    for (const Symbol* symbol : reading.symbols.sorted())
+      reading.print(head(s), std::string("  ") + (symbol->constant ? "const " : "") +
                                  type_name(type_of(symbol->value)) + ' ' + symbol->name + " = " +
                                  printed(symbol->value) + '\n');
   }
 
   void setenv(const Statement& s) {
-    Cursor c(session, s);
+    Cursor c(reading, s);
     bool overwrite = false;
     if (c.peek_word() == "overwrite") {
       c.word("overwrite");
@@ -245,27 +245,27 @@ struct Statements::Impl {
     }
     const std::string text = c.quoted("setenv: text");
     const std::size_t equal = text.find('=');
-    if (equal == 0) session.fail(c.last(), "setenv: name missing before \"=\"");
+    if (equal == 0) reading.fail(c.last(), "setenv: name missing before \"=\"");
     const SourceSpan where = c.last();
     end_of_card(c, "setenv", "further");
     const std::string name = text.substr(0, equal);
     if (equal == std::string::npos)
-      session.environment.erase(name);
-    else if (overwrite || !session.environment.count(name))
-      session.environment[name] = text.substr(equal + 1);
-    session.warn(where,
+      reading.environment.erase(name);
+    else if (overwrite || !reading.environment.count(name))
+      reading.environment[name] = text.substr(equal + 1);
+    reading.warn(where,
                  "setenv acts only on the file names of this deck; the environment of the program "
                  "is not changed");
   }
 
   void exit(const Statement& s) {
     no_arguments(s, "exit");
-    session.exited = true;
+    reading.exited = true;
   }
 
   void notice(const Statement& s) {
     no_arguments(s, s.word.c_str());
-    session.print(head(s), s.word == "license"
+    reading.print(head(s), s.word == "license"
                                ? "mbcosim is distributed under the Apache License, Version 2.0.\n"
                                : "mbcosim comes without warranties or conditions of any kind.\n");
   }
@@ -274,7 +274,7 @@ struct Statements::Impl {
     if (const auto* b = std::get_if<bool>(&v)) return *b;
     if (const auto* i = std::get_if<std::int32_t>(&v)) return *i != 0;
     if (const auto* r = std::get_if<double>(&v)) return *r != 0;
-    session.fail(c.last(), "the condition must be a number, string found");
+    reading.fail(c.last(), "the condition must be a number, string found");
   }
 
   // -------------------------------------------------------------------------------------------------
@@ -298,10 +298,10 @@ struct Statements::Impl {
     while (std::optional<Statement> s = take()) {
       count_statement(*s);
       if (opens(*s)) {
-        if (static_cast<int>(open.size()) >= session.limits.nesting_depth)
-          session.fail_limit(head(*s), "nesting-depth",
+        if (static_cast<int>(open.size()) >= reading.limits.nesting_depth)
+          reading.fail_limit(head(*s), "nesting-depth",
                              "\"for\" and \"if\" nested deeper than " +
-                                 std::to_string(session.limits.nesting_depth) + " levels");
+                                 std::to_string(reading.limits.nesting_depth) + " levels");
         open.push_back(*s);
       }
       if (closes(*s)) {
@@ -340,12 +340,12 @@ struct Statements::Impl {
 
   std::int64_t bound(Cursor& c, const char* what) const {
     if (!c.more())
-      session.fail(c.next(), std::string("for: ") + what + " missing",
+      reading.fail(c.next(), std::string("for: ") + what + " missing",
                    "for: integer k = first, last, step;");
     const Value v = c.expression(what);
     if (const auto* b = std::get_if<bool>(&v)) return *b;
     if (const auto* i = std::get_if<std::int32_t>(&v)) return *i;
-    session.fail(
+    reading.fail(
         c.last(),
         std::string("for: ") + what + " must be an integer, " + type_name(type_of(v)) + " found",
         "write integer(...)");
@@ -358,25 +358,25 @@ struct Statements::Impl {
     loop.where = head(s);
     Statement rest = s;
     rest.arguments = read_loop_variable(s, &loop.name);
-    Cursor c(session, rest);
+    Cursor c(reading, rest);
     loop.first = bound(c, "first value");
     const std::int64_t last = bound(c, "last value");
     if (c.more()) loop.step = bound(c, "step");
-    if (loop.step == 0) session.fail(c.last(), "for: the step must not be zero");
+    if (loop.step == 0) reading.fail(c.last(), "for: the step must not be zero");
     end_of_card(c, "for", "fourth");
-    if (const Symbol* known = session.symbols.find(loop.name))
+    if (const Symbol* known = reading.symbols.find(loop.name))
       fail(s, "for: name \"" + loop.name + "\" is already used" +
-                  (known->where.file >= 0 ? ", declared at " + session.place(known->where) : ""));
+                  (known->where.file >= 0 ? ", declared at " + reading.place(known->where) : ""));
     check_blocks(*body, 0, body->size());
     const std::int64_t range = (last - loop.first) * (loop.step > 0 ? 1 : -1);
     loop.passes = range < 0 ? 0 : range / std::abs(loop.step) + 1;
-    if (loop.passes > session.limits.loop_iterations)
-      session.fail_limit(loop.where, "loop-iterations",
+    if (loop.passes > reading.limits.loop_iterations)
+      reading.fail_limit(loop.where, "loop-iterations",
                          "for: " + std::to_string(loop.passes) + " passes exceed the limit of " +
-                             std::to_string(session.limits.loop_iterations));
+                             std::to_string(reading.limits.loop_iterations));
     loop.end = body->size();
     loop.body = std::move(body);
-    if (loop.passes == 0 || loop.end == 0 || session.full()) return;
+    if (loop.passes == 0 || loop.end == 0 || reading.full()) return;
     loop.outer_trail = s.trail;
     sources.push_back(std::move(loop));
     start_pass(sources.back());
@@ -387,7 +387,7 @@ struct Statements::Impl {
     const char* form = "for: integer k = first, last, step;";
     const auto expect = [&](bool good, std::size_t at, const char* what) {
       if (!good)
-        session.fail(session.span(s.file, s.offset + std::min(at, s.text.size() - 1), 1),
+        reading.fail(reading.span(s.file, s.offset + std::min(at, s.text.size() - 1), 1),
                      std::string("for: ") + what + " expected", form);
     };
     std::size_t at = skip_blanks(s.text, s.arguments);
@@ -410,8 +410,8 @@ struct Statements::Impl {
     variable.value = value;
     variable.constant = true;
     variable.where = loop.where;
-    session.symbols.open_scope();
-    session.symbols.declare(std::move(variable));
+    reading.symbols.open_scope();
+    reading.symbols.declare(std::move(variable));
     ++statements;
     Trail t;
     t.parent = loop.outer_trail;
@@ -420,7 +420,7 @@ struct Statements::Impl {
     t.line = loop.where.line;
     t.name = loop.name;
     t.value = value;
-    loop.trail = session.add_trail(std::move(t));
+    loop.trail = reading.add_trail(std::move(t));
   }
 
   struct Branch {
@@ -461,20 +461,20 @@ struct Statements::Impl {
   }
 
   bool condition(const Statement& s) {
-    Cursor c(session, s);
+    Cursor c(reading, s);
     if (!c.more()) fail(s, "condition missing");
     const bool is = is_true(c, c.expression("condition"));
     end_of_card(c, s.word == "if" ? "if" : "else if", "second");
     return is;
   }
 
-  Session& session;
+  Reading& reading;
   std::vector<Source> sources;
   std::int64_t statements = 0;
   std::int64_t includes = 0;
 };
 
-Statements::Statements(Session& session) : impl_(std::make_unique<Impl>(session)) {}
+Statements::Statements(Reading& reading) : impl_(std::make_unique<Impl>(reading)) {}
 Statements::~Statements() = default;
 
 std::optional<Statement> Statements::next() { return impl_->next(); }

@@ -12,10 +12,10 @@ namespace mbcosim {
 
 class Statements {
  public:
-  explicit Statements(Session& session);
+  explicit Statements(Reading& reading);
   ~Statements();
   /// The next statement of the deck proper, or nothing at the end. Errors inside go to the
-  /// session's diagnostics; reading goes on with the next statement.
+  /// diagnostics of `Reading`; it goes on with the next statement.
   std::optional<Statement> next();
 
  private:

@@ -23,14 +23,14 @@ Result<ExpressionPtr> compile_formula(const std::string& text,
   if (names.size() > kMostNames)
     return wrong(text, "at most 12 variables are allowed, got " + std::to_string(names.size()));
   const BundleSource none(std::map<std::string, std::string>{});
-  Session session(none, Limits{});
+  Reading reading(none, Limits{});
   try {
-    const int file = session.add_text("expression", text);
+    const int file = reading.add_text("expression", text);
     ExpressionPtr compiled =
-        compile_expression(session, text, names, session.span(file, 0, text.size()));
-    session.bind_strings();
-    if (session.errors() == 0) return compiled;
-    for (const Diagnostic& d : session.diagnostics())
+        compile_expression(reading, text, names, reading.span(file, 0, text.size()));
+    reading.bind_strings();
+    if (reading.errors() == 0) return compiled;
+    for (const Diagnostic& d : reading.diagnostics())
       if (d.severity == Severity::error) return wrong(text, d.message);
     return wrong(text, "it cannot be read");
   } catch (const std::exception& error) {

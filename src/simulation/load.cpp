@@ -1,5 +1,5 @@
 /// load_deck: text to model.
-#include "elements/registry.h"
+#include "elements/families.h"
 #include "input/deck_reader.h"
 #include "simulation/model_check.h"
 #include "simulation/simulation.h"
@@ -10,19 +10,19 @@ namespace {
 
 /// Of all files read: the deck, what it includes, data files in the order of reading. Names count
 /// relative to the deck's folder.
-std::uint64_t digest(const Session& session, Digest data) {
-  const std::string& main = session.file(0).name;
+std::uint64_t digest(const Reading& reading, Digest data) {
+  const std::string& main = reading.file(0).name;
   const std::string folder = main.substr(0, main.rfind('/') + 1);
-  for (int i = 0; i < session.file_count(); ++i) {
-    const std::string& name = session.file(i).name;
+  for (int i = 0; i < reading.file_count(); ++i) {
+    const std::string& name = reading.file(i).name;
     data.add(name.starts_with(folder) ? name.substr(folder.size()) : name);
-    data.add(session.file(i).text);
+    data.add(reading.file(i).text);
   }
   return data.value();
 }
 
-void store_symbols(const Session& session, Model& model) {
-  for (const Symbol* s : session.symbols.sorted())
+void store_symbols(const Reading& reading, Model& model) {
+  for (const Symbol* s : reading.symbols.sorted())
     model.symbols.emplace_back(
         std::string(s->constant ? "const " : "") + type_name(type_of(s->value)) + " " + s->name,
         printed(s->value));
@@ -76,32 +76,32 @@ bool attach(ModelBuilder& builder, const std::vector<PortAttachment>& ports,
   return true;
 }
 
-/// Reads into `session`; the model, or null with the reason in the session's diagnostics.
-ModelPtr read_model(Session& session, ModelBuilder& builder,
+/// Reads into `reading`; the model, or null with the reason in the reading's diagnostics.
+ModelPtr read_model(Reading& reading, ModelBuilder& builder,
                     const std::vector<PortAttachment>& ports, std::vector<Diagnostic>& extra) {
-  Deck deck(session, builder, full_registry());
-  Statements statements(session);
+  Deck deck(reading, builder, full_registry());
+  Statements statements(reading);
   DeckReader(deck, statements).read();
-  if (session.errors() == 0) session.bind_strings();
-  if (session.errors() > 0) return nullptr;
-  if (!attach(builder, ports, session.file(0).name, extra)) return nullptr;
+  if (reading.errors() == 0) reading.bind_strings();
+  if (reading.errors() > 0) return nullptr;
+  if (!attach(builder, ports, reading.file(0).name, extra)) return nullptr;
   Model& model = builder.model();
-  if (const std::int64_t n = count_unknowns(model); n > session.limits.unknowns) {
-    extra.push_back(plain_error("limit-unknowns", session.file(0).name,
+  if (const std::int64_t n = count_unknowns(model); n > reading.limits.unknowns) {
+    extra.push_back(plain_error("limit-unknowns", reading.file(0).name,
                                 "the model has " + std::to_string(n) + " unknowns; the limit is " +
-                                    std::to_string(session.limits.unknowns) +
+                                    std::to_string(reading.limits.unknowns) +
                                     " (limit `unknowns`)"));
     return nullptr;
   }
-  model.digest = digest_with(digest(session, deck.data_files), ports);
-  store_symbols(session, model);
+  model.digest = digest_with(digest(reading, deck.data_files), ports);
+  store_symbols(reading, model);
   Result<ModelPtr> finished = builder.finish();
   if (!finished) {
-    extra.push_back(plain_error("model", session.file(0).name, finished.error().message));
+    extra.push_back(plain_error("model", reading.file(0).name, finished.error().message));
     return nullptr;
   }
-  check_model(session, **finished);
-  return session.errors() == 0 ? *finished : nullptr;
+  check_model(reading, **finished);
+  return reading.errors() == 0 ? *finished : nullptr;
 }
 
 }  // namespace
@@ -111,8 +111,8 @@ LoadReport load_deck(const FileSource& files, const std::string& main_file, cons
   LoadReport report;
   try {
     ModelBuilder builder;
-    Session session(files, limits, &builder);
-    const Result<int> opened = session.open_file(main_file);
+    Reading reading(files, limits, &builder);
+    const Result<int> opened = reading.open_file(main_file);
     if (!opened) {
       const bool limit = opened.error().kind == ErrorKind::limit;
       report.diagnostics.push_back(
@@ -121,11 +121,11 @@ LoadReport load_deck(const FileSource& files, const std::string& main_file, cons
       return report;
     }
     std::vector<Diagnostic> extra;
-    report.model = read_model(session, builder, ports, extra);
-    report.printed = session.printed;
-    report.diagnostics = session.take_diagnostics();
+    report.model = read_model(reading, builder, ports, extra);
+    report.printed = reading.printed;
+    report.diagnostics = reading.release_diagnostics();
     report.diagnostics.insert(report.diagnostics.end(), extra.begin(), extra.end());
-    if (session.errors() >= limits.errors) report.diagnostics.push_back(full_note(limits));
+    if (reading.errors() >= limits.errors) report.diagnostics.push_back(full_note(limits));
   } catch (const std::exception& error) {
     report.model = nullptr;
     report.diagnostics.push_back(plain_error(

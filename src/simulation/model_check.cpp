@@ -15,18 +15,18 @@ std::string hydraulic_node(const ScalarNode& node) {
   return "hydraulic node " + std::to_string(node.label);
 }
 
-void check_hydraulic_nodes(Session& session, const Model& model) {
+void check_hydraulic_nodes(Reading& reading, const Model& model) {
   for (const ScalarNode& node : model.scalars) {
     if (node.kind != ScalarKind::hydraulic) continue;
     if (model.column_start[node.unknown] < model.column_start[node.unknown + 1]) continue;
-    session.report(session.diagnostic(
+    reading.report(reading.diagnostic(
         Severity::error, "loose-node", node.where,
         hydraulic_node(node) + ": no element is connected to it, nothing determines its pressure",
         "connect an element or remove the node"));
   }
 }
 
-void check_modal_nodes(Session& session, const Model& model) {
+void check_modal_nodes(Reading& reading, const Model& model) {
   std::set<int> used;
   for (const auto& set : model.sets)
     if (const auto* joints = dynamic_cast<const ModalJointSet*>(set.get()))
@@ -34,7 +34,7 @@ void check_modal_nodes(Session& session, const Model& model) {
   for (std::size_t k = 0; k < model.structural.size(); ++k) {
     const StructuralNode& node = model.structural[k];
     if (node.kind == StructuralKind::modal && !used.count(static_cast<int>(k)))
-      session.report(session.diagnostic(
+      reading.report(reading.diagnostic(
           Severity::error, "loose-node", node.where,
           "structural node " + std::to_string(node.label) +
               ": no modal joint uses this modal node, nothing determines its motion",
@@ -53,7 +53,7 @@ void collect_pressure_nodes(const Model& model, std::set<int>& nodes) {
 
 /// Elements start from the declared pressure, a clamped node from the clamp's: a difference is an
 /// impulse.
-void check_start_pressures(Session& session, const Model& model) {
+void check_start_pressures(Reading& reading, const Model& model) {
   std::set<int> nodes;
   collect_pressure_nodes<Actuator>(model, nodes);
   collect_pressure_nodes<DynamicPipe>(model, nodes);
@@ -67,7 +67,7 @@ void check_start_pressures(Session& session, const Model& model) {
       char pressures[80];
       std::snprintf(pressures, sizeof pressures, "%g Pa, but is clamped at %g Pa", node.value,
                     value);
-      session.warn(node.where,
+      reading.warn(node.where,
                    hydraulic_node(node) + " is declared at " + pressures +
                        ": the jump makes the pressure rates of its elements ring",
                    "declare the pressure that the clamp has at the start");
@@ -79,10 +79,10 @@ void check_start_pressures(Session& session, const Model& model) {
 
 }  // namespace
 
-void check_model(Session& session, const Model& model) {
-  check_hydraulic_nodes(session, model);
-  check_modal_nodes(session, model);
-  check_start_pressures(session, model);
+void check_model(Reading& reading, const Model& model) {
+  check_hydraulic_nodes(reading, model);
+  check_modal_nodes(reading, model);
+  check_start_pressures(reading, model);
 }
 
 }  // namespace mbcosim

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "input/session.h"
+#include "input/reading.h"
 #include "input/statements.h"
 #include "model/model.h"
 
@@ -24,13 +24,13 @@ inline Calculation calculate(const std::string& deck, std::map<std::string, std:
   files["deck.mbd"] = deck;
   const BundleSource source(std::move(files));
   ModelBuilder builder;
-  Session session(source, limits, with_model ? &builder : nullptr, options);
-  if (with_model) session.start_run_variables(0);
+  Reading reading(source, limits, with_model ? &builder : nullptr, options);
+  if (with_model) reading.start_run_variables(0);
   Calculation r;
-  (void)session.open_file("deck.mbd");
-  Statements statements(session);
+  (void)reading.open_file("deck.mbd");
+  Statements statements(reading);
   while (const auto s = statements.next()) r.cards.push_back(s->word);
-  for (const Diagnostic& d : session.diagnostics()) {
+  for (const Diagnostic& d : reading.diagnostics()) {
     const char* severity = d.severity == Severity::error ? "error" : "warning";
     const std::string file = d.file == "deck.mbd" ? "" : d.file + ":";
     r.messages.push_back(file + std::to_string(d.line) + ":" + std::to_string(d.column) + ": " +
@@ -38,9 +38,9 @@ inline Calculation calculate(const std::string& deck, std::map<std::string, std:
     r.full.push_back(d.text());
   }
   std::size_t at = 0;
-  while (at < session.printed.size()) {
-    const std::size_t end = session.printed.find('\n', at);
-    std::string line = session.printed.substr(at, end - at);
+  while (at < reading.printed.size()) {
+    const std::size_t end = reading.printed.find('\n', at);
+    std::string line = reading.printed.substr(at, end - at);
     const std::size_t text = line.find(">: ");
     if (line.rfind("line ", 0) == 0 && text != std::string::npos) line = line.substr(text + 3);
     r.lines.push_back(line);

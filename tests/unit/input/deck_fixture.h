@@ -57,12 +57,12 @@ inline std::string probe(DeckText deck, const std::string& arguments,
   deck.elements += "probe: 1, " + arguments + ";";
   const BundleSource files({{"deck.mbd", deck.text()}});
   ModelBuilder builder;
-  Session session(files, Limits{}, &builder);
-  EXPECT_TRUE(session.open_file("deck.mbd"));
-  Deck state(session, builder, registry);
-  Statements statements(session);
+  Reading reading(files, Limits{}, &builder);
+  EXPECT_TRUE(reading.open_file("deck.mbd"));
+  Deck state(reading, builder, registry);
+  Statements statements(reading);
   DeckReader(state, statements).read();
-  return findings(session.diagnostics());
+  return findings(reading.diagnostics());
 }
 
 }  // namespace mbcosim::testing

@@ -37,24 +37,24 @@ class RunStrings : public testing::Test {
  protected:
   void read(const std::string& deck) {
     source_ = std::make_unique<BundleSource>(std::map<std::string, std::string>{{"a.mbd", deck}});
-    session_ = std::make_unique<Session>(*source_, Limits{}, &builder_);
-    session_->start_run_variables(2);
-    session_->functions["f"] = std::make_shared<Parabola>();
+    reading_ = std::make_unique<Reading>(*source_, Limits{}, &builder_);
+    reading_->start_run_variables(2);
+    reading_->functions["f"] = std::make_shared<Parabola>();
     builder_.model().drives.push_back({7, "", std::make_shared<Line>(), false, false});
     builder_.model().drive_index[7] = 0;
-    ASSERT_TRUE(static_cast<bool>(session_->open_file("a.mbd")));
-    Statements statements(*session_);
+    ASSERT_TRUE(static_cast<bool>(reading_->open_file("a.mbd")));
+    Statements statements(*reading_);
     while (const auto s = statements.next()) {
       try {
-        Cursor c(*session_, *s);
+        Cursor c(*reading_, *s);
         const std::string text = c.quoted("text");
-        drives_.push_back(compile_string(*session_, text, c.last()));
+        drives_.push_back(compile_string(*reading_, text, c.last()));
       } catch (const DeckError& e) {
-        session_->report(e.diagnostic);
+        reading_->report(e.diagnostic);
       }
     }
-    session_->bind_strings();
-    for (const Diagnostic& d : session_->diagnostics())
+    reading_->bind_strings();
+    for (const Diagnostic& d : reading_->diagnostics())
       messages_.push_back(std::to_string(d.line) + ":" + std::to_string(d.column) + ": " +
                           d.message);
     state_.variables = builder_.model().initial_variables;
@@ -86,7 +86,7 @@ class RunStrings : public testing::Test {
 
   std::unique_ptr<BundleSource> source_;
   ModelBuilder builder_;
-  std::unique_ptr<Session> session_;
+  std::unique_ptr<Reading> reading_;
   std::vector<DrivePtr> drives_;
   std::vector<std::string> messages_;
   State state_;
@@ -148,16 +148,16 @@ TEST_F(RunStrings, VarIsTheArgument) {
 
 TEST_F(RunStrings, CurrentValuesOfTheCardAreCaptured) {
   read("");
-  session_->currents["L"] = 5;
-  const DrivePtr d = compile_string(*session_, "model::current(\"L\")*100.", {});
-  session_->currents.clear();
-  session_->bind_strings();
+  reading_->currents["L"] = 5;
+  const DrivePtr d = compile_string(*reading_, "model::current(\"L\")*100.", {});
+  reading_->currents.clear();
+  reading_->bind_strings();
   EXPECT_EQ(d->value(context_), 500);
 }
 
 TEST_F(RunStrings, EvaluateBeforeTheEndOfTheDeckWithPresentValues) {
   read("set: real a = 3.;");
-  const DrivePtr d = compile_string(*session_, "2*a", {});
+  const DrivePtr d = compile_string(*reading_, "2*a", {});
   EXPECT_EQ(d->value(context_), 6);
 }
 
@@ -197,10 +197,10 @@ TEST_F(RunStrings, ErrorsAtEvaluationNameThePlace) {
 
 TEST_F(RunStrings, CirclesAreRefused) {
   read("");
-  const DrivePtr d = compile_string(*session_, "model::drive(8, 0.)", {});
+  const DrivePtr d = compile_string(*reading_, "model::drive(8, 0.)", {});
   builder_.model().drives.push_back({8, "", d, false, false});
   builder_.model().drive_index[8] = 1;
-  session_->bind_strings();
+  reading_->bind_strings();
   EXPECT_THROW(d->value(context_), EvaluationError);
 }
 
@@ -225,7 +225,7 @@ TEST_F(RunStrings, WrongTextsAreRefused) {
 
 TEST_F(RunStrings, MessagesNameTheOffsetInTheString) {
   read("drive: \"1 + foo\";");
-  EXPECT_EQ(session_->diagnostics()[0].text(),
+  EXPECT_EQ(reading_->diagnostics()[0].text(),
             "a.mbd:1:13: error: unknown variable \"foo\"\n"
             "  drive: \"1 + foo\";\n"
             "              ^~~\n"
@@ -238,9 +238,9 @@ class Gradients : public RunStrings, public testing::WithParamInterface<const ch
 
 TEST_P(Gradients, AgreeWithCentralDifferences) {
   read("");
-  const ExpressionPtr f = compile_expression(*session_, GetParam(), {"x", "y"}, {});
-  session_->bind_strings();
-  ASSERT_EQ(session_->errors(), 0) << session_->diagnostics()[0].text();
+  const ExpressionPtr f = compile_expression(*reading_, GetParam(), {"x", "y"}, {});
+  reading_->bind_strings();
+  ASSERT_EQ(reading_->errors(), 0) << reading_->diagnostics()[0].text();
   context_.time = 1.3;
   const double at[2] = {0.37, 0.83};
   double gradient[2];
@@ -271,15 +271,15 @@ TEST_F(RunStrings, ExpressionsTakeAtMostTwelveNames) {
   read("");
   std::vector<std::string> names(12, "a");
   for (std::size_t k = 0; k < names.size(); ++k) names[k] += std::to_string(k);
-  const ExpressionPtr f = compile_expression(*session_, "a0*a11 + a5", names, {});
-  session_->bind_strings();
+  const ExpressionPtr f = compile_expression(*reading_, "a0*a11 + a5", names, {});
+  reading_->bind_strings();
   double at[12] = {}, gradient[12];
   at[0] = 2;
   at[11] = 3;
   EXPECT_EQ(f->value_and_gradient(context_, at, gradient), 6);
   EXPECT_THAT(gradient, ElementsAre(3, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 2));
   names.push_back("b");
-  EXPECT_THROW(compile_expression(*session_, "b", names, {}), DeckError);
+  EXPECT_THROW(compile_expression(*reading_, "b", names, {}), DeckError);
 }
 
 }  // namespace

@@ -64,11 +64,11 @@ TEST(Lexer, SemicolonsInsideParenthesesDoNotEndTheCard) {
 TEST(Remark, NamesLineAndFile) {
   const BundleSource source(
       std::map<std::string, std::string>{{"a.mbd", "\nremark\n: 1, 2.5, \"t\", TRUE;\nremark;"}});
-  Session session(source, {});
-  ASSERT_TRUE(static_cast<bool>(session.open_file("a.mbd")));
-  Statements statements(session);
+  Reading reading(source, {});
+  ASSERT_TRUE(static_cast<bool>(reading.open_file("a.mbd")));
+  Statements statements(reading);
   EXPECT_FALSE(statements.next().has_value());
-  EXPECT_EQ(session.printed, "line 3, file <a.mbd>: 1, 2.5, \"t\", 1\nline 4, file <a.mbd>\n");
+  EXPECT_EQ(reading.printed, "line 3, file <a.mbd>: 1, 2.5, \"t\", 1\nline 4, file <a.mbd>\n");
 }
 
 TEST(Include, NamesAreRelativeToTheIncludingFile) {

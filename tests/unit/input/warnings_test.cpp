@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "deck_fixture.h"
-#include "elements/registry.h"
+#include "elements/families.h"
 
 namespace mbcosim::testing {
 namespace {

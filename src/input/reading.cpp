@@ -1,4 +1,4 @@
-#include "input/session.h"
+#include "input/reading.h"
 
 #include <algorithm>
 #include <cstring>
@@ -10,7 +10,7 @@
 
 namespace mbcosim {
 
-Session::Session(const FileSource& source, Limits limits_in, ModelBuilder* builder,
+Reading::Reading(const FileSource& source, Limits limits_in, ModelBuilder* builder,
                  ReaderOptions options_in)
     : limits(limits_in),
       options(options_in),
@@ -23,14 +23,14 @@ Session::Session(const FileSource& source, Limits limits_in, ModelBuilder* build
   seed(1);
 }
 
-Session::~Session() {
+Reading::~Reading() {
   for (const auto& s : pending_) s->detach();
 }
 
 // --------------------------------------------------------------------------------------------------------------
 // files
 
-Result<std::string> Session::read_counted(const std::string& name) {
+Result<std::string> Reading::read_counted(const std::string& name) {
   Result<std::string> text = source_.read(name);
   if (!text) return text;
   bytes_ += static_cast<std::int64_t>(text->size());
@@ -44,7 +44,7 @@ Result<std::string> Session::read_counted(const std::string& name) {
   return text;
 }
 
-Result<int> Session::open_file(const std::string& name) {
+Result<int> Reading::open_file(const std::string& name) {
   const auto known = file_index_.find(name);
   if (known != file_index_.end()) return known->second;
   Result<std::string> text = read_counted(name);
@@ -54,12 +54,12 @@ Result<int> Session::open_file(const std::string& name) {
   return index;
 }
 
-int Session::add_text(std::string name, std::string text) {
+int Reading::add_text(std::string name, std::string text) {
   files_.push_back({std::move(name), std::move(text), {}});
   return file_count() - 1;
 }
 
-Result<std::string> Session::resolve(std::string_view name, int from) const {
+Result<std::string> Reading::resolve(std::string_view name, int from) const {
   Result<std::string> expanded = expand_environment(name);
   if (!expanded) return expanded;
   std::string path = *expanded;
@@ -85,7 +85,7 @@ Result<std::string> Session::resolve(std::string_view name, int from) const {
   return resolved;
 }
 
-Result<std::string> Session::expand_environment(std::string_view name) const {
+Result<std::string> Reading::expand_environment(std::string_view name) const {
   std::string r;
   for (std::size_t i = 0; i < name.size(); ++i) {
     if (name[i] != '$') {
@@ -114,13 +114,13 @@ Result<std::string> Session::expand_environment(std::string_view name) const {
   return r;
 }
 
-Result<std::string> Session::read_data(std::string_view name, int from) {
+Result<std::string> Reading::read_data(std::string_view name, int from) {
   Result<std::string> path = resolve(name, from);
   if (!path) return path;
   return read_counted(*path);
 }
 
-SourceSpan Session::span(int file, std::size_t offset, std::size_t length) const {
+SourceSpan Reading::span(int file, std::size_t offset, std::size_t length) const {
   SourceSpan s;
   if (file < 0 || file >= file_count()) return s;
   DeckFile& f = files_[file];
@@ -139,12 +139,12 @@ SourceSpan Session::span(int file, std::size_t offset, std::size_t length) const
   return s;
 }
 
-std::size_t Session::offset_of(SourceSpan where) const {
+std::size_t Reading::offset_of(SourceSpan where) const {
   if (where.file < 0 || where.line < 1) return 0;
   return files_[where.file].line_starts[where.line - 1] + where.column - 1;
 }
 
-std::string Session::place(SourceSpan where) const {
+std::string Reading::place(SourceSpan where) const {
   if (where.file < 0) return "the start";
   return files_[where.file].name + ":" + std::to_string(where.line);
 }
@@ -168,7 +168,7 @@ std::string line_of(const DeckFile& f, int line) {
 
 }  // namespace
 
-Diagnostic Session::diagnostic(Severity severity, std::string code, SourceSpan where,
+Diagnostic Reading::diagnostic(Severity severity, std::string code, SourceSpan where,
                                std::string message, std::string hint) const {
   Diagnostic d;
   d.severity = severity;
@@ -193,7 +193,7 @@ Diagnostic Session::diagnostic(Severity severity, std::string code, SourceSpan w
   return d;
 }
 
-void Session::report(Diagnostic d) {
+void Reading::report(Diagnostic d) {
   if (damaged_ || exited || is_known(d) || is_repeated_refusal(d)) return;
   if (d.severity == Severity::error) {
     if (errors_ >= limits.errors) return;
@@ -206,7 +206,7 @@ void Session::report(Diagnostic d) {
 }
 
 /// Was the same said about the same place? Passes of loops and repeated includes would repeat it.
-bool Session::is_known(const Diagnostic& d) const {
+bool Reading::is_known(const Diagnostic& d) const {
   return std::any_of(diagnostics_.begin(), diagnostics_.end(), [&](const Diagnostic& other) {
     return other.line == d.line && other.column == d.column && other.severity == d.severity &&
            other.file == d.file && other.message == d.message;
@@ -215,7 +215,7 @@ bool Session::is_known(const Diagnostic& d) const {
 
 /// A card that is not supported is refused once by name; further ones of its kind are counted, so
 /// that they do not hide other errors.
-bool Session::is_repeated_refusal(const Diagnostic& d) {
+bool Reading::is_repeated_refusal(const Diagnostic& d) {
   if (d.code != "not-supported") return false;
   const std::string word = d.message.substr(std::min(d.message.find('"'), d.message.size()));
   const auto [entry, is_new] = refusals_.try_emplace(word, Refusal{diagnostics_.size()});
@@ -225,42 +225,42 @@ bool Session::is_repeated_refusal(const Diagnostic& d) {
   return true;
 }
 
-void Session::warn(SourceSpan where, std::string message, std::string hint) {
+void Reading::warn(SourceSpan where, std::string message, std::string hint) {
   report(diagnostic(Severity::warning, "warning", where, std::move(message), std::move(hint)));
 }
 
-void Session::set_expression_place(int file, std::size_t offset) {
+void Reading::set_expression_place(int file, std::size_t offset) {
   expression_file_ = file;
   expression_offset_ = offset;
 }
 
-void Session::warn_in_expression(std::size_t where, std::size_t length, std::string message) {
+void Reading::warn_in_expression(std::size_t where, std::size_t length, std::string message) {
   warn(expression_span(where, length), std::move(message));
 }
 
-SourceSpan Session::expression_span(std::size_t where, std::size_t length) const {
+SourceSpan Reading::expression_span(std::size_t where, std::size_t length) const {
   return span(expression_file_, expression_offset_ + where, length);
 }
 
-void Session::fail(SourceSpan where, std::string message, std::string hint,
+void Reading::fail(SourceSpan where, std::string message, std::string hint,
                    std::string code) const {
   throw DeckError(
       diagnostic(Severity::error, std::move(code), where, std::move(message), std::move(hint)));
 }
 
-void Session::fail_limit(SourceSpan where, std::string_view name, std::string message) const {
+void Reading::fail_limit(SourceSpan where, std::string_view name, std::string message) const {
   fail(where, std::move(message) + " (limit `" + std::string(name) + "`)", "",
        "limit-" + std::string(name));
 }
 
-void Session::print(SourceSpan where, std::string_view line) {
+void Reading::print(SourceSpan where, std::string_view line) {
   if (printed.size() + line.size() > options.printed_bytes)
     fail_limit(where, "printed-bytes",
                "the deck prints more than " + std::to_string(options.printed_bytes) + " bytes");
   printed += line;
 }
 
-void Session::fail_read(SourceSpan where, const Error& error, int from) const {
+void Reading::fail_read(SourceSpan where, const Error& error, int from) const {
   if (error.kind == ErrorKind::limit) fail_limit(where, error.reason, error.message);
   std::string message = error.message;
   if (error.kind == ErrorKind::io) {
@@ -272,23 +272,23 @@ void Session::fail_read(SourceSpan where, const Error& error, int from) const {
   fail(where, std::move(message), "", "file");
 }
 
-int Session::add_trail(Trail t) {
+int Reading::add_trail(Trail t) {
   trails_.push_back(std::move(t));
   return static_cast<int>(trails_.size()) - 1;
 }
 
-void Session::forget_trail(int trail) {
+void Reading::forget_trail(int trail) {
   if (trail >= kept_trails_) trails_.resize(trail);
 }
 
 // --------------------------------------------------------------------------------------------------------------
 // model
 
-const EvalContext& Session::context() {
+const EvalContext& Reading::context() {
   return builder_ ? builder_->input_context() : *empty_context_;
 }
 
-void Session::start_run_variables(double initial_time) {
+void Reading::start_run_variables(double initial_time) {
   model_available_ = true;
   const std::pair<const char*, SymbolRole> names[] = {{"Time", SymbolRole::time},
                                                       {"TimeStep", SymbolRole::time_step},
@@ -316,7 +316,7 @@ void Session::start_run_variables(double initial_time) {
   }
 }
 
-void Session::add_pending(std::shared_ptr<PendingString> s) {
+void Reading::add_pending(std::shared_ptr<PendingString> s) {
   pending_.push_back(std::move(s));
   kept_trails_ = static_cast<int>(trails_.size());
 }
@@ -326,7 +326,7 @@ void Session::add_pending(std::shared_ptr<PendingString> s) {
 
 // Additive feedback generator r(i) = r(i-3) + r(i-31) mod 2^32, value r/2, started by a Lehmer
 // generator (16807).
-void Session::seed(std::uint32_t value) {
+void Reading::seed(std::uint32_t value) {
   std::int64_t x = value ? static_cast<std::int32_t>(value) : 1;
   for (int i = 0; i < 31; ++i) {
     if (i > 0) {
@@ -339,7 +339,7 @@ void Session::seed(std::uint32_t value) {
   for (int i = 0; i < 310; ++i) random();
 }
 
-std::int32_t Session::random() {
+std::int32_t Reading::random() {
   // The ring holds the last 31 values; the oldest is at random_position_.
   std::uint32_t& oldest = random_[random_position_];
   const std::uint32_t third = random_[(random_position_ + 28) % 31];

@@ -1,5 +1,5 @@
-/// Everything that outlives a statement while a deck is read: files, symbols, diagnostics, limits,
-/// the model being built.
+/// One reading of a deck: everything that outlives a statement (files, symbols, diagnostics,
+/// limits, the model being built).
 #pragma once
 
 #include <chrono>
@@ -47,14 +47,14 @@ struct ReaderOptions {
   std::size_t printed_bytes = 16 << 20;                           ///< limit `printed-bytes`
 };
 
-class Session {
+class Reading {
  public:
   /// `builder` may be null: a deck used as a calculator.
-  Session(const FileSource& source, Limits limits, ModelBuilder* builder = nullptr,
+  Reading(const FileSource& source, Limits limits, ModelBuilder* builder = nullptr,
           ReaderOptions options = {});
-  ~Session();
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
+  ~Reading();
+  Reading(const Reading&) = delete;
+  Reading& operator=(const Reading&) = delete;
 
   // ------------------------------------------------------------------ files
   const DeckFile& file(int index) const { return files_[index]; }
@@ -88,7 +88,7 @@ class Session {
   /// Refuses a file named in file `from` that could not be read.
   [[noreturn]] void fail_read(SourceSpan where, const Error& error, int from) const;
   const std::vector<Diagnostic>& diagnostics() const { return diagnostics_; }
-  std::vector<Diagnostic> take_diagnostics() { return std::move(diagnostics_); }
+  std::vector<Diagnostic> release_diagnostics() { return std::move(diagnostics_); }
   int errors() const { return errors_; }
   bool full() const { return errors_ >= limits.errors || stopped_; }  ///< no use in reading on
   void stop() { stopped_ = true; }  ///< after a limit: nothing more is read
