@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "elements/registry.h"
+#include "elements/families.h"
 #include "input/vocabulary.h"
 
 namespace mbcosim::cli {

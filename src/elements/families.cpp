@@ -1,4 +1,4 @@
-#include "elements/registry.h"
+#include "elements/families.h"
 
 namespace mbcosim {
 
@@ -12,6 +12,8 @@ const Registry& full_registry() {
     register_external_forces(r);
     register_ports(r);
     register_genels(r);
+    register_electric(r);
+    register_control(r);
     register_hydraulics(r);
     register_modal(r);
     register_drives(r);

@@ -12,7 +12,9 @@ void register_forces(Registry& registry);           ///< forces and couples
 void register_external_forces(Registry& registry);  ///< loads from peers on ports
 void register_ports(
     Registry& registry);  ///< external structural mapping, external modal, stream output
-void register_genels(Registry& registry);      ///< genels and electric elements
+void register_genels(Registry& registry);
+void register_electric(Registry& registry);    ///< sensors and motors
+void register_control(Registry& registry);     ///< `electric: …, discrete control`
 void register_hydraulics(Registry& registry);  ///< elements and fluids
 void register_modal(Registry& registry);       ///< modal joint, modal force
 

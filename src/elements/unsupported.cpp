@@ -2,7 +2,7 @@
 /// is refused by name. A word that is registered by its family is served, whatever stands here.
 #include <initializer_list>
 
-#include "elements/registry.h"
+#include "elements/families.h"
 
 namespace mbcosim {
 

@@ -115,7 +115,7 @@ class Pattern : public PatternSink, public PositionSource {
 /// Gives every owner its unknowns in the documented order: nodes by type, then elements by family.
 void number_unknowns(Model& model) {
   int n = 0;
-  const auto take = [&](int count, UnknownKind kind, double scale) {
+  const auto add_unknowns = [&](int count, UnknownKind kind, double scale) {
     n += count;
     model.kinds.resize(n, kind);
     model.row_scale.resize(n, scale);
@@ -125,7 +125,7 @@ void number_unknowns(Model& model) {
     if (node.is_dummy()) continue;
     node.first = n;
     node.equilibrium = n + node.unknowns() - node.position_unknowns();
-    take(node.unknowns(), UnknownKind::differential, node.scale);
+    add_unknowns(node.unknowns(), UnknownKind::differential, node.scale);
   }
   for (const StructuralNode& node : model.structural)
     model.places.push_back({node.first, node.equilibrium, node.position_unknowns()});
@@ -134,7 +134,8 @@ void number_unknowns(Model& model) {
     for (ScalarNode& node : model.scalars) {
       if (node.kind != kind) continue;
       node.unknown = n;
-      take(1, node.differential ? UnknownKind::differential : UnknownKind::algebraic, node.scale);
+      add_unknowns(1, node.differential ? UnknownKind::differential : UnknownKind::algebraic,
+                   node.scale);
     }
   for (int family = 0; family < static_cast<int>(Family::count); ++family)
     for (const ElementRef& e : model.elements) {
@@ -142,8 +143,8 @@ void number_unknowns(Model& model) {
       const int own = e.set->unknowns(e.index);
       for (int k = 0; k < own; ++k) {
         const bool differential = e.set->is_differential(e.index, k);
-        take(1, differential ? UnknownKind::differential : UnknownKind::algebraic,
-             model.family_scale[family]);
+        add_unknowns(1, differential ? UnknownKind::differential : UnknownKind::algebraic,
+                     model.family_scale[family]);
         model.is_constraint_row.back() = !differential;
       }
       e.set->bind(model, e.index, n - own);

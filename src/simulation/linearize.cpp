@@ -27,7 +27,7 @@ class Differences {
   }
   /// Derivatives along a change of the state: change(state, ±step).
   template <class Change>
-  void take(double step, Change&& change, VecX& residual, VecX& outputs) {
+  void compute(double step, Change&& change, VecX& residual, VecX& outputs) {
     State plus = state_, minus = state_;
     change(plus, step);
     change(minus, -step);
@@ -82,7 +82,7 @@ Result<InputsOutputs> linearize_inputs_outputs(const Model& model, const State& 
         moved[k] += step;
         (void)variables.set(model, changed, handle, moved);
       };
-      differences.take(step_at(values[k]), change, residual, output);
+      differences.compute(step_at(values[k]), change, residual, output);
       io.b.col(column) = residual;
       io.d0.col(column) = output;
     }
@@ -94,10 +94,10 @@ Result<InputsOutputs> linearize_inputs_outputs(const Model& model, const State& 
         update_rotations(model, changed);
       };
     };
-    differences.take(step_at(state.y[i]), change(&State::y), residual, output);
+    differences.compute(step_at(state.y[i]), change(&State::y), residual, output);
     io.c0.col(i) = output;
     if (model.kinds[i] != UnknownKind::differential) continue;
-    differences.take(step_at(state.yp[i]), change(&State::yp), residual, output);
+    differences.compute(step_at(state.yp[i]), change(&State::yp), residual, output);
     io.c1.col(i) = output;
   }
   return io;

@@ -45,7 +45,7 @@ std::unique_ptr<DenseTail> DenseTail::plan(int n, int* column_start, int* row_in
   KluReference reference(n, column_start, row_index, values, rows, columns);
   if (!reference.numeric || reference.symbolic->nblocks != 1) return nullptr;
   std::unique_ptr<DenseTail> tail(new DenseTail(n, column_start, row_index));
-  if (!tail->take(reference)) return nullptr;
+  if (!tail->read_factors(reference)) return nullptr;
   return tail->factor(values) ? std::move(tail) : nullptr;
 }
 
@@ -72,7 +72,7 @@ void DenseTail::Columns::filter(int columns, Keep keep) {
   value.assign(kept, 0.0);
 }
 
-bool DenseTail::take(KluReference& reference) {
+bool DenseTail::read_factors(KluReference& reference) {
   klu_symbolic* symbolic = reference.symbolic;
   klu_numeric* numeric = reference.numeric;
   klu_common* common = &reference.common;
@@ -136,7 +136,7 @@ void DenseTail::eliminate(const double* values, int j) {
   }
 }
 
-bool DenseTail::keep_head_column(int j) {
+bool DenseTail::read_head_column(int j) {
   const double pivot = pivots_[j] = work_[j];
   work_[j] = 0;
   const double size = std::abs(pivot);
@@ -156,7 +156,7 @@ bool DenseTail::factor_columns(const double* values) {
   for (int j = 0; j < n_; ++j) {
     eliminate(values, j);
     if (j < head_) {
-      if (!keep_head_column(j)) return false;
+      if (!read_head_column(j)) return false;
     } else {
       std::copy(work_.begin() + head_, work_.end(), tail_.col(j - head_).data());
       std::fill(work_.begin() + head_, work_.end(), 0.0);

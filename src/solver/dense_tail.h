@@ -40,11 +40,11 @@ class DenseTail {
     void filter(int columns, Keep keep);
   };
   DenseTail(int n, const int* column_start, const int* row_index);
-  bool take(KluReference& reference);
+  bool read_factors(KluReference& reference);
   bool choose_head(double flops);
   bool scale_rows(const double* values);
   void eliminate(const double* values, int j);
-  bool keep_head_column(int j);
+  bool read_head_column(int j);
   bool factor_columns(const double* values);
 
   int n_, head_ = 0;

@@ -17,7 +17,7 @@ class Assembly {
   Assembly(const Model& model, State& state)
       : model_(model), state_(state), start_(state), n_(model.unknowns), to_local_(2 * n_, -1) {
     for (const ElementRef& e : model.elements)
-      if (takes_part(e)) elements_.push_back(e);
+      if (is_assembled(e)) elements_.push_back(e);
     number();
   }
   bool needed() const { return !elements_.empty(); }
@@ -44,7 +44,7 @@ class Assembly {
     return report;
   }
 
-  bool takes_part(const ElementRef& e) const {
+  bool is_assembled(const ElementRef& e) const {
     if (e.set->assembly_role(e.index) == AssemblyRole::none || !e.set->is_active(state_, e.index))
       return false;
     switch (e.set->info(e.index).family) {

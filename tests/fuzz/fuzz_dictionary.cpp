@@ -4,7 +4,7 @@
 #include <set>
 #include <string>
 
-#include "elements/registry.h"
+#include "elements/families.h"
 #include "input/vocabulary.h"
 
 namespace {

@@ -1,7 +1,7 @@
 /// Stands in for the elements of the program when only the reader is fuzzed: cards under the usual
 /// words that read every kind of argument a `Card` offers and add nothing to the model.
+#include "elements/families.h"
 #include "elements/ports/attach.h"
-#include "elements/registry.h"
 #include "model/card.h"
 #include "model/model.h"
 #include "simulation/model_check.h"

@@ -4,7 +4,9 @@
 arrows   folders include only what stands below them
 headers  every header compiles alone: the build shows it for those that their source includes first, the compiler for the
          others; arguments: compiler and its options
-layout   the top level has the agreed entries and no others; the quick start does not switch off what tests/run.sh builds
+layout   the top level has the agreed entries and no others; the quick start does not switch off what tests/run.sh builds;
+         no two sources of the engine have the same name but those that mean the same in every folder, and register.cpp only
+         lists what its folder has
 format   clang-format would change nothing
 """
 import concurrent.futures
@@ -36,6 +38,8 @@ ARROWS = {
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",
              "tests"}
 FORMATTED = ["src", "server", "client_examples", "tests"]
+# The names of files that every folder may have: they mean the same everywhere.
+COMMON_NAMES = {"register.cpp", "readers.h"}
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([a-z_0-9]+)/', re.MULTILINE)
 
 
@@ -70,7 +74,20 @@ def headers(root, *compiler):
         yield from filter(None, pool.map(compile_alone, paths))
 
 
+def names(root):
+    """Of what is found by its name: files with one name in two folders, and readers in register.cpp."""
+    folders = {}
+    for path in sources(root / "src", ".h", ".cpp"):
+        folders.setdefault(path.name, []).append(str(path.parent.relative_to(root)))
+        if path.name == "register.cpp" and "Card& card" in path.read_text(encoding="utf-8"):
+            yield f"{path.relative_to(root)} reads cards: readers stand in read_….cpp or beside their element"
+    for name, places in folders.items():
+        if len(places) > 1 and name not in COMMON_NAMES:
+            yield f"{name} stands in {' and '.join(places)}: a name means one thing"
+
+
 def layout(root):
+    yield from names(root)
     if "-DMBCOSIM_" in (root / "client_examples" / "quickstart.sh").read_text():
         yield "quickstart.sh sets options of the build folder that tests/run.sh uses, too"
     if not shutil.which("git"):

@@ -2,7 +2,7 @@
 #include <string>
 
 #include "elements/beams/beam.h"
-#include "elements/registry.h"
+#include "elements/families.h"
 #include "model/card.h"
 #include "model/laws/law_parts.h"
 

@@ -1,1 +1,1 @@
-set(SOURCES beam.cpp beam_output.cpp beam_tangent.cpp register.cpp)
+set(SOURCES beam.cpp beam_results.cpp beam_tangent.cpp read_beams.cpp)

@@ -3,7 +3,7 @@
 #include "elements/bodies/body.h"
 #include "elements/bodies/moving_frame.h"
 #include "elements/bodies/readers.h"
-#include "elements/registry.h"
+#include "elements/families.h"
 #include "model/card.h"
 
 namespace mbcosim {

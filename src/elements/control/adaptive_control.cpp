@@ -1,4 +1,4 @@
-#include "elements/genels/adaptive_control.h"
+#include "elements/control/adaptive_control.h"
 
 #include <algorithm>
 
@@ -44,7 +44,7 @@ void AdaptiveControl::obey_law(const GeneralView& u, double* memory) const {
   law_->control(identifier_, memory + desired_, weight, memory, control(memory));
 }
 
-void AdaptiveControl::take(const double* y, const double* u, double* memory) const {
+void AdaptiveControl::add_sample(const double* y, const double* u, double* memory) const {
   identifier_.update(memory, y, u);
   memory[fresh_] = 1;
 }
@@ -52,7 +52,7 @@ void AdaptiveControl::take(const double* y, const double* u, double* memory) con
 int AdaptiveControl::private_datum(std::string_view name) const {
   if (const int k = SampledControl::private_datum(name); k >= 0) return k;
   const int last = identifier_.count() - 1;
-  const int k = name == "forgetting" ? last : place_of(name, "theta[", last);
+  const int k = name == "forgetting" ? last : component_in(name, "theta[", last);
   return k < 0 ? -1 : input_count() + k;
 }
 

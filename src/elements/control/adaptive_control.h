@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "elements/genels/arx_identifier.h"
-#include "elements/genels/predictive_law.h"
-#include "elements/genels/sampled_control.h"
+#include "elements/control/arx_identifier.h"
+#include "elements/control/predictive_law.h"
+#include "elements/control/sampled_control.h"
 
 namespace mbcosim {
 
@@ -45,7 +45,7 @@ class AdaptiveControl : public SampledControl {
   bool sampled_table(SampledTable& table) const override;
 
  private:
-  void take(const double* y, const double* u, double* memory) const override;
+  void add_sample(const double* y, const double* u, double* memory) const override;
   void excite(const GeneralView& u, double* memory) const;
   void obey_law(const GeneralView& u, double* memory) const;
 

@@ -1,9 +1,9 @@
-#include "elements/genels/arx_identifier.h"
+#include "elements/control/arx_identifier.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "elements/genels/sampled_control.h"
+#include "elements/control/sampled_control.h"
 
 namespace mbcosim {
 

@@ -1,4 +1,4 @@
-#include "elements/genels/discrete_control.h"
+#include "elements/control/discrete_control.h"
 
 namespace mbcosim {
 
@@ -8,7 +8,7 @@ void DiscreteControl::connect(GeneralConnection& c) {
   u_ = c.memory(static_cast<int>(gains_.B.size()) * input_count());
 }
 
-void DiscreteControl::take(const double* y, const double* u, double* memory) const {
+void DiscreteControl::add_sample(const double* y, const double* u, double* memory) const {
   push_sample(memory + y_, static_cast<int>(gains_.A.size()), output_count(), y);
   push_sample(memory + u_, static_cast<int>(gains_.B.size()), input_count(), u);
   Eigen::Map<VecX> sum(control(memory), input_count());

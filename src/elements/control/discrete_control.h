@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "elements/genels/sampled_control.h"
+#include "elements/control/sampled_control.h"
 
 namespace mbcosim {
 
@@ -22,7 +22,7 @@ class DiscreteControl : public SampledControl {
   void connect(GeneralConnection& c) override;
 
  private:
-  void take(const double* y, const double* u, double* memory) const override;
+  void add_sample(const double* y, const double* u, double* memory) const override;
 
   Gains gains_;
   int y_ = 0, u_ = 0;  ///< offsets in the element's memory: y and u of the last samples

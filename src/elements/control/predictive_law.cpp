@@ -1,9 +1,9 @@
-#include "elements/genels/predictive_law.h"
+#include "elements/control/predictive_law.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "elements/genels/sampled_control.h"
+#include "elements/control/sampled_control.h"
 
 namespace mbcosim {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "elements/genels/arx_identifier.h"
+#include "elements/control/arx_identifier.h"
 
 namespace mbcosim {
 

@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <set>
 
-#include "elements/genels/adaptive_control.h"
-#include "elements/genels/discrete_control_cards.h"
+#include "elements/control/adaptive_control.h"
+#include "elements/control/readers.h"
 #include "model/model.h"
 
 namespace mbcosim {

@@ -2,9 +2,10 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "elements/genels/discrete_control.h"
-#include "elements/genels/discrete_control_cards.h"
-#include "elements/genels/readers.h"
+#include "elements/control/discrete_control.h"
+#include "elements/control/readers.h"
+#include "elements/families.h"
+#include "elements/read_dof.h"
 #include "model/model.h"
 
 namespace mbcosim {
@@ -96,7 +97,7 @@ void read_signals(Card& card, const ControlSizes& sizes, SampledControl::Signals
   for (int k = 0; k < sizes.outputs; ++k) signals.outputs.push_back(read_measure(card));
   expect(card, "inputs");
   for (int k = 0; k < sizes.inputs; ++k)
-    signals.inputs.push_back(read_genel_dof(card, "discrete control"));
+    signals.inputs.push_back(read_equation_dof(card, "discrete control"));
 }
 
 void read_discrete_control(Card& card, ElementInfo& info) {
@@ -141,7 +142,7 @@ int read_control_number(Card& card, const char* what, int least, int most) {
   return n;
 }
 
-void register_discrete_control(Registry& registry) {
+void register_control(Registry& registry) {
   registry.typed("electric", Family::electric, {"discrete control"}, read_discrete_control);
 }
 

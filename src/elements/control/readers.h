@@ -1,7 +1,7 @@
 /// Readers of the kinds of control data of `discrete control`.
 #pragma once
 
-#include "elements/genels/adaptive_control.h"
+#include "elements/control/adaptive_control.h"
 #include "model/card.h"
 
 namespace mbcosim {

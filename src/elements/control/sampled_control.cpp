@@ -1,4 +1,4 @@
-#include "elements/genels/sampled_control.h"
+#include "elements/control/sampled_control.h"
 
 #include <algorithm>
 #include <charconv>
@@ -35,10 +35,10 @@ void SampledControl::after_convergence(const GeneralView& u, State& state) const
     y[k] = m.scale ? u.drive(m.scale) * value : value;
   }
   for (int k = 0; k < input_count(); ++k) inputs[k] = u.dof(signals_.inputs[k]);
-  take(y, inputs, memory);
+  add_sample(y, inputs, memory);
 }
 
-int SampledControl::place_of(std::string_view name, std::string_view start, int count) {
+int SampledControl::component_in(std::string_view name, std::string_view start, int count) {
   if (name.substr(0, start.size()) != start) return -1;
   int k = 0;
   const char *first = name.data() + start.size(), *end = name.data() + name.size();
@@ -48,7 +48,7 @@ int SampledControl::place_of(std::string_view name, std::string_view start, int 
 }
 
 int SampledControl::private_datum(std::string_view name) const {
-  return place_of(name, "u[", input_count());
+  return component_in(name, "u[", input_count());
 }
 
 std::vector<std::string> SampledControl::private_data() const {

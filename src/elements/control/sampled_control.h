@@ -6,7 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "elements/genels/state_space.h"
+#include "elements/general_element.h"
+#include "elements/scalar_value.h"
 
 namespace mbcosim {
 
@@ -47,10 +48,10 @@ class SampledControl : public GeneralElement {
 
  protected:
   /// A sample has been taken. `memory`: the element's in State::memory.
-  virtual void take(const double* y, const double* u, double* memory) const = 0;
+  virtual void add_sample(const double* y, const double* u, double* memory) const = 0;
 
   /// k − 1 for "<start>k]" with k from 1 to `count`, else −1.
-  static int place_of(std::string_view name, std::string_view start, int count);
+  static int component_in(std::string_view name, std::string_view start, int count);
   int output_count() const { return static_cast<int>(signals_.outputs.size()); }
   int input_count() const { return static_cast<int>(signals_.inputs.size()); }
   double* control(double* memory) const { return memory + control_; }

@@ -1,4 +1,4 @@
-#include "elements/genels/electric.h"
+#include "elements/electric/electric.h"
 
 #include <algorithm>
 

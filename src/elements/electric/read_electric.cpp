@@ -1,8 +1,9 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "elements/genels/electric.h"
-#include "elements/genels/readers.h"
+#include "elements/electric/electric.h"
+#include "elements/families.h"
+#include "model/card.h"
 
 namespace mbcosim {
 
@@ -114,7 +115,7 @@ void read_motor(Card& card, ElementInfo& info) {
 
 }  // namespace
 
-void register_electric_elements(Registry& registry) {
+void register_electric(Registry& registry) {
   registry.typed("electric", Family::electric, {"accelerometer"}, read_accelerometer);
   registry.typed("electric", Family::electric, {"displacement"}, read_displacement);
   registry.typed("electric", Family::electric, {"motor"}, read_motor);

@@ -1,9 +1,9 @@
 /// Cards of forces that an external code gives: `force: …, external structural`.
 #include "elements/forces/read_external.h"
 
+#include "elements/families.h"
 #include "elements/forces/external_structural.h"
 #include "elements/ports/port_element.h"
-#include "elements/registry.h"
 #include "model/card.h"
 
 namespace mbcosim {

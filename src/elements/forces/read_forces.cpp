@@ -1,4 +1,4 @@
-#include "elements/registry.h"
+#include "elements/families.h"
 
 #include "elements/forces/abstract_force.h"
 #include "elements/forces/structural_force.h"

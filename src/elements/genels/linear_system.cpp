@@ -1,4 +1,4 @@
-#include "elements/genels/state_space.h"
+#include "elements/genels/linear_system.h"
 
 #include <limits>
 

@@ -5,15 +5,9 @@
 #include <vector>
 
 #include "elements/general_element.h"
-#include "model/drive.h"
+#include "elements/scalar_value.h"
 
 namespace mbcosim {
-
-/// Input of a genel: a degree of freedom or a drive.
-struct ScalarValue {
-  NodeDof dof;
-  DrivePtr drive;  ///< null: the dof
-};
 
 /// E ẋ = A x + B u,  y = C x + D u.
 struct LinearSystem {

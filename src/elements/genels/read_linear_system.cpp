@@ -1,5 +1,6 @@
+#include "elements/genels/linear_system.h"
 #include "elements/genels/readers.h"
-#include "elements/genels/state_space.h"
+#include "elements/read_dof.h"
 
 namespace mbcosim {
 
@@ -31,7 +32,7 @@ ScalarValue read_input(Card& card) {
 
 NodeDof read_output(Card& card, const char* what) {
   const SourceSpan where = card.next();
-  const NodeDof dof = read_genel_value_dof(card, what);
+  const NodeDof dof = read_value_dof(card, what);
   if (!dof.differential)
     card.fail_at(where, std::string(what) + ": the output must be a differential node",
                  "declare the abstract node `differential`");

@@ -1,40 +1,15 @@
 #include "elements/genels/readers.h"
 #include "elements/genels/scalar_genels.h"
 #include "elements/genels/swashplate.h"
+#include "elements/read_dof.h"
 
 namespace mbcosim {
-
-NodeDof read_genel_dof(Card& card, const char* what) {
-  const SourceSpan where = card.next();
-  const NodeDof dof = card.node_dof(true);
-  const auto refuse = [&](const std::string& why) {
-    card.fail_at(where, std::string(what) + ": " + why);
-  };
-  if (!dof.structural && card.model().scalars[dof.node].kind == ScalarKind::parameter)
-    refuse("a parameter node has no equation");
-  if (dof.structural && card.model().structural[dof.node].is_dummy())
-    refuse("a dummy node has no equations");
-  if (dof.structural && dof.component >= 6)
-    refuse("only components 1 to 6 of a structural node are accepted");
-  if (dof.order > 1) refuse("second derivatives are not accepted");
-  if (dof.structural && dof.component >= 3 && dof.order == 0)
-    refuse("the value of a rotation is not defined; write `differential`");
-  return dof;
-}
-
-NodeDof read_genel_value_dof(Card& card, const char* what) {
-  const SourceSpan where = card.next();
-  const NodeDof dof = read_genel_dof(card, what);
-  if (dof.order != 0)
-    card.fail_at(where, std::string(what) + ": the dof's own value is needed", "write `algebraic`");
-  return dof;
-}
 
 namespace {
 
 void read_clamp(Card& card, ElementInfo& info) {
   GenelClamp e;
-  e.dof = read_genel_dof(card, "clamp");
+  e.dof = read_equation_dof(card, "clamp");
   e.d = card.drive("imposed value");
   add_element(card.builder(), info, std::move(e));
 }
@@ -47,8 +22,8 @@ void refuse_same_dof(Card& card, const NodeDof& a, const NodeDof& b, const char*
 
 void read_distance(Card& card, ElementInfo& info) {
   GenelDistance e;
-  e.first = read_genel_dof(card, "distance");
-  e.second = read_genel_dof(card, "distance");
+  e.first = read_equation_dof(card, "distance");
+  e.second = read_equation_dof(card, "distance");
   refuse_same_dof(card, e.first, e.second, "distance");
   e.d = card.drive("distance");
   add_element(card.builder(), info, std::move(e));
@@ -56,8 +31,8 @@ void read_distance(Card& card, ElementInfo& info) {
 
 void read_spring(Card& card, ElementInfo& info) {
   GenelSpring e;
-  e.first = read_genel_dof(card, "spring");
-  e.second = read_genel_dof(card, "spring");
+  e.first = read_equation_dof(card, "spring");
+  e.second = read_equation_dof(card, "spring");
   refuse_same_dof(card, e.first, e.second, "spring");
   const SourceSpan law = card.next();
   e.law = card.law1();
@@ -69,7 +44,7 @@ void read_spring(Card& card, ElementInfo& info) {
 /// A dof whose rate is an unknown, too.
 NodeDof read_differential_dof(Card& card, const char* what) {
   const SourceSpan where = card.next();
-  const NodeDof dof = read_genel_value_dof(card, what);
+  const NodeDof dof = read_value_dof(card, what);
   if (!dof.differential)
     card.fail_at(where, std::string(what) +
                             ": a differential degree of freedom is needed, this one is algebraic");
@@ -91,7 +66,7 @@ void read_spring_support(Card& card, ElementInfo& info) {
 
 void read_cross_spring_support(Card& card, ElementInfo& info) {
   GenelSpringSupport e;
-  e.row_dof = read_genel_dof(card, "cross spring support");
+  e.row_dof = read_equation_dof(card, "cross spring support");
   e.dof = read_differential_dof(card, "cross spring support");
   e.law = card.law1();
   add_element(card.builder(), info, std::move(e));
@@ -100,7 +75,7 @@ void read_cross_spring_support(Card& card, ElementInfo& info) {
 void read_mass(Card& card, ElementInfo& info) {
   GenelMass e;
   const SourceSpan where = card.next();
-  e.dof = read_genel_dof(card, "mass");
+  e.dof = read_equation_dof(card, "mass");
   if (!e.dof.differential)
     card.fail_at(where, "mass: a differential degree of freedom is needed, this one is algebraic");
   e.m = card.drive("mass");

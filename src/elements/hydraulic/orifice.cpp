@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "elements/hydraulic/reading.h"
-#include "elements/hydraulic/register.h"
+#include "elements/hydraulic/read_values.h"
+#include "elements/hydraulic/readers.h"
 
 namespace mbcosim {
 

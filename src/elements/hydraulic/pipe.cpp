@@ -1,7 +1,7 @@
 #include "elements/hydraulic/pipe.h"
 
-#include "elements/hydraulic/reading.h"
-#include "elements/hydraulic/register.h"
+#include "elements/hydraulic/read_values.h"
+#include "elements/hydraulic/readers.h"
 
 namespace mbcosim {
 

@@ -1,6 +1,6 @@
 #include "elements/hydraulic/pipe_friction.h"
 
-#include "elements/hydraulic/reading.h"
+#include "elements/hydraulic/read_values.h"
 
 namespace mbcosim::hydraulic {
 namespace {

@@ -1,4 +1,4 @@
-#include "elements/hydraulic/reading.h"
+#include "elements/hydraulic/read_values.h"
 
 #include <cstdio>
 #include <limits>

@@ -1,6 +1,6 @@
-#include "elements/hydraulic/register.h"
+#include "elements/hydraulic/readers.h"
 
-#include "elements/registry.h"
+#include "elements/families.h"
 
 namespace mbcosim {
 

@@ -1,3 +1,4 @@
+#include "elements/families.h"
 #include "elements/joints/clamp.h"
 #include "elements/joints/deformable.h"
 #include "elements/joints/distance.h"
@@ -14,7 +15,6 @@
 #include "elements/joints/total_equation.h"
 #include "elements/joints/universal.h"
 #include "elements/joints/velocity.h"
-#include "elements/registry.h"
 
 namespace mbcosim {
 

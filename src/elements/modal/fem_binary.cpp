@@ -26,12 +26,12 @@ class FemBinaryReader {
 
   FemData read() {
     pos_ = 4;  // "bmod"
-    const auto version = take<std::uint32_t>();
+    const auto version = read_value<std::uint32_t>();
     if (version != kVersion)
       fail("version " + std::to_string(version) + " of the binary format is not supported; 4 is");
     read_header();
     while (true) {
-      const int group = take<unsigned char>();
+      const int group = read_value<unsigned char>();
       if (group == kEnd) break;
       if (group < 2 || group > 13) detail::refuse_fem_group(data_.name, 0, group);
       if (have_[group]) fail("record group " + std::to_string(group) + " appears a second time");
@@ -54,7 +54,7 @@ class FemBinaryReader {
     if (bytes_.size() - pos_ < bytes) fail("the binary file is truncated");
   }
   template <class T>
-  T take() {
+  T read_value() {
     need(sizeof(T));
     T v;
     std::memcpy(&v, bytes_.data() + pos_, sizeof v);
@@ -62,8 +62,9 @@ class FemBinaryReader {
     return v;
   }
   void read_header() {
-    if (take<unsigned char>() != 1) fail("the binary file does not start with record group 1");
-    const auto nodes = take<std::uint32_t>(), modes = take<std::uint32_t>();
+    if (read_value<unsigned char>() != 1)
+      fail("the binary file does not start with record group 1");
+    const auto nodes = read_value<std::uint32_t>(), modes = read_value<std::uint32_t>();
     if (nodes < 1 || modes < 1) fail("the header announces no node or no mode");
     const double left = static_cast<double>(bytes_.size());
     if (8.0 * (double(nodes) * (3 + 6.0 * modes) + 2.0 * modes * modes) > left)
@@ -87,7 +88,7 @@ class FemBinaryReader {
     switch (group) {
       case 2:
         for (int i = 0; i < n; ++i) {
-          const auto length = take<std::uint32_t>();
+          const auto length = read_value<std::uint32_t>();
           need(length);
           data_.labels.emplace_back(bytes_.substr(pos_, length));
           pos_ += length;
@@ -157,7 +158,7 @@ class FemBinaryWriter {
     const MatX by_rows = m.transpose();
     out_.append(reinterpret_cast<const char*>(by_rows.data()), 8 * by_rows.size());
   }
-  std::string take() { return std::move(out_); }
+  std::string release() { return std::move(out_); }
 
  private:
   std::string out_;
@@ -203,7 +204,7 @@ std::string write_fem_binary(const FemData& data) {
   }
   if (data.damping) matrix(13, *data.damping);
   out.group(kEnd);
-  return out.take();
+  return out.release();
 }
 
 }  // namespace mbcosim

@@ -359,7 +359,7 @@ class FemTextWriter {
     std::snprintf(text, sizeof text, " %24.16e", v);
     out_ += text;
   }
-  std::string take() { return std::move(out_); }
+  std::string release() { return std::move(out_); }
 
  private:
   std::string out_;
@@ -419,7 +419,7 @@ std::string write_fem_text(const FemData& data, const std::vector<std::string>& 
     out.rows(*data.damping);
   }
   out.line("** END OF FILE");
-  return out.take();
+  return out.release();
 }
 
 }  // namespace mbcosim

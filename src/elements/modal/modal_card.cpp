@@ -4,8 +4,8 @@
 #include <map>
 #include <numeric>
 
-#include "elements/modal/modal_cards.h"
 #include "elements/modal/modal_joint.h"
+#include "elements/modal/readers.h"
 #include "model/card.h"
 
 namespace mbcosim {

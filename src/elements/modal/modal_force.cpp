@@ -1,6 +1,6 @@
 #include "elements/modal/modal_force.h"
 
-#include "elements/modal/modal_cards.h"
+#include "elements/modal/readers.h"
 #include "model/card.h"
 #include "model/output_row.h"
 

@@ -1,5 +1,5 @@
-#include "elements/modal/modal_cards.h"
-#include "elements/registry.h"
+#include "elements/families.h"
+#include "elements/modal/readers.h"
 
 namespace mbcosim {
 

@@ -2,11 +2,11 @@
 /// `stream motion output`.
 #include <sstream>
 
+#include "elements/families.h"
 #include "elements/forces/read_external.h"
 #include "elements/ports/external_modal.h"
 #include "elements/ports/mapped_structural.h"
 #include "elements/ports/stream_output.h"
-#include "elements/registry.h"
 #include "model/card.h"
 
 namespace mbcosim {

@@ -1,7 +1,7 @@
 #include "model/registry.h"
 
 #include "model/drives/readers.h"
-#include "model/functions/register.h"
+#include "model/functions/readers.h"
 
 namespace mbcosim {
 

@@ -1,1 +1,1 @@
-set(SOURCES fluids.cpp register.cpp)
+set(SOURCES fluids.cpp read_fluids.cpp)

@@ -1,4 +1,4 @@
-#include "model/functions/register.h"
+#include "model/functions/readers.h"
 
 #include <cmath>
 

@@ -1,1 +1,1 @@
-set(SOURCES register.cpp scalar_functions.cpp)
+set(SOURCES read_functions.cpp scalar_functions.cpp)

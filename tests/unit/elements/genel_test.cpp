@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "elements/conformance.h"
-#include "elements/genels/electric.h"
+#include "elements/electric/electric.h"
+#include "elements/genels/linear_system.h"
 #include "elements/genels/scalar_genels.h"
-#include "elements/genels/state_space.h"
 #include "elements/genels/swashplate.h"
 #include "elements/general_element.h"
 #include "model/drive.h"

@@ -1,0 +1,1 @@
+set(SOURCES electric.cpp read_electric.cpp)
