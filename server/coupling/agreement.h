@@ -3,6 +3,7 @@
 
 #include <chrono>
 
+#include "coupling/fixed_point.h"
 #include "mbcosim/v1/coupling.pb.h"
 
 namespace mbcosim::server {
@@ -16,7 +17,7 @@ struct Agreement {
   v1::InputHold hold = v1::INPUT_HOLD_ZERO_ORDER;
   std::chrono::milliseconds timeout{10000};  ///< longest wait for an answer
   v1::PeerPolicy policy = v1::PEER_POLICY_FAIL_STEP;
-  v1::Acceleration acceleration = v1::ACCELERATION_NONE;
+  Acceleration acceleration = Acceleration::none;
   double relaxation = 0.5;
   double tolerance = 1e-6;  ///< of the interface, relative
   int maximum_passes = 50;
@@ -25,6 +26,10 @@ struct Agreement {
   std::chrono::milliseconds heartbeat_timeout{0};   ///< longest silence of the peer; 0: any
   int generation = 0;                               ///< number of the handshake on this port
 
+  /// Answers that the held inputs follow.
+  std::size_t held_answers() const {
+    return hold == v1::INPUT_HOLD_QUADRATIC ? 3 : hold == v1::INPUT_HOLD_LINEAR ? 2 : 1;
+  }
   bool is_window() const { return mode == v1::COUPLING_MODE_WINDOW; }
   bool is_tight() const { return mode == v1::COUPLING_MODE_TIGHT; }
   bool is_implicit() const { return is_window() || is_tight(); }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {
@@ -119,7 +119,7 @@ void Coupler::prepare(const Simulation& simulation) {
   target_time_ = simulation.time() + simulation.next_step_size();
   for (Line& line : lines_) {
     const Agreement now = line.port->agreement();
-    if (now.hold != line.agreement.hold) line.history = InputHistory(now.hold);
+    if (now.hold != line.agreement.hold) line.history = InputHistory(now.held_answers());
     line.agreement = now;
     const bool idle = line.port->is_idle();
     line.due = !idle && !now.is_implicit() && (step % now.every == 0 || line.history.empty());

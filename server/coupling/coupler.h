@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "coupling/fixed_point.h"
+#include "coupling/input_history.h"
 #include "coupling/port.h"
 
 namespace mbcosim::server {
@@ -67,11 +68,11 @@ class Coupler {
   struct Line {  ///< what belongs to one port
     Port* port = nullptr;
     Agreement agreement;  ///< during the present step
-    InputHistory history{v1::INPUT_HOLD_ZERO_ORDER};
+    InputHistory history{1};
     v1::ServerMessage message;
     bool due = false;
     std::int64_t sent_for = -1;  ///< step whose motion is on its way; −1: none
-    FixedPoint fixed_point{v1::ACCELERATION_NONE, 1};
+    FixedPoint fixed_point{Acceleration::none, 1};
     Eigen::VectorXd interface;  ///< window, tight: values applied
     bool settled = false;       ///< tight: the last answer was what is applied
     int tangent = -1;           ///< tight: number among the simulation's load tangents; −1: none

@@ -14,15 +14,16 @@ void FixedPoint::start() {
 Eigen::VectorXd FixedPoint::next(const Eigen::VectorXd& x, const Eigen::VectorXd& answer) {
   const Eigen::VectorXd r = answer - x;
   switch (kind_) {
-    case v1::ACCELERATION_CONSTANT:
+    case Acceleration::constant:
       return x + relaxation_ * r;
-    case v1::ACCELERATION_AITKEN:
+    case Acceleration::aitken:
       return aitken(x, r);
-    case v1::ACCELERATION_IQN_ILS:
+    case Acceleration::iqn_ils:
       return quasi_newton(x, answer, r);
-    default:
-      return answer;
+    case Acceleration::none:
+      break;
   }
+  return answer;
 }
 
 Eigen::VectorXd FixedPoint::aitken(const Eigen::VectorXd& x, const Eigen::VectorXd& r) {

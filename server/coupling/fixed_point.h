@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "coupling/agreement.h"
-
 namespace mbcosim::server {
+
+enum class Acceleration { none, constant, aitken, iqn_ils };
 
 /// Proposes the next interface values x from the pair (x, x̃ = S(x)); r = x̃ − x is the residual.
 ///
@@ -18,7 +18,7 @@ namespace mbcosim::server {
 /// The first step of Aitken and IQN-ILS is a constant relaxation. `start` begins a new time step.
 class FixedPoint {
  public:
-  FixedPoint(v1::Acceleration kind, double relaxation) : kind_(kind), relaxation_(relaxation) {}
+  FixedPoint(Acceleration kind, double relaxation) : kind_(kind), relaxation_(relaxation) {}
   void start();
   Eigen::VectorXd next(const Eigen::VectorXd& x, const Eigen::VectorXd& answer);
 
@@ -27,7 +27,7 @@ class FixedPoint {
   Eigen::VectorXd quasi_newton(const Eigen::VectorXd& x, const Eigen::VectorXd& answer,
                                const Eigen::VectorXd& r);
 
-  v1::Acceleration kind_;
+  Acceleration kind_;
   double relaxation_;
   double omega_ = 0;
   std::vector<Eigen::VectorXd> residuals_, answers_;  ///< of this time step, oldest first

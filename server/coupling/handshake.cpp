@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {
@@ -37,6 +37,25 @@ class Mismatches {
  private:
   std::map<std::string, std::string> found_;
 };
+
+Acceleration acceleration_of(v1::Acceleration wanted) {
+  switch (wanted) {
+    case v1::ACCELERATION_CONSTANT:
+      return Acceleration::constant;
+    case v1::ACCELERATION_AITKEN:
+      return Acceleration::aitken;
+    case v1::ACCELERATION_IQN_ILS:
+      return Acceleration::iqn_ils;
+    default:
+      return Acceleration::none;
+  }
+}
+
+v1::Acceleration to_proto(Acceleration acceleration) {
+  constexpr v1::Acceleration kNames[] = {v1::ACCELERATION_NONE, v1::ACCELERATION_CONSTANT,
+                                         v1::ACCELERATION_AITKEN, v1::ACCELERATION_IQN_ILS};
+  return kNames[static_cast<int>(acceleration)];
+}
 
 template <class Enum>
 Enum chosen(Enum wanted, Enum fallback) {
@@ -130,7 +149,7 @@ void check_agreement(const Agreement& agreement, const PortModel& port, const Mo
   mismatches.expect(agreement.frame == v1::PORT_FRAME_GLOBAL, "tangent", "needs the global frame");
   mismatches.expect(method != Method::third_order && method != Method::third_order_ad_hoc,
                     "tangent", "the deck's method does not take one");
-  mismatches.expect(agreement.acceleration == v1::ACCELERATION_NONE, "acceleration",
+  mismatches.expect(agreement.acceleration == Acceleration::none, "acceleration",
                     "has no use with a tangent");
 }
 
@@ -148,7 +167,7 @@ Agreement choose(const v1::Hello& hello, const PortModel& port) {
       std::max({hello.every(), hello.every() == 0 && stepwise ? layout.default_every() : 1, 1});
   agreement.hold = chosen(hello.input_hold(), agreement.hold);
   agreement.policy = chosen(hello.policy(), agreement.policy);
-  agreement.acceleration = chosen(hello.acceleration(), agreement.acceleration);
+  agreement.acceleration = acceleration_of(hello.acceleration());
   agreement.tangent = chosen(hello.tangent(), agreement.tangent);
   if (hello.has_peer_timeout()) agreement.timeout = milliseconds(hello.peer_timeout());
   agreement.heartbeat_interval = milliseconds(hello.heartbeat_interval());
@@ -193,7 +212,7 @@ void fill_agreed(const v1::Hello& hello, const Agreement& agreement, v1::Hello* 
   out->set_input_hold(agreement.hold);
   *out->mutable_peer_timeout() = TimeUtil::MillisecondsToDuration(agreement.timeout.count());
   out->set_policy(agreement.policy);
-  out->set_acceleration(agreement.acceleration);
+  out->set_acceleration(to_proto(agreement.acceleration));
   out->set_relaxation(agreement.relaxation);
   out->set_interface_tolerance(agreement.tolerance);
   out->set_maximum_passes(agreement.maximum_passes);

@@ -2,16 +2,11 @@
 
 namespace mbcosim::server {
 
-InputHistory::InputHistory(v1::InputHold hold)
-    : depth_(hold == v1::INPUT_HOLD_QUADRATIC ? 3
-             : hold == v1::INPUT_HOLD_LINEAR  ? 2
-                                              : 1) {}
-
 void InputHistory::add(double time, const std::vector<double>& values) {
   if (!points_.empty() && points_.back().time >= time)
     points_.clear();  // the simulation went back in time
   points_.push_back({time, values});
-  if (points_.size() > depth_) points_.pop_front();
+  if (points_.size() > most_) points_.pop_front();
 }
 
 std::vector<double> InputHistory::at(double time) const {

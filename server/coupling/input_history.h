@@ -1,10 +1,9 @@
 /// A peer's last answers, and what they say about times between exchanges.
 #pragma once
 
+#include <cstddef>
 #include <deque>
 #include <vector>
-
-#include "coupling/agreement.h"
 
 namespace mbcosim::server {
 
@@ -12,7 +11,8 @@ namespace mbcosim::server {
 /// newest.
 class InputHistory {
  public:
-  explicit InputHistory(v1::InputHold hold);
+  /// `most`: answers that count, 1 (held), 2 (linear) or 3 (quadratic).
+  explicit InputHistory(std::size_t most) : most_(most) {}
   void clear() { points_.clear(); }
   bool empty() const { return points_.empty(); }
   void add(double time, const std::vector<double>& values);
@@ -24,7 +24,7 @@ class InputHistory {
     double time;
     std::vector<double> values;
   };
-  std::size_t depth_;
+  std::size_t most_;
   std::deque<Point> points_;  ///< oldest first
 };
 

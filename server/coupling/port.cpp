@@ -4,7 +4,7 @@
 
 #include <thread>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

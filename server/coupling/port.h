@@ -8,12 +8,11 @@
 #include <optional>
 #include <string>
 
-#include "coupling/input_history.h"
 #include "coupling/port_model.h"
 #include "coupling/recorder.h"
 #include "mbcosim/v1/coupling.pb.h"
 #include "mbcosim/v1/simulations.pb.h"
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 

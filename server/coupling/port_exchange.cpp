@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "coupling/port_numbers.h"
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

@@ -5,8 +5,8 @@
 #include <map>
 
 #include "coupling/port_numbers.h"
-#include "service/refusal.h"
 #include "simulation/formula.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

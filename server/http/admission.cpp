@@ -9,7 +9,7 @@
 #include <array>
 #include <stdexcept>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server::http {
 namespace {

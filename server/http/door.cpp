@@ -13,7 +13,7 @@
 #include "http/reaper.h"
 #include "http/rpc_error.h"
 #include "http/rpc_handler.h"
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server::http {
 namespace {

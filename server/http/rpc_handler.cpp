@@ -4,7 +4,7 @@
 #include <charconv>
 
 #include "http/rpc_error.h"
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server::http {
 namespace {

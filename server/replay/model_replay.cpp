@@ -6,9 +6,9 @@
 
 #include "coupling/handshake.h"
 #include "replay/record_file.h"
-#include "service/convert.h"
 #include "service/session.h"
 #include "service/upload.h"
+#include "wire/convert.h"
 
 namespace mbcosim::replay {
 namespace {

@@ -4,7 +4,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <prometheus/text_serializer.h>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

@@ -8,8 +8,8 @@
 #include "service/auth.h"
 #include "service/call_watch.h"
 #include "service/config.h"
-#include "service/refusal.h"
 #include "service/session_store.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "service/convert.h"
-#include "service/refusal.h"
 #include "service/session_advance.h"
+#include "wire/convert.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

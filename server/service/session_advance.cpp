@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "service/convert.h"
-#include "service/refusal.h"
+#include "wire/convert.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

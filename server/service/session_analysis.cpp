@@ -1,8 +1,8 @@
 /// Linearization and eigenvalues of a session's current state.
 #include <complex>
 
-#include "service/refusal.h"
 #include "service/session.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

@@ -1,9 +1,9 @@
 /// The part of Session that saves and restores.
 #include <charconv>
 
-#include "service/convert.h"
-#include "service/refusal.h"
 #include "service/session.h"
+#include "wire/convert.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

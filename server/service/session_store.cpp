@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <random>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "service/convert.h"
 #include "service/upload.h"
+#include "wire/convert.h"
 
 namespace mbcosim::server {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {

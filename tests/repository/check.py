@@ -28,12 +28,13 @@ ARROWS = {
     "src/reduction": {"math", "model", "input", "elements", "solver"},  # elements: the FEM data file
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
     "server/cli": {"math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
-    "server/coupling": {"math", "model", "simulation", "service", "mbcosim"},
-    "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "mbcosim", "shared_memory"},
+    "server/wire": {"model", "simulation", "mbcosim"},
+    "server/coupling": {"math", "model", "simulation", "wire", "mbcosim"},
+    "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "wire", "mbcosim", "shared_memory"},
     "server/client": {"mbcosim", "shared_memory"},
     "server/shared_memory": set(),
-    "server/http": {"service", "mbcosim"},
-    "server/daemon": {"service", "http", "mbcosim"},
+    "server/http": {"service", "wire", "mbcosim"},
+    "server/daemon": {"service", "http", "wire", "mbcosim"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",
              "tests"}

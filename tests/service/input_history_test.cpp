@@ -8,8 +8,7 @@ namespace {
 double value(const InputHistory& history, double time) { return history.at(time)[0]; }
 
 TEST(InputHistory, FollowsPolynomialsUpToItsDegree) {
-  InputHistory held(v1::INPUT_HOLD_ZERO_ORDER), line(v1::INPUT_HOLD_LINEAR),
-      parabola(v1::INPUT_HOLD_QUADRATIC);
+  InputHistory held(1), line(2), parabola(3);
   for (const double t : {1.0, 2.0, 4.0}) {
     held.add(t, {5 * t});
     line.add(t, {3 * t - 1});
@@ -22,7 +21,7 @@ TEST(InputHistory, FollowsPolynomialsUpToItsDegree) {
 }
 
 TEST(InputHistory, StartsWithFewerPoints) {
-  InputHistory parabola(v1::INPUT_HOLD_QUADRATIC);
+  InputHistory parabola(3);
   parabola.add(0, {1});
   EXPECT_DOUBLE_EQ(value(parabola, 3), 1);
   parabola.add(1, {2});
@@ -30,7 +29,7 @@ TEST(InputHistory, StartsWithFewerPoints) {
 }
 
 TEST(InputHistory, ForgetsAFutureThatWasUndone) {
-  InputHistory line(v1::INPUT_HOLD_LINEAR);
+  InputHistory line(2);
   line.add(1, {1});
   line.add(2, {2});
   line.add(1.5, {7});

@@ -1,8 +1,8 @@
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 #include <gtest/gtest.h>
 
-#include "service/convert.h"
+#include "wire/convert.h"
 
 namespace mbcosim::server {
 namespace {

@@ -1,8 +1,8 @@
-#include "service/convert.h"
+#include "wire/convert.h"
 
 #include <cstdio>
 
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
 namespace mbcosim::server {
 

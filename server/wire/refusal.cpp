@@ -1,6 +1,6 @@
-#include "service/refusal.h"
+#include "wire/refusal.h"
 
-#include "service/convert.h"
+#include "wire/convert.h"
 
 namespace mbcosim::server {
 namespace {
