@@ -1,12 +1,8 @@
 /// One simulation on the server: who owns it, who advances it, what is saved of it.
 #pragma once
 
-#include <atomic>
-#include <chrono>
 #include <functional>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -15,8 +11,12 @@
 #include "service/call_watch.h"
 #include "service/config.h"
 #include "service/fair_mutex.h"
+#include "service/lease.h"
 #include "service/metrics.h"
-#include "service/telemetry_buffer.h"
+#include "service/session_status.h"
+#include "service/snapshot_shelf.h"
+#include "service/telemetry_hub.h"
+#include "service/variable_access.h"
 #include "simulation/simulation.h"
 
 namespace mbcosim::server {
@@ -43,7 +43,7 @@ class Session {
 
   const Identity& identity() const { return identity_; }
   const Model& model() const { return *model_; }
-  const std::vector<Variable>& variables() const { return *variables_; }
+  const std::vector<Variable>& variables() const { return variables_.variables(); }
   void fill(v1::SimulationInfo* out) const;
   void fill(v1::ModelDescription* out, const std::string& variable_prefix) const;
 
@@ -63,15 +63,14 @@ class Session {
 
   void save(const std::string& display_name, v1::Snapshot* out);
   void restore(int snapshot);
-  void list_snapshots(v1::ListSnapshotsReply* out) const;
-  void delete_snapshot(int snapshot);
+  SnapshotShelf& snapshots() { return snapshots_; }
   std::string export_state(int snapshot);  ///< negative: the current state
   void import_state(const std::string& bytes, const std::string& display_name, bool also_restore,
                     v1::Snapshot* out);
   std::unique_ptr<Simulation> fork(int snapshot);  ///< negative: the current state
 
   void subscribe(std::shared_ptr<TelemetryBuffer> buffer);
-  void unsubscribe(const std::shared_ptr<TelemetryBuffer>& buffer);
+  void unsubscribe(const std::shared_ptr<TelemetryBuffer>& buffer) { telemetry_.remove(buffer); }
 
   /// Throws NO_SUCH_PORT. The port lives as long as the session.
   Port& port(const std::string& name) const;
@@ -79,32 +78,20 @@ class Session {
   /// Interrupts, ends subscriptions; later calls find the session gone.
   void close();
 
-  /// Keeps the lease from running out while it lives.
+  /// Keeps the lease from running out while it lives. Throws NO_SUCH_SIMULATION when it has.
   class Use {
    public:
     explicit Use(Session& session);
-    ~Use();
+    ~Use() { lease_.give_back(); }
     Use(const Use&) = delete;
     Use& operator=(const Use&) = delete;
 
    private:
-    Session& session_;
+    Lease& lease_;
   };
-  bool lease_is_over(std::chrono::steady_clock::time_point now) const;
+  Lease& lease() { return lease_; }
 
  private:
-  struct Saved {
-    std::string display_name;
-    State state;
-    std::int64_t bytes = 0;
-  };
-  struct Published {  ///< what can be told without waiting for a step
-    std::int64_t step = 0;
-    double time = 0, next_step = 0;
-    bool finished = false, failed = false;
-    std::string last_failure, display_name;
-    StepPolicy policy;
-  };
   struct Advance;  ///< one call of `step` in progress
   class SteppingClaim;
   class ExchangeInStep;
@@ -112,10 +99,7 @@ class Session {
   bool replay(const v1::StepRequest& request, v1::StepReply* reply) const;
   void remember(const v1::StepReply& reply);
   void check(const v1::StepRequest& request) const;
-  void check_handle(int handle) const;
-  void check_inputs(const v1::Values& inputs) const;
   void check_step(std::int64_t expected) const;
-  void apply_inputs(const v1::Values& inputs);
   bool wants_more(const Advance& advance) const;
   bool begin(Advance& advance);
   bool run_slice(Advance& advance);
@@ -126,58 +110,30 @@ class Session {
   StepReport attempt(Advance& advance);
   StepReport attempt_in_slot(Advance& advance);
   void restore_or_fail(const State& state);
-  bool condition_holds(const v1::Condition& condition);
   void set_policy(v1::NonConvergencePolicy kind, double minimum);
   void start_record(const v1::CreateOptions& options);
   void account(Advance& advance, const StepReport& report);
   void account_pieces(v1::StepReply& reply, const StepReport& report);
-  void take_samples(Advance& advance);
-  bool deliver_samples(Advance& advance);
   void finish(Advance& advance);
-  void publish();
-  void fail(const std::string& why);
-  void remember_failure(const std::string& why);
   void require_usable() const;
   void require_rest() const;  ///< usable and not advancing
-  void read_values(const google::protobuf::RepeatedField<int>& handles,
-                   google::protobuf::RepeatedField<double>* out);
-  const Saved& find_snapshot(int snapshot) const;
-  int add_snapshot(Saved saved);
-  void fill(int number, const Saved& saved, v1::Snapshot* out) const;
 
   const Identity identity_;
   const Shared shared_;
   const Model* const model_;
-  const std::vector<Variable>* const variables_;
+  const VariableAccess variables_;
+
+  // Thread-safe by themselves.
+  Lease lease_;
+  SessionStatus status_;
+  SnapshotShelf snapshots_;
+  TelemetryHub telemetry_;
 
   FairMutex lock_;  // protects the four below
   std::unique_ptr<Simulation> simulation_;
   const std::unique_ptr<Recorder> recorder_;  // thread-safe; null: nothing is recorded
   Coupler coupler_;                           // its ports are thread-safe by themselves
-  std::vector<double> scratch_;
   v1::StepReply last_reply_;
-
-  std::atomic<bool> stepping_{false}, closed_{false};
-
-  mutable std::mutex published_mutex_;  // protects the two below
-  Published published_;
-  CancelToken* running_ = nullptr;
-
-  mutable std::mutex snapshots_mutex_;  // protects the three below
-  std::map<int, Saved> snapshots_;
-  int next_snapshot_ = 1;
-  std::int64_t snapshot_bytes_ = 0;
-
-  std::mutex subscribers_mutex_;  // protects the one below
-  std::vector<std::shared_ptr<TelemetryBuffer>> subscribers_;
-  std::atomic<bool> has_subscribers_{false};
-
-  std::atomic<int> uses_{0};
-  std::atomic<std::chrono::steady_clock::rep> last_use_;
 };
-
-/// Number in "simulations/ID/snapshots/N" after splitting off the simulation's name; -1: not such a
-/// name.
-int split_snapshot_name(const std::string& name, std::string* simulation);
 
 }  // namespace mbcosim::server

@@ -20,48 +20,28 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-bool holds(v1::Comparison comparison, double value, double threshold) {
-  switch (comparison) {
-    case v1::COMPARISON_LESS:
-      return value < threshold;
-    case v1::COMPARISON_LESS_OR_EQUAL:
-      return value <= threshold;
-    case v1::COMPARISON_GREATER:
-      return value > threshold;
-    case v1::COMPARISON_GREATER_OR_EQUAL:
-      return value >= threshold;
-    default:
-      return false;
-  }
-}
-
 }  // namespace
 
-/// Marks the session as stepping while it lives, and connects its token with whoever may interrupt.
+/// Marks the session as advancing while it lives, and connects a token with whoever may interrupt.
 class Session::SteppingClaim {
  public:
-  SteppingClaim(Session& session, Call& call) : session_(session), call_(call) {
-    if (session_.stepping_.exchange(true))
+  SteppingClaim(Session& session, Call& call, CancelToken& token)
+      : status_(session.status_), call_(call) {
+    if (!status_.claim(&token))
       throw Refusal(v1::REASON_SIMULATION_BUSY,
                     "another call advances the simulation at the moment");
+    if (session.lease_.ended()) token.cancel();
+    call_.attach(&token);
   }
   ~SteppingClaim() {
-    attach(nullptr);
-    session_.stepping_.store(false);
+    call_.attach(nullptr);
+    status_.release();
   }
   SteppingClaim(const SteppingClaim&) = delete;
   SteppingClaim& operator=(const SteppingClaim&) = delete;
-  void attach(CancelToken* token) {
-    {
-      std::lock_guard guard(session_.published_mutex_);
-      session_.running_ = token;
-      if (token && session_.closed_.load()) token->cancel();
-    }
-    call_.attach(token);
-  }
 
  private:
-  Session& session_;
+  SessionStatus& status_;
   Call& call_;
 };
 
@@ -72,19 +52,18 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
   const Clock::time_point start = Clock::now();
   require_usable();
   check(request);
-  SteppingClaim claim(*this, call);
   Advance advance{request, *reply, {}, 1, INFINITY, false, false, {}};
+  const SteppingClaim claim(*this, call, advance.token);
   if (request.has_steps()) advance.steps_left = request.steps();
   if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
     advance.steps_left = INT64_MAX;
   if (request.has_until_time_s()) advance.until = request.until_time_s();
-  claim.attach(&advance.token);
   const bool coupled = !coupler_.ports().empty();
   while (!(coupled ? run_coupled_step(advance) : run_slice(advance))) {
-    deliver_samples(advance);
+    advance.deliver();
     if (progress) progress();
   }
-  while (!deliver_samples(advance)) {
+  while (!advance.deliver()) {
   }
   if (!advance.started) return;  // a repeated request: the stored reply, as it was
   reply->set_total_seconds(seconds_since(start));
@@ -112,7 +91,7 @@ bool Session::begin(Advance& advance) {
   const v1::StepRequest& request = advance.request;
   if (replay(request, &advance.reply)) return true;
   if (request.has_expected_step()) check_step(request.expected_step());
-  apply_inputs(request.inputs());
+  variables_.write(request.inputs(), *simulation_);
   if (recorder_ && request.inputs().handles_size() > 0) recorder_->inputs(request.inputs());
   advance.started = true;
   advance.reply.set_request_id(request.request_id());
@@ -149,7 +128,7 @@ StepReport Session::attempt(Advance& advance) {
   try {
     return simulation_->step(&advance.token);
   } catch (const std::exception&) {
-    fail("internal error while stepping");
+    status_.fail("internal error while stepping");
     throw Refusal(v1::REASON_INTERNAL,
                   "internal error while stepping; restore a snapshot or delete the simulation");
   }
@@ -169,19 +148,19 @@ void Session::account(Advance& advance, const StepReport& report) {
   if (recorder_)
     recorder_->stepped(is_accepted(report.outcome), simulation_->step_number(),
                        simulation_->time());
-  publish();
+  status_.publish(*simulation_);
   if (!is_accepted(report.outcome)) {
     advance.ended = true;
     if (report.error && report.outcome != StepOutcome::interrupted) {
       to_proto(*report.error, reply.mutable_failure());
-      remember_failure(reply.failure().message());
+      status_.remember_failure(reply.failure().message());
     }
     return;
   }
   account_pieces(reply, report);
   --advance.steps_left;
-  if (has_subscribers_.load(std::memory_order_relaxed)) take_samples(advance);
-  if (advance.request.has_until() && condition_holds(advance.request.until())) {
+  if (!telemetry_.empty()) telemetry_.publish(*simulation_, advance.pending);
+  if (advance.request.has_until() && variables_.holds(advance.request.until(), *simulation_)) {
     reply.set_condition_met(true);
     advance.ended = true;
   }
@@ -194,17 +173,11 @@ void Session::account_pieces(v1::StepReply& reply, const StepReport& report) {
   if (report.pieces > 1) reply.set_cut_steps(reply.cut_steps() + 1);
 }
 
-bool Session::condition_holds(const v1::Condition& condition) {
-  scratch_.clear();
-  simulation_->get(condition.handle(), scratch_);
-  return holds(condition.comparison(), scratch_[condition.element()], condition.threshold());
-}
-
 void Session::finish(Advance& advance) {
   v1::StepReply& reply = advance.reply;
   reply.set_step(simulation_->step_number());
   reply.set_time_s(simulation_->time());
-  read_values(advance.request.outputs(), reply.mutable_outputs());
+  variables_.read(*simulation_, advance.request.outputs(), reply.mutable_outputs());
 }
 
 // ------------------------------------------------------------------ with ports
@@ -335,7 +308,7 @@ StepReport Session::run_passes(Advance& advance) {
 void Session::restore_or_fail(const State& state) {
   const auto status = simulation_->restore(state);
   if (status) return;
-  fail("internal error while redoing a step");
+  status_.fail("internal error while redoing a step");
   throw Refusal(v1::REASON_INTERNAL, "internal error while redoing a step");
 }
 
@@ -343,7 +316,7 @@ void Session::lose_peer(Advance& advance, const std::string& why) {
   std::lock_guard lock(lock_);
   advance.ended = true;
   if (recorder_) recorder_->stepped(false, simulation_->step_number(), simulation_->time());
-  publish();
+  status_.publish(*simulation_);
   if (advance.token.cancelled()) {
     advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
     return;
@@ -354,7 +327,7 @@ void Session::lose_peer(Advance& advance, const std::string& why) {
   failure->set_message(utf8(why));
   failure->set_step(simulation_->step_number() + 1);
   failure->set_time_s(simulation_->time() + simulation_->next_step_size());
-  remember_failure(failure->message());
+  status_.remember_failure(failure->message());
 }
 
 }  // namespace mbcosim::server

@@ -15,11 +15,14 @@ struct Session::Advance {
   std::int64_t steps_left = 1;
   double until = INFINITY;
   bool started = false, ended = false;
-  struct Pending {
-    std::shared_ptr<TelemetryBuffer> buffer;
-    v1::Sample sample;
-  };
-  std::vector<Pending> pending;  ///< samples not yet delivered
+  TelemetryHub::Pending pending;  ///< samples not yet delivered
+
+  /// Waits a moment for subscribers that block. True: all samples are delivered.
+  bool deliver() {
+    if (pending.empty()) return true;
+    if (token.cancelled()) pending.clear();
+    return pending.deliver();
+  }
 };
 
 }  // namespace mbcosim::server

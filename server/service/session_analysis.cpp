@@ -69,14 +69,14 @@ void fill_state_space(const Linearization& system, const InputsOutputs& io,
 
 void Session::require_rest() const {
   require_usable();
-  if (stepping_.load())
+  if (status_.stepping())
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; it is analysed between advances");
 }
 
 void Session::linearize(const v1::LinearizeRequest& request, v1::LinearizeReply* reply) {
-  for (const int handle : request.inputs()) check_handle(handle);
-  for (const int handle : request.outputs()) check_handle(handle);
+  variables_.check(request.inputs());
+  variables_.check(request.outputs());
   require_rest();
   CancelToken never;
   const SolverSlots::Slot slot = shared_.slots.acquire(never);

@@ -102,7 +102,7 @@ void SessionStore::close_expired() {
     std::lock_guard guard(mutex_);
     const auto now = std::chrono::steady_clock::now();
     for (const auto& [id, session] : sessions_)
-      if (session->lease_is_over(now)) expired.push_back(session);
+      if (session->lease().expire(now)) expired.push_back(session);
   }
   for (const SessionPtr& session : expired) {
     spdlog::info("{}: lease over", session->identity().id);

@@ -408,7 +408,7 @@ grpc::Status SimulationsService::ListSnapshots(Context context,
                                                const v1::ListSnapshotsRequest* request,
                                                v1::ListSnapshotsReply* reply) {
   return serve(parts_, *context, "ListSnapshots", Role::observe, [&](const Caller& caller) {
-    parts_.store.get(request->simulation(), caller)->list_snapshots(reply);
+    parts_.store.get(request->simulation(), caller)->snapshots().list(reply);
   });
 }
 
@@ -417,7 +417,7 @@ grpc::Status SimulationsService::DeleteSnapshot(Context context,
                                                 v1::DeleteSnapshotReply*) {
   return serve(parts_, *context, "DeleteSnapshot", Role::control, [&](const Caller& caller) {
     const auto [session, number] = find_snapshot(request->name(), caller);
-    session->delete_snapshot(number);
+    session->snapshots().remove(number);
   });
 }
 

@@ -1,0 +1,52 @@
+/// Who uses a session, and how long it lives when nobody does.
+#pragma once
+
+#include <chrono>
+#include <mutex>
+
+namespace mbcosim::server {
+
+/// Thread-safe. Ends once: by `end`, or by `expire` when nobody has used it for its length. From
+/// then on it cannot be taken any more, so that a call never works on a session that goes.
+class Lease {
+ public:
+  using Clock = std::chrono::steady_clock;
+  explicit Lease(std::chrono::milliseconds length) : length_(length) {}
+  std::chrono::milliseconds length() const { return length_; }
+
+  /// False: it has ended.
+  bool take() {
+    std::lock_guard guard(mutex_);
+    if (!ended_) ++uses_;
+    return !ended_;
+  }
+  void give_back() {
+    std::lock_guard guard(mutex_);
+    --uses_;
+    last_use_ = Clock::now();
+  }
+  /// True: it ends now, because nobody uses it and its time is over.
+  bool expire(Clock::time_point now) {
+    std::lock_guard guard(mutex_);
+    if (ended_ || uses_ > 0 || now - last_use_ <= length_) return false;
+    ended_ = true;
+    return true;
+  }
+  void end() {
+    std::lock_guard guard(mutex_);
+    ended_ = true;
+  }
+  bool ended() const {
+    std::lock_guard guard(mutex_);
+    return ended_;
+  }
+
+ private:
+  const std::chrono::milliseconds length_;
+  mutable std::mutex mutex_;  // protects all below
+  int uses_ = 0;
+  Clock::time_point last_use_ = Clock::now();
+  bool ended_ = false;
+};
+
+}  // namespace mbcosim::server

@@ -1,0 +1,49 @@
+/// What can be told of a session without waiting for its step, and who advances it.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include "simulation/simulation.h"
+
+namespace mbcosim::server {
+
+/// Thread-safe.
+class SessionStatus {
+ public:
+  struct View {
+    std::int64_t step = 0;
+    double time = 0, next_step = 0;
+    bool finished = false, failed = false, stepping = false;
+    std::string last_failure, display_name;
+    StepPolicy policy;
+  };
+  View view() const {
+    std::lock_guard guard(mutex_);
+    return view_;
+  }
+  void publish(const Simulation& simulation);
+  void set_display_name(const std::string& name);
+  void set_policy(const StepPolicy& policy);
+  void remember_failure(const std::string& why);
+  void fail(const std::string& why);  ///< the server failed in it
+  void recover();                     ///< it was restored
+  bool failed() const;
+
+  // --- one call at a time advances
+  bool stepping() const;
+  /// False: another call advances. Until `release`, `token` is cancelled by `interrupt`; null: what
+  /// is done cannot be interrupted.
+  bool claim(CancelToken* token);
+  void release();
+  /// Was anything advancing?
+  bool interrupt();
+
+ private:
+  mutable std::mutex mutex_;  // protects all below
+  View view_;
+  CancelToken* running_ = nullptr;
+};
+
+}  // namespace mbcosim::server

@@ -1,0 +1,78 @@
+#include "service/snapshot_shelf.h"
+
+#include <charconv>
+
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+
+std::int64_t size_of(const State& s) {
+  const std::size_t numbers = s.y.size() + s.yp.size() + s.y1.size() + s.yp1.size() + s.y2.size() +
+                              s.yp2.size() + s.memory.size() + s.variables.size() +
+                              s.external_loads.size() + s.control.size();
+  return static_cast<std::int64_t>(numbers * sizeof(double) +
+                                   s.rotation.size() * sizeof(NodeRotation) + sizeof(State));
+}
+
+int split_snapshot_name(const std::string& name, std::string* simulation) {
+  static constexpr std::string_view kInfix = "/snapshots/";
+  const std::size_t at = name.find(kInfix);
+  if (at == std::string::npos) return -1;
+  int number = -1;
+  const char* first = name.data() + at + kInfix.size();
+  const char* last = name.data() + name.size();
+  const auto [end, error] = std::from_chars(first, last, number);
+  if (error != std::errc() || end != last || number < 1) return -1;
+  *simulation = name.substr(0, at);
+  return number;
+}
+
+int SnapshotShelf::add(State state, const std::string& display_name, v1::Snapshot* out) {
+  const std::int64_t bytes = size_of(state);
+  std::lock_guard guard(mutex_);
+  if (static_cast<int>(saved_.size()) >= limits_.snapshots)
+    throw limit_refusal("snapshots", limits_.snapshots,
+                        "the simulation has as many snapshots as are allowed");
+  if (bytes_ + bytes > limits_.snapshot_bytes)
+    throw limit_refusal("snapshot_bytes", limits_.snapshot_bytes,
+                        "the simulation's snapshots would take too much memory");
+  const auto added = saved_.emplace(next_, Saved{display_name, std::move(state), bytes}).first;
+  bytes_ += bytes;
+  fill(next_, added->second, out);
+  return next_++;
+}
+
+State SnapshotShelf::get(int number) const {
+  std::lock_guard guard(mutex_);
+  return find(number).state;
+}
+
+void SnapshotShelf::remove(int number) {
+  std::lock_guard guard(mutex_);
+  bytes_ -= find(number).bytes;
+  saved_.erase(number);
+}
+
+void SnapshotShelf::list(v1::ListSnapshotsReply* out) const {
+  std::lock_guard guard(mutex_);
+  for (const auto& [number, saved] : saved_) fill(number, saved, out->add_snapshots());
+}
+
+const SnapshotShelf::Saved& SnapshotShelf::find(int number) const {
+  const auto found = saved_.find(number);
+  if (found != saved_.end()) return found->second;
+  throw Refusal(v1::REASON_NO_SUCH_SNAPSHOT, simulation_ + " has no snapshot " +
+                                                 std::to_string(number) + "; it has " +
+                                                 std::to_string(saved_.size()));
+}
+
+void SnapshotShelf::fill(int number, const Saved& saved, v1::Snapshot* out) const {
+  out->set_name(simulation_ + "/snapshots/" + std::to_string(number));
+  out->set_step(saved.state.step);
+  out->set_time_s(saved.state.time);
+  out->set_display_name(saved.display_name);
+  out->set_model_digest(digest_);
+  out->set_size_bytes(saved.bytes);
+}
+
+}  // namespace mbcosim::server

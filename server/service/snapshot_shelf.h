@@ -1,0 +1,54 @@
+/// The saved states of one simulation.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "mbcosim/v1/simulations.pb.h"
+#include "model/state.h"
+#include "service/config.h"
+
+namespace mbcosim::server {
+
+/// Bytes that a state takes.
+std::int64_t size_of(const State& state);
+
+/// Thread-safe. Snapshots are numbered from 1; a number is never given twice. Methods throw
+/// Refusal.
+class SnapshotShelf {
+ public:
+  /// `simulation`: name of the simulation; `digest`: of its model, for descriptions.
+  SnapshotShelf(std::string simulation, std::string digest, const ServiceLimits& limits)
+      : simulation_(std::move(simulation)), digest_(std::move(digest)), limits_(limits) {}
+
+  /// Keeps a state. Throws LIMIT_EXCEEDED.
+  int add(State state, const std::string& display_name, v1::Snapshot* out);
+  /// A copy of a saved state. Throws NO_SUCH_SNAPSHOT.
+  State get(int number) const;
+  void remove(int number);
+  void list(v1::ListSnapshotsReply* out) const;
+
+ private:
+  struct Saved {
+    std::string display_name;
+    State state;
+    std::int64_t bytes = 0;
+  };
+  const Saved& find(int number) const;
+  void fill(int number, const Saved& saved, v1::Snapshot* out) const;
+
+  const std::string simulation_, digest_;
+  const ServiceLimits& limits_;
+  mutable std::mutex mutex_;  // protects all below
+  std::map<int, Saved> saved_;
+  int next_ = 1;
+  std::int64_t bytes_ = 0;
+};
+
+/// Number in "simulations/ID/snapshots/N" after splitting off the simulation's name; -1: not such a
+/// name.
+int split_snapshot_name(const std::string& name, std::string* simulation);
+
+}  // namespace mbcosim::server

@@ -1,0 +1,90 @@
+#include "service/variable_access.h"
+
+#include <cmath>
+
+#include "wire/convert.h"
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+bool compare(v1::Comparison comparison, double value, double threshold) {
+  switch (comparison) {
+    case v1::COMPARISON_LESS:
+      return value < threshold;
+    case v1::COMPARISON_LESS_OR_EQUAL:
+      return value <= threshold;
+    case v1::COMPARISON_GREATER:
+      return value > threshold;
+    case v1::COMPARISON_GREATER_OR_EQUAL:
+      return value >= threshold;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+void VariableAccess::check(int handle) const {
+  if (handle >= 0 && handle < static_cast<int>(variables_.size())) return;
+  throw Refusal(v1::REASON_NO_SUCH_VARIABLE, "no variable has handle " + std::to_string(handle) +
+                                                 "; there are " +
+                                                 std::to_string(variables_.size()));
+}
+
+void VariableAccess::check_inputs(const v1::Values& inputs) const {
+  std::int64_t size = 0;
+  for (const int handle : inputs.handles()) {
+    check(handle);
+    const Variable& variable = variables_[handle];
+    if (variable.causality != Causality::input && variable.causality != Causality::parameter)
+      throw Refusal(v1::REASON_NOT_WRITABLE,
+                    "variable \"" + utf8(variable.name) + "\" is neither an input nor a parameter");
+    size += variable.size;
+  }
+  if (size != inputs.values_size())
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "the variables to write take " + std::to_string(size) +
+                                               " values, got " +
+                                               std::to_string(inputs.values_size()));
+  for (const double value : inputs.values())
+    if (!std::isfinite(value))
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "a value to write is not finite");
+}
+
+void VariableAccess::check_condition(const v1::Condition& condition) const {
+  check(condition.handle());
+  const int size = variables_[condition.handle()].size;
+  if (condition.element() < 0 || condition.element() >= size)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`until.element` must be from 0 to " + std::to_string(size - 1));
+  if (condition.comparison() == v1::COMPARISON_UNSPECIFIED)
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`until.comparison` is missing");
+}
+
+void VariableAccess::write(const v1::Values& inputs, Simulation& simulation) const {
+  const double* value = inputs.values().data();
+  for (const int handle : inputs.handles()) {
+    const std::size_t size = variables_[handle].size;
+    const auto status = simulation.set(handle, {value, size});
+    if (!status) throw Refusal(status.error());
+    value += size;
+  }
+}
+
+void VariableAccess::read(const Simulation& simulation,
+                          const google::protobuf::RepeatedField<int>& handles,
+                          google::protobuf::RepeatedField<double>* out) const {
+  thread_local std::vector<double> values;
+  values.clear();
+  for (const int handle : handles) simulation.get(handle, values);
+  out->Add(values.begin(), values.end());
+}
+
+bool VariableAccess::holds(const v1::Condition& condition, const Simulation& simulation) const {
+  thread_local std::vector<double> values;
+  values.clear();
+  simulation.get(condition.handle(), values);
+  return compare(condition.comparison(), values[condition.element()], condition.threshold());
+}
+
+}  // namespace mbcosim::server
