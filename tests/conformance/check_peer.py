@@ -7,6 +7,7 @@ its last arguments. The port has two nodes. The peer has passed when it went thr
 usage: check_peer.py COMMAND...      exit code 0: all checks passed
 """
 import math
+import os
 import subprocess
 import sys
 import tempfile
@@ -18,7 +19,7 @@ import grpc
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 import scripted_server
 
-WAIT = 5.0  # [s] for any message, and for the peer's end
+WAIT = 5.0 * float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))  # [s] for any message, and for the peer's end
 NODES = 2
 STEPS = 4
 

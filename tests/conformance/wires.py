@@ -1,6 +1,7 @@
 """What carries a scripted peer's messages: the stream, or shared memory read and written here without the library's help."""
 import ctypes
 import mmap
+import os
 import platform
 import queue
 import select
@@ -115,7 +116,7 @@ class SharedMemoryWire:
     def send(self, message):
         data = message.SerializeToString()
         data = struct.pack("<I", len(data)) + data
-        end = time.monotonic() + 10
+        end = time.monotonic() + 10 * float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
         while data and time.monotonic() < end:
             at = self._written % _RING
             part = data[:min(_RING - at, _RING - (self._written - self._word(1, _READ)))]

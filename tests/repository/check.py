@@ -6,7 +6,7 @@ headers  every header compiles alone: the build shows it for those that their so
          others; arguments: compiler and its options
 layout   the top level has the agreed entries and no others; the quick start does not switch off what tests/run.sh builds;
          no two sources of the engine have the same name but those that mean the same in every folder, and register.cpp only
-         lists what its folder has
+         lists what its folder has; bounds on time in tests follow MBCOSIM_TIME_FACTOR
 format   clang-format would change nothing
 """
 import concurrent.futures
@@ -87,8 +87,18 @@ def names(root):
             yield f"{name} stands in {' and '.join(places)}: a name means one thing"
 
 
+def bounds_on_time(root):
+    """Of tests that compare what they took with a bound that a loaded machine would exceed."""
+    elapsed = re.compile(r"monotonic\(\) - \w+ <|monotonic\(\) \+|steady_clock::now\(\) - \w+")
+    for path in sources(root / "tests", ".py", ".cpp"):
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            if elapsed.search(line) and not re.search("TIME_FACTOR|WAIT|timeout|stretched|benchmark", line + path.parent.name):
+                yield f"{path.relative_to(root)}:{number}: a bound on time without MBCOSIM_TIME_FACTOR"
+
+
 def layout(root):
     yield from names(root)
+    yield from bounds_on_time(root)
     if "-DMBCOSIM_" in (root / "client_examples" / "quickstart.sh").read_text():
         yield "quickstart.sh sets options of the build folder that tests/run.sh uses, too"
     if not shutil.which("git"):

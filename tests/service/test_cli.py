@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import decks
-from conftest import BIN
+from conftest import BIN, TIME_FACTOR
 
 MBCOSIM = os.path.join(BIN, "mbcosim")
 
@@ -90,11 +90,11 @@ def test_interrupt_exits_with_130(tmp_path):
     deck.write_text(decks.endless())
     process = subprocess.Popen([MBCOSIM, "run", str(deck)], stderr=subprocess.DEVNULL)
     output = tmp_path / "deck.mov"
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 60 * TIME_FACTOR
     while not (output.exists() and output.stat().st_size) and time.monotonic() < deadline:
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    assert process.wait(60) == 130
+    assert process.wait(60 * TIME_FACTOR) == 130
 
 
 def test_validate_and_describe_as_json(deck, tmp_path):

@@ -205,7 +205,9 @@ struct Reading {
   const char* points;
 };
 
-/// Ours less what is read, both in millimetres, is within constant + share × reading.
+/// Ours less what is read, both in millimetres, is within constant + share × reading. A reading
+/// that is no larger than its bound would be met by a beam that does not move: it has no place
+/// here.
 void expect_as_read(const Reading& reading, double constant, double share) {
   SCOPED_TRACE(reading.at.name());
   const Curve curve(reading.at.beam, reading.at.pitch);
@@ -214,24 +216,27 @@ void expect_as_read(const Reading& reading, double constant, double share) {
   for (std::size_t k = 0; k < points.size(); k += 2) {
     const int i = reading.at.component;
     const double u = (i == 1 ? 1e3 : -1e3) * curve.at(points[k])(i);
-    EXPECT_NEAR(u, points[k + 1], constant + share * points[k + 1]) << points[k] << " g";
+    const double bound = constant + share * points[k + 1];
+    EXPECT_GT(points[k + 1], bound) << "no displacement at all would pass at " << points[k] << " g";
+    EXPECT_NEAR(u, points[k + 1], bound) << points[k] << " g";
   }
 }
 
 /// The curves that Minguet and Dugundji computed themselves (pitch 0, beams 1 and 3), as read by
 /// SHARPy's authors, up to 500 g. What is read strays by some millimetres: at the smallest loads,
-/// where every theory is linear and gives the same, by 2 mm for beam 3.
+/// where every theory is linear and gives the same, by 2 mm for beam 3. Readings below the bound of
+/// 4 mm are left out.
 TEST(CompositeCantilever, AsThePaperComputesIt) {
   const Reading curves[] = {
       {{1, 0, 0},
-       "20.64 -.03, 49.14 .59, 88.47 3.90, 130.75 8.90, 161.23 12.90, 192.70 17.92, 234.99 24.94, "
+       "130.75 8.90, 161.23 12.90, 192.70 17.92, 234.99 24.94, "
        "269.41 31.98, 309.74 40.02, 351.05 48.06, 392.36 57.78"},
       {{1, 0, 2},
        "10.84 6.74, 31.53 21.23, 46.32 31.68, 68.97 45.49, 95.57 61.33, 126.12 81.54, 150.75 "
        "96.70, 181.28 114.22, 203.94 126.34, 233.48 142.51, 274.84 162.04, 318.15 180.21, 353.60 "
        "196.02, 381.15 205.78, 400.83 211.82"},
       {{3, 0, 0},
-       "36.04 .40, 80.22 1.15, 118.59 2.90, 151.13 5.31, 196.46 9.44, 242.94 14.91, 287.09 21.06, "
+       "151.13 5.31, 196.46 9.44, 242.94 14.91, 287.09 21.06, "
        "337.05 27.89, 381.20 34.03, 434.64 41.88, 481.11 48.70"},
       {{3, 0, 2},
        "18.56 6.77, 41.76 17.61, 66.11 29.45, 88.13 40.96, 105.52 50.43, 128.72 59.91, 157.71 "
@@ -248,13 +253,13 @@ TEST(CompositeCantilever, AsThePaperComputesIt) {
 /// Left out: beam 2, for which the paper's own computation and AeroBeams.jl differ from each other
 /// by 14 mm at 400 g, so that the published stiffness is in doubt; u₁ of beam 3, measured a third
 /// or more above either computation; u₂ at pitch 0, where it should be nothing and up to 3.2 mm are
-/// read. All other points of both readings are here, also those that stand out (beam 1: u₁ at pitch
-/// 0 and 150 g, u₃ at pitch 45 and 50 g).
+/// read; readings of u₁ below its bound of 6 mm, at loads where it is a second-order effect: .64 to
+/// 5.83 mm up to 150 g, 2 mm more than any theory at 20 g. All other points of both readings are
+/// here, also those that stand out (beam 1: u₁ at pitch 0 and 150 g, u₃ at pitch 45 and 50 g).
 TEST(CompositeCantilever, AsMeasured) {
-  const Reading along[] = {
-      {{1, 0, 0}, "150 6.34, 200 21.14, 400 61.21"},
-      {{1, 45, 0}, "20 2.38, 50 2.34, 75 3.14, 200 12.98, 400 45.74"},
-      {{1, 0, 0}, "19.66 0.64, 74.70 2.58, 150.39 5.83, 199.59 20.95, 400.24 60.81"}};
+  const Reading along[] = {{{1, 0, 0}, "150 6.34, 200 21.14, 400 61.21"},
+                           {{1, 45, 0}, "200 12.98, 400 45.74"},
+                           {{1, 0, 0}, "199.59 20.95, 400.24 60.81"}};
   const Reading across[] = {
       {{1, 0, 2}, "20 14.12, 50 35.86, 75 53.24, 100 69.11, 150 101.43, 200 130.90, 400 217.90"},
       {{1, 45, 1}, "50 18.22, 200 67.81, 400 114.16"},
