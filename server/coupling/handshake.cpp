@@ -138,17 +138,13 @@ void check_heartbeats(const v1::Hello& hello, Mismatches& mismatches) {
 }
 
 /// What does not fit together once the defaults are filled in.
-void check_agreement(const Agreement& agreement, const PortModel& port, const Model& model,
-                     Mismatches& mismatches) {
+void check_agreement(const Agreement& agreement, const PortModel& port, Mismatches& mismatches) {
   mismatches.expect(!port.is_motion() || agreement.policy != v1::PEER_POLICY_ZERO, "policy",
                     "motion has no zero; choose HOLD_LAST");
   if (agreement.tangent == v1::TANGENT_FORM_NONE) return;
-  const Method method = model.initial_value.method.method;
   mismatches.expect(agreement.is_tight(), "tangent", "belongs to mode TIGHT");
   mismatches.expect(port.takes_tangents(), "tangent", "the port takes none");
   mismatches.expect(agreement.frame == v1::PORT_FRAME_GLOBAL, "tangent", "needs the global frame");
-  mismatches.expect(method != Method::third_order && method != Method::third_order_ad_hoc,
-                    "tangent", "the deck's method does not take one");
   mismatches.expect(agreement.acceleration == Acceleration::none, "acceleration",
                     "has no use with a tangent");
 }
@@ -180,8 +176,8 @@ Agreement choose(const v1::Hello& hello, const PortModel& port) {
 
 }  // namespace
 
-Agreement agree(const v1::Hello& hello, const PortModel& port, const Model& model,
-                const std::string& digest, double step_size) {
+Agreement agree(const v1::Hello& hello, const PortModel& port, const std::string& digest,
+                double step_size) {
   Mismatches mismatches;
   const v1::VersionRange& range = hello.protocol();
   const bool any = range.lowest() == 0 && range.highest() == 0;
@@ -194,7 +190,7 @@ Agreement agree(const v1::Hello& hello, const PortModel& port, const Model& mode
   check_choices(hello, mismatches);
   check_heartbeats(hello, mismatches);
   const Agreement agreement = choose(hello, port);
-  check_agreement(agreement, port, model, mismatches);
+  check_agreement(agreement, port, mismatches);
   mismatches.refuse_if_any(hello.port());
   return agreement;
 }

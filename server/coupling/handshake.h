@@ -12,8 +12,8 @@ constexpr int kProtocolVersion = 1;
 
 /// Fills in what `hello` leaves open. Throws PORT_MISMATCH or VERSION_MISMATCH with everything that
 /// does not fit. `step_size`: of the next step [s].
-Agreement agree(const v1::Hello& hello, const PortModel& port, const Model& model,
-                const std::string& digest, double step_size);
+Agreement agree(const v1::Hello& hello, const PortModel& port, const std::string& digest,
+                double step_size);
 /// `hello` with every choice filled in.
 void fill_agreed(const v1::Hello& hello, const Agreement& agreement, v1::Hello* out);
 

@@ -151,8 +151,8 @@ class ModelReplay {
     Port& port = session_.port(entry.port());
     v1::Hello hello = entry.from_peer().hello();
     hello.clear_step_size_s();
-    Agreement agreement = server::agree(hello, port.model(), session_.model(),
-                                        server::digest_text(session_.model().digest), 0);
+    Agreement agreement =
+        server::agree(hello, port.model(), server::digest_text(session_.model().digest), 0);
     agreement.timeout = std::chrono::milliseconds(20);  // who did not answer then does not now
     if (agreement.policy == v1::PEER_POLICY_WAIT) agreement.policy = v1::PEER_POLICY_FAIL_STEP;
     auto& peer = peers_[entry.port()];

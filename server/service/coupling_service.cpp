@@ -153,8 +153,7 @@ void CouplingService::serve_peer(const v1::Hello& hello, Session& session, PeerS
   Port& port = session.port(hello.port());
   v1::SimulationInfo info;
   session.fill(&info);
-  const Agreement agreement =
-      agree(hello, port.model(), session.model(), info.model_digest(), info.next_step_s());
+  const Agreement agreement = agree(hello, port.model(), info.model_digest(), info.next_step_s());
   TurnTaker link(stream);
   const Attachment attachment(port, agreement);
   v1::ServerMessage message;

@@ -105,11 +105,9 @@ class Session {
   bool run_slice(Advance& advance);
   bool run_coupled_step(Advance& advance);
   void step_coupled(Advance& advance);
-  StepReport run_passes(Advance& advance);
   void lose_peer(Advance& advance, const std::string& why);
   StepReport attempt(Advance& advance);
   StepReport attempt_in_slot(Advance& advance);
-  void restore_or_fail(const State& state);
   void set_policy(v1::NonConvergencePolicy kind, double minimum);
   void start_record(const v1::CreateOptions& options);
   void account(Advance& advance, const StepReport& report);

@@ -13,7 +13,8 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kSlice =
     std::chrono::milliseconds(5);  // longest hold of lock and slot by many short steps
 bool is_accepted(StepOutcome outcome) {
-  return outcome == StepOutcome::accepted || outcome == StepOutcome::finished;
+  return outcome == StepOutcome::accepted || outcome == StepOutcome::finished ||
+         outcome == StepOutcome::not_written;
 }
 
 double seconds_since(Clock::time_point start) {
@@ -149,14 +150,12 @@ void Session::account(Advance& advance, const StepReport& report) {
     recorder_->stepped(is_accepted(report.outcome), simulation_->step_number(),
                        simulation_->time());
   status_.publish(*simulation_);
-  if (!is_accepted(report.outcome)) {
-    advance.ended = true;
-    if (report.error && report.outcome != StepOutcome::interrupted) {
-      to_proto(*report.error, reply.mutable_failure());
-      status_.remember_failure(reply.failure().message());
-    }
-    return;
+  advance.ended = report.error || !is_accepted(report.outcome);
+  if (report.error && report.outcome != StepOutcome::interrupted) {
+    to_proto(*report.error, reply.mutable_failure());
+    status_.remember_failure(reply.failure().message());
   }
+  if (!is_accepted(report.outcome)) return;
   account_pieces(reply, report);
   --advance.steps_left;
   if (!telemetry_.empty()) telemetry_.publish(*simulation_, advance.pending);
@@ -219,41 +218,66 @@ bool Session::run_coupled_step(Advance& advance) {
 void Session::step_coupled(Advance& advance) {
   coupler_.apply(*simulation_);
   coupler_.start_iterations(*simulation_);
-  const StepReport report = coupler_.has_window() ? run_passes(advance) : attempt_in_slot(advance);
+  const StepReport report = attempt_in_slot(advance);
   account(advance, report);
   coupler_.notify(is_accepted(report.outcome), *simulation_);
   if (is_accepted(report.outcome)) coupler_.finish(*simulation_);
 }
 
-/// While it lives, steps exchange with tight ports at each iteration; the slot is free while peers
-/// compute.
+/// While it lives, steps exchange with tight ports at each iteration and are redone until window
+/// ports agree; the slot is free while peers compute.
 class Session::ExchangeInStep {
  public:
-  ExchangeInStep(Session& session, Advance& advance, std::optional<SolverSlots::Slot>& slot)
-      : simulation_(session.coupler_.has_tight() ? session.simulation_.get() : nullptr) {
-    if (!simulation_) return;
-    session.coupler_.start_iterations(*simulation_);
-    simulation_->set_attempt_ended([&session](bool accepted) {
-      session.coupler_.end_attempt(accepted, *session.simulation_);
-    });
-    simulation_->set_exchange([&session, &advance, &slot](int iteration) {
-      slot.reset();
-      const bool settled =
-          session.coupler_.exchange_iteration(*session.simulation_, iteration, advance.token);
-      slot.emplace(session.shared_.slots.acquire(advance.token));
-      return settled;
-    });
+  using Slot = std::optional<SolverSlots::Slot>;
+  ExchangeInStep(Session& session, Advance& advance, Slot& slot)
+      : session_(session), advance_(advance), slot_(slot) {
+    if (coupler().has_tight()) iterate();
+    if (coupler().has_window()) repeat();
   }
   ~ExchangeInStep() {
-    if (!simulation_) return;
-    simulation_->set_exchange({});
-    simulation_->set_attempt_ended({});
+    simulation().set_exchange({});
+    simulation().set_attempt_ended({});
+    simulation().set_passes({});
   }
   ExchangeInStep(const ExchangeInStep&) = delete;
   ExchangeInStep& operator=(const ExchangeInStep&) = delete;
 
  private:
-  Simulation* simulation_;
+  Coupler& coupler() { return session_.coupler_; }
+  Simulation& simulation() { return *session_.simulation_; }
+  void iterate() {
+    simulation().set_attempt_ended(
+        [this](bool accepted) { coupler().end_attempt(accepted, simulation()); });
+    simulation().set_exchange([this](int iteration) {
+      return wait(
+          [&] { return coupler().exchange_iteration(simulation(), iteration, advance_.token); });
+    });
+  }
+  void repeat() {
+    StepPasses passes;
+    passes.most = coupler().maximum_passes();
+    passes.begin = [this](int pass) {
+      if (pass == 1) coupler().start_passes(simulation());
+      coupler().apply_window(simulation());
+      if (pass > 1) coupler().start_iterations(simulation());
+    };
+    passes.agrees = [this](int pass) {
+      return wait([&] { return coupler().exchange_window(simulation(), pass, advance_.token); });
+    };
+    simulation().set_passes(std::move(passes));
+  }
+  /// Without the slot.
+  template <class Exchange>
+  bool wait(Exchange&& exchange) {
+    slot_.reset();
+    const bool done = exchange();
+    slot_.emplace(session_.shared_.slots.acquire(advance_.token));
+    return done;
+  }
+
+  Session& session_;
+  Advance& advance_;
+  Slot& slot_;
 };
 
 StepReport Session::attempt_in_slot(Advance& advance) {
@@ -268,48 +292,6 @@ StepReport Session::attempt_in_slot(Advance& advance) {
   }
   report.outcome = StepOutcome::interrupted;
   return report;
-}
-
-// Redoes the step until the interfaces of all window ports agree. On failure the state is as
-// before.
-StepReport Session::run_passes(Advance& advance) {
-  const State base = simulation_->snapshot();
-  const int most = coupler_.maximum_passes();
-  int iterations = 0;
-  StepReport report;
-  coupler_.start_passes(*simulation_);
-  for (int pass = 1; pass <= most; ++pass) {
-    coupler_.apply_window(*simulation_);
-    report = attempt_in_slot(advance);
-    iterations += report.iterations;
-    report.iterations = iterations;
-    if (!is_accepted(report.outcome)) return report;
-    bool agreed = false;
-    try {
-      agreed = coupler_.exchange_window(*simulation_, pass, advance.token);
-    } catch (const PeerLost&) {
-      restore_or_fail(base);
-      throw;
-    }
-    report.flagged = !agreed && pass == most && simulation_->policy().kind == StepPolicy::accept;
-    if (agreed || report.flagged) return report;
-    restore_or_fail(base);
-  }
-  report.outcome = StepOutcome::not_converged;
-  report.steps_done = 0;
-  Error& error = report.error.emplace();
-  error.kind = ErrorKind::not_converged;
-  error.message = "the interface did not converge in " + std::to_string(most) + " passes";
-  error.failure.time = simulation_->time() + simulation_->next_step_size();
-  error.failure.step = simulation_->step_number() + 1;
-  return report;
-}
-
-void Session::restore_or_fail(const State& state) {
-  const auto status = simulation_->restore(state);
-  if (status) return;
-  status_.fail("internal error while redoing a step");
-  throw Refusal(v1::REASON_INTERNAL, "internal error while redoing a step");
 }
 
 void Session::lose_peer(Advance& advance, const std::string& why) {

@@ -171,10 +171,8 @@ v1::StepOutcome to_proto(StepOutcome outcome) {
       return v1::STEP_OUTCOME_NOT_CONVERGED;
     case StepOutcome::interrupted:
       return v1::STEP_OUTCOME_INTERRUPTED;
-    case StepOutcome::peer_lost:
-      return v1::STEP_OUTCOME_PEER_LOST;
-    case StepOutcome::limit:
-      return v1::STEP_OUTCOME_LIMIT;
+    case StepOutcome::not_written:
+      return v1::STEP_OUTCOME_NOT_WRITTEN;
   }
   return v1::STEP_OUTCOME_UNSPECIFIED;
 }

@@ -237,10 +237,6 @@ void DeckReader::check_initial_value() {
     deck_.reading.report(
         deck_.reading.diagnostic(Severity::error, "initial-value", where, message));
   };
-  const bool third_order =
-      s.method.method == Method::third_order || s.method.method == Method::third_order_ad_hoc;
-  if (third_order && s.line_search)
-    refuse(deck_.method_where, "the third order method has no line search: use newton raphson");
   if (s.method.method == Method::hope && s.strategy != StepStrategy::no_change)
     deck_.reading.report(deck_.reading.diagnostic(
         Severity::warning, "initial-value", deck_.strategy_where,

@@ -1,7 +1,6 @@
 #include "simulation/simulation.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -12,6 +11,7 @@
 #include "simulation/variables.h"
 #include "solver/control.h"
 #include "solver/eigenanalysis.h"
+#include "solver/step_controller.h"
 #include "solver/stepper.h"
 
 namespace mbcosim {
@@ -40,10 +40,9 @@ struct Simulation::Impl {
   ModelPtr model;
   State state;
   Stepper stepper;
+  StepController controller{stepper};
   std::shared_ptr<ResultWriter> writer;
-  StepPolicy policy;
   TimeKeeping time_keeping = TimeKeeping::summed;
-  std::function<void(bool)> attempt_ended;
   mutable std::once_flag variables_once;
   mutable std::unique_ptr<Variables> variables;
 
@@ -83,16 +82,6 @@ struct Simulation::Impl {
   StepReport step(const CancelToken* cancel);
   /// What an accepted step writes: its line and record, and the deck's eigenanalyses.
   Status write(const NewtonReport& newton, double previous_time);
-  /// A step that fails leaves the state, with the counters of the deck's strategy, as it was.
-  PhaseReport advance_or_restore(int& pieces);
-  /// By the deck's strategy, then by the policy. `pieces` counts the parts of the step.
-  PhaseReport advance(int& pieces);
-  PhaseReport advance_by_strategy(double h);
-  PhaseReport advance_in_pieces(double whole, PhaseReport failed, int& pieces);
-  void end_at(const State& start, double whole);
-  void end_attempt(bool accepted) const {
-    if (attempt_ended) attempt_ended(accepted);
-  }
 };
 
 /// Phases before the first step: assembly, derivatives, dummy steps, record of step 0.
@@ -157,103 +146,6 @@ Status Simulation::Impl::analyse_modes(double after, double until) {
   return ok();
 }
 
-PhaseReport Simulation::Impl::advance_by_strategy(double h) {
-  PhaseReport phase = stepper.step(state, h);
-  while (phase.error && phase.error->kind != ErrorKind::cancelled) {
-    h = stepper.retry_step_size(state, h);
-    if (h <= 0) break;
-    end_attempt(false);
-    phase = stepper.step(state, h);
-  }
-  return phase;
-}
-
-PhaseReport Simulation::Impl::advance(int& pieces) {
-  const double h = stepper.next_step_size(state);
-  const bool accept = policy.kind == StepPolicy::accept;
-  const bool only_attempt = model->initial_value.strategy == StepStrategy::no_change;
-  stepper.accept_unconverged(accept && only_attempt);
-  PhaseReport phase = advance_by_strategy(h);
-  if (!phase.error || phase.error->kind == ErrorKind::cancelled) return phase;
-  if (policy.kind == StepPolicy::cut) return advance_in_pieces(h, std::move(phase), pieces);
-  if (!accept || only_attempt) return phase;
-  end_attempt(false);
-  stepper.accept_unconverged(true);
-  return stepper.step(state, h);
-}
-
-/// Pieces are whole/2^k long and start at multiples of their length; after a success they double
-/// again. All carry the number of the whole step.
-PhaseReport Simulation::Impl::advance_in_pieces(double whole, PhaseReport failed, int& pieces) {
-  constexpr int kFinest = 10;
-  const State start = state;
-  const double shortest = policy.minimum > 0 ? policy.minimum : whole / (1 << kFinest);
-  std::int64_t all = 1;
-  while (all < (std::int64_t{1} << 40) && whole / static_cast<double>(2 * all) >= shortest)
-    all *= 2;
-  PhaseReport phase = std::move(failed);
-  int iterations = 0;
-  pieces = 0;
-  try {
-    for (std::int64_t done = 0, length = all; done < all;) {
-      if (phase.error) {
-        length /= 2;
-        if (length == 0 || phase.error->kind == ErrorKind::cancelled) break;
-      }
-      end_attempt(!phase.error);
-      state.step = start.step;
-      phase = stepper.step(state, whole * (static_cast<double>(length) / static_cast<double>(all)));
-      if (phase.error) continue;
-      ++pieces;
-      iterations += phase.newton.iterations;
-      done += length;
-      if (done % (2 * length) == 0 && 2 * length <= all - done) length *= 2;
-    }
-  } catch (...) {  // from the exchange
-    state = start;
-    throw;
-  }
-  if (phase.error) {
-    state = start;
-    pieces = 1;
-    char text[80];
-    std::snprintf(text, sizeof text, "\n  the step was cut down to pieces of %.6g s",
-                  whole / static_cast<double>(all));
-    if (phase.error->kind != ErrorKind::cancelled) phase.error->message += text;
-    return phase;
-  }
-  phase.newton.iterations = iterations;
-  end_at(start, whole);
-  return phase;
-}
-
-/// Time goes on as if the step had been one.
-void Simulation::Impl::end_at(const State& start, double whole) {
-  for (const int slot : {control::kGridStart, control::kGridStep, control::kGridCount})
-    state.control[slot] = start.control[slot];
-  state.time = start.time;
-  control::advance_time(state, whole);
-}
-
-PhaseReport Simulation::Impl::advance_or_restore(int& pieces) {
-  std::array<double, control::kCount> counters;
-  std::copy_n(state.control.begin(), control::kCount, counters.begin());
-  const auto restore = [&] { std::copy(counters.begin(), counters.end(), state.control.begin()); };
-  PhaseReport phase;
-  try {
-    phase = advance(pieces);
-  } catch (const EvaluationError& e) {  // from a drive of the deck's strategy
-    phase.error = evaluation_failure(state, e);
-  } catch (...) {  // from the exchange
-    restore();
-    throw;
-  }
-  if (!phase.error) return phase;
-  restore();
-  stepper.explain(phase, state);
-  return phase;
-}
-
 Status Simulation::Impl::write(const NewtonReport& newton, double previous_time) try {
   if (!writer) return ok();
   StepLine line{state.step,
@@ -277,8 +169,9 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
   const double previous_time = state.time;
   const auto begin = std::chrono::steady_clock::now();
   stepper.set_cancelled(cancel);
-  PhaseReport phase = advance_or_restore(report.pieces);
+  PhaseReport phase = controller.advance(state);
   report.flagged = phase.flagged;
+  report.pieces = phase.pieces;
   report.solver_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.step = state.step;
@@ -296,7 +189,7 @@ StepReport Simulation::Impl::step(const CancelToken* cancel) {
   }
   report.steps_done = 1;
   if (auto status = write(phase.newton, previous_time); !status) {
-    report.outcome = StepOutcome::limit;
+    report.outcome = StepOutcome::not_written;
     report.error = status.error();
     return report;
   }
@@ -350,10 +243,11 @@ void Simulation::set_exchange(std::function<bool(int)> exchange) {
 }
 
 void Simulation::set_attempt_ended(std::function<void(bool)> attempt_ended) {
-  impl_->attempt_ended = std::move(attempt_ended);
+  impl_->controller.set_attempt_ended(std::move(attempt_ended));
 }
-void Simulation::set_policy(const StepPolicy& policy) { impl_->policy = policy; }
-const StepPolicy& Simulation::policy() const { return impl_->policy; }
+void Simulation::set_passes(StepPasses passes) { impl_->controller.set_passes(std::move(passes)); }
+void Simulation::set_policy(const StepPolicy& policy) { impl_->controller.set_policy(policy); }
+const StepPolicy& Simulation::policy() const { return impl_->controller.policy(); }
 
 void Simulation::set_load_tangents(std::vector<LoadTangent> tangents) {
   impl_->stepper.set_tangents(

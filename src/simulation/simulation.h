@@ -23,6 +23,7 @@
 #include "solver/eigen_spectrum.h"
 #include "solver/load_tangent.h"
 #include "solver/state_space.h"
+#include "solver/step_policy.h"
 
 namespace mbcosim {
 
@@ -40,7 +41,13 @@ struct LoadReport {
 LoadReport load_deck(const FileSource& files, const std::string& main_file,
                      const Limits& limits = {}, const std::vector<PortAttachment>& ports = {});
 
-enum class StepOutcome { accepted, finished, not_converged, interrupted, peer_lost, limit };
+enum class StepOutcome {
+  accepted,
+  finished,       ///< accepted, and the deck's final time is reached
+  not_converged,  ///< the state is that of the last accepted step
+  interrupted,    ///< as well
+  not_written     ///< accepted, but its results could not be written
+};
 
 /// What a step (or several) did.
 struct StepReport {
@@ -57,16 +64,6 @@ struct StepReport {
   bool flagged = false;  ///< the last step did not converge and was accepted by StepPolicy::accept
   double solver_seconds = 0;   ///< wall time inside the solver
   std::optional<Error> error;  ///< set unless accepted or finished
-};
-
-/// What to do when a step does not converge and the deck's own strategy has no shorter step.
-struct StepPolicy {
-  enum Kind {
-    fail,  ///< the step fails
-    cut,  ///< the step is solved in pieces of 1/2, 1/4, … of its length, not shorter than `minimum`
-    accept  ///< the last iterate is accepted when it is finite, and the step flagged
-  } kind = fail;
-  double minimum = 0;  ///< shortest piece [s]; 0: 1/1024 of the step
 };
 
 /// How time goes on. Drives with events at the end of a step (`step`, `ramp`) tell the two apart.
@@ -107,6 +104,10 @@ class Simulation {
   /// cut step but the last (true); state and time are those at which the next attempt starts.
   /// Empty: none.
   void set_attempt_ended(std::function<void(bool)> attempt_ended);
+  /// Steps are redone until what is outside agrees; results are written of the last pass alone.
+  /// What its callbacks throw leaves `step`, and the state is that of the last accepted step.
+  /// Empty: none.
+  void set_passes(StepPasses passes);
   void set_policy(const StepPolicy& policy);
   const StepPolicy& policy() const;
   /// Derivatives of the loads that `exchange` sets; see solver/load_tangent.h. Empty: none. They

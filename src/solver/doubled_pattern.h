@@ -24,9 +24,9 @@ inline SparsePattern doubled_pattern(const std::vector<int>& column_start,
   return p;
 }
 
-/// A solver for matrices of that arrangement.
-inline LinearSolver doubled_solver(const Model& m) {
-  const SparsePattern p = doubled_pattern(m.column_start, m.row_index);
+/// A solver for matrices of that arrangement of `pattern`, which holds the model's own.
+inline LinearSolver doubled_solver(const Model& m, const SparsePattern& pattern) {
+  const SparsePattern p = doubled_pattern(pattern.column_start, pattern.row_index);
   const SparsePattern c = doubled_pattern(m.couplings.column_start, m.couplings.row_index);
   return LinearSolver(2 * m.unknowns, p.column_start, p.row_index, c);
 }

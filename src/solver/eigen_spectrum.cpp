@@ -76,7 +76,7 @@ class ShiftInvert {
  private:
   static LinearSolver make_solver(const Model& m, bool complex) {
     if (!complex) return LinearSolver(m.unknowns, m.column_start, m.row_index, m.couplings);
-    return doubled_solver(m);
+    return doubled_solver(m, {m.column_start, m.row_index});
   }
 
   const Linearization& system_;

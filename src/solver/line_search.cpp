@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "solver/system.h"
-
 namespace mbcosim {
 
 namespace {
@@ -47,57 +45,58 @@ double next_lambda(const LineSearchSettings& s, bool first, double f0, double sl
 }
 
 /// Limits the length of δ: factor max(min scale, min(p/|δ|, 1)), p = max step · max(|(y, ẏ)|, n).
-void limit_step(const LineSearchSettings& s, const State& state, std::vector<double>& delta) {
-  const double size = std::sqrt(dot(state.y, state.y) + dot(state.yp, state.yp));
+void limit_step(const LineSearchSettings& s, const NewtonSystem& system,
+                std::vector<double>& delta) {
+  const double size = std::sqrt(system.square());
   const double limit = s.max_step * std::max(size, static_cast<double>(delta.size()));
   const double norm = std::sqrt(dot(delta, delta));
   const double factor = std::max(s.min_scale, std::min(norm > 0 ? limit / norm : 1.0, 1.0));
   for (double& d : delta) d *= factor;
 }
 
-/// Is the gradient of ½ rᵀr so small that its minimum is a spurious one? J: the matrix in the
-/// workspace.
-bool is_local_minimum(const Model& model, const LineSearchSettings& s, const State& state, double f,
-                      const Workspace& ws) {
+/// Is the gradient of ½ rᵀr so small that its minimum is a spurious one?
+bool is_local_minimum(const LineSearchSettings& s, const NewtonSystem& system, int unknowns,
+                      double f) {
   double largest = 0;
-  for (int j = 0; j < model.unknowns; ++j) {
-    double g = 0;
-    for (int k = model.column_start[j]; k < model.column_start[j + 1]; ++k)
-      g += ws.values[k] * ws.residual[model.row_index[k]];
-    largest = std::max(largest,
-                       std::abs(g) * std::max({std::abs(state.y[j]), std::abs(state.yp[j]), 1.0}));
-  }
-  return largest < s.tolerance_min * std::max(f, 0.5 * model.unknowns);
+  for (int i = 0; i < unknowns; ++i)
+    largest = std::max(largest, std::abs(system.gradient(i)) * system.magnitude(i));
+  return largest < s.tolerance_min * std::max(f, 0.5 * unknowns);
+}
+
+/// The smallest step fraction for a correction.
+double smallest_lambda(const LineSearchSettings& s, const NewtonSystem& system,
+                       const std::vector<double>& delta) {
+  if (!s.lambda_min_relative) return s.lambda_min;
+  double t = 0;
+  for (std::size_t i = 0; i < delta.size(); ++i)
+    t = std::max(t, std::abs(delta[i]) / system.magnitude(static_cast<int>(i)));
+  return std::max(s.lambda_min, std::min(t > 0 ? s.tolerance_x / t : 1.0, 1.0));
 }
 
 }  // namespace
 
-bool search_along(const Model& model, Phase phase, double c, double c_algebraic,
-                  const LineSearchSettings& s, State& state, Workspace& ws) {
-  ws.start = state;
+bool search_along(NewtonSystem& system, const LineSearchSettings& s) {
+  NewtonScratch& ws = system.scratch();
+  system.mark();
   const double f0 = 0.5 * dot(ws.residual, ws.residual);
-  if (s.scale_newton_step) limit_step(s, state, ws.delta);
-  double t = 0;
-  for (int i = 0; i < model.unknowns; ++i)
-    t = std::max(
-        t, std::abs(ws.delta[i]) / std::max({std::abs(state.y[i]), std::abs(state.yp[i]), 1.0}));
-  const double lambda_min =
-      s.lambda_min_relative ? std::max(s.lambda_min, std::min(t > 0 ? s.tolerance_x / t : 1.0, 1.0))
-                            : s.lambda_min;
+  if (s.scale_newton_step) limit_step(s, system, ws.delta);
+  const double lambda_min = smallest_lambda(s, system, ws.delta);
   const double slope = -2 * f0;
   ws.direction = ws.delta;
   Trial now{1, 0}, before;
   for (int k = 0;; ++k) {
     for (std::size_t i = 0; i < ws.delta.size(); ++i) ws.delta[i] = now.lambda * ws.direction[i];
-    state = ws.start;
-    apply_correction(model, ws.delta, c, c_algebraic, state);
-    compute_residual(model.context(state, phase, c, c_algebraic), ws.residual);
+    system.go_back();
+    system.correct(ws.delta);
+    system.compute_residual();
     now.f = 0.5 * dot(ws.residual, ws.residual);
     if (std::isfinite(now.f) && now.f <= f0 + s.alpha * now.lambda * slope) return true;
     if (k >= s.max_iterations) return false;
     if (now.lambda <= lambda_min) {
       if (s.abort_at_lambda_min || !std::isfinite(now.f)) return false;
-      if (!s.zero_gradient_continue && is_local_minimum(model, s, state, now.f, ws)) return false;
+      if (!s.zero_gradient_continue &&
+          is_local_minimum(s, system, static_cast<int>(ws.delta.size()), now.f))
+        return false;
       return !s.divergence_check || now.f <= s.divergence_factor * f0;
     }
     const double next =

@@ -3,15 +3,14 @@
 /// input manual, "line search".
 #pragma once
 
-#include "model/model.h"
-#include "solver/workspace.h"
+#include "model/settings.h"
+#include "solver/newton_system.h"
 
 namespace mbcosim {
 
-/// Moves `state` along workspace.delta (scaled in place to the accepted step) so that ½ rᵀr
-/// decreases. False when it gives up: the smallest step is reached without enough decrease (unless
-/// the settings accept that), or after too many trials.
-bool search_along(const Model& model, Phase phase, double c, double c_algebraic,
-                  const LineSearchSettings& settings, State& state, Workspace& workspace);
+/// Moves the iterate along the correction in its scratch (scaled in place to the accepted step) so
+/// that ½ rᵀr decreases. False when it gives up: the smallest step is reached without enough
+/// decrease (unless the settings accept that), or after too many trials.
+bool search_along(NewtonSystem& system, const LineSearchSettings& settings);
 
 }  // namespace mbcosim

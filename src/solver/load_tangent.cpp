@@ -21,9 +21,9 @@ int motion_column(const StructuralNode& node, int i) {
 TangentSolver::TangentSolver(const Model& model, std::vector<LoadTangent> tangents)
     : model_(model), tangents_(std::move(tangents)) {
   make_pattern();
-  values_.resize(row_index_.size());
-  solver_ =
-      std::make_unique<LinearSolver>(model.unknowns, column_start_, row_index_, model.couplings);
+  values_.resize(pattern_.row_index.size());
+  solver_ = std::make_unique<LinearSolver>(model.unknowns, pattern_.column_start,
+                                           pattern_.row_index, model.couplings);
 }
 
 void TangentSolver::make_pattern() {
@@ -54,10 +54,10 @@ void TangentSolver::make_pattern() {
     each_entry(block, [&](int row, int column) {
       if (row >= 0 && column >= 0) rows[column].insert(row);
     });
-  column_start_.assign(1, 0);
+  pattern_.column_start.assign(1, 0);
   for (const auto& column : rows) {
-    row_index_.insert(row_index_.end(), column.begin(), column.end());
-    column_start_.push_back(static_cast<int>(row_index_.size()));
+    pattern_.row_index.insert(pattern_.row_index.end(), column.begin(), column.end());
+    pattern_.column_start.push_back(static_cast<int>(pattern_.row_index.size()));
   }
   for (int j = 0; j < model_.unknowns; ++j)
     for (int k = model_.column_start[j]; k < model_.column_start[j + 1]; ++k)
@@ -69,13 +69,14 @@ void TangentSolver::make_pattern() {
 }
 
 int TangentSolver::position(int row, int column) const {
-  const auto first = row_index_.begin() + column_start_[column],
-             last = row_index_.begin() + column_start_[column + 1];
-  return static_cast<int>(std::lower_bound(first, last, row) - row_index_.begin());
+  const std::vector<int>& all = pattern_.row_index;
+  const auto first = all.begin() + pattern_.column_start[column],
+             last = all.begin() + pattern_.column_start[column + 1];
+  return static_cast<int>(std::lower_bound(first, last, row) - all.begin());
 }
 
-void TangentSolver::add_nodes(const Block& block, double seed,
-                              const std::vector<NodeSeeds>& seeds) {
+void TangentSolver::add_nodes(const Block& block, double seed, const std::vector<NodeSeeds>& seeds,
+                              std::vector<double>& values) const {
   const LoadTangent& t = tangents_[block.tangent];
   const NodeSeeds& s = seeds[t.nodes[block.column_node]];
   const auto part = [&](const MatX& m) -> Eigen::Matrix<double, 6, 6> {
@@ -87,17 +88,29 @@ void TangentSolver::add_nodes(const Block& block, double seed,
   J.leftCols<3>() = K.leftCols<3>() * seed + C.leftCols<3>();
   J.rightCols<3>() = K.rightCols<3>() * s.A + C.rightCols<3>() * s.B;
   for (int k = 0; k < 36; ++k)
-    if (block.positions[k] >= 0) values_[block.positions[k]] -= J(k % 6, k / 6);
+    if (block.positions[k] >= 0) values[block.positions[k]] -= J(k % 6, k / 6);
 }
 
-void TangentSolver::add_modes(const Block& block, double seed) {
+void TangentSolver::add_modes(const Block& block, double seed, std::vector<double>& values) const {
   const LoadTangent& t = tangents_[block.tangent];
   const int square = t.modes * t.modes;
   for (int k = 0; k < square; ++k) {
     if (t.stiffness.size() > 0)
-      values_[block.positions[k]] -= seed * t.stiffness(k % t.modes, k / t.modes);
+      values[block.positions[k]] -= seed * t.stiffness(k % t.modes, k / t.modes);
     if (t.damping.size() > 0)
-      values_[block.positions[square + k]] -= seed * t.damping(k % t.modes, k / t.modes);
+      values[block.positions[square + k]] -= seed * t.damping(k % t.modes, k / t.modes);
+  }
+}
+
+void TangentSolver::add(double seed, const std::vector<NodeSeeds>& seeds,
+                        std::vector<double>& values) const {
+  for (const Block& block : blocks_) {
+    const LoadTangent& t = tangents_[block.tangent];
+    if (t.stiffness.size() == 0 && t.damping.size() == 0) continue;
+    if (t.modes > 0)
+      add_modes(block, seed, values);
+    else
+      add_nodes(block, seed, seeds, values);
   }
 }
 
@@ -105,14 +118,7 @@ LinearSolver::Outcome TangentSolver::factor(double seed, const std::vector<NodeS
                                             const std::vector<double>& values) {
   std::fill(values_.begin(), values_.end(), 0.0);
   for (std::size_t k = 0; k < own_.size(); ++k) values_[own_[k]] = values[k];
-  for (const Block& block : blocks_) {
-    const LoadTangent& t = tangents_[block.tangent];
-    if (t.stiffness.size() == 0 && t.damping.size() == 0) continue;
-    if (t.modes > 0)
-      add_modes(block, seed);
-    else
-      add_nodes(block, seed, seeds);
-  }
+  add(seed, seeds, values_);
   return solver_->factor_alone(values_.data());
 }
 

@@ -28,8 +28,8 @@ struct LoadTangent {
   MatX stiffness, damping;  ///< K, C; empty: zero
 };
 
-/// Factors the model's matrix with tangents, which may couple unknowns that the model's own pattern
-/// keeps apart.
+/// Factors matrices with tangents, which may couple unknowns that the model's own pattern keeps
+/// apart.
 class TangentSolver {
  public:
   TangentSolver(const Model& model, std::vector<LoadTangent> tangents);
@@ -41,20 +41,27 @@ class TangentSolver {
   void solve(double* rhs) { solver_->solve(rhs); }
   int singular_column() const { return solver_->singular_column(); }
 
+  /// The model's pattern with the entries of tangents, and where the model's own lie in it.
+  const SparsePattern& pattern() const { return pattern_; }
+  const std::vector<int>& own() const { return own_; }
+  /// Adds −∂(loads)/∂δ to `values` in that pattern.
+  void add(double seed, const std::vector<NodeSeeds>& seeds, std::vector<double>& values) const;
+
  private:
   struct Block {  ///< one node's (or all modes') loads against one node's motion
     int tangent, row_node, column_node;
     std::vector<int> positions;  ///< in the extended values, by columns; −1: no such entry
   };
   void make_pattern();
-  void add_nodes(const Block& block, double seed, const std::vector<NodeSeeds>& seeds);
-  void add_modes(const Block& block, double seed);
+  void add_nodes(const Block& block, double seed, const std::vector<NodeSeeds>& seeds,
+                 std::vector<double>& values) const;
+  void add_modes(const Block& block, double seed, std::vector<double>& values) const;
   int position(int row, int column) const;
 
   const Model& model_;
   std::vector<LoadTangent> tangents_;
-  std::vector<int> column_start_, row_index_;  ///< the extended pattern
-  std::vector<int> own_;                       ///< where the model's entries lie in it
+  SparsePattern pattern_;
+  std::vector<int> own_;
   std::vector<Block> blocks_;
   std::vector<double> values_;
   std::unique_ptr<LinearSolver> solver_;

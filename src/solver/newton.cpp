@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "solver/control.h"
 #include "solver/line_search.h"
-#include "solver/system.h"
 
 namespace mbcosim {
 
@@ -46,32 +46,38 @@ double root_near(Function&& f, double at_zero, double tolerance) {
   return std::isfinite(fb) ? b : NAN;
 }
 
+/// What the last residual error says after `iterations` solves: an outcome, or nothing to go on.
+/// Nothing converges before loads from outside have `settled`.
+std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings,
+                                            const std::vector<double>& errors, int iterations,
+                                            bool settled) {
+  const double error = errors.back();
+  if (!std::isfinite(error)) return NewtonOutcome::not_converged;
+  const bool tested = settings.residual_test != ResidualTest::none && settings.tolerance > 0;
+  if (tested && settled && error < settings.tolerance) return NewtonOutcome::converged;
+  if (iterations < settings.max_iterations) return std::nullopt;
+  return settled && settings.at_most && error < errors.front() ? NewtonOutcome::converged
+                                                               : NewtonOutcome::not_converged;
+}
+
 class Newton {
  public:
-  Newton(const Model& model, Phase phase, double c, double ca, const NewtonSettings& settings,
-         const NewtonHooks& hooks, State& state, Workspace& workspace)
-      : model_(model),
-        phase_(phase),
-        c_(c),
-        ca_(ca),
-        settings_(settings),
-        hooks_(hooks),
-        state_(state),
-        ws_(workspace) {}
+  Newton(NewtonSystem& system, const NewtonSettings& settings, const NewtonHooks& hooks)
+      : system_(system), settings_(settings), hooks_(hooks), scratch_(system.scratch()) {}
 
   NewtonReport run() {
-    ws_.residual_history.clear();
+    scratch_.residual_history.clear();
     NewtonReport report;
     report.tolerance = settings_.tolerance;
     for (;;) {
       const bool settled = hooks_.exchange(report.iterations);
-      report.residual_error = residual();
-      ws_.residual_history.push_back(report.residual_error);
+      system_.compute_residual();
+      report.residual_error = system_.error(settings_);
+      scratch_.residual_history.push_back(report.residual_error);
       if (const auto verdict =
-              judge_residual(settings_, ws_.residual_history, report.iterations, settled))
+              judge_residual(settings_, scratch_.residual_history, report.iterations, settled))
         return finish(report, *verdict);
-      if (exceeds_residual_limits(model_, settings_, ws_.residual))
-        return finish(report, NewtonOutcome::not_converged);
+      if (system_.exceeds_limits(settings_)) return finish(report, NewtonOutcome::not_converged);
       if (hooks_.cancelled()) return finish(report, NewtonOutcome::cancelled);
       if (!correct(report)) return report;
       if (settled && settings_.solution_tolerance > 0 &&
@@ -88,11 +94,6 @@ class Newton {
     return report;
   }
 
-  double residual() {
-    compute_residual(model_.context(state_, phase_, c_, ca_), ws_.residual);
-    return residual_error(model_, settings_, state_, ws_.residual);
-  }
-
   /// One linear solve and update; false (with the outcome set) when the matrix cannot be factored
   /// or the line search gives up.
   bool correct(NewtonReport& report) {
@@ -101,37 +102,33 @@ class Newton {
     const bool factored = factor(report.iterations);
     ++report.iterations;
     if (!factored) {
-      report.singular_column =
-          by_tangents() ? ws_.tangents->singular_column() : ws_.solver.singular_column();
+      report.singular_column = system_.singular_column();
       finish(report, NewtonOutcome::singular);
       return false;
     }
-    std::copy(ws_.residual.begin(), ws_.residual.end(), ws_.delta.begin());
-    if (by_tangents())
-      ws_.tangents->solve(ws_.delta.data());
-    else
-      ws_.solver.solve(ws_.delta.data());
+    std::copy(scratch_.residual.begin(), scratch_.residual.end(), scratch_.delta.begin());
+    system_.solve(scratch_.delta.data());
     if (!settings_.line_search) {
       // Full steps that cycle (dry friction, contacts) are shortened; a search without success goes
       // on from where it ended.
       if (cycling)
-        (void)search_along(model_, phase_, c_, ca_, rescue_, state_, ws_);
+        (void)search_along(system_, rescue_);
       else
-        apply_correction(model_, ws_.delta, c_, ca_, state_);
-    } else if (!search_along(model_, phase_, c_, ca_, *settings_.line_search, state_, ws_)) {
+        system_.correct(scratch_.delta);
+    } else if (!search_along(system_, *settings_.line_search)) {
       finish(report, NewtonOutcome::not_converged);
       return false;
     }
-    hooks_.after_correction(state_);
+    hooks_.after_correction(system_.state());
     if (settings_.solution_test != ResidualTest::none)
-      report.solution_error = test_value(settings_.solution_test, ws_.delta);
+      report.solution_error = test_value(settings_.solution_test, scratch_.delta);
     return true;
   }
 
   /// Has the residual found no new minimum in the last iterations?
   bool cycles() const {
     constexpr std::size_t kPatience = 8;
-    const std::vector<double>& errors = ws_.residual_history;
+    const std::vector<double>& errors = scratch_.residual_history;
     if (settings_.jacobian_every > 1 || errors.size() <= kPatience) return false;
     const auto recent = errors.end() - kPatience;
     return !(*std::min_element(recent, errors.end()) < *std::min_element(errors.begin(), recent));
@@ -140,23 +137,22 @@ class Newton {
   /// state of dry friction at a kink of its law), that equation is solved for its own unknown
   /// before the next step.
   void eliminate_worst() {
-    const std::vector<double>& r = ws_.residual;
+    const std::vector<double>& r = scratch_.residual;
     const auto worst = std::max_element(
         r.begin(), r.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
     const int row = static_cast<int>(worst - r.begin());
     const double all = test_value(ResidualTest::norm, r);
-    if (model_.kinds[row] != UnknownKind::differential || std::abs(*worst) < 0.9 * all ||
-        !std::isfinite(all))
+    if (!system_.is_differential(row) || std::abs(*worst) < 0.9 * all || !std::isfinite(all))
       return;
-    ws_.start = state_;
+    system_.mark();
     const double at_start = *worst;
     const auto value = [&](double correction) {
-      std::fill(ws_.delta.begin(), ws_.delta.end(), 0.0);
-      ws_.delta[row] = correction;
-      state_ = ws_.start;
-      apply_correction(model_, ws_.delta, c_, ca_, state_);
-      (void)residual();
-      return ws_.residual[row];
+      std::fill(scratch_.delta.begin(), scratch_.delta.end(), 0.0);
+      scratch_.delta[row] = correction;
+      system_.go_back();
+      system_.correct(scratch_.delta);
+      system_.compute_residual();
+      return scratch_.residual[row];
     };
     const double solution = root_near(value, at_start, 0.1 * settings_.tolerance);
     (void)value(std::isfinite(solution) ? solution : 0.0);
@@ -171,45 +167,39 @@ class Newton {
     return s;
   }
 
-  /// Do derivatives of external loads enter the matrix?
-  bool by_tangents() const { return ws_.tangents && phase_ == Phase::step; }
-
   /// Builds and factors the matrix when it is due; false when it cannot be factored.
   bool factor(int iterations) {
     const bool keep = settings_.keep_jacobian;
-    double* const kept = keep ? &state_.control[control::kCount] : nullptr;
+    double* const kept = keep ? &system_.state().control[control::kCount] : nullptr;
     const long count = keep ? kept_iterations() : iterations;
     if (count % settings_.jacobian_every == 0) {
-      compute_jacobian(model_.context(state_, phase_, c_, ca_), ws_);
-      if (keep) std::copy(ws_.values.begin(), ws_.values.end(), kept);
+      system_.compute_matrix();
+      if (keep) std::copy(scratch_.values.begin(), scratch_.values.end(), kept);
     } else if (keep && iterations == 0) {
-      std::copy(kept, kept + ws_.values.size(), ws_.values.begin());
+      std::copy(kept, kept + scratch_.values.size(), scratch_.values.begin());
     } else {
       return true;
     }
-    if (by_tangents())
-      return ws_.tangents->factor(c_, ws_.seeds, ws_.values) == LinearSolver::Outcome::ok;
-    return ws_.solver.factor(ws_.values.data()) == LinearSolver::Outcome::ok;
+    return system_.factor();
   }
 
   /// Iterations since the integrator's coefficients changed: a matrix is not kept beyond that.
   long kept_iterations() {
-    double& count = state_.control[control::kKeptIterations];
-    double& c = state_.control[control::kKeptCoefficient];
-    double& ca = state_.control[control::kKeptAlgebraicCoefficient];
-    if (c != c_ || ca != ca_) count = 0;
-    c = c_;
-    ca = ca_;
+    std::vector<double>& c = system_.state().control;
+    const NewtonSystem::Coefficients now = system_.coefficients();
+    double& count = c[control::kKeptIterations];
+    if (now != NewtonSystem::Coefficients{c[control::kKeptCoefficient],
+                                          c[control::kKeptAlgebraicCoefficient]})
+      count = 0;
+    c[control::kKeptCoefficient] = now.first;
+    c[control::kKeptAlgebraicCoefficient] = now.second;
     return static_cast<long>(count++);
   }
 
-  const Model& model_;
-  Phase phase_;
-  double c_, ca_;
+  NewtonSystem& system_;
   const NewtonSettings& settings_;
   const NewtonHooks& hooks_;
-  State& state_;
-  Workspace& ws_;
+  NewtonScratch& scratch_;
   const LineSearchSettings rescue_ = rescue_settings();
 };
 
@@ -265,22 +255,9 @@ bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings,
           differential > settings.max_residual_differential);
 }
 
-std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings,
-                                            const std::vector<double>& errors, int iterations,
-                                            bool settled) {
-  const double error = errors.back();
-  if (!std::isfinite(error)) return NewtonOutcome::not_converged;
-  const bool tested = settings.residual_test != ResidualTest::none && settings.tolerance > 0;
-  if (tested && settled && error < settings.tolerance) return NewtonOutcome::converged;
-  if (iterations < settings.max_iterations) return std::nullopt;
-  return settled && settings.at_most && error < errors.front() ? NewtonOutcome::converged
-                                                               : NewtonOutcome::not_converged;
-}
-
-NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic,
-                          const NewtonSettings& settings, const NewtonHooks& hooks, State& state,
-                          Workspace& workspace) {
-  return Newton(model, phase, c, c_algebraic, settings, hooks, state, workspace).run();
+NewtonReport solve_newton(NewtonSystem& system, const NewtonSettings& settings,
+                          const NewtonHooks& hooks) {
+  return Newton(system, settings, hooks).run();
 }
 
 std::vector<WorstEquation> worst_equations(const Model& model, const std::vector<double>& residual,

@@ -1,11 +1,11 @@
-/// Newton iteration on one instant (MBDyn input manual, "tolerance", "nonlinear solver").
+/// Newton iteration, the one of all phases and integrators (MBDyn input manual, "tolerance",
+/// "nonlinear solver").
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "model/model.h"
-#include "solver/workspace.h"
+#include "solver/newton_system.h"
 
 namespace mbcosim {
 
@@ -45,12 +45,6 @@ double residual_error(const Model& model, const NewtonSettings& settings, const 
 /// Is a residual beyond `max residual`?
 bool exceeds_residual_limits(const Model& model, const NewtonSettings& settings,
                              const std::vector<double>& residual);
-/// What the last residual error says after `iterations` solves: an outcome, or nothing to go on.
-/// Nothing converges before loads from outside have `settled`.
-std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings,
-                                            const std::vector<double>& errors, int iterations,
-                                            bool settled);
-
 /// What the phase that iterates adds.
 class NewtonHooks {
  public:
@@ -64,11 +58,10 @@ class NewtonHooks {
   virtual bool cancelled() const { return false; }
 };
 
-/// Iterates from the state as it stands with the coefficients c, c_a. The state is left at the last
-/// iterate. Throws EvaluationError when a drive or law cannot be evaluated.
-NewtonReport solve_newton(const Model& model, Phase phase, double c, double c_algebraic,
-                          const NewtonSettings& settings, const NewtonHooks& hooks, State& state,
-                          Workspace& workspace);
+/// Iterates from where the system stands; it is left at the last iterate. Throws EvaluationError
+/// when a drive or law cannot be evaluated.
+NewtonReport solve_newton(NewtonSystem& system, const NewtonSettings& settings,
+                          const NewtonHooks& hooks);
 
 /// The rows with the largest residuals, by owner and meaning.
 std::vector<WorstEquation> worst_equations(const Model& model, const std::vector<double>& residual,

@@ -5,6 +5,7 @@
 
 #include "solver/control.h"
 #include "solver/initial_assembly.h"
+#include "solver/instant.h"
 #include "solver/singularity.h"
 #include "solver/system.h"
 
@@ -72,16 +73,6 @@ bool is_third_order(const MethodSettings& m) {
 
 }  // namespace
 
-Error evaluation_failure(const State& state, const EvaluationError& cause) {
-  Error error;
-  error.kind = ErrorKind::evaluation;
-  error.reason = "EVALUATION_FAILED";
-  error.message = "t = " + std::to_string(state.time) + ": " + cause.what();
-  error.failure.time = state.time;
-  error.failure.step = static_cast<long>(state.step);
-  return error;
-}
-
 /// Regular steps only ask whether to go on.
 class Stepper::StepHooks : public NewtonHooks {
  public:
@@ -137,12 +128,12 @@ Stepper::Stepper(const Model& model)
   activity_.resize(driven_.size());
   const InitialValueSettings& s = model.initial_value;
   if (is_third_order(s.method) || (s.dummy_method && is_third_order(*s.dummy_method)))
-    third_order_ = std::make_unique<ThirdOrderSolver>(model);
+    two_stages_ = std::make_unique<TwoStageSystem>(model, workspace_);
 }
 
 Status Stepper::assemble(State& state) {
-  state.control.assign(control::kCount + (regular_.keep_jacobian ? model_.row_index.size() : 0),
-                       0.0);
+  const std::size_t matrix = (two_stages_ ? 4 : 1) * model_.row_index.size();
+  state.control.assign(control::kCount + (regular_.keep_jacobian ? matrix : 0), 0.0);
   state.h = state.h_previous = model_.initial_value.time_step;
   for (const auto& listener : model_.step_listeners)
     listener->advance(model_.context(state, Phase::assembly), state, true);
@@ -170,8 +161,8 @@ PhaseReport Stepper::solve_derivatives(State& state) {
     const EvalContext context = model_.context(state, Phase::derivatives, c, c);
     compute_jacobian(context, workspace_);
     workspace_.solver.analyze(workspace_.values.data());
-    report.newton =
-        solve_newton(model_, Phase::derivatives, c, c, settings, hooks, state, workspace_);
+    InstantSystem system(model_, Phase::derivatives, c, c, state, workspace_);
+    report.newton = solve_newton(system, settings, hooks);
     if (report.newton.outcome == NewtonOutcome::converged)
       after_convergence(state, Phase::derivatives, c, c);
     return report.newton.outcome == NewtonOutcome::converged;
@@ -211,10 +202,10 @@ void Stepper::choose_pivots(const State& state) {
   compute_jacobian(model_.context(state, Phase::step, c, c), workspace_);
   workspace_.solver.analyze(workspace_.values.data());
   if (!driven_.empty()) pivot_state_ = state;
-  if (!third_order_) return;
+  if (!two_stages_) return;
   const InitialValueSettings& s = model_.initial_value;
-  third_order_->choose_pivots(
-      state, third_order(state, is_third_order(s.method) ? s.method : *s.dummy_method), workspace_);
+  two_stages_->choose_pivots(
+      state, third_order(state, is_third_order(s.method) ? s.method : *s.dummy_method));
 }
 
 void Stepper::select_pivots(const State& state) {
@@ -251,8 +242,10 @@ PhaseReport Stepper::run_dummy_steps(State& state) {
   MethodSettings method;
   if (s.dummy_method) method = *s.dummy_method;
   for (int k = 0; k < s.dummy_steps; ++k) {
+    const State start = state;
     report = attempt(state, s.dummy_ratio * s.time_step, method, k == 0, dummy_);
     if (report.error) {
+      state = start;
       explain(report, state);
       return report;
     }
@@ -291,10 +284,19 @@ NewtonReport Stepper::iterate(State& state, const StepFormula& f, const MethodSe
     settings.constraint_factor =
         c * (s.constraint_scale > 0 ? s.constraint_scale : 1 / s.time_step);
   }
-  if (!first && is_third_order(method))
-    return third_order_->solve(third_order(state, method), settings, hooks, state, workspace_);
-  return solve_newton(model_, Phase::step, f.c(), f.c_algebraic(), settings, hooks, state,
-                      workspace_);
+  if (first || !is_third_order(method)) {
+    InstantSystem system(model_, Phase::step, f.c(), f.c_algebraic(), state, workspace_);
+    return solve_newton(system, settings, hooks);
+  }
+  two_stages_->start(state, third_order(state, method));
+  const NewtonReport report = solve_newton(*two_stages_, settings, hooks);
+  workspace_.residual_history = two_stages_->scratch().residual_history;
+  return report;
+}
+
+void Stepper::set_tangents(std::unique_ptr<TangentSolver> tangents) {
+  workspace_.tangents = std::move(tangents);
+  if (two_stages_) two_stages_->tangents_changed();
 }
 
 /// Values at the last two accepted steps -> prediction at the new time. Rotation unknowns are first
@@ -354,9 +356,8 @@ void Stepper::after_convergence(State& state, Phase phase, double c, double ca) 
 }
 
 PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& method, bool first,
-                             const NewtonSettings& settings) {
+                             const NewtonSettings& settings, bool accept_unconverged) {
   PhaseReport report;
-  backup_ = state;
   try {
     std::swap(state.y2, state.y1);
     std::swap(state.yp2, state.yp1);
@@ -380,7 +381,7 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     for (const auto& set : model_.sets) set->after_predict(context, state);
     select_pivots(state);
     report.newton = iterate(state, f, method, first, settings);
-    report.flagged = accept_unconverged_ && report.newton.outcome == NewtonOutcome::not_converged &&
+    report.flagged = accept_unconverged && report.newton.outcome == NewtonOutcome::not_converged &&
                      is_finite(state);
     if (report.newton.outcome == NewtonOutcome::converged || report.flagged) {
       after_convergence(state, Phase::step, f.c(), f.c_algebraic());
@@ -389,20 +390,17 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     report.error = failure(report.newton, state, "step");
   } catch (const EvaluationError& e) {
     report.error = evaluation_failure(state, e);
-  } catch (...) {  // from the exchange
-    state = backup_;
-    throw;
   }
-  state = backup_;
   return report;
 }
 
-PhaseReport Stepper::step(State& state, double h) {
+PhaseReport Stepper::attempt(State& state, double h, bool accept_unconverged) {
   NewtonSettings settings = regular_;
   if (h <= 2 * model_.initial_value.min_time_step)
     settings.max_residual = settings.max_residual_differential = 0;
   const bool first = state.control[control::kRegularSteps] == 0;
-  PhaseReport report = attempt(state, h, model_.initial_value.method, first, settings);
+  PhaseReport report =
+      attempt(state, h, model_.initial_value.method, first, settings, accept_unconverged);
   if (!report.error) {
     state.control[control::kRegularSteps] += 1;
     state.control[control::kLastIterations] = report.newton.iterations;
@@ -449,7 +447,9 @@ double Stepper::step_size(const State& state, SinceChange& since) const {
   return h;
 }
 
-double Stepper::retry_step_size(State& state, double h) {
+bool Stepper::can_retry() const { return model_.initial_value.strategy != StepStrategy::no_change; }
+
+double Stepper::retry_step_size(State& state, double h) const {
   const InitialValueSettings& s = model_.initial_value;
   if (s.strategy == StepStrategy::change) {
     const double other =

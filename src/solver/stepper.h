@@ -9,22 +9,13 @@
 #include "solver/cancel.h"
 #include "solver/integrator.h"
 #include "solver/newton.h"
+#include "solver/step_controller.h"
 #include "solver/third_order.h"
 #include "solver/workspace.h"
 
 namespace mbcosim {
 
-/// Result of a phase or step that was solved (or not).
-struct PhaseReport {
-  NewtonReport newton;
-  bool flagged = false;        ///< did not converge, the last iterate was accepted
-  std::optional<Error> error;  ///< set when it failed
-};
-
-/// A drive or law that could not be evaluated, as an error at the state's time and step.
-Error evaluation_failure(const State& state, const EvaluationError& cause);
-
-class Stepper {
+class Stepper final : public StepSystem {
  public:
   explicit Stepper(const Model& model);
 
@@ -32,17 +23,11 @@ class Stepper {
   void set_cancelled(const CancelToken* cancel) { cancel_ = cancel; }
 
   /// Called before each residual of a step with the number of corrections so far; false: loads from
-  /// outside have not settled. May be empty. What it throws leaves the step, and the state is as it
-  /// was.
+  /// outside have not settled. May be empty. What it throws leaves the attempt.
   void set_exchange(std::function<bool(int)> exchange) { exchange_ = std::move(exchange); }
 
-  /// Steps that do not converge end at their last iterate, when it is finite, and are flagged.
-  void accept_unconverged(bool accept) { accept_unconverged_ = accept; }
-
   /// Derivatives of the loads that `exchange` sets; none: nullptr.
-  void set_tangents(std::unique_ptr<TangentSolver> tangents) {
-    workspace_.tangents = std::move(tangents);
-  }
+  void set_tangents(std::unique_ptr<TangentSolver> tangents);
   TangentSolver* tangents() { return workspace_.tangents.get(); }
 
   /// Initial assembly, momenta. The state comes from make_initial_state.
@@ -52,17 +37,13 @@ class Stepper {
   /// `dummy steps`: short steps before the first regular one.
   PhaseReport run_dummy_steps(State& state);
 
-  /// Length of the next step by the deck's strategy, whose counters go on.
-  double next_step_size(State& state) const;
-  /// The same without going on.
+  double next_step_size(State& state) const override;
+  /// The same, without the counters of the strategy going on.
   double peek_step_size(const State& state) const;
-  /// Tries one step of length h from the accepted `state`. On failure `state` is as it was.
-  PhaseReport step(State& state, double h);
-  /// Adds to the error of a failed step what the last matrix tells, or, after an iteration that
-  /// diverged, that at the accepted `state`. Takes longer than the step.
-  void explain(PhaseReport& report, const State& state);
-  /// A shorter step after a failure, or 0 when the strategy has none.
-  double retry_step_size(State& state, double h);
+  double retry_step_size(State& state, double h) const override;
+  bool can_retry() const override;
+  PhaseReport attempt(State& state, double h, bool accept_unconverged) override;
+  void explain(PhaseReport& report, const State& state) override;
 
   Workspace& workspace() { return workspace_; }
 
@@ -75,8 +56,10 @@ class Stepper {
   void select_pivots(const State& state);
   class StepHooks;
   class DerivativesHooks;
+  /// One step of length h by a method; the first one by Crank-Nicolson. On failure the state is
+  /// anywhere.
   PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first,
-                      const NewtonSettings& settings);
+                      const NewtonSettings& settings, bool accept_unconverged = false);
   /// Newton on the prediction, by the method of the step.
   NewtonReport iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first,
                        NewtonSettings settings);
@@ -97,12 +80,10 @@ class Stepper {
   Workspace workspace_;
   State pivot_state_;  ///< the initial state, when there are `driven` elements; else empty
   std::vector<ElementRef> driven_;
-  std::vector<bool> activity_;                     ///< (driven_)
-  std::unique_ptr<ThirdOrderSolver> third_order_;  ///< when a method of the deck needs it
-  State backup_;
+  std::vector<bool> activity_;                  ///< (driven_)
+  std::unique_ptr<TwoStageSystem> two_stages_;  ///< when a method of the deck needs it
   const CancelToken* cancel_ = nullptr;
   std::function<bool(int)> exchange_;
-  bool accept_unconverged_ = false;
   NewtonSettings regular_, derivatives_, dummy_;
   double derivatives_coefficient_ = 0;
 };

@@ -56,21 +56,25 @@ NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c)
   return s;
 }
 
-void compute_jacobian(const EvalContext& context, Workspace& workspace) {
+void compute_seeds(const EvalContext& context, std::vector<NodeSeeds>& seeds) {
   const Model& model = *context.model;
   const State& state = *context.state;
   for (std::size_t k = 0; k < model.places.size(); ++k) {
     const NodePlace& n = model.places[k];
     if (!n.has_rotation()) {
-      workspace.seeds[k] = {Mat3::Zero(), Mat3::Zero()};
+      seeds[k] = {Mat3::Zero(), Mat3::Zero()};
       continue;
     }
     const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
-    workspace.seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]),
-                                    state.rotation_history[k].w_ref, context.seed);
+    seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]),
+                          state.rotation_history[k].w_ref, context.seed);
   }
+}
+
+void compute_jacobian(const EvalContext& context, Workspace& workspace) {
+  compute_seeds(context, workspace.seeds);
   std::fill(workspace.values.begin(), workspace.values.end(), 0.0);
-  each_tile(model, [&](const auto& part, ElementRange range) {
+  each_tile(*context.model, [&](const auto& part, ElementRange range) {
     if constexpr (std::is_same_v<decltype(part), const NodeEquations&>)
       part.jacobian(context, workspace.values.data(), range);
     else

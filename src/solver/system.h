@@ -16,6 +16,9 @@ void compute_jacobian(const EvalContext& context, Workspace& workspace);
 /// How node rotations depend on the Newton increments: A = c G(g), B = ∂w/∂δ.
 NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c);
 
+/// The seeds of all structural nodes at the state in `context`.
+void compute_seeds(const EvalContext& context, std::vector<NodeSeeds>& seeds);
+
 /// Refreshes R and w of every node from g, ġ and the references.
 void update_rotations(const Model& model, State& state);
 

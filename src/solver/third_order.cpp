@@ -24,34 +24,41 @@ ThirdOrderFormula ThirdOrderFormula::ad_hoc() {
   return {t, (2 * t + 1) / (2 * t), -1 / (2 * t), 0, 1 - t * t, t * t, t * (1 + t), 0};
 }
 
-ThirdOrderSolver::ThirdOrderSolver(const Model& model)
+TwoStageSystem::TwoStageSystem(const Model& model, Workspace& workspace)
     : model_(model),
+      ws_(workspace),
       n_(model.unknowns),
+      pattern_(doubled_pattern(model.column_start, model.row_index)),
+      scratch_(2 * n_, pattern_.row_index.size()),
+      solver_(doubled_solver(model, {model.column_start, model.row_index})),
       stage_residual_(n_),
-      stage_delta_(n_),
-      final_delta_(n_),
-      right_(2 * n_),
       by_rate_(model.row_index.size()),
-      by_value_(model.row_index.size()),
-      values_(4 * model.row_index.size()),
-      solver_(doubled_solver(model)) {}
+      by_value_(model.row_index.size()) {}
 
-void ThirdOrderSolver::choose_pivots(const State& state, const ThirdOrderFormula& f,
-                                     Workspace& workspace) {
+void TwoStageSystem::choose_pivots(const State& state, const ThirdOrderFormula& f) {
+  f_ = f;
   stage_ = state;
   stage_.h = model_.initial_value.time_step;
-  assemble(f, stage_, workspace);
-  solver_.analyze(values_.data());
+  end_ = &stage_;
+  compute_matrix();
+  solver_.analyze(scratch_.values.data());
+}
+
+void TwoStageSystem::start(State& state, const ThirdOrderFormula& f) {
+  f_ = f;
+  end_ = &state;
+  predict_stage();
 }
 
 /// ẏ_ξ = ẏ₁, y_ξ = y + θ h ẏ₁; rotations relative to the reference of the end: g_ξ = θ h ω₁, ġ_ξ =
 /// 0.
-void ThirdOrderSolver::predict_stage(const ThirdOrderFormula& f, const State& state) {
+void TwoStageSystem::predict_stage() {
+  const State& state = *end_;
   stage_ = state;
-  const double step = f.theta * state.h;
+  const double step = f_.theta * state.h;
   stage_.time += step;
   for (int i = 0; i < n_; ++i) {
-    const bool differential = model_.kinds[i] == UnknownKind::differential;
+    const bool differential = is_differential(i);
     (differential ? stage_.y : stage_.yp)[i] += step * (differential ? state.yp1 : state.y1)[i];
   }
   for (std::size_t k = 0; k < model_.structural.size(); ++k) {
@@ -65,60 +72,128 @@ void ThirdOrderSolver::predict_stage(const ThirdOrderFormula& f, const State& st
   update_rotations(model_, stage_);
 }
 
-double ThirdOrderSolver::evaluate(const NewtonSettings& settings, const State& state,
-                                  Workspace& workspace) {
-  compute_residual(model_.context(state, Phase::step), workspace.residual);
-  compute_residual(model_.context(stage_, Phase::step), stage_residual_);
-  const double a = residual_error(model_, settings, state, workspace.residual),
+void TwoStageSystem::compute_residual() {
+  stage_.external_loads = end_->external_loads;  // which the exchange may have changed
+  stage_.memory = end_->memory;
+  mbcosim::compute_residual(model_.context(*end_, Phase::step), ws_.residual);
+  mbcosim::compute_residual(model_.context(stage_, Phase::step), stage_residual_);
+  std::copy(ws_.residual.begin(), ws_.residual.end(), scratch_.residual.begin());
+  std::copy(stage_residual_.begin(), stage_residual_.end(), scratch_.residual.begin() + n_);
+}
+
+double TwoStageSystem::error(const NewtonSettings& settings) const {
+  const double a = residual_error(model_, settings, *end_, ws_.residual),
                b = residual_error(model_, settings, stage_, stage_residual_);
   return settings.residual_test == ResidualTest::norm ? std::hypot(a, b)
          : !(a > b) && !std::isnan(a)                 ? b
                                                       : a;
 }
 
+bool TwoStageSystem::exceeds_limits(const NewtonSettings& settings) const {
+  return exceeds_residual_limits(model_, settings, ws_.residual) ||
+         exceeds_residual_limits(model_, settings, stage_residual_);
+}
+
 /// by_rate_ and by_value_ at `state`, from the Jacobians with two values of ∂y/∂δ: it is linear in
 /// it.
-void ThirdOrderSolver::split(const State& state, Workspace& workspace) {
+void TwoStageSystem::split(const State& state) {
   EvalContext context = model_.context(state, Phase::step);
   context.seed = 0;
-  compute_jacobian(context, workspace);
-  std::swap(by_rate_, workspace.values);
+  compute_jacobian(context, ws_);
+  std::swap(by_rate_, ws_.values);
   context.seed = state.h;
-  compute_jacobian(context, workspace);
+  compute_jacobian(context, ws_);
   for (std::size_t k = 0; k < by_value_.size(); ++k)
-    by_value_[k] = (workspace.values[k] - by_rate_[k]) / state.h;
+    by_value_[k] = (ws_.values[k] - by_rate_[k]) / state.h;
 }
 
 /// Rows of one half (0: end, 1: stage): diagonal block by_rate_ + own h by_value_, other block
 /// other h by_value_.
-void ThirdOrderSolver::fill(int half, double own, double other, double h) {
+void TwoStageSystem::fill(int half, double own, double other) {
   const std::size_t all = model_.row_index.size();
   for (int block = 0; block < 2; ++block) {
-    const double factor = h * (block == half ? own : other);
+    const double factor = end_->h * (block == half ? own : other);
     for (int j = 0; j < n_; ++j) {
       const int first = model_.column_start[j], last = model_.column_start[j + 1];
-      double* out = &values_[2 * (block * all + first) + (half == 1 ? last - first : 0)];
+      double* out = &scratch_.values[2 * (block * all + first) + (half == 1 ? last - first : 0)];
       for (int k = first; k < last; ++k)
         *out++ = (block == half ? by_rate_[k] : 0.0) + factor * by_value_[k];
     }
   }
 }
 
-void ThirdOrderSolver::assemble(const ThirdOrderFormula& f, const State& state,
-                                Workspace& workspace) {
-  split(state, workspace);
-  fill(0, f.w0, f.w1, state.h);
-  split(stage_, workspace);
-  fill(1, f.p0 * f.w1, f.p0 * f.w0 + f.q0, state.h);
+void TwoStageSystem::compute_matrix() {
+  split(*end_);
+  fill(0, f_.w0, f_.w1);
+  split(stage_);
+  fill(1, f_.p0 * f_.w1, f_.p0 * f_.w0 + f_.q0);
 }
 
-void ThirdOrderSolver::correct(const ThirdOrderFormula& f, State& state) {
+/// The matrix in the pattern of the tangents, and with them: the loads in both halves of the rows
+/// follow the motion at the end of the step, y = … + h (w0 δ + w1 δ_ξ), ẏ = … + δ.
+void TwoStageSystem::add_tangents() {
+  const TangentSolver& tangents = *ws_.tangents;
+  const SparsePattern& wide = tangents.pattern();
+  if (!tangent_solver_) tangent_solver_.reset(new LinearSolver(doubled_solver(model_, wide)));
+  EvalContext context = model_.context(*end_, Phase::step);
+  const auto loads = [&](double seed, std::vector<double>& values) {
+    context.seed = seed;
+    compute_seeds(context, ws_.seeds);
+    values.assign(wide.row_index.size(), 0.0);
+    tangents.add(seed, ws_.seeds, values);
+  };
+  const double h = end_->h;
+  loads(0, load_by_rate_);
+  loads(h, load_by_value_);
+  for (std::size_t k = 0; k < load_by_rate_.size(); ++k)
+    load_by_value_[k] = (load_by_value_[k] - load_by_rate_[k]) / h;
+
+  tangent_values_.assign(4 * wide.row_index.size(), 0.0);
+  const std::vector<int>& own = tangents.own();
+  for (int block = 0; block < 2; ++block)
+    for (int j = 0; j < n_; ++j)
+      for (int half = 0; half < 2; ++half) {
+        const int first = model_.column_start[j], last = model_.column_start[j + 1];
+        const int wide_first = wide.column_start[j], size = wide.column_start[j + 1] - wide_first;
+        const double* in =
+            &scratch_.values[2 * (block * model_.row_index.size() + first) + half * (last - first)];
+        double* out =
+            &tangent_values_[2 * (block * wide.row_index.size() + wide_first) + half * size];
+        for (int k = first; k < last; ++k) out[own[k] - wide_first] = *in++;
+        for (int k = 0; k < size; ++k)
+          out[k] += (block == 0 ? load_by_rate_[wide_first + k] : 0.0) +
+                    h * (block == 0 ? f_.w0 : f_.w1) * load_by_value_[wide_first + k];
+      }
+}
+
+bool TwoStageSystem::factor() {
+  if (!ws_.tangents) return solver_.factor(scratch_.values.data()) == LinearSolver::Outcome::ok;
+  add_tangents();
+  return tangent_solver_->factor_alone(tangent_values_.data()) == LinearSolver::Outcome::ok;
+}
+
+void TwoStageSystem::solve(double* rhs) { (ws_.tangents ? *tangent_solver_ : solver_).solve(rhs); }
+
+int TwoStageSystem::singular_column() const {
+  const int column = (ws_.tangents ? *tangent_solver_ : solver_).singular_column();
+  return column < 0 ? -1 : column % n_;
+}
+
+double TwoStageSystem::gradient(int i) const {
+  double g = 0;
+  for (int k = pattern_.column_start[i]; k < pattern_.column_start[i + 1]; ++k)
+    g += scratch_.values[k] * scratch_.residual[pattern_.row_index[k]];
+  return g;
+}
+
+void TwoStageSystem::correct(const std::vector<double>& delta) {
+  State& state = *end_;
   const double h = state.h;
   for (int i = 0; i < n_; ++i) {
-    const double d = final_delta_[i], s = stage_delta_[i];
-    const double value = h * (f.w1 * s + f.w0 * d),
-                 stage_value = h * (f.p0 * f.w1 * s + (f.p0 * f.w0 + f.q0) * d);
-    const bool differential = model_.kinds[i] == UnknownKind::differential;
+    const double d = delta[i], s = delta[n_ + i];
+    const double value = h * (f_.w1 * s + f_.w0 * d),
+                 stage_value = h * (f_.p0 * f_.w1 * s + (f_.p0 * f_.w0 + f_.q0) * d);
+    const bool differential = is_differential(i);
     (differential ? state.yp : state.y)[i] += d;
     (differential ? stage_.yp : stage_.y)[i] += s;
     (differential ? state.y : state.yp)[i] += value;
@@ -128,53 +203,31 @@ void ThirdOrderSolver::correct(const ThirdOrderFormula& f, State& state) {
   update_rotations(model_, stage_);
 }
 
-NewtonReport ThirdOrderSolver::solve(const ThirdOrderFormula& f, const NewtonSettings& settings,
-                                     const NewtonHooks& hooks, State& state, Workspace& workspace) {
-  predict_stage(f, state);
-  workspace.residual_history.clear();
-  NewtonReport report;
-  report.tolerance = settings.tolerance;
-  const auto finish = [&](NewtonOutcome outcome) {
-    report.outcome = outcome;
-    return report;
-  };
-  for (;;) {
-    const bool settled = hooks.exchange(report.iterations);
-    stage_.external_loads = state.external_loads;  // which the exchange may have changed
-    stage_.memory = state.memory;
-    report.residual_error = evaluate(settings, state, workspace);
-    workspace.residual_history.push_back(report.residual_error);
-    if (const auto verdict =
-            judge_residual(settings, workspace.residual_history, report.iterations, settled))
-      return finish(*verdict);
-    if (exceeds_residual_limits(model_, settings, workspace.residual) ||
-        exceeds_residual_limits(model_, settings, stage_residual_))
-      return finish(NewtonOutcome::not_converged);
-    if (hooks.cancelled()) return finish(NewtonOutcome::cancelled);
-    if (settings.jacobian_every <= 1 || report.iterations % settings.jacobian_every == 0) {
-      assemble(f, state, workspace);
-      if (solver_.factor(values_.data()) != LinearSolver::Outcome::ok) {
-        report.singular_column =
-            solver_.singular_column() < 0 ? -1 : solver_.singular_column() % n_;
-        return finish(NewtonOutcome::singular);
-      }
-    }
-    ++report.iterations;
-    std::copy(workspace.residual.begin(), workspace.residual.end(), right_.begin());
-    std::copy(stage_residual_.begin(), stage_residual_.end(), right_.begin() + n_);
-    solver_.solve(right_.data());
-    final_delta_.assign(right_.begin(), right_.begin() + n_);
-    stage_delta_.assign(right_.begin() + n_, right_.end());
-    correct(f, state);
-    hooks.after_correction(state);
-    if (settings.solution_test == ResidualTest::none) continue;
-    report.solution_error = test_value(settings.solution_test, right_);
-    if (settled && settings.solution_tolerance > 0 &&
-        report.solution_error < settings.solution_tolerance) {
-      report.by_solution = true;
-      return finish(NewtonOutcome::converged);
-    }
-  }
+void TwoStageSystem::mark() {
+  ws_.start = *end_;
+  marked_stage_ = stage_;
+}
+
+void TwoStageSystem::go_back() {
+  *end_ = ws_.start;
+  stage_ = marked_stage_;
+}
+
+bool TwoStageSystem::is_differential(int i) const {
+  return model_.kinds[i % n_] == UnknownKind::differential;
+}
+
+double TwoStageSystem::magnitude(int i) const {
+  const State& state = i < n_ ? *end_ : stage_;
+  return std::max({std::abs(state.y[i % n_]), std::abs(state.yp[i % n_]), 1.0});
+}
+
+double TwoStageSystem::square() const {
+  double sum = 0;
+  for (const State* state : {static_cast<const State*>(end_), &stage_})
+    for (const std::vector<double>* v : {&state->y, &state->yp})
+      for (const double x : *v) sum += x * x;
+  return sum;
 }
 
 }  // namespace mbcosim

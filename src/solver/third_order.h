@@ -17,6 +17,8 @@
 /// MBDyn input manual, "method".
 #pragma once
 
+#include <memory>
+
 #include "model/model.h"
 #include "solver/newton.h"
 
@@ -29,34 +31,61 @@ struct ThirdOrderFormula {
   static ThirdOrderFormula ad_hoc();
 };
 
-/// Solves the steps of this method. Scratch only: results depend on the state alone.
-class ThirdOrderSolver {
+/// The equations of both instants. The iterate: the state (end of the step) and the stage, whose
+/// unknowns follow in all vectors. Scratch only: results depend on the state alone.
+class TwoStageSystem final : public NewtonSystem {
  public:
-  explicit ThirdOrderSolver(const Model& model);
+  TwoStageSystem(const Model& model, Workspace& workspace);
 
   /// Pivots of the doubled matrix, chosen at a reference state with the model's time step.
-  void choose_pivots(const State& state, const ThirdOrderFormula& f, Workspace& workspace);
-  /// Iterates `state`, which stands at its prediction for the end of a step. Its y1, yp1 and
-  /// rotations hold the last accepted step.
-  NewtonReport solve(const ThirdOrderFormula& f, const NewtonSettings& settings,
-                     const NewtonHooks& hooks, State& state, Workspace& workspace);
+  void choose_pivots(const State& state, const ThirdOrderFormula& f);
+  /// The workspace has other load tangents.
+  void tangents_changed() { tangent_solver_.reset(); }
+  /// Starts an iteration of `state`, which stands at its prediction for the end of a step. Its y1,
+  /// yp1 and rotations hold the last accepted step. The system refers to it from now on.
+  void start(State& state, const ThirdOrderFormula& f);
+
+  NewtonScratch& scratch() override { return scratch_; }
+  State& state() override { return *end_; }
+  void compute_residual() override;
+  double error(const NewtonSettings& settings) const override;
+  bool exceeds_limits(const NewtonSettings& settings) const override;
+  void compute_matrix() override;
+  bool factor() override;
+  void solve(double* rhs) override;
+  int singular_column() const override;
+  double gradient(int i) const override;
+  void correct(const std::vector<double>& delta) override;
+  void mark() override;
+  void go_back() override;
+  bool is_differential(int i) const override;
+  double magnitude(int i) const override;
+  double square() const override;
+  Coefficients coefficients() const override { return {end_->h, f_.theta}; }  // θ < 0
 
  private:
-  void predict_stage(const ThirdOrderFormula& f, const State& state);
-  double evaluate(const NewtonSettings& settings, const State& state, Workspace& workspace);
-  void assemble(const ThirdOrderFormula& f, const State& state, Workspace& workspace);
-  void split(const State& state, Workspace& workspace);
-  void fill(int half, double own, double other, double h);
-  void correct(const ThirdOrderFormula& f, State& state);
+  void predict_stage();
+  void split(const State& state);
+  void fill(int half, double own, double other);
+  void add_tangents();
 
   const Model& model_;
-  int n_;
-  State stage_;
-  std::vector<double> stage_residual_, stage_delta_, final_delta_, right_;
+  Workspace& ws_;
+  const int n_;
+  const SparsePattern pattern_;  ///< of the doubled matrix
+  NewtonScratch scratch_;        ///< (2n)
+  LinearSolver solver_;
+  State* end_ = nullptr;
+  State stage_, marked_stage_;
+  ThirdOrderFormula f_{};
+  std::vector<double> stage_residual_;
   std::vector<double> by_rate_,
       by_value_;  ///< −∂r/∂ẏ (algebraic columns: −∂r/∂y), −∂r/∂y; model's pattern
-  std::vector<double> values_;
-  LinearSolver solver_;
+
+  // --- load tangents
+  std::unique_ptr<LinearSolver> tangent_solver_;      ///< in their pattern, doubled
+  std::vector<double> tangent_values_;                ///< of that matrix
+  std::vector<double> load_by_rate_, load_by_value_;  ///< −∂(loads)/∂ẏ, −∂(loads)/∂y
 };
 
 }  // namespace mbcosim

@@ -11,25 +11,31 @@
 
 namespace mbcosim {
 
-struct Workspace {
-  explicit Workspace(const Model& model)
-      : residual(model.unknowns),
-        delta(model.unknowns),
-        values(model.row_index.size()),
-        seeds(model.structural.size()),
-        solver(model.unknowns, model.column_start, model.row_index, model.couplings,
-               LinearSolver::kNewtonPivots) {
+/// Vectors and matrix of Newton's method for m unknowns.
+struct NewtonScratch {
+  NewtonScratch(std::size_t unknowns, std::size_t entries)
+      : residual(unknowns), delta(unknowns), values(entries) {
     residual_history.reserve(256);
   }
 
-  std::vector<double> residual;   ///< r (n)
-  std::vector<double> delta;      ///< Newton correction (n)
-  std::vector<double> values;     ///< of the sparse Jacobian
-  std::vector<NodeSeeds> seeds;   ///< (structural nodes)
-  State start;                    ///< from which a search along a line tries its steps
-  std::vector<double> direction;  ///< of that search (n)
-  LinearSolver solver;
+  std::vector<double> residual;          ///< r (m)
+  std::vector<double> delta;             ///< Newton correction (m)
+  std::vector<double> direction;         ///< along which a line is searched (m)
+  std::vector<double> values;            ///< of the sparse matrix
   std::vector<double> residual_history;  ///< test values of the last solve
+};
+
+/// Of the model's equations at one instant.
+struct Workspace : NewtonScratch {
+  explicit Workspace(const Model& model)
+      : NewtonScratch(model.unknowns, model.row_index.size()),
+        seeds(model.structural.size()),
+        solver(model.unknowns, model.column_start, model.row_index, model.couplings,
+               LinearSolver::kNewtonPivots) {}
+
+  std::vector<NodeSeeds> seeds;  ///< (structural nodes)
+  State start;                   ///< from which a search along a line tries its steps
+  LinearSolver solver;
   std::unique_ptr<TangentSolver>
       tangents;  ///< takes the place of `solver` when external codes give derivatives
 };

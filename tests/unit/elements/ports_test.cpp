@@ -52,8 +52,8 @@ INSTANTIATE_TEST_SUITE_P(WithAndWithoutRotations, Imposed, testing::Bool());
 
 constexpr double kStiffness = 900;
 
-std::string oscillator(const std::string& spring) {
-  const std::string settings = "method: ms, 0.6; tolerance: 1.e-10; max iterations: 20;";
+std::string oscillator(const std::string& spring, const std::string& method = "ms, 0.6") {
+  const std::string settings = "method: " + method + "; tolerance: 1.e-10; max iterations: 20;";
   return initial_value_block(1e-2, 10, settings) +
          "begin: control data; structural nodes: 2; rigid bodies: 1; joints: " +
          (spring.empty() ? "1" : "2") +
@@ -94,6 +94,49 @@ TEST(LoadTangents, TakeTheIterationsOfTheModelThatIsNotCut) {
     EXPECT_EQ(a.iterations, b.iterations) << "step " << k;
   }
   EXPECT_LT((uncut.node(2).x - cut.node(2).x).norm(), 1e-10);
+}
+
+/// The spring of the oscillator as an external code at each iterate, with or without its tangent.
+StepReport run_with_external_spring(const std::string& method, bool with_tangent, Vec3& end) {
+  DeckRun run(oscillator("", method));
+  Simulation& s = run.simulation();
+  LoadTangent tangent;
+  tangent.nodes = {run.model().find_structural(2)};
+  if (with_tangent) s.set_load_tangents({tangent});
+  const int x = s.find_variable("node.structural.2.X"),
+            load = s.find_variable("node.structural.2.load");
+  Vec3 applied = Vec3::Zero();
+  s.set_exchange([&](int) {
+    std::vector<double> v;
+    s.get(x, v);
+    const Vec3 d(v[0], v[1], v[2]);
+    const double l = d.norm();
+    const Vec3 e = d / l, f = -kStiffness * (l - 1) * e;
+    const bool settled = with_tangent || (f - applied).norm() < 1e-9;
+    applied = f;
+    EXPECT_TRUE(s.set(load, std::vector<double>{f(0), f(1), f(2), 0, 0, 0}));
+    if (!with_tangent) return settled;
+    s.load_tangent(0).stiffness = MatX::Zero(6, 6);
+    s.load_tangent(0).stiffness.topLeftCorner<3, 3>() =
+        -kStiffness * (e * e.transpose() + (1 - 1 / l) * (Mat3::Identity() - e * e.transpose()));
+    return true;
+  });
+  const StepReport report = s.step_many(50);
+  EXPECT_FALSE(report.error) << (report.error ? report.error->message : "");
+  end = run.node(2).x;
+  return report;
+}
+
+TEST(LoadTangents, ServeTheThirdOrderMethodToo) {
+  for (const std::string method : {"third order, .6", "third order, ad hoc"}) {
+    Vec3 with, without;
+    const StepReport fast = run_with_external_spring(method, true, with),
+                     slow = run_with_external_spring(method, false, without);
+    EXPECT_LT((with - without).norm(), 1e-9) << method;
+    EXPECT_GT((with - Vec3(1, 0, 0)).norm(), 1e-2) << method;
+    EXPECT_LE(fast.total_iterations, 3 * 50) << method;  // quadratic
+    EXPECT_GT(slow.total_iterations, 2 * fast.total_iterations) << method;
+  }
 }
 
 // ------------------------------------------------------------------ policies and time
