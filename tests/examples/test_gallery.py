@@ -1,0 +1,190 @@
+"""The gallery of client_examples/models: each deck against the source that its first lines name. Pictures go to the folder of MBCOSIM_PICTURES."""
+import math
+import os
+import pathlib
+import re
+import subprocess
+
+import numpy as np
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MODELS = ROOT / "client_examples" / "models"
+BINARY = os.path.join(os.environ["MBCOSIM_BIN"], "mbcosim")
+SECONDS = 60 * float(os.environ.get("MBCOSIM_TIME_FACTOR", 1))
+
+
+class Run:
+    """A deck run to its end: time (records,), and for each node the columns of `.mov` (records, 12): position [m], Euler angles [degrees],
+    velocity [m/s], angular velocity [rad/s]."""
+
+    def __init__(self, folder, deck, **changes):
+        text = (MODELS / f"{deck}.mbd").read_text()
+        for old, new in changes.items():
+            text, count = re.subn(rf"{old.replace('_', ' ')}: [^;]*;", f"{old.replace('_', ' ')}: {new};", text)
+            assert count == 1
+        source = folder / f"{deck}.mbd"
+        source.write_text(text)
+        self.prefix = folder / deck
+        subprocess.run([BINARY, "run", source, "-o", self.prefix, "-q"], check=True, timeout=SECONDS)
+        rows = np.loadtxt(f"{self.prefix}.mov", usecols=range(13))
+        self.nodes = {int(label): rows[rows[:, 0] == label, 1:] for label in np.unique(rows[:, 0])}
+        step = float(re.search(r"time step: ([^;]*);", text).group(1))
+        self.time = step * np.arange(len(next(iter(self.nodes.values()))))
+
+
+def draw(name, curves, x, y):
+    """A picture of curves {label: (abscissa, ordinate)}."""
+    folder = os.environ.get("MBCOSIM_PICTURES")
+    if not folder:
+        return
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    figure, axes = pyplot.subplots(figsize=(7, 4.2), layout="constrained")
+    for label, (a, b) in curves.items():
+        axes.plot(a, b, label=label, linewidth=1.4)
+    axes.set(xlabel=x, ylabel=y, title=name.replace("_", " "))
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False)
+    os.makedirs(folder, exist_ok=True)
+    figure.savefig(os.path.join(folder, f"{name}.png"), dpi=110)
+    pyplot.close(figure)
+
+
+def integrate(rate, state, seconds, steps):
+    """Classical Runge-Kutta method of order four; rows of states, the first one included."""
+    h, rows = seconds / steps, [np.array(state, float)]
+    for k in range(steps):
+        t, y = k * h, rows[-1]
+        k1 = rate(t, y)
+        k2 = rate(t + h / 2, y + h / 2 * k1)
+        k3 = rate(t + h / 2, y + h / 2 * k2)
+        rows.append(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(t + h, y + h * k3)))
+    return np.array(rows)
+
+
+def test_the_piston_of_the_slider_crank_follows_the_closed_form(tmp_path):
+    run = Run(tmp_path, "slider_crank")
+    angle = 2 * math.pi * run.time
+    exact = 0.1 * np.cos(angle) + np.sqrt(0.3**2 - 0.1**2 * np.sin(angle)**2)
+    piston = run.nodes[3][:, 0]
+    draw("slider_crank", {"piston": (run.time, piston), "middle of the rod": (run.time, run.nodes[2][:, 1])}, "time [s]", "position [m]")
+    assert np.ptp(piston) == pytest.approx(0.2, rel=1e-3)
+    np.testing.assert_allclose(piston, exact, atol=1e-6)  # six decimals are written
+
+
+# Test Set for IVP Solvers (Mazzia and Magherini), Andrews' squeezing mechanism, solution at 0.03 s: beta, Theta, gamma, Phi, delta,
+# Omega, epsilon.
+SQUEEZER = (15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948, 0.5244099658805304, 0.5347301163226948,
+            1.048080741042263)
+
+
+def squeezer_errors(folder, step):
+    run = Run(folder, "squeezer", time_step=step)
+    beta, theta, gamma, phi, delta, omega, epsilon = SQUEEZER
+    exact = np.array([beta, beta + theta, gamma, phi + delta, delta, omega + epsilon, epsilon])
+    angles = np.radians([run.nodes[k][-1, 5] for k in range(1, 8)])
+    assert run.time[-1] == pytest.approx(0.03)
+    return run, np.abs(np.angle(np.exp(1j * (angles - exact))))
+
+
+def test_the_squeezer_approaches_the_angles_of_the_test_set_with_order_two(tmp_path):
+    run, fine = squeezer_errors(tmp_path, "1.e-5")
+    _, coarse = squeezer_errors(tmp_path, "2.e-5")
+    time = run.time * 1e3
+    draw("squeezer", {f"body {k}": (time, np.unwrap(np.radians(run.nodes[k][:, 5]))) for k in (3, 5, 7)}, "time [ms]", "angle [rad]")
+    assert fine.max() < 1e-4  # rad, of a crank that has turned by 15.8
+    assert math.log2(coarse[0] / fine[0]) == pytest.approx(2, abs=0.1)
+
+
+def top_error(run):
+    """Largest distance of a point of the axis, at 1 m, from steady precession; and its path."""
+    roll, pitch = np.radians(run.nodes[1][:, 3]), np.radians(run.nodes[1][:, 4])
+    axis = np.array([np.sin(pitch), -np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch)])  # R e3 of Euler angles 1, 2, 3
+    phase, tilt = 2 * run.time, math.pi / 6
+    exact = np.array([math.sin(tilt) * np.cos(phase), math.sin(tilt) * np.sin(phase), np.full_like(phase, math.cos(tilt))])
+    return np.linalg.norm(axis - exact, axis=0).max(), axis
+
+
+def test_the_top_precesses_steadily(tmp_path):
+    error, axis = top_error(Run(tmp_path, "heavy_top"))
+    draw("heavy_top", {"axis, seen from above": (axis[0], axis[1])}, "x", "y")
+    assert error < 1e-5  # over four seconds, with 71 rad/s of spin
+
+
+def test_the_gyroscope_precesses_at_the_rate_of_the_fast_top(tmp_path):
+    run = Run(tmp_path, "gyroscope")
+    wheel = run.nodes[2]
+    angle = np.unwrap(np.arctan2(wheel[:, 1], wheel[:, 0]))
+    draw("gyroscope", {"path of the wheel": (angle, wheel[:, 2])}, "angle about the vertical [rad]", "height [m]")
+    torque, spin, across = 9.81 * 0.1, 0.004 * 300, 0.012
+    # The nutation (frequency C omega/A) averages out over whole periods.
+    period = 2 * math.pi * across / spin
+    whole = int(1 / period) * period
+    rate = np.interp(whole, run.time, angle) / whole
+    assert rate == pytest.approx(torque / spin, rel=2e-3)
+    depth = 2 * torque * across / spin**2 * 0.1  # 2 m g l A/(C omega)^2, as an angle, times l
+    assert wheel[:, 2].min() == pytest.approx(-depth, rel=0.02)
+
+
+def test_the_rotor_blade_flaps_at_the_published_frequencies(tmp_path):
+    run = Run(tmp_path, "rotor_blade")
+    text = pathlib.Path(f"{run.prefix}_0.m").read_text()
+    table = np.array([row.split() for row in re.search(r"alpha = \[\s*(.*?)\];", text, re.S).group(1).splitlines() if row.strip()], float)
+    coefficient = float(re.search(r"dCoef = (\S+);", text).group(1))
+    ratio = (table[:, 0] + 1j * table[:, 1]) / table[:, 2]
+    values = (ratio - 1) / (ratio + 1) / coefficient
+    frequencies = np.sort(values.imag[values.imag > 0])
+    draw("rotor_blade", {"tip, stretch": (run.time, run.nodes[25][:, 0] - 1)}, "time [s]", "displacement [m]")
+    assert np.min(np.abs(frequencies - 5.5850)) < 5e-4 * 5.585
+    assert np.min(np.abs(frequencies - 24.2733)) < 5e-4 * 24.2733
+
+
+def test_the_robot_arm_moves_as_the_textbook_says(tmp_path):
+    run = Run(tmp_path, "robot_arm")
+    l1, l2, m1, m2, g, kp, kd = 0.5, 0.4, 2., 1., 9.81, 400., 40.
+
+    def smooth(t):  # drive `step5`
+        s = min(max(t, 0.), 1.)
+        return s**3 * (10 + s * (6 * s - 15))
+
+    def rate(t, y):  # Craig, eq. 6.58
+        a, b, da, db = y
+        tau1 = kp * (smooth(t) * (math.pi / 6 + math.pi / 2) - (a + math.pi / 2)) - kd * da
+        tau2 = kp * (smooth(t) * math.pi / 3 - b) - kd * db
+        c2, s2 = math.cos(b), math.sin(b)
+        mass = np.array([[l2**2 * m2 + 2 * l1 * l2 * m2 * c2 + l1**2 * (m1 + m2), l2**2 * m2 + l1 * l2 * m2 * c2],
+                         [l2**2 * m2 + l1 * l2 * m2 * c2, l2**2 * m2]])
+        bias = np.array([-m2 * l1 * l2 * s2 * (db**2 + 2 * da * db) + m2 * l2 * g * math.cos(a + b) + (m1 + m2) * l1 * g * math.cos(a),
+                         m2 * l1 * l2 * s2 * da**2 + m2 * l2 * g * math.cos(a + b)])
+        return np.concatenate([y[2:], np.linalg.solve(mass, [tau1, tau2] - bias)])
+
+    exact = integrate(rate, [-math.pi / 2, 0, 0, 0], run.time[-1], 4 * (len(run.time) - 1))[::4]
+    upper, fore = np.radians(run.nodes[2][:, 5]), np.radians(run.nodes[3][:, 5])
+    draw("robot_arm", {"link 1": (run.time, upper), "link 2": (run.time, fore)}, "time [s]", "angle [rad]")
+    assert np.ptp(upper) > 2
+    np.testing.assert_allclose(upper, exact[:, 0], atol=2e-5)
+    np.testing.assert_allclose(fore, exact[:, 0] + exact[:, 1], atol=2e-5)
+
+
+def test_the_landing_gear_drops_as_its_equations_say(tmp_path):
+    run = Run(tmp_path, "landing_gear")
+    airframe, wheel, g, length, stroke, pressure, area, hole = 1000., 50., 9.81, 1., 0.3, 6e5, 5e-3, 3e-4
+
+    def rate(_, y):
+        body, hub, v_body, v_hub = y
+        compression, speed = hub + length - body, v_hub - v_body
+        strut = pressure * area * (1 - compression / stroke)**-1.3
+        strut += 0.5 * 870. * area * (area / (hole * 0.65))**2 * speed * abs(speed)
+        if compression < 0:  # on its stop
+            strut += 2e6 * compression + min(0., 2e4 * speed)
+        tyre = max(0., 4e5 * (1 - hub))
+        return np.array([v_body, v_hub, strut / airframe, (tyre - strut) / wheel - g])
+
+    exact = integrate(rate, [2, 1, -3, -3], run.time[-1], 20 * (len(run.time) - 1))[::20]
+    body, hub = run.nodes[1][:, 2], run.nodes[2][:, 2]
+    draw("landing_gear", {"airframe": (run.time, body), "wheel": (run.time, hub)}, "time [s]", "height [m]")
+    assert body.min() < 1.75  # the strut has given way by 0.2 m or more
+    np.testing.assert_allclose(body, exact[:, 0], atol=1e-3)
+    np.testing.assert_allclose(hub, exact[:, 1], atol=1e-3)
