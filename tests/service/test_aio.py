@@ -91,7 +91,7 @@ def test_failures(daemon):
         async with await simulation.couple("spring", gust):
             with pytest.raises(mbcosim.StepFailed, match="no aerodynamics today"):
                 await simulation.step()
-        wrong = await simulation.couple("spring", lambda motion: [1.0, 2.0], timeout=5)
+        wrong = await simulation.couple("spring", lambda motion: [1.0, 2.0], peer_timeout=5)
         with pytest.raises(mbcosim.StepFailed):
             await simulation.step()
         for _ in range(200):

@@ -165,7 +165,7 @@ def test_a_late_peer_is_given_up_within_its_bound(server):
         time.sleep(3)
         return spring(motion)
 
-    with oscillator(server) as simulation, simulation.couple("spring", slow, timeout=0.3):
+    with oscillator(server) as simulation, simulation.couple("spring", slow, peer_timeout=0.3):
         start = time.monotonic()
         with pytest.raises(mbcosim.StepFailed, match="in time"):
             simulation.step()
@@ -201,7 +201,7 @@ def test_every_mismatch_is_told_at_once(server):
 
 
 def test_an_answer_of_the_wrong_length_ends_the_stream(server):
-    with oscillator(server) as simulation, simulation.couple("spring", lambda motion: [[1.0, 2.0]], timeout=5) as peer:
+    with oscillator(server) as simulation, simulation.couple("spring", lambda motion: [[1.0, 2.0]], peer_timeout=5) as peer:
         with pytest.raises(mbcosim.StepFailed):
             simulation.step()
         wait_for(lambda: peer.error)

@@ -33,7 +33,7 @@ def answer(motion):
             os._exit(0)
         time.sleep(60)
     return [[1.0, 0.0, 0.0]]
-peer = simulation.couple("spring", answer, timeout=0.5, mode=sys.argv[5], server_timeout=30)
+peer = simulation.couple("spring", answer, peer_timeout=0.5, mode=sys.argv[5], server_timeout=30)
 print("attached", flush=True)
 for line in sys.stdin:
     if line.strip() == "close":
@@ -122,7 +122,7 @@ def test_peer(server, daemon, processes, hole, blow, when):
 @pytest.mark.parametrize("blow", BLOWS)
 def test_client(server, daemon, processes, hole, blow, when):
     with oscillator(server) as simulation:
-        with simulation.couple("spring", lambda m: time.sleep(0.005) or spring(m), mode=MODES[when], timeout=10):
+        with simulation.couple("spring", lambda m: time.sleep(0.005) or spring(m), mode=MODES[when], peer_timeout=10):
             client = processes(CLIENT, hole.address, simulation.name, "wait" if when == "idle" else "step")
             if when != "idle":
                 wait_for(lambda: simulation.refresh().step > 2, 30)
@@ -158,7 +158,7 @@ def test_daemon(tmp_path_factory, tmp_path, blow, when):
     simulation = oscillator(server)
     simulation._owned = False
     request = pb.StepRequest(simulation=simulation.name, steps=2 if when == "idle" else 10)
-    peer = simulation.couple("spring", answer, mode=MODES[when], timeout=20)
+    peer = simulation.couple("spring", answer, mode=MODES[when], peer_timeout=20)
     client = threading.Thread(target=step)
     client.start()
     if when == "idle":
@@ -208,7 +208,7 @@ def test_heartbeats_come_whatever_a_step_does(server):
     from mbcosim import exchange
     from mbcosim.coupling import open_stream
     with oscillator(server) as simulation:
-        hello = exchange.hello(simulation, "spring", heartbeat_interval=0.02, timeout=5)
+        hello = exchange.hello(simulation, "spring", heartbeat_interval=0.02, peer_timeout=5)
         done = threading.Event()
 
         def messages():

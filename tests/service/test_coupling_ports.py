@@ -157,7 +157,7 @@ def test_ports_that_do_not_fit_are_refused(server, port, match):
     (lambda m: [[0, 0, 0]], "`rotations` must have 9"), (lambda m: mbcosim.Loads(positions=[0, 0, 0], rotations=np.eye(3), forces=[1, 2, 3]), "only")])
 def test_wrong_motion_is_refused(server, answer, match):
     with server.load_text(decks.body(), ports=[mbcosim.motion_port("m", nodes=[1])]) as simulation:
-        with simulation.couple("m", answer, timeout=5) as peer:
+        with simulation.couple("m", answer, peer_timeout=5) as peer:
             with pytest.raises(mbcosim.StepFailed):
                 simulation.step()
             wait_for(lambda: peer.error)

@@ -235,7 +235,7 @@ def answer(motion):
     if count == int(sys.argv[3]):
         time.sleep(60)
     return [[1.0, 0.0, 0.0]]
-with simulation.couple("spring", answer, timeout=0.5):
+with simulation.couple("spring", answer, peer_timeout=0.5):
     print("attached", flush=True)
     time.sleep(60)
 """
@@ -322,7 +322,7 @@ def test_when_the_daemon_ends_peer_and_client_are_told(tmp_path_factory, blow, w
     with daemon.connect() as server:
         simulation = oscillator(server)
         simulation._owned = False  # nobody is left to delete it
-        peer = simulation.couple("spring", answer, timeout=20)
+        peer = simulation.couple("spring", answer, peer_timeout=20)
         client = threading.Thread(target=step)
         client.start()
         if when == "idle":

@@ -159,7 +159,7 @@ def test_choices_that_do_not_fit_are_refused_at_once(server, options, what):
 def test_a_wrong_tangent_ends_the_stream(server, tangent, given, match):
     with server.load_text(cut(), ports=PORTS) as simulation:
         answer = lambda m: mbcosim.Loads(forces=np.zeros((2, 3)), stiffness=given)
-        with simulation.couple("rod", answer, mode="tight", tangent=tangent, timeout=2) as peer:
+        with simulation.couple("rod", answer, mode="tight", tangent=tangent, peer_timeout=2) as peer:
             with pytest.raises(mbcosim.StepFailed):
                 simulation.step()
             wait_for(lambda: peer.error)

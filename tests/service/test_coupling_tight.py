@@ -90,7 +90,7 @@ def test_a_peer_may_be_another_simulation_of_a_daemon_with_one_worker(start_daem
                 other.step()
             return spring(motion)
 
-        with simulation.couple("spring", answer, mode="tight", timeout=5):
+        with simulation.couple("spring", answer, mode="tight", peer_timeout=5):
             other_peer = other.couple("spring", lambda motion: np.zeros((1, 3)))
             assert simulation.step(10).step == 10 and other.step_number == 10
             other_peer.close()

@@ -98,7 +98,7 @@ def test_a_reference_node_takes_the_total_load(server):
 
 def test_missing_reference_loads_are_told(server):
     with server.load_text(external('grpc, port, "p", reference node, 2, 1, 1')) as simulation:
-        with simulation.couple("p", lambda motion: [[1.0, 0, 0]], timeout=5) as peer:
+        with simulation.couple("p", lambda motion: [[1.0, 0, 0]], peer_timeout=5) as peer:
             with pytest.raises(mbcosim.StepFailed):
                 simulation.step()
             wait_for(lambda: peer.error)
@@ -108,7 +108,7 @@ def test_missing_reference_loads_are_told(server):
 def test_without_a_peer_the_step_fails(server):
     text = external('grpc, port, "p", 1, 1')
     with server.load_text(text) as simulation:
-        with simulation.couple("p", spring, timeout=0.2):
+        with simulation.couple("p", spring, peer_timeout=0.2):
             simulation.step()
         wait_for(lambda: not simulation.describe().ports[0].has_peer)
         with pytest.raises(mbcosim.StepFailed, match='port "p": the peer is gone'):

@@ -6,15 +6,16 @@
         simulation.run_until(1.0)
         print(simulation.time, simulation["node.structural.1.X"])
 """
+from .calls import StepResult
 from .client import Server, connect, default_address
 from .coupling import Peer, modal_port, motion_port, signal_port, structural_port
 from .errors import (DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
-                     StepFailed, Unavailable)
+                     StepFailed, TimedOut, Unavailable)
 from .exchange import Loads, Motion
-from .simulation import Simulation, Snapshot, StepResult, Stepper, Subscription
+from .simulation import Simulation, Snapshot, Stepper, Subscription
 
 __all__ = [
     "connect", "default_address", "Server", "Simulation", "Snapshot", "StepResult", "Stepper", "Subscription", "Motion", "Loads",
     "Peer", "modal_port", "motion_port",
-    "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound", "PreconditionFailed", "StepFailed", "Unavailable",
+    "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound", "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable",
 ]

@@ -13,125 +13,248 @@
 import asyncio
 import contextlib
 import inspect
-import uuid
+import time
 
 import grpc
+import numpy as np
 
-from mbcosim.v1 import simulations_pb2 as pb, simulations_pb2_grpc
+from mbcosim.v1 import coupling_pb2, simulations_pb2 as pb
 
-from . import bundle, exchange, simulation as blocking
+from . import exchange
+from .calls import ServerCalls, SimulationCalls, SnapshotCalls
 from .client import default_address
 from .coupling import open_stream
-from .errors import from_rpc_error, translated
+from .errors import PreconditionFailed, TimedOut, Unavailable, from_rpc_error, translated
+from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Retries, Stubs, metadata, parting, runs_calls
+from .simulation import subscribe_request
 
 
 @contextlib.asynccontextmanager
-async def connect(address=None, *, token=None, credentials=None, timeout=10.0):
-    """A connection; waits until the server answers, at most `timeout` seconds."""
-    options = [("grpc.max_receive_message_length", -1)]
-    address = address or default_address()
-    channel = (grpc.aio.secure_channel(address, credentials, options) if credentials
-               else grpc.aio.insecure_channel(address, options))
-    async with channel:
-        server = Server(channel, token)
+async def connect(address=None, *, token=None, credentials=None, timeout=10.0, reconnect=0.0):
+    """A connection; waits until the server answers, at most `timeout` seconds. See mbcosim.connect."""
+    server = Server(address or default_address(), token, credentials, reconnect)
+    try:
         with translated():
-            await server.simulations.GetServerInfo(pb.GetServerInfoRequest(), metadata=server.metadata, timeout=timeout,
-                                                   wait_for_ready=True)
+            await server._connection.stubs.simulations.GetServerInfo(
+                pb.GetServerInfoRequest(), metadata=server.metadata, timeout=timeout, wait_for_ready=True)
         yield server
+    finally:
+        await server.close()
 
 
-class Server:
-    """A connection; made by `connect`."""
+class Connection:
+    """A channel whose calls are awaited."""
 
-    def __init__(self, channel, token):
-        self._channel = channel
-        self.metadata = [("authorization", f"Bearer {token}")] if token else []
-        self.simulations = simulations_pb2_grpc.SimulationsStub(channel)
+    def __init__(self, channel, token, reconnect):
+        self.channel, self.metadata, self.reconnect = channel, metadata(token), reconnect
+        self.stubs = Stubs(channel)
 
-    async def load(self, deck, **options):
-        """Creates a simulation from a deck on this machine and the files that it names."""
-        return await self._create(*bundle.collect(deck), **options)
+    async def run(self, calls):
+        """Makes the calls of a generator one after the other; its result."""
+        reply = None
+        try:
+            while True:
+                reply = await self.perform(calls.send(reply))
+        except StopIteration as end:
+            return end.value
 
-    async def load_text(self, text, **options):
-        """Creates a simulation from a deck given as text."""
-        return await self._create("deck", {"deck": text.encode()}, **options)
+    async def perform(self, call):
+        retries = Retries(call, self.reconnect)
+        while True:
+            try:
+                with translated():
+                    return await self._once(call)
+            except Unavailable as error:
+                pause, left = retries.again(error)
+                await asyncio.sleep(pause)
+                with contextlib.suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(self.channel.channel_ready(), left)
+                    continue
+                raise
 
-    async def _create(self, main, files, *, name="", lease=None, ports=()):
-        header = pb.UploadHeader(bundle_main_file=main)
-        header.options.request_id = uuid.uuid4().hex
-        header.options.display_name = name
-        header.options.ports.extend(ports)
-        if lease is not None:
-            header.options.lease.FromMilliseconds(int(lease * 1000))
-        with translated():
-            reply = await self.simulations.CreateSimulation(bundle.requests(header, files), metadata=self.metadata)
-            description = await self.simulations.DescribeSimulation(
-                pb.DescribeSimulationRequest(name=reply.simulation.name), metadata=self.metadata)
-        return Simulation(self, reply, description)
+    async def _once(self, call):
+        answer = self.stubs.method(call.method)(call.request, metadata=self.metadata, timeout=call.timeout)
+        if call.each is None:
+            return await answer
+        async for message in answer:
+            taken = call.each(message)
+            if inspect.isawaitable(taken):
+                await taken
+        return None
 
 
-class Simulation:
-    """A simulation; `async with` deletes it at the end."""
+def awaited(function):
+    """The generator `function` as a coroutine function."""
+    async def method(self, *arguments, **options):
+        return await self._connection.run(function(self, *arguments, **options))
+    return method
 
-    def __init__(self, server, reply, description):
-        self._server, self._stub = server, server.simulations
-        # Packs, splits and checks replies; makes no calls once it knows the variables.
-        self._local = blocking.Simulation(server, reply.simulation, list(reply.diagnostics), reply.printed)
-        self._local._variables = {v.name: v for v in description.variables}
-        self.name, self.info, self.description = reply.simulation.name, reply.simulation, description
+
+async def _bounded(seconds, awaitable, cancel, what):
+    """What `awaitable` gives; after `seconds` (None: never) `cancel` is called and TimedOut raised."""
+    try:
+        return await asyncio.wait_for(awaitable, seconds)
+    except asyncio.TimeoutError:
+        cancel()
+        raise TimedOut(f"{what} took longer than {seconds} s", grpc.StatusCode.DEADLINE_EXCEEDED) from None
+
+
+@runs_calls(awaited)
+class Snapshot(SnapshotCalls):
+    """A saved state of a simulation."""
+
+
+@runs_calls(awaited)
+class Simulation(SimulationCalls):
+    """A simulation; `async with` deletes it at the end (unless it was attached)."""
+    _snapshot_class = Snapshot
 
     async def __aenter__(self):
         return self
 
     async def __aexit__(self, *_):
-        await self.delete()
-
-    async def _call(self, method, request):
-        with translated():
-            return await method(request, metadata=self._server.metadata)
+        if self._owned:
+            with parting():
+                await self.delete(timeout=PARTING)
 
     @property
-    def step_number(self):
-        """Number of the last accepted step."""
-        return self._local.step_number
+    def variables(self):
+        """`mbcosim.v1.Variable` by name, once `describe` was called."""
+        if self._description is None:
+            raise PreconditionFailed("the variables are not known yet: await Simulation.describe() first")
+        return self._known
 
-    @property
-    def time(self):
-        """Time of the last accepted step [s]."""
-        return self._local.time
-
-    async def step(self, count=1, *, inputs=None, outputs=()):
-        """Takes `count` steps. Raises StepFailed when one does not converge."""
-        return await self._advance(pb.StepRequest(steps=count), inputs, outputs)
-
-    async def run_until(self, time, *, inputs=None, outputs=()):
-        """Steps until `time` [s] or the deck's end."""
-        return await self._advance(pb.StepRequest(until_time_s=time), inputs, outputs)
-
-    async def _advance(self, request, inputs, outputs):
-        self._local._fill(request, inputs, outputs)
-        request.request_id = uuid.uuid4().hex
-        return self._local.result(await self._call(self._stub.Step, request), outputs)
-
-    async def read(self, names):
-        """Values at the last accepted step, by name."""
-        request = pb.ReadVariablesRequest(simulation=self.name, handles=self._local.handles(names))
-        return self._local.split(names, (await self._call(self._stub.ReadVariables, request)).values)
-
-    async def write(self, values):
-        """Sets inputs, by name."""
-        await self._call(self._stub.WriteVariables,
-                         pb.WriteVariablesRequest(simulation=self.name, values=self._local.pack(values)))
-
-    async def delete(self):
-        """Ends the simulation."""
-        await self._call(self._stub.DeleteSimulation, pb.DeleteSimulationRequest(name=self.name))
+    async def stepper(self, outputs=(), inputs=(), *, timeout=USUAL):
+        """An open stream for stepping with the least delay; see Stepper."""
+        handles = await self.handles([*outputs, *inputs], timeout=timeout)
+        return Stepper(self, list(outputs), handles[:len(outputs)], handles[len(outputs):])
 
     async def couple(self, port, answer=None, **options):
         """Attaches a peer to a port. `answer` may be a coroutine function; for the options see coupling.Peer."""
-        peer = Peer(self, answer, options.get("rotation", "matrix"))
-        await peer._attach(exchange.hello(self, port, **options))
+        timeout = options.pop("timeout", USUAL)
+        peer = Peer(self, answer, options.get("rotation", "matrix"), options.get("heartbeat_timeout"),
+                    options.pop("server_timeout", None))
+        await peer._attach(exchange.hello(self, port, heartbeat_interval=peer._heartbeat_interval, **options), timeout)
         return peer
+
+    async def subscribe(self, names, *, every=1, policy="drop_oldest", buffer=1024, timeout=USUAL):
+        """Samples of variables every so many steps, whoever advances; see Subscription."""
+        names = list(names)
+        request = subscribe_request(self, await self.handles(names, timeout=timeout), every, policy, buffer)
+        subscription = Subscription(self, names, request)
+        with translated():
+            await _bounded(timeout, subscription._stream.read(), subscription.close, "the subscription")
+        return subscription
+
+
+@runs_calls(awaited)
+class Server(ServerCalls):
+    """A connection; made by `connect`."""
+    _simulation_class = Simulation
+
+    def __init__(self, address, token, credentials, reconnect):
+        channel = (grpc.aio.secure_channel(address, credentials, CHANNEL_OPTIONS) if credentials
+                   else grpc.aio.insecure_channel(address, CHANNEL_OPTIONS))
+        self.address = address
+        self._connection = Connection(channel, token, reconnect)
+        self.metadata = self._connection.metadata
+
+    async def close(self):
+        """Closes the connection. Simulations on the server live on for their lease."""
+        await self._connection.channel.close()
+
+
+class Stepper:
+    """Steps on one open stream: one message each way per step.
+
+        async with await simulation.stepper(outputs=["node.structural.1.X"]) as stepper:
+            x = (await stepper.step()).values["node.structural.1.X"]
+    """
+
+    def __init__(self, simulation, outputs, output_handles, input_handles):
+        self._simulation, self._outputs = simulation, outputs
+        self._request = pb.StepRequest(simulation=simulation.name, outputs=output_handles)
+        self._request.inputs.handles.extend(input_handles)
+        connection = simulation._connection
+        self._stream = connection.stubs.simulations.StepStream(metadata=connection.metadata)
+
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *_):
+        await self.close()
+
+    async def step(self, values=None, count=1, *, timeout=None):
+        """Takes `count` steps; `values`: numbers of the stepper's inputs, one variable after the other. After a timeout the stream is
+        over."""
+        request = pb.StepRequest()
+        request.CopyFrom(self._request)
+        request.steps = count
+        if request.inputs.handles:
+            request.inputs.values.extend(np.ravel(np.asarray(values, float)))
+        with translated():
+            reply = await _bounded(timeout, self._exchange(request), self._stream.cancel, "the step")
+        return self._simulation.result(reply, self._outputs)
+
+    async def _exchange(self, request):
+        try:
+            await self._stream.write(request)
+            reply = await self._stream.read()
+        except asyncio.InvalidStateError:  # the stream has ended
+            reply = grpc.aio.EOF
+        if reply is grpc.aio.EOF:
+            raise await _status(self._stream)
+        return reply
+
+    async def close(self, *, timeout=PARTING):
+        """Ends the stream."""
+        if self._stream.done():
+            return
+        with parting():
+            await self._stream.done_writing()
+            await _bounded(timeout, self._stream.code(), self._stream.cancel, "the end of the stream")
+
+
+class Subscription:
+    """Samples as they come: `async for` over (step, time, values by name). Close it, or use it with `async with`.
+
+    `dropped` counts the samples that the server dropped because they were not read in time.
+    """
+
+    def __init__(self, simulation, names, request):
+        self._simulation, self._names, self.dropped = simulation, names, 0
+        connection = simulation._connection
+        self._stream = connection.stubs.telemetry.Subscribe(request, metadata=connection.metadata)
+
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *_):
+        self.close()
+
+    async def __aiter__(self):
+        try:
+            while True:
+                with translated():
+                    batch = await self._stream.read()
+                if batch is grpc.aio.EOF:
+                    return
+                self.dropped = batch.total_dropped
+                for sample in batch.samples:
+                    yield sample.step, sample.time_s, self._simulation.split(self._names, sample.values)
+        except asyncio.CancelledError:
+            if not self._stream.cancelled():
+                raise
+
+    def close(self):
+        """Ends the subscription."""
+        self._stream.cancel()
+
+
+async def _status(stream):
+    """How a stream ended, as an exception of grpc."""
+    code, details = await stream.code(), await stream.details()
+    return grpc.aio.AioRpcError(code, await stream.initial_metadata(), await stream.trailing_metadata(), details)
 
 
 class Peer(exchange.Course):
@@ -141,29 +264,32 @@ class Peer(exchange.Course):
             await peer.answer(-100.0 * motion.x)
     """
 
-    def __init__(self, simulation, answer, rotation):
+    def __init__(self, simulation, answer, rotation, heartbeat_timeout, server_timeout):
         super().__init__(rotation)
-        self._server, self._function, self._task = simulation._server, answer, None
+        self._connection, self._function, self._task, self._heart = simulation._connection, answer, None, None
+        self._beats, self._silence = heartbeat_timeout, server_timeout
+        self._heartbeat_interval = None if server_timeout is None else server_timeout / 3
+        self._waiting_since = None
+        self._writing = asyncio.Lock()
 
-    async def _attach(self, hello):
-        self._stream = open_stream(self._server._channel)(metadata=self._server.metadata)
+    async def _attach(self, hello, timeout):
+        self._stream = open_stream(self._connection.channel)(metadata=self._connection.metadata)
+        self.welcome = await _bounded(timeout, self._shake_hands(hello), self._stream.cancel, "attaching the peer")
+        loop = asyncio.get_running_loop()
+        if self._beats is not None or self._silence is not None:
+            self._heart = loop.create_task(self._beat())
+        if self._function is not None:
+            self._task = loop.create_task(self._serve())
+
+    async def _shake_hands(self, hello):
         try:
             await self._stream.write(hello)
             data = await self._stream.read()
-            if data is grpc.aio.EOF:
-                await self._raise_status()
-            self.welcome = exchange.receive(data)[1]
+            if data is not grpc.aio.EOF:
+                return exchange.receive(data)[1]
         except (grpc.RpcError, asyncio.InvalidStateError):
-            await self._raise_status()
-        if self._function is not None:
-            self._task = asyncio.get_running_loop().create_task(self._serve())
-
-    async def _raise_status(self):
-        raise from_rpc_error(await self._status()) from None
-
-    async def _status(self):
-        code, details = await self._stream.code(), await self._stream.details()
-        return grpc.aio.AioRpcError(code, await self._stream.initial_metadata(), await self._stream.trailing_metadata(), details)
+            pass
+        raise from_rpc_error(await _status(self._stream)) from None
 
     async def __aenter__(self):
         return self
@@ -173,35 +299,62 @@ class Peer(exchange.Course):
 
     async def close(self):
         """Leaves the port."""
+        if self._heart is not None:
+            self._heart.cancel()
         if not self._stream.done():
-            await self._stream.done_writing()
+            with contextlib.suppress(asyncio.TimeoutError, asyncio.InvalidStateError):
+                await asyncio.wait_for(self._stream.done_writing(), PARTING / 2)
             self._stream.cancel()
         if self._task is not None:
-            await asyncio.wait([self._task], timeout=5)
+            await asyncio.wait([self._task], timeout=PARTING / 2)
 
     async def __aiter__(self):
         """Every Motion until the stream ends."""
         while True:
+            self._waiting_since = time.monotonic()
             try:
                 data = await self._stream.read()
             except (grpc.RpcError, asyncio.CancelledError):
                 data = grpc.aio.EOF
+            self._waiting_since = None
             if data is grpc.aio.EOF:
                 break
             motion = self._take(data)
             if motion is not None:
                 yield motion
-        status = await self._status()
+        status = await _status(self._stream)
         if status.code() not in (grpc.StatusCode.OK, grpc.StatusCode.CANCELLED):
-            self.error = from_rpc_error(status)
+            self.error = self.error or from_rpc_error(status)
 
     async def answer(self, value):
         """Answers the last motion."""
-        await self._stream.write(self._answer(value))
+        await self._write(self._answer(value))
 
     async def fail(self, error):
         """The peer cannot answer the last motion; the step fails with this text."""
-        await self._stream.write(self._failure(error))
+        await self._write(self._failure(error))
+
+    async def _write(self, message):
+        async with self._writing:  # the heart writes, too
+            await self._stream.write(message)
+
+    async def _beat(self):
+        """Sends signs of life, and looks for those of the server."""
+        count = 0
+        while not self._stream.done():
+            await asyncio.sleep(min(t for t in (self._beats, self._silence) if t is not None) / 3)
+            since = self._waiting_since
+            if self._silence is not None and since is not None and time.monotonic() - since > self._silence:
+                self.error = Unavailable(f"the server was silent for {self._silence} s", grpc.StatusCode.UNAVAILABLE)
+                self._stream.cancel()
+                return
+            if self._beats is None:
+                continue
+            count += 1
+            try:
+                await self._write(coupling_pb2.PeerMessage(heartbeat=coupling_pb2.Heartbeat(count=count)))
+            except (grpc.RpcError, asyncio.InvalidStateError):
+                return
 
     async def _serve(self):
         async for motion in self:
@@ -210,4 +363,4 @@ class Peer(exchange.Course):
                 message = self._answer(await value if inspect.isawaitable(value) else value)
             except Exception as error:  # whatever the user's code raises becomes a failed step with this text
                 message = self._failure(error)
-            await self._stream.write(message)
+            await self._write(message)

@@ -17,7 +17,8 @@ import numpy as np
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
 from . import exchange
-from .errors import Unavailable, from_rpc_error
+from .errors import Unavailable, from_rpc_error, translated
+from .rpc import PARTING, USUAL, bounded
 
 
 def structural_port(name, nodes, *, offsets=None, reference=None):
@@ -65,24 +66,25 @@ class Peer(exchange.Course):
     mode       "loose", "staggered", "tight" or "window"; None: the port's own, "loose" unless its deck says otherwise
     frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
     tangent    "dense" or "block_diagonal" when answers are Loads with derivatives
+    peer_timeout        the server waits so long for an answer [s]
     server_timeout      the server gives signs of life; when none comes for so long [s], the peer ends with an error
     heartbeat_timeout   the peer shows signs of life at least that often [s], also while it computes; the library sends them
+    timeout             seconds that attaching may take
     After the end `error` has what ended the stream, None when it ended in good order.
     """
 
-    def __init__(self, simulation, port, answer=None, *, rotation="matrix", heartbeat_timeout=None, server_timeout=None, **options):
+    def __init__(self, simulation, port, answer=None, *, rotation="matrix", heartbeat_timeout=None, server_timeout=None, timeout=USUAL,
+                 **options):
         super().__init__(rotation)
         self._function = answer
         self._out = queue.SimpleQueue()
         self._out.put(exchange.hello(
             simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout,
             heartbeat_interval=None if server_timeout is None else server_timeout / 3, **options))
-        server = simulation._server
-        self._stream = open_stream(server._channel)(iter(self._out.get, None), metadata=server.metadata)
-        try:
+        connection = simulation._connection
+        self._stream = open_stream(connection.channel)(iter(self._out.get, None), metadata=connection.metadata)
+        with bounded(timeout, self._stream.cancel, "attaching the peer"), translated():
             self.welcome = exchange.receive(next(self._stream))[1]
-        except grpc.RpcError as error:
-            raise from_rpc_error(error) from None
         self._closing = threading.Event()
         self._waiting_since = None
         if heartbeat_timeout is not None or server_timeout is not None:
@@ -102,7 +104,7 @@ class Peer(exchange.Course):
         self._closing.set()
         self._out.put(None)
         if self._function is not None:
-            self._thread.join(5)
+            self._thread.join(PARTING)
         self._stream.cancel()
 
     def __iter__(self):

@@ -52,6 +52,10 @@ class Unavailable(Error):
     """The server cannot be reached or is shutting down."""
 
 
+class TimedOut(Unavailable):
+    """A call took longer than its `timeout`. What it asked for may have happened, or happen yet."""
+
+
 class StepFailed(Error):
     """A step failed; the simulation stands at its last accepted step.
 
@@ -68,8 +72,14 @@ _CLASSES = {
     grpc.StatusCode.UNAUTHENTICATED: NotAllowed,
     grpc.StatusCode.PERMISSION_DENIED: NotAllowed,
     grpc.StatusCode.UNAVAILABLE: Unavailable,
+    grpc.StatusCode.DEADLINE_EXCEEDED: TimedOut,
     grpc.StatusCode.ABORTED: StepFailed,
 }
+
+
+def enum_name(kind, value, prefix):
+    """Name of a value without its prefix; one that this client does not know: "UNKNOWN_17"."""
+    return kind.Name(value)[len(prefix):] if value in kind.values() else f"UNKNOWN_{value}"
 
 
 def diagnostic_text(diagnostic):

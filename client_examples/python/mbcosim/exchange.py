@@ -45,7 +45,7 @@ class Loads:
 
 
 def hello(simulation, port, *, mode=None, rotation="matrix", frame=None, accelerations=False, every=1, hold="zero_order",
-          timeout=10.0, policy="fail_step", acceleration="none", relaxation=0.5, tolerance=1e-6, maximum_passes=50,
+          peer_timeout=10.0, policy="fail_step", acceleration="none", relaxation=0.5, tolerance=1e-6, maximum_passes=50,
           check_model=True, tangent="none", heartbeat_interval=None, heartbeat_timeout=None):
     """First message of a peer."""
     message = pb.Hello(
@@ -58,7 +58,7 @@ def hello(simulation, port, *, mode=None, rotation="matrix", frame=None, acceler
         model_digest=simulation.info.model_digest if check_model else "",
         tangent=_enum(pb.TangentForm, "TANGENT_FORM_", tangent))
     message.protocol.lowest = message.protocol.highest = 1
-    message.peer_timeout.FromMilliseconds(int(timeout * 1000))
+    message.peer_timeout.FromMilliseconds(int(peer_timeout * 1000))
     for field, seconds in ((message.heartbeat_interval, heartbeat_interval), (message.heartbeat_timeout, heartbeat_timeout)):
         if seconds is not None:
             field.FromMilliseconds(int(seconds * 1000))

@@ -1,0 +1,197 @@
+"""No public call waits without a bound, and both Python clients have the same calls."""
+import asyncio
+import inspect
+import os
+import signal
+import threading
+import time
+
+import grpc
+import pytest
+
+import decks
+import mbcosim
+import mbcosim.aio
+from conftest import TIME_FACTOR
+from mbcosim.v1 import simulations_pb2 as pb
+from relay import BlackHole
+from test_coupling import PORT, spring
+
+X = "node.structural.1.X"
+SILENT = 25.0  # seconds after which a silent server must have been noticed
+
+PAIRS = [(getattr(mbcosim, name), getattr(mbcosim.aio, name))
+         for name in ("Server", "Simulation", "Snapshot", "Stepper", "Subscription", "Peer")]
+
+
+def public(cls):
+    return {name for name in dir(cls) if not name.startswith("_")}
+
+
+@pytest.mark.parametrize("blocking, awaited", PAIRS, ids=lambda c: c.__module__)
+def test_both_clients_have_the_same_public_names(blocking, awaited):
+    assert public(blocking) == public(awaited)
+
+
+@pytest.mark.parametrize("module", [mbcosim, mbcosim.aio], ids=lambda m: m.__name__)
+def test_every_call_takes_a_timeout(module):
+    plain = {"Server": {"close"}, "Simulation": {"split", "pack", "result", "variables"}, "Snapshot": set()}
+    for name, exempt in plain.items():
+        cls = getattr(module, name)
+        for method in public(cls) - exempt:
+            parameters = inspect.signature(getattr(cls, method)).parameters
+            assert "timeout" in parameters or "options" in parameters, f"{name}.{method}"
+
+
+CALLS = {
+    "read": lambda s: s.read([X], timeout=0.3),
+    "write": lambda s: s.write({"node.structural.1.load": [0, 0, 1, 0, 0, 0]}, timeout=0.3),
+    "step": lambda s: s.step(timeout=0.3),
+    "run_until": lambda s: s.run_until(1.0, timeout=0.3),
+    "run with progress": lambda s: s.run_until(1.0, progress=print, timeout=0.3),
+    "interrupt": lambda s: s.interrupt(timeout=0.3),
+    "describe": lambda s: s.describe(timeout=0.3),
+    "snapshot": lambda s: s.snapshot(timeout=0.3),
+    "snapshots": lambda s: s.snapshots(timeout=0.3),
+    "export_state": lambda s: s.export_state(timeout=0.3),
+    "import_state": lambda s: s.import_state(b"x" * (3 << 20), timeout=0.3),
+    "fork": lambda s: s.fork(timeout=0.3),
+    "eigenvalues": lambda s: s.eigenvalues(timeout=0.3),
+    "linearize": lambda s: s.linearize(timeout=0.3),
+    "linearize_descriptor": lambda s: s.linearize_descriptor(timeout=0.3),
+    "refresh": lambda s: s.refresh(timeout=0.3),
+    "update": lambda s: s.update(name="x", timeout=0.3),
+    "record": lambda s: s.record(timeout=0.3),
+    "delete": lambda s: s.delete(timeout=0.3),
+    "couple": lambda s: s.couple("spring", spring, timeout=0.3),
+    "subscribe": lambda s: s.subscribe([X], timeout=0.3),
+}
+SERVER_CALLS = {
+    "info": lambda s: s.info(timeout=0.3),
+    "load": lambda s: s.load_text(decks.body(), timeout=0.3),
+    "list": lambda s: s.list(timeout=0.3),
+    "attach": lambda s: s.attach("simulations/x", timeout=0.3),
+}
+
+
+@pytest.fixture(params=["stopped", "black hole"])
+def falls_silent(request, tmp_path, start_daemon):
+    """(address, function after which the server says nothing any more)"""
+    daemon = start_daemon()
+    if request.param == "stopped":
+        yield daemon.address, lambda: os.kill(daemon.process.pid, signal.SIGSTOP)
+        os.kill(daemon.process.pid, signal.SIGCONT)
+        return
+    hole = BlackHole(str(tmp_path), daemon.address)
+    yield hole.address, hole.fall_silent
+    hole.close()
+
+
+def took(begin, bound, what="it"):
+    seconds = time.monotonic() - begin
+    assert seconds < bound, f"{what} took {seconds:.1f} s"
+
+
+def test_a_timeout_ends_every_blocking_call(falls_silent):
+    address, silence = falls_silent
+    with mbcosim.connect(address) as server:
+        simulation = server.load_text(decks.body(), ports=PORT)
+        simulation.describe()
+        stepper = server.load_text(decks.body()).stepper()
+        stepper.step()
+        saved = simulation.snapshot()
+        silence()
+        calls = [(CALLS, simulation), (SERVER_CALLS, server),
+                 ({"restore": lambda s: s.restore(timeout=0.3), "export": lambda s: s.export(timeout=0.3),
+                   "delete": lambda s: s.delete(timeout=0.3)}, saved),
+                 ({"stepper": lambda s: s.step(timeout=0.3)}, stepper)]
+        for table, subject in calls:
+            for name, call in table.items():
+                begin = time.monotonic()
+                with pytest.raises(mbcosim.Unavailable):
+                    call(subject)
+                took(begin, 1 + 2 * TIME_FACTOR, name)
+        begin = time.monotonic()
+        stepper.close()
+        simulation.__exit__()
+        took(begin, 4 + TIME_FACTOR)
+
+
+def test_a_timeout_ends_every_awaited_call(falls_silent):
+    address, silence = falls_silent
+
+    async def main():
+        async with mbcosim.aio.connect(address) as server:
+            simulation = await server.load_text(decks.body(), ports=PORT)
+            await simulation.describe()
+            saved = await simulation.snapshot()
+            stepper = await (await server.load_text(decks.body())).stepper()
+            await stepper.step()
+            silence()
+            calls = [(CALLS, simulation), (SERVER_CALLS, server),
+                     ({"restore": lambda s: s.restore(timeout=0.3), "export": lambda s: s.export(timeout=0.3)}, saved),
+                     ({"stepper": lambda s: s.step(timeout=0.3)}, stepper)]
+            for table, subject in calls:
+                for name, call in table.items():
+                    begin = time.monotonic()
+                    with pytest.raises(mbcosim.Unavailable):
+                        await call(subject)
+                    took(begin, 1 + 2 * TIME_FACTOR, name)
+            begin = time.monotonic()
+            await stepper.close()
+            await simulation.__aexit__()
+            took(begin, 4 + TIME_FACTOR)
+
+    asyncio.run(main())
+
+
+def test_a_silent_server_is_noticed_in_the_middle_of_a_step_without_a_timeout(falls_silent):
+    address, silence = falls_silent
+    with mbcosim.connect(address) as server:
+        simulation = server.load_text(decks.endless())
+        threading.Timer(1.0, silence).start()
+        begin = time.monotonic()
+        with pytest.raises(mbcosim.Unavailable):
+            simulation.run_until(1e9)
+        took(begin, 1 + SILENT + 2 * TIME_FACTOR)
+        begin = time.monotonic()
+        simulation.__exit__()
+        took(begin, 2 + TIME_FACTOR)
+
+
+def test_an_awaited_peer_shows_signs_of_life_while_it_computes(daemon):
+    async def main():
+        async with mbcosim.aio.connect(daemon.address) as server:
+            async with await server.load_text(decks.body(final_time="100.", spin="null"), ports=PORT) as simulation:
+                async def slow(motion):
+                    await asyncio.sleep(1.5)
+                    return spring(motion)
+
+                async with await simulation.couple("spring", slow, heartbeat_timeout=0.6, server_timeout=1.5) as peer:
+                    await simulation.step(1)
+                    assert peer.error is None
+
+    asyncio.run(asyncio.wait_for(main(), 60 * TIME_FACTOR))
+
+
+def test_an_unknown_outcome_is_never_a_success(server):
+    with server.load_text(decks.body()) as simulation:
+        for outcome in (0, 17):
+            reply = pb.StepReply(step=3, time_s=0.5)
+            reply.outcome = outcome
+            with pytest.raises(mbcosim.StepFailed) as caught:
+                simulation.result(reply)
+            assert caught.value.reason == {0: "UNSPECIFIED", 17: "UNKNOWN_17"}[outcome]
+
+
+def test_a_lost_connection_is_made_again_within_reconnect(tmp_path, start_daemon):
+    daemon = start_daemon()
+    hole = BlackHole(str(tmp_path), daemon.address)
+    with mbcosim.connect(hole.address) as server:
+        assert server.info().identity
+        hole.close()
+        begin = time.monotonic()
+        with pytest.raises(mbcosim.Unavailable) as caught:
+            server.info()
+        assert caught.value.code == grpc.StatusCode.UNAVAILABLE
+        took(begin, 4 + TIME_FACTOR)
