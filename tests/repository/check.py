@@ -6,7 +6,8 @@ headers  every header compiles alone: the build shows it for those that their so
          others; arguments: compiler and its options
 layout   the top level has the agreed entries and no others; the quick start does not switch off what tests/run.sh builds;
          no two sources of the engine have the same name but those that mean the same in every folder, and register.cpp only
-         lists what its folder has; bounds on time in tests follow MBCOSIM_TIME_FACTOR
+         lists what its folder has; bounds on time in tests follow MBCOSIM_TIME_FACTOR;
+         tests/REFERENCES.md names every test with reference numbers
 format   clang-format would change nothing
 """
 import concurrent.futures
@@ -96,8 +97,18 @@ def bounds_on_time(root):
                 yield f"{path.relative_to(root)}:{number}: a bound on time without MBCOSIM_TIME_FACTOR"
 
 
+def references(root):
+    """Of tests with reference constants that tests/REFERENCES.md does not name."""
+    page = (root / "tests" / "REFERENCES.md").read_text(encoding="utf-8")
+    for path in sources(root / "tests" / "unit", ".h", ".cpp"):
+        name = str(path.relative_to(root / "tests"))
+        if len(re.findall(r"\d*\.\d{7,}", path.read_text(encoding="utf-8"))) > 1 and f"`{name}`" not in page:
+            yield f"tests/{name} has reference numbers: tests/REFERENCES.md must say where they come from"
+
+
 def layout(root):
     yield from names(root)
+    yield from references(root)
     yield from bounds_on_time(root)
     if "-DMBCOSIM_" in (root / "client_examples" / "quickstart.sh").read_text():
         yield "quickstart.sh sets options of the build folder that tests/run.sh uses, too"
