@@ -29,8 +29,8 @@ class Run:
         subprocess.run([BINARY, "run", source, "-o", self.prefix, "-q"], check=True, timeout=SECONDS)
         rows = np.loadtxt(f"{self.prefix}.mov", usecols=range(13))
         self.nodes = {int(label): rows[rows[:, 0] == label, 1:] for label in np.unique(rows[:, 0])}
-        step = float(re.search(r"time step: ([^;]*);", text).group(1))
-        self.time = step * np.arange(len(next(iter(self.nodes.values()))))
+        steps = re.findall(r"^Step \d+ (\S+)", pathlib.Path(f"{self.prefix}.out").read_text(), re.M)
+        self.time = np.array(steps, float)
 
 
 def draw(name, curves, x, y):
@@ -188,3 +188,32 @@ def test_the_landing_gear_drops_as_its_equations_say(tmp_path):
     assert body.min() < 1.75  # the strut has given way by 0.2 m or more
     np.testing.assert_allclose(body, exact[:, 0], atol=1e-3)
     np.testing.assert_allclose(hub, exact[:, 1], atol=1e-3)
+
+
+def test_the_quarter_car_takes_the_bump_as_its_equations_say(tmp_path):
+    run = Run(tmp_path, "quarter_car")
+    body_mass, wheel_mass, spring, tyre, piston, passage, loss, stroke, rest = 375., 75., 35e3, 193e3, 1e-3, 2e-5, 2., 0.15, 2e6
+    bulk = 870. * 1300**2
+
+    def density(p):
+        return 870. * (1 + (p - 1e5) / bulk)
+
+    def rate(t, y):  # heights of body and wheel, their velocities, pressures below and above the piston
+        road = 0.025 * (1 - math.cos(2 * math.pi / 0.25 * (t - 0.1))) if 0.1 < t < 0.35 else 0.
+        body, wheel, v_body, v_wheel, below, above = y
+        drop, mean, speed = below - above, density((below + above) / 2), v_body - v_wheel
+        flow = mean * passage * math.sqrt(2 / (loss * mean)) * math.copysign(math.sqrt(abs(drop)), drop)
+        column = stroke + body - wheel
+        strut = piston * drop - spring * (body - wheel)
+        return np.array([v_body, v_wheel, strut / body_mass, (-strut - tyre * (wheel - road)) / wheel_mass,
+                         (-flow - density(below) * piston * speed) / (piston * column) * bulk / 870.,
+                         (flow + density(above) * piston * speed) / (piston * (2 * stroke - column)) * bulk / 870.])
+
+    exact = integrate(rate, [0, 0, 0, 0, rest, rest], 1.5, 60000)
+    instants = np.linspace(0, 1.5, len(exact))
+    until = run.time <= 1.5
+    body, wheel = run.nodes[1][until, 2] - 1, run.nodes[2][until, 2] - 0.5
+    draw("quarter_car", {"body": (run.time[until], body), "wheel": (run.time[until], wheel)}, "time [s]", "height [m]")
+    assert body.max() > 0.04
+    np.testing.assert_allclose(body, np.interp(run.time[until], instants, exact[:, 0]), atol=1e-4)
+    np.testing.assert_allclose(wheel, np.interp(run.time[until], instants, exact[:, 1]), atol=1e-4)
