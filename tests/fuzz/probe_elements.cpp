@@ -125,7 +125,7 @@ void register_probes(Registry& r) {
 }  // namespace
 
 /// Looks at real elements only.
-void check_model(Session&, const Model&) {}
+void check_model(Reading&, const Model&) {}
 
 /// Ports come from clients, not from decks.
 Status attach_port(ModelBuilder&, const PortAttachment&) { return ok(); }
