@@ -35,14 +35,17 @@ bool same_layout(const State& a, const State& b) {
 }  // namespace
 
 struct Simulation::Impl {
-  explicit Impl(ModelPtr m) : model(std::move(m)), stepper(*model) {}
+  explicit Impl(ModelPtr m)
+      : model(std::move(m)), stepper(*model), final_time(model->initial_value.final_time) {}
 
   ModelPtr model;
   State state;
   Stepper stepper;
   StepController controller{stepper};
+  double final_time;  ///< [s]
   std::shared_ptr<ResultWriter> writer;
   TimeKeeping time_keeping = TimeKeeping::summed;
+  std::function<void(StartEvent)> start_observer;
   mutable std::once_flag variables_once;
   mutable std::unique_ptr<Variables> variables;
 
@@ -73,10 +76,13 @@ struct Simulation::Impl {
         1e-9;  // of a step: exact times leave no step that rounding alone asks for
     const double margin =
         state.control.empty() || state.control[control::kExactTime] == 0 ? 0 : kRounding * state.h;
-    return !(state.time < model->initial_value.final_time - margin);
+    return !(state.time < final_time - margin);
   }
 
   Status start();
+  void tell(StartEvent event) const {
+    if (start_observer) start_observer(event);
+  }
   /// The deck's eigenanalyses with times in (after, until].
   Status analyse_modes(double after, double until);
   StepReport step(const CancelToken* cancel);
@@ -88,7 +94,6 @@ struct Simulation::Impl {
 Status Simulation::Impl::start() {
   const InitialValueSettings& s = model->initial_value;
   using AbortAfter = InitialValueSettings::AbortAfter;
-  state = make_initial_state(*model);
   if (writer) writer->begin(*model);
   if (s.abort_after == AbortAfter::input) {
     record();
@@ -102,16 +107,20 @@ Status Simulation::Impl::start() {
   }
   if (auto status = analyse_modes(-HUGE_VAL, std::nextafter(s.initial_time, -HUGE_VAL)); !status)
     return status;
+  tell(StartEvent::assembled);
   PhaseReport report = stepper.solve_derivatives(state);
   if (report.error) {
     record();
     return *report.error;
   }
+  tell(StartEvent::derivatives_solved);
   if (writer)
     writer->derivatives(state.time, report.newton.iterations, report.newton.residual_error);
   NewtonReport last = report.newton;
   if (s.dummy_steps > 0 && s.abort_after != AbortAfter::derivatives) {
-    report = stepper.run_dummy_steps(state);
+    report = stepper.run_dummy_steps(state, [this](bool ended) {
+      tell(ended ? StartEvent::dummy_step_ended : StartEvent::dummy_step_begins);
+    });
     if (report.error) return *report.error;
     if (writer)
       writer->dummy_steps(state.time, report.newton.iterations, report.newton.residual_error);
@@ -203,23 +212,35 @@ Simulation::~Simulation() = default;
 Result<std::unique_ptr<Simulation>> Simulation::create(ModelPtr model, const CancelToken* cancel,
                                                        std::shared_ptr<ResultWriter> writer,
                                                        TimeKeeping time_keeping) {
+  auto simulation = prepare(std::move(model), std::move(writer), time_keeping);
+  if (auto status = simulation->start(cancel); !status) return status.error();
+  return simulation;
+}
+
+std::unique_ptr<Simulation> Simulation::prepare(ModelPtr model,
+                                                std::shared_ptr<ResultWriter> writer,
+                                                TimeKeeping time_keeping) {
   auto impl = std::make_unique<Impl>(std::move(model));
   impl->writer = std::move(writer);
   impl->time_keeping = time_keeping;
-  impl->stepper.set_cancelled(cancel);
+  impl->state = make_initial_state(*impl->model);
+  return std::unique_ptr<Simulation>(new Simulation(std::move(impl)));
+}
+
+Status Simulation::start(const CancelToken* cancel) {
+  impl_->stepper.set_cancelled(cancel);
   Status status = ok();
   try {
-    status = impl->start();
+    status = impl_->start();
   } catch (const EvaluationError& e) {
     status = make_error(ErrorKind::evaluation, "EVALUATION_FAILED",
                         std::string("before the first step: ") + e.what());
   }
-  if (!status) {
-    if (impl->writer) (void)impl->writer->finish();
-    return status.error();
-  }
-  return std::unique_ptr<Simulation>(new Simulation(std::move(impl)));
+  if (!status && impl_->writer) (void)impl_->writer->finish();
+  return status;
 }
+
+void Simulation::set_final_time(double time) { impl_->final_time = time; }
 
 const Model& Simulation::model() const { return *impl_->model; }
 const State& Simulation::state() const { return impl_->state; }
@@ -240,6 +261,12 @@ bool Simulation::finished() const {
 
 void Simulation::set_exchange(std::function<bool(int)> exchange) {
   impl_->stepper.set_exchange(std::move(exchange));
+}
+
+void Simulation::set_start_exchange(std::function<bool(int)> exchange,
+                                    std::function<void(StartEvent)> observer) {
+  impl_->stepper.set_start_exchange(std::move(exchange));
+  impl_->start_observer = std::move(observer);
 }
 
 void Simulation::set_attempt_ended(std::function<void(bool)> attempt_ended) {

@@ -72,6 +72,14 @@ enum class TimeKeeping {
   exact    ///< t = t₀ + n h while h stays: no drift over any number of steps
 };
 
+/// What happens before the first step, for those who exchange loads with it.
+enum class StartEvent {
+  assembled,           ///< the initial positions and velocities are there
+  derivatives_solved,  ///< and accelerations and multipliers
+  dummy_step_begins,
+  dummy_step_ended
+};
+
 /// Writes results while the simulation runs. Implementations: output/text_writer.h,
 /// output/netcdf_writer.h.
 class ResultWriter;
@@ -84,6 +92,13 @@ class Simulation {
                                                     const CancelToken* cancel = nullptr,
                                                     std::shared_ptr<ResultWriter> writer = nullptr,
                                                     TimeKeeping time_keeping = TimeKeeping::summed);
+  /// The same without the phases before the first step: inputs can be set, then `start` solves
+  /// them.
+  static std::unique_ptr<Simulation> prepare(ModelPtr model,
+                                             std::shared_ptr<ResultWriter> writer = nullptr,
+                                             TimeKeeping time_keeping = TimeKeeping::summed);
+  /// Initial assembly, derivatives phase, dummy steps; once, after `prepare`.
+  Status start(const CancelToken* cancel = nullptr);
   ~Simulation();
 
   const Model& model() const;
@@ -91,7 +106,9 @@ class Simulation {
   std::int64_t step_number() const;  ///< of the last accepted step; 0 after create
   double time() const;               ///< of the last accepted step [s]
   double next_step_size() const;     ///< [s]; the last one where the deck's drive has no value
-  bool finished() const;             ///< the deck's final time is reached
+  bool finished() const;             ///< the final time is reached
+  /// Another final time than the deck's [s]; infinite: none. Drives go on with the deck's.
+  void set_final_time(double time);
 
   /// One step. On failure the state is that of the last accepted step and `report.error` says why.
   StepReport step(const CancelToken* cancel = nullptr);
@@ -100,6 +117,10 @@ class Simulation {
   /// inputs of this iteration; false: the loads have not settled and the iteration goes on. What it
   /// throws leaves `step`, and the state is that of the last accepted step. Empty: none.
   void set_exchange(std::function<bool(int)> exchange);
+  /// The same in the derivatives phase, and what happens around it; before `start`. Every attempt
+  /// at the phase begins with zero corrections and with the inputs that it found.
+  void set_start_exchange(std::function<bool(int)> exchange,
+                          std::function<void(StartEvent)> observer);
   /// Called when an attempt at a step failed and another follows (false), and after each piece of a
   /// cut step but the last (true); state and time are those at which the next attempt starts.
   /// Empty: none.

@@ -1,2 +1,2 @@
 set(SOURCES simulation.cpp state_bytes.cpp variables.cpp load.cpp model_check.cpp describe.cpp formula.cpp
-    units.cpp linearize.cpp)
+    units.cpp linearize.cpp point_motion.cpp)

@@ -93,8 +93,9 @@ class Stepper::StepHooks : public NewtonHooks {
 /// their corrections.
 class Stepper::DerivativesHooks : public NewtonHooks {
  public:
-  DerivativesHooks(const Model& model, const State& start, const CancelToken* cancel)
-      : model_(model), start_(start), cancel_(cancel) {}
+  DerivativesHooks(const Model& model, const State& start, const CancelToken* cancel,
+                   const std::function<bool(int)>& exchange)
+      : model_(model), start_(start), cancel_(cancel), exchange_(exchange) {}
   void after_correction(State& state) const override {
     for (const NodePlace& n : model_.places)
       for (int i = 0; i < n.position_unknowns; ++i) {
@@ -103,12 +104,14 @@ class Stepper::DerivativesHooks : public NewtonHooks {
       }
     state.rotation = start_.rotation;
   }
+  bool exchange(int iteration) const override { return !exchange_ || exchange_(iteration); }
   bool cancelled() const override { return cancel_ && cancel_->cancelled(); }
 
  private:
   const Model& model_;
   const State& start_;
   const CancelToken* cancel_;
+  const std::function<bool(int)>& exchange_;
 };
 
 Stepper::Stepper(const Model& model)
@@ -150,7 +153,7 @@ Status Stepper::assemble(State& state) {
 
 PhaseReport Stepper::solve_derivatives(State& state) {
   const State start = state;
-  const DerivativesHooks hooks(model_, start, cancel_);
+  const DerivativesHooks hooks(model_, start, cancel_, start_exchange_);
   const InitialValueSettings& s = model_.initial_value;
   PhaseReport report;
   const auto attempt_with = [&](double coefficient, double tolerance) {
@@ -236,12 +239,13 @@ void Stepper::select_pivots(const State& state) {
   workspace_.solver.add_kind(activity_, values);
 }
 
-PhaseReport Stepper::run_dummy_steps(State& state) {
+PhaseReport Stepper::run_dummy_steps(State& state, const std::function<void(bool)>& between) {
   PhaseReport report;
   const InitialValueSettings& s = model_.initial_value;
   MethodSettings method;
   if (s.dummy_method) method = *s.dummy_method;
   for (int k = 0; k < s.dummy_steps; ++k) {
+    if (between) between(false);
     const State start = state;
     report = attempt(state, s.dummy_ratio * s.time_step, method, k == 0, dummy_);
     if (report.error) {
@@ -249,6 +253,7 @@ PhaseReport Stepper::run_dummy_steps(State& state) {
       explain(report, state);
       return report;
     }
+    if (between) between(true);
   }
   state.h = s.time_step;
   state.h_previous = s.time_step;

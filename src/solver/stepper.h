@@ -25,6 +25,11 @@ class Stepper final : public StepSystem {
   /// Called before each residual of a step with the number of corrections so far; false: loads from
   /// outside have not settled. May be empty. What it throws leaves the attempt.
   void set_exchange(std::function<bool(int)> exchange) { exchange_ = std::move(exchange); }
+  /// The same in the derivatives phase, where an attempt with another coefficient starts from zero
+  /// corrections and from the loads at the start of the phase.
+  void set_start_exchange(std::function<bool(int)> exchange) {
+    start_exchange_ = std::move(exchange);
+  }
 
   /// Derivatives of the loads that `exchange` sets; none: nullptr.
   void set_tangents(std::unique_ptr<TangentSolver> tangents);
@@ -34,8 +39,9 @@ class Stepper final : public StepSystem {
   Status assemble(State& state);
   /// Accelerations and multipliers at the initial time.
   PhaseReport solve_derivatives(State& state);
-  /// `dummy steps`: short steps before the first regular one.
-  PhaseReport run_dummy_steps(State& state);
+  /// `dummy steps`: short steps before the first regular one. `between` is called before each one
+  /// (false) and after it (true); may be empty.
+  PhaseReport run_dummy_steps(State& state, const std::function<void(bool)>& between = {});
 
   double next_step_size(State& state) const override;
   /// The same, without the counters of the strategy going on.
@@ -83,7 +89,7 @@ class Stepper final : public StepSystem {
   std::vector<bool> activity_;                  ///< (driven_)
   std::unique_ptr<TwoStageSystem> two_stages_;  ///< when a method of the deck needs it
   const CancelToken* cancel_ = nullptr;
-  std::function<bool(int)> exchange_;
+  std::function<bool(int)> exchange_, start_exchange_;
   NewtonSettings regular_, derivatives_, dummy_;
   double derivatives_coefficient_ = 0;
 };
