@@ -37,8 +37,8 @@ int reduce_model(const ReduceCommand& command);
 /// What a FEM data file holds; `convert`: name of a copy to write, the packed form when it ends
 /// with .bin, or empty.
 int fem_info(const std::string& file, bool json, const std::string& convert);
-/// Runs `mbcosim-replay`; returns only when that cannot be started.
-int replay(const std::vector<std::string>& arguments);
+/// Runs `mbcosim-SUBCOMMAND`; returns only when that cannot be started.
+int hand_over(const std::string& subcommand, const std::vector<std::string>& arguments);
 /// The words of the input language, served or refused by name.
 int keywords(bool json);
 

@@ -35,6 +35,20 @@ void add_reduce(CLI::App& app, mbcosim::cli::ReduceCommand& command, int& exit_c
   reduce_app->callback([&] { exit_code = reduce_model(command); });
 }
 
+/// Subcommands that are programs of their own.
+void add_programs(CLI::App& app, int& exit_code) {
+  const auto add = [&](const std::string& name, const char* description) {
+    CLI::App* program = app.add_subcommand(name, description);
+    program->prefix_command();
+    program->set_help_flag();
+    program->callback([program, name, &exit_code] {
+      exit_code = mbcosim::cli::hand_over(name, program->remaining());
+    });
+  };
+  add("fmu", "Make an FMU of a deck, for co-simulation in other tools");
+  add("replay", "Run a model against a record of its ports, or a recorded server against a client");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -81,11 +95,7 @@ int main(int argc, char** argv) {
                       "Write a copy to this file; the packed form when its name ends with .bin");
   fem_app->callback([&] { exit_code = fem_info(deck, json, convert); });
 
-  CLI::App* replay_app = app.add_subcommand(
-      "replay", "Run a model against a record of its ports, or a recorded server against a client");
-  replay_app->prefix_command();
-  replay_app->set_help_flag();
-  replay_app->callback([&] { exit_code = replay(replay_app->remaining()); });
+  add_programs(app, exit_code);
 
   CLI::App* keywords_app = app.add_subcommand(
       "keywords", "List the words of the input language; refused ones are marked");

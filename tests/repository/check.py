@@ -28,6 +28,7 @@ ARROWS = {
     "src/output": {"math", "model"},
     "src/reduction": {"math", "model", "input", "elements", "solver"},  # elements: the FEM data file
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
+    "server/fmi": {"math", "model", "solver", "input", "simulation"},
     "server/cli": {"math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/wire": {"model", "simulation", "mbcosim"},
     "server/coupling": {"math", "model", "simulation", "wire", "mbcosim"},

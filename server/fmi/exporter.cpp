@@ -1,0 +1,157 @@
+#include "fmi/exporter.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "fmi/archive.h"
+#include "fmi/description.h"
+#include "fmi/needed_libraries.h"
+#include "simulation/state_bytes.h"
+
+namespace mbcosim::fmi {
+namespace {
+
+namespace fs = std::filesystem;
+
+Error refused(ErrorKind kind, const std::string& message) {
+  Error error;
+  error.kind = kind;
+  error.message = message;
+  return error;
+}
+
+/// Hands out files and keeps what was read.
+class RecordingSource : public FileSource {
+ public:
+  explicit RecordingSource(const FileSource& source) : source_(source) {}
+  Result<std::string> read(const std::string& name) const override {
+    auto content = source_.read(name);
+    if (content) files_[name] = *content;
+    return content;
+  }
+  const std::map<std::string, std::string>& files() const { return files_; }
+
+ private:
+  const FileSource& source_;
+  mutable std::map<std::string, std::string> files_;
+};
+
+std::string hexadecimal(std::uint64_t number) {
+  char text[20];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(number));
+  return text;
+}
+
+/// A name that a C compiler would take: letters, digits and underscores.
+std::string identifier_of(const std::string& stem) {
+  std::string name;
+  for (const unsigned char c : stem)
+    name += std::isalnum(c) && c < 128 ? static_cast<char>(c) : '_';
+  if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0]))) name = "_" + name;
+  return name;
+}
+
+/// Equal decks and variables make equal tokens; as a GUID of 128 bits.
+std::string make_token(const Manifest& manifest, const std::string& variables) {
+  const std::uint64_t first = fnv1a(manifest.digest + variables);
+  return "{" + manifest.digest + "-" + hexadecimal(first) + "}";
+}
+
+std::optional<Error> unfit(const Model& model) {
+  const InitialValueSettings& s = model.initial_value;
+  if (s.abort_after != InitialValueSettings::AbortAfter::never)
+    return refused(ErrorKind::argument, "the deck stops before its first step (`abort after`)");
+  if (!(s.final_time >= s.initial_time))
+    return refused(ErrorKind::argument, "the deck's final time lies before its initial time");
+  return std::nullopt;
+}
+
+Result<std::string> read_whole(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return refused(ErrorKind::io, "cannot read \"" + path + "\"");
+  return std::string(std::istreambuf_iterator<char>(in), {});
+}
+
+/// The engine and what it needs, into the folder of the platform.
+mbcosim::Status add_binaries(const ExportOptions& options, const std::string& identifier,
+                             std::map<std::string, std::string>& archive) {
+  const std::string folder =
+      options.standard == Standard::fmi2 ? "binaries/linux64/" : "binaries/x86_64-linux/";
+  const auto needed = needed_libraries(options.library);
+  if (!needed) return needed.error();
+  std::map<std::string, std::string> files = *needed;
+  files[identifier + ".so"] = options.library;
+  for (const auto& [name, path] : files) {
+    auto content = read_whole(path);
+    if (!content) return content.error();
+    archive[folder + name] = std::move(*content);
+  }
+  return ok();
+}
+
+/// The deck's files under names of ours: theirs may lead anywhere.
+void add_files(const std::map<std::string, std::string>& files, Manifest& manifest,
+               std::map<std::string, std::string>& archive) {
+  int count = 0;
+  for (const auto& [name, content] : files) {
+    const std::string path =
+        "files/" + std::to_string(++count) + "-" + fs::path(name).filename().string();
+    manifest.files[name] = path;
+    archive["resources/" + path] = content;
+  }
+}
+
+DescriptionHead head_of(const ExportOptions& options, const Model& model,
+                        const std::string& token) {
+  const InitialValueSettings& s = model.initial_value;
+  const std::string stem = fs::path(options.output).stem().string();
+  return {stem, identifier_of(stem), token, model.title, s.initial_time, s.final_time, s.time_step};
+}
+
+void count(const std::vector<Entry>& entries, ExportReport& report) {
+  for (const Entry& e : entries) {
+    report.inputs += e.variable.role == FmuVariable::Role::input ? 1 : 0;
+    report.outputs += e.variable.role == FmuVariable::Role::output ? 1 : 0;
+    report.parameters += e.variable.role == FmuVariable::Role::tunable ? 1 : 0;
+  }
+}
+
+}  // namespace
+
+mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
+  const FolderSource folder(".", /*unrestricted=*/true);
+  const RecordingSource source(folder);
+  const LoadReport loaded = load_deck(source, options.deck);
+  report.diagnostics = loaded.diagnostics;
+  if (!loaded.ok()) return refused(ErrorKind::deck, "the deck is refused");
+  const Model& model = *loaded.model;
+  if (const auto error = unfit(model)) return *error;
+  const auto simulation = Simulation::prepare(loaded.model);
+  auto entries = make_catalogue(*simulation, options.selection);
+  if (!entries) return entries.error();
+  const bool arrays = options.standard == Standard::fmi3;
+  if (!arrays) *entries = as_scalars(*entries);
+  count(*entries, report);
+
+  Manifest manifest;
+  std::map<std::string, std::string> archive;
+  manifest.deck = options.deck;
+  manifest.digest = hexadecimal(model.digest);
+  for (const Entry& e : *entries) manifest.variables.push_back(e.variable);
+  add_files(source.files(), manifest, archive);
+  manifest.token = make_token(manifest, to_json(manifest));
+  const DescriptionHead head = head_of(options, model, manifest.token);
+  archive["resources/mbcosim.json"] = to_json(manifest);
+  archive["modelDescription.xml"] =
+      arrays ? describe_fmi3(head, *entries) : describe_fmi2(head, *entries);
+  if (std::string terminals = arrays ? describe_terminals(*entries) : ""; !terminals.empty())
+    archive["terminalsAndIcons/terminalsAndIcons.xml"] = std::move(terminals);
+  if (auto added = add_binaries(options, head.identifier, archive); !added) return added.error();
+  return write_archive(options.output, archive);
+}
+
+}  // namespace mbcosim::fmi

@@ -1,0 +1,135 @@
+/// What every function of the C interfaces does around its own work.
+#pragma once
+
+#include <exception>
+#include <span>
+
+#include "fmi/instance.h"
+
+namespace mbcosim::fmi {
+
+/// Runs work(instance) when the call is allowed. Nothing is thrown through the C interface, and a
+/// call while another one runs on the instance is refused without touching it.
+template <class Work>
+int guarded(void* handle, Call call, const char* function, Work&& work) {
+  constexpr int kError = static_cast<int>(Status::error);
+  if (!handle) return kError;
+  Instance& instance = *static_cast<Instance*>(handle);
+  if (instance.busy.exchange(true)) {
+    instance.log().write(Status::error,
+                         std::string(function) + ": another call runs on this instance");
+    return kError;
+  }
+  int status = kError;
+  try {
+    if (instance.admit(call, function)) status = static_cast<int>(work(instance));
+  } catch (const std::exception& e) {
+    status = static_cast<int>(instance.fail(std::string(function) + ": " + e.what()));
+  }
+  instance.busy = false;
+  return status;
+}
+
+/// Arrays of the C interface; a null pointer counts as empty.
+template <class T>
+std::span<T> array(T* first, std::size_t size) {
+  return first ? std::span<T>(first, size) : std::span<T>();
+}
+
+/// A function of FMI that the capabilities in modelDescription.xml rule out.
+inline int unsupported(void* handle, const char* function) {
+  if (!handle) return static_cast<int>(Status::error);
+  Instance& instance = *static_cast<Instance*>(handle);
+  if (instance.busy.exchange(true)) return static_cast<int>(Status::error);
+  const Status status =
+      instance.fail(std::string(function) + " is not supported, as modelDescription.xml says");
+  instance.busy = false;
+  return static_cast<int>(status);
+}
+
+/// Values of a type that none of our variables has.
+inline int no_such_type(void* handle, Call call, const char* function, const char* type,
+                        std::size_t references) {
+  return guarded(handle, call, function, [&](Instance& instance) {
+    if (references == 0) return Status::ok;
+    return instance.fail(std::string(function) + ": no variable is of type " + type);
+  });
+}
+
+/// Saves into *state; what *state held before is replaced.
+inline Status save_state(Instance& instance, void** state) {
+  if (!state) return instance.fail("no place for the state was given");
+  auto saved = instance.save();
+  if (*state)
+    *static_cast<SavedState*>(*state) = std::move(*saved);
+  else
+    *state = saved.release();
+  return Status::ok;
+}
+
+inline Status restore_state(Instance& instance, void* state) {
+  if (!state) return instance.fail("no state was given");
+  return instance.restore(*static_cast<SavedState*>(state));
+}
+
+inline Status free_state(void** state) {
+  if (!state) return Status::ok;
+  delete static_cast<SavedState*>(*state);
+  *state = nullptr;
+  return Status::ok;
+}
+
+inline Status state_size(Instance& instance, void* state, std::size_t* size) {
+  if (!state || !size) return instance.fail("no state was given");
+  *size = instance.serialize(*static_cast<SavedState*>(state)).size();
+  return Status::ok;
+}
+
+template <class Byte>
+Status serialize_state(Instance& instance, void* state, Byte* out, std::size_t size) {
+  if (!state || !out) return instance.fail("no state was given");
+  const std::string bytes = instance.serialize(*static_cast<SavedState*>(state));
+  if (bytes.size() > size)
+    return instance.fail("the state has " + std::to_string(bytes.size()) + " bytes, room is for " +
+                         std::to_string(size));
+  std::copy(bytes.begin(), bytes.end(), out);
+  return Status::ok;
+}
+
+template <class Byte>
+Status deserialize_state(Instance& instance, const Byte* bytes, std::size_t size, void** state) {
+  if (!bytes || !state) return instance.fail("no bytes were given");
+  auto saved = instance.deserialize({reinterpret_cast<const char*>(bytes), size});
+  if (!saved) return Status::error;
+  *state = saved.release();
+  return Status::ok;
+}
+
+/// Log categories of `Set…DebugLogging`; none means all.
+inline Status switch_logging(Instance& instance, bool on, std::size_t count,
+                             const char* const categories[]) {
+  if (count == 0) instance.log().switch_all(on);
+  for (std::size_t k = 0; k < count; ++k)
+    if (!categories || !categories[k] || !instance.log().switch_one(categories[k], on))
+      return instance.fail(
+          "there is no such log category; they are listed in "
+          "modelDescription.xml");
+  return Status::ok;
+}
+
+/// A folder from FMI 2's URI ("file:///tmp/a%20b/resources") or FMI 3's path; empty: none.
+inline std::string folder_of(const char* location) {
+  std::string text = location ? location : "";
+  if (text.rfind("file:", 0) != 0) return text;
+  text.erase(0, 5);
+  if (text.rfind("//", 0) == 0) text.erase(0, text.find('/', 2));
+  std::string path;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const bool escaped = text[k] == '%' && k + 2 < text.size();
+    path += escaped ? static_cast<char>(std::stoi(text.substr(k + 1, 2), nullptr, 16)) : text[k];
+    k += escaped ? 2 : 0;
+  }
+  return path;
+}
+
+}  // namespace mbcosim::fmi

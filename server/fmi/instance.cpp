@@ -1,0 +1,446 @@
+#include "fmi/instance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+#include "fmi/saved_state.h"
+#include "solver/state_space.h"
+
+namespace mbcosim::fmi {
+namespace {
+
+/// Of a step: lengths and times that differ by less are the same.
+constexpr double kRounding = 1e-9;
+
+std::optional<std::string> read_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return std::nullopt;
+  return std::string(std::istreambuf_iterator<char>(in), {});
+}
+
+std::string number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.12g", value);
+  return text;
+}
+
+void put(const Vec3& v, std::vector<double>& out) { out.insert(out.end(), v.data(), v.data() + 3); }
+
+/// x, R by rows, v or ω of all points.
+void put_motion(const Simulation& simulation, const PointMotion& motion, FmuVariable::Source what,
+                std::vector<double>& out) {
+  for (int k = 0; k < motion.size(); ++k) {
+    const PointState point = motion.at(simulation, k);
+    if (what == FmuVariable::Source::positions) put(point.x, out);
+    if (what == FmuVariable::Source::velocities) put(point.v, out);
+    if (what == FmuVariable::Source::angular_velocities) put(point.w, out);
+    if (what == FmuVariable::Source::orientations)
+      for (int i = 0; i < 3; ++i) put(point.R.row(i).transpose(), out);
+  }
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------ life
+
+std::unique_ptr<Instance> Instance::create(Standard standard, const std::string& name,
+                                           const std::string& token, const std::string& resources,
+                                           Log log) {
+  std::unique_ptr<Instance> instance(new Instance(standard, name, std::move(log)));
+  if (name.find_first_not_of(" \t\n") == std::string::npos) {
+    instance->log_.write(Status::error, "the name of the instance is empty");
+    return nullptr;
+  }
+  if (!instance->load(token, resources)) return nullptr;
+  return instance;
+}
+
+bool Instance::load(const std::string& token, const std::string& resources) {
+  const auto refuse = [this](const std::string& message) {
+    log_.write(Status::error, message);
+    return false;
+  };
+  const auto text = read_file(resources + "/mbcosim.json");
+  if (!text) return refuse("cannot read \"" + resources + "/mbcosim.json\"");
+  auto manifest = manifest_from_json(*text);
+  if (!manifest) return refuse(manifest.error().message);
+  manifest_ = std::move(*manifest);
+  if (token != manifest_.token)
+    return refuse("the token \"" + token + "\" is not that of these resources, \"" +
+                  manifest_.token + "\"");
+  std::map<std::string, std::string> files;
+  for (const auto& [name, path] : manifest_.files) {
+    auto content = read_file(resources + "/" + path);
+    if (!content) return refuse("cannot read \"" + resources + "/" + path + "\"");
+    files[name] = std::move(*content);
+  }
+  const LoadReport report = load_deck(BundleSource(std::move(files)), manifest_.deck);
+  for (const Diagnostic& d : report.diagnostics)
+    log_.write(d.severity == Severity::error ? Status::error : Status::warning, d.text());
+  if (!report.ok()) return false;
+  model_ = report.model;
+  log_.write(Status::ok, "model read: " + std::to_string(model_->unknowns) + " unknowns");
+  set_start_values();
+  return bind();
+}
+
+void Instance::set_start_values() {
+  mode_ = Mode::instantiated;
+  communication_time_ = last_time_ = model_->initial_value.initial_time;
+  stop_time_.reset();
+  given_.clear();
+  for (const FmuVariable& variable : manifest_.variables) given_.push_back(variable.start);
+  simulation_ = Simulation::prepare(model_);
+  started_ = false;
+  ++revision_;
+}
+
+bool Instance::bind() {
+  for (const FmuVariable& variable : manifest_.variables) {
+    Variable bound{&variable};
+    if (variable.source == FmuVariable::Source::variable) {
+      bound.handle = simulation_->find_variable(variable.name);
+    } else if (const StructuralPort* port = find_structural_port(*model_, variable.name)) {
+      motions_.push_back(std::make_unique<PointMotion>(*simulation_, *port));
+      bound.motion = motions_.back().get();
+    }
+    if (bound.handle < 0 && !bound.motion) {
+      log_.write(Status::error, "the model has no variable \"" + variable.name + "\"");
+      return false;
+    }
+    index_.emplace(variable.reference, static_cast<int>(variables_.size()));
+    variables_.push_back(bound);
+  }
+  return true;
+}
+
+bool Instance::admit(Call call, const char* function) {
+  if (is_allowed(standard_, call, mode_)) return true;
+  fail(std::string(function) + " is not allowed in the state \"" + mode_name(standard_, mode_) +
+       "\"");
+  return false;
+}
+
+Status Instance::fail(const std::string& message) {
+  log_.write(Status::error, name_ + ": " + message);
+  mode_ = standard_ == Standard::fmi2 ? Mode::failed : Mode::terminated;
+  return Status::error;
+}
+
+Status Instance::discard(const std::string& message) {
+  log_.write(Status::discard, name_ + ": " + message);
+  return Status::discard;
+}
+
+Status Instance::setup(double start_time, std::optional<double> stop_time) {
+  const double initial = model_->initial_value.initial_time;
+  if (!(std::abs(start_time - initial) <= kRounding * std::max(1.0, std::abs(initial))))
+    return fail("the deck starts at " + number(initial) + " s, the importer at " +
+                number(start_time) + " s");
+  if (stop_time && !(*stop_time >= start_time))
+    return fail("the stop time " + number(*stop_time) + " s lies before the start");
+  communication_time_ = last_time_ = start_time;
+  stop_time_ = stop_time;
+  return Status::ok;
+}
+
+Status Instance::enter_initialization() {
+  mode_ = Mode::initialization;
+  return Status::ok;
+}
+
+mbcosim::Status Instance::ensure_started() {
+  if (started_) return ok();
+  simulation_ = Simulation::prepare(model_);
+  simulation_->set_final_time(std::numeric_limits<double>::infinity());
+  for (std::size_t k = 0; k < variables_.size(); ++k)
+    if (!given_[k].empty() && !write(variables_[k], given_[k]))
+      return Error{ErrorKind::argument, "a start value was refused", {}, {}, {}};
+  if (auto status = simulation_->start(); !status) return status;
+  started_ = true;
+  ++revision_;
+  return ok();
+}
+
+Status Instance::exit_initialization() {
+  if (const auto started = ensure_started(); !started) return fail(started.error().message);
+  mode_ = Mode::step;
+  return Status::ok;
+}
+
+Status Instance::terminate() {
+  mode_ = Mode::terminated;
+  return Status::ok;
+}
+
+Status Instance::reset() {
+  set_start_values();
+  return Status::ok;
+}
+
+// ------------------------------------------------------------------ values
+
+const Instance::Variable* Instance::find(std::uint32_t reference) const {
+  const auto it = index_.find(reference);
+  return it == index_.end() ? nullptr : &variables_[it->second];
+}
+
+void Instance::read(const Variable& variable, std::vector<double>& all,
+                    std::vector<double>& out) const {
+  all.clear();
+  if (variable.motion)
+    put_motion(*simulation_, *variable.motion, variable.of->source, all);
+  else
+    simulation_->get(variable.handle, all);
+  for (const int element : variable.of->elements) out.push_back(all[element]);
+}
+
+Status Instance::get(std::span<const std::uint32_t> references, std::span<double> values) {
+  if (mode_ == Mode::initialization)
+    if (const auto started = ensure_started(); !started) return fail(started.error().message);
+  std::vector<double> all, one;
+  std::size_t at = 0;
+  for (const std::uint32_t reference : references) {
+    const Variable* variable = find(reference);
+    if (!variable) return fail("no real variable has the reference " + std::to_string(reference));
+    const std::vector<double>& given = given_[index_of(*variable)];
+    one = given;
+    if (variable->of->role == FmuVariable::Role::independent)
+      one = {communication_time_};
+    else if (given.empty())
+      read(*variable, all, one);
+    if (one.size() > values.size() - at)
+      return fail("the variables have more than " + std::to_string(values.size()) + " values");
+    std::copy(one.begin(), one.end(), values.begin() + static_cast<std::ptrdiff_t>(at));
+    at += one.size();
+  }
+  if (at != values.size())
+    return fail("the variables have " + std::to_string(at) + " values, not " +
+                std::to_string(values.size()));
+  return Status::ok;
+}
+
+Status Instance::may_set(const Variable& variable) {
+  const FmuVariable::Role role = variable.of->role;
+  if (role == FmuVariable::Role::input || role == FmuVariable::Role::tunable) return Status::ok;
+  return fail("\"" + variable.of->name + "\" is neither an input nor a parameter");
+}
+
+bool Instance::write(const Variable& variable, std::span<const double> values) {
+  std::vector<double> all;
+  simulation_->get(variable.handle, all);
+  const std::vector<double> before = all;
+  for (std::size_t k = 0; k < values.size(); ++k) all[variable.of->elements[k]] = values[k];
+  if (all == before) return true;
+  return static_cast<bool>(simulation_->set(variable.handle, all));
+}
+
+Status Instance::set(std::span<const std::uint32_t> references, std::span<const double> values) {
+  std::size_t at = 0;
+  for (const std::uint32_t reference : references) {
+    const Variable* variable = find(reference);
+    if (!variable) return fail("no real variable has the reference " + std::to_string(reference));
+    if (const Status status = may_set(*variable); status != Status::ok) return status;
+    const std::size_t size = variable->of->elements.size();
+    if (size > values.size() - at)
+      return fail("the variables have more than " + std::to_string(values.size()) + " values");
+    at += size;
+  }
+  if (at != values.size())
+    return fail("the variables have " + std::to_string(at) + " values, not " +
+                std::to_string(values.size()));
+  if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
+    return discard("a value is not finite; none was set");
+  for (const std::uint32_t reference : references) {
+    const Variable& variable = *find(reference);
+    const auto mine = values.first(variable.of->elements.size());
+    values = values.subspan(mine.size());
+    given_[index_of(variable)].assign(mine.begin(), mine.end());
+    if (mode_ == Mode::step && !write(variable, mine))
+      return fail("\"" + variable.of->name + "\" cannot be set");
+  }
+  if (mode_ != Mode::step) started_ = false;
+  ++revision_;
+  return Status::ok;
+}
+
+// ------------------------------------------------------------------ steps
+
+Status Instance::check_step(double time, double length) {
+  if (!(length > 0) || !std::isfinite(length))
+    return fail("the length of a step must be positive, got " + number(length));
+  const double tolerance =
+      kRounding * std::max({length, std::abs(time), std::abs(communication_time_)});
+  if (!(std::abs(time - communication_time_) <= tolerance))
+    return fail("the step starts at " + number(time) + " s, the instance stands at " +
+                number(communication_time_) + " s");
+  if (stop_time_ && time + length > *stop_time_ + tolerance)
+    return fail("the step ends after the stop time " + number(*stop_time_) + " s");
+  return Status::ok;
+}
+
+/// Steps of the deck's length until `length` is used up.
+mbcosim::Status Instance::advance(double length) {
+  double left = length;
+  while (left > kRounding * length) {
+    const double h = simulation_->next_step_size();
+    if (!(h > 0) || h > left * (1 + kRounding)) {
+      Error error;
+      error.kind = ErrorKind::argument;
+      error.message = "a step of " + number(length) + " s is no multiple of the deck's step, " +
+                      number(h) + " s";
+      return error;
+    }
+    const StepReport report = simulation_->step();
+    if (report.error) return *report.error;
+    left -= report.step_size;
+  }
+  return ok();
+}
+
+Status Instance::do_step(double time, double length) {
+  if (const Status status = check_step(time, length); status != Status::ok) return status;
+  const State before = simulation_->snapshot();
+  ++revision_;
+  if (const auto done = advance(length); !done) {
+    (void)simulation_->restore(before);
+    if (standard_ == Standard::fmi2) mode_ = Mode::step_failed;
+    return discard(done.error().message);
+  }
+  communication_time_ = last_time_ = time + length;
+  return Status::ok;
+}
+
+// ------------------------------------------------------------------ states
+
+std::unique_ptr<SavedState> Instance::save() const {
+  auto saved = std::make_unique<SavedState>();
+  saved->token = manifest_.token;
+  saved->mode = mode_;
+  saved->given = given_;
+  saved->communication_time = communication_time_;
+  saved->last_time = last_time_;
+  saved->stop_time = stop_time_;
+  if (started_) saved->state = simulation_->snapshot();
+  return saved;
+}
+
+Status Instance::restore(const SavedState& saved) {
+  if (saved.token != manifest_.token) return fail("the state belongs to another FMU");
+  given_ = saved.given;
+  if (saved.state) {
+    if (!started_)
+      if (const auto started = ensure_started(); !started) return fail(started.error().message);
+    if (const auto restored = simulation_->restore(*saved.state); !restored)
+      return fail(restored.error().message);
+  } else {
+    started_ = false;
+    simulation_ = Simulation::prepare(model_);
+  }
+  mode_ = saved.mode;
+  communication_time_ = saved.communication_time;
+  last_time_ = saved.last_time;
+  stop_time_ = saved.stop_time;
+  ++revision_;
+  log_.write(Status::ok, "state of t = " + number(communication_time_) + " s restored");
+  return Status::ok;
+}
+
+std::string Instance::serialize(const SavedState& saved) const {
+  return to_bytes(saved, model_->digest);
+}
+
+std::unique_ptr<SavedState> Instance::deserialize(std::string_view bytes) {
+  auto saved = saved_state_from_bytes(bytes, manifest_.token, model_->digest);
+  if (!saved) {
+    fail(saved.error().message);
+    return nullptr;
+  }
+  bool fits = saved->given.size() == given_.size();
+  for (std::size_t k = 0; fits && k < given_.size(); ++k)
+    fits = saved->given[k].size() == given_[k].size();
+  if (fits) return std::make_unique<SavedState>(std::move(*saved));
+  fail("the state has other variables");
+  return nullptr;
+}
+
+// ------------------------------------------------------------------ derivatives
+
+/// Handles, each once; `elements`: where each number of the references stands among theirs.
+std::optional<std::vector<int>> Instance::handles_of(std::span<const std::uint32_t> references,
+                                                     bool inputs, std::vector<int>& elements) {
+  std::vector<int> handles, starts;
+  int size = 0;
+  for (const std::uint32_t reference : references) {
+    const Variable* variable = find(reference);
+    const bool fits = variable && variable->handle >= 0 &&
+                      variable->of->role != FmuVariable::Role::independent &&
+                      given_[index_of(*variable)].empty() != inputs;
+    if (!fits) {
+      fail("variable " + std::to_string(reference) + " is no " +
+           (inputs ? "input" : "output with derivatives"));
+      return std::nullopt;
+    }
+    auto known = std::find(handles.begin(), handles.end(), variable->handle);
+    if (known == handles.end()) {
+      handles.push_back(variable->handle);
+      starts.push_back(size);
+      size += simulation_->variables()[variable->handle].size;
+      known = handles.end() - 1;
+    }
+    for (const int element : variable->of->elements)
+      elements.push_back(starts[known - handles.begin()] + element);
+  }
+  return handles;
+}
+
+mbcosim::Status Instance::compute_derivative(std::span<const std::uint32_t> unknowns,
+                                             std::span<const std::uint32_t> knowns) {
+  constexpr int kLargest = 2000;  ///< unknowns; the elimination works on full matrices
+  Derivative now{{unknowns.begin(), unknowns.end()}, {knowns.begin(), knowns.end()}, revision_, {}};
+  if (derivative_ && derivative_->revision == revision_ && derivative_->unknowns == now.unknowns &&
+      derivative_->knowns == now.knowns)
+    return ok();
+  std::vector<int> rows, columns;
+  const auto outputs = handles_of(unknowns, false, rows);
+  const auto inputs = outputs ? handles_of(knowns, true, columns) : std::nullopt;
+  Error error;
+  error.kind = ErrorKind::argument;
+  if (!inputs) return error;
+  error.kind = ErrorKind::limit;
+  error.message = "derivatives are given for models of at most " + std::to_string(kLargest) +
+                  " unknowns; this one has " + std::to_string(model_->unknowns);
+  if (model_->unknowns > kLargest) return error;
+  const auto io = simulation_->linearize(*inputs, *outputs);
+  if (!io) return io.error();
+  const auto system = state_space(simulation_->linearize(), *io);
+  if (!system) return system.error();
+  now.d = system->d(rows, columns);
+  derivative_ = std::move(now);
+  return ok();
+}
+
+Status Instance::derivative(std::span<const std::uint32_t> unknowns,
+                            std::span<const std::uint32_t> knowns, std::span<const double> seed,
+                            std::span<double> sensitivity, bool transposed) {
+  if (mode_ == Mode::initialization)
+    if (const auto started = ensure_started(); !started) return fail(started.error().message);
+  if (const auto computed = compute_derivative(unknowns, knowns); !computed)
+    return computed.error().message.empty() ? Status::error : discard(computed.error().message);
+  const MatX D = transposed ? MatX(derivative_->d.transpose()) : derivative_->d;
+  if (D.cols() != static_cast<Eigen::Index>(seed.size()) ||
+      D.rows() != static_cast<Eigen::Index>(sensitivity.size()))
+    return fail("the derivative is " + std::to_string(D.rows()) + " by " +
+                std::to_string(D.cols()) + ", the arrays have " +
+                std::to_string(sensitivity.size()) + " and " + std::to_string(seed.size()) +
+                " numbers");
+  Eigen::Map<VecX>(sensitivity.data(), D.rows()) =
+      D * Eigen::Map<const VecX>(seed.data(), D.cols());
+  return Status::ok;
+}
+
+}  // namespace mbcosim::fmi

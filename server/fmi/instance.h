@@ -1,0 +1,125 @@
+/// One instance of an FMU of ours: the engine behind the functions of FMI 2 and FMI 3.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "fmi/log.h"
+#include "fmi/manifest.h"
+#include "fmi/modes.h"
+#include "simulation/point_motion.h"
+#include "simulation/simulation.h"
+
+namespace mbcosim::fmi {
+
+/// All that a step changes, in memory.
+struct SavedState {
+  std::string token;  ///< of the FMU
+  Mode mode = Mode::instantiated;
+  std::vector<std::vector<double>> given;  ///< last values of inputs and parameters, by variable
+  double communication_time = 0, last_time = 0;
+  std::optional<double> stop_time;
+  std::optional<State> state;  ///< when the start was computed
+};
+
+/// FMU time is the importer's: a step ends at the sum of its arguments. The simulation sums its own
+/// steps, as `mbcosim run` does; the two differ by rounding.
+class Instance {
+ public:
+  /// Reads the manifest and the deck below `resources` (a folder). null: `log` says why.
+  static std::unique_ptr<Instance> create(Standard standard, const std::string& name,
+                                          const std::string& token, const std::string& resources,
+                                          Log log);
+
+  Standard standard() const { return standard_; }
+  Log& log() { return log_; }
+  Mode mode() const { return mode_; }
+  /// Is the call allowed now? If not: logs it and fails.
+  bool admit(Call call, const char* function);
+  /// Logs a failure and enters the mode that the standard has for it.
+  Status fail(const std::string& message);
+  Status discard(const std::string& message);
+
+  Status setup(double start_time, std::optional<double> stop_time);
+  Status enter_initialization();
+  Status exit_initialization();
+  Status terminate();
+  Status reset();
+  Status get(std::span<const std::uint32_t> references, std::span<double> values);
+  Status set(std::span<const std::uint32_t> references, std::span<const double> values);
+  Status do_step(double time, double length);
+  double last_time() const { return last_time_; }  ///< that the last step reached [s]
+
+  std::unique_ptr<SavedState> save() const;
+  Status restore(const SavedState& saved);
+  std::string serialize(const SavedState& saved) const;
+  /// null: the bytes are refused, which is logged.
+  std::unique_ptr<SavedState> deserialize(std::string_view bytes);
+
+  /// sensitivity = D seed, D = ∂unknowns/∂knowns at constant states; transposed: Dᵀ seed.
+  Status derivative(std::span<const std::uint32_t> unknowns, std::span<const std::uint32_t> knowns,
+                    std::span<const double> seed, std::span<double> sensitivity, bool transposed);
+
+  /// Taken while a call runs: a second one at the same time is refused.
+  std::atomic<bool> busy{false};
+
+ private:
+  struct Variable {
+    const FmuVariable* of = nullptr;
+    int handle = -1;                      ///< of the simulation
+    const PointMotion* motion = nullptr;  ///< of a port's points
+  };
+  /// D of all outputs by all inputs of a call, kept while nothing changes.
+  struct Derivative {
+    std::vector<std::uint32_t> unknowns, knowns;
+    std::uint64_t revision = 0;
+    MatX d;
+  };
+
+  Instance(Standard standard, std::string name, Log log)
+      : standard_(standard), name_(std::move(name)), log_(std::move(log)) {}
+  bool load(const std::string& token, const std::string& resources);
+  bool bind();
+  void set_start_values();
+  /// The phases before the first step, with the inputs as given; again when one has changed.
+  mbcosim::Status ensure_started();
+  const Variable* find(std::uint32_t reference) const;
+  int index_of(const Variable& variable) const {
+    return static_cast<int>(&variable - variables_.data());
+  }
+  void read(const Variable& variable, std::vector<double>& all, std::vector<double>& out) const;
+  Status may_set(const Variable& variable);
+  bool write(const Variable& variable, std::span<const double> values);
+  mbcosim::Status advance(double length);
+  Status check_step(double time, double length);
+  mbcosim::Status compute_derivative(std::span<const std::uint32_t> unknowns,
+                                     std::span<const std::uint32_t> knowns);
+  std::optional<std::vector<int>> handles_of(std::span<const std::uint32_t> references, bool inputs,
+                                             std::vector<int>& elements);
+
+  const Standard standard_;
+  const std::string name_;
+  Log log_;
+  Manifest manifest_;
+  ModelPtr model_;
+  std::unique_ptr<Simulation> simulation_;
+  std::vector<std::unique_ptr<PointMotion>> motions_;
+  std::vector<Variable> variables_;
+  std::unordered_map<std::uint32_t, int> index_;
+  std::vector<std::vector<double>> given_;
+  Mode mode_ = Mode::instantiated;
+  bool started_ = false;
+  double communication_time_ = 0, last_time_ = 0;
+  std::optional<double> stop_time_;
+  std::uint64_t revision_ = 1;  ///< counts changes of state and inputs
+  std::optional<Derivative> derivative_;
+};
+
+}  // namespace mbcosim::fmi

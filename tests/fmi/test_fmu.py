@@ -1,0 +1,526 @@
+"""FMUs of decks, run by the importer beside this file: numbers of `mbcosim run` bit for bit, states, misuse."""
+import ctypes
+import os
+import random
+import re
+import shutil
+import subprocess
+import threading
+
+import pytest
+
+from importer import DISCARD, ERROR, OK, Archive, Failed, instance_of
+
+BIN = os.environ["MBCOSIM_BIN"]
+MODELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "client_examples", "models")
+TUTORIALS = ["rigid_body", "pendulum", "three_pendulums", "chain", "cantilever_dead_load", "cantilever_follower_load",
+             "cantilever_varying_load", "cantilever_five", "cantilever_piezo_open", "cantilever_piezo_shunt", "actuated_beam",
+             "actuated_beam_inline", "actuated_beam_servo", "modal_body"]
+STANDARDS = ["2", "3"]
+# A port, a stream drive, a parameter node and a drive that fails below x = -0.4.
+PORTS = """begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: 1e-2; tolerance: 1e-9; max iterations: 20; end: initial value;
+begin: control data; structural nodes: 1; parameter nodes: 1; rigid bodies: 1; forces: 3; file drivers: 1; end: control data;
+begin: nodes; structural: 1, dynamic, 0.,0.,0., eye, null, 0.,0.,1.; parameter: 7, value, 2.; end: nodes;
+begin: drivers; file: 1, stream, stream drive name, "push", create, no, path, "nobody", 2; end: drivers;
+begin: elements; body: 1, 1, 2., null, diag, 1.,2.,3.;
+force: 1, external structural, grpc, port, "wing", coupling, loose, 2, 1, offset, 0.,.5,0., 1;
+force: 2, absolute, 1, position, null, 1.,0.,0., file, 1, 2;
+force: 3, absolute, 1, position, null, 0.,0.,1., string, "sqrt(model::node::structural(1, \\"X[1]\\") + .4)";
+end: elements;
+"""
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    """exported(deck, standard, *options): the unpacked FMU; each is made once."""
+    folder, done = tmp_path_factory.mktemp("fmu"), {}
+
+    def make(deck, standard="3", *options):
+        key = (deck, standard, options)
+        if key not in done:
+            path = str(folder / f"{os.path.splitext(os.path.basename(deck))[0]}{len(done)}.fmu")
+            deck_path = deck if os.path.isabs(deck) else os.path.join(MODELS, deck + ".mbd")
+            made = subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", deck_path, "-o", path, "--fmi", standard, *options],
+                                  capture_output=True, text=True, timeout=300)
+            assert made.returncode == 0, made.stderr
+            done[key] = Archive(path)
+        return done[key]
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def ports(exported, tmp_path_factory):
+    path = tmp_path_factory.mktemp("deck") / "ports.mbd"
+    path.write_text(PORTS)
+    return lambda standard, *options: exported(str(path), standard, *options)
+
+
+def run_exactly(deck, folder):
+    """Positions and velocities of all nodes and steps as `mbcosim run` has them, with all digits."""
+    for name in os.listdir(MODELS):
+        path = os.path.join(folder, name)
+        shutil.copy(os.path.join(MODELS, name), path)
+        if name.endswith((".mbd", ".inc")):
+            with open(path) as file:
+                text = re.sub(r"(begin\s*:\s*control data\s*;)", r"\1 output precision: 16;", file.read())
+            with open(path, "w") as file:
+                file.write(text)
+    path = os.path.join(folder, deck + ".mbd")
+    subprocess.run([os.path.join(BIN, "mbcosim"), "run", path, "-o", os.path.join(folder, "out"), "-q"], check=True, timeout=300,
+                   capture_output=True)
+    rows = {}
+    with open(os.path.join(folder, "out.mov")) as file:
+        for line in file:
+            words = line.split()
+            rows.setdefault(words[0], []).append([float(x) for x in words[1:]])
+    return rows
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("deck", TUTORIALS)
+def test_tutorials_have_the_bits_of_the_command_line(exported, tmp_path, deck, standard):
+    rows = run_exactly(deck, str(tmp_path))
+    fmu = exported(deck, standard)
+    start, stop, step = fmu.experiment()
+    indices = "[1] [2] [3]".split() if standard == "2" else [""]
+    labels = [label for label in rows if f"node.structural.{label}.X{indices[0]}" in fmu.variables]
+    assert labels
+    x = [f"node.structural.{label}.X{i}" for label in labels for i in indices]
+    v = [f"node.structural.{label}.XP{i}" for label in labels for i in indices]
+    records = min(len(rows[labels[0]]), 200)
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        for k in range(records):
+            if k > 0:
+                assert instance.do_step(start + (k - 1) * step, step) == OK
+            assert instance[x] == [number for label in labels for number in rows[label][k][:3]]
+            assert instance[v] == [number for label in labels for number in rows[label][k][-6:-3]]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_several_steps_of_the_deck_at_once_change_no_bit(exported, standard):
+    fmu = exported("pendulum", standard)
+    start, _, step = fmu.experiment()
+    outputs = fmu.names("output")
+    with instance_of(fmu) as one, instance_of(fmu) as other:
+        one.initialize(), other.initialize()
+        time, dice = start, random.Random(5)
+        for _ in range(20):
+            count = dice.randint(1, 7)
+            for k in range(count):
+                assert one.do_step(time + k * step, step) == OK
+            assert other.do_step(time, count * step) == OK
+            time += count * step
+            assert one[outputs] == other[outputs]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_restored_states_go_on_as_the_original(ports, standard):
+    fmu = ports(standard)
+    outputs = fmu.names("output")
+    force = "port.wing.loads.force"
+    names = [force] if standard == "3" else [f"{force}[{k},{i}]" for k in (1, 2) for i in (1, 2, 3)]
+
+    def steps(instance, first):
+        values = []
+        for k in range(first, first + 10):
+            for n, name in enumerate(names):
+                instance[name] = [0.1 * k + n] * fmu.sizes[name]
+            assert instance.do_step(0.01 * k, 0.01) == OK
+            values.append(instance[outputs])
+        return values
+
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        steps(instance, 0)
+        state = instance.get_state()
+        data = instance.serialize(state)
+        expected = steps(instance, 10)
+        instance.set_state(state)
+        assert steps(instance, 10) == expected
+        again = instance.get_state(instance.get_state())
+        instance.free_state(again)
+        instance.free_state(state)
+    with instance_of(fmu) as other:  # in another instance, which was not even initialized
+        other.set_state(other.deserialize(data))
+        assert steps(other, 10) == expected
+        assert other.call("Terminate") == OK
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_damaged_and_foreign_states_are_refused(ports, exported, standard):
+    fmu = ports(standard)
+    with instance_of(fmu) as instance, instance_of(exported("pendulum", standard)) as other:
+        instance.initialize(), other.initialize()
+        data = bytearray(instance.serialize(instance.get_state()))
+        assert "another FMU" in fails(other, lambda: other.deserialize(data))
+        data[len(data) // 2] ^= 1
+        assert "damaged" in fails(instance, lambda: instance.deserialize(data))
+    with instance_of(fmu) as instance:
+        assert "damaged" in fails(instance, lambda: instance.deserialize(b"short"))
+    with instance_of(fmu) as instance, instance_of(exported("pendulum", standard)) as other:
+        state = other.get_state()
+        assert "another FMU" in fails(instance, lambda: instance.set_state(state))
+
+
+def fails(instance, call):
+    """The message of a call that ends with an error."""
+    with pytest.raises(Failed) as failed:
+        call()
+    assert failed.value.status == ERROR
+    return instance.log[-1][2]
+
+
+def test_eight_instances_in_eight_threads_have_the_bits_of_one(exported):
+    fmus = [exported("chain", standard) for standard in STANDARDS]
+    start, _, step = fmus[0].experiment()
+    results = [None] * 8
+
+    def run(k):
+        fmu = fmus[k % 2]
+        with instance_of(fmu, name=f"chain {k}") as instance:
+            instance.initialize()
+            for n in range(100):
+                assert instance.do_step(start + n * step, step) == OK
+            results[k] = [x for name in fmu.names("output") for x in instance[name]]
+
+    run(0), run(1)
+    alone = results[:2]
+    threads = [threading.Thread(target=run, args=(k,)) for k in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(240)
+    assert all(results[k] == alone[k % 2] for k in range(8))
+    assert alone[0] == alone[1]
+
+
+def test_two_calls_at_once_on_one_instance_are_refused_without_harm(exported):
+    fmu = exported("chain")
+    with instance_of(fmu) as instance, instance_of(fmu) as alone:
+        instance.initialize(), alone.initialize()
+        statuses = []
+
+        def step():
+            statuses.append(instance.do_step(0, 500 * fmu.experiment()[2]))
+
+        thread = threading.Thread(target=step)
+        thread.start()
+        refused = 0
+        while thread.is_alive():
+            try:
+                instance["node.structural.2.X"]
+            except Failed as failed:
+                refused += failed.status == ERROR
+        thread.join()
+        assert statuses == [OK] and refused > 0
+        assert alone.do_step(0, 500 * fmu.experiment()[2]) == OK
+        assert instance["node.structural.2.X"] == alone["node.structural.2.X"]
+
+
+# ------------------------------------------------------------------ calls out of order
+
+def to_instantiated(i):
+    pass
+
+
+def to_initialization(i):
+    i.enter_initialization(0.0)
+
+
+def to_step(i):
+    i.initialize()
+
+
+def to_terminated(i):
+    i.initialize()
+    assert i.call("Terminate") == OK
+
+
+def to_error(i):
+    i.initialize()
+    assert i.do_step(0.0, -1.0) == ERROR
+
+
+def to_failed(i):
+    i.initialize()
+    assert i.do_step(0.0, 0.003) == DISCARD
+
+
+MODES = [to_instantiated, to_initialization, to_step, to_terminated, to_error, to_failed]
+# Allowed calls by mode, one letter a mode in the order of MODES. A discarded step leaves FMI 3 in Step Mode.
+CALLS = {
+    "SetupExperiment": ("x.....", None),
+    "EnterInitializationMode": ("x.....", "x....."),
+    "ExitInitializationMode": (".x....", ".x...."),
+    "Terminate": ("..x..x", "..x..x"),
+    "Reset": ("xxxxxx", "xxxxxx"),
+    "get": (".xxxxx", "xxxxxx"),
+    "set": ("xxx...", "xxx..x"),
+    "do_step": ("..x...", "..x..x"),
+    "get_state": ("xxxxxx", "xxxxxx"),
+    "derivative": (".xxxxx", ".xxxxx"),
+    "set_logging": ("xxxxxx", "xxxxxx"),
+    "CancelStep": ("......", None),
+    "EnterEventMode": ("......", "......"),
+    "EnterContinuousTimeMode": ("......", "......"),
+    "EnterStepMode": (None, "......"),
+    "EnterConfigurationMode": (None, "......"),
+    "EvaluateDiscreteStates": (None, "......"),
+}
+
+
+def perform(instance, call, fmu):
+    """Status of a call with right arguments."""
+    scalar = "node.structural.1.X" + ("[1]" if fmu.version == "2.0" else "")
+    force = "port.wing.loads.force" + ("[1,1]" if fmu.version == "2.0" else "")
+    try:
+        if call == "get":
+            instance[scalar]
+        elif call == "set":
+            instance[force] = [1.0] * fmu.sizes[force]
+        elif call == "do_step":
+            return instance.do_step(0.0, 0.01)
+        elif call == "get_state":
+            instance.free_state(instance.get_state())
+        elif call == "derivative":
+            instance.derivative([scalar], [force], [1.0] * fmu.sizes[force])
+        elif call == "set_logging":
+            return instance.set_logging(False, ["logEvents"])
+        elif call == "SetupExperiment":
+            instance.must(call, 0, ctypes.c_double(0), ctypes.c_double(0), 0, ctypes.c_double(0))
+        elif call == "EnterInitializationMode" and fmu.version == "3.0":
+            instance.enter_initialization(0.0)
+        else:
+            return instance.call(call)
+    except Failed as failed:
+        return failed.status
+    return OK
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("call", CALLS)
+def test_calls_are_allowed_in_the_states_that_the_standard_names(ports, call, standard):
+    allowed = CALLS[call][STANDARDS.index(standard)]
+    fmu = ports(standard)
+    for mode, letter in zip(MODES, allowed or ""):
+        with instance_of(fmu) as instance:
+            mode(instance)
+            instance.log.clear()
+            status = perform(instance, call, fmu)
+            assert status == (OK if letter == "x" else ERROR), f"{call} in {mode.__name__}: {instance.log}"
+            if letter != "x":
+                assert instance.log and instance.log[-1][:2] == (ERROR, "logStatusError")
+                assert perform(instance, "do_step", fmu) == ERROR  # the error ended the simulation
+                assert instance.call("Reset") == OK
+                instance.initialize()
+                assert perform(instance, "do_step", fmu) == OK
+
+
+# ------------------------------------------------------------------ bad input
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_bad_steps(ports, standard):
+    fmu = ports(standard)
+    for time, length, message in [(0.0, -0.01, "must be positive"), (0.0, 0.0, "must be positive"), (0.0, float("nan"), "must be positive"),
+                                  (0.5, 0.01, "stands at 0 s"), (float("nan"), 0.01, "stands at"), (0.0, 0.6, "after the stop time 0.5 s")]:
+        with instance_of(fmu) as instance:
+            instance.initialize(stop=0.5)
+            assert instance.do_step(time, length) == ERROR
+            assert message in instance.log[-1][2]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_bad_values(ports, standard):
+    fmu = ports(standard)
+    scalar = [name for name in fmu.names("input") if name.startswith("stream.push")][0]
+    output = fmu.names("output")[0]
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        assert instance.set_reals([fmu.reference(scalar)], [float("nan")] * fmu.sizes[scalar]) == DISCARD
+        instance[scalar] = [1.0] * fmu.sizes[scalar]
+        assert instance.set_reals([99999], [1.0]) == ERROR
+        assert "reference 99999" in instance.log[-1][2]
+    with instance_of(fmu) as instance:
+        assert instance.set_reals([fmu.reference(output)], [1.0] * fmu.sizes[output]) == ERROR
+        assert "neither an input nor a parameter" in instance.log[-1][2]
+    wrong_type = "SetInteger" if standard == "2" else "SetInt32"
+    with instance_of(fmu) as instance:
+        one = (ctypes.c_uint32 * 1)(fmu.reference(scalar))
+        assert instance.call(wrong_type, one, ctypes.c_size_t(1), (ctypes.c_int32 * 1)(1), ctypes.c_size_t(1)) == ERROR
+        assert "no variable is of type Int" in instance.log[-1][2]
+    if standard == "3":
+        with instance_of(fmu) as instance:
+            assert instance.set_reals([fmu.reference("port.wing.loads.force")], [1.0] * 5) == ERROR
+            assert "more than 5 values" in instance.log[-1][2]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_instances_need_their_resources_and_token(ports, tmp_path, standard):
+    fmu = ports(standard)
+    for options, message in [({"resources": str(tmp_path)}, "cannot read"), ({"token": "{other}"}, "the token"),
+                             ({"name": " "}, "name of the instance is empty")]:
+        refused = instance_of(fmu, **options)
+        assert not refused.handle and message in refused.log[-1][2]
+    damaged = tmp_path / "a b%"
+    shutil.copytree(fmu.resources, damaged)
+    with instance_of(fmu, resources=str(damaged)) as moved:
+        assert moved.handle
+    (damaged / "mbcosim.json").write_text("{}")
+    refused = instance_of(fmu, resources=str(damaged))
+    assert not refused.handle and "damaged" in refused.log[-1][2]
+    assert not instance_of(fmu, logging=False, token="{other}").log
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_null_instances_are_refused(ports, standard):
+    instance = instance_of(ports(standard), token="{other}")
+    assert instance.call("Terminate") == ERROR and instance.do_step(0.0, 0.01) == ERROR
+    instance.free()
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_a_step_that_fails_is_discarded_and_changes_nothing(ports, standard):
+    fmu = ports(standard)
+    push = ["stream.push"] if standard == "3" else ["stream.push[1]", "stream.push[2]"]
+    values = [0.0, -1e4]
+    with instance_of(fmu) as instance, instance_of(fmu) as other:
+        instance.initialize(), other.initialize()
+        outputs = fmu.names("output")
+        before, state = instance[outputs], instance.get_state()
+        for k, name in enumerate(push):
+            instance[name] = values if standard == "3" else [values[k]]
+        assert instance.do_step(0.0, 0.1) == DISCARD
+        assert any(status == DISCARD and category == "logStatusDiscard" for status, category, _ in instance.log)
+        assert instance[outputs] == before
+        instance.set_state(state)
+        assert instance.do_step(0.0, 0.1) == OK and other.do_step(0.0, 0.1) == OK
+        assert instance[outputs] == other[outputs]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_log_categories_can_be_switched(ports, standard):
+    with instance_of(ports(standard)) as instance:
+        assert any(category == "logEvents" for _, category, _ in instance.log)
+        assert instance.set_logging(False) == OK and instance.set_logging(True, ["logStatusDiscard"]) == OK
+        instance.initialize()
+        instance.log.clear()
+        assert instance.do_step(0.0, 0.003) == DISCARD and len(instance.log) == 1
+        instance.log.clear()
+        instance.set_logging(False, ["logStatusDiscard"])
+        instance.set_logging(False, ["no such"])
+        assert instance.log == []
+
+
+# ------------------------------------------------------------------ values
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_inputs_of_the_start_reach_the_first_accelerations(ports, standard):
+    fmu = ports(standard)
+    acceleration = "node.structural.1.XPP" + ("[2]" if standard == "2" else "")
+    force = "port.wing.loads.force" + ("[1,2]" if standard == "2" else "")
+    with instance_of(fmu) as instance:
+        instance.enter_initialization(0.0)
+        before = instance[acceleration]
+        instance[force] = [3.0] if standard == "2" else [0.0, 3.0, 0.0, 0.0, 0.0, 0.0]
+        after = instance[acceleration]
+        component = 0 if standard == "2" else 1
+        assert after[component] - before[component] == pytest.approx(1.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_derivatives_are_those_of_accelerations_by_forces(ports, standard):
+    fmu = ports(standard)
+    if standard == "2":
+        outputs, inputs, seed = [f"node.structural.1.XPP[{i}]" for i in (1, 2, 3)], ["port.wing.loads.force[2,2]"], [4.0]
+        expected = [0.0, 2.0, 0.0]
+    else:
+        outputs, inputs, seed = ["node.structural.1.XPP"], ["port.wing.loads.force"], [0, 0, 0, 1.0, 4.0, 0.0]
+        expected = [0.5, 2.0, 0.0]
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        before = instance.serialize(instance.get_state())
+        assert instance.derivative(outputs, inputs, seed) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+        assert instance.serialize(instance.get_state()) == before
+        assert "is no input" in fails(instance, lambda: instance.derivative(outputs, outputs, [1.0] * 3))
+
+
+def test_adjoint_derivatives_are_the_transpose(ports):
+    fmu = ports("3")
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        seed = instance.derivative(["node.structural.1.XPP"], ["port.wing.loads.force"], [0.0, 1.0, 0.0], "GetAdjointDerivative", 6)
+        assert seed == pytest.approx([0.0, 0.5, 0.0, 0.0, 0.5, 0.0], rel=1e-6, abs=1e-9)
+
+
+def test_points_of_a_port_move_with_their_node(ports):
+    fmu = ports("3")
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        for k in range(20):
+            assert instance.do_step(0.01 * k, 0.01) == OK
+        x, R = instance["node.structural.1.X"], instance["node.structural.1.R"]
+        v, w = instance["node.structural.1.XP"], instance["node.structural.1.Omega"]
+        arm = [0.5 * R[3 * i + 1] for i in range(3)]
+        turn = [w[1] * arm[2] - w[2] * arm[1], w[2] * arm[0] - w[0] * arm[2], w[0] * arm[1] - w[1] * arm[0]]
+        assert instance["port.wing.positions"] == pytest.approx([a + b for a, b in zip(x, arm)] + x, abs=1e-14)
+        assert instance["port.wing.velocities"] == pytest.approx([a + b for a, b in zip(v, turn)] + v, abs=1e-14)
+        assert instance["port.wing.orientations"] == R + R
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_variables_can_be_chosen(ports, standard):
+    fmu = ports(standard, "--inputs", "node.structural.1.load,node.parameter.7.x", "--outputs", "node.*.X,node.*.XP")
+    assert {name.split("[")[0] for name in fmu.names("input")} == {"node.structural.1.load.force", "node.structural.1.load.moment",
+                                                                   "node.parameter.7.x"}
+    assert {name.split("[")[0] for name in fmu.names("output")} == {"node.structural.1.X", "node.structural.1.XP"}
+    default = ports(standard)
+    assert default.names("parameter") == ["node.parameter.7.x"] and default.start("node.parameter.7.x") == [2.0]
+
+
+def test_wrong_selections_and_decks_are_refused(tmp_path):
+    def export(*arguments):
+        done = subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", *arguments, "-o", str(tmp_path / "x.fmu")], capture_output=True,
+                              text=True, timeout=60)
+        assert not (tmp_path / "x.fmu").exists()
+        return done.returncode, done.stderr
+
+    pendulum = os.path.join(MODELS, "pendulum.mbd")
+    assert export(pendulum, "--outputs", "nothing.*") == (
+        4, 'mbcosim fmu: --outputs: no variable that can be read matches "nothing.*"; `mbcosim describe` lists them\n')
+    assert export(pendulum, "--inputs", "node.structural.2.X")[0] == 4
+    bad = tmp_path / "bad.mbd"
+    bad.write_text("begin: nonsense;")
+    assert export(str(bad))[0] == 2
+    assert export(pendulum, "--fmi", "1")[0] == 4
+
+
+def test_only_functions_of_fmi_are_visible(ports):
+    names = subprocess.run(["nm", "-D", "--defined-only", ports("3").library_path], capture_output=True, text=True, check=True).stdout
+    visible = {line.split()[-1] for line in names.splitlines()}
+    assert "fmi3DoStep" in visible and "fmi2DoStep" in visible
+    assert all(name.startswith(("fmi2", "fmi3")) for name in visible)
+
+
+def test_equal_decks_make_equal_files(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", os.path.join(MODELS, "pendulum.mbd"), "-o",
+                        str(tmp_path / name / "p.fmu")], check=True, capture_output=True, timeout=60)
+    assert (tmp_path / "a" / "p.fmu").read_bytes() == (tmp_path / "b" / "p.fmu").read_bytes()
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_descriptions_meet_the_schema(exported, ports, standard):
+    schema = os.environ.get("MBCOSIM_FMI_SCHEMA", "")  # folder with fmi2/ and fmi3/ of the standard's own files
+    if not schema:
+        pytest.skip("MBCOSIM_FMI_SCHEMA is not set")
+    etree = pytest.importorskip("lxml.etree")
+    validator = etree.XMLSchema(etree.parse(os.path.join(schema, f"fmi{standard}", f"fmi{standard}ModelDescription.xsd")))
+    for fmu in [ports(standard)] + [exported(deck, standard) for deck in TUTORIALS]:
+        validator.assertValid(etree.parse(os.path.join(fmu.folder, "modelDescription.xml")))
+    if standard == "3":
+        terminals = etree.XMLSchema(etree.parse(os.path.join(schema, "fmi3", "fmi3TerminalsAndIcons.xsd")))
+        terminals.assertValid(etree.parse(os.path.join(ports("3").folder, "terminalsAndIcons", "terminalsAndIcons.xml")))
