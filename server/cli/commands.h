@@ -13,6 +13,7 @@ enum ExitCode {
   kDeckRefused = 2,
   kNumericalFailure = 3,
   kRefused = 4,
+  kPeerLost = 5,
   kInterrupted = 130
 };
 
@@ -20,6 +21,8 @@ struct RunOptions {
   std::string deck;    ///< path of the main file
   std::string prefix;  ///< of the result files; empty: the deck's path
   bool quiet = false;
+  bool deck_sockets = true;  ///< the sockets and files that the deck names are served
+  double peer_timeout = 60;  ///< longest wait for a code behind them [s]
 };
 
 struct ReduceCommand {

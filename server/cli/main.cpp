@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kFooter =
     "Exit codes: 0 done, 2 deck refused, 3 numerical failure, 4 refused or limit exceeded, "
-    "130 interrupted.\n"
+    "5 an external code is missing or lost, 130 interrupted.\n"
     "The daemon is `mbcosimd`; clients are under client_examples/.";
 
 /// `mbcosim reduce`: each option of a job is one of the command line too.
@@ -69,6 +69,14 @@ int main(int argc, char** argv) {
                       "default: the deck's name");
   run_app->add_flag("-q,--quiet", run_options.quiet,
                     "No progress bar and no summary on a terminal");
+  run_app->add_flag("!--no-deck-sockets", run_options.deck_sockets,
+                    "Open no socket and no file that the deck names for external codes: their "
+                    "values stay as they start");
+  run_app
+      ->add_option("--peer-timeout", run_options.peer_timeout,
+                   "Longest wait for an external code [s]")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e6));
   run_app->callback([&] { exit_code = run(run_options); });
 
   std::string deck;

@@ -1,8 +1,11 @@
+#include <algorithm>
+#include <cmath>
 
 #include "cli/commands.h"
 #include "cli/deck_report.h"
 #include "cli/interrupt.h"
 #include "cli/progress.h"
+#include "mbdyn/channels.h"
 #include "output/result_files.h"
 
 namespace mbcosim::cli {
@@ -45,6 +48,37 @@ ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& wr
   return done.outcome == StepOutcome::interrupted ? kInterrupted : kDone;
 }
 
+bool is_channel(const std::vector<const DeckChannel*>& channels, const std::string& port) {
+  return std::any_of(channels.begin(), channels.end(),
+                     [&](const DeckChannel* channel) { return channel->port == port; });
+}
+
+ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWriter>& writer,
+                          const InterruptGuard& interrupt, const RunOptions& options) try {
+  const CancelToken* cancel = interrupt.token();
+  const auto simulation = Simulation::prepare(model, writer);
+  mbdyn::Patience patience;
+  patience.time = std::chrono::milliseconds(std::llround(1000 * options.peer_timeout));
+  patience.cancelled = [cancel] { return cancel->cancelled(); };
+  mbdyn::Channels channels(deck_channels(*model), *simulation, patience);
+  if (const auto started = channels.start(cancel); !started) return complain(started.error());
+  while (!simulation->finished()) {
+    const StepReport report = channels.step(cancel);
+    if (report.error) return complain(*report.error);
+    if (report.outcome == StepOutcome::interrupted) return kInterrupted;
+    if (const auto name = channels.wants_end()) {
+      std::fprintf(stderr, "%s: the peer ended the run at t = %.10g s\n", name->c_str(),
+                   simulation->time());
+      return kPeerLost;
+    }
+  }
+  return kDone;
+} catch (const mbdyn::ChannelLost& lost) {
+  if (interrupt.token()->cancelled()) return kInterrupted;
+  std::fprintf(stderr, "error: %s\n", lost.what());
+  return kPeerLost;
+}
+
 }  // namespace
 
 int run(const RunOptions& options) {
@@ -53,13 +87,18 @@ int run(const RunOptions& options) {
   std::fputs(report.printed.c_str(), stdout);
   print_diagnostics(report.diagnostics, stderr);
   if (!report.ok()) return exit_code_of(report);
+  const std::vector<const DeckChannel*> channels = deck_channels(*report.model);
+  const bool coupled = options.deck_sockets && !channels.empty();
   for (const StructuralPort& port : report.model->structural_ports)
-    std::fprintf(stderr, "note: nobody is coupled to port \"%s\"; its loads stay zero\n",
-                 port.name.c_str());
+    if (!coupled || !is_channel(channels, port.name))
+      std::fprintf(stderr, "note: nobody is coupled to port \"%s\"; its loads stay zero\n",
+                   port.name.c_str());
 
   const auto writer =
       make_result_writer(*report.model, options.prefix.empty() ? options.deck : options.prefix);
-  const ExitCode exit_code = simulate(report.model, writer, interrupt.token(), options.quiet);
+  const ExitCode exit_code = coupled
+                                 ? simulate_coupled(report.model, writer, interrupt, options)
+                                 : simulate(report.model, writer, interrupt.token(), options.quiet);
   const auto written = writer->finish();
   if (!written) return complain(written.error());
   return exit_code;

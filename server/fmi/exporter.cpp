@@ -123,9 +123,12 @@ void count(const std::vector<Entry>& entries, ExportReport& report) {
 }  // namespace
 
 mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
-  const FolderSource folder(".", /*unrestricted=*/true);
+  const fs::path path(options.deck);
+  const FolderSource folder(path.has_parent_path() ? path.parent_path().string() : ".",
+                            /*unrestricted=*/true);
   const RecordingSource source(folder);
-  const LoadReport loaded = load_deck(source, options.deck);
+  const std::string main_file = path.filename().string();
+  const LoadReport loaded = load_deck(source, main_file);
   report.diagnostics = loaded.diagnostics;
   if (!loaded.ok()) return refused(ErrorKind::deck, "the deck is refused");
   const Model& model = *loaded.model;
@@ -139,7 +142,7 @@ mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
 
   Manifest manifest;
   std::map<std::string, std::string> archive;
-  manifest.deck = options.deck;
+  manifest.deck = main_file;
   manifest.digest = hexadecimal(model.digest);
   for (const Entry& e : *entries) manifest.variables.push_back(e.variable);
   add_files(source.files(), manifest, archive);

@@ -514,13 +514,16 @@ def test_equal_decks_make_equal_files(tmp_path):
 
 @pytest.mark.parametrize("standard", STANDARDS)
 def test_descriptions_meet_the_schema(exported, ports, standard):
-    schema = os.environ.get("MBCOSIM_FMI_SCHEMA", "")  # folder with fmi2/ and fmi3/ of the standard's own files
-    if not schema:
-        pytest.skip("MBCOSIM_FMI_SCHEMA is not set")
-    etree = pytest.importorskip("lxml.etree")
-    validator = etree.XMLSchema(etree.parse(os.path.join(schema, f"fmi{standard}", f"fmi{standard}ModelDescription.xsd")))
-    for fmu in [ports(standard)] + [exported(deck, standard) for deck in TUTORIALS]:
-        validator.assertValid(etree.parse(os.path.join(fmu.folder, "modelDescription.xml")))
+    schema = os.environ.get("MBCOSIM_FMI_SCHEMA", "")  # folder with fmi2/ and fmi3/, the standard's own files
+    if not schema or not shutil.which("xmllint"):
+        pytest.skip("MBCOSIM_FMI_SCHEMA is not set, or there is no xmllint")
+
+    def validate(name, *paths):
+        command = ["xmllint", "--noout", "--schema", os.path.join(schema, f"fmi{standard}", name), *paths]
+        checked = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        assert checked.returncode == 0, checked.stderr
+
+    fmus = [ports(standard)] + [exported(deck, standard) for deck in TUTORIALS]
+    validate(f"fmi{standard}ModelDescription.xsd", *[os.path.join(fmu.folder, "modelDescription.xml") for fmu in fmus])
     if standard == "3":
-        terminals = etree.XMLSchema(etree.parse(os.path.join(schema, "fmi3", "fmi3TerminalsAndIcons.xsd")))
-        terminals.assertValid(etree.parse(os.path.join(ports("3").folder, "terminalsAndIcons", "terminalsAndIcons.xml")))
+        validate("fmi3TerminalsAndIcons.xsd", os.path.join(ports("3").folder, "terminalsAndIcons", "terminalsAndIcons.xml"))

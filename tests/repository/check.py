@@ -29,7 +29,8 @@ ARROWS = {
     "src/reduction": {"math", "model", "input", "elements", "solver"},  # elements: the FEM data file
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
     "server/fmi": {"math", "model", "solver", "input", "simulation"},
-    "server/cli": {"math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
+    "server/mbdyn": {"math", "model", "elements", "simulation"},
+    "server/cli": {"mbdyn", "math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/wire": {"model", "simulation", "mbcosim"},
     "server/coupling": {"math", "model", "simulation", "wire", "mbcosim"},
     "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "wire", "mbcosim", "shared_memory"},

@@ -10,58 +10,71 @@ namespace mbcosim {
 
 namespace {
 
-/// A socket of the reference solver: the words are read, the peer attaches to a port instead.
-void skip_socket(Card& card) {
-  if (card.keyword("create")) card.yes_no("create");
-  if (card.one_of({"path", "local"}) >= 0) {
-    card.quoted("path");
-  } else {
-    if (card.keyword("port")) card.integer("port");
-    if (card.keyword("host")) card.quoted("host");
-  }
-  if (card.keyword("socket type")) card.required("socket type", {"tcp", "udp"});
-  card.one_of({"signal", "no signal"});
+/// `"in" [, unlink], "out" [, no clobber]`
+ChannelAddress read_files(Card& card) {
+  ChannelAddress address;
+  address.kind = ChannelAddress::Kind::files;
+  address.in = card.quoted("file to read");
+  address.unlink = card.keyword("unlink");
+  address.out = card.quoted("file to write");
+  address.no_clobber = card.keyword("no clobber");
+  return address;
 }
 
-/// Name of the port: `grpc, port, "name"`, or "external<label>" for a socket.
-std::string read_communicator(Card& card, int label) {
+ChannelAddress read_socket(Card& card) {
+  const ChannelAddress address = read_channel_address(card, 0);
+  if (address.kind == ChannelAddress::Kind::udp)
+    card.fail("external forces do not work over UDP", "write `socket type, tcp`");
+  card.one_of({"signal", "no signal"});
+  return address;
+}
+
+/// Name of the port: `grpc, port, "name"`, or "external<label>" for a socket and files.
+std::string read_communicator(Card& card, int label, DeckChannel& channel) {
   const SourceSpan where = card.next();
-  if (card.at_string() || card.peek_word() == "edge")
-    card.fail_at(
-        where, "peers that exchange files are not supported",
-        "write `grpc, port, \"name\"`; the peer attaches to the daemon's port of that name");
-  if (card.required("communicator", {"grpc", "socket"}) == 0) {
+  if (card.peek_word() == "edge")
+    card.fail_at(where, "peers that exchange files of EDGE are not supported",
+                 "write `socket, ...` or `grpc, port, \"name\"`");
+  if (card.at_string()) {
+    channel.address = read_files(card);
+  } else if (card.required("communicator", {"grpc", "socket"}) == 0) {
     if (!card.keyword("port"))
       card.fail_expected("`port` expected after `grpc`", "write `grpc, port, \"name\"`");
     return card.quoted("name of the port");
+  } else {
+    channel.address = read_socket(card);
   }
-  skip_socket(card);
-  const std::string name = "external" + std::to_string(label);
-  card.warn_at(where,
-               "the socket is not opened; peers attach to the daemon's port \"" + name + "\"",
-               "write `grpc, port, \"name\"`");
-  return name;
+  return "external" + std::to_string(label);
 }
 
-PortCoupling read_coupling(Card& card) {
-  if (!card.keyword("coupling")) return PortCoupling::loose;
+void read_coupling(Card& card, DeckChannel& channel) {
+  ChannelTiming& timing = channel.timing;
   const SourceSpan where = card.next();
-  if (card.keyword("none"))
-    card.fail_at(where, "coupling `none` is not supported",
-                 "subscribe to the nodes' variables instead; no port is needed to watch");
+  if (card.keyword("none")) {
+    if (channel.address.kind == ChannelAddress::Kind::port)
+      card.fail_at(where, "coupling `none` is not supported",
+                   "subscribe to the nodes' variables instead; no port is needed to watch");
+    timing.listens = timing.send_after_predict = false;
+    timing.coupling = PortCoupling::staggered;
+    return;
+  }
   switch (card.one_of({"staggered", "loose", "tight"})) {
     case 0:
-      return PortCoupling::staggered;
+      timing.coupling = PortCoupling::staggered;
+      timing.send_after_predict = false;
+      return;
     case 1:
-      return PortCoupling::loose;
+      return;
     case 2:
-      return PortCoupling::tight;
+      timing.coupling = PortCoupling::tight;
+      return;
     default:
-      if (card.integer("coupling") < 1)
+      timing.coupling = PortCoupling::tight;
+      timing.every = card.integer("coupling");
+      if (timing.every < 1)
         card.fail(
             "coupling must be `staggered`, `loose`, `tight` or a number of "
             "iterations, at least 1");
-      return PortCoupling::tight;
   }
 }
 
@@ -103,54 +116,89 @@ void check_accelerations(Card& card, const StructuralPort& port) {
 
 void read_external_structural(Card& card, ElementInfo& info) {
   StructuralPort port;
-  port.name = read_port_name(card, info.label);
-  port.coupling = read_port_timing(card);
-  read_port_options(card, port);
+  DeckChannel channel;
+  port.name = read_port_name(card, info.label, channel);
+  port.coupling = read_port_timing(card, channel);
+  read_port_options(card, port, channel);
   read_points(card, port);
   check_accelerations(card, port);
-  if (card.keyword("echo"))
-    card.fail("`echo` is not supported",
-              "leave it out; DescribeSimulation tells the port's layout");
+  read_port_echo(card, channel);
   const bool kinematics = card.keyword("kinematics");
   port.memory = card.builder().allocate_memory(port.load_size());
   card.model().structural_ports.push_back(port);
+  keep_channel(card, std::move(channel));
   add_general_element(card.builder(), info,
                       std::make_unique<ExternalStructural>(std::move(port), kinematics));
 }
 
 }  // namespace
 
-std::string read_port_name(Card& card, int label) {
+std::string read_port_name(Card& card, int label, DeckChannel& channel) {
   const SourceSpan where = card.next();
-  std::string name = read_communicator(card, label);
-  if (name.empty()) card.fail_at(where, "the name of the port is empty");
-  if (has_port(card.model(), name))
-    card.fail_at(where, "there is a port named \"" + name + "\" already");
-  return name;
+  channel.port = read_communicator(card, label, channel);
+  channel.card = "force " + std::to_string(label);
+  if (channel.port.empty()) card.fail_at(where, "the name of the port is empty");
+  if (has_port(card.model(), channel.port))
+    card.fail_at(where, "there is a port named \"" + channel.port + "\" already");
+  return channel.port;
 }
 
-PortCoupling read_port_timing(Card& card) {
-  if (card.keyword("sleep time")) card.real("sleep time");
-  if (card.keyword("precision") && !card.keyword("default")) card.integer("precision");
-  const PortCoupling coupling = read_coupling(card);
-  if (card.keyword("send after predict")) card.yes_no("send after predict");
-  return coupling;
+PortCoupling read_port_timing(Card& card, DeckChannel& channel) {
+  ChannelAddress& address = channel.address;
+  if (card.keyword("sleep time")) {
+    address.sleep_time = card.real("sleep time");
+    if (!(address.sleep_time > 0)) card.fail("the sleep time must be positive");
+  }
+  if (card.keyword("precision") && !card.keyword("default")) {
+    address.precision = card.integer("precision");
+    if (address.precision < 1 || address.precision > 17)
+      card.fail("the precision must be from 1 to 17 digits");
+  }
+  ChannelTiming& timing = channel.timing;
+  if (card.keyword("coupling")) read_coupling(card, channel);
+  if (card.keyword("send after predict")) {
+    const bool wanted = card.yes_no("send after predict");
+    if (timing.send_after_predict) timing.send_after_predict = wanted;
+  }
+  if (timing.coupling == PortCoupling::loose && !timing.send_after_predict)
+    timing.coupling = PortCoupling::staggered;
+  return timing.coupling;
 }
 
-void read_port_options(Card& card, StructuralPort& port) {
+void read_port_options(Card& card, StructuralPort& port, DeckChannel& channel) {
   if (card.keyword("reference node")) port.reference = card.structural_node();
-  if (card.keyword("labels")) card.yes_no("labels");  // the layout of the port always has them
-  if (card.keyword("sorted")) card.yes_no("sorted");
-  if (card.keyword("orientation")) port.orientation = read_orientation(card);
+  if (card.keyword("labels")) channel.labels = card.yes_no("labels");
+  if (card.keyword("sorted")) channel.sorted = card.yes_no("sorted");
+  if (!channel.sorted && !channel.labels && channel.address.kind != ChannelAddress::Kind::port)
+    card.fail("`sorted, no` needs labels", "write `labels, yes` before it");
+  if (card.keyword("orientation")) {
+    channel.rotations = card.peek_word() != "none";
+    port.orientation = read_orientation(card);
+  }
   if (card.keyword("accelerations")) port.accelerations = card.yes_no("accelerations");
+  channel.accelerations = port.accelerations;
   port.use_reference_loads = port.reference >= 0;
   if (!card.keyword("use reference node forces")) return;
   if (port.reference < 0) card.fail("`use reference node forces` needs a `reference node`");
   port.use_reference_loads = card.yes_no("use reference node forces");
-  if (port.use_reference_loads && card.keyword("rotate reference node forces") &&
-      !card.yes_no("rotate reference node forces"))
+  if (!port.use_reference_loads || !card.keyword("rotate reference node forces")) return;
+  channel.rotate_reference_loads = card.yes_no("rotate reference node forces");
+  if (!channel.rotate_reference_loads && channel.address.kind == ChannelAddress::Kind::port)
     card.fail("the loads on the reference node travel in the frame of the others",
               "leave `rotate reference node forces` out");
+}
+
+void read_port_echo(Card& card, DeckChannel& channel) {
+  if (!card.keyword("echo")) return;
+  if (channel.address.kind == ChannelAddress::Kind::port)
+    card.fail("`echo` is not supported",
+              "leave it out; DescribeSimulation tells the port's layout");
+  channel.echo = card.quoted("echo");
+}
+
+void keep_channel(Card& card, DeckChannel channel) {
+  if (channel.address.kind != ChannelAddress::Kind::port)
+    card.builder().on_step(std::make_shared<DeckChannel>(std::move(channel)));
 }
 
 void register_external_forces(Registry& registry) {

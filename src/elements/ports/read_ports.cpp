@@ -128,9 +128,13 @@ MatX read_mapping(Card& card, StructuralPort& port) {
 
 void read_external_mapping(Card& card, ElementInfo& info) {
   StructuralPort points;
-  points.name = read_port_name(card, info.label);
-  points.coupling = read_port_timing(card);
-  read_port_options(card, points);
+  DeckChannel channel;
+  channel.content = DeckChannel::Content::mapped;
+  points.name = read_port_name(card, info.label, channel);
+  points.coupling = read_port_timing(card, channel);
+  read_port_options(card, points, channel);
+  if (channel.labels && channel.address.kind != ChannelAddress::Kind::port)
+    card.fail("the messages of a mapping have no labels", "write `labels, no`");
   if (points.use_reference_loads)
     card.fail("the peer of a mapping gives forces on its points, none on the reference node",
               "write `use reference node forces, no`");
@@ -141,6 +145,7 @@ void read_external_mapping(Card& card, ElementInfo& info) {
   if (card.keyword("echo"))
     card.fail("`echo` is not supported",
               "leave it out; DescribeSimulation tells the port's layout");
+  keep_channel(card, std::move(channel));
   ElementPort port;
   port.kind = ElementPort::Kind::mapped;
   port.name = points.name;
@@ -156,8 +161,10 @@ void read_external_mapping(Card& card, ElementInfo& info) {
 // ------------------------------------------------------------------ external modal
 
 void read_external_modal(Card& card, ElementInfo& info) {
-  const std::string name = read_port_name(card, info.label);
-  const PortCoupling coupling = read_port_timing(card);
+  DeckChannel channel;
+  channel.content = DeckChannel::Content::modal;
+  const std::string name = read_port_name(card, info.label, channel);
+  const PortCoupling coupling = read_port_timing(card, channel);
   const ModalJointSet* joints = nullptr;
   int node = -1, joint = -1;
   if (card.keyword("reference node")) {
@@ -180,6 +187,7 @@ void read_external_modal(Card& card, ElementInfo& info) {
       card.fail("external modal: this type needs a modal node; the joint is clamped");
     if (type != 0 && !joints) card.fail("external modal: this type needs a modal joint");
   }
+  keep_channel(card, std::move(channel));
   ElementPort port;
   if (joints) {
     port = modal_port(card.model(), *joints, joint, type != 1, type != 0);
@@ -197,8 +205,21 @@ void read_external_modal(Card& card, ElementInfo& info) {
 
 // ------------------------------------------------------------------ stream output
 
-/// What stands before the content: name, address (without meaning here) and flags.
-ElementPort read_stream_head(Card& card) {
+void read_stream_flags(Card& card, DeckChannel& channel) {
+  enum { signal, no_signal, blocking, non_blocking, send_first, no_send_first, abort, go_on };
+  for (;;) {
+    const int flag = card.one_of({"signal", "no signal", "blocking", "non blocking", "send first",
+                                  "no send first", "abort if broken", "do not abort if broken"});
+    if (flag < 0) return;
+    if (flag == blocking || flag == non_blocking) channel.blocking = flag == blocking;
+    if (flag == send_first || flag == no_send_first) channel.at_start = flag == send_first;
+    if (flag == abort || flag == go_on) channel.abort_if_broken = flag == abort;
+  }
+}
+
+/// What stands before the content: name, address and flags.
+ElementPort read_stream_head(Card& card, DeckChannel& channel) {
+  constexpr int kDefaultPort = 9011;
   ElementPort port;
   if (card.one_of({"stream name", "name"}) < 0)
     card.fail_expected("stream output: `stream name` expected");
@@ -207,27 +228,20 @@ ElementPort read_stream_head(Card& card) {
   if (port.name.empty()) card.fail_at(where, "the name of the stream is empty");
   if (has_port(card.model(), port.name))
     card.fail_at(where, "there is a port named \"" + port.name + "\" already");
-  if (card.keyword("create")) card.yes_no("create");
-  if (!card.keyword("grpc")) {
-    if (card.one_of({"local", "path"}) >= 0)
-      card.quoted("path");
-    else {
-      if (card.keyword("port")) card.integer("port");
-      if (card.keyword("host")) card.quoted("host");
-    }
-  }
-  if (card.keyword("socket type")) card.required("socket type", {"tcp", "udp"});
-  while (card.one_of({"signal", "no signal", "blocking", "non blocking", "send first",
-                      "no send first", "abort if broken", "do not abort if broken"}) >= 0) {
-  }
+  channel.content = DeckChannel::Content::output;
+  channel.port = port.name;
+  channel.card = "stream output \"" + port.name + "\"";
+  channel.address = read_channel_address(card, kDefaultPort);
+  read_stream_flags(card, channel);
   if (card.keyword("output every")) {
-    port.every = card.integer("steps between two outputs");
+    port.every = channel.every = card.integer("steps between two outputs");
     if (port.every < 1)
       card.fail("stream output: the steps between two outputs must be at least 1");
   }
-  if (card.keyword("echo"))
-    card.fail("stream output: `echo` is not supported",
-              "leave it out; the service's telemetry and records tell what is sent");
+  if (channel.address.kind == ChannelAddress::Kind::port && card.peek_word() == "echo")
+    card.fail_at(card.next(), "stream output: `echo` is not supported",
+                 "leave it out; the service's telemetry and records tell what is sent");
+  read_channel_echo(card, channel);
   return port;
 }
 
@@ -293,7 +307,8 @@ void name_motion(const Model& model, const std::vector<StreamOutput::Motion>& mo
 }
 
 void read_stream_output(Card& card, ElementInfo& info, bool only_motion) {
-  ElementPort port = read_stream_head(card);
+  DeckChannel channel;
+  ElementPort port = read_stream_head(card, channel);
   std::vector<StreamOutput::Value> values;
   std::vector<StreamOutput::Motion> motion;
   std::vector<int> nodes;
@@ -305,9 +320,8 @@ void read_stream_output(Card& card, ElementInfo& info, bool only_motion) {
   } else {
     values = read_stream_values(card, port);
   }
-  if (card.keyword("modifier") && card.required("modifier", {"copy", "copy cast"}) == 1)
-    card.fail("stream output: `copy cast` is not supported",
-              "messages of the service carry real numbers; leave the modifier out");
+  read_channel_modifier(card, static_cast<int>(port.output_names.size()), channel);
+  keep_channel(card, std::move(channel));
   port.output_size = static_cast<int>(port.output_names.size());
   add_general_element(card.builder(), info,
                       std::make_unique<StreamOutput>(std::move(port), std::move(values),

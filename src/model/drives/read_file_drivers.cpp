@@ -1,5 +1,6 @@
 #include <charconv>
 
+#include "model/deck_channel.h"
 #include "model/drives/file_driver.h"
 #include "model/drives/readers.h"
 #include "model/model.h"
@@ -124,62 +125,58 @@ std::vector<double> read_initial_values(Card& card, int channels) {
   return values;
 }
 
-/// Where the peer would be: kept by the reference solver's sockets; here peers attach to the port
-/// by its name.
-void skip_address(Card& card) {
-  if (card.keyword("grpc")) return;
-  if (card.one_of({"local", "path"}) >= 0) {
-    card.quoted("path");
-  } else {
-    if (card.keyword("port")) card.integer("port");
-    if (card.keyword("host")) card.quoted("host");
-  }
-}
-
-void skip_flags(Card& card) {
-  for (;;) {
-    if (card.one_of({"signal", "no signal", "blocking", "non blocking"}) >= 0) continue;
-    return;
-  }
-}
-
-/// modifier, { copy | copy cast, ... }: the layout of messages on a socket, of no meaning here.
-void read_modifier(Card& card) {
-  if (!card.keyword("modifier")) return;
-  if (card.required("modifier", {"copy", "copy cast"}) == 1)
-    card.fail("stream: `copy cast` is not supported",
-              "messages of the service carry real numbers; leave the modifier out");
+/// Keeps what the card says with the model, unless the stream is a port of the daemon.
+void keep_channel(Card& card, DeckChannel channel, const StreamInput& stream) {
+  channel.port = stream.name;
+  channel.card = "stream drive \"" + stream.name + "\"";
+  channel.every = stream.every;
+  channel.at_start = stream.receive_first;
+  if (channel.address.kind != ChannelAddress::Kind::port)
+    card.builder().on_step(std::make_shared<DeckChannel>(std::move(channel)));
 }
 
 FileDriverPtr read_stream(Card& card) {
+  constexpr int kDefaultPort = 9012;
   StreamInput stream;
+  DeckChannel channel;
+  channel.content = DeckChannel::Content::input;
   stream.where = card.next();
   if (card.one_of({"name", "stream drive name"}) < 0) card.fail_expected("stream: `name` expected");
   stream.name = card.quoted("name");
-  if (card.keyword("create")) card.yes_no("create");
-  skip_address(card);
-  if (card.keyword("socket type")) card.required("socket type", {"tcp", "udp"});
-  skip_flags(card);
+  channel.address = read_channel_address(card, kDefaultPort);
+  if (channel.address.kind == ChannelAddress::Kind::udp)
+    card.fail("stream: input over UDP is not supported", "write `socket type, tcp`");
+  for (;;) {
+    const int flag = card.one_of({"signal", "no signal", "blocking", "non blocking"});
+    if (flag < 0) break;
+    if (flag >= 2) channel.blocking = flag == 2;
+  }
   if (card.keyword("input every")) stream.every = read_count(card, "steps between two inputs");
   if (card.keyword("receive first")) stream.receive_first = card.yes_no("receive first");
-  if (card.keyword("timeout")) card.real("timeout");
-  if (card.keyword("echo"))
-    card.fail("stream: `echo` is not supported",
-              "leave it out; the service's telemetry records what is received");
+  if (card.keyword("timeout")) {
+    channel.timeout = card.real("timeout");
+    if (!(channel.timeout > 0)) card.fail("stream: the timeout must be positive");
+  }
+  if (channel.address.kind == ChannelAddress::Kind::port && card.peek_word() == "echo")
+    card.fail_at(card.next(), "stream: `echo` is not supported",
+                 "leave it out; the service's telemetry records what is received");
+  read_channel_echo(card, channel);
   stream.channels = read_stream_channels(card);
   const std::vector<double> initial = read_initial_values(card, stream.channels);
-  read_modifier(card);
+  read_channel_modifier(card, stream.channels, channel);
+  keep_channel(card, std::move(channel), stream);
   return add_stream(card, std::move(stream), initial);
 }
 
 FileDriverPtr read_socket(Card& card) {
+  constexpr int kDefaultPort = 5555;
   StreamInput stream;
   stream.where = card.next();
   stream.channels = read_stream_channels(card);
   stream.name = "socket" + std::to_string(card.model().stream_inputs.size() + 1);
   const std::vector<double> initial = read_initial_values(card, stream.channels);
-  skip_address(card);
-  while (card.more()) {  // authentication: the daemon has its own
+  (void)read_channel_address(card, kDefaultPort);  // peers attach to the port by its name
+  while (card.more()) {                            // authentication: the daemon has its own
     if (card.at_string())
       card.quoted("authentication");
     else

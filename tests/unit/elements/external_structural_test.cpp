@@ -143,8 +143,16 @@ TEST(ExternalStructuralCard, AReferenceNodeTakesTheTotalUnlessToldOtherwise) {
 }
 
 TEST(ExternalStructuralCard, RefusesWhatItDoesNotServe) {
-  EXPECT_EQ(refusal("\"in.dat\", \"out.dat\", 1, 2"),
-            "force 5 (external structural): peers that exchange files are not supported");
+  EXPECT_EQ(refusal("EDGE, \"flag\", \"data\", 1, 2"),
+            "force 5 (external structural): peers that exchange files of EDGE are not supported");
+  EXPECT_EQ(refusal("socket, create, yes, 1, 2"),
+            "force 5 (external structural): the address of the socket is missing");
+  EXPECT_EQ(refusal("socket, port, 70000, 1, 2"),
+            "force 5 (external structural): a port is a number from 1 to 65535, got 70000");
+  EXPECT_EQ(refusal("socket, port, 7000, socket type, udp, 1, 2"),
+            "force 5 (external structural): external forces do not work over UDP");
+  EXPECT_EQ(refusal("socket, path, \"p\", sorted, no, 1, 2"),
+            "force 5 (external structural): `sorted, no` needs labels");
   EXPECT_EQ(refusal("grpc, port, \"a\", coupling, none, 1, 2"),
             "force 5 (external structural): coupling `none` is not supported");
   EXPECT_EQ(refusal("grpc, port, \"\", 1, 2"),

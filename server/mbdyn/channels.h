@@ -1,0 +1,50 @@
+/// All channels of a deck, carried out: `mbcosim run` obeys the sockets and files that a deck
+/// names.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbdyn/force_dialogue.h"
+#include "mbdyn/link.h"
+#include "mbdyn/stream.h"
+
+namespace mbcosim::mbdyn {
+
+/// Channels of a prepared simulation. Every wait ends within the patience; what goes wrong is
+/// thrown as ChannelLost, out of `Simulation::step` and `start`, too, and names the channel.
+class Channels {
+ public:
+  /// Opens and connects all: listening sockets first, so that codes may come in any order.
+  Channels(const std::vector<const DeckChannel*>& channels, Simulation& simulation,
+           const Patience& patience);
+  ~Channels();
+  Channels(const Channels&) = delete;
+  Channels& operator=(const Channels&) = delete;
+
+  /// Starts the simulation, and takes steps; like the methods of the same name.
+  Status start(const CancelToken* cancel);
+  StepReport step(const CancelToken* cancel);
+  /// A code has asked for the end of the run: its name.
+  std::optional<std::string> wants_end() const;
+  /// Tells the codes that the run is over.
+  void end();
+
+ private:
+  void open(const DeckChannel& channel, std::unique_ptr<Link> link);
+  void step_begins();
+  void converged();
+  void observe(StartEvent event);
+  bool exchange(int iteration, bool in_derivatives);
+
+  Simulation& simulation_;
+  const Patience patience_;
+  std::vector<std::unique_ptr<ForceDialogue>> forces_;
+  std::vector<std::unique_ptr<StreamSender>> senders_;
+  std::vector<std::unique_ptr<StreamReceiver>> receivers_;
+  bool ended_ = false;
+};
+
+}  // namespace mbcosim::mbdyn

@@ -1,0 +1,595 @@
+"""`mbcosim run` with decks that name sockets and files: bytes and numbers as MBDyn has them, and peers that misbehave.
+
+Expected bytes and numbers were recorded from runs of MBDyn with peers of the same behaviour; decks stand below.
+"""
+import os
+import socket
+import struct
+import subprocess
+import threading
+import time
+
+import numpy as np
+import pytest
+
+BIN = os.environ["MBCOSIM_BIN"]
+SLOW = float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
+RUN = """begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: {end}; time step: 1e-2; tolerance: 1e-10; max iterations: 20;
+derivatives tolerance: 1e-4; derivatives max iterations: 10; end: initial value;
+begin: control data; structural nodes: 2; rigid bodies: 2; {counts} output precision: 16; default orientation: orientation matrix; end: control data;
+begin: nodes; structural: 1, dynamic, 1.,2.,3., euler123, .1,.2,.3, .1,.2,.3, 0.,0.,1.;
+structural: 2, dynamic, {node2}; end: nodes;
+{drivers}
+begin: elements; body: 1, 1, 1., null, eye; body: 2, 2, 1., null, eye;
+{cards} end: elements;
+"""
+FREE = "2.,-1.,1.5, eye, null, 1.,0.,0."
+TURNED = "2.,-1.,1.5, euler123, .2,.3,-.1, .5,.6,.7, 1.,2.,3."
+LOADS = np.array([[1.0, 0, 0], [0, 2.0, 0]]).tobytes() + np.array([[0, 0, 0.1], [0, 0, 0]]).tobytes()
+
+
+def deck(cards, end=0.02, counts="forces: 1;", drivers="", node2=FREE):
+    return RUN.format(cards=cards, end=end, counts=counts, drivers=drivers, node2=node2)
+
+
+def force(options="", points="1, offset, .1,0.,0., 2", count=2, address='socket, create, yes, path, "s"'):
+    return deck(f"force: 5, external structural, {address}, {options} {count}, {points};")
+
+
+class Run:
+    """`mbcosim run` of a deck in a folder of its own; `peer` connects to, or accepts from, its sockets."""
+
+    def __init__(self, folder, text, *options):
+        self.folder = str(folder)
+        with open(os.path.join(self.folder, "deck"), "w") as file:
+            file.write(text)
+        self.process = subprocess.Popen([os.path.join(BIN, "mbcosim"), "run", "deck", "-o", "out", *options], cwd=self.folder,
+                                        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def connect(self, name="s"):
+        """Peer of a Unix socket (name) or a TCP port on which the run listens."""
+        end = time.monotonic() + 20 * SLOW
+        while True:
+            if isinstance(name, str):
+                peer, address = socket.socket(socket.AF_UNIX), os.path.join(self.folder, name)
+            else:
+                peer, address = socket.socket(), ("127.0.0.1", name)
+            try:
+                peer.connect(address)
+                peer.settimeout(20 * SLOW)
+                return peer
+            except OSError:
+                peer.close()
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.02)
+
+    def finish(self):
+        _, self.errors = self.process.communicate(timeout=60 * SLOW)
+        return self.process.returncode
+
+    def rows(self, extension="mov"):
+        with open(os.path.join(self.folder, "out." + extension)) as file:
+            return [line.split() for line in file]
+
+    def last(self, node):
+        """x, R, v, w of the last record."""
+        row = [float(x) for x in [r for r in self.rows() if r[0] == str(node)][-1][1:]]
+        return row[:3], row[3:12], row[12:15], row[15:18]
+
+
+@pytest.fixture
+def run(tmp_path):
+    runs = []
+
+    def start(text, *options):
+        runs.append(Run(tmp_path, text, *options))
+        return runs[-1]
+
+    yield start
+    for each in runs:
+        if each.process.poll() is None:
+            each.process.kill()
+        each.process.communicate()
+
+
+def receive(peer, size):
+    data = b""
+    while len(data) < size:
+        more = peer.recv(size - len(data))
+        if not more:
+            raise EOFError(f"closed after {len(data)} of {size} bytes")
+        data += more
+    return data
+
+
+def shake(peer, flags, count):
+    peer.sendall(b"\7" + struct.pack("<II", flags, count))
+    assert receive(peer, 1) == b"\10"
+
+
+def talk(peer, size, answers):
+    """Answers messages of `size` bytes after the command until the run ends; returns [(command, data)]."""
+    messages = []
+    while True:
+        command = receive(peer, 1)[0]
+        if command == 5:
+            assert peer.recv(1) == b""
+            return messages
+        messages.append((command, receive(peer, size)))
+        answer = answers(len(messages))
+        if answer:
+            peer.sendall(answer)
+
+
+# ------------------------------------------------------------------ sequences
+
+def test_loose_sequence(run):
+    done = run(force())
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    messages = talk(peer, 288, lambda _: b"\6" + LOADS)
+    assert [command for command, _ in messages] == [6, 6, 6]
+    assert messages[0][1][:8].hex() == "87b09979817ff13f"
+    assert done.finish() == 0, done.errors
+
+
+def test_loose_numbers(run):
+    done = run(deck('force: 5, external structural, socket, create, yes, path, "s", 2, 1, offset, .1,0.,0., 2;', end=0.03))
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    talk(peer, 288, lambda _: b"\6" + LOADS)
+    assert done.finish() == 0
+    x, _, v, w = done.last(1)
+    assert (x[0], v[0], w[2]) == pytest.approx((1.00345000023, 0.130000010, 1.00201902417), abs=2e-10)
+    x, _, v, _ = done.last(2)
+    assert (x[1], v[1]) == pytest.approx((-0.9990999995, 0.06000002), abs=2e-10)
+
+
+def test_tight_sequence_and_numbers(run):
+    done = run(deck('force: 5, external structural, socket, create, yes, path, "s", coupling, tight, 2, 1, offset, .1,0.,0., 2;', end=0.03))
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    messages = talk(peer, 288, lambda k: (b"\6" if k % 3 == 0 else b"\2") + LOADS)
+    assert [command for command, _ in messages] == [2] * 9
+    first = np.frombuffer(messages[0][1])
+    assert first[:6] == pytest.approx([1.09431, 2.03423, 2.98707, 2, -1, 1.5], abs=6e-6)
+    assert first[15:24] == pytest.approx([1, 0, 0, 0, 0.99995, 0.00999975, 0, -0.00999975, 0.99995], abs=6e-7)
+    assert done.finish() == 0
+    x, _, v, w = done.last(1)
+    assert (x[0], v[0], w[2]) == pytest.approx((1.00330648148, 0.122777778, 1.00152286258), abs=6e-10)
+    x, _, v, _ = done.last(2)
+    assert (x[1], v[1]) == pytest.approx((-0.999387037, 0.0455555556), abs=6e-10)
+
+
+def test_tight_code_that_ends_a_step_without_data(run):
+    done = run(force("coupling, tight,"))
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    messages = talk(peer, 288, lambda k: b"\4" if k % 3 == 0 else b"\2" + LOADS)
+    assert [command for command, _ in messages] == [2] * 6
+    assert done.finish() == 0
+
+
+@pytest.mark.parametrize("options", ["coupling, staggered,", "coupling, loose, send after predict, no,"])
+def test_staggered_sequence(run, options):
+    done = run(force(options))
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    messages = talk(peer, 288, lambda _: b"\2" + LOADS)
+    assert [command for command, _ in messages] == [6] * 4
+    assert messages[0][1] == messages[1][1]  # the derivatives phase moves nothing
+    assert done.finish() == 0
+
+
+def test_every_second_iteration(run):
+    done = run(force("coupling, 2,"))
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    messages = talk(peer, 288, lambda k: (b"\6" if k % 2 == 0 else b"\2") + LOADS)
+    assert [command for command, _ in messages] == [2] * 4
+    assert done.finish() == 0
+
+
+def test_coupling_none_only_sends(run):
+    done = run(force("coupling, none,"))
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    assert len(talk(peer, 288, lambda _: b"")) == 4
+    assert done.finish() == 0
+
+
+def test_loose_code_may_keep_its_loads(run):
+    done = run(force())
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    assert len(talk(peer, 288, lambda k: b"\6" + LOADS if k == 1 else b"\4")) == 3
+    assert done.finish() == 0
+    assert done.last(1)[2][0] == pytest.approx(0.12, abs=1e-7)  # 0.1 + 1 N · 0.02 s / 1 kg
+
+
+def test_a_code_that_asks_for_the_end(run):
+    done = run(force())
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    messages = talk(peer, 288, lambda k: b"\6" + LOADS if k < 2 else b"\5")
+    assert len(messages) == 2
+    assert done.finish() == 5
+    assert "force 5: the peer ended the run at t = 0.01 s" in done.errors
+    assert len(done.rows()) == 4  # two nodes: start and the step that was under way
+
+
+# ------------------------------------------------------------------ forms of messages
+
+ROTATIONS = {"orientation, none,": (0x000, 0), "orientation, orientation vector,": (0x100, 3), "": (0x200, 9),
+             "orientation, euler 123,": (0x400, 3)}
+
+
+@pytest.mark.parametrize("accelerations", [False, True])
+@pytest.mark.parametrize("labels", [False, True])
+@pytest.mark.parametrize("rotation", ROTATIONS)
+def test_all_forms_without_reference_node(run, rotation, labels, accelerations):
+    flag, size = ROTATIONS[rotation]
+    vectors = 2 + (1 if size else 0) + (0 if not accelerations else 2 if size else 1)
+    done = run(force(("labels, yes," if labels else "") + rotation + ("accelerations, yes," if accelerations else "")))
+    peer = done.connect()
+    shake(peer, 0x2 | flag | (0x10 if labels else 0) | (8 if accelerations else 0), 2)
+    head = struct.pack("<II", 1, 2) if labels else b""
+    loads = head + (LOADS if size else LOADS[:48])
+    messages = talk(peer, len(head) + 2 * 8 * (3 * vectors + size), lambda _: b"\6" + loads)
+    assert done.finish() == 0, done.errors
+    data = messages[0][1]
+    assert data[:len(head)] == head
+    numbers = np.frombuffer(data[len(head):])
+    assert numbers[:6] == pytest.approx([1.09362933616, 2.0312992, 2.9840655, 2, -1, 1.5], abs=1e-6)
+    R = np.array([[0.936293, 0.312992, -0.159345], [-0.289629, 0.944702, 0.153792], [0.198669, -0.0978434, 0.97517]]).T
+    if flag == 0x200:
+        assert numbers[6:15].reshape(3, 3).T == pytest.approx(R, abs=1e-6)
+    if flag == 0x400:
+        assert numbers[6:12] == pytest.approx(np.degrees([0.1, 0.2, 0.3, 0, 0, 0]), abs=1e-12)
+    if flag == 0x100:
+        angle = np.linalg.norm(numbers[6:9])
+        assert 1 + 2 * np.cos(angle) == pytest.approx(np.trace(R), abs=3e-6)
+        assert R @ numbers[6:9] == pytest.approx(numbers[6:9], abs=1e-6)
+    v = numbers[6 + 2 * size:12 + 2 * size]
+    assert v == pytest.approx([0.0687008, 0.293629, 0.3, 0, 0, 0], abs=1e-6)
+    assert done.last(1)[2][0] == pytest.approx(0.12, abs=1e-6)
+
+
+def test_reference_node(run):
+    done = run(deck('force: 5, external structural, socket, create, yes, path, "s", reference node, 2, accelerations, yes, '
+                    "use reference node forces, no, 1, 1, offset, .1,0.,0.;", end=0.01, node2=TURNED))
+    peer = done.connect()
+    shake(peer, 0x220E, 1)
+    one = np.array([1.0, 2, 3]).tobytes() + bytes(24)
+    messages = talk(peer, 384, lambda _: b"\6" + bytes(48) + one)
+    assert done.finish() == 0, done.errors
+    reference, point = np.frombuffer(messages[0][1][:192]), np.frombuffer(messages[0][1][192:])
+    assert reference[:3] == pytest.approx([2, -1, 1.5]) and reference[12:18] == pytest.approx([0.5, 0.6, 0.7, 1, 2, 3])
+    assert point[:3] == pytest.approx([-1.43819, 3.13781, 0.546341], abs=6e-6)
+    assert point[12:15] == pytest.approx([6.87457, 3.48100, -3.96673], abs=6e-6)
+    assert point[15:18] == pytest.approx([-0.255679, -2.39496, -1.78851], abs=6e-6)
+    assert point[18:21] == pytest.approx([19.5898, -17.7922, 17.0593], abs=1e-4)
+    assert point[21:24] == pytest.approx([-1.94055, 0.790283, -0.780836], abs=6e-6)  # in the reference's frame, unlike MBDyn's
+
+
+def test_loads_on_the_reference_node_are_totals(run):
+    """F1 = sum of the points' forces: nothing remains for the reference node itself."""
+    done = run(deck('force: 5, external structural, socket, create, yes, path, "s", reference node, 2, 1, 1;', node2=FREE.replace("1.,0.,0.", "null")))
+    peer = done.connect()
+    shake(peer, 0x206, 1)
+    f = np.array([3.0, 0, 0]).tobytes()
+    talk(peer, 288, lambda _: b"\6" + f + bytes(24) + f + bytes(24))
+    assert done.finish() == 0, done.errors
+    assert done.last(1)[2][0] == pytest.approx(0.1 + 3 * 0.02, abs=1e-6)
+    assert done.last(2)[2][0] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("library", [False, True])
+def test_odd_numbers_of_labels_are_padded_but_for_the_client_library(run, library):
+    done = run(force("labels, yes, orientation, orientation vector,", points="1", count=1))
+    peer = done.connect()
+    shake(peer, 0x112 | (0x1000 if library else 0), 1)
+    head = struct.pack("<I", 1) + (b"" if library else bytes(4))
+    messages = talk(peer, len(head) + 96, lambda _: b"\6" + head + LOADS[:24] + bytes(24))
+    assert done.finish() == 0, done.errors
+    assert messages[0][1][:len(head)] == head
+
+
+def test_unsorted_labels_name_the_points(run):
+    done = run(force("labels, yes, sorted, no, orientation, none,", points="1, label, 77, 2, label, 5"))
+    peer = done.connect()
+    shake(peer, 0x12, 2)
+    swapped = struct.pack("<II", 5, 77) + LOADS[24:48] + LOADS[:24]
+    talk(peer, 8 + 96, lambda _: b"\6" + swapped)
+    assert done.finish() == 0, done.errors
+    assert done.last(1)[2][0] == pytest.approx(0.12, abs=1e-6) and done.last(2)[2][1] == pytest.approx(0.04, abs=1e-6)
+
+
+def test_the_run_connects_when_the_deck_says_so(run, tmp_path):
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(str(tmp_path / "p"))
+    listener.listen(1)
+    done = run(force(address='socket, path, "p"'))
+    peer = listener.accept()[0]
+    assert receive(peer, 10).hex() == "07" "02020000" "02000000" "08"
+    assert len(talk(peer, 288, lambda _: b"\6" + LOADS)) == 3
+    assert done.finish() == 0
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def test_tcp_with_a_peer_that_splits_its_messages(run):
+    port = free_port()
+    done = run(force(address=f'socket, create, yes, port, {port}, host, "127.0.0.1"'))
+    peer = done.connect(port)
+    shake(peer, 0x202, 2)
+
+    def answer(_):
+        for byte in b"\6" + LOADS:
+            peer.sendall(bytes([byte]))
+        return b""
+
+    assert len(talk(peer, 288, answer)) == 3
+    assert done.finish() == 0
+
+
+# ------------------------------------------------------------------ mapping
+
+def test_mapping(run, tmp_path):
+    """Two mapped points from two points: the mean, and the first one alone."""
+    H = np.zeros((6, 6))
+    H[:3, :3] = H[:3, 3:] = 0.5 * np.eye(3)
+    H[3:, :3] = np.eye(3)
+    np.savetxt(tmp_path / "H.dat", H)
+    done = run(deck('force: 5, external structural mapping, socket, create, yes, path, "s", points number, 2, 1, offset, null, 2, offset, null, '
+                    'mapped points number, from file, full mapping file, "H.dat";'))
+    peer = done.connect()
+    shake(peer, 0x2002, 2)
+    messages = talk(peer, 96, lambda _: b"\6" + np.array([[2.0, 0, 0], [0, 0, 4.0]]).tobytes())
+    assert done.finish() == 0, done.errors
+    assert np.frombuffer(messages[0][1])[:6] == pytest.approx([1.5, 0.5, 2.25, 1, 2, 3])
+    assert done.last(1)[2] == pytest.approx([0.12, 0.2, 0.38], abs=1e-6)
+    assert done.last(2)[2] == pytest.approx([0.02, 0, 0], abs=1e-6)
+
+
+# ------------------------------------------------------------------ streams
+
+def stream_out(options, values="values, 2, drive, time, drive, const, 7."):
+    return deck(f'stream output: 9, stream name, "out", create, yes, path, "o", {options} {values};', end=0.05,
+                counts="output elements: 1;")
+
+
+def drain(peer):
+    data = b""
+    while more := peer.recv(65536):
+        data += more
+    return data
+
+
+@pytest.mark.parametrize("options,times", [("", [0, 1, 2, 3, 4, 5]), ("no send first, output every, 2,", [2, 4])])
+def test_stream_output(run, options, times):
+    done = run(stream_out(options))
+    peer = done.connect("o")
+    numbers = np.frombuffer(drain(peer)).reshape(-1, 2)
+    assert done.finish() == 0, done.errors
+    assert numbers[:, 0] == pytest.approx([0.01 * t for t in times], abs=1e-12) and np.all(numbers[:, 1] == 7)
+
+
+def test_stream_output_casts(run):
+    done = run(stream_out("", "values, 4, drive, const, 0., drive, const, -3.7, drive, const, 300., drive, const, 2.5, "
+                              "modifier, copy cast, swap, yes, double, int16_t, uint8_t, skip, 1, float, size, 20"))
+    data = drain(done.connect("o"))
+    assert done.finish() == 0, done.errors
+    assert len(data) == 6 * 20
+    assert data[:20].hex() == "0000000000000000" "fffd" "ff" "00" "40200000" "00000000"
+
+
+def test_stream_output_of_floats(run):
+    done = run(stream_out("", "values, 2, drive, const, 0., drive, const, -3.7, modifier, copy cast, swap, no, all, float"))
+    assert drain(done.connect("o"))[:8].hex() == "00000000cdcc6cc0"
+    assert done.finish() == 0
+
+
+def test_stream_output_echo(run):
+    done = run(stream_out('echo, "e.txt",'))
+    drain(done.connect("o"))
+    assert done.finish() == 0, done.errors
+    with open(os.path.join(done.folder, "e.txt")) as file:
+        lines = file.read().splitlines()
+    assert lines[1] == "# Channels #1-2" and lines[3] == "1.000000e-02 7.000000e+00" and len(lines) == 8
+
+
+def test_motion_output(run):
+    done = run(deck('stream motion output: 9, stream name, "out", create, yes, path, "o", '
+                    "output flags, position, orientation matrix, velocity, angular velocity, 1, 2;", counts="output elements: 1;"))
+    data = np.frombuffer(drain(done.connect("o"))).reshape(3, 2, 18)
+    assert done.finish() == 0, done.errors
+    assert data[0, 0, :3] == pytest.approx([1, 2, 3]) and data[0, 0, 3:6] == pytest.approx([0.936293, -0.289629, 0.198669], abs=1e-6)
+    assert data[2, 1, 15:] == pytest.approx([1, 0, 0])
+
+
+def test_a_broken_output_lets_the_run_go_on_or_ends_it(run, tmp_path):
+    for options, code, goes_on in [("", 0, True), ("abort if broken,", 5, False)]:
+        text = deck(f'stream output: 9, stream name, "out", create, yes, path, "o", {options} values, 1, drive, time;', end=10.0,
+                    counts="output elements: 1;")
+        done = run(text)
+        done.connect("o").close()
+        assert done.finish() == code, done.errors
+        assert "closed by the peer" in done.errors
+        assert (len(done.rows()) >= 2002) == goes_on
+
+
+def stream_in(options, every="", address='create, yes, path, "i"'):
+    drivers = f'begin: drivers; file: 1, stream, stream drive name, "in", {address}, {every} {options} 1, initial values, 100.; end: drivers;'
+    return deck('force: 5, absolute, 1, position, null, 1.,0.,0., file, 1, 1;\nstream output: 9, stream name, "out", create, yes, path, "o", '
+                "values, 1, drive, file, 1, 1;", end=0.05, counts="forces: 1; file drivers: 1; output elements: 1;", drivers=drivers)
+
+
+@pytest.mark.parametrize("every,options,expected", [("", "", [1, 2, 3, 4, 5, 6]), ("", "receive first, no,", [100, 1, 2, 3, 4, 5]),
+                                                    ("input every, 2,", "", [1, 1, 2, 2, 3, 3]),
+                                                    ("input every, 2,", "receive first, no,", [100, 100, 1, 1, 2, 2])])
+def test_which_record_sees_which_message(run, every, options, expected):
+    done = run(stream_in(options, every))
+    source, sink = done.connect("i"), done.connect("o")
+    source.sendall(np.arange(1.0, 7).tobytes())
+    assert list(np.frombuffer(drain(sink))) == expected
+    assert done.finish() == 0, done.errors
+
+
+def test_last_values_stay_when_the_source_closes(run):
+    done = run(stream_in(""))
+    source, sink = done.connect("i"), done.connect("o")
+    source.sendall(np.array([1.0, 2.0]).tobytes())
+    source.close()
+    assert list(np.frombuffer(drain(sink))) == [1, 2, 2, 2, 2, 2]
+    assert done.finish() == 0
+    assert "the last values stay" in done.errors
+
+
+def test_inputs_that_do_not_block(run):
+    done = run(stream_in("", every="non blocking,"))
+    source, sink = done.connect("i"), done.connect("o")
+    assert list(np.frombuffer(drain(sink))) == [100] * 6
+    source.close()
+    assert done.finish() == 0
+
+
+def test_streams_over_tcp_of_both_ends(run, tmp_path):
+    port = free_port()
+    listener = socket.socket()
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener.bind(("127.0.0.1", port))
+    listener.listen(1)
+    done = run(stream_in("", address=f'create, no, port, {port}, host, "localhost"'))
+    sink_thread = []
+    thread = threading.Thread(target=lambda: sink_thread.append(drain(done.connect("o"))))
+    thread.start()
+    source = listener.accept()[0]
+    source.sendall(np.arange(1.0, 7).tobytes())
+    thread.join(60 * SLOW)
+    assert list(np.frombuffer(sink_thread[0])) == [1, 2, 3, 4, 5, 6]
+    assert done.finish() == 0, done.errors
+
+
+# ------------------------------------------------------------------ files
+
+def test_files(run, tmp_path):
+    done = run(force(address='"in.txt", unlink, "out.txt", no clobber', options="sleep time, .01, precision, 12,"))
+    states = []
+    for _ in range(3):
+        end = time.monotonic() + 20 * SLOW
+        while not (tmp_path / "out.txt").exists():
+            assert time.monotonic() < end and done.process.poll() is None, done.finish()
+            time.sleep(0.005)
+        states.append((tmp_path / "out.txt").read_text())
+        (tmp_path / "in.tmp").write_text("1. 0. 0. 0. 0. .1\n0. 2. 0. 0. 0. 0.\n")
+        (tmp_path / "in.tmp").rename(tmp_path / "in.txt")
+        (tmp_path / "out.txt").unlink()
+    assert done.finish() == 0, done.errors
+    lines = states[0].splitlines()
+    assert lines[0] == "# regular nodes" and len(lines) == 3
+    first = [float(x) for x in lines[1].split()]
+    assert len(first) == 18 and first[:3] == pytest.approx([1.09362933616, 2.0312992, 2.9840655], abs=1e-6)
+    assert first[3:6] == pytest.approx([0.936293, -0.289629, 0.198669], abs=1e-6)
+    assert done.last(1)[2][0] == pytest.approx(0.12, abs=1e-6)
+
+
+# ------------------------------------------------------------------ peers that misbehave
+
+@pytest.mark.parametrize("request_bytes,message", [
+    (b"\7" + struct.pack("<II", 0x101, 3), "kind (1 modal, 2 nodal): the deck has 0x2, the peer 0x1; rotations (0x100 vector, 0x200 matrix, "
+     "0x400 Euler angles): the deck has 0x200, the peer 0x100; number of points: the deck has 2, the peer 3"),
+    (b"\2", "the peer must begin with 7 (negotiation), it sent 2")])
+def test_peers_that_do_not_fit_are_refused(run, request_bytes, message):
+    done = run(force())
+    peer = done.connect()
+    peer.sendall(request_bytes)
+    assert receive(peer, 1) == b"\5"
+    assert done.finish() == 5
+    assert "error: force 5 (s): " in done.errors and message in done.errors
+
+
+NAN = np.full(12, np.nan).tobytes()
+
+
+@pytest.mark.parametrize("answer,message", [(b"\3", "unknown command 3 from the peer"), (b"\6" + NAN, "a load is not finite"),
+                                            (b"\6" + LOADS[:40], "closed by the peer after 40 of 96 bytes of a message"),
+                                            (b"", "closed by the peer")])
+def test_peers_that_break_the_dialogue_are_named(run, answer, message):
+    done = run(force())
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    for k in range(3):
+        assert receive(peer, 1) == b"\6"
+        receive(peer, 288)
+        peer.sendall(b"\6" + LOADS if k < 2 else answer)
+    peer.close()
+    assert done.finish() == 5
+    assert f"error: force 5 (s): {message}" in done.errors
+    assert len(done.rows()) == 4  # results up to the step before
+
+
+def test_a_wrong_label_is_named(run):
+    done = run(force("labels, yes, orientation, none,"))
+    peer = done.connect()
+    shake(peer, 0x12, 2)
+    receive(peer, 1 + 8 + 96)
+    peer.sendall(b"\6" + struct.pack("<II", 1, 9) + LOADS[:48])
+    assert done.finish() == 5
+    assert "force 5 (s): label 9 of point 2 is not 2" in done.errors
+
+
+@pytest.mark.parametrize("when", ["never connects", "never shakes hands", "stops in mid-message"])
+def test_silent_peers_cost_no_more_than_the_time_out(run, when):
+    done = run(force(), "--peer-timeout", "0.5")
+    if when != "never connects":
+        peer = done.connect()
+        if when == "stops in mid-message":
+            shake(peer, 0x202, 2)
+            peer.sendall(b"\6" + LOADS[:17])
+    start = time.monotonic()
+    assert done.finish() == 5
+    assert time.monotonic() - start < 5 * SLOW
+    assert ("nobody connected in time" if when == "never connects" else "silent for 0.5 s") in done.errors
+
+
+def test_a_missing_server_costs_no_more_than_the_time_out(run):
+    done = run(force(address='socket, path, "nobody"'), "--peer-timeout", "0.5")
+    assert done.finish() == 5
+    assert "force 5 (nobody): cannot connect: No such file or directory" in done.errors
+
+
+def test_a_taken_path_is_refused(run, tmp_path):
+    (tmp_path / "s").write_text("")
+    done = run(force())
+    assert done.finish() == 5
+    assert "cannot listen: Address already in use" in done.errors
+
+
+def test_interrupts_end_a_wait(run):
+    done = run(force())
+    done.connect()
+    done.process.send_signal(2)
+    start = time.monotonic()
+    assert done.finish() == 130
+    assert time.monotonic() - start < 5 * SLOW
+
+
+def test_no_deck_sockets_opens_nothing(run, tmp_path):
+    done = run(force(), "--no-deck-sockets")
+    assert done.finish() == 0
+    assert not (tmp_path / "s").exists()
+    assert done.last(1)[2] == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_validate_and_describe_open_nothing(tmp_path):
+    (tmp_path / "deck").write_text(force())
+    for command in ("validate", "describe"):
+        subprocess.run([os.path.join(BIN, "mbcosim"), command, "deck"], cwd=tmp_path, check=True, capture_output=True, timeout=20 * SLOW)
+    assert os.listdir(tmp_path) == ["deck"]
