@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 BIN = os.environ["MBCOSIM_BIN"]
-SLOW = float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
+TIME_FACTOR = float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
 RUN = """begin: data; problem: initial value; end: data;
 begin: initial value; initial time: 0.; final time: {end}; time step: 1e-2; tolerance: 1e-10; max iterations: 20;
 derivatives tolerance: 1e-4; derivatives max iterations: 10; end: initial value;
@@ -49,7 +49,7 @@ class Run:
 
     def connect(self, name="s"):
         """Peer of a Unix socket (name) or a TCP port on which the run listens."""
-        end = time.monotonic() + 20 * SLOW
+        end = time.monotonic() + 20 * TIME_FACTOR
         while True:
             if isinstance(name, str):
                 peer, address = socket.socket(socket.AF_UNIX), os.path.join(self.folder, name)
@@ -57,7 +57,7 @@ class Run:
                 peer, address = socket.socket(), ("127.0.0.1", name)
             try:
                 peer.connect(address)
-                peer.settimeout(20 * SLOW)
+                peer.settimeout(20 * TIME_FACTOR)
                 return peer
             except OSError:
                 peer.close()
@@ -66,7 +66,7 @@ class Run:
                 time.sleep(0.02)
 
     def finish(self):
-        _, self.errors = self.process.communicate(timeout=60 * SLOW)
+        _, self.errors = self.process.communicate(timeout=60 * TIME_FACTOR)
         return self.process.returncode
 
     def rows(self, extension="mov"):
@@ -472,7 +472,7 @@ def test_streams_over_tcp_of_both_ends(run, tmp_path):
     thread.start()
     source = listener.accept()[0]
     source.sendall(np.arange(1.0, 7).tobytes())
-    thread.join(60 * SLOW)
+    thread.join(60 * TIME_FACTOR)
     assert list(np.frombuffer(sink_thread[0])) == [1, 2, 3, 4, 5, 6]
     assert done.finish() == 0, done.errors
 
@@ -483,7 +483,7 @@ def test_files(run, tmp_path):
     done = run(force(address='"in.txt", unlink, "out.txt", no clobber', options="sleep time, .01, precision, 12,"))
     states = []
     for _ in range(3):
-        end = time.monotonic() + 20 * SLOW
+        end = time.monotonic() + 20 * TIME_FACTOR
         while not (tmp_path / "out.txt").exists():
             assert time.monotonic() < end and done.process.poll() is None, done.finish()
             time.sleep(0.005)
@@ -555,7 +555,7 @@ def test_silent_peers_cost_no_more_than_the_time_out(run, when):
             peer.sendall(b"\6" + LOADS[:17])
     start = time.monotonic()
     assert done.finish() == 5
-    assert time.monotonic() - start < 5 * SLOW
+    assert time.monotonic() - start < 5 * TIME_FACTOR
     assert ("nobody connected in time" if when == "never connects" else "silent for 0.5 s") in done.errors
 
 
@@ -578,7 +578,7 @@ def test_interrupts_end_a_wait(run):
     done.process.send_signal(2)
     start = time.monotonic()
     assert done.finish() == 130
-    assert time.monotonic() - start < 5 * SLOW
+    assert time.monotonic() - start < 5 * TIME_FACTOR
 
 
 def test_no_deck_sockets_opens_nothing(run, tmp_path):
@@ -591,5 +591,5 @@ def test_no_deck_sockets_opens_nothing(run, tmp_path):
 def test_validate_and_describe_open_nothing(tmp_path):
     (tmp_path / "deck").write_text(force())
     for command in ("validate", "describe"):
-        subprocess.run([os.path.join(BIN, "mbcosim"), command, "deck"], cwd=tmp_path, check=True, capture_output=True, timeout=20 * SLOW)
+        subprocess.run([os.path.join(BIN, "mbcosim"), command, "deck"], cwd=tmp_path, check=True, capture_output=True, timeout=20 * TIME_FACTOR)
     assert os.listdir(tmp_path) == ["deck"]
