@@ -3,7 +3,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-docker/install-dependencies.sh all
+docker/install-dependencies.sh start
 cmake --preset release >/dev/null
 cmake --build build --parallel "$(nproc)" --target mbcosim mbcosimd mbcosim_python
 

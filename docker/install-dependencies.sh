@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs the Debian packages of dependencies.txt that are missing. Usage: install-dependencies.sh [build|run|all|fuzz]
-#   build  what compiles the program          run  what a container needs to run the daemon
+# Installs the Debian packages of dependencies.txt that are missing. Usage: install-dependencies.sh [build|page|run|start|all|fuzz]
+#   build  what compiles the program                   page   build, and what builds the daemon's page
+#   run    what a container needs to run the daemon    start  what the quick start needs: no page
 #   all    what builds, tests and shows (default)      fuzz   what builds the fuzz target
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -9,14 +10,19 @@ what=${1:-all}
 case $what in
   build) wanted='$2 == ""' ;;
   run) wanted='$2 == "run"' ;;
+  page) wanted='$2 == "" || $2 == "page"' ;;
+  start) wanted='$2 == "" || $2 == "test"' ;;
   all) wanted='$2 != "run" && $2 != "fuzz"' ;;
   fuzz) wanted='$2 == "" || $2 == "fuzz"' ;;
-  *) echo "usage: $0 [build|run|all|fuzz]" >&2; exit 4 ;;
+  *) echo "usage: $0 [build|page|run|start|all|fuzz]" >&2; exit 4 ;;
 esac
 mapfile -t packages < <(sed 's/#.*//' "$here/dependencies.txt" | awk "NF && $wanted {print \$1}")
 
 missing=()
 for package in "${packages[@]}"; do
+  case $package in  # Debian's conflict with other builds of Node
+    nodejs | npm) command -v npm >/dev/null && continue ;;
+  esac
   state=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
   [ "$state" = installed ] || missing+=("$package")
 done

@@ -1,0 +1,43 @@
+/** The service as the page calls it: Connect over the origin that served the page. */
+import { fromBinary } from '@bufbuild/protobuf';
+import { Code, ConnectError, createClient } from '@connectrpc/connect';
+import { createConnectTransport } from '@connectrpc/connect-web';
+import { DeckDiagnosticsSchema, ErrorInfoSchema, SolverFailureSchema, type Diagnostic, type SolverFailure } from './gen/mbcosim/v1/common_pb';
+import { Simulations } from './gen/mbcosim/v1/simulations_pb';
+import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
+
+const transport = createConnectTransport({ baseUrl: globalThis.location?.origin ?? '', useBinaryFormat: true });
+
+export const simulations = createClient(Simulations, transport);
+export const telemetry = createClient(Telemetry, transport);
+
+/** What a failed call says, taken apart. */
+export interface Failure {
+  message: string;
+  /** Name of the service's `Reason`: "WRONG_STEP"; empty: the failure is not the service's. */
+  reason: string;
+  metadata: Record<string, string>;
+  diagnostics: Diagnostic[];
+  solver?: SolverFailure;
+  cancelled: boolean;
+}
+
+/** The detail of this type, whose bytes are those of `google.rpc.ErrorInfo` too. */
+function errorInfo(error: ConnectError) {
+  for (const detail of error.details)
+    if ('type' in detail && detail.type === 'google.rpc.ErrorInfo') return fromBinary(ErrorInfoSchema, detail.value as Uint8Array);
+  return undefined;
+}
+
+export function failureOf(thrown: unknown): Failure {
+  const error = ConnectError.from(thrown);
+  const info = errorInfo(error);
+  return {
+    message: error.rawMessage || 'the daemon does not answer',
+    reason: info?.reason ?? (error.code === Code.Unauthenticated ? 'UNAUTHENTICATED' : ''),
+    metadata: info?.metadata ?? {},
+    diagnostics: error.findDetails(DeckDiagnosticsSchema)[0]?.diagnostics ?? [],
+    solver: error.findDetails(SolverFailureSchema)[0],
+    cancelled: error.code === Code.Canceled,
+  };
+}

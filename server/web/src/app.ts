@@ -1,0 +1,268 @@
+/** The page put together. */
+import { failureOf } from './api';
+import { Desk } from './desk';
+import { download, h, icon, iconButton } from './dom';
+import { csv, recordingPage } from './export';
+import { Home, STATES } from './panels/home';
+import { inputsPanel } from './panels/inputs';
+import { logPanel } from './panels/log';
+import { modesPanel } from './panels/modes';
+import { plotsPanel } from './panels/plots';
+import { ScenePanel, toggle } from './panels/scene_panel';
+import { selectionPanel } from './panels/selection';
+import { snapshotsPanel } from './panels/snapshots';
+import { solverPanel } from './panels/solver';
+import { TimeBar } from './panels/time_bar';
+import { treePanel } from './panels/tree';
+import { diagnosticsList } from './panels/diagnostics';
+import { Session, type Shown } from './session';
+
+const KEYS: [string, string][] = [
+  ['Space', 'run and pause'], ['S', 'one step'], ['← →', 'one recorded sample back, on (turn the scene while it has the focus)'],
+  ['L', 'back to live'], ['B', 'save the state'], ['/', 'search'], ['F', 'follow the selected node'], ['T', 'trail of the selected node'],
+  ['H', 'whole model'], ['1 2 3', 'views along the axes'], ['O', 'parallel projection'], ['D', 'dark and light'], ['?', 'these keys'],
+];
+
+export class App {
+  readonly desk = new Desk();
+  readonly scene = new ScenePanel(this.desk);
+  readonly home = new Home(this.desk, (name) => void this.open(name), (name) => void this.compare(name));
+  private readonly time = new TimeBar(this.desk);
+  private readonly banner = h('div', { class: 'banner hidden', role: 'alert' });
+  private readonly chip = h('span', { class: 'chip' });
+  private readonly name = h('span', { class: 'title' });
+  private readonly shell: HTMLElement;
+  private readonly left = h('nav', { class: 'left', 'aria-label': 'Model' });
+  private readonly help = this.helpDialog();
+  private unwatch: (() => void)[] = [];
+
+  constructor(root: HTMLElement, private readonly recorded?: Shown) {
+    this.shell = h('div', { class: 'shell', 'data-tab': 'scene' }, this.top(), this.left, this.middle(), this.right(), this.time.element, this.narrowTabs(), this.help);
+    root.replaceChildren(this.shell);
+    this.fillLeft();
+    this.setTheme((localStorageGet('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark')) as 'dark' | 'light');
+    this.desk.shown.watch((shown) => this.connect(shown));
+    document.addEventListener('keydown', (event) => this.key(event));
+    if (recorded) this.desk.show(recorded);
+    else void this.start();
+  }
+
+  private async start(): Promise<void> {
+    const known = await this.home.refresh();
+    const wanted = new URLSearchParams(location.hash.slice(1)).get('simulation');
+    const name = wanted ?? (known.length === 1 ? known[0].name : undefined);
+    if (name) await this.open(name);
+    void this.home.follow();
+    window.addEventListener('hashchange', () => {
+      const next = new URLSearchParams(location.hash.slice(1)).get('simulation');
+      if (next && next !== this.desk.session?.name) void this.open(next);
+    });
+  }
+
+  async open(name: string): Promise<void> {
+    try {
+      this.desk.show(await Session.open(name));
+      history.replaceState(null, '', `#simulation=${encodeURIComponent(name)}`);
+      void this.home.refresh();
+      this.tab('scene');
+    } catch (thrown) {
+      this.home.tell(failureOf(thrown));
+    }
+  }
+
+  private async compare(name: string): Promise<void> {
+    try {
+      this.scene.compareWith(await Session.open(name));
+    } catch (thrown) {
+      this.home.tell(failureOf(thrown));
+    }
+  }
+
+  // ---- parts
+
+  private top(): HTMLElement {
+    const menu = h('div', { class: 'menu hidden' },
+      this.menuEntry('camera', 'Picture (PNG)', () => void this.savePicture()),
+      this.menuEntry('plot', 'Table of the plots (CSV)', () => this.saveTable()),
+      this.menuEntry('download', 'Recording (HTML)', () => void this.saveRecording()));
+    const save = h('button', { type: 'button', class: 'button', 'aria-expanded': 'false', onclick: () => toggle(save, menu) }, icon('download'), h('span', {}, 'Export'));
+    const brand = h('div', { class: 'brand' });
+    brand.innerHTML = '<svg viewBox="0 0 32 32" aria-hidden="true"><path d="M5 8h9l9 14" fill="none" stroke="#35c2a8" stroke-width="3"/><circle cx="5" cy="8" r="4" fill="#f0a13c"/><circle cx="14" cy="8" r="3" fill="#9aa7b4"/><circle cx="23" cy="23" r="5.4" fill="#4aa8ff"/></svg>';
+    brand.append('mbcosim');
+    return h('header', { class: 'top' }, brand, this.name, this.chip, h('span', { class: 'spacer' }), h('div', { class: 'anchor end' }, save, menu),
+      iconButton('theme', 'Dark and light (D)', () => this.setTheme(this.desk.theme.value === 'dark' ? 'light' : 'dark')),
+      iconButton('help', 'Keys (?)', () => this.help.showModal()));
+  }
+
+  private menuEntry(picture: string, label: string, action: () => void): HTMLElement {
+    return h('button', { type: 'button', class: 'button', onclick: action }, icon(picture), label);
+  }
+
+  private fillLeft(): void {
+    const tree = treePanel(this.desk);
+    if (this.recorded) return this.left.replaceChildren(tree);
+    const list = h('div', { class: 'pane hidden' }, this.home.list);
+    const tabs: [HTMLButtonElement, HTMLElement][] = [
+      [h('button', { type: 'button', role: 'tab', 'aria-selected': 'true' }, 'Model'), tree],
+      [h('button', { type: 'button', role: 'tab', 'aria-selected': 'false' }, 'Simulations'), list],
+    ];
+    for (const [button, pane] of tabs)
+      button.addEventListener('click', () => {
+        for (const [other, otherPane] of tabs) {
+          other.setAttribute('aria-selected', String(other === button));
+          otherPane.classList.toggle('hidden', otherPane !== pane);
+        }
+      });
+    this.left.replaceChildren(h('div', { class: 'tabs', role: 'tablist' }, ...tabs.map(([button]) => button)), tree, list);
+    this.desk.shown.watch((shown) => tabs[shown ? 0 : 1][0].click());
+  }
+
+  private middle(): HTMLElement {
+    this.scene.element.append(this.banner);
+    return h('main', { class: 'main' }, this.scene.element, plotsPanel(this.desk), this.home.welcome);
+  }
+
+  private right(): HTMLElement {
+    return h('aside', { class: 'right', 'aria-label': 'Panels' },
+      selectionPanel(this.desk, (id) => this.scene.follow(id)),
+      inputsPanel(this.desk),
+      snapshotsPanel(this.desk, (name) => void this.open(name)),
+      solverPanel(this.desk),
+      modesPanel(this.desk, (mode, size) => this.scene.animate(mode, size)),
+      logPanel(this.desk));
+  }
+
+  private narrowTabs(): HTMLElement {
+    const tabs = ([['scene', 'eye', 'Scene'], ['model', 'list', 'Model'], ['plots', 'plot', 'Plots'], ['panel', 'layers', 'Panels']] as const).map(([tab, picture, label]) =>
+      h('button', { type: 'button', role: 'tab', 'data-tab': tab, 'aria-selected': String(tab === 'scene'), onclick: () => this.tab(tab) }, icon(picture), label));
+    return h('div', { class: 'nav', role: 'tablist', 'aria-label': 'Parts of the page' }, ...tabs);
+  }
+
+  private tab(name: string): void {
+    this.shell.dataset.tab = name;
+    for (const button of this.shell.querySelectorAll('.nav button')) button.setAttribute('aria-selected', String(button.getAttribute('data-tab') === name));
+  }
+
+  private helpDialog(): HTMLDialogElement {
+    const dialog: HTMLDialogElement = h('dialog', { 'aria-label': 'Keys' }, h('h1', { style: 'font-size:18px' }, 'Keys'),
+      h('div', { class: 'keys' }, ...KEYS.flatMap(([key, meaning]) => [h('span', {}, ...key.split(' ').map((part) => h('kbd', {}, part))), h('span', {}, meaning)])),
+      h('button', { type: 'button', class: 'button', onclick: () => dialog.close() }, 'Close'));
+    return dialog;
+  }
+
+  // ---- what changes
+
+  private connect(shown: Shown | undefined): void {
+    this.unwatch.forEach((end) => end());
+    const session = this.desk.session;
+    this.name.textContent = shown?.title ?? '';
+    document.title = shown ? `${shown.title} – mbcosim` : 'mbcosim';
+    this.unwatch = session
+      ? [session.info.watch(() => this.updateState()), session.connected.watch(() => this.updateState()), session.failure.watch(() => this.updateState())]
+      : [];
+    this.updateState();
+  }
+
+  private updateState(): void {
+    const session = this.desk.session;
+    this.chip.classList.toggle('hidden', !this.desk.shown.value);
+    if (!session) {
+      this.chip.className = `chip${this.desk.shown.value ? '' : ' hidden'}`;
+      this.chip.textContent = 'recording';
+      this.banner.classList.add('hidden');
+      return;
+    }
+    const state = session.connected.value ? STATES[session.info.value.state] ?? 'unknown' : 'lost';
+    this.chip.className = `chip ${state}`;
+    this.chip.textContent = state === 'lost' ? 'no connection' : state;
+    const waits = session.info.value.waits.map((wait) => `waits ${wait.hasPeer ? 'for the peer of' : 'for a peer on'} port ${wait.port} since ${wait.seconds.toFixed(1)} s`);
+    const failure = session.failure.value;
+    this.banner.classList.toggle('hidden', waits.length === 0 && !failure && state !== 'lost');
+    this.banner.classList.toggle('bad', failure !== undefined || state === 'lost');
+    if (failure) this.banner.replaceChildren(h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)),
+      iconButton('close', 'Close', () => (session.failure.value = undefined), { class: 'icon-button small' }));
+    else this.banner.replaceChildren(h('div', { class: 'text' }, state === 'lost' ? 'The daemon does not answer; trying again.' : waits.join('\n')));
+  }
+
+  private worst(): HTMLElement | string {
+    const equations = this.desk.session?.failure.value?.solver?.worstEquations.slice(0, 3) ?? [];
+    return equations.length > 0 ? h('div', { class: 'soft' }, equations.map((row) => `${row.owner}: ${row.equation}, residual ${row.residual.toExponential(2)}`).join('\n')) : '';
+  }
+
+  private setTheme(theme: 'dark' | 'light'): void {
+    document.documentElement.dataset.theme = theme;
+    this.desk.theme.value = theme;
+    localStorageSet('theme', theme);
+  }
+
+  // ---- export
+
+  private fileName(ending: string): string {
+    return `${(this.desk.shown.value?.title ?? 'mbcosim').replace(/[^\w.-]+/g, '_')}.${ending}`;
+  }
+
+  private async savePicture(): Promise<void> {
+    const picture = await this.scene.view.picture();
+    if (picture) download(this.fileName('png'), picture);
+  }
+
+  private saveTable(): void {
+    const shown = this.desk.shown.value;
+    if (shown) download(this.fileName('csv'), new Blob([csv(shown.recording.samples, this.desk.plots.value)], { type: 'text/csv' }));
+  }
+
+  private async saveRecording(): Promise<void> {
+    const shown = this.desk.shown.value;
+    if (!shown) return;
+    const page = this.recorded ? undefined : await (await fetch('/')).text();
+    if (page) download(this.fileName('html'), new Blob([recordingPage(page, shown)], { type: 'text/html' }));
+  }
+
+  // ---- keys
+
+  private key(event: KeyboardEvent): void {
+    const target = event.target as HTMLElement;
+    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName) || this.help.open) return;
+    if (event.key === ' ' && /^(BUTTON|SUMMARY)$/.test(target.tagName)) return;
+    const press = (label: string) => this.shell.querySelector<HTMLButtonElement>(`button[title*="(${label})"]`)?.click();
+    const actions: Record<string, () => void> = {
+      ' ': () => this.time.toggle(),
+      s: () => this.time.step(1),
+      ArrowLeft: () => this.time.nudge(-1),
+      ArrowRight: () => this.time.nudge(1),
+      l: () => this.time.goLive(),
+      b: () => void this.desk.session?.saveSnapshot(''),
+      '/': () => this.shell.querySelector<HTMLInputElement>('.search input')?.focus(),
+      f: () => press('F'),
+      t: () => this.scene.toggleTrail(),
+      h: () => this.scene.view.look('iso'),
+      '1': () => this.scene.view.look('front'),
+      '2': () => this.scene.view.look('side'),
+      '3': () => this.scene.view.look('top'),
+      o: () => press('O'),
+      d: () => press('D'),
+      '?': () => this.help.showModal(),
+    };
+    const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!action) return;
+    action();
+    event.preventDefault();
+  }
+}
+
+/** Storage may be forbidden, as in recordings opened from a disk. */
+function localStorageGet(key: string): string | undefined {
+  try {
+    return localStorage.getItem(`mbcosim.${key}`) ?? undefined;
+  } catch {
+    return undefined;
+  }
+}
+
+function localStorageSet(key: string, value: string): void {
+  try {
+    localStorage.setItem(`mbcosim.${key}`, value);
+  } catch {
+    // not remembered, then
+  }
+}

@@ -1,0 +1,87 @@
+/** What the parts of the page share: the simulation on show, the time looked at, what is selected, what is plotted. */
+import type { Sample } from './recording';
+import { Session, type Shown } from './session';
+import { Signal } from './signal';
+import type { VariableInfo } from './model';
+
+export interface Curve {
+  variable: VariableInfo;
+  element: number;
+}
+
+export interface Plot {
+  id: number;
+  curves: Curve[];
+  /** Abscissa; absent: time. */
+  against?: Curve;
+}
+
+export class Desk {
+  readonly shown = new Signal<Shown | undefined>(undefined);
+  /** Time looked at; undefined: the newest. */
+  readonly cursor = new Signal<number | undefined>(undefined);
+  readonly selected = new Signal<string | undefined>(undefined);
+  readonly plots = new Signal<Plot[]>([]);
+  readonly theme = new Signal<'dark' | 'light'>('dark');
+  /** Once for each frame of the screen in which something changed. */
+  readonly frame = new Signal(0);
+  private stale = false;
+  private unwatch = () => {};
+  private nextPlot = 1;
+
+  constructor() {
+    this.shown.watch((shown) => {
+      this.unwatch();
+      this.unwatch = shown ? shown.changed.watch(() => this.invalidate()) : () => {};
+      this.invalidate();
+    });
+    this.cursor.watch(() => this.invalidate());
+  }
+
+  get session(): Session | undefined {
+    return this.shown.value instanceof Session ? this.shown.value : undefined;
+  }
+
+  /** The sample at the time looked at. */
+  get sample(): Sample | undefined {
+    const recording = this.shown.value?.recording;
+    if (!recording) return undefined;
+    if (this.cursor.value === undefined) return recording.last;
+    return recording.samples[recording.indexAt(this.cursor.value)];
+  }
+
+  invalidate(): void {
+    if (this.stale) return;
+    this.stale = true;
+    requestAnimationFrame(() => {
+      this.stale = false;
+      this.frame.value += 1;
+    });
+  }
+
+  show(shown: Shown | undefined): void {
+    this.session?.close();
+    this.cursor.value = undefined;
+    this.selected.value = undefined;
+    this.plots.value = [];
+    this.shown.value = shown;
+  }
+
+  /** Adds curves of all numbers of a variable: to the plot `id`, or in a new one. */
+  plot(variable: VariableInfo, id?: number): void {
+    this.session?.want([variable]);
+    const elements = variable.size <= 9 ? Array.from({ length: variable.size }, (_, k) => k) : [0];
+    const curves = elements.map((element) => ({ variable, element }));
+    const known = this.plots.value.find((plot) => plot.id === id);
+    if (known) known.curves.push(...curves);
+    else this.plots.value.push({ id: this.nextPlot++, curves });
+    this.plots.notify();
+    this.invalidate();
+  }
+
+  unplot(plot: Plot, curve?: Curve): void {
+    if (curve) plot.curves = plot.curves.filter((other) => other !== curve);
+    if (!curve || plot.curves.length === 0) this.plots.value = this.plots.value.filter((other) => other !== plot);
+    this.plots.notify();
+  }
+}

@@ -1,0 +1,43 @@
+/** Numbers and names as people read them. */
+
+/** About `digits` significant digits, without trailing zeros; a power of ten only where it helps. */
+export function number(value: number, digits = 5): string {
+  if (!Number.isFinite(value)) return Number.isNaN(value) ? '–' : value > 0 ? '∞' : '−∞';
+  if (value === 0) return '0';
+  const size = Math.abs(value);
+  const text = size >= 1e6 || size < 1e-4 ? value.toExponential(digits - 1) : value.toPrecision(digits);
+  return text.replace(/(\.\d*?)0+(e|$)/, '$1$2').replace(/\.(e|$)/, '$1').replace('-', '−');
+}
+
+export function seconds(value: number): string {
+  if (!Number.isFinite(value)) return number(value);
+  const size = Math.abs(value);
+  if (size > 0 && size < 1e-3) return `${number(value * 1e6, 3)} µs`;
+  if (size > 0 && size < 1) return `${number(value * 1e3, 3)} ms`;
+  return `${number(value, 4)} s`;
+}
+
+export function bytes(count: number): string {
+  if (count < 1024) return `${count} B`;
+  const units = ['KiB', 'MiB', 'GiB'];
+  let size = count, unit = -1;
+  while (size >= 1024 && unit < units.length - 1) size /= 1024, ++unit;
+  return `${number(size, 3)} ${units[unit]}`;
+}
+
+const COMPONENTS: Record<number, string[]> = {
+  3: ['x', 'y', 'z'],
+  6: ['fx', 'fy', 'fz', 'mx', 'my', 'mz'],
+  9: ['11', '12', '13', '21', '22', '23', '31', '32', '33'],
+};
+
+/** "x" for the first of three numbers; "" for a scalar. */
+export function componentName(size: number, element: number): string {
+  return size === 1 ? '' : COMPONENTS[size]?.[element] ?? String(element + 1);
+}
+
+/** "X.y": the end of a variable's name and the component. */
+export function curveName(variable: string, size: number, element: number): string {
+  const component = componentName(size, element);
+  return component ? `${variable}.${component}` : variable;
+}

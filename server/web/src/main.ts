@@ -1,0 +1,9 @@
+import { App } from './app';
+import { unstore } from './export';
+
+const root = document.getElementById('app') as HTMLElement;
+const recording = document.getElementById('recording')?.textContent;
+const app = new App(root, recording ? unstore(recording) : undefined);
+
+// For tests, and for whoever looks in from the console.
+Object.assign(window, { mbcosim: app });

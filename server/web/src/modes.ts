@@ -1,0 +1,88 @@
+/** Eigenmodes as motions of the nodes. */
+import { add, multiply, norm, rotationOf, type Vec3 } from './algebra';
+import type { NodeShape, Pose } from './geometry';
+
+export interface Mode {
+  /** Eigenvalue in 1/s. */
+  real: number;
+  imaginary: number;
+  /** Real and imaginary parts of displacement and rotation vector of each node, global: 12 numbers a node. */
+  motion: Float64Array;
+}
+
+/** Where a node's displacement and rotation stand among the unknowns, by the unknowns' names: "structural node 7 (tip), unknown of: …". */
+export function unknownsOfNodes(names: readonly string[], nodes: readonly NodeShape[]): (number | undefined)[] {
+  const first = new Map<number, number>();
+  names.forEach((name, at) => {
+    const label = /^structural node (-?\d+)\b/.exec(name)?.[1];
+    if (label !== undefined && !first.has(Number(label))) first.set(Number(label), at);
+  });
+  return nodes.map((node) => first.get(node.label));
+}
+
+interface Matrix {
+  rows: number;
+  columns: number;
+  values: ArrayLike<number>;
+}
+
+/** Modes with a frequency, one of each conjugate pair, slowest first. */
+export function modesOf(
+  eigen: { real: readonly number[]; imaginary: readonly number[]; vectorsReal?: Matrix; vectorsImaginary?: Matrix },
+  names: readonly string[],
+  nodes: readonly NodeShape[],
+): Mode[] {
+  const at = unknownsOfNodes(names, nodes);
+  const entry = (matrix: Matrix | undefined, row: number, column: number) => (matrix && matrix.values.length > 0 ? matrix.values[row * matrix.columns + column] : 0);
+  const modes: Mode[] = [];
+  eigen.real.forEach((real, column) => {
+    const imaginary = eigen.imaginary[column];
+    if (!(imaginary > 0)) return;
+    const motion = new Float64Array(12 * nodes.length);
+    nodes.forEach((node, i) => {
+      const row = at[i];
+      if (row === undefined) return;
+      for (let k = 0; k < (node.orientation ? 6 : 3); ++k) {
+        motion[12 * i + k] = entry(eigen.vectorsReal, row + k, column);
+        motion[12 * i + 6 + k] = entry(eigen.vectorsImaginary, row + k, column);
+      }
+    });
+    modes.push({ real, imaginary, motion });
+  });
+  return modes.sort((a, b) => a.imaginary - b.imaginary);
+}
+
+export function frequency(mode: Mode): number {
+  return mode.imaginary / (2 * Math.PI);
+}
+
+/** Part of the critical damping. */
+export function damping(mode: Mode): number {
+  return -mode.real / Math.hypot(mode.real, mode.imaginary);
+}
+
+function vector(motion: Float64Array, at: number, cos: number, sin: number): Vec3 {
+  return [0, 1, 2].map((k) => motion[at + k] * cos - motion[at + 6 + k] * sin) as unknown as Vec3;
+}
+
+/** Factor by which the largest displacement becomes `reach`; where nothing is displaced, the largest rotation 0.5 rad. */
+export function amplitude(mode: Mode, reach: number): number {
+  let displacement = 0, rotation = 0;
+  for (let at = 0; at < mode.motion.length; at += 12) {
+    const size = (from: number) => Math.hypot(norm(vector(mode.motion, from, 1, 0)), norm(vector(mode.motion, from, 0, 1)));
+    displacement = Math.max(displacement, size(at));
+    rotation = Math.max(rotation, size(at + 3));
+  }
+  if (displacement > 0) return Math.min(reach / displacement, rotation > 0 ? 1 / rotation : Infinity);
+  return rotation > 0 ? 0.5 / rotation : 0;
+}
+
+/** `base`, moved by the mode at a phase in radians. */
+export function moved(base: Pose, mode: Mode, phase: number, factor: number): Pose {
+  const cos = factor * Math.cos(phase), sin = factor * Math.sin(phase);
+  return {
+    position: (node) => add(base.position(node), vector(mode.motion, 12 * node, cos, sin)),
+    orientation: (node) => multiply(rotationOf(vector(mode.motion, 12 * node + 3, cos, sin)), base.orientation(node)),
+    value: base.value,
+  };
+}

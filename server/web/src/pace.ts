@@ -1,0 +1,29 @@
+/** How far to step next, so that simulated time follows the wall clock. */
+
+/** Longest piece of simulated time asked for at once, as wall time in seconds. */
+const LONGEST = 0.1;
+
+export class Pace {
+  private origin = { wall: 0, time: 0 };
+
+  constructor(private speed: number, wall: number, time: number) {
+    this.origin = { wall, time };
+  }
+
+  setSpeed(speed: number, wall: number, time: number): void {
+    this.speed = speed;
+    this.origin = { wall, time };
+  }
+
+  /** Time to step to, or nothing while the next step is not due. A simulation that is too slow is not chased. */
+  next(wall: number, time: number, step: number): number | undefined {
+    let target = this.origin.time + (wall - this.origin.wall) * this.speed;
+    const longest = Math.max(LONGEST * this.speed, step);
+    if (target - time > longest) {
+      this.origin = { wall, time: time + longest };
+      target = this.origin.time;
+    }
+    const due = target - time >= step * 0.5;
+    return due ? Math.max(target, time + step) : undefined;
+  }
+}

@@ -1,0 +1,85 @@
+/** The list of simulations, and where a deck is dropped. */
+import { failureOf, simulations, type Failure } from '../api';
+import type { Desk } from '../desk';
+import { h, iconButton } from '../dom';
+import { number } from '../format';
+import { SimulationState, type SimulationInfo } from '../gen/mbcosim/v1/simulations_pb';
+import { diagnosticsList } from './diagnostics';
+
+const REFRESH_MILLISECONDS = 3000;
+
+export const STATES: Record<number, string> = {
+  [SimulationState.READY]: 'ready',
+  [SimulationState.STEPPING]: 'stepping',
+  [SimulationState.FINISHED]: 'finished',
+  [SimulationState.FAILED]: 'failed',
+};
+
+export class Home {
+  /** The list for the left-hand side. */
+  readonly list = h('ul', { class: 'list', style: 'padding:8px' });
+  /** What stands in place of the scene while nothing is shown. */
+  readonly welcome = h('div', { class: 'empty' });
+  private readonly message = h('div', { 'aria-live': 'polite' });
+  private known: SimulationInfo[] = [];
+
+  constructor(private readonly desk: Desk, private readonly open: (name: string) => void, private readonly compare: (name: string) => void) {
+    this.welcome.append(h('div', { class: 'box' },
+      h('h1', {}, 'See it move'),
+      h('p', { class: 'soft' }, 'Choose a simulation of this daemon. New ones are made by clients: mbcosim view DECK, Python, C++ or any other.'),
+      this.message));
+    desk.shown.watch((shown) => {
+      this.welcome.classList.toggle('hidden', shown !== undefined);
+      this.draw();
+    });
+  }
+
+  /** Keeps the list up to date until the page is left. */
+  async follow(): Promise<void> {
+    for (;;) {
+      await this.refresh();
+      await new Promise((resolve) => setTimeout(resolve, REFRESH_MILLISECONDS));
+    }
+  }
+
+  async refresh(): Promise<SimulationInfo[]> {
+    try {
+      this.known = (await simulations.listSimulations({})).simulations;
+      if (this.message.dataset.kind === 'connection') this.message.replaceChildren();
+      this.draw();
+    } catch (thrown) {
+      this.tell(failureOf(thrown), 'connection');
+    }
+    return this.known;
+  }
+
+  tell(failure: Failure, kind = ''): void {
+    this.message.dataset.kind = kind;
+    const hint = failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started: it has the token.' : '';
+    this.message.replaceChildren(
+      h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)),
+      diagnosticsList(failure.diagnostics));
+  }
+
+  private draw(): void {
+    const current = this.desk.session?.name;
+    this.list.replaceChildren(...this.known.map((info) => h('li', { class: `card${info.name === current ? ' current' : ''}` },
+      h('button', { type: 'button', class: 'name body', style: 'background:none;border:0;text-align:left;cursor:pointer;padding:0', onclick: () => this.open(info.name) },
+        h('div', {}, info.displayName || info.name.replace('simulations/', '')),
+        h('div', { class: 'soft' }, `${STATES[info.state] ?? 'unknown'}, ${number(info.timeS, 5)} s, ${info.owner}`)),
+      current && info.name !== current ? iconButton('eye', `Compare with ${info.displayName || info.name}`, () => this.compare(info.name), { class: 'icon-button small' }) : null,
+      iconButton('trash', `Delete ${info.displayName || info.name}`, () => void this.remove(info), { class: 'icon-button small' }))));
+    if (this.known.length === 0) this.list.append(h('li', { class: 'soft' }, 'No simulation yet.'));
+  }
+
+  private async remove(info: SimulationInfo): Promise<void> {
+    if (!confirm(`Delete the simulation ${info.displayName || info.name}?`)) return;
+    try {
+      await simulations.deleteSimulation({ name: info.name });
+    } catch (thrown) {
+      this.tell(failureOf(thrown));
+    }
+    await this.refresh();
+  }
+}
+

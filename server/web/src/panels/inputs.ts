@@ -1,0 +1,97 @@
+/** Sliders for what clients may write: loads on nodes, drives of streams, parameters. */
+import type { Desk } from '../desk';
+import { h } from '../dom';
+import { curveName, number } from '../format';
+import { matches, partOf, type VariableInfo } from '../model';
+import { valueOf } from '../recording';
+import { section } from './section';
+
+const MOST = 12;
+const WRITE_MILLISECONDS = 40;
+
+export function inputsPanel(desk: Desk): HTMLElement {
+  const search = h('input', { type: 'search', placeholder: 'Search inputs', 'aria-label': 'Search inputs' });
+  const rows = h('div', { class: 'inside', style: 'padding:0' });
+  const panel = section('Inputs', false, search, rows);
+  let shown: { variable: VariableInfo; set: (values: number[]) => void }[] = [];
+
+  const inputs = (): VariableInfo[] =>
+    (desk.shown.value?.model.variables ?? []).filter((variable) => variable.kind === 'input' || variable.kind === 'parameter');
+
+  const rebuild = () => {
+    shown = [];
+    const all = inputs(), selected = desk.selected.value, query = search.value.trim();
+    const found = all.filter((variable) => (query ? matches(`${variable.name} ${variable.description}`, query) : !selected || partOf(variable.name) === selected));
+    const list = found.length > 0 || query ? found : all;
+    panel.classList.toggle('hidden', all.length === 0 || !desk.session);
+    if (!panel.open) return rows.replaceChildren();
+    desk.session?.want(list.slice(0, MOST));
+    rows.replaceChildren(...list.slice(0, MOST).map(row), list.length > MOST ? h('p', { class: 'soft' }, `${list.length - MOST} more: search, or select their node`) : '');
+    update();
+  };
+
+  const row = (variable: VariableInfo): HTMLElement => {
+    const count = Math.min(variable.size, 9);
+    const values = new Array<number>(variable.size).fill(0);
+    const fields: { slider: HTMLInputElement; field: HTMLInputElement }[] = [];
+    let timer = 0;
+    const write = (k: number, value: number) => {
+      if (!Number.isFinite(value)) return;
+      values[k] = value;
+      clearTimeout(timer);
+      timer = window.setTimeout(() => void desk.session?.write(variable, [...values]), WRITE_MILLISECONDS);
+    };
+    const lines = Array.from({ length: count }, (_, k) => {
+      const name = curveName(variable.name.replace('node.structural.', 'node '), variable.size, k);
+      const slider = h('input', { type: 'range', min: -10, max: 10, step: 'any', 'aria-label': name });
+      const field = h('input', { type: 'number', step: 'any', 'aria-label': `${name}, value` });
+      slider.addEventListener('input', () => {
+        field.value = number(slider.valueAsNumber, 4).replace('−', '-');
+        write(k, slider.valueAsNumber);
+      });
+      field.addEventListener('change', () => {
+        widen(slider, field.valueAsNumber);
+        slider.value = field.value;
+        write(k, field.valueAsNumber);
+      });
+      fields.push({ slider, field });
+      return h('div', { class: 'input' }, h('span', { class: 'label', title: variable.description }, name, ' ', h('span', { class: 'soft' }, variable.unit)), slider, field);
+    });
+    shown.push({
+      variable,
+      set: (next) => next.slice(0, count).forEach((value, k) => {
+        const { slider, field } = fields[k];
+        values[k] = value;
+        if (document.activeElement === slider || document.activeElement === field) return;
+        widen(slider, value);
+        slider.value = String(value);
+        field.value = number(value, 6).replace('−', '-');
+      }),
+    });
+    return h('div', {}, ...lines);
+  };
+
+  const update = () => {
+    const sample = desk.shown.value?.recording.last;
+    if (!sample || !panel.open) return;
+    for (const { variable, set } of shown) {
+      const values = Array.from({ length: variable.size }, (_, k) => valueOf(sample, variable.handle, k));
+      if (values.every(Number.isFinite)) set(values);
+    }
+  };
+
+  search.addEventListener('input', rebuild);
+  panel.addEventListener('toggle', rebuild);
+  desk.shown.watch(rebuild);
+  desk.selected.watch(rebuild);
+  desk.frame.watch(update);
+  return panel;
+}
+
+/** A slider reaches ten times as far once its value is out of its range. */
+function widen(slider: HTMLInputElement, value: number): void {
+  let reach = Number(slider.max);
+  while (Number.isFinite(value) && Math.abs(value) > reach) reach *= 10;
+  slider.max = String(reach);
+  slider.min = String(-reach);
+}

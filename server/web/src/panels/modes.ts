@@ -1,0 +1,45 @@
+/** Eigenmodes about the present state: a list to animate. */
+import type { Desk } from '../desk';
+import { h, icon } from '../dom';
+import { number } from '../format';
+import { damping, frequency, type Mode } from '../modes';
+import { section } from './section';
+
+export function modesPanel(desk: Desk, animate: (mode: Mode | undefined, size: number) => void): HTMLElement {
+  const count = h('input', { type: 'number', min: 1, max: 200, value: '10', 'aria-label': 'Number of eigenvalues', style: 'width:70px' });
+  const near = h('input', { type: 'number', min: 0, step: 'any', value: '1', 'aria-label': 'Nearest to this frequency, in hertz', style: 'width:70px' });
+  const size = h('input', { type: 'range', min: 0.02, max: 0.5, step: 0.01, value: '0.12', 'aria-label': 'Size of the motion' });
+  const list = h('ul', { class: 'list' });
+  const compute = h('button', { type: 'button', class: 'button', onclick: () => void run() }, icon('wave'), 'Compute');
+  const panel = section('Eigenmodes', false, h('div', { class: 'legend' }, count, h('span', { class: 'soft' }, 'nearest to'), near, h('span', { class: 'soft' }, 'Hz'), compute), size, list);
+  let modes: Mode[] = [];
+  let shown: Mode | undefined;
+
+  const run = async () => {
+    compute.disabled = true;
+    show(undefined);
+    modes = (await desk.session?.eigenmodes(count.valueAsNumber || 10, near.valueAsNumber || 0)) ?? [];
+    compute.disabled = false;
+    draw();
+  };
+
+  const show = (mode: Mode | undefined) => {
+    shown = mode;
+    animate(mode, size.valueAsNumber);
+    draw();
+  };
+
+  const draw = () => {
+    list.replaceChildren(...modes.map((mode) => h('li', {}, h('button', {
+      type: 'button', class: `card${mode === shown ? ' current' : ''}`, 'aria-pressed': String(mode === shown), onclick: () => show(mode === shown ? undefined : mode),
+    }, h('span', { class: 'number' }, `${number(frequency(mode), 5)} Hz`), h('span', { class: 'spacer' }), h('span', { class: 'soft number' }, `damping ${number(100 * damping(mode), 3)} %`)))));
+  };
+
+  size.addEventListener('input', () => animate(shown, size.valueAsNumber));
+  desk.shown.watch(() => {
+    modes = [];
+    show(undefined);
+    panel.classList.toggle('hidden', !desk.session);
+  });
+  return panel;
+}

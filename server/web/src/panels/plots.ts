@@ -1,0 +1,149 @@
+/** Plots of chosen variables against time, or against each other. */
+import uPlot from 'uplot';
+import type { Curve, Desk, Plot } from '../desk';
+import { h, iconButton, replace } from '../dom';
+import { curveName, number } from '../format';
+import { shortName } from '../model';
+import { valueOf, type Sample } from '../recording';
+
+const COLOURS = {
+  dark: ['#4aa8ff', '#f0a13c', '#35c2a8', '#ff7676', '#b980ff', '#c9b458', '#d86f9a', '#8fd3ff', '#e3eaf1'],
+  light: ['#0b63c4', '#b45f00', '#00755f', '#c22222', '#6d35c4', '#766300', '#a92a60', '#2f86b8', '#17212c'],
+};
+/** Points of a curve are at most about so many; a screen has no more. */
+const POINTS = 3000;
+const HEIGHT = 150;
+
+/** Columns for a plot: abscissa, then one for each curve. */
+export function columns(samples: readonly Sample[], plot: Plot): number[][] {
+  const stride = Math.max(1, Math.ceil(samples.length / POINTS));
+  const result: number[][] = [[], ...plot.curves.map(() => [])];
+  const add = (sample: Sample) => {
+    result[0].push(plot.against ? valueOf(sample, plot.against.variable.handle, plot.against.element) : sample.time);
+    plot.curves.forEach((curve, k) => result[k + 1].push(valueOf(sample, curve.variable.handle, curve.element)));
+  };
+  for (let i = 0; i < samples.length; i += stride) add(samples[i]);
+  if (samples.length > 0 && (samples.length - 1) % stride !== 0) add(samples[samples.length - 1]);
+  return result;
+}
+
+function label(curve: Curve): string {
+  const { variable, element } = curve;
+  const part = variable.name.slice(0, variable.name.length - shortName(variable.name).length).replace(/\.$/, '');
+  return `${part.replace('node.structural.', 'node ').replaceAll('.', ' ')} ${curveName(shortName(variable.name), variable.size, element)}`.trim();
+}
+
+class PlotView {
+  readonly element: HTMLElement;
+  private chart?: uPlot;
+  private readonly header = h('header');
+  private readonly canvas = h('div', { class: 'canvas' });
+
+  constructor(private readonly desk: Desk, readonly plot: Plot) {
+    this.element = h('section', { class: 'plot', 'aria-label': 'Plot' }, this.header, this.canvas);
+    new ResizeObserver(() => this.chart?.setSize({ width: this.width(), height: HEIGHT })).observe(this.canvas);
+  }
+
+  private width(): number {
+    return Math.max(this.canvas.clientWidth, 120);
+  }
+
+  /** Builds the chart anew: its curves or colours changed. */
+  rebuild(): void {
+    this.chart?.destroy();
+    const colours = COLOURS[this.desk.theme.value];
+    const units = [...new Set(this.plot.curves.map((curve) => curve.variable.unit))].filter(Boolean).join(', ');
+    replace(
+      this.header,
+      ...this.plot.curves.map((curve, k) => this.chip(curve, colours[k % colours.length])),
+      h('span', { class: 'soft' }, units && `[${units}]`),
+      h('span', { class: 'spacer' }),
+      this.abscissa(),
+      iconButton('close', 'Close this plot', () => this.desk.unplot(this.plot), { class: 'icon-button small' }),
+    );
+    const style = getComputedStyle(document.documentElement);
+    const axis: uPlot.Axis = {
+      stroke: style.getPropertyValue('--soft'),
+      grid: { stroke: style.getPropertyValue('--line'), width: 1 },
+      ticks: { stroke: style.getPropertyValue('--line'), width: 1 },
+      font: '11px system-ui',
+    };
+    this.chart = new uPlot(
+      {
+        width: this.width(),
+        height: HEIGHT,
+        cursor: { drag: { x: true, y: false }, points: { size: 6 } },
+        scales: { x: { time: false } },
+        axes: [
+          { ...axis, size: 26, values: (_, ticks) => ticks.map((tick) => number(tick, 4)) },
+          { ...axis, size: 56, values: (_, ticks) => ticks.map((tick) => number(tick, 4)) },
+        ],
+        series: [
+          {},
+          ...this.plot.curves.map((curve, k) => ({ label: label(curve), stroke: colours[k % colours.length], width: 1.6, points: { show: false }, sorted: (this.plot.against ? 0 : 1) as 0 | 1 })),
+        ],
+        hooks: { draw: [(chart) => this.drawCursor(chart)] },
+      },
+      [[], ...this.plot.curves.map(() => [])],
+      this.canvas,
+    );
+    this.chart.over.addEventListener('dblclick', (event) => this.goTo(event));
+    this.update();
+  }
+
+  private chip(curve: Curve, colour: string): HTMLElement {
+    return h('span', { class: 'curve' }, h('i', { style: `background:${colour}` }), label(curve),
+      iconButton('close', `Remove ${label(curve)}`, () => this.desk.unplot(this.plot, curve), { class: 'icon-button small' }));
+  }
+
+  private abscissa(): HTMLElement {
+    const choices = this.desk.plots.value.flatMap((plot) => plot.curves);
+    const select = h('select', { 'aria-label': 'Plot against', class: 'small' }, h('option', { value: '' }, 'over time'));
+    choices.forEach((curve, k) => select.append(h('option', { value: String(k) }, `over ${label(curve)}`)));
+    select.value = String(choices.findIndex((curve) => this.plot.against && curve.variable === this.plot.against.variable && curve.element === this.plot.against.element));
+    if (select.selectedIndex < 0) select.value = '';
+    select.addEventListener('change', () => {
+      this.plot.against = select.value === '' ? undefined : choices[Number(select.value)];
+      this.desk.plots.notify();
+    });
+    return select;
+  }
+
+  private goTo(event: MouseEvent): void {
+    if (!this.chart || this.plot.against) return;
+    this.desk.cursor.value = this.chart.posToVal(event.offsetX, 'x');
+  }
+
+  private drawCursor(chart: uPlot): void {
+    const sample = this.desk.sample;
+    if (!sample || this.desk.cursor.value === undefined || this.plot.against) return;
+    const x = chart.valToPos(sample.time, 'x', true);
+    chart.ctx.save();
+    chart.ctx.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue('--accent');
+    chart.ctx.lineWidth = 1.5 * devicePixelRatio;
+    chart.ctx.beginPath();
+    chart.ctx.moveTo(x, chart.bbox.top);
+    chart.ctx.lineTo(x, chart.bbox.top + chart.bbox.height);
+    chart.ctx.stroke();
+    chart.ctx.restore();
+  }
+
+  update(): void {
+    const samples = this.desk.shown.value?.recording.samples ?? [];
+    this.chart?.setData(columns(samples, this.plot) as uPlot.AlignedData);
+  }
+}
+
+export function plotsPanel(desk: Desk): HTMLElement {
+  const element = h('div', { class: 'plots' });
+  let views: PlotView[] = [];
+  const rebuild = () => {
+    views = desk.plots.value.map((plot) => views.find((view) => view.plot === plot) ?? new PlotView(desk, plot));
+    element.replaceChildren(...views.map((view) => view.element));
+    views.forEach((view) => view.rebuild());
+  };
+  desk.plots.watch(rebuild);
+  desk.theme.watch(() => views.forEach((view) => view.rebuild()));
+  desk.frame.watch(() => views.forEach((view) => view.update()));
+  return element;
+}

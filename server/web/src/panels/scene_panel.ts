@@ -1,0 +1,178 @@
+/** The scene with its tools. */
+import type { Vec3 } from '../algebra';
+import type { Desk } from '../desk';
+import { h, icon, iconButton } from '../dom';
+import { number } from '../format';
+import { amplitude, moved, type Mode } from '../modes';
+import { pointAt, poseOf } from '../geometry';
+import type { Layer } from '../scene/build';
+import { DARK, LIGHT } from '../scene/palette';
+import { View, type ViewName } from '../scene/view';
+import type { Session } from '../session';
+
+const LAYERS: [Layer, string][] = [
+  ['bodies', 'bodies'], ['joints', 'joints'], ['lines', 'beams and rods'], ['surfaces', 'shells'], ['flexible', 'flexible bodies'],
+  ['forces', 'forces and moments'], ['links', 'links to nodes'], ['nodes', 'nodes'],
+];
+const TRAIL_SAMPLES = 2000;
+/** Modes are shown at this pace, whatever their frequency. */
+const MODE_HERTZ = 0.8;
+
+export class ScenePanel {
+  readonly element = h('div', { class: 'scene' });
+  readonly view: View;
+  /** Nodes whose paths are drawn, by index. */
+  private readonly trails = new Set<number>();
+  private readonly hud = h('div', { class: 'hud', role: 'status', 'aria-live': 'off' });
+  private other?: Session;
+  private mode?: { mode: Mode; factor: number };
+  private unwatchOther = () => {};
+
+  constructor(private readonly desk: Desk) {
+    this.view = new View(this.element, DARK);
+    this.view.onPick = (id) => (desk.selected.value = id);
+    this.element.append(this.layerTools(), this.viewTools(), this.hud);
+    desk.theme.watch((theme) => this.view.setPalette(theme === 'dark' ? DARK : LIGHT));
+    desk.shown.watch((shown) => {
+      this.trails.clear();
+      this.compareWith(undefined);
+      this.view.follow(-1);
+      if (shown) this.view.show(shown.geometry);
+    });
+    desk.selected.watch((id) => this.view.select(id));
+    desk.frame.watch(() => this.update());
+  }
+
+  /** Index of the structural node with the identifier "node.structural:7"; −1: none. */
+  private nodeIndex(id: string | undefined): number {
+    const nodes = this.desk.shown.value?.geometry.nodes ?? [];
+    return nodes.findIndex((node) => `node.structural:${node.label}` === id);
+  }
+
+  follow(id: string | undefined): void {
+    this.view.follow(this.nodeIndex(id));
+  }
+
+  toggleTrail(): void {
+    const node = this.nodeIndex(this.desk.selected.value);
+    const nodes = node >= 0 ? [node] : this.attachedNodes();
+    for (const index of nodes) if (!this.trails.delete(index)) this.trails.add(index);
+    this.desk.invalidate();
+  }
+
+  private attachedNodes(): number[] {
+    const shape = this.desk.shown.value?.geometry.elements.find((element) => element.id === this.desk.selected.value);
+    return [...new Set(shape?.points.map((point) => point.node).filter((node) => node >= 0) ?? [])];
+  }
+
+  /** Draws another simulation in the same picture; undefined: none. */
+  compareWith(session: Session | undefined): void {
+    this.unwatchOther();
+    this.other?.close();
+    this.other = session;
+    this.view.compare(session?.geometry);
+    this.unwatchOther = session ? session.changed.watch(() => this.desk.invalidate()) : () => {};
+  }
+
+  /** Shows a mode about the sample looked at, `size` times the model large; undefined: none. */
+  animate(mode: Mode | undefined, size: number): void {
+    const extent = this.desk.shown.value?.geometry.extent ?? 1;
+    const idle = this.mode === undefined;
+    this.mode = mode && { mode, factor: amplitude(mode, size * extent) };
+    if (this.mode && idle) this.vibrate();
+    else this.desk.invalidate();
+  }
+
+  private vibrate(): void {
+    requestAnimationFrame(() => {
+      if (!this.mode) return this.desk.invalidate();
+      this.update();
+      this.vibrate();
+    });
+  }
+
+  private update(): void {
+    const shown = this.desk.shown.value, sample = this.desk.sample;
+    if (!shown || !sample) return this.hud.replaceChildren();
+    const pose = poseOf(shown.geometry.nodes, sample.values, (handle) => sample.layout.offset(handle));
+    const phase = (performance.now() / 1000) * 2 * Math.PI * MODE_HERTZ;
+    this.view.setPose(this.mode ? moved(pose, this.mode.mode, phase, this.mode.factor) : pose);
+    this.updateOther(sample.time);
+    this.view.setTrails([...this.trails].map((node) => this.path(node)));
+    this.hud.replaceChildren(h('strong', {}, `${number(sample.time, 6)} s`), h('div', { class: 'soft' }, `step ${sample.step}`));
+  }
+
+  private updateOther(time: number): void {
+    const recording = this.other?.recording;
+    const sample = recording && (this.desk.cursor.value === undefined ? recording.last : recording.samples[recording.indexAt(time)]);
+    if (this.other && sample) this.view.setGhostPose(poseOf(this.other.geometry.nodes, sample.values, (handle) => sample.layout.offset(handle)));
+  }
+
+  private path(node: number): Vec3[] {
+    const shown = this.desk.shown.value, last = this.desk.sample;
+    if (!shown || !last) return [];
+    const samples = shown.recording.samples, end = shown.recording.indexAt(last.time);
+    const stride = Math.max(1, Math.ceil((end + 1) / TRAIL_SAMPLES));
+    const path: Vec3[] = [];
+    for (let i = 0; i <= end; i += stride) {
+      const sample = samples[i];
+      const pose = poseOf(shown.geometry.nodes, sample.values, (handle) => sample.layout.offset(handle));
+      path.push(pointAt(pose, { name: '', node, offset: [0, 0, 0] }));
+    }
+    return path;
+  }
+
+  private layerTools(): HTMLElement {
+    const deformation = h('input', { type: 'range', min: 0, max: 3, step: 0.05, value: 0, 'aria-label': 'Deformation scale' });
+    const scale = h('span', { class: 'number' }, '× 1');
+    deformation.addEventListener('input', () => {
+      const factor = 10 ** deformation.valueAsNumber;
+      scale.textContent = `× ${number(factor, 2)}`;
+      this.view.setDeformation(factor);
+    });
+    const menu = h('div', { class: 'menu hidden' },
+      ...LAYERS.map(([layer, name]) => check(name, true, (on) => this.view.setLayer(layer, on))),
+      check('grid', true, (on) => this.view.setGrid(on)),
+      h('label', {}, 'deformation', deformation, scale));
+    const button = h('button', { type: 'button', class: 'button', 'aria-expanded': 'false', onclick: () => toggle(button, menu) }, icon('layers'), 'Show');
+    const trail = h('button', { type: 'button', class: 'button', title: 'Draw the path of the selected node (T)', onclick: () => this.toggleTrail() }, icon('wave'), 'Trail');
+    return h('div', { class: 'toolbar layers' }, h('div', { class: 'anchor' }, button, menu), trail);
+  }
+
+  private viewTools(): HTMLElement {
+    const look = (name: ViewName, label: string) => h('button', { type: 'button', class: 'button', title: `View: ${name}`, onclick: () => this.view.look(name) }, label);
+    let flat = false, followed = false;
+    const orthographic = h('button', { type: 'button', class: 'button wide', 'aria-pressed': 'false', title: 'Parallel projection (O)', onclick: () => {
+      flat = !flat;
+      orthographic.setAttribute('aria-pressed', String(flat));
+      this.view.setOrthographic(flat);
+    } }, 'ortho');
+    const follow = iconButton('follow', 'Follow the selected node (F)', () => {
+      followed = !followed && this.nodeIndex(this.desk.selected.value) >= 0;
+      follow.setAttribute('aria-pressed', String(followed));
+      this.follow(followed ? this.desk.selected.value : undefined);
+    }, { 'aria-pressed': 'false' });
+    return h('div', { class: 'toolbar views' }, look('front', 'X–Z'), look('side', 'Y–Z'), look('top', 'X–Y'), iconButton('fit', 'Whole model (H)', () => this.view.look('iso')), orthographic, follow);
+  }
+}
+
+function check(name: string, on: boolean, change: (on: boolean) => void): HTMLElement {
+  const box = h('input', { type: 'checkbox', checked: on, onchange: () => change(box.checked) });
+  return h('label', {}, box, name);
+}
+
+/** Opens and closes a menu; a click elsewhere and Escape close it. */
+export function toggle(button: HTMLElement, menu: HTMLElement): void {
+  const open = menu.classList.toggle('hidden') === false;
+  button.setAttribute('aria-expanded', String(open));
+  if (!open) return;
+  const close = (event: Event) => {
+    if (event instanceof KeyboardEvent ? event.key !== 'Escape' : menu.contains(event.target as Node) || button.contains(event.target as Node)) return;
+    menu.classList.add('hidden');
+    button.setAttribute('aria-expanded', 'false');
+    document.removeEventListener('pointerdown', close);
+    document.removeEventListener('keydown', close);
+  };
+  document.addEventListener('pointerdown', close);
+  document.addEventListener('keydown', close);
+}

@@ -1,0 +1,401 @@
+/** The picture: camera, light, grid, and what moves in it. Draws only when something changed. */
+import * as THREE from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { LineMaterial } from 'three/examples/jsm/lines/LineMaterial.js';
+import type { Vec3 } from '../algebra';
+import { initialPose, type Geometry, type Pose } from '../geometry';
+import { FlexibleBatch } from './batches';
+import { build, type Drawn, type Layer } from './build';
+import type { Palette } from './palette';
+import { Trails } from './trails';
+
+/** Views along axes: where the camera stands, and what is up. */
+export const VIEWS = {
+  iso: { from: [1, -1.4, 0.8], up: [0, 0, 1] },
+  front: { from: [0, -1, 0], up: [0, 0, 1] },
+  side: { from: [1, 0, 0], up: [0, 0, 1] },
+  top: { from: [0, 0, 1], up: [0, 1, 0] },
+} as const;
+export type ViewName = keyof typeof VIEWS;
+
+const NEAR = 0.01, FAR = 100;  // times the model's extent
+
+export class View {
+  readonly canvas: HTMLCanvasElement;
+  onPick: (id: string | undefined) => void = () => {};
+
+  private readonly renderer: THREE.WebGLRenderer;
+  private readonly scene = new THREE.Scene();
+  private readonly perspective = new THREE.PerspectiveCamera(38, 1);
+  private readonly orthographic = new THREE.OrthographicCamera();
+  private camera: THREE.PerspectiveCamera | THREE.OrthographicCamera = this.perspective;
+  private controls: OrbitControls;
+  private readonly triad = new THREE.Scene();
+  private readonly triadCamera = new THREE.PerspectiveCamera(30, 1, 0.1, 10);
+  private readonly hidden = new Set<Layer>();
+  private grid?: THREE.Group;
+  private drawn?: Drawn;
+  private ghost?: Drawn;
+  private trails?: Trails;
+  private geometry?: Geometry;
+  private pose?: Pose;
+  private ghostPose?: Pose;
+  private selected?: string;
+  private followed = -1;
+  private followedAt?: THREE.Vector3;
+  private deformation = 1;
+  private dirty = true;
+  private pressedAt?: [number, number];
+
+  constructor(parent: HTMLElement, private palette: Palette) {
+    this.renderer = new THREE.WebGLRenderer({ antialias: true });
+    this.canvas = this.renderer.domElement;
+    this.canvas.tabIndex = 0;
+    this.canvas.setAttribute('aria-label', 'The model in three dimensions. Arrow keys turn it, + and − zoom.');
+    this.canvas.setAttribute('role', 'img');
+    parent.append(this.canvas);
+    this.renderer.autoClear = false;
+    this.controls = this.newControls();
+    this.addLights(this.scene);
+    this.addLights(this.triad);
+    this.addTriad();
+    this.listen();
+    new ResizeObserver(() => this.resize()).observe(parent);
+    this.resize();
+    const frame = () => {
+      requestAnimationFrame(frame);
+      if (this.dirty) this.render();
+    };
+    frame();
+  }
+
+  // ---- what is shown
+
+  show(geometry: Geometry, keepView = false): void {
+    this.clear();
+    this.geometry = geometry;
+    this.drawn = build(geometry, this.palette);
+    this.addBatches(this.drawn, 1);
+    this.trails = new Trails(new THREE.Color(this.palette.trail));
+    this.scene.add(this.trails.object);
+    this.addGrid(geometry);
+    this.setPose(initialPose(geometry.nodes));
+    this.setDeformation(this.deformation);
+    if (!keepView) this.look('iso');
+  }
+
+  /** Another simulation in the same picture, pale. */
+  compare(geometry: Geometry | undefined): void {
+    if (this.ghost) this.removeBatches(this.ghost);
+    this.ghost = geometry && build(geometry, this.palette);
+    if (this.ghost) this.addBatches(this.ghost, 0.25);
+    if (geometry) this.setGhostPose(initialPose(geometry.nodes));
+    this.invalidate();
+  }
+
+  setPose(pose: Pose): void {
+    this.pose = pose;
+    for (const { layer, batch } of this.drawn?.batches ?? []) if (!this.hidden.has(layer)) batch.update(pose);
+    this.moveWithNode();
+    this.invalidate();
+  }
+
+  setGhostPose(pose: Pose): void {
+    this.ghostPose = pose;
+    for (const { layer, batch } of this.ghost?.batches ?? []) if (!this.hidden.has(layer)) batch.update(pose);
+    this.invalidate();
+  }
+
+  setTrails(paths: Vec3[][]): void {
+    this.trails?.set(paths);
+    this.invalidate();
+  }
+
+  setLayer(layer: Layer, visible: boolean): void {
+    if (visible) this.hidden.delete(layer);
+    else this.hidden.add(layer);
+    for (const drawn of [this.drawn, this.ghost])
+      for (const entry of drawn?.batches ?? []) entry.batch.object.visible = !this.hidden.has(entry.layer);
+    if (this.pose) this.setPose(this.pose);
+    if (this.ghostPose) this.setGhostPose(this.ghostPose);
+  }
+
+  setGrid(visible: boolean): void {
+    if (this.grid) this.grid.visible = visible;
+    this.invalidate();
+  }
+
+  setDeformation(factor: number): void {
+    this.deformation = factor;
+    for (const { batch } of this.drawn?.batches ?? []) if (batch instanceof FlexibleBatch) batch.factor = factor;
+    if (this.pose) this.setPose(this.pose);
+  }
+
+  select(id: string | undefined): void {
+    this.selected = id;
+    const colour = new THREE.Color(this.palette.selected);
+    for (const { batch } of this.drawn?.batches ?? []) batch.highlight(id, colour);
+    this.invalidate();
+  }
+
+  setPalette(palette: Palette): void {
+    this.palette = palette;
+    if (!this.geometry) return this.invalidate();
+    const pose = this.pose, ghostPose = this.ghostPose, grid = this.grid?.visible ?? true;
+    this.show(this.geometry, true);
+    if (pose) this.setPose(pose);
+    if (ghostPose) this.setGhostPose(ghostPose);
+    this.setGrid(grid);
+    this.hidden.forEach((layer) => this.setLayer(layer, false));
+    this.select(this.selected);
+  }
+
+  /** What is drawn for a node: its matrix, 16 numbers by columns, as the graphics card has it. */
+  nodeMatrix(index: number): number[] {
+    const matrix = new THREE.Matrix4();
+    this.drawn?.nodes.object.getMatrixAt(index, matrix);
+    return matrix.toArray();
+  }
+
+  // ---- how it is looked at
+
+  look(name: ViewName): void {
+    const { from, up } = VIEWS[name];
+    const extent = this.geometry?.extent ?? 1, centre = this.middle();
+    const target = this.followed >= 0 && this.pose ? this.pose.position(this.followed) : centre;
+    this.controls.target.set(...target);
+    for (const camera of [this.perspective, this.orthographic]) {
+      camera.up.set(up[0], up[1], up[2]);
+      camera.position.set(from[0], from[1], from[2]).normalize().multiplyScalar((extent * 1.9) / Math.min(1, this.perspective.aspect)).add(this.controls.target);
+      camera.near = extent * NEAR;
+      camera.far = extent * FAR;
+    }
+    this.orthographic.zoom = 1;
+    const aim = this.controls.target.clone();
+    this.controls.dispose();
+    this.controls = this.newControls();  // they take what is up from the camera, once
+    this.controls.target.copy(aim);
+    this.resize();
+    this.controls.update();
+  }
+
+  private newControls(): OrbitControls {
+    const controls = new OrbitControls(this.camera, this.canvas);
+    controls.addEventListener('change', () => this.invalidate());
+    return controls;
+  }
+
+  /** Of the box around the nodes as they are; the model's own where there are none. */
+  private middle(): Vec3 {
+    const count = this.geometry?.nodes.length ?? 0;
+    if (!this.pose || count === 0) return this.geometry?.centre ?? [0, 0, 0];
+    const box = new THREE.Box3();
+    for (let node = 0; node < count; ++node) box.expandByPoint(new THREE.Vector3(...this.pose.position(node)));
+    return box.getCenter(new THREE.Vector3()).toArray();
+  }
+
+  setOrthographic(on: boolean): void {
+    const next = on ? this.orthographic : this.perspective;
+    if (next === this.camera) return;
+    next.position.copy(this.camera.position);
+    next.up.copy(this.camera.up);
+    this.camera = next;
+    this.controls.object = next;
+    this.resize();
+    this.controls.update();
+    this.invalidate();
+  }
+
+  /** The camera moves along with a node; −1: it stays. */
+  follow(node: number): void {
+    this.followed = node;
+    this.followedAt = undefined;
+    this.moveWithNode();
+  }
+
+  private moveWithNode(): void {
+    if (this.followed < 0 || !this.pose) return;
+    const at = new THREE.Vector3(...this.pose.position(this.followed));
+    const moved = at.clone().sub(this.followedAt ?? this.controls.target);
+    this.controls.target.add(moved);
+    this.camera.position.add(moved);
+    this.followedAt = at;
+    this.controls.update();
+  }
+
+  /** Turns the camera about the target by angles in radians. */
+  turn(horizontal: number, vertical: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    offset.applyAxisAngle(this.camera.up, horizontal);
+    const side = new THREE.Vector3().crossVectors(offset, this.camera.up).normalize();
+    const tilted = offset.clone().applyAxisAngle(side, vertical);
+    if (Math.abs(tilted.clone().normalize().dot(this.camera.up)) < 0.995) offset.copy(tilted);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.invalidate();
+  }
+
+  zoom(factor: number): void {
+    if (this.camera === this.orthographic) {
+      this.orthographic.zoom *= factor;
+      this.orthographic.updateProjectionMatrix();
+    } else {
+      this.camera.position.sub(this.controls.target).multiplyScalar(1 / factor).add(this.controls.target);
+    }
+    this.controls.update();
+    this.invalidate();
+  }
+
+  picture(): Promise<Blob | null> {
+    this.render();  // what was drawn before is gone from the buffer
+    return new Promise((resolve) => this.canvas.toBlob(resolve, 'image/png'));
+  }
+
+  invalidate(): void {
+    this.dirty = true;
+  }
+
+  // ---- the inside
+
+  private addBatches(drawn: Drawn, opacity: number): void {
+    for (const { layer, batch } of drawn.batches) {
+      batch.object.visible = !this.hidden.has(layer);
+      this.scene.add(batch.object);
+      if (opacity < 1) batch.object.traverse((object) => fade(object, opacity));
+    }
+  }
+
+  private removeBatches(drawn: Drawn): void {
+    for (const { batch } of drawn.batches) {
+      this.scene.remove(batch.object);
+      batch.dispose();
+    }
+  }
+
+  private clear(): void {
+    if (this.drawn) this.removeBatches(this.drawn);
+    if (this.trails) this.scene.remove(this.trails.object);
+    if (this.grid) this.scene.remove(this.grid);
+    this.drawn = undefined;
+  }
+
+  private addLights(scene: THREE.Scene): void {
+    scene.add(new THREE.HemisphereLight(0xffffff, 0x667788, 1.7));
+    const sun = new THREE.DirectionalLight(0xffffff, 1.9);
+    sun.position.set(2, -3, 5);
+    scene.add(sun);
+  }
+
+  private addGrid(geometry: Geometry): void {
+    const cell = 10 ** Math.floor(Math.log10(geometry.extent / 2));
+    const cells = 2 * Math.ceil(geometry.extent / cell) + 2;
+    this.grid = new THREE.Group();
+    for (const [parts, opacity] of [[10, 0.28], [2, 0.55], [1, 1]]) this.grid.add(this.gridLines(cells, cell, parts, opacity));
+    const lowest = Math.min(0, ...geometry.nodes.map((node) => node.position[2]));
+    this.grid.position.set(Math.round(geometry.centre[0] / cell) * cell, Math.round(geometry.centre[1] / cell) * cell, lowest - 0.02 * geometry.extent);
+    this.scene.add(this.grid);
+  }
+
+  private gridLines(cells: number, cell: number, parts: number, opacity: number): THREE.GridHelper {
+    const lines = new THREE.GridHelper(cells * cell, cells * parts, this.palette.grid, this.palette.grid);
+    lines.rotateX(Math.PI / 2);
+    Object.assign(lines.material, { transparent: true, opacity });
+    return lines;
+  }
+
+  private addTriad(): void {
+    const axes: [THREE.Vector3, string][] = [
+      [new THREE.Vector3(1, 0, 0), '#e5484d'],
+      [new THREE.Vector3(0, 1, 0), '#30a46c'],
+      [new THREE.Vector3(0, 0, 1), '#3e8bff'],
+    ];
+    for (const [axis, colour] of axes) {
+      const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis);
+      const material = new THREE.MeshBasicMaterial({ color: colour });
+      const shaft = new THREE.Mesh(new THREE.CylinderGeometry(0.035, 0.035, 0.7, 12).translate(0, 0.35, 0), material);
+      const head = new THREE.Mesh(new THREE.ConeGeometry(0.1, 0.25, 16).translate(0, 0.8, 0), material);
+      for (const mesh of [shaft, head]) mesh.quaternion.copy(turn), this.triad.add(mesh);
+    }
+  }
+
+  private resize(): void {
+    const parent = this.canvas.parentElement;
+    const width = Math.max(parent?.clientWidth ?? 1, 1), height = Math.max(parent?.clientHeight ?? 1, 1);
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height);
+    this.perspective.aspect = width / height;
+    this.perspective.updateProjectionMatrix();
+    const half = ((this.geometry?.extent ?? 1) * 0.62) / Math.min(1, width / height);
+    Object.assign(this.orthographic, { left: (-half * width) / height, right: (half * width) / height, top: half, bottom: -half });
+    this.orthographic.updateProjectionMatrix();
+    this.scene.traverse((object) => {
+      const material = (object as THREE.Mesh).material;
+      if (material instanceof LineMaterial) material.resolution.set(width, height);
+    });
+    this.invalidate();
+  }
+
+  private render(): void {
+    this.dirty = false;
+    const { width, height } = this.renderer.getSize(new THREE.Vector2());
+    this.renderer.setClearColor(this.palette.background);
+    this.renderer.setViewport(0, 0, width, height);
+    this.renderer.clear();
+    this.renderer.render(this.scene, this.camera);
+    this.triadCamera.position.copy(this.camera.position).sub(this.controls.target).setLength(4.2);
+    this.triadCamera.up.copy(this.camera.up);
+    this.triadCamera.lookAt(0, 0, 0);
+    const corner = Math.min(96, height / 4);
+    this.renderer.clearDepth();
+    this.renderer.setViewport(8, 8, corner, corner);
+    this.renderer.render(this.triad, this.triadCamera);
+  }
+
+  private listen(): void {
+    this.canvas.addEventListener('pointerdown', (event) => (this.pressedAt = [event.clientX, event.clientY]));
+    this.canvas.addEventListener('pointerup', (event) => {
+      const [x, y] = this.pressedAt ?? [Infinity, Infinity];
+      if (Math.hypot(event.clientX - x, event.clientY - y) < 5) this.onPick(this.hit(event));
+    });
+    const steps: Record<string, () => void> = {
+      ArrowLeft: () => this.turn(-0.1, 0),
+      ArrowRight: () => this.turn(0.1, 0),
+      ArrowUp: () => this.turn(0, 0.1),
+      ArrowDown: () => this.turn(0, -0.1),
+      '+': () => this.zoom(1.15),
+      '=': () => this.zoom(1.15),
+      '-': () => this.zoom(1 / 1.15),
+    };
+    this.canvas.addEventListener('keydown', (event) => {
+      const step = steps[event.key];
+      if (!step) return;
+      step();
+      event.preventDefault();
+      event.stopPropagation();
+    });
+  }
+
+  private hit(event: PointerEvent): string | undefined {
+    const box = this.canvas.getBoundingClientRect();
+    const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+    const ray = new THREE.Raycaster();
+    ray.params.Points.threshold = (this.geometry?.extent ?? 1) * 0.01;
+    ray.setFromCamera(at, this.camera);
+    let nearest: { distance: number; id: string } | undefined;
+    for (const { batch } of this.drawn?.batches ?? []) {
+      if (!batch.object.visible) continue;
+      const hit = ray.intersectObject(batch.object, true)[0];
+      const id = hit && batch.idOf(hit);
+      if (id && (!nearest || hit.distance < nearest.distance)) nearest = { distance: hit.distance, id };
+    }
+    return nearest?.id;
+  }
+}
+
+function fade(object: THREE.Object3D, opacity: number): void {
+  const material = (object as THREE.Mesh).material;
+  if (!(material instanceof THREE.Material)) return;
+  material.transparent = true;
+  material.opacity *= opacity;
+  material.depthWrite = false;
+}

@@ -1,0 +1,383 @@
+/** A simulation on the screen: what is known of it, what was seen of it, and what can be done with it. */
+import { failureOf, simulations, telemetry, type Failure } from './api';
+import { duration } from './duration';
+import { SimulationState, StepOutcome, type SimulationInfo, type Snapshot, type StepReply } from './gen/mbcosim/v1/simulations_pb';
+import { OverflowPolicy, type TelemetryBatch } from './gen/mbcosim/v1/telemetry_pb';
+import type { Geometry } from './geometry';
+import { loadGeometry } from './load_geometry';
+import { modelOf, type Model, type VariableInfo } from './model';
+import { modesOf, type Mode } from './modes';
+import { Pace } from './pace';
+import { Layout, Recording, type Sample } from './recording';
+import { Signal } from './signal';
+
+/** What the panels and the scene show: a running simulation, or one out of a file. */
+export interface Shown {
+  readonly title: string;
+  readonly model: Model;
+  readonly geometry: Geometry;
+  readonly recording: Recording;
+  /** Told when samples came or went. */
+  readonly changed: Signal<number>;
+}
+
+export interface StepRecord {
+  step: number;
+  time: number;
+  iterations: number;
+  residual: number;
+  solver: number;
+  peers: number;
+  total: number;
+  steps: number;
+}
+
+export interface LogEntry {
+  wall: Date;
+  text: string;
+  level: 'info' | 'error';
+}
+
+/** Samples a second are at most so many. */
+const RATE = 60;
+const RETRY_MILLISECONDS = 1500;
+
+export type Playing = 'no' | 'paced' | 'fast';
+
+export class Session implements Shown {
+  readonly recording = new Recording();
+  readonly changed = new Signal(0);
+  readonly info: Signal<SimulationInfo>;
+  readonly playing = new Signal<Playing>('no');
+  readonly speed = new Signal(1);
+  readonly snapshots = new Signal<Snapshot[]>([]);
+  readonly steps = new Signal<StepRecord[]>([]);
+  readonly log = new Signal<LogEntry[]>([]);
+  readonly failure = new Signal<Failure | undefined>(undefined);
+  /** False while the daemon does not answer. */
+  readonly connected = new Signal(true);
+
+  private layout: Layout;
+  private readonly base: VariableInfo[] = [];
+  private readonly wanted = new Map<number, VariableInfo>();
+  private readonly ended = new AbortController();
+  private stream = new AbortController();
+  private fast = new AbortController();
+  /** Step of the last sample of the stream. */
+  private streamed = -1;
+  private busy = false;
+
+  private constructor(info: SimulationInfo, readonly model: Model, readonly geometry: Geometry) {
+    this.info = new Signal(info);
+    const byHandle = new Map(model.variables.map((variable) => [variable.handle, variable]));
+    const follow = (handle: number | undefined) => {
+      const variable = handle === undefined ? undefined : byHandle.get(handle);
+      if (variable) this.base.push(variable);
+    };
+    for (const node of geometry.nodes) follow(node.positionHandle), follow(node.orientationHandle);
+    for (const element of geometry.elements) for (const arrow of element.arrows) follow(arrow.handle);
+    for (const body of geometry.bodies) body.amplitudes.forEach(follow);
+    this.layout = new Layout(this.base);
+  }
+
+  /** Reads all about the simulation `name` and follows it until `close`. */
+  static async open(name: string): Promise<Session> {
+    const [info, description] = await Promise.all([simulations.getSimulation({ name }), simulations.describeSimulation({ name })]);
+    const model = modelOf(description);
+    const session = new Session(info, model, await loadGeometry(name, model));
+    await session.read();
+    void session.follow();
+    void session.poll();
+    void session.refreshSnapshots();
+    return session;
+  }
+
+  get name(): string {
+    return this.info.value.name;
+  }
+
+  get title(): string {
+    return this.info.value.displayName || this.model.title || this.name;
+  }
+
+  close(): void {
+    this.pause();
+    this.ended.abort();
+    this.stream.abort();
+  }
+
+  // ---- what is seen
+
+  /** Variables that plots and panels need besides those of the scene. */
+  want(variables: readonly VariableInfo[]): void {
+    const missing = variables.filter((variable) => this.layout.offset(variable.handle) === undefined);
+    for (const variable of variables) this.wanted.set(variable.handle, variable);
+    if (missing.length === 0) return;
+    this.layout = new Layout([...this.base, ...this.wanted.values()]);
+    this.stream.abort();  // subscribes anew
+    void this.read();
+  }
+
+  /** Takes the values at the last accepted step into the recording. */
+  private async read(undone = false): Promise<void> {
+    const layout = this.layout;
+    try {
+      const reply = await simulations.readVariables({ simulation: this.name, handles: [...layout.handles] });
+      this.take({ step: Number(reply.step), time: reply.timeS, layout, values: Float64Array.from(reply.values) }, undone);
+    } catch (thrown) {
+      this.tell(failureOf(thrown));
+    }
+  }
+
+  /** `undone`: the simulation went back to this sample's step; otherwise it may come late, and takes its place. */
+  private take(sample: Sample, undone: boolean): void {
+    if (undone) this.recording.push(sample);
+    else this.recording.insert(sample);
+    this.changed.value += 1;
+  }
+
+  private async follow(): Promise<void> {
+    while (!this.ended.signal.aborted) {
+      this.stream = new AbortController();
+      this.streamed = -1;
+      const layout = this.layout;
+      try {
+        const batches = telemetry.subscribe(
+          { simulation: this.name, handles: [...layout.handles], every: BigInt(this.every()), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64 },
+          { signal: this.stream.signal },
+        );
+        for await (const batch of batches) this.takeBatch(batch, layout);
+        return;  // the simulation is deleted
+      } catch (thrown) {
+        if (this.ended.signal.aborted) return;
+        if (!this.stream.signal.aborted) await pause(RETRY_MILLISECONDS);
+      }
+    }
+  }
+
+  private every(): number {
+    const speed = Number.isFinite(this.speed.value) ? this.speed.value : 1;
+    return Math.max(1, Math.floor(speed / RATE / (this.model.step || 1)));
+  }
+
+  private takeBatch(batch: TelemetryBatch, layout: Layout): void {
+    this.connected.value = true;
+    for (const sample of batch.samples) {
+      const step = Number(sample.step);
+      // Samples of a stream come in order, unless somebody restored a state.
+      this.take({ step, time: sample.timeS, layout, values: Float64Array.from(sample.values) }, step <= this.streamed);
+      this.streamed = step;
+    }
+  }
+
+  /** Keeps state, waits and connection up to date, whoever drives the simulation. */
+  private async poll(): Promise<void> {
+    while (!this.ended.signal.aborted) {
+      await pause(this.playing.value === 'no' ? 1000 : 400);
+      try {
+        this.info.value = await simulations.getSimulation({ name: this.name }, { timeoutMs: 5000, signal: this.ended.signal });
+        if (!this.connected.value) await this.read();
+        this.connected.value = true;
+      } catch (thrown) {
+        const failure = failureOf(thrown);
+        if (failure.cancelled) continue;
+        this.connected.value = false;
+        if (failure.reason === 'NO_SUCH_SIMULATION') {
+          this.note('the simulation is gone', 'error');
+          this.close();
+        }
+      }
+    }
+  }
+
+  // ---- what is done
+
+  step(steps: number): Promise<void> {
+    return this.advance({ case: 'steps', value: BigInt(steps) });
+  }
+
+  runUntil(time: number): Promise<void> {
+    return this.advance({ case: 'untilTimeS', value: time });
+  }
+
+  private async advance(how: { case: 'steps'; value: bigint } | { case: 'untilTimeS'; value: number }): Promise<void> {
+    if (this.busy) return;
+    this.busy = true;
+    try {
+      this.done(await simulations.step({ simulation: this.name, advance: how }));
+      if (this.playing.value === 'no') await this.read();  // telemetry need not have this step
+    } catch (thrown) {
+      this.tell(failureOf(thrown));
+      this.pause();
+    } finally {
+      this.busy = false;
+    }
+  }
+
+  play(): void {
+    if (this.playing.value !== 'no') return;
+    this.failure.value = undefined;
+    if (Number.isFinite(this.speed.value)) void this.playPaced();
+    else void this.playFast();
+  }
+
+  pause(): void {
+    if (this.playing.value === 'fast') this.fast.abort();
+    this.playing.value = 'no';
+  }
+
+  setSpeed(speed: number): void {
+    const again = this.playing.value !== 'no';
+    this.pause();
+    this.speed.value = speed;
+    this.stream.abort();  // another `every`
+    if (again) setTimeout(() => this.play(), 0);
+  }
+
+  private async playPaced(): Promise<void> {
+    this.playing.value = 'paced';
+    const pace = new Pace(this.speed.value, performance.now() / 1000, this.info.value.timeS);
+    while (this.playing.value === 'paced') {
+      const info = this.info.value;
+      const target = pace.next(performance.now() / 1000, info.timeS, info.nextStepS || this.model.step);
+      if (target === undefined) await pause(8);
+      else await this.runUntil(target);
+      if (this.info.value.state === SimulationState.FINISHED) this.pause();
+    }
+  }
+
+  private async playFast(): Promise<void> {
+    this.playing.value = 'fast';
+    this.fast = new AbortController();
+    const end = Number.isFinite(this.model.finalTime) ? this.model.finalTime : Number.MAX_VALUE;
+    try {
+      const run = simulations.run(
+        { step: { simulation: this.name, advance: { case: 'untilTimeS', value: end } }, progressInterval: duration(0.2) },
+        { signal: this.fast.signal },
+      );
+      for await (const reply of run) if (reply.content.case === 'done') this.done(reply.content.value);
+    } catch (thrown) {
+      const failure = failureOf(thrown);
+      if (!failure.cancelled) this.tell(failure);
+    }
+    if (this.playing.value === 'fast') this.playing.value = 'no';
+    await this.read();
+  }
+
+  private done(reply: StepReply): void {
+    const state = reply.outcome === StepOutcome.FINISHED ? SimulationState.FINISHED : SimulationState.READY;
+    this.info.value = { ...this.info.value, state, step: reply.step, timeS: reply.timeS };
+    if (reply.stepsDone > 0n) this.keep(reply);
+    if (reply.outcome === StepOutcome.ACCEPTED || reply.outcome === StepOutcome.INTERRUPTED) return;
+    this.pause();
+    if (reply.outcome === StepOutcome.FINISHED) return this.note('the final time of the deck is reached');
+    this.tell({
+      message: reply.failure?.message ?? 'the step failed',
+      reason: StepOutcome[reply.outcome],
+      metadata: {},
+      diagnostics: [],
+      solver: reply.failure,
+      cancelled: false,
+    });
+  }
+
+  private keep(reply: StepReply): void {
+    const steps = this.steps.value.slice(-499);
+    steps.push({
+      step: Number(reply.step),
+      time: reply.timeS,
+      iterations: reply.iterations,
+      residual: reply.residualError,
+      solver: reply.solverSeconds,
+      peers: reply.peerWaitSeconds,
+      total: reply.totalSeconds,
+      steps: Number(reply.stepsDone),
+    });
+    this.steps.value = steps;
+  }
+
+  async write(variable: VariableInfo, values: number[]): Promise<void> {
+    await this.attempt(async () => {
+      await simulations.writeVariables({ simulation: this.name, values: { handles: [variable.handle], values } });
+      await this.read();
+    });
+  }
+
+  async saveSnapshot(displayName: string): Promise<void> {
+    await this.attempt(async () => {
+      const saved = await simulations.createSnapshot({ simulation: this.name, displayName });
+      this.note(`state saved at ${saved.timeS} s`);
+    });
+    await this.refreshSnapshots();
+  }
+
+  async restore(snapshot: Snapshot): Promise<void> {
+    this.pause();
+    await this.attempt(async () => {
+      this.info.value = await simulations.restoreSnapshot({ name: snapshot.name });
+      this.failure.value = undefined;
+      this.stream.abort();  // what is still on its way is of a time undone
+      await this.read(true);
+      this.note(`back at ${snapshot.timeS} s`);
+    });
+  }
+
+  /** Name of a new simulation that starts at the snapshot, or at the present state. */
+  async branch(snapshot: Snapshot | undefined, displayName: string): Promise<string | undefined> {
+    const source = snapshot
+      ? { case: 'snapshot' as const, value: snapshot.name }
+      : { case: 'simulation' as const, value: this.name };
+    let name: string | undefined;
+    await this.attempt(async () => {
+      const reply = await simulations.forkSimulation({ source, options: { displayName } });
+      name = reply.simulation?.name;
+    });
+    return name;
+  }
+
+  async deleteSnapshot(snapshot: Snapshot): Promise<void> {
+    await this.attempt(async () => void (await simulations.deleteSnapshot({ name: snapshot.name })));
+    await this.refreshSnapshots();
+  }
+
+  async refreshSnapshots(): Promise<void> {
+    await this.attempt(async () => {
+      this.snapshots.value = (await simulations.listSnapshots({ simulation: this.name })).snapshots;
+    });
+  }
+
+  /** Modes about the present state, nearest to a frequency in hertz. */
+  async eigenmodes(count: number, shiftHz: number): Promise<Mode[]> {
+    let modes: Mode[] = [];
+    await this.attempt(async () => {
+      const simulation = this.name;
+      const [eigen, names] = await Promise.all([
+        simulations.computeEigenvalues({ simulation, count: 2 * count, shiftHz, eigenvectors: true }),
+        simulations.linearize({ simulation, descriptorForm: true }),
+      ]);
+      modes = modesOf(eigen, names.stateNames, this.geometry.nodes);
+    });
+    return modes;
+  }
+
+  private async attempt(work: () => Promise<void>): Promise<void> {
+    try {
+      await work();
+    } catch (thrown) {
+      this.tell(failureOf(thrown));
+    }
+  }
+
+  private tell(failure: Failure): void {
+    this.failure.value = failure;
+    this.note(failure.message, 'error');
+  }
+
+  note(text: string, level: 'info' | 'error' = 'info'): void {
+    this.log.value = [...this.log.value.slice(-199), { wall: new Date(), text, level }];
+  }
+}
+
+function pause(milliseconds: number): Promise<void> {
+  return new Promise((resolve) => setTimeout(resolve, milliseconds));
+}

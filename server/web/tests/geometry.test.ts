@@ -1,0 +1,50 @@
+import { describe, expect, test } from 'vitest';
+import { rotationOf, type Mat3 } from '../src/algebra';
+import { deformedPoints, finish, initialPose, pointAt, poseOf, type FlexibleBody, type NodeShape } from '../src/geometry';
+
+const R = rotationOf([0, 0, Math.PI / 2]);
+const nodes: NodeShape[] = [
+  { label: 1, kind: 'static', name: '', position: [1, 0, 0], orientation: R, positionHandle: 0, orientationHandle: 1 },
+  { label: 2, kind: 'dynamic', name: '', position: [3, 4, 0], positionHandle: 2 },
+];
+
+function close(a: ArrayLike<number>, b: ArrayLike<number>) {
+  expect(a.length).toBe(b.length);
+  for (let i = 0; i < a.length; ++i) expect(a[i]).toBeCloseTo(b[i], 6);
+}
+
+describe('points', () => {
+  test('turn with their node', () => {
+    close(pointAt(initialPose(nodes), { name: '', node: 0, offset: [2, 0, 0] }), [1, 2, 0]);
+    close(pointAt(initialPose(nodes), { name: '', node: -1, offset: [2, 0, 5] }), [2, 0, 5]);
+  });
+
+  test('follow a sample, and stay where the sample says nothing', () => {
+    const offsets = new Map([[0, 1]]);
+    const pose = poseOf(nodes, [9, 5, 6, 7], (handle) => offsets.get(handle));
+    close(pose.position(0), [5, 6, 7]);
+    close(pose.orientation(0), R);
+    close(pose.position(1), [3, 4, 0]);
+    expect(pose.value(0, 2)).toBe(7);
+    expect(pose.value(8, 0)).toBeNaN();
+  });
+});
+
+test('a flexible body is x + R (f + factor Σ U q)', () => {
+  const body: FlexibleBody = {
+    joint: 1, node: 0, fixedPosition: [0, 0, 0], fixedOrientation: [1, 0, 0, 0, 1, 0, 0, 0, 1] as Mat3, amplitudes: [10, 11], labels: ['a', 'b'],
+    positions: [1, 0, 0, 2, 0, 0],
+    shapes: [0, 0, 1, 0, 0, 0.5, 0, 0, 2, 0, 0, 1],
+  };
+  const out = new Float32Array(6);
+  deformedPoints(body, initialPose(nodes), [0.1, 0.2], 10, out);
+  // local: (1, 1, 1) and (2, 2, 2), turned by a quarter about z and moved by x = 1
+  close(out, [1 - 1, 1, 1, 1 - 2, 2, 2]);
+});
+
+test('the extent is that of all points', () => {
+  const geometry = finish(nodes, [], []);
+  close(geometry.centre, [2, 2, 0]);
+  expect(geometry.extent).toBeCloseTo(Math.hypot(2, 4), 12);
+  expect(finish([], [], []).extent).toBe(1);
+});
