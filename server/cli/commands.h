@@ -42,6 +42,9 @@ int reduce_model(const ReduceCommand& command);
 int fem_info(const std::string& file, bool json, const std::string& convert);
 /// Runs `mbcosim-SUBCOMMAND`; returns only when that cannot be started.
 int hand_over(const std::string& subcommand, const std::vector<std::string>& arguments);
+/// Shows a deck in a browser, at `http` ("HOST:PORT"): becomes `mbcosim-view` when the deck can be
+/// read.
+int view(const std::string& deck, const std::string& http);
 /// The words of the input language, served or refused by name.
 int keywords(bool json);
 

@@ -105,6 +105,14 @@ int main(int argc, char** argv) {
 
   add_programs(app, exit_code);
 
+  std::string http = "127.0.0.1:0";
+  CLI::App* view_app = app.add_subcommand(
+      "view", "Show a deck in a browser: starts a daemon of its own and prints the address");
+  view_app->add_option("deck", deck, "Main file of the deck")->required();
+  view_app->add_option("--http", http, "HOST:PORT of the page; port 0: any that is free")
+      ->capture_default_str();
+  view_app->callback([&] { exit_code = view(deck, http); });
+
   CLI::App* keywords_app = app.add_subcommand(
       "keywords", "List the words of the input language; refused ones are marked");
   keywords_app->add_flag("--json", json, "Print the list as JSON");

@@ -37,6 +37,7 @@ ARROWS = {
     "server/client": {"mbcosim", "shared_memory"},
     "server/shared_memory": set(),
     "server/http": {"service", "wire", "mbcosim"},
+    "server/view": {"client"},
     "server/daemon": {"service", "http", "wire", "mbcosim"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",

@@ -1,0 +1,187 @@
+/** A daemon with a deck, and a browser before it. */
+import { spawn, type ChildProcess } from 'node:child_process';
+import { readdirSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import { chromium, type Browser, type Page } from 'playwright-core';
+
+export const FACTOR = Number(process.env.MBCOSIM_TIME_FACTOR ?? 1);
+const ROOT = fileURLToPath(new URL('../../..', import.meta.url));
+const BIN = process.env.MBCOSIM_BIN ?? `${ROOT}/build/bin`;
+export const MODELS = `${ROOT}/client_examples/models`;
+export const decks = (): string[] => readdirSync(MODELS).filter((name) => name.endsWith('.mbd')).sort();
+
+/** `mbcosim view DECK`. */
+export class View {
+  private constructor(private readonly child: ChildProcess, readonly address: string) {}
+
+  static start(deck: string): Promise<View> {
+    const child = spawn(`${BIN}/mbcosim`, ['view', deck.includes('/') ? deck : `${MODELS}/${deck}`], { stdio: ['ignore', 'pipe', 'pipe'] });
+    let said = '';
+    return new Promise((resolve, reject) => {
+      const hear = (data: Buffer) => {
+        said += data;
+        const address = /^(http:\S+)$/m.exec(said)?.[1];
+        if (address) resolve(new View(child, address));
+      };
+      child.stdout?.on('data', hear);
+      child.stderr?.on('data', (data: Buffer) => (said += data));
+      child.on('exit', (code) => reject(new Error(`mbcosim view ended with ${code}: ${said}`)));
+    });
+  }
+
+  get origin(): string {
+    return new URL(this.address).origin;
+  }
+
+  get token(): string {
+    return new URL(this.address).searchParams.get('token') ?? '';
+  }
+
+  get simulation(): string {
+    return new URL(this.address).hash.replace('#simulation=', '');
+  }
+
+  /** A unary call in JSON. */
+  async call<T>(method: string, request: object): Promise<T> {
+    const reply = await fetch(`${this.origin}/mbcosim.v1.${method}`, {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/json', Authorization: `Bearer ${this.token}` },
+      body: JSON.stringify(request),
+    });
+    if (!reply.ok) throw new Error(`${method}: ${reply.status} ${await reply.text()}`);
+    return (await reply.json()) as T;
+  }
+
+  /** Values of variables at the last accepted step, by name. */
+  async read(names: string[]): Promise<{ step: number; time: number; values: Record<string, number[]> }> {
+    const { variables } = await this.call<{ variables: { name: string; handle: number; size: number }[] }>('Simulations/DescribeSimulation', { name: this.simulation });
+    const chosen = names.map((name) => variables.find((variable) => variable.name === name) ?? fail(`no variable ${name}`));
+    const reply = await this.call<{ step: string; timeS: number; values: number[] }>('Simulations/ReadVariables', { simulation: this.simulation, handles: chosen.map((variable) => variable.handle) });
+    const values: Record<string, number[]> = {};
+    let at = 0;
+    for (const { name, size } of chosen) values[name] = reply.values.slice(at, (at += size));
+    return { step: Number(reply.step), time: reply.timeS, values };
+  }
+
+  async stop(): Promise<void> {
+    if (this.child.exitCode !== null) return;
+    const ended = new Promise((resolve) => this.child.on('exit', resolve));
+    this.child.kill('SIGTERM');
+    await ended;
+  }
+}
+
+function fail(message: string): never {
+  throw new Error(message);
+}
+
+export function launch(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+    args: [
+      '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync',
+      '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+    ],
+  });
+}
+
+export interface Visit {
+  page: Page;
+  /** Errors of the console, exceptions, and requests to other hosts. */
+  faults: string[];
+  close(): Promise<void>;
+}
+
+/** Opens an address in a fresh profile. */
+export async function visit(browser: Browser, address: string, options: { width?: number; height?: number; dark?: boolean } = {}): Promise<Visit> {
+  const context = await browser.newContext({
+    viewport: { width: options.width ?? 1280, height: options.height ?? 800 },
+    colorScheme: options.dark === false ? 'light' : 'dark',
+    acceptDownloads: true,
+    reducedMotion: 'reduce',
+  });
+  const page = await context.newPage();
+  const faults: string[] = [];
+  const origin = new URL(address).origin;
+  page.on('console', (message) => message.type() === 'error' && faults.push(message.text()));
+  page.on('pageerror', (error) => faults.push(String(error)));
+  page.on('request', (request) => {
+    const url = new URL(request.url());
+    if (!['data:', 'blob:', 'file:'].includes(url.protocol) && url.origin !== origin) faults.push(`request to ${url.origin}`);
+  });
+  page.setDefaultTimeout(20_000 * FACTOR);
+  await page.goto(address);
+  return { page, faults, close: () => context.close() };
+}
+
+/** What the page has inside, as far as tests look at it. */
+interface Inside {
+  mbcosim: {
+    desk: {
+      shown: { value?: { geometry: { nodes: { label: number }[] }; recording: { samples: { step: number; time: number }[] } } };
+      session?: { playing: { value: string } };
+      sample?: { step: number; time: number };
+    };
+    scene: { view: { nodeMatrix(index: number): number[]; picture(): Promise<Blob> } };
+  };
+}
+
+/** Waits until `condition` holds in the page. (The page's content policy forbids what Playwright's own waiting does.) */
+export async function until<T>(page: Page, condition: (argument: T) => boolean, argument: T): Promise<void> {
+  const end = Date.now() + 20_000 * FACTOR;
+  while (!(await page.evaluate(condition as (argument: unknown) => boolean, argument))) {
+    if (Date.now() > end) throw new Error(`waited too long for ${condition}`);
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+}
+
+/** Waits until a simulation is on show. */
+export async function shown(page: Page): Promise<void> {
+  await until(page, () => (window as unknown as Inside).mbcosim?.desk.sample !== undefined, undefined);
+}
+
+/** Matrices of the nodes in the scene, 16 numbers by columns, by label, and the step that they belong to. */
+export function scene(page: Page): Promise<{ step: number; nodes: Record<string, number[]> }> {
+  return page.evaluate(
+    () =>
+      new Promise<{ step: number; nodes: Record<string, number[]> }>((resolve) => {
+        const { desk, scene: { view } } = (window as unknown as Inside).mbcosim;
+        requestAnimationFrame(() => requestAnimationFrame(() => {
+          const nodes: Record<string, number[]> = {};
+          desk.shown.value?.geometry.nodes.forEach((node, i) => (nodes[node.label] = view.nodeMatrix(i)));
+          resolve({ step: desk.sample?.step ?? -1, nodes });
+        }));
+      }),
+  );
+}
+
+/** Steps that the page has recorded. */
+export function recorded(page: Page): Promise<number[]> {
+  return page.evaluate(() => (window as unknown as Inside).mbcosim.desk.shown.value?.recording.samples.map((sample) => sample.step) ?? []);
+}
+
+/** Waits until the page looks at this step. */
+export async function atStep(page: Page, step: number): Promise<void> {
+  await until(page, (wanted) => (window as unknown as Inside).mbcosim.desk.sample?.step === wanted, step);
+}
+
+/** How many colours the scene has, and the part of it that is not background. */
+export function picture(page: Page): Promise<{ colours: number; covered: number }> {
+  return page.evaluate(async () => {
+    const drawn = await createImageBitmap(await (window as unknown as Inside).mbcosim.scene.view.picture());
+    const copy = document.createElement('canvas');
+    copy.width = drawn.width, copy.height = drawn.height;
+    const context = copy.getContext('2d') as CanvasRenderingContext2D;
+    context.drawImage(drawn, 0, 0);
+    const { data } = context.getImageData(0, 0, copy.width, copy.height);
+    const colours = new Set<number>();
+    const background = (data[0] << 16) | (data[1] << 8) | data[2];
+    let covered = 0;
+    for (let i = 0; i < data.length; i += 4) {
+      const colour = (data[i] << 16) | (data[i + 1] << 8) | data[i + 2];
+      colours.add(colour);
+      if (colour !== background) ++covered;
+    }
+    return { colours: colours.size, covered: covered / (data.length / 4) };
+  });
+}

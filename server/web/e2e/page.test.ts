@@ -1,0 +1,281 @@
+import type { Browser } from 'playwright-core';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { dirname, join } from 'node:path';
+import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { atStep, decks, launch, picture, recorded, scene, shown, until, View, visit, type Visit } from './bench';
+
+let browser: Browser;
+beforeAll(async () => {
+  browser = await launch();
+});
+afterAll(() => browser?.close());
+
+/** Runs `work` with a daemon of its own and a page on it; no error may be left in the console. */
+async function withPage(deck: string, work: (visit: Visit, view: View) => Promise<void>, options?: Parameters<typeof visit>[2]): Promise<void> {
+  const view = await View.start(deck);
+  try {
+    const visited = await visit(browser, view.address, options);
+    await shown(visited.page);
+    await work(visited, view);
+    expect(visited.faults).toEqual([]);
+    await visited.close();
+  } finally {
+    await view.stop();
+  }
+}
+
+/** Do the scene's node matrices equal what the service reads? */
+async function expectSceneOf(visited: Visit, view: View): Promise<void> {
+  const drawn = await scene(visited.page);
+  const labels = Object.keys(drawn.nodes);
+  expect(labels.length).toBeGreaterThan(0);
+  const { variables } = await view.call<{ variables: { name: string }[] }>('Simulations/DescribeSimulation', { name: view.simulation });
+  const names = new Set(variables.map((variable) => variable.name));
+  const wanted = labels.flatMap((label) => [`node.structural.${label}.X`, `node.structural.${label}.R`]).filter((name) => names.has(name));
+  const read = await view.read(wanted);
+  expect(drawn.step).toBe(read.step);
+  for (const label of labels) {
+    const matrix = drawn.nodes[label], X = read.values[`node.structural.${label}.X`], R = read.values[`node.structural.${label}.R`];
+    const size = Math.hypot(matrix[0], matrix[1], matrix[2]);
+    X.forEach((x, k) => expect(Math.abs(matrix[12 + k] - x)).toBeLessThan(1e-6 * Math.max(1, Math.abs(x))));
+    R?.forEach((r, i) => expect(Math.abs(matrix[4 * (i % 3) + Math.floor(i / 3)] / size - r)).toBeLessThan(1e-6));
+  }
+}
+
+describe('each example deck', () => {
+  test.each(decks())('%s draws, and its nodes stand where the service says', async (deck) => {
+    await withPage(deck, async (visited, view) => {
+      await expectSceneOf(visited, view);
+      const { colours, covered } = await picture(visited.page);
+      expect(colours).toBeGreaterThan(20);
+      expect(covered).toBeGreaterThan(0.002);
+    });
+  });
+});
+
+describe('time', () => {
+  test('a step of the page is a step of the simulation, and the scene follows', async () => {
+    await withPage('pendulum.mbd', async (visited, view) => {
+      await visited.page.getByRole('button', { name: 'One step (S)' }).click();
+      await atStep(visited.page, 1);
+      await visited.page.keyboard.press('s');
+      await atStep(visited.page, 2);
+      await visited.page.getByRole('button', { name: '+10' }).click();
+      await atStep(visited.page, 12);
+      await expectSceneOf(visited, view);
+    });
+  });
+
+  test('runs by the wall clock until it is paused, and then stands still', async () => {
+    await withPage('pendulum.mbd', async ({ page }, view) => {
+      await page.getByRole('button', { name: 'Run (space)' }).click();
+      await until(page, () => Number(document.querySelector('.time output')?.textContent?.replace(' s', '')) > 0.5, undefined);
+      await page.getByRole('button', { name: 'Pause (space)' }).click();
+      await page.getByRole('button', { name: 'Run (space)' }).waitFor();
+      await page.waitForTimeout(300);
+      const stopped = (await view.read([])).step;
+      await page.waitForTimeout(500);
+      expect((await view.read([])).step).toBe(stopped);
+      await atStep(page, stopped);
+      expect(stopped).toBeGreaterThan(100);
+    });
+  });
+
+  test('runs until a given time', async () => {
+    await withPage('pendulum.mbd', async ({ page }, view) => {
+      await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('0.25');
+      await page.keyboard.press('Enter');
+      await atStep(page, 50);
+      expect((await view.read([])).time).toBeCloseTo(0.25, 9);
+    });
+  });
+
+  test('a restored state is the saved one, and steps from there give what they gave', async () => {
+    await withPage('pendulum.mbd', async (visited, view) => {
+      const { page } = visited;
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      const saved = await view.read(['node.structural.2.X']);
+      await page.getByRole('button', { name: 'Save state' }).click();
+      const restore = page.getByRole('button', { name: /^Restore the state at/ });
+      await restore.waitFor();
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 20);
+      const later = await view.read(['node.structural.2.X']);
+      await restore.click();
+      await atStep(page, 10);
+      expect(await view.read(['node.structural.2.X'])).toEqual(saved);
+      await expectSceneOf(visited, view);
+      expect(Math.max(...(await recorded(page)))).toBe(10);
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 20);
+      expect(await view.read(['node.structural.2.X'])).toEqual(later);
+    });
+  });
+
+  test('what was recorded can be looked at again while the simulation stays', async () => {
+    await withPage('pendulum.mbd', async ({ page }, view) => {
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      await page.getByRole('slider', { name: 'Time looked at' }).fill('0');
+      await atStep(page, 0);
+      expect((await view.read([])).step).toBe(10);
+      await page.getByRole('button', { name: 'live' }).click();
+      await atStep(page, 10);
+    });
+  });
+
+  test('a branch is another simulation at the same state', async () => {
+    await withPage('pendulum.mbd', async ({ page }, view) => {
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      await page.getByRole('button', { name: 'Branch off here' }).click();
+      await until(page, (name) => location.hash.includes('simulation=') && !location.hash.includes(encodeURIComponent(name)), view.simulation);
+      await atStep(page, 10);
+      await page.keyboard.press('s');
+      await atStep(page, 11);
+      expect((await view.read([])).step).toBe(10);
+    });
+  });
+});
+
+describe('plots', () => {
+  test('grow with the run', async () => {
+    await withPage('pendulum.mbd', async ({ page }) => {
+      await page.getByRole('searchbox', { name: 'Search the model' }).fill('2.X');
+      await page.getByRole('button', { name: 'Plot node.structural.2.X', exact: true }).click();
+      await page.locator('.plot canvas').waitFor();
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      const before = await recorded(page);
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 20);
+      expect((await recorded(page)).length).toBeGreaterThan(before.length);
+      const download = page.waitForEvent('download');
+      await page.getByRole('button', { name: 'Export' }).click();
+      await page.getByRole('button', { name: 'Table of the plots (CSV)' }).click();
+      const lines = readFileSync(await (await download).path(), 'utf8').trim().split('\n');
+      expect(lines[0]).toBe('step,time [s],node.structural.2.X.x [m],node.structural.2.X.y [m],node.structural.2.X.z [m]');
+      const [step, time, x, , z] = lines[lines.length - 1].split(',').map(Number);
+      expect([step, time]).toEqual([20, expect.closeTo(0.1, 9)]);
+      expect(Math.hypot(x, z)).toBeCloseTo(1, 5);
+    });
+  });
+});
+
+describe('what can be taken away', () => {
+  test('a recording opens without a daemon and shows the same', async () => {
+    const view = await View.start('pendulum.mbd');
+    const visited = await visit(browser, view.address);
+    await shown(visited.page);
+    await visited.page.getByRole('button', { name: '+10' }).click();
+    await atStep(visited.page, 10);
+    const drawn = await scene(visited.page);
+    const download = visited.page.waitForEvent('download');
+    await visited.page.getByRole('button', { name: 'Export' }).click();
+    await visited.page.getByRole('button', { name: 'Recording (HTML)' }).click();
+    const file = join(mkdtempSync(join(tmpdir(), 'mbcosim-')), 'recording.html');
+    await (await download).saveAs(file);
+    await view.stop();
+    const again = await visit(browser, `file://${file}`);
+    await shown(again.page);
+    const replayed = await scene(again.page);
+    expect(replayed.step).toBe(10);
+    for (const [label, matrix] of Object.entries(drawn.nodes)) matrix.forEach((value, k) => expect(replayed.nodes[label][k]).toBeCloseTo(value, 6));
+    expect((await picture(again.page)).covered).toBeGreaterThan(0.002);
+    expect(again.faults).toEqual([]);
+    await again.close();
+    await visited.close();
+    rmSync(dirname(file), { recursive: true });
+  });
+});
+
+describe('who comes in', () => {
+  test('a foreign web site can neither call nor frame the page', async () => {
+    const view = await View.start('pendulum.mbd');
+    const foreign = createServer((_, reply) => reply.setHeader('Content-Type', 'text/html').end('<body>foreign</body>'));
+    await new Promise<void>((resolve) => foreign.listen(0, '127.0.0.1', resolve));
+    try {
+      const { port } = foreign.address() as { port: number };
+      const visited = await visit(browser, view.address);  // has the cookie from now on
+      await shown(visited.page);
+      await visited.page.goto(`http://127.0.0.1:${port}/`);
+      const outcome = await visited.page.evaluate(async (target) => {
+        try {
+          await fetch(`${target}/mbcosim.v1.Simulations/ListSimulations`, { method: 'POST', mode: 'no-cors', credentials: 'include', headers: { 'Content-Type': 'text/plain' }, body: '{}' });
+          const reply = await fetch(`${target}/mbcosim.v1.Simulations/ListSimulations`, { method: 'POST', credentials: 'include', headers: { 'Content-Type': 'application/json' }, body: '{}' });
+          return `read ${reply.status}`;
+        } catch {
+          return 'refused';
+        }
+      }, view.origin);
+      expect(outcome).toBe('refused');
+      await visited.close();
+    } finally {
+      foreign.close();
+      await view.stop();
+    }
+  });
+
+  test('without the token the page says what to do', async () => {
+    const view = await View.start('pendulum.mbd');
+    const visited = await visit(browser, `${view.origin}/`);
+    await visited.page.getByText('Open the address that the daemon printed').waitFor();
+    await visited.close();
+    await view.stop();
+  });
+
+  test('a reload shows the simulation where it stands', async () => {
+    await withPage('pendulum.mbd', async (visited, view) => {
+      await visited.page.getByRole('button', { name: '+10' }).click();
+      await atStep(visited.page, 10);
+      await visited.page.reload();
+      await shown(visited.page);
+      await atStep(visited.page, 10);
+      await expectSceneOf(visited, view);
+    });
+  });
+});
+
+describe('for everybody', () => {
+  const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+
+  async function seriousFaults({ page }: Visit): Promise<string[]> {
+    await page.evaluate(axe);
+    const { violations } = await page.evaluate(() => (window as unknown as { axe: { run(): Promise<{ violations: { id: string; impact: string; nodes: { html: string }[] }[] }> } }).axe.run());
+    return violations.filter((found) => ['serious', 'critical'].includes(found.impact)).map((found) => `${found.id}: ${found.nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`);
+  }
+
+  test.each([
+    { name: 'wide and dark', options: {} },
+    { name: 'wide and light', options: { dark: false } },
+    { name: 'narrow', options: { width: 390, height: 780 } },
+  ])('no serious fault, $name', async ({ options }) => {
+    await withPage('actuated_beam.mbd', async (visited) => {
+      expect(await seriousFaults(visited)).toEqual([]);
+      for (const tab of options.width ? ['Model', 'Plots', 'Panels'] : []) {
+        await visited.page.getByRole('tab', { name: tab, exact: true }).last().click();
+        expect(await seriousFaults(visited)).toEqual([]);
+      }
+    }, options);
+  });
+
+  test('the keyboard alone is enough', async () => {
+    await withPage('pendulum.mbd', async ({ page }) => {
+      await page.keyboard.press('/');
+      await page.keyboard.type('body');
+      await page.keyboard.press('Tab');
+      await page.keyboard.press('Tab');
+      await page.keyboard.press('Enter');
+      await page.locator('.right .section').first().getByText('body 2').waitFor();
+      await page.keyboard.press('?');
+      await page.getByRole('dialog', { name: 'Keys' }).waitFor();
+      await page.keyboard.press('Escape');
+      await page.keyboard.press('s');
+      await atStep(page, 1);
+    });
+  });
+});
