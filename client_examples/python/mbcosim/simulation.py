@@ -111,6 +111,8 @@ class Stepper:
     def close(self, *, timeout=PARTING):
         """Ends the stream."""
         self._requests.put(None)
+        if not self._replies.is_active():
+            return
         with parting(), bounded(timeout, self._replies.cancel, "the end of the stream"), translated():
             for _ in self._replies:
                 pass
