@@ -75,8 +75,11 @@ export interface LineItem {
   fill(pose: Pose, out: Float32Array, at: number): void;
 }
 
+/** Above so many pieces, lines are one pixel wide: without a graphics card, wide ones cost many times as much. */
+const MANY_PIECES = 800;
+
 export class LineBatch implements Batch {
-  readonly object: LineSegments2;
+  readonly object: LineSegments2 | THREE.LineSegments;
   private readonly corners: Float32Array;
   private readonly segments: Float32Array;
   private readonly owners: string[] = [];
@@ -86,11 +89,22 @@ export class LineBatch implements Batch {
     this.corners = new Float32Array(3 * items.reduce((largest, item) => Math.max(largest, item.corners), 0));
     this.segments = new Float32Array(6 * count);
     for (const item of items) for (let i = 1; i < item.corners; ++i) this.owners.push(item.id);
+    this.object = count > MANY_PIECES ? this.thin() : this.wide(width);
+    this.object.frustumCulled = false;
+    this.highlight(undefined, colour);
+  }
+
+  private wide(width: number): LineSegments2 {
     const geometry = new LineSegmentsGeometry();
     geometry.setPositions(this.segments);
-    geometry.setColors(this.colours(undefined, colour));
-    this.object = new LineSegments2(geometry, new LineMaterial({ linewidth: width, vertexColors: true, worldUnits: false }));
-    this.object.frustumCulled = false;
+    return new LineSegments2(geometry, new LineMaterial({ linewidth: width, vertexColors: true, worldUnits: false }));
+  }
+
+  private thin(): THREE.LineSegments {
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.BufferAttribute(this.segments, 3));
+    geometry.setAttribute('color', new THREE.BufferAttribute(new Float32Array(this.segments.length), 3));
+    return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: true }));
   }
 
   update(pose: Pose): void {
@@ -102,34 +116,41 @@ export class LineBatch implements Batch {
         this.segments.set(this.corners.subarray(3 * i, 3 * i + 3), at + 3);
       }
     }
-    const start = this.object.geometry.attributes.instanceStart as THREE.InterleavedBufferAttribute;
-    (start.data.array as Float32Array).set(this.segments);
-    start.data.needsUpdate = true;
+    if (this.object instanceof LineSegments2) {
+      const start = this.object.geometry.attributes.instanceStart as THREE.InterleavedBufferAttribute;
+      (start.data.array as Float32Array).set(this.segments);
+      start.data.needsUpdate = true;
+    } else {
+      this.object.geometry.attributes.position.needsUpdate = true;
+    }
     this.object.geometry.boundingSphere = null;
     this.object.geometry.boundingBox = null;
   }
 
-  private colours(id: string | undefined, selected: THREE.Color): Float32Array {
+  idOf(hit: THREE.Intersection): string | undefined {
+    const piece = this.object instanceof LineSegments2 ? hit.faceIndex : hit.index === undefined ? undefined : Math.floor(hit.index / 2);
+    return piece === undefined || piece === null ? undefined : this.owners[piece];
+  }
+
+  highlight(id: string | undefined, selected: THREE.Color): void {
     const colours = new Float32Array(6 * this.owners.length);
     this.owners.forEach((owner, i) => {
       const colour = owner === id ? selected : this.colour;
       colour.toArray(colours, 6 * i);
       colour.toArray(colours, 6 * i + 3);
     });
-    return colours;
-  }
-
-  idOf(hit: THREE.Intersection): string | undefined {
-    return hit.faceIndex === undefined || hit.faceIndex === null ? undefined : this.owners[hit.faceIndex];
-  }
-
-  highlight(id: string | undefined, colour: THREE.Color): void {
-    this.object.geometry.setColors(this.colours(id, colour));
+    if (this.object instanceof LineSegments2) {
+      this.object.geometry.setColors(colours);
+    } else {
+      const attribute = this.object.geometry.attributes.color as THREE.BufferAttribute;
+      (attribute.array as Float32Array).set(colours);
+      attribute.needsUpdate = true;
+    }
   }
 
   dispose(): void {
     this.object.geometry.dispose();
-    this.object.material.dispose();
+    (this.object.material as THREE.Material).dispose();
   }
 }
 

@@ -379,7 +379,7 @@ export class View {
     const box = this.canvas.getBoundingClientRect();
     const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
     const ray = new THREE.Raycaster();
-    ray.params.Points.threshold = (this.geometry?.extent ?? 1) * 0.01;
+    ray.params.Points.threshold = ray.params.Line.threshold = (this.geometry?.extent ?? 1) * 0.01;
     ray.setFromCamera(at, this.camera);
     let nearest: { distance: number; id: string } | undefined;
     for (const { batch } of this.drawn?.batches ?? []) {
