@@ -166,6 +166,47 @@ describe('plots', () => {
   });
 });
 
+describe('eigenmodes', () => {
+  test('are those of the service, and move the scene', async () => {
+    await withPage('cantilever_five.mbd', async ({ page }, view) => {
+      const eigen = await view.call<{ real: number[]; imaginary: number[] }>('Simulations/ComputeEigenvalues', { simulation: view.simulation, count: 20, shiftHz: 1 });
+      const slowest = Math.min(...eigen.imaginary.filter((imaginary) => imaginary > 0)) / (2 * Math.PI);
+      await page.locator('summary', { hasText: 'Eigenmodes' }).click();
+      await page.getByRole('button', { name: 'Compute' }).click();
+      const first = page.getByRole('button', { name: /Hz damping/ }).first();
+      await first.waitFor();
+      const [, shown] = /^(\S+) Hz/.exec((await first.textContent()) ?? '') ?? [];
+      expect(Math.abs(Number(shown) / slowest - 1)).toBeLessThan(1e-4);
+      const still = await scene(page);
+      await first.click();
+      let largest = 0;
+      for (let look = 0; look < 10; ++look) {
+        const moved = await scene(page);
+        for (const [label, matrix] of Object.entries(moved.nodes)) largest = Math.max(largest, ...[12, 13, 14].map((k) => Math.abs(matrix[k] - still.nodes[label][k])));
+      }
+      expect(largest).toBeGreaterThan(0);
+      await first.click();
+      expect((await scene(page)).nodes).toEqual(still.nodes);
+    });
+  });
+});
+
+describe('several readers', () => {
+  test('of one simulation see the same, whoever steps', async () => {
+    await withPage('pendulum.mbd', async (visited, view) => {
+      const other = await visit(browser, view.address);
+      await shown(other.page);
+      await view.call('Simulations/Step', { simulation: view.simulation, steps: 30 });
+      for (const { page } of [visited, other]) await until(page, (wanted) => ((window as unknown as { mbcosim: { desk: { sample: { step: number } } } }).mbcosim.desk.sample.step >= wanted), 28);
+      await other.page.getByRole('button', { name: 'One step (S)' }).click();
+      await atStep(other.page, 31);
+      await until(visited.page, (wanted) => ((window as unknown as { mbcosim: { desk: { sample: { step: number } } } }).mbcosim.desk.sample.step >= wanted), 30);
+      expect(other.faults).toEqual([]);
+      await other.close();
+    });
+  });
+});
+
 describe('what can be taken away', () => {
   test('a recording opens without a daemon and shows the same', async () => {
     const view = await View.start('pendulum.mbd');
