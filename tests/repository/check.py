@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Rules about the sources that no compiler checks. usage: check.py ROOT {arrows|headers|layout|format} [arguments]
 
-arrows   folders include only what stands below them
+arrows   folders include only what stands below them; families of elements do not include each other
 headers  every header compiles alone: the build shows it for those that their source includes first, the compiler for the
          others; arguments: compiler and its options
 layout   the top level has the agreed entries and no others; the quick start does not switch off what tests/run.sh builds;
@@ -43,6 +43,8 @@ ARROWS = {
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",
              "tests"}
 FORMATTED = ["src", "server", "client_examples", "tests"]
+# Families of elements know what all elements share and themselves, and of each other no more than this.
+FAMILY_ARROWS = {"ports": {"modal"}}
 # The names of files that every folder may have: they mean the same everywhere.
 COMMON_NAMES = {"register.cpp", "readers.h"}
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([a-z_0-9]+)/', re.MULTILINE)
@@ -58,6 +60,11 @@ def arrows(root):
             for included in INCLUDE.findall(path.read_text(encoding="utf-8")):
                 if included not in allowed | {os.path.basename(folder)}:
                     yield f"{path.relative_to(root)} includes \"{included}/…\"; {folder} may include: {', '.join(sorted(allowed))}"
+    for path in sources(root / "src" / "elements", ".h", ".cpp"):
+        family = path.parent.name
+        for other in re.findall(r'^#include "elements/([a-z_]+)/', path.read_text(encoding="utf-8"), re.MULTILINE):
+            if family != "elements" and other not in FAMILY_ARROWS.get(family, set()) | {family}:
+                yield f"{path.relative_to(root)} includes \"elements/{other}/…\": a family of elements knows no other"
 
 
 def leads_its_source(header):

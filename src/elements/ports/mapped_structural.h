@@ -2,7 +2,7 @@
 /// external structural mapping`.
 #pragma once
 
-#include "elements/forces/external_structural.h"
+#include "elements/ports/external_structural.h"
 #include "elements/ports/port_element.h"
 
 namespace mbcosim {

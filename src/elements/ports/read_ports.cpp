@@ -3,9 +3,9 @@
 #include <sstream>
 
 #include "elements/families.h"
-#include "elements/forces/read_external.h"
 #include "elements/ports/external_modal.h"
 #include "elements/ports/mapped_structural.h"
+#include "elements/ports/read_external.h"
 #include "elements/ports/stream_output.h"
 #include "model/card.h"
 

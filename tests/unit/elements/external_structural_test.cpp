@@ -1,5 +1,5 @@
 /// Loads of external codes: equations, derivatives, the card.
-#include "elements/forces/external_structural.h"
+#include "elements/ports/external_structural.h"
 
 #include <gtest/gtest.h>
 

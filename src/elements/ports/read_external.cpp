@@ -1,8 +1,8 @@
 /// Cards of forces that an external code gives: `force: …, external structural`.
-#include "elements/forces/read_external.h"
+#include "elements/ports/read_external.h"
 
 #include "elements/families.h"
-#include "elements/forces/external_structural.h"
+#include "elements/ports/external_structural.h"
 #include "elements/ports/port_element.h"
 #include "model/card.h"
 

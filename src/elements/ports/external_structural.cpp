@@ -1,4 +1,4 @@
-#include "elements/forces/external_structural.h"
+#include "elements/ports/external_structural.h"
 
 namespace mbcosim {
 
