@@ -5,10 +5,9 @@
 
 #include "coupling/agreement.h"
 #include "coupling/port_model.h"
+#include "wire/protocol.h"
 
 namespace mbcosim::server {
-
-constexpr int kProtocolVersion = 1;
 
 /// Fills in what `hello` leaves open. Throws PORT_MISMATCH or VERSION_MISMATCH with everything that
 /// does not fit. `step_size`: of the next step [s].

@@ -6,6 +6,7 @@
 
 #include "service/session_advance.h"
 #include "wire/convert.h"
+#include "wire/protocol.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -31,7 +32,7 @@ Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shar
 void Session::start_record(const v1::CreateOptions& options) {
   v1::RecordEntry entry;
   v1::RecordHeader* header = entry.mutable_header();
-  header->set_protocol_version(1);
+  header->set_protocol_version(kProtocolVersion);
   header->set_model_digest(digest_text(model_->digest));
   header->set_step(simulation_->step_number());
   header->set_time_s(simulation_->time());

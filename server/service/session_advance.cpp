@@ -1,6 +1,8 @@
 /// The part of Session that advances.
 #include "service/session_advance.h"
 
+#include <spdlog/spdlog.h>
+
 #include <optional>
 
 #include "wire/convert.h"
@@ -128,7 +130,8 @@ bool Session::run_slice(Advance& advance) {
 StepReport Session::attempt(Advance& advance) {
   try {
     return simulation_->step(&advance.token);
-  } catch (const std::exception&) {
+  } catch (const std::exception& error) {
+    spdlog::error("{}: {}", identity_.id, error.what());
     status_.fail("internal error while stepping");
     throw Refusal(v1::REASON_INTERNAL,
                   "internal error while stepping; restore a snapshot or delete the simulation");

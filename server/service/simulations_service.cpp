@@ -7,13 +7,13 @@
 
 #include "service/upload.h"
 #include "wire/convert.h"
+#include "wire/protocol.h"
 
 namespace mbcosim::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 using google::protobuf::util::TimeUtil;
-constexpr int kProtocolVersion = 1;
 constexpr std::size_t kChunkBytes = 1 << 20;
 
 void check_protocol(const v1::VersionRange& range) {
