@@ -281,6 +281,39 @@ describe('who comes in', () => {
   });
 });
 
+describe('a daemon that is gone', () => {
+  test('is told, and what was seen can still be looked at', async () => {
+    const view = await View.start('pendulum.mbd');
+    const visited = await visit(browser, view.address);
+    const { page } = visited;
+    await shown(page);
+    await page.getByRole('button', { name: '+10' }).click();
+    await atStep(page, 10);
+    await view.stop();
+    await page.getByText('The daemon does not answer; trying again.').waitFor();
+    await page.getByRole('slider', { name: 'Time looked at' }).fill('0');
+    await atStep(page, 0);
+    await visited.close();
+  });
+});
+
+describe('comparing', () => {
+  test('draws another simulation in the same scene', async () => {
+    await withPage('pendulum.mbd', async ({ page }, view) => {
+      const { simulation } = await view.call<{ simulation: { name: string } }>('Simulations/ForkSimulation', { simulation: view.simulation, options: { displayName: 'other' } });
+      await view.call('Simulations/Step', { simulation: simulation.name, steps: 60 });
+      const alone = await picture(page);
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      await page.getByRole('button', { name: 'Compare with other' }).click();
+      const until = Date.now() + 20_000;
+      let both = alone;
+      while (both.covered <= alone.covered && Date.now() < until) both = await picture(page);
+      expect(both.covered).toBeGreaterThan(alone.covered);
+      await atStep(page, 0);
+    });
+  });
+});
+
 describe('for everybody', () => {
   const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
