@@ -20,6 +20,7 @@
 #include <random>
 
 #include "elements/element.h"
+#include "jacobian_check.h"
 
 namespace mbcosim::conformance {
 
@@ -173,28 +174,14 @@ class Bench {
     return r;
   }
   /// −∂r/∂δ as the elements give it, dense.
-  MatX jacobian() const {
-    std::vector<double> values(model->row_index.size(), 0.0);
-    const EvalContext c = context(state);
-    const std::vector<NodeSeeds> all = seeds();
-    for (const auto& set : model->sets) set->jacobian(c, all.data(), values.data(), set->all());
-    MatX J = MatX::Zero(n, n);
-    for (int j = 0; j < n; ++j)
-      for (int k = model->column_start[j]; k < model->column_start[j + 1]; ++k)
-        J(model->row_index[k], j) = values[k];
-    return J;
-  }
+  MatX jacobian() const { return matrix_of_elements(context(state), seeds()); }
   /// −∂r/∂δ by central differences on the manifold.
   MatX numerical_jacobian() const {
-    MatX J(n, n);
-    for (int j = 0; j < n; ++j) {
+    const auto step_of = [&](int j) {
       const bool differential = model->kinds[j] == UnknownKind::differential;
-      const double step = differential ? 1e-4 : 1e-4 * std::max(1.0, std::abs(state.y[j]));
-      J.col(j) = -(8 * (residual(moved(j, step)) - residual(moved(j, -step))) -
-                   (residual(moved(j, 2 * step)) - residual(moved(j, -2 * step)))) /
-                 (12 * step);
-    }
-    return J;
+      return differential ? 1e-4 : 1e-4 * std::max(1.0, std::abs(state.y[j]));
+    };
+    return central_differences(n, step_of, [&](int j, double e) { return residual(moved(j, e)); });
   }
   std::string entry_name(int row, int column) const {
     const auto [owner, meaning] = model->row_text(row);

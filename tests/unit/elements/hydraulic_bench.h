@@ -10,6 +10,7 @@
 
 #include "elements/columns.h"
 #include "elements/element.h"
+#include "jacobian_check.h"
 #include "model/fluids/fluids.h"
 
 namespace mbcosim::testing {
@@ -96,47 +97,22 @@ inline double HydraulicBench::jacobian_error(double c, double step) {
   seed.A = c * Mat3::Identity() + 0.1 * c * cross<double>(Vec3(1, -2, 3));
   seed.B = Mat3::Identity() + 0.2 * cross<double>(Vec3(0.5, 1, -1));
   const std::vector<NodeSeeds> seeds(model->structural.size(), seed);
-  std::vector<double> values(model->row_index.size(), 0.0);
-  set().jacobian(context(c), seeds.data(), values.data(), set().all());
-  MatX exact = MatX::Zero(n, n), numeric = MatX::Zero(n, n);
-  for (int j = 0; j < n; ++j)
-    for (int k = model->column_start[j]; k < model->column_start[j + 1]; ++k)
-      exact(model->row_index[k], j) += values[k];
-
+  const MatX exact = matrix_of_elements(context(c), seeds);
   const State base = state;
-  const auto column = [&](int j, double size, const std::function<void(double)>& move) {
-    state = base;
-    move(size);
-    const std::vector<double> plus = residual(c);
-    state = base;
-    move(-size);
-    const std::vector<double> minus = residual(c);
-    state = base;
-    for (int i = 0; i < n; ++i) numeric(i, j) = -(plus[i] - minus[i]) / (2 * size);
+  const auto step_of = [&](int j) {
+    const UnknownKind kind = model->kinds[j];
+    if (j < static_cast<int>(model->structural.size()) * 6) return step;
+    const double value = kind == UnknownKind::differential ? base.yp[j] : base.y[j];
+    return step * std::max(1.0, std::abs(value));
   };
-  for (std::size_t k = 0; k < model->structural.size(); ++k)
-    for (int i = 0; i < 3; ++i) {
-      const int first = model->structural[k].first;
-      column(first + i, step, [&](double e) {
-        state.y[first + i] += c * e;
-        state.yp[first + i] += e;
-      });
-      column(first + 3 + i, step, [&](double e) {
-        NodeRotation& r = state.rotation[k];
-        r.R = rotation_of_vector<double>(seed.A.col(i) * e) * r.R;
-        r.w += seed.B.col(i) * e;
-      });
-    }
-  const int structural = static_cast<int>(model->structural.size()) * 6;
-  for (int j = structural; j < n; ++j) {
-    const bool differential = model->kinds[j] == UnknownKind::differential;
-    const double scale =
-        differential ? std::max(1.0, std::abs(state.yp[j])) : std::max(1.0, std::abs(state.y[j]));
-    column(j, step * scale, [&](double e) {
-      state.y[j] += differential ? c * e : e;
-      if (differential) state.yp[j] += e;
-    });
-  }
+  const auto residual_at = [&](int j, double delta) {
+    state = base;
+    move_along(*model, seeds, c, j, delta, state);
+    const std::vector<double> r = residual(c);
+    return VecX(Eigen::Map<const VecX>(r.data(), n));
+  };
+  const MatX numeric = central_differences(n, step_of, residual_at);
+  state = base;
   double error = 0;
   for (int i = 0; i < n; ++i) {
     const double size = exact.row(i).cwiseAbs().maxCoeff();

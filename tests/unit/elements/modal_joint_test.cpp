@@ -6,6 +6,7 @@
 
 #include "elements/modal/modal_force.h"
 #include "elements/modal_bodies.h"
+#include "jacobian_check.h"
 
 namespace mbcosim {
 namespace {
@@ -92,35 +93,15 @@ void check_jacobian(ModalBench& bench) {
   seed.A = bench.c * (Mat3::Identity() + .1 * cross<double>(Vec3(1, -2, 3)));
   seed.B = Mat3::Identity() + .2 * cross<double>(Vec3(.5, 1, -1));
   const std::vector<NodeSeeds> seeds(model.structural.size(), seed);
-  std::vector<double> values(model.row_index.size(), 0.0);
-  const EvalContext at = bench.context();
-  for (const auto& set : model.sets) set->jacobian(at, seeds.data(), values.data(), set->all());
-  MatX exact = MatX::Zero(n, n), numeric = MatX::Zero(n, n);
-  for (int j = 0; j < n; ++j)
-    for (int k = model.column_start[j]; k < model.column_start[j + 1]; ++k)
-      exact(model.row_index[k], j) += values[k];
+  const MatX exact = matrix_of_elements(bench.context(), seeds);
   const State base = bench.state;
-  for (int j = 0; j < n; ++j) {
-    const auto moved = [&](double e) {
-      bench.state = base;
-      int turned = -1, axis = 0;
-      for (std::size_t k = 0; k < model.structural.size(); ++k)
-        if (const int i = j - model.structural[k].first; i >= 3 && i < 6)
-          turned = static_cast<int>(k), axis = i - 3;
-      if (turned >= 0) {
-        NodeRotation& r = bench.state.rotation[turned];
-        r.R = rotation_of_vector<double>(seed.A.col(axis) * e) * r.R;
-        r.w += seed.B.col(axis) * e;
-      } else {
-        const bool differential = model.kinds[j] == UnknownKind::differential;
-        bench.state.y[j] += differential ? bench.c * e : e;
-        if (differential) bench.state.yp[j] += e;
-      }
-      return bench.residual();
-    };
-    constexpr double kStep = 1e-4;
-    numeric.col(j) = -(moved(kStep) - moved(-kStep)) / (2 * kStep);
-  }
+  const auto residual_at = [&](int column, double delta) {
+    bench.state = base;
+    move_along(model, seeds, bench.c, column, delta, bench.state);
+    return bench.residual();
+  };
+  const MatX numeric = central_differences(
+      n, [](int) { return 1e-4; }, residual_at);
   bench.state = base;
   expect_near_matrix(exact, numeric, model, 1e-7);
 }
