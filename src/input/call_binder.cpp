@@ -4,7 +4,9 @@
 #include "input/nearest.h"
 #include "input/reading.h"
 #include "model/drive.h"
+#include "model/family.h"
 #include "model/model.h"
+#include "model/registry.h"
 
 namespace mbcosim {
 
@@ -141,10 +143,10 @@ void CallBinder::call_node_datum(const SyntaxItem& item, std::string_view name) 
 }
 
 void CallBinder::call_element_datum(const SyntaxItem& item, std::string_view name) {
-  Family family;
-  if (!family_of(name, &family)) fail("unknown element type " + in_quotes(name));
+  const FamilyFacts* const family = family_by_function(normalized(name));
+  if (!family) fail("unknown element type " + in_quotes(name));
   check_count(item, item.name, 1, 2);
-  call_datum(item, Op::element_datum, static_cast<int>(family));
+  call_datum(item, Op::element_datum, static_cast<int>(family->family));
 }
 
 void CallBinder::call_datum(const SyntaxItem& item, Op op, int index) {

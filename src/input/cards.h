@@ -17,9 +17,6 @@ void read_node_card(DeckCard& card);
 void read_driver_card(DeckCard& card);
 void read_element_card(DeckCard& card);
 
-/// Family of a statement head that MBDyn counts as an element, served here or not; null: none.
-const Family* family_of_head(std::string_view word);
-
 /// The words that `read_initial_value_card` and `read_control_card` accept.
 std::vector<std::string> initial_value_words();
 std::vector<std::string> control_words();

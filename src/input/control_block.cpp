@@ -4,6 +4,7 @@
 #include "input/cards.h"
 #include "input/deck.h"
 #include "input/suggest.h"
+#include "model/family.h"
 
 namespace mbcosim {
 
@@ -90,8 +91,9 @@ void set_default_output(OutputDefaults& o, bool on) {
 
 bool has_default_output(Kind kind) {
   if (kind == Kind::parameter_node || kind == Kind::file_driver) return false;
-  return kind != kind_of(Family::bulk) && kind != kind_of(Family::output_element) &&
-         kind != kind_of(Family::inertia) && kind != kind_of(Family::automatic_structural);
+  for (const FamilyFacts& f : all_families())
+    if (kind == kind_of(f.family)) return f.has_default_output;
+  return true;
 }
 
 void switch_on(OutputDefaults& o, Kind kind) {
@@ -329,8 +331,9 @@ bool read_count(DeckCard& card) {
   const std::optional<Kind> kind = kind_of_count_card(card.statement().word);
   if (!kind || *kind == kind_of(Family::gravity) || *kind == kind_of(Family::air_properties))
     return false;
-  if (card.statement().word == "rotors" || card.statement().word == "rtaioutput")
-    warn_old_name(card, card.head(), kind_names(*kind).card);
+  for (const FamilyFacts& f : all_families())
+    if (*f.old_count_card && card.statement().word == f.old_count_card)
+      warn_old_name(card, card.head(), kind_names(*kind).card);
   card.deck().counts[static_cast<int>(*kind)].declared = card.more() ? card.count("count") : 0;
   return true;
 }

@@ -1,50 +1,41 @@
 #include "input/counts.h"
 
+#include "model/family.h"
 #include "model/registry.h"
 
 namespace mbcosim {
 
 namespace {
 
-constexpr std::array<KindNames, kKinds> kNames = {{
-    {"structural nodes", "structural node", "structural nodes"},
-    {"abstract nodes", "abstract node", "abstract nodes"},
-    {"electric nodes", "electric node", "electric nodes"},
-    {"hydraulic nodes", "hydraulic node", "hydraulic nodes"},
-    {"thermal nodes", "thermal node", "thermal nodes"},
-    {"parameter nodes", "parameter node", "parameter nodes"},
-    {"file drivers", "file driver", "file drivers"},
-    {"joints", "joint", "joints"},
-    {"joint regularizations", "joint regularization", "joint regularizations"},
-    {"plates", "plate", "plates"},
-    {"genels", "genel", "genels"},
-    {"induced velocity elements", "induced velocity element", "induced velocity elements"},
-    {"aerodynamic elements", "aerodynamic element", "aerodynamic elements"},
-    {"aeromodals", "aeromodal", "aeromodals"},
-    {"electric elements", "electric element", "electric elements"},
-    {"thermal elements", "thermal element", "thermal elements"},
-    {"hydraulic elements", "hydraulic element", "hydraulic elements"},
-    {"loadable elements", "user defined element", "loadable elements"},
-    {"rigid bodies", "body", "rigid bodies"},
-    {"beams", "beam", "beams"},
-    {"forces", "force", "forces"},
-    {"gravity", "gravity", "gravity"},
-    {"inertia", "inertia", "inertia elements"},
-    {"", "automatic structural", "automatic structural elements"},
-    {"air properties", "air properties", "air properties"},
-    {"bulk elements", "bulk element", "bulk elements"},
-    {"output elements", "output element", "output elements"},
-}};
+std::array<KindNames, kKinds> make_names() {
+  std::array<KindNames, kKinds> names = {{
+      {"structural nodes", "structural node", "structural nodes"},
+      {"abstract nodes", "abstract node", "abstract nodes"},
+      {"electric nodes", "electric node", "electric nodes"},
+      {"hydraulic nodes", "hydraulic node", "hydraulic nodes"},
+      {"thermal nodes", "thermal node", "thermal nodes"},
+      {"parameter nodes", "parameter node", "parameter nodes"},
+      {"file drivers", "file driver", "file drivers"},
+  }};
+  for (const FamilyFacts& f : all_families())
+    names[static_cast<int>(kind_of(f.family))] = {f.count_card, f.name, f.plural};
+  return names;
+}
 
 }  // namespace
 
-const KindNames& kind_names(Kind kind) { return kNames[static_cast<int>(kind)]; }
+const KindNames& kind_names(Kind kind) {
+  static const std::array<KindNames, kKinds> kNames = make_names();
+  return kNames[static_cast<int>(kind)];
+}
 
 std::optional<Kind> kind_of_count_card(std::string_view word) {
-  if (word == "rotors") return kind_of(Family::induced_velocity);
-  if (word == "rtaioutput") return kind_of(Family::output_element);
-  for (int k = 0; k < kKinds; ++k)
-    if (*kNames[k].card && normalized(kNames[k].card) == word) return static_cast<Kind>(k);
+  for (const FamilyFacts& f : all_families())
+    if (*f.old_count_card && word == f.old_count_card) return kind_of(f.family);
+  for (int k = 0; k < kKinds; ++k) {
+    const char* card = kind_names(static_cast<Kind>(k)).card;
+    if (*card && normalized(card) == word) return static_cast<Kind>(k);
+  }
   return std::nullopt;
 }
 

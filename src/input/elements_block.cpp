@@ -1,55 +1,12 @@
 /// Cards of the `elements` block: any element by its head, `driven`, `bind`, `output`.
-#include <map>
-
 #include "input/cards.h"
 #include "input/deck.h"
 #include "input/suggest.h"
+#include "model/family.h"
 
 namespace mbcosim {
 
 namespace {
-
-const std::map<std::string, Family, std::less<>>& families_by_head() {
-  static const std::map<std::string, Family, std::less<>> kHeads = {
-      {"body", Family::body},
-      {"joint", Family::joint},
-      {"jointregularization", Family::joint_regularization},
-      {"beam", Family::beam},
-      {"beam2", Family::beam},
-      {"beam3", Family::beam},
-      {"hbeam", Family::beam},
-      {"membrane4eas", Family::plate},
-      {"shell4eas", Family::plate},
-      {"shell4easans", Family::plate},
-      {"force", Family::force},
-      {"couple", Family::force},
-      {"genel", Family::genel},
-      {"hydraulic", Family::hydraulic},
-      {"electric", Family::electric},
-      {"thermal", Family::thermal},
-      {"bulk", Family::bulk},
-      {"gravity", Family::gravity},
-      {"airproperties", Family::air_properties},
-      {"aerodynamicbody", Family::aerodynamic},
-      {"aerodynamicbeam", Family::aerodynamic},
-      {"aerodynamicbeam2", Family::aerodynamic},
-      {"aerodynamicbeam3", Family::aerodynamic},
-      {"aircraftinstruments", Family::aerodynamic},
-      {"genericaerodynamicforce", Family::aerodynamic},
-      {"inducedvelocity", Family::induced_velocity},
-      {"rotor", Family::induced_velocity},
-      {"aeromodal", Family::aeromodal},
-      {"userdefined", Family::loadable},
-      {"loadable", Family::loadable},
-      {"outputelement", Family::output_element},
-      {"streamoutput", Family::output_element},
-      {"streammotionoutput", Family::output_element},
-      {"rtaioutput", Family::output_element},
-      {"inertia", Family::inertia},
-      {"automaticstructural", Family::automatic_structural},
-  };
-  return kHeads;
-}
 
 /// What `driven` gives to its inner element.
 struct Driven {
@@ -151,12 +108,11 @@ void refuse_self_joints(DeckCard& card, Family family, std::size_t before) {
 void read_element(DeckCard& card, Driven* driven = nullptr) {
   const Registry& registry = card.registry();
   const std::string word = card.statement().word;
-  const Family* const family = family_of_head(word);
+  const FamilyFacts* const family = family_by_head(word);
   const auto head = registry.heads.find(word);
   if (head == registry.heads.end() && !family) fail_unknown_head(card);
-  const Family f = head != registry.heads.end() ? head->second.family : *family;
-  const bool has_label =
-      head != registry.heads.end() ? head->second.has_label : f != Family::air_properties;
+  const Family f = head != registry.heads.end() ? head->second.family : family->family;
+  const bool has_label = head != registry.heads.end() ? head->second.has_label : family->has_label;
   ElementInfo info;
   read_element_head(card, f, has_label, driven, info);
   const bool counted_later = f == Family::inertia;  // counts only with `output, always`
@@ -230,8 +186,8 @@ void read_driven(DeckCard& card) {
     drive_existing(inner, driven);
     return;
   }
-  if (const Family* const family = family_of_head(inner.statement().word))
-    card.set_defining(family_name(*family), driven.label);
+  if (const FamilyFacts* const family = family_by_head(inner.statement().word))
+    card.set_defining(family->name, driven.label);
   read_element(inner, &driven);
 }
 
@@ -337,7 +293,7 @@ void read_bind(DeckCard& card) {
 
 void read_output_card(DeckCard& card) {
   const Family family = card.element_family("element type");
-  Model& model = card.model();
+  const Model& model = card.model();
   read_output_labels(card, [&](int first, int last) {
     if (first == last) {
       const ElementRef e = model.find_element(family, first);
@@ -356,11 +312,6 @@ void read_output_card(DeckCard& card) {
 }
 
 }  // namespace
-
-const Family* family_of_head(std::string_view word) {
-  const auto found = families_by_head().find(word);
-  return found == families_by_head().end() ? nullptr : &found->second;
-}
 
 void read_element_card(DeckCard& card) {
   const std::string& word = card.statement().word;

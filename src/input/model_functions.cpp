@@ -201,42 +201,6 @@ int node_type(std::string_view word) {
   return -1;
 }
 
-bool family_of(std::string_view word, Family* family) {
-  const std::string w = normalized(word);
-  constexpr std::pair<const char*, Family> words[] = {
-      {"joint", Family::joint},
-      {"jointregularization", Family::joint_regularization},
-      {"body", Family::body},
-      {"beam", Family::beam},
-      {"force", Family::force},
-      {"couple", Family::force},
-      {"genel", Family::genel},
-      {"hydraulic", Family::hydraulic},
-      {"electric", Family::electric},
-      {"thermal", Family::thermal},
-      {"gravity", Family::gravity},
-      {"plate", Family::plate},
-      {"shell", Family::plate},
-      {"membrane", Family::plate},
-      {"inertia", Family::inertia},
-      {"loadable", Family::loadable},
-      {"userdefined", Family::loadable},
-      {"airproperties", Family::air_properties},
-      {"automaticstructural", Family::automatic_structural},
-      {"aerodynamicelement", Family::aerodynamic},
-      {"aeromodal", Family::aeromodal},
-      {"rotor", Family::induced_velocity},
-      {"inducedvelocity", Family::induced_velocity},
-      {"bulk", Family::bulk},
-  };
-  for (const auto& [text, f] : words) {
-    if (w != text) continue;
-    *family = f;
-    return true;
-  }
-  return false;
-}
-
 namespace {
 
 class StructuralDatum : public Drive {

@@ -46,8 +46,6 @@ double evaluate_drive(const EvalContext& context, int label, double argument, bo
 /// What `model::node::TYPE` and plugin variables call a kind of node: 0 structural, 1 + ScalarKind
 /// otherwise; -1 unknown.
 int node_type(std::string_view word);
-/// Family by the word used in expressions, blanks and case aside; false when unknown.
-bool family_of(std::string_view word, Family* family);
 
 /// A private datum of a node or element as a drive. `datum` may be empty when the entity has
 /// exactly one, or its number

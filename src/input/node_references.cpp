@@ -3,6 +3,7 @@
 #include "input/deck.h"
 #include "input/deck_card.h"
 #include "input/suggest.h"
+#include "model/family.h"
 
 namespace mbcosim {
 
@@ -119,15 +120,15 @@ Family DeckCard::element_family(std::string_view what) {
     skip();
     return head->second.family;
   }
-  if (const Family* const family = family_of_head(w)) {
+  if (const FamilyFacts* const family = family_by_head(w)) {
     skip();
-    return *family;
+    return family->family;
   }
   std::vector<std::string> accepted;
-  for (int f = 0; f < static_cast<int>(Family::count); ++f)
-    accepted.push_back(family_name(static_cast<Family>(f)));
-  for (int f = 0; f < static_cast<int>(Family::count); ++f)
-    if (keyword(accepted[f])) return static_cast<Family>(f);
+  for (const FamilyFacts& f : all_families()) {
+    if (keyword(f.name)) return f.family;
+    accepted.emplace_back(f.name);
+  }
   for (const auto& entry : registry().heads) accepted.push_back(entry.first);
   fail_at(next(), "unknown " + std::string(what) + (w.empty() ? "" : " \"" + w + "\""),
           suggestion(w, accepted), "unknown-word");

@@ -8,6 +8,7 @@
 #include "input/model_functions.h"
 #include "input/reading.h"
 #include "input/syntax.h"
+#include "model/family.h"
 #include "model/model.h"
 #include "model/registry.h"
 
@@ -141,11 +142,11 @@ class Reader {
 
   DrivePtr datum(bool is_node) {
     const int label = integer(items_[2], "label");
-    Family family = Family::joint;
+    const FamilyFacts* family = nullptr;
     int kind = 0;
     if (is_node)
       kind = type(items_[3]);
-    else if (!family_of(items_[3].text, &family))
+    else if (family = family_by_function(normalized(items_[3].text)); !family)
       fail(items_[3], "unknown element type \"" + excerpt(items_[3].text) + '"');
     next_ = 4;
     std::string name;
@@ -153,7 +154,7 @@ class Reader {
     if (next_ < items_.size()) read_datum_choice(items_[next_++], &name, &index);
     const Model& model = reading_.builder()->model();
     return is_node ? node_datum(model, kind, label, name, index)
-                   : element_datum(model, family, true, label, name, index);
+                   : element_datum(model, family->family, true, label, name, index);
   }
 
   void read_datum_choice(const Item& item, std::string* name, int* index) {

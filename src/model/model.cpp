@@ -66,30 +66,6 @@ NodeAcceleration dummy_acceleration(const Model& model, const EvalContext& conte
 
 }  // namespace
 
-const char* family_name(Family family) {
-  static constexpr const char* kNames[] = {"joint",
-                                           "joint regularization",
-                                           "plate",
-                                           "genel",
-                                           "induced velocity element",
-                                           "aerodynamic element",
-                                           "aeromodal",
-                                           "electric element",
-                                           "thermal element",
-                                           "hydraulic element",
-                                           "user defined element",
-                                           "body",
-                                           "beam",
-                                           "force",
-                                           "gravity",
-                                           "inertia",
-                                           "automatic structural",
-                                           "air properties",
-                                           "bulk element",
-                                           "output element"};
-  return kNames[static_cast<int>(family)];
-}
-
 NodeState Model::node_state(const EvalContext& context, int node) const {
   const StructuralNode& n = structural[node];
   if (n.is_dummy()) {

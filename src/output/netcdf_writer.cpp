@@ -4,6 +4,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "model/family.h"
 #include "output/netcdf_file.h"
 #include "output/record.h"
 
@@ -25,26 +26,13 @@ std::string owner_kind(OutputFile file) {
       return "node.thermal";
     case OutputFile::prm:
       return "node.parameter";
-    case OutputFile::jnt:
-    case OutputFile::mod:
-      return "elem.joint";
-    case OutputFile::frc:
-      return "elem.force";
-    case OutputFile::act:
-      return "elem.beam";
-    case OutputFile::gen:
-      return "elem.genel";
-    case OutputFile::hyd:
-      return "elem.hydraulic";
-    case OutputFile::grv:
-      return "elem.gravity";
-    case OutputFile::ele:
-      return "elem.electric";
     case OutputFile::drv:
       return "drive";
     default:
-      return std::string("elem.") + extension(file);
+      break;
   }
+  const FamilyFacts* const family = family_by_file(extension(file));
+  return std::string("elem.") + (family ? family->owner : extension(file));
 }
 
 /// One column group of a line.

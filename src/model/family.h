@@ -1,0 +1,39 @@
+/// Families of elements: what each is called wherever a deck, a result file or a client names it.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "model/element_set.h"
+
+namespace mbcosim {
+
+struct FamilyFacts {
+  Family family;
+  const char* name;            ///< in messages and private data: "joint"
+  const char* plural;          ///< in messages: "rigid bodies"
+  const char* count_card;      ///< of the control data; empty: none
+  const char* old_count_card;  ///< normalized name that older decks use; empty: none
+  /// Normalized heads of the elements block that count as this family, served or not.
+  std::span<const std::string_view> heads;
+  /// Normalized words of model functions: `model::joint(…)`.
+  std::span<const std::string_view> functions;
+  /// Extensions of the family's result files, and what their variables in NetCDF begin with:
+  /// "elem.<owner>.<label>.". Empty for families that write none.
+  std::span<const std::string_view> files = {};
+  const char* owner = "";
+  bool has_default_output = true;  ///< `default output` knows the family
+  bool has_label = true;
+};
+
+const FamilyFacts& family_facts(Family family);
+std::span<const FamilyFacts> all_families();
+
+/// By a normalized head of the elements block, or nullptr.
+const FamilyFacts* family_by_head(std::string_view head);
+/// By a normalized word of a model function, or nullptr.
+const FamilyFacts* family_by_function(std::string_view word);
+/// By the extension of a result file, or nullptr.
+const FamilyFacts* family_by_file(std::string_view extension);
+
+}  // namespace mbcosim
