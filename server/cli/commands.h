@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "input/symbols.h"
+
 namespace mbcosim::cli {
 
 /// Exit codes of `mbcosim`, the same for every subcommand.
@@ -18,7 +20,8 @@ enum ExitCode {
 };
 
 struct RunOptions {
-  std::string deck;    ///< path of the main file
+  std::string deck;  ///< path of the main file
+  SymbolValues symbols;
   std::string prefix;  ///< of the result files; empty: the deck's path
   bool quiet = false;
   bool deck_sockets = true;  ///< the sockets and files that the deck names are served
@@ -33,8 +36,8 @@ struct ReduceCommand {
 };
 
 int run(const RunOptions& options);
-int validate(const std::string& deck, bool json);
-int describe(const std::string& deck, bool json);
+int validate(const std::string& deck, const SymbolValues& symbols, bool json);
+int describe(const std::string& deck, const SymbolValues& symbols, bool json);
 /// Reduces a finite element model to a FEM data file, and reports beside it as OUTPUT.json.
 int reduce_model(const ReduceCommand& command);
 /// What a FEM data file holds; `convert`: name of a copy to write, the packed form when it ends

@@ -4,8 +4,8 @@
 
 namespace mbcosim::cli {
 
-LoadReport load_path(const std::string& deck) {
-  return load_deck(FolderSource(".", /*unrestricted=*/true), deck);
+DeckReport load_path(const std::string& deck, const SymbolValues& symbols) {
+  return read_deck(FolderSource(".", /*unrestricted=*/true), deck, {.symbols = symbols});
 }
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out) {

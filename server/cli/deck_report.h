@@ -5,12 +5,12 @@
 #include <string>
 
 #include "cli/commands.h"
-#include "simulation/simulation.h"
+#include "simulation/load.h"
 
 namespace mbcosim::cli {
 
 /// Reads a deck from the user's own files, without the restrictions that uploaded decks are under.
-LoadReport load_path(const std::string& deck);
+DeckReport load_path(const std::string& deck, const SymbolValues& symbols = {});
 
 /// Diagnostics as text, one after another.
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out);

@@ -4,6 +4,7 @@
 #include <new>
 
 #include "cli/commands.h"
+#include "input/symbol_values.h"
 #include "reduction/job.h"
 
 namespace {
@@ -49,6 +50,23 @@ void add_programs(CLI::App& app, int& exit_code) {
   add("replay", "Run a model against a record of its ports, or a recorded server against a client");
 }
 
+/// `-D NAME=VALUE`, any number of times.
+void add_symbols(CLI::App& app, mbcosim::SymbolValues& symbols) {
+  app.add_option_function<std::vector<std::string>>(
+         "-D,--define",
+         [&symbols](const std::vector<std::string>& definitions) {
+           for (const std::string& definition : definitions) {
+             auto symbol = mbcosim::parse_symbol(definition);
+             if (!symbol) throw CLI::ValidationError("-D", symbol.error().message);
+             if (!symbols.insert(std::move(*symbol)).second)
+               throw CLI::ValidationError("-D", "\"" + definition + "\": the name is given twice");
+           }
+         },
+         "Give a symbol of the deck another value: NAME=VALUE takes the place of what its first "
+         "declaration says; numbers, TRUE, FALSE or text")
+      ->allow_extra_args(false);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -67,6 +85,7 @@ int main(int argc, char** argv) {
   run_app->add_option("-o,--output", run_options.prefix,
                       "Prefix of the result files (PREFIX.mov, PREFIX.jnt, ...); "
                       "default: the deck's name");
+  add_symbols(*run_app, run_options.symbols);
   run_app->add_flag("-q,--quiet", run_options.quiet,
                     "No progress bar and no summary on a terminal");
   run_app->add_flag("!--no-deck-sockets", run_options.deck_sockets,
@@ -81,17 +100,20 @@ int main(int argc, char** argv) {
 
   std::string deck;
   bool json = false;
+  mbcosim::SymbolValues symbols;
   CLI::App* validate_app =
       app.add_subcommand("validate", "Read a deck and report all that is wrong with it");
   validate_app->add_option("deck", deck, "Main file of the deck")->required();
+  add_symbols(*validate_app, symbols);
   validate_app->add_flag("--json", json, "Print the diagnostics as JSON");
-  validate_app->callback([&] { exit_code = validate(deck, json); });
+  validate_app->callback([&] { exit_code = validate(deck, symbols, json); });
 
   CLI::App* describe_app =
       app.add_subcommand("describe", "List a deck's nodes, elements and variables");
   describe_app->add_option("deck", deck, "Main file of the deck")->required();
+  add_symbols(*describe_app, symbols);
   describe_app->add_flag("--json", json, "Print the description as JSON");
-  describe_app->callback([&] { exit_code = describe(deck, json); });
+  describe_app->callback([&] { exit_code = describe(deck, symbols, json); });
 
   ReduceCommand reduce_command;
   add_reduce(app, reduce_command, exit_code);

@@ -83,7 +83,7 @@ ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWri
 
 int run(const RunOptions& options) {
   InterruptGuard interrupt;
-  const LoadReport report = load_path(options.deck);
+  const LoadReport report = load_path(options.deck, options.symbols);
   std::fputs(report.printed.c_str(), stdout);
   print_diagnostics(report.diagnostics, stderr);
   if (!report.ok()) return exit_code_of(report);

@@ -4,8 +4,8 @@
 
 namespace mbcosim::cli {
 
-int validate(const std::string& deck, bool json) {
-  const LoadReport report = load_path(deck);
+int validate(const std::string& deck, const SymbolValues& symbols, bool json) {
+  const LoadReport report = load_path(deck, symbols);
   if (json) {
     std::printf("%s\n", diagnostics_json(report).c_str());
     return exit_code_of(report);

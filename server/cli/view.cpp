@@ -7,7 +7,7 @@
 namespace mbcosim::cli {
 
 int view(const std::string& deck, const std::string& http) {
-  const int readable = validate(deck, false);
+  const int readable = validate(deck, {}, false);
   std::fflush(stdout);
   return readable == kDone ? hand_over("view", {deck, "--http", http}) : readable;
 }

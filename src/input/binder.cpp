@@ -3,6 +3,7 @@
 #include "input/call_binder.h"
 #include "input/plugin.h"
 #include "input/reading.h"
+#include "input/symbol_values.h"
 
 namespace mbcosim {
 
@@ -206,11 +207,31 @@ class Binder : CallBinder {
     s.value = zero_of(item.type);
     s.constant = item.is_constant;
     s.where = reading_.expression_span(item.where, item.length);
+    const Value* const given = given_value(item);
+    if (given) s.overridden = true;
+    if (!item.has_value) s.declared = given ? *given : s.value;
+    if (given && !item.has_value) s.value = *given;
     Symbol& made = reading_.symbols.declare(std::move(s));
+    if (given && item.has_value) {
+      drop();
+      push_value(*given);
+    }
     if (item.has_value)
       store(item, made);
     else
       load(Op::load_symbol, item.type).symbol = &made;
+  }
+
+  /// What the user gave for the symbol, as the declared type; null: nothing.
+  const Value* given_value(const SyntaxItem& item) {
+    const auto found = reading_.options.symbols.find(item.name);
+    if (found == reading_.options.symbols.end() || reading_.symbols.depth() > 0) return nullptr;
+    Result<Value> value = as_symbol(found->second, item.type);
+    if (!value)
+      fail("symbol " + in_quotes(item.name) + ": " + value.error().message, value.error().reason,
+           "symbol");
+    given_ = *value;
+    return &given_;
   }
 
   void redeclare(const SyntaxItem& item, Symbol* known) {
@@ -454,6 +475,7 @@ class Binder : CallBinder {
   const BindingRules& rules_;
   std::vector<std::string_view> local_names_;
   std::vector<std::string_view> constant_locals_;
+  Value given_;
 };
 
 }  // namespace

@@ -287,6 +287,7 @@ class Machine {
         v = frame_.texts.back();
         break;
     }
+    if (!in.symbol->declared) in.symbol->declared = v;
     in.symbol->damaged = frame_.reading && frame_.reading->is_damaged();
   }
 

@@ -45,6 +45,7 @@ struct ReaderOptions {
   bool redefine = false;  ///< declarations of known variables assign (MBDyn's switch -r)
   std::chrono::milliseconds read_time = std::chrono::minutes(5);  ///< limit `read-time`
   std::size_t printed_bytes = 16 << 20;                           ///< limit `printed-bytes`
+  SymbolValues symbols;  ///< instead of the values of the first declarations at outer level
 };
 
 class Reading {

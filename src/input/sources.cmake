@@ -36,6 +36,7 @@ set(SOURCES
   structural_node_card.cpp
   structured_values.cpp
   suggest.cpp
+  symbol_values.cpp
   symbols.cpp
   value.cpp
   vocabulary.cpp

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -15,6 +17,9 @@
 
 namespace mbcosim {
 
+/// Values that take the place of those in the deck's first declarations, by name.
+using SymbolValues = std::map<std::string, Value, std::less<>>;
+
 /// Variables that the run updates; run-time strings read them from the EvalContext.
 enum class SymbolRole : std::uint8_t { plain, time, time_step, step, var };
 
@@ -23,13 +28,15 @@ struct Symbol {
   Value value;  ///< its alternative is the declared type
   bool constant = false;
   bool predefined = false;  ///< `pi`, `TRUE`, ...
+  bool overridden = false;  ///< its declaration took the value that the user gave
   bool damaged =
       false;  ///< its value could not be computed: errors that follow from it are not reported
   SymbolRole role = SymbolRole::plain;
-  int scope = 0;      ///< 0: whole deck; n: a pass of the n-th enclosing loop
-  int variable = -1;  ///< index in State::variables when a run-time string assigns it
-  SourceSpan where;   ///< of its declaration
-  DrivePtr plugin;    ///< plugin variable: fetches the value at each use
+  int scope = 0;                  ///< 0: whole deck; n: a pass of the n-th enclosing loop
+  int variable = -1;              ///< index in State::variables when a run-time string assigns it
+  SourceSpan where;               ///< of its declaration
+  std::optional<Value> declared;  ///< what its declaration gave it
+  DrivePtr plugin;                ///< plugin variable: fetches the value at each use
 };
 
 class SymbolTable {

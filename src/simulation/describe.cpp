@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "input/symbols.h"
+#include "input/value.h"
 
 namespace mbcosim {
 
@@ -64,7 +64,21 @@ std::string title_of(const std::string& type, int label, const std::string& name
   return type + " " + std::to_string(label) + (name.empty() ? "" : " \"" + name + "\"");
 }
 
+/// "const real L"
+std::string declaration(const DeckSymbol& s) {
+  return std::string(s.constant ? "const " : "") + type_name(type_of(s.declared)) + " " + s.name;
+}
+
 using Json = nlohmann::ordered_json;
+
+Json to_json(const DeckSymbol::Value& value) {
+  return std::visit([](const auto& v) { return Json(v); }, value);
+}
+
+/// With all its digits.
+std::string exact(const DeckSymbol::Value& value) {
+  return to_json(value).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 Json number(double x) { return std::isfinite(x) ? Json(x) : Json(); }
 
@@ -97,7 +111,9 @@ class TreeWriter {
     elements();
     drives();
     out_ << "symbols (" << d_.symbols.size() << ")\n";
-    for (const auto& s : d_.symbols) out_ << "  " << s.first << " = " << s.second << "\n";
+    for (const DeckSymbol& s : d_.symbols)
+      out_ << "  " << declaration(s) << " = " << exact(s.value) << (s.overridden ? ", given" : "")
+           << "\n";
     out_ << "variables of the model (" << by_prefix_[""].size() << ")\n";
     variables("", "  ");
     return out_.str();
@@ -180,6 +196,16 @@ Json to_json(const Variable& v) {
           {"owner", v.owner}, {"description", v.description}};
 }
 
+Json to_json(const DeckSymbol& s) {
+  return {{"declaration", declaration(s)},
+          {"name", s.name},
+          {"type", type_name(type_of(s.declared))},
+          {"constant", s.constant},
+          {"given", s.overridden},
+          {"declared", to_json(s.declared)},
+          {"value", to_json(s.value)}};
+}
+
 template <class T>
 Json list(const std::vector<T>& items) {
   Json array = Json::array();
@@ -203,7 +229,8 @@ const char* causality_name(Causality causality) {
   return "";
 }
 
-ModelDescription describe(const Model& model, std::vector<Variable> variables) {
+ModelDescription describe(const Model& model, std::vector<Variable> variables,
+                          std::vector<DeckSymbol> symbols) {
   ModelDescription d;
   d.title = model.title;
   d.digest = hexadecimal(model.digest);
@@ -217,10 +244,7 @@ ModelDescription describe(const Model& model, std::vector<Variable> variables) {
   for (const NamedDrive& n : model.drives)
     d.drives.push_back({n.label, n.name, n.drive->has_derivative()});
   for (const ReferenceFrame& f : model.frames) d.frames.push_back(f.label);
-  const SymbolTable predefined;
-  for (const auto& symbol : model.symbols)
-    if (!predefined.find(symbol.first.substr(symbol.first.rfind(' ') + 1)))
-      d.symbols.push_back(symbol);
+  d.symbols = std::move(symbols);
   d.variables = std::move(variables);
   return d;
 }
@@ -228,9 +252,6 @@ ModelDescription describe(const Model& model, std::vector<Variable> variables) {
 std::string to_text(const ModelDescription& d) { return TreeWriter(d).text(); }
 
 std::string to_json(const ModelDescription& d) {
-  Json symbols = Json::array();
-  for (const auto& s : d.symbols)
-    symbols.push_back({{"declaration", s.first}, {"value", s.second}});
   const Json j = {{"title", d.title},
                   {"digest", d.digest},
                   {"unknowns", d.unknowns},
@@ -241,7 +262,7 @@ std::string to_json(const ModelDescription& d) {
                   {"elements", list(d.elements)},
                   {"drives", list(d.drives)},
                   {"frames", d.frames},
-                  {"symbols", symbols},
+                  {"symbols", list(d.symbols)},
                   {"variables", list(d.variables)}};
   return j.dump(2, ' ', false, Json::error_handler_t::replace);
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "model/model.h"
+#include "model/symbol.h"
 #include "simulation/variable.h"
 
 namespace mbcosim {
@@ -46,13 +47,14 @@ struct ModelDescription {
   std::vector<NodeDescription> nodes;
   std::vector<ElementDescription> elements;
   std::vector<DriveDescription> drives;
-  std::vector<int> frames;                                   ///< labels of reference frames
-  std::vector<std::pair<std::string, std::string>> symbols;  ///< of `set` cards: ("real L", "0.5")
-  std::vector<Variable> variables;                           ///< what can be read and written
+  std::vector<int> frames;          ///< labels of reference frames
+  std::vector<DeckSymbol> symbols;  ///< of `set` cards
+  std::vector<Variable> variables;  ///< what can be read and written
 };
 
-/// `variables` of a simulation of the model; may be left out.
-ModelDescription describe(const Model& model, std::vector<Variable> variables = {});
+/// `variables` of a simulation of the model, `symbols` of its deck; may be left out.
+ModelDescription describe(const Model& model, std::vector<Variable> variables = {},
+                          std::vector<DeckSymbol> symbols = {});
 /// A tree of lines with two blanks per level: variables stand below what they belong to.
 std::string to_text(const ModelDescription& description);
 /// One JSON object; infinite numbers are null, what is not UTF-8 is replaced.

@@ -1,8 +1,10 @@
-/// load_deck: text to model.
+/// Text to model.
+#include "simulation/load.h"
+
 #include "elements/families.h"
 #include "input/deck_reader.h"
+#include "input/symbol_values.h"
 #include "simulation/model_check.h"
-#include "simulation/simulation.h"
 
 namespace mbcosim {
 
@@ -26,6 +28,14 @@ void store_symbols(const Reading& reading, Model& model) {
     model.symbols.emplace_back(
         std::string(s->constant ? "const " : "") + type_name(type_of(s->value)) + " " + s->name,
         printed(s->value));
+}
+
+std::vector<DeckSymbol> declared_symbols(const Reading& reading) {
+  std::vector<DeckSymbol> found;
+  for (const Symbol* s : reading.symbols.sorted())
+    if (s->declared && !s->predefined && s->role == SymbolRole::plain)
+      found.push_back({s->name, s->constant, s->overridden, *s->declared, s->value});
+  return found;
 }
 
 Diagnostic plain_error(std::string code, std::string file, std::string message) {
@@ -66,6 +76,14 @@ std::uint64_t digest_with(std::uint64_t deck, const std::vector<PortAttachment>&
   return all.value();
 }
 
+std::uint64_t digest_with(std::uint64_t deck, const SymbolValues& symbols) {
+  if (symbols.empty()) return deck;
+  Digest all;
+  all.add(std::to_string(deck));
+  all.add(exact_text(symbols));
+  return all.value();
+}
+
 bool attach(ModelBuilder& builder, const std::vector<PortAttachment>& ports,
             const std::string& file, std::vector<Diagnostic>& extra) {
   for (const PortAttachment& port : ports)
@@ -84,6 +102,8 @@ ModelPtr read_model(Reading& reading, ModelBuilder& builder,
   DeckReader(deck, statements).read();
   if (reading.errors() == 0) reading.bind_strings();
   if (reading.errors() > 0) return nullptr;
+  extra = unreached_symbols(reading);
+  if (!extra.empty()) return nullptr;
   if (!attach(builder, ports, reading.file(0).name, extra)) return nullptr;
   Model& model = builder.model();
   if (const std::int64_t n = count_unknowns(model); n > reading.limits.unknowns) {
@@ -93,7 +113,8 @@ ModelPtr read_model(Reading& reading, ModelBuilder& builder,
                                     " (limit `unknowns`)"));
     return nullptr;
   }
-  model.digest = digest_with(digest(reading, deck.data_files), ports);
+  model.digest =
+      digest_with(digest_with(digest(reading, deck.data_files), ports), reading.options.symbols);
   store_symbols(reading, model);
   Result<ModelPtr> finished = builder.finish();
   if (!finished) {
@@ -108,10 +129,18 @@ ModelPtr read_model(Reading& reading, ModelBuilder& builder,
 
 LoadReport load_deck(const FileSource& files, const std::string& main_file, const Limits& limits,
                      const std::vector<PortAttachment>& ports) {
-  LoadReport report;
+  return read_deck(files, main_file, {limits, ports});
+}
+
+DeckReport read_deck(const FileSource& files, const std::string& main_file,
+                     const LoadRequest& request) {
+  const Limits& limits = request.limits;
+  DeckReport report;
   try {
     ModelBuilder builder;
-    Reading reading(files, limits, &builder);
+    ReaderOptions options;
+    options.symbols = request.symbols;
+    Reading reading(files, limits, &builder, std::move(options));
     const Result<int> opened = reading.open_file(main_file);
     if (!opened) {
       const bool limit = opened.error().kind == ErrorKind::limit;
@@ -121,7 +150,8 @@ LoadReport load_deck(const FileSource& files, const std::string& main_file, cons
       return report;
     }
     std::vector<Diagnostic> extra;
-    report.model = read_model(reading, builder, ports, extra);
+    report.model = read_model(reading, builder, request.ports, extra);
+    if (report.model) report.symbols = declared_symbols(reading);
     report.printed = reading.printed;
     report.diagnostics = reading.release_diagnostics();
     report.diagnostics.insert(report.diagnostics.end(), extra.begin(), extra.end());

@@ -109,6 +109,21 @@ def test_validate_and_describe_as_json(deck, tmp_path):
     assert report.returncode == 2 and json.loads(report.stdout)["diagnostics"]
 
 
+def test_symbols_are_given_on_the_command_line(tmp_path):
+    deck = tmp_path / "deck"
+    deck.write_text("set: const real h = 1.e-3; set: string s = \"x\";\n" + decks.body(step="h"))
+    described = json.loads(mbcosim("describe", str(deck), "-D", "h=0.25", "-D", "s=5m", "--json").stdout)
+    assert described["time_step"] == 0.25
+    symbols = {s["name"]: s for s in described["symbols"]}
+    assert (symbols["h"]["declared"], symbols["h"]["given"], symbols["s"]["value"]) == (0.25, True, "5m")
+    assert mbcosim("run", str(deck), "-D", "h=0.25", "-o", str(tmp_path / "out"), "-q").returncode == 0
+    assert len((tmp_path / "out.mov").read_text().splitlines()) == 5
+    wrong = mbcosim("validate", str(deck), "-D", "H=1")
+    assert wrong.returncode == 2 and 'did you mean "h"?' in wrong.stdout
+    assert mbcosim("validate", str(deck), "-D", "h").returncode == 4
+    assert mbcosim("validate", str(deck), "-D", "h=1", "-D", "h=2").returncode == 4
+
+
 def test_help_and_version():
     assert mbcosim("--version").stdout.startswith("mbcosim ")
     assert "Exit codes" in mbcosim("--help").stdout
