@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "elements/drawing.h"
+#include "simulation/geometry_view.h"
 #include "simulation/units.h"
 
 namespace mbcosim {
@@ -10,13 +12,6 @@ namespace {
 
 constexpr const char* kScalarName[] = {"abstract", "electric", "hydraulic", "thermal", "parameter"};
 constexpr const char* kScalarUnit[] = {"", "V", "Pa", "K", ""};
-
-/// "joint.7", "body.2", "hydraulic.3": family and label without blanks.
-std::string element_prefix(const ElementInfo& info) {
-  std::string family = family_name(info.family);
-  std::replace(family.begin(), family.end(), ' ', '_');
-  return family + "." + std::to_string(info.label);
-}
 
 Error not_writable(const Variable& v) {
   Error e;
@@ -181,7 +176,7 @@ void Variables::add_scalar(const Model& model, int node) {
 
 void Variables::add_element(const Model& model, int element) {
   const ElementRef& e = model.elements[element];
-  const std::string prefix = element_prefix(e.set->info(e.index)) + ".",
+  const std::string prefix = variable_prefix(e.set->info(e.index)) + ".",
                     owner = model.element_text(e);
   for (const std::string& name : e.set->private_data(e.index)) {
     const int datum = e.set->private_datum(e.index, name);
@@ -195,6 +190,19 @@ void Variables::add_element(const Model& model, int element) {
            "private datum " + name,
            owner},
           {Source::element_datum, element, datum});
+  }
+  const std::vector<std::string> arrows = all_drawings().arrow_names(e);
+  for (std::size_t k = 0; k < arrows.size(); ++k) {
+    const bool moment = arrows[k] == "M";
+    add({prefix + arrows[k],
+         3,
+         {3},
+         moment ? "N m" : "N",
+         "global",
+         Causality::output,
+         moment ? "moment" : "force",
+         owner},
+        {Source::element_arrow, element, static_cast<int>(k)});
   }
 }
 
@@ -255,6 +263,8 @@ void Variables::get(const EvalContext& context, int handle, std::vector<double>&
       const ElementRef& element = model.elements[e.index];
       return out.push_back(element.set->private_value(context, element.index, e.datum));
     }
+    case Source::element_arrow:
+      return put(all_drawings().arrow(model.elements[e.index], context, e.datum));
     case Source::stream: {
       const StreamInput& stream = model.stream_inputs[e.index];
       const double* values = &state.memory[stream.memory];

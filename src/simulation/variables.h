@@ -40,6 +40,7 @@ class Variables {
     scalar_rate,
     parameter,
     element_datum,
+    element_arrow,
     drive,
     stream,
     port_loads,

@@ -1,1 +1,1 @@
-set(SOURCES electric.cpp read_electric.cpp)
+set(SOURCES draw_electric.cpp electric.cpp read_electric.cpp)

@@ -1,1 +1,1 @@
-set(SOURCES abstract_force.cpp read_forces.cpp structural_force.cpp)
+set(SOURCES abstract_force.cpp draw_forces.cpp read_forces.cpp structural_force.cpp)

@@ -1,4 +1,5 @@
 set(SOURCES
+  draw_modal.cpp
   fem_binary.cpp
   fem_data.cpp
   fem_text.cpp
