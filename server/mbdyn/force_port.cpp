@@ -47,6 +47,7 @@ ForcePort::ForcePort(const DeckChannel& channel, const Simulation& simulation) {
   input_ = simulation.find_variable(port_input_name(element.port()));
   if (channel.content == DeckChannel::Content::modal) {
     make_modal(element.port(), simulation);
+    form_.count = static_cast<std::uint32_t>(channel.modes);
     return;
   }
   make_points(*element.element->points(), simulation, channel);
@@ -78,7 +79,6 @@ void ForcePort::make_points(const StructuralPort& port, const Simulation& simula
 void ForcePort::make_modal(const ElementPort& port, const Simulation& simulation) {
   form_.kind = ForceForm::Kind::modal;
   form_.modes = static_cast<int>(port.mode_numbers.size());
-  form_.count = static_cast<std::uint32_t>(form_.modes);
   form_.reference = !port.nodes.empty();
   if (form_.reference) reference_.emplace(simulation, port.nodes, std::vector<Vec3>{Vec3::Zero()});
   if (port.output_size > 0) output_ = simulation.find_variable(port_output_name(port));

@@ -71,6 +71,7 @@ struct DeckChannel : StepListener {
   bool labels = false, sorted = true, accelerations = false;
   bool rotations = true;  ///< `orientation, none`: neither rotations nor moments
   bool rotate_reference_loads = true;
+  int modes = 0;  ///< modal: of the joint, whether they travel or not
   // streams
   int every = 1;         ///< steps between two messages
   bool at_start = true;  ///< `send first`, `receive first`

@@ -3,6 +3,7 @@
 Expected bytes and numbers were recorded from runs of MBDyn with peers of the same behaviour; decks stand below.
 """
 import os
+import shutil
 import socket
 import struct
 import subprocess
@@ -356,6 +357,43 @@ def test_mapping(run, tmp_path):
     assert np.frombuffer(messages[0][1])[:6] == pytest.approx([1.5, 0.5, 2.25, 1, 2, 3])
     assert done.last(1)[2] == pytest.approx([0.12, 0.2, 0.38], abs=1e-6)
     assert done.last(2)[2] == pytest.approx([0.02, 0, 0], abs=1e-6)
+
+
+# ------------------------------------------------------------------ modal
+
+def test_rigid_motion_of_a_modal_element(run):
+    done = run(deck('force: 5, external modal, socket, create, yes, path, "s", reference node, 1;'))
+    peer = done.connect()
+    shake(peer, 0x5, 0)
+    messages = talk(peer, 144, lambda _: b"\6" + np.array([0, 0, 4.0, 0, 0, 0]).tobytes())
+    assert [command for command, _ in messages] == [6, 6, 6]
+    numbers = np.frombuffer(messages[0][1])
+    assert numbers[:3] == pytest.approx([1, 2, 3]) and numbers[3:6] == pytest.approx([0.936293, 0.312992, -0.159345], abs=1e-6)
+    assert numbers[12:] == pytest.approx([0.1, 0.2, 0.3, 0, 0, 1])
+    assert done.finish() == 0, done.errors
+    assert done.last(1)[2][2] == pytest.approx(0.38, abs=1e-6)
+
+
+MODES = 2
+
+
+@pytest.mark.parametrize("options,flags,sent,taken", [("", 0x5, 144 + 16 * MODES, 48 + 8 * MODES), ("type, modal,", 0x1, 16 * MODES, 8 * MODES),
+                                                      ("type, rigid,", 0x5, 144, 48)])
+def test_modes_of_a_modal_joint(run, tmp_path, options, flags, sent, taken):
+    models = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "client_examples", "models")
+    for name in ("modal_body_static.fem", "modal_body_dynamic.fem"):
+        shutil.copy(os.path.join(models, name), tmp_path)
+    with open(os.path.join(models, "modal_body.mbd")) as file:
+        text = file.read()
+    text = text.replace("forces: 2;", "forces: 3;")
+    card = f'    force: 5, external modal, socket, create, yes, path, "s", STATIC, {options}'.rstrip(", ")
+    assert text.count("end: elements;") == 1 and "forces: 3;" in text
+    done = run(text.replace("end: elements;", card + ";\nend: elements;"))
+    peer = done.connect()
+    shake(peer, flags, MODES)
+    messages = talk(peer, sent, lambda k: b"\6" + bytes(taken) if k < 5 else b"\5")
+    assert len(messages) == 5
+    assert done.finish() == 5
 
 
 # ------------------------------------------------------------------ streams

@@ -187,15 +187,17 @@ void read_external_modal(Card& card, ElementInfo& info) {
       card.fail("external modal: this type needs a modal node; the joint is clamped");
     if (type != 0 && !joints) card.fail("external modal: this type needs a modal joint");
   }
-  keep_channel(card, std::move(channel));
   ElementPort port;
   if (joints) {
+    channel.modes = static_cast<int>(
+        modal_port(card.model(), *joints, joint, false, true).mode_numbers.size());
     port = modal_port(card.model(), *joints, joint, type != 1, type != 0);
   } else {
     port.kind = ElementPort::Kind::modal;
     port.nodes = {node};
     port.input_size = 6;
   }
+  keep_channel(card, std::move(channel));
   port.name = name;
   port.coupling = coupling;
   port.memory = card.builder().allocate_memory(port.input_size);
