@@ -47,6 +47,8 @@ void add_programs(CLI::App& app, int& exit_code) {
     });
   };
   add("fmu", "Make an FMU of a deck, for co-simulation in other tools");
+  add("peer",
+      "Let an FMU, or a code that speaks MBDyn's protocol, take part in a daemon's simulation");
   add("replay", "Run a model against a record of its ports, or a recorded server against a client");
 }
 

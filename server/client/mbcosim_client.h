@@ -146,6 +146,15 @@ struct PeerOptions {
   StepEnded step_ended = {};  ///< called by the thread that reads: `next`, or the peer's own
 };
 
+/// What crosses a port, as the server said at the handshake.
+struct PortLayout {
+  bool modal = false;
+  std::vector<int> node_labels;              ///< of the points, or the modal node
+  int reference_node = 0;                    ///< label; 0: none
+  std::vector<std::string> outputs, inputs;  ///< variables of a signal or modal port
+  std::vector<int> mode_numbers;             ///< of a modal port
+};
+
 /// An attached peer. Ends when it is destroyed.
 class Peer {
  public:
@@ -161,6 +170,9 @@ class Peer {
   /// The peer cannot compute; the step fails with this text.
   void fail(const std::string& why);
   std::int64_t exchanges() const;
+  const PortLayout& layout() const;
+  /// Ends a `next` that waits, from any thread; the peer can only be closed then.
+  void interrupt();
   void close();
 
  private:

@@ -153,6 +153,17 @@ void put(const Loads& loads, v1::PeerExchange* out) {
   out->set_unfinished(loads.unfinished);
 }
 
+PortLayout to_layout(const v1::PortLayout& from) {
+  PortLayout layout;
+  layout.modal = from.kind() == v1::PORT_KIND_MODAL;
+  layout.node_labels.assign(from.node_labels().begin(), from.node_labels().end());
+  layout.reference_node = from.reference_node_label();
+  layout.outputs.assign(from.output_names().begin(), from.output_names().end());
+  layout.inputs.assign(from.input_names().begin(), from.input_names().end());
+  layout.mode_numbers.assign(from.mode_numbers().begin(), from.mode_numbers().end());
+  return layout;
+}
+
 }  // namespace
 
 v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& port,
@@ -196,6 +207,7 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
   *first.mutable_hello() = hello;
   if (impl->wire->write(first) && impl->wire->read(&impl->in)) {
     impl->tangent = options.tangent;
+    impl->layout = to_layout(impl->in.welcome().layout());
     impl->start_heart(options);
     return impl;
   }
@@ -304,6 +316,8 @@ bool Peer::next(Motion& motion) { return impl_->next(motion); }
 void Peer::answer(const Loads& loads) { impl_->answer(loads); }
 void Peer::fail(const std::string& why) { impl_->fail(why); }
 std::int64_t Peer::exchanges() const { return impl_->exchanges; }
+const PortLayout& Peer::layout() const { return impl_->layout; }
+void Peer::interrupt() { impl_->wire->cancel(); }
 void Peer::close() { impl_->close(); }
 
 }  // namespace mbcosim::client

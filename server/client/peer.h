@@ -33,6 +33,7 @@ struct Peer::Impl {
   std::mutex write_mutex;  ///< the heart writes, too
   Tangent tangent = Tangent::none;
   StepEnded step_ended;
+  PortLayout layout;
   v1::ServerMessage in;
   v1::PeerMessage out;
   std::thread thread, heart;

@@ -30,6 +30,7 @@ ARROWS = {
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
     "server/fmi": {"math", "model", "solver", "input", "simulation"},
     "server/mbdyn": {"math", "model", "elements", "simulation"},
+    "server/peer": {"math", "model", "simulation", "client", "mbdyn", "fmi"},
     "server/cli": {"mbdyn", "math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/wire": {"model", "simulation", "mbcosim"},
     "server/coupling": {"math", "model", "simulation", "wire", "mbcosim"},

@@ -1,0 +1,53 @@
+/// An FMU as a peer of a signal port.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "client/mbcosim_client.h"
+#include "peer/controller.h"
+
+namespace mbcosim::peer {
+
+/// Signals of a port, one for each number: a variable of several numbers is "name[1]", "name[2]", …
+struct PortSignals {
+  std::vector<std::string> outputs;  ///< that the simulation sends
+  std::vector<std::string> inputs;   ///< that it takes
+};
+
+/// Which variable of the FMU goes with each signal.
+struct SignalMap {
+  std::vector<std::uint32_t> inputs;   ///< of the FMU, that are set
+  std::vector<int> sources;            ///< their places among the signals sent
+  std::vector<std::uint32_t> outputs;  ///< of the FMU, in the order of the signals taken
+};
+
+/// By equal names, or as `map` says (name in the FMU -> name of the signal). Throws
+/// std::runtime_error when a name is unknown, or a signal that the simulation takes has no source.
+SignalMap map_signals(const FmuArchive& archive, const PortSignals& signals,
+                      const std::map<std::string, std::string>& map);
+
+/// Advances the FMU with the simulation: at each exchange inputs are set and the FMU steps to the
+/// time for which an answer is wanted. A step that is asked for again starts from the state before
+/// it.
+class FmuPeer {
+ public:
+  /// `time`: of the simulation now [s]; the FMU starts there.
+  FmuPeer(Controller& controller, SignalMap map, bool keeps_states, double time);
+  std::vector<double> exchange(const client::Motion& motion);
+  /// An implicit step ended: accepted, or to be redone.
+  void step_ended(bool accepted);
+
+ private:
+  void begin_step();
+  void go_back();
+
+  Controller& controller_;
+  const SignalMap map_;
+  const bool keeps_states_;
+  bool in_step_ = false;  ///< the state before the present step is kept
+  double time_, before_;  ///< of the FMU, and of its state before the step [s]
+};
+
+}  // namespace mbcosim::peer

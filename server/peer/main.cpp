@@ -1,0 +1,126 @@
+/// mbcosim-peer: `mbcosim peer` hands over to it.
+#include <unistd.h>
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+
+#include "mbdyn/link.h"
+#include "peer/options.h"
+
+namespace mbcosim::peer {
+namespace {
+
+constexpr int kDone = 0, kRefused = 4, kPeerLost = 5;
+
+/// Where a daemon of this user listens by default.
+std::string default_server() {
+  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime && *runtime)
+    return std::string("unix:") + runtime + "/mbcosim.sock";
+  return "unix:/tmp/mbcosim-" + std::to_string(::getuid()) + "/mbcosim.sock";
+}
+
+void add_call(CLI::App& app, PeerCall& call) {
+  call.server = default_server();
+  app.add_option("--simulation", call.simulation, "Name of the simulation")->required();
+  app.add_option("--port", call.port, "Name of its port")->required();
+  app.add_option("--server", call.server, "Address of the daemon")->capture_default_str();
+  app.add_option("--token-file", call.token_file, "File with a bearer token");
+  app.add_option("--server-ca", call.server_ca,
+                 "Certificate of the authority of the daemon: the connection uses TLS");
+  app.add_option("--mode", call.mode, "When to exchange; default: as the port says")
+      ->check(CLI::IsMember({"loose", "staggered", "tight", "window"}));
+  app.add_option("--peer-timeout", call.timeout, "Longest wait [s]")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e6));
+}
+
+/// "unix:PATH" or "HOST:PORT"
+ChannelAddress address_of(const std::string& text, bool create) {
+  ChannelAddress address;
+  address.create = create;
+  if (text.rfind("unix:", 0) == 0) {
+    address.kind = ChannelAddress::Kind::local;
+    address.path = text.substr(5);
+    return address;
+  }
+  const std::size_t colon = text.rfind(':');
+  char* end = nullptr;
+  const std::string port = colon == std::string::npos ? "" : text.substr(colon + 1);
+  const long number = std::strtol(port.c_str(), &end, 10);
+  if (port.empty() || *end != 0 || number < 1 || number > 65535)
+    throw std::runtime_error("an address is unix:PATH or HOST:PORT, got \"" + text + "\"");
+  address.kind = ChannelAddress::Kind::tcp;
+  address.host = text.substr(0, colon);
+  address.port = static_cast<int>(number);
+  return address;
+}
+
+void add_socket(CLI::App& app, SocketCall& socket, std::string& listen, std::string& connect) {
+  std::string& protocol = socket.protocol;
+  app.add_option("--protocol", protocol, "mbdyn: that of MBDyn's external forces")
+      ->required()
+      ->check(CLI::IsMember({"mbdyn"}));
+  auto* listens = app.add_option("--listen", listen, "unix:PATH or HOST:PORT for the code");
+  app.add_option("--connect", connect, "unix:PATH or HOST:PORT where the code listens")
+      ->excludes(listens);
+  app.add_option("--orientation", socket.rotation, "Form of rotations")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"none", "vector", "matrix", "euler123"}));
+  app.add_flag("--labels", socket.labels, "Labels of nodes travel, too");
+  app.add_flag("--accelerations", socket.accelerations, "Accelerations travel, too");
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Takes part in a simulation of a daemon.", "mbcosim peer"};
+  app.require_subcommand(1);
+  PeerCall call;
+  FmuCall fmu;
+  std::vector<std::string> pairs;
+  CLI::App* fmu_app = app.add_subcommand("fmu", "An FMU is the peer of a signal port");
+  fmu_app->add_option("file", fmu.file, "The FMU, of FMI 2.0 or 3.0 for co-simulation")->required();
+  fmu_app->add_option("--map", pairs, "NAME=SIGNAL: an input or output of the FMU and its signal");
+  add_call(*fmu_app, call);
+  SocketCall socket;
+  std::string listen, connect;
+  CLI::App* socket_app =
+      app.add_subcommand("socket", "A code that speaks another protocol is the peer");
+  add_socket(*socket_app, socket, listen, connect);
+  add_call(*socket_app, call);
+  app.footer("Exit codes: 0 the simulation is gone, 4 refused, 5 the code is missing or lost.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kDone : kRefused;
+  }
+  if (fmu_app->parsed()) {
+    for (const std::string& pair : pairs) {
+      const std::size_t equals = pair.find('=');
+      if (equals == std::string::npos)
+        throw std::runtime_error("--map takes NAME=SIGNAL, got \"" + pair + "\"");
+      fmu.map[pair.substr(0, equals)] = pair.substr(equals + 1);
+    }
+    serve_fmu(call, fmu);
+    return kDone;
+  }
+  if (listen.empty() == connect.empty())
+    throw std::runtime_error("give either --listen or --connect");
+  socket.address = address_of(listen.empty() ? connect : listen, !listen.empty());
+  serve_socket(call, socket);
+  return kDone;
+}
+
+}  // namespace
+}  // namespace mbcosim::peer
+
+int main(int argc, char** argv) {
+  using namespace mbcosim::peer;
+  try {
+    return run(argc, argv);
+  } catch (const mbcosim::mbdyn::ChannelLost& lost) {
+    std::fprintf(stderr, "mbcosim peer: %s\n", lost.what());
+    return kPeerLost;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "mbcosim peer: %s\n", error.what());
+    return kRefused;
+  }
+}

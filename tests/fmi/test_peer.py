@@ -1,0 +1,216 @@
+"""`mbcosim peer`: FMUs and codes that speak MBDyn's protocol as peers of a daemon's simulation."""
+import os
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+import zipfile
+
+import numpy as np
+import pytest
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, os.path.join(HERE, "..", "service"))
+from conftest import BIN, MODELS, TIME_FACTOR, start_daemon  # noqa: E402,F401
+
+import mbcosim  # noqa: E402
+
+CART = os.path.join(MODELS, "pendulum_cart.mbd")
+SENT = "node.structural.1.XP"
+DESCRIPTION = {
+    2: """<fmiModelDescription fmiVersion="2.0" modelName="c" guid="{{1}}"><CoSimulation modelIdentifier="c" canGetAndSetFMUstate="{state}"/>
+<ModelVariables><ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
+<ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable></ModelVariables><ModelStructure/></fmiModelDescription>""",
+    3: """<fmiModelDescription fmiVersion="3.0" modelName="c" instantiationToken="{{1}}"><CoSimulation modelIdentifier="c" canGetAndSetFMUState="{state}"/>
+<ModelVariables><Float64 name="u" valueReference="0" causality="input" start="0"/><Float64 name="y" valueReference="1" causality="output"/>
+</ModelVariables><ModelStructure/></fmiModelDescription>"""}
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    """fmus(version, state): path of the small FMU."""
+    folder, compiler = tmp_path_factory.mktemp("fmus"), shutil.which("cc") or shutil.which("gcc")
+
+    def make(version, state="true"):
+        path = folder / f"c{version}{state}.fmu"
+        if not path.exists():
+            library = str(folder / f"c{version}.so")
+            subprocess.run([compiler, "-shared", "-fPIC", "-O1", f"-DFMI={version}", os.path.join(HERE, "controller.c"), "-o", library],
+                           check=True)
+            with zipfile.ZipFile(path, "w") as archive:
+                archive.writestr("modelDescription.xml", DESCRIPTION[version].format(state=state))
+                archive.write(library, "binaries/" + ("linux64" if version == 2 else "x86_64-linux") + "/c.so")
+        return str(path)
+
+    return make
+
+
+class PeerProgram:
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen([os.path.join(BIN, "mbcosim"), "peer", *arguments], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True)
+
+    def first_line(self):
+        return self.process.stdout.readline()
+
+    def finish(self):
+        _, self.errors = self.process.communicate(timeout=60 * TIME_FACTOR)
+        return self.process.returncode
+
+
+@pytest.fixture
+def program():
+    programs = []
+
+    def start(*arguments):
+        programs.append(PeerProgram(*arguments))
+        return programs[-1]
+
+    yield start
+    for each in programs:
+        if each.process.poll() is None:
+            each.process.kill()
+            each.process.communicate()
+
+
+def signal_port():
+    return mbcosim.signal_port("control", outputs=[SENT], inputs=["stream.force"])
+
+
+def run_fmu(daemon, program, path, mode, steps=20):
+    with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
+        peer = program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode, "--map",
+                       f"u={SENT}[1]", "--map", "y=stream.force")
+        assert "attached to port" in peer.first_line(), peer.finish() or peer.errors
+        values = []
+        for _ in range(steps):
+            result = cart.step(1, outputs=[SENT, "stream.force"])
+            assert result.outcome == "ACCEPTED", result
+            values.append((result.time, result.values[SENT][0], float(np.atleast_1d(result.values["stream.force"])[0])))
+    assert peer.finish() == 0, peer.errors
+    return values
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_loose_fmu_integrates_what_it_was_sent(start_daemon, program, fmus, version):  # noqa: F811
+    values = run_fmu(start_daemon(), program, fmus(version), "loose")
+    for (t0, v0, f0), (t1, _, f1) in zip(values, values[1:]):
+        assert f1 - f0 == pytest.approx((t1 - t0) * v0, rel=1e-6, abs=1e-15)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("mode", ["tight", "window"])
+def test_implicit_fmus_go_back_within_a_step(start_daemon, program, fmus, version, mode):  # noqa: F811
+    """The force at the end of each step belongs to the speed at its end: backward Euler, whatever the number of passes."""
+    values = run_fmu(start_daemon(), program, fmus(version), mode)
+    for (t0, _, f0), (t1, v1, f1) in zip(values, values[1:]):
+        assert f1 - f0 == pytest.approx((t1 - t0) * v1, rel=1e-4, abs=1e-12)
+
+
+def refused(daemon, program, *arguments):
+    with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
+        peer = program(*arguments, "--server", daemon.address, "--simulation", cart.name, "--port", "control")
+        assert peer.finish() == 4
+        return peer.errors
+
+
+def test_what_does_not_fit_is_refused(start_daemon, program, fmus, tmp_path):  # noqa: F811
+    daemon = start_daemon()
+    assert "explicit modes only" in refused(daemon, program, "fmu", fmus(3, "false"), "--mode", "tight", "--map", "y=stream.force")
+    assert 'gives nothing for the signal "stream.force"' in refused(daemon, program, "fmu", fmus(3))
+    assert 'has no real input or output "z"' in refused(daemon, program, "fmu", fmus(3), "--map", "z=stream.force")
+    assert "no such file" in refused(daemon, program, "fmu", "nothing.fmu")
+    (tmp_path / "x.fmu").write_text("no archive")
+    assert "no zip archive" in refused(daemon, program, "fmu", str(tmp_path / "x.fmu"))
+    with zipfile.ZipFile(tmp_path / "y.fmu", "w") as archive:
+        archive.writestr("../outside", "")
+    assert "leads out of it" in refused(daemon, program, "fmu", str(tmp_path / "y.fmu"))
+    assert not (tmp_path / "outside").exists()
+
+
+def test_an_fmu_that_discards_a_step_fails_it(start_daemon, program, fmus):  # noqa: F811
+    daemon = start_daemon()
+    with daemon.connect() as server, server.load(CART, ports=[mbcosim.signal_port("control", outputs=["node.structural.1.load"],
+                                                                                  inputs=["stream.force"])]) as cart:
+        peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", "loose",
+                       "--map", "u=node.structural.1.load[3]", "--map", "y=stream.force")
+        assert "attached" in peer.first_line()
+        assert cart.step(1).outcome == "ACCEPTED"
+        cart["node.structural.1.load"] = [0, 0, 2e6, 0, 0, 0]
+        with pytest.raises(mbcosim.errors.StepFailed, match="the FMU discards the step"):
+            cart.step(1)
+    assert peer.finish() == 0
+
+
+# ------------------------------------------------------------------ MBDyn's protocol
+
+def receive(peer, size):
+    data = b""
+    while len(data) < size:
+        more = peer.recv(size - len(data))
+        assert more, "closed"
+        data += more
+    return data
+
+
+def connect(path):
+    end = time.monotonic() + 20 * TIME_FACTOR
+    while True:
+        peer = socket.socket(socket.AF_UNIX)
+        try:
+            peer.connect(path)
+            peer.settimeout(20 * TIME_FACTOR)
+            return peer
+        except OSError:
+            peer.close()
+            assert time.monotonic() < end
+            time.sleep(0.02)
+
+
+@pytest.mark.parametrize("mode", ["loose", "tight"])
+def test_a_code_of_mbdyn_couples_with_a_daemon(start_daemon, program, tmp_path, mode):  # noqa: F811
+    """A constant load through the gateway acts as the same load written by the client."""
+    daemon, path = start_daemon(), str(tmp_path / "s")
+    load = np.array([0, 3.0, 0]).tobytes() + bytes(24)
+    ports = [mbcosim.structural_port("tip", nodes=[2])]
+    deck = os.path.join(MODELS, "pendulum.mbd")
+    with daemon.connect() as server, server.load(deck, ports=ports) as pendulum, server.load(deck) as alone:
+        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", mode, "--server", daemon.address,
+                          "--simulation", pendulum.name, "--port", "tip")
+        code = connect(path)
+        code.sendall(b"\7" + struct.pack("<II", 0x202, 1))
+        assert receive(code, 1) == b"\10"
+        alone["node.structural.2.load"] = [0, 3.0, 0, 0, 0, 0]
+        results = []
+        stepping = threading.Thread(target=lambda: results.append(pendulum.step(5, outputs=["node.structural.2.X"])))
+        stepping.start()
+        steps = 0
+        while steps < 5:
+            command = receive(code, 1)
+            assert command == (b"\6" if mode == "loose" else b"\2")
+            receive(code, 144)
+            code.sendall(b"\6" + load)
+            steps += 1
+        stepping.join()
+        expected = alone.step(5, outputs=["node.structural.2.X"]).values["node.structural.2.X"]
+        assert results[0].values["node.structural.2.X"] == pytest.approx(expected, abs=1e-12)
+    assert receive(code, 1) == b"\5"
+    assert gateway.finish() == 0
+
+
+def test_a_silent_code_fails_the_step_and_is_named(start_daemon, program, tmp_path):  # noqa: F811
+    daemon, path = start_daemon(), str(tmp_path / "s")
+    with daemon.connect() as server, server.load(os.path.join(MODELS, "pendulum.mbd"),
+                                                 ports=[mbcosim.structural_port("tip", nodes=[2])]) as pendulum:
+        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--peer-timeout", "1", "--server", daemon.address,
+                          "--simulation", pendulum.name, "--port", "tip")
+        code = connect(path)
+        code.sendall(b"\7" + struct.pack("<II", 0x202, 1))
+        assert receive(code, 1) == b"\10"
+        with pytest.raises(mbcosim.errors.StepFailed, match="silent for 1 s"):
+            pendulum.step(1)
+        assert gateway.finish() == 5
+        assert "silent for 1 s" in gateway.errors
