@@ -237,10 +237,6 @@ void DeckReader::check_initial_value() {
     deck_.reading.report(
         deck_.reading.diagnostic(Severity::error, "initial-value", where, message));
   };
-  if (s.method.method == Method::hope && s.strategy != StepStrategy::no_change)
-    deck_.reading.report(deck_.reading.diagnostic(
-        Severity::warning, "initial-value", deck_.strategy_where,
-        "method hope supposes equal steps: it loses its order when they vary", "use `method: ms`"));
   if (s.strategy == StepStrategy::factor) {
     if (s.max_iterations_factor == 0) s.max_iterations_factor = s.max_iterations;
     if (s.max_iterations_factor <= s.min_iterations)

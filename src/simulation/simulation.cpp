@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <utility>
 
 #include "output/result_writer.h"
 #include "simulation/linearize.h"
@@ -79,13 +80,28 @@ struct Simulation::Impl {
     return !(state.time < final_time - margin);
   }
 
+  bool is_finished() const {
+    return model->initial_value.abort_after != InitialValueSettings::AbortAfter::never || at_end();
+  }
+
   Status start();
   void tell(StartEvent event) const {
     if (start_observer) start_observer(event);
   }
   /// The deck's eigenanalyses with times in (after, until].
   Status analyse_modes(double after, double until);
-  StepReport step(const CancelToken* cancel);
+  StepReport step(const CancelToken* cancel, const StepChoice& choice = {});
+  /// As many steps as `next` has choices for.
+  template <class Next>
+  StepReport run(const CancelToken* cancel, Next&& next);
+  /// Shortest length that tells the end of a step from its start [s].
+  double shortest() const {
+    constexpr double kRelative = 1e-12;
+    const InitialValueSettings& s = model->initial_value;
+    return kRelative * std::max({std::abs(state.time), std::abs(s.initial_time), s.time_step});
+  }
+  double next_step_size() const;
+  Status check_length(double length) const;
   /// What an accepted step writes: its line and record, and the deck's eigenanalyses.
   Status write(const NewtonReport& newton, double previous_time);
 };
@@ -173,13 +189,46 @@ Status Simulation::Impl::write(const NewtonReport& newton, double previous_time)
   return evaluation_failure(state, e);
 }
 
-StepReport Simulation::Impl::step(const CancelToken* cancel) {
+double Simulation::Impl::next_step_size() const try {
+  if (state.control.empty()) return state.h;  // the deck ends before the first phase
+  return stepper.peek_step_size(state);
+} catch (const EvaluationError&) {
+  return state.h;  // the step itself will say what is wrong
+}
+
+Status Simulation::Impl::check_length(double length) const {
+  const auto bad = [&](const std::string& what) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.9g", length);
+    return make_error(ErrorKind::argument, "BAD_STEP_SIZE",
+                      "a step of " + std::string(text) + " s " + what);
+  };
+  const auto seconds = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.9g s", value);
+    return std::string(text);
+  };
+  if (!(length > 0) || !std::isfinite(length))
+    return bad("is not possible: choose a positive length");
+  if (length < shortest())
+    return bad("is too short: its end could not be told from its start; at least " +
+               seconds(shortest()));
+  if (is_finished()) return ok();
+  constexpr double kRounding = 1e-9;
+  const double left = final_time - state.time;
+  if (length > left * (1 + kRounding) && length != next_step_size())  // the deck's own may do that
+    return bad("goes beyond the final time; at most " + seconds(left));
+  return ok();
+}
+
+StepReport Simulation::Impl::step(const CancelToken* cancel, const StepChoice& choice) {
   StepReport report;
   const double previous_time = state.time;
   const auto begin = std::chrono::steady_clock::now();
   stepper.set_cancelled(cancel);
-  PhaseReport phase = controller.advance(state);
+  PhaseReport phase = controller.advance(state, choice);
   report.flagged = phase.flagged;
+  report.restarted = phase.restarted;
   report.pieces = phase.pieces;
   report.solver_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -247,17 +296,13 @@ const State& Simulation::state() const { return impl_->state; }
 std::int64_t Simulation::step_number() const { return impl_->state.step; }
 double Simulation::time() const { return impl_->state.time; }
 
-double Simulation::next_step_size() const try {
-  if (impl_->state.control.empty()) return impl_->state.h;  // the deck ends before the first phase
-  return impl_->stepper.peek_step_size(impl_->state);
-} catch (const EvaluationError&) {
-  return impl_->state.h;  // the step itself will say what is wrong
-}
+double Simulation::next_step_size() const { return impl_->next_step_size(); }
 
-bool Simulation::finished() const {
-  const InitialValueSettings& s = impl_->model->initial_value;
-  return s.abort_after != InitialValueSettings::AbortAfter::never || impl_->at_end();
-}
+double Simulation::final_time() const { return impl_->final_time; }
+
+double Simulation::largest_step_size() const { return std::max(0.0, final_time() - time()); }
+
+bool Simulation::finished() const { return impl_->is_finished(); }
 
 void Simulation::set_exchange(std::function<bool(int)> exchange) {
   impl_->stepper.set_exchange(std::move(exchange));
@@ -285,14 +330,35 @@ LoadTangent& Simulation::load_tangent(int i) { return impl_->stepper.tangents()-
 
 StepReport Simulation::step(const CancelToken* cancel) { return step_many(1, cancel); }
 
-StepReport Simulation::step_many(std::int64_t count, const CancelToken* cancel) {
+Status Simulation::check(const StepChoice& choice) const {
+  if (choice.length && impl_->model->initial_value.strategy == StepStrategy::factor)
+    return make_error(ErrorKind::argument, "BAD_STEP_SIZE",
+                      "the deck's `strategy: factor` chooses the length of each step");
+  if (choice.event && !(choice.within >= impl_->shortest()))
+    return make_error(ErrorKind::argument, "BAD_TOLERANCE",
+                      "an event cannot be located within " + std::to_string(choice.within) + " s");
+  if (choice.end) return impl_->check_length(*choice.end - time());
+  return choice.length ? impl_->check_length(*choice.length) : ok();
+}
+
+Result<StepReport> Simulation::step(const StepChoice& choice, const CancelToken* cancel) {
+  if (auto status = check(choice); !status) return status.error();
+  bool done = false;
+  return impl_->run(cancel, [&]() -> std::optional<StepChoice> {
+    if (std::exchange(done, true) || finished()) return {};
+    return choice;
+  });
+}
+
+template <class Next>
+StepReport Simulation::Impl::run(const CancelToken* cancel, Next&& next) {
   StepReport total;
-  total.step = step_number();
-  total.time = time();
-  total.step_size = impl_->state.h;
-  if (finished()) total.outcome = StepOutcome::finished;
-  for (std::int64_t k = 0; k < count && !finished(); ++k) {
-    StepReport one = impl_->step(cancel);
+  total.step = state.step;
+  total.time = state.time;
+  total.step_size = state.h;
+  if (is_finished()) total.outcome = StepOutcome::finished;
+  while (const std::optional<StepChoice> choice = next()) {
+    StepReport one = step(cancel, *choice);
     one.steps_done += total.steps_done;
     one.total_iterations += total.total_iterations;
     one.solver_seconds += total.solver_seconds;
@@ -302,22 +368,37 @@ StepReport Simulation::step_many(std::int64_t count, const CancelToken* cancel) 
   return total;
 }
 
+StepReport Simulation::step_many(std::int64_t count, const CancelToken* cancel) {
+  return impl_->run(cancel, [&]() -> std::optional<StepChoice> {
+    if (count-- <= 0 || finished()) return {};
+    return StepChoice{};
+  });
+}
+
 StepReport Simulation::run_until(double end, const CancelToken* cancel) {
-  StepReport total;
-  total.step = step_number();
-  total.time = time();
-  total.step_size = impl_->state.h;
-  if (finished()) total.outcome = StepOutcome::finished;
-  const bool to_the_end = end >= impl_->model->initial_value.final_time;
-  while (!finished() && (to_the_end || time() + 0.5 * impl_->state.h < end)) {
-    StepReport one = impl_->step(cancel);
-    one.steps_done += total.steps_done;
-    one.total_iterations += total.total_iterations;
-    one.solver_seconds += total.solver_seconds;
-    total = std::move(one);
-    if (total.error) break;
-  }
-  return total;
+  const bool to_the_end = end >= final_time();
+  return impl_->run(cancel, [&]() -> std::optional<StepChoice> {
+    if (finished() || (!to_the_end && !(time() + 0.5 * impl_->state.h < end))) return {};
+    return StepChoice{};
+  });
+}
+
+StepReport Simulation::run_exactly_until(double end, const CancelToken* cancel) {
+  return impl_->run(cancel, [&] { return next_towards(end); });
+}
+
+std::optional<StepChoice> Simulation::next_towards(double end, std::optional<double> length) const {
+  constexpr double kRounding = 1e-9;  // of a step: no tiny step is left for the end
+  end = std::min(end, final_time());
+  const double left = end - time();
+  if (finished() || !(left >= impl_->shortest())) return {};
+  StepChoice choice;
+  const double h = length ? *length : next_step_size();
+  if (left <= h * (1 + kRounding))
+    choice.end = end;
+  else
+    choice.length = length;
+  return choice;
 }
 
 const std::vector<Variable>& Simulation::variables() const { return impl_->all_variables().list(); }

@@ -61,6 +61,8 @@ struct StepReport {
   double solution_error = 0;
   std::int64_t total_iterations = 0;
   int pieces = 1;  ///< in which the last step was solved; more than one when StepPolicy::cut had to
+  bool restarted = false;  ///< the last step, of a length that a caller chose, was ten times longer
+                           ///< than the one before: Crank-Nicolson took the place of the method
   bool flagged = false;  ///< the last step did not converge and was accepted by StepPolicy::accept
   double solver_seconds = 0;   ///< wall time inside the solver
   std::optional<Error> error;  ///< set unless accepted or finished
@@ -106,12 +108,21 @@ class Simulation {
   std::int64_t step_number() const;  ///< of the last accepted step; 0 after create
   double time() const;               ///< of the last accepted step [s]
   double next_step_size() const;     ///< [s]; the last one where the deck's drive has no value
+  double largest_step_size() const;  ///< that a caller may choose [s]: to the final time
+  double final_time() const;         ///< [s]; infinite when there is none
   bool finished() const;             ///< the final time is reached
   /// Another final time than the deck's [s]; infinite: none. Drives go on with the deck's.
   void set_final_time(double time);
 
   /// One step. On failure the state is that of the last accepted step and `report.error` says why.
   StepReport step(const CancelToken* cancel = nullptr);
+  /// One step as the caller chooses. ErrorKind::argument when the length is no positive number, too
+  /// short to tell its end from its start or longer than `largest_step_size` without being the
+  /// deck's own, and when the deck's strategy is `factor`, whose lengths follow its own iterations;
+  /// nothing is done then.
+  Result<StepReport> step(const StepChoice& choice, const CancelToken* cancel = nullptr);
+  /// What `step` would refuse.
+  Status check(const StepChoice& choice) const;
   /// For loads that depend on the iterate: `exchange` is called before each residual of a step with
   /// the number of corrections so far. `get` then gives values at the iterate and `set` changes
   /// inputs of this iteration; false: the loads have not settled and the iteration goes on. What it
@@ -138,6 +149,11 @@ class Simulation {
   StepReport step_many(std::int64_t count, const CancelToken* cancel = nullptr);
   /// Steps until `time` (within half a step) or the deck's final time.
   StepReport run_until(double time, const CancelToken* cancel = nullptr);
+  /// Steps until `time` or the deck's final time, to the bit: the last step is shortened.
+  StepReport run_exactly_until(double time, const CancelToken* cancel = nullptr);
+  /// The next step of a run that ends at `time` to the bit, in steps of `length` [s] (the deck's
+  /// when there is none). Nothing when the time is reached.
+  std::optional<StepChoice> next_towards(double time, std::optional<double> length = {}) const;
 
   const std::vector<Variable>& variables() const;
   int find_variable(const std::string& name) const;  ///< handle or -1

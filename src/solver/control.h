@@ -12,9 +12,9 @@ enum Slot {
   kSinceReduction,
   kSinceRaise,
   kLastIterations,
-  kLastChange,
+  kChosenStep,  ///< the last step's length was not the deck's
   kLastChance,
-  kNextStep,
+  kStrategyStep,  ///< after such a step: the length from which the strategy goes on [s]; else 0
   kKeptIterations,
   kKeptCoefficient,
   kKeptAlgebraicCoefficient,
@@ -24,6 +24,12 @@ enum Slot {
   kGridCount,  ///< steps of it so far
   kCount
 };
+
+/// Ends a step at a given time, from which exact times count on.
+inline void jump_to(State& state, double time) {
+  state.time = time;
+  state.control[kGridStep] = 0;
+}
 
 /// Ends a step of length h. Exact: time is start + n h while the length stays, never a sum, so that
 /// it does not drift.

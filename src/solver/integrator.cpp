@@ -49,17 +49,37 @@ StepFormula multistep(double h, double h_previous, double rho, double rho_algebr
   return f;
 }
 
+/// The even formula y = (1 − b) y₁ + b y₂ + c ẏ + b1 ẏ₁ with b = (A − 1)/3, A = 4ρ/(3 + ρ). With
+/// t = 0 at y₁, h at y and −h′ at y₂ it holds for y = t and y = t² when
+///
+///   h  = −b h′ + c + b1,    h²/2 = b h′²/2 + c h
+///
+///   c  = (h/2) (1 − b/α²)           = (h/6) (4 − A + (A − 1)(1 − 1/α²))
+///   b1 = (h/2) (1 + b (2/α + 1/α²)) = (h/2) (A + (A − 1)(1 − α)(1 + 3α)/(3α²))
+///
+/// written so that equal steps (α = 1) give the published coefficients to the last bit.
+struct EvenHope {
+  double a1, a2, c, b1;
+  EvenHope(double h, double h_previous, double rho) {
+    const double A = 4 * rho / (3 + rho), a = h / h_previous, q = a * a;
+    a1 = (4 - A) / 3;
+    a2 = (A - 1) / 3;
+    c = h * (4 - A + (A - 1) * (1 - 1 / q)) / 6;
+    b1 = h * (A + (A - 1) * (1 - a) * (1 + 3 * a) / (3 * q)) / 2;
+  }
+};
+
 StepFormula hope(double h, double h_previous, double rho, double rho_algebraic, bool odd) {
   StepFormula f = crank_nicolson(h);
   if (!odd) {
-    const double d = 4 * rho / (3 + rho), a = 4 * rho_algebraic / (3 + rho_algebraic);
-    f.a1 = (4 - d) / 3;
-    f.a2 = (d - 1) / 3;
-    f.b0 = h * (4 - d) / 6;
-    f.b1 = h * d / 2;
-    f.i0 = h * (4 - a) / 6;
-    f.i1 = h * a / 2;
-    f.j1 = -(a - 1) / 3;
+    const EvenHope d(h, h_previous, rho), a(h, h_previous, rho_algebraic);
+    f.a1 = d.a1;
+    f.a2 = d.a2;
+    f.b0 = d.c;
+    f.b1 = d.b1;
+    f.i0 = a.c;
+    f.i1 = a.b1;
+    f.j1 = -a.a2;
   }
   use_cubic_predictor(f, h, h_previous);
   return f;

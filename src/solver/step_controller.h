@@ -1,6 +1,7 @@
 /// One step, accepted whole or not at all.
 ///
-///   step      one pass; with StepPasses as many as it takes, each from the same start
+///   step      one trial; to locate an event, trials of other lengths, each from the same start
+///   trial     one pass; with StepPasses as many as it takes, each from the same start
 ///   pass      attempts of falling length by the deck's strategy, then by the policy: the whole
 ///             step in pieces, or its last iterate as it is
 ///   attempt   one Newton solution by the system
@@ -25,7 +26,16 @@ struct PhaseReport {
   NewtonReport newton;
   bool flagged = false;        ///< did not converge, the last iterate was accepted
   int pieces = 1;              ///< in which a step was solved
+  bool restarted = false;      ///< by Crank-Nicolson: ten times longer than the step before
   std::optional<Error> error;  ///< set when it failed
+};
+
+/// One try at a step.
+struct StepAttempt {
+  double h = 0;                     ///< length [s]
+  bool chosen = false;              ///< it is not the deck's
+  std::optional<double> end = {};   ///< where the step ends, if not at the sum [s]
+  bool accept_unconverged = false;  ///< it may end at its last iterate, being flagged then
 };
 
 /// What the controller advances.
@@ -34,13 +44,14 @@ class StepSystem {
   virtual ~StepSystem() = default;
   /// Length of the next step by the deck's strategy, whose counters in the state go on.
   virtual double next_step_size(State& state) const = 0;
+  /// The same, without the counters of the strategy going on.
+  virtual double peek_step_size(const State& state) const = 0;
   /// A shorter step after one of length h failed, or 0 when the strategy has none.
   virtual double retry_step_size(State& state, double h) const = 0;
   /// May a step that fails be followed by a shorter one of the strategy?
   virtual bool can_retry() const = 0;
-  /// Solves a step of length h from the accepted `state`. On failure the state is anywhere. With
-  /// `accept_unconverged` it ends at its last iterate, when that is finite, and is flagged.
-  virtual PhaseReport attempt(State& state, double h, bool accept_unconverged) = 0;
+  /// Solves a step from the accepted `state`. On failure the state is anywhere.
+  virtual PhaseReport attempt(State& state, const StepAttempt& attempt) = 0;
   /// Adds to the error of a failed step what the last matrix tells, or, after an iteration that
   /// diverged, that at the accepted `state`. Takes longer than the step.
   virtual void explain(PhaseReport& report, const State& state) = 0;
@@ -63,16 +74,22 @@ class StepController {
   }
 
   /// One step. What a callback throws leaves it, and the state is as it was.
-  PhaseReport advance(State& state);
+  PhaseReport advance(State& state, const StepChoice& choice = {});
 
  private:
-  PhaseReport repeat_until_agreed(State& state);
+  PhaseReport locate(State& state, const StepChoice& choice);
+  /// From `start_`, at which the state stands.
+  PhaseReport try_step(State& state, const StepChoice& choice);
+  PhaseReport repeat_until_agreed(State& state, const StepChoice& choice);
   /// One pass from `start`, at which the state stands; it is back there after a failure.
-  PhaseReport solve(State& state, const State& start);
-  PhaseReport solve_by_policy(State& state, const State& start);
-  PhaseReport solve_by_strategy(State& state, const State& start, double h);
-  PhaseReport solve_in_pieces(State& state, const State& start, double whole, PhaseReport failed);
-  PhaseReport attempt(State& state, const State& start, double h, bool accept_unconverged = false);
+  PhaseReport solve(State& state, const State& start, const StepChoice& choice);
+  StepAttempt first_attempt(State& state, const StepChoice& choice) const;
+  PhaseReport solve_by_policy(State& state, const State& start, StepAttempt whole,
+                              bool by_strategy);
+  PhaseReport solve_by_strategy(State& state, const State& start, StepAttempt next);
+  PhaseReport solve_in_pieces(State& state, const State& start, const StepAttempt& whole,
+                              PhaseReport failed);
+  PhaseReport attempt(State& state, const State& start, const StepAttempt& attempt);
   void end_attempt(bool accepted) const {
     if (attempt_ended_) attempt_ended_(accepted);
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 namespace mbcosim {
 
@@ -20,6 +21,16 @@ struct StepPasses {
   int most = 0;                     ///< 0: steps are solved once
   std::function<void(int)> begin;   ///< pass k = 1, 2, … begins: inputs may be set
   std::function<bool(int)> agrees;  ///< pass k is solved, values are those at its end; true: done
+};
+
+/// What a caller decides of one step. Empty: the deck decides.
+struct StepChoice {
+  std::optional<double> length;  ///< [s]
+  std::optional<double> end;     ///< in the place of `length`: where it ends, to the bit [s]
+  /// A step at whose start this is negative and at whose end it is not is shortened until it ends
+  /// behind the crossing, no more than `within` [s] after it. May be empty.
+  std::function<double()> event;
+  double within = 0;
 };
 
 }  // namespace mbcosim

@@ -71,6 +71,11 @@ bool is_third_order(const MethodSettings& m) {
   return m.method == Method::third_order || m.method == Method::third_order_ad_hoc;
 }
 
+/// The others need no history, and no restart when the step grows.
+bool is_two_step(const MethodSettings& m) {
+  return m.method == Method::multistep || m.method == Method::hope;
+}
+
 }  // namespace
 
 /// Regular steps only ask whether to go on.
@@ -247,7 +252,7 @@ PhaseReport Stepper::run_dummy_steps(State& state, const std::function<void(bool
   for (int k = 0; k < s.dummy_steps; ++k) {
     if (between) between(false);
     const State start = state;
-    report = attempt(state, s.dummy_ratio * s.time_step, method, k == 0, dummy_);
+    report = attempt(state, {s.dummy_ratio * s.time_step}, method, k == 0, dummy_);
     if (report.error) {
       state = start;
       explain(report, state);
@@ -360,23 +365,30 @@ void Stepper::after_convergence(State& state, Phase phase, double c, double ca) 
   for (const auto& set : model_.sets) set->after_convergence(context, state);
 }
 
-PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& method, bool first,
-                             const NewtonSettings& settings, bool accept_unconverged) {
+void Stepper::begin_step(State& state, const StepAttempt& attempt, bool restart) const {
+  std::swap(state.y2, state.y1);
+  std::swap(state.yp2, state.yp1);
+  state.y1 = state.y;
+  state.yp1 = state.yp;
+  if (state.y2.empty()) {
+    state.y2 = state.y1;
+    state.yp2 = state.yp1;
+  }
+  state.h_previous = restart ? attempt.h : state.h;
+  state.h = attempt.h;
+  if (attempt.end)
+    control::jump_to(state, *attempt.end);
+  else
+    control::advance_time(state, attempt.h);
+  ++state.step;
+}
+
+PhaseReport Stepper::attempt(State& state, const StepAttempt& attempt, const MethodSettings& method,
+                             bool first, const NewtonSettings& settings) {
   PhaseReport report;
   try {
-    std::swap(state.y2, state.y1);
-    std::swap(state.yp2, state.yp1);
-    state.y1 = state.y;
-    state.yp1 = state.yp;
-    if (state.y2.empty()) {
-      state.y2 = state.y1;
-      state.yp2 = state.yp1;
-    }
-    state.h_previous = first ? h : state.h;
-    state.h = h;
-    control::advance_time(state, h);
-    ++state.step;
-    const StepFormula f = formula(state, h, method, first);
+    begin_step(state, attempt, first);
+    const StepFormula f = formula(state, attempt.h, method, first);
     for (const auto& listener : model_.step_listeners)
       listener->advance(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, false);
     predict(state, f);
@@ -386,8 +398,8 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
     for (const auto& set : model_.sets) set->after_predict(context, state);
     select_pivots(state);
     report.newton = iterate(state, f, method, first, settings);
-    report.flagged = accept_unconverged && report.newton.outcome == NewtonOutcome::not_converged &&
-                     is_finite(state);
+    report.flagged = attempt.accept_unconverged &&
+                     report.newton.outcome == NewtonOutcome::not_converged && is_finite(state);
     if (report.newton.outcome == NewtonOutcome::converged || report.flagged) {
       after_convergence(state, Phase::step, f.c(), f.c_algebraic());
       return report;
@@ -399,18 +411,25 @@ PhaseReport Stepper::attempt(State& state, double h, const MethodSettings& metho
   return report;
 }
 
-PhaseReport Stepper::attempt(State& state, double h, bool accept_unconverged) {
+PhaseReport Stepper::attempt(State& state, const StepAttempt& attempt) {
+  constexpr double kLongest = 10;  // against the step before: two-step formulas would extrapolate
+  const InitialValueSettings& s = model_.initial_value;
   NewtonSettings settings = regular_;
-  if (h <= 2 * model_.initial_value.min_time_step)
+  if (attempt.h <= 2 * s.min_time_step)
     settings.max_residual = settings.max_residual_differential = 0;
   const bool first = state.control[control::kRegularSteps] == 0;
-  PhaseReport report =
-      attempt(state, h, model_.initial_value.method, first, settings, accept_unconverged);
-  if (!report.error) {
-    state.control[control::kRegularSteps] += 1;
-    state.control[control::kLastIterations] = report.newton.iterations;
-    state.control[control::kLastChance] = 0;
-  }
+  const bool chosen = attempt.chosen || state.control[control::kChosenStep] != 0;
+  const bool restart = !first && chosen && is_two_step(s.method) && attempt.h > kLongest * state.h;
+  const double strategy_length =
+      attempt.chosen && s.strategy != StepStrategy::no_change ? this->strategy_length(state) : 0;
+  PhaseReport report = this->attempt(state, attempt, s.method, first || restart, settings);
+  if (report.error) return report;
+  report.restarted = restart;
+  state.control[control::kRegularSteps] += 1;
+  state.control[control::kLastIterations] = report.newton.iterations;
+  state.control[control::kLastChance] = 0;
+  state.control[control::kChosenStep] = attempt.chosen ? 1 : 0;
+  state.control[control::kStrategyStep] = strategy_length;
   return report;
 }
 
@@ -427,9 +446,15 @@ double Stepper::peek_step_size(const State& state) const {
   return step_size(state, since);
 }
 
+double Stepper::strategy_length(const State& state) const {
+  if (state.control[control::kRegularSteps] == 0) return model_.initial_value.time_step;
+  const double kept = state.control[control::kStrategyStep];
+  return kept > 0 ? kept : state.h;
+}
+
 double Stepper::step_size(const State& state, SinceChange& since) const {
   const InitialValueSettings& s = model_.initial_value;
-  const double h = state.control[control::kRegularSteps] == 0 ? s.time_step : state.h;
+  const double h = strategy_length(state);
   if (s.strategy == StepStrategy::no_change) return s.time_step;  // also after a step in pieces
   if (state.control[control::kRegularSteps] < 2) return h;
   const EvalContext context = model_.context(state, Phase::step);

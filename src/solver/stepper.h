@@ -44,11 +44,10 @@ class Stepper final : public StepSystem {
   PhaseReport run_dummy_steps(State& state, const std::function<void(bool)>& between = {});
 
   double next_step_size(State& state) const override;
-  /// The same, without the counters of the strategy going on.
-  double peek_step_size(const State& state) const;
+  double peek_step_size(const State& state) const override;
   double retry_step_size(State& state, double h) const override;
   bool can_retry() const override;
-  PhaseReport attempt(State& state, double h, bool accept_unconverged) override;
+  PhaseReport attempt(State& state, const StepAttempt& attempt) override;
   void explain(PhaseReport& report, const State& state) override;
 
   Workspace& workspace() { return workspace_; }
@@ -62,10 +61,11 @@ class Stepper final : public StepSystem {
   void select_pivots(const State& state);
   class StepHooks;
   class DerivativesHooks;
-  /// One step of length h by a method; the first one by Crank-Nicolson. On failure the state is
-  /// anywhere.
-  PhaseReport attempt(State& state, double h, const MethodSettings& method, bool first,
-                      const NewtonSettings& settings, bool accept_unconverged = false);
+  /// One step by a method; the first one by Crank-Nicolson. On failure the state is anywhere.
+  PhaseReport attempt(State& state, const StepAttempt& attempt, const MethodSettings& method,
+                      bool first, const NewtonSettings& settings);
+  /// Ends the prediction's history at the accepted step and begins one of the attempt's length.
+  void begin_step(State& state, const StepAttempt& attempt, bool restart) const;
   /// Newton on the prediction, by the method of the step.
   NewtonReport iterate(State& state, const StepFormula& f, const MethodSettings& method, bool first,
                        NewtonSettings settings);
@@ -74,6 +74,8 @@ class Stepper final : public StepSystem {
     double reduction, raise;
   };
   double step_size(const State& state, SinceChange& since) const;
+  /// From which the strategy goes on [s].
+  double strategy_length(const State& state) const;
   ThirdOrderFormula third_order(const State& state, const MethodSettings& method) const;
   StepFormula formula(State& state, double h, const MethodSettings& method, bool first) const;
   void predict(State& state, const StepFormula& f) const;

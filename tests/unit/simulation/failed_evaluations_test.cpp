@@ -112,6 +112,7 @@ TEST(FailedEvaluation, OfTheOutputMeterEndsTheRun) {
   const StepReport end = (*simulation)->run_until(1);
   ASSERT_TRUE(end.error);
   EXPECT_EQ(end.error->kind, ErrorKind::evaluation);
+  EXPECT_EQ(end.outcome, StepOutcome::not_written) << "the last step stands";
   EXPECT_EQ(end.steps_done, 3);
   EXPECT_EQ((*simulation)->step_number(), 3);
   EXPECT_EQ(writer->records, 3);

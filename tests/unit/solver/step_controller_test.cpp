@@ -1,6 +1,9 @@
 /// What the step controller accepts, repeats and takes back, on a system that fails as told.
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <utility>
+
 #include "solver/control.h"
 #include "solver/step_controller.h"
 
@@ -15,25 +18,32 @@ class Scripted final : public StepSystem {
   double h = 1, longest = 1e9;
   bool has_strategy = false;
   std::vector<double> attempts;
+  std::vector<bool> chosen;
   int explained = 0;
 
   double next_step_size(State& state) const override {
     state.control[control::kSinceRaise] += 1;
     return h;
   }
+  double peek_step_size(const State&) const override { return h; }
   double retry_step_size(State& state, double failed) const override {
     if (!has_strategy || failed < 0.3) return 0;
     state.control[control::kSinceReduction] = -1;
     return failed / 2;
   }
   bool can_retry() const override { return has_strategy; }
-  PhaseReport attempt(State& state, double length, bool accept) override {
+  PhaseReport attempt(State& state, const StepAttempt& attempt) override {
+    const double length = attempt.h;
     attempts.push_back(length);
+    chosen.push_back(attempt.chosen);
     PhaseReport report;
     report.newton.iterations = 1;
     ++state.step;
-    control::advance_time(state, length);
-    report.flagged = accept && length > longest;
+    if (attempt.end)
+      control::jump_to(state, *attempt.end);
+    else
+      control::advance_time(state, length);
+    report.flagged = attempt.accept_unconverged && length > longest;
     if (length <= longest || report.flagged) {
       state.y[0] += length;
       return report;
@@ -188,6 +198,98 @@ TEST_F(StepControllerTest, GoesBackWhenACallbackThrows) {
     if (accepted) throw 2;  // in the middle of the step
   });
   EXPECT_THROW((void)controller_.advance(state_), int);
+  expect_untouched();
+}
+
+// ------------------------------------------------------------------ lengths of the caller
+
+TEST_F(StepControllerTest, TakesALengthWithoutAskingTheStrategy) {
+  system_.has_strategy = true;
+  StepChoice choice;
+  choice.length = 0.7;
+  EXPECT_FALSE(controller_.advance(state_, choice).error);
+  EXPECT_EQ(state_.y[0], 0.7);
+  EXPECT_THAT(system_.chosen, ElementsAre(true));
+  EXPECT_EQ(state_.control[control::kSinceRaise], 0);
+}
+
+TEST_F(StepControllerTest, TakesTheDecksOwnLengthForTheDecks) {
+  StepChoice choice;
+  choice.length = 1;
+  EXPECT_FALSE(controller_.advance(state_, choice).error);
+  EXPECT_THAT(system_.chosen, ElementsAre(false));
+}
+
+TEST_F(StepControllerTest, TriesNoOtherLengthThanTheCallers) {
+  system_.has_strategy = true;
+  system_.longest = 0.3;
+  StepChoice choice;
+  choice.length = 0.7;
+  EXPECT_TRUE(controller_.advance(state_, choice).error);
+  EXPECT_THAT(system_.attempts, ElementsAre(0.7));
+  expect_untouched();
+}
+
+TEST_F(StepControllerTest, EndsAnExactStepToTheBitInPiecesToo) {
+  controller_.set_policy({StepPolicy::cut, 0});
+  StepChoice choice;
+  for (const double end : {1. / 3, 1.}) {
+    choice.end = end;
+    system_.longest = 0.2;
+    EXPECT_GT(controller_.advance(state_, choice).pieces, 1);
+    EXPECT_EQ(state_.time, end);
+  }
+  EXPECT_NEAR(state_.y[0], 1, 1e-15);
+}
+
+TEST_F(StepControllerTest, ShortensAStepUntilItsEventIsJustBehind) {
+  StepChoice choice;
+  choice.event = [&] { return state_.y[0] * state_.y[0] - 0.1; };
+  choice.within = 1e-10;
+  const PhaseReport report = controller_.advance(state_, choice);
+  EXPECT_FALSE(report.error);
+  EXPECT_GE(state_.y[0], std::sqrt(0.1));
+  EXPECT_LE(state_.y[0], std::sqrt(0.1) + 1e-10);
+  EXPECT_EQ(system_.attempts.back(), state_.y[0]) << "what is accepted was solved last";
+  EXPECT_EQ(ended_.size(), system_.attempts.size() - 1);
+  EXPECT_THAT(ended_, testing::Each(false));
+  EXPECT_LE(system_.attempts.size(), 12u);
+  EXPECT_EQ(state_.step, 1);
+}
+
+TEST_F(StepControllerTest, LocatesWithPassesInEachTrial) {
+  StepPasses passes;
+  passes.most = 3;
+  int first = 0;
+  passes.begin = [&](int pass) { first += pass == 1; };
+  passes.agrees = [](int pass) { return pass == 2; };
+  controller_.set_passes(passes);
+  StepChoice choice;
+  choice.event = [&] { return state_.y[0] - 0.25; };
+  choice.within = 1e-3;
+  EXPECT_FALSE(controller_.advance(state_, choice).error);
+  EXPECT_GE(state_.y[0], .25);
+  EXPECT_LE(state_.y[0], .251);
+  EXPECT_EQ(static_cast<std::size_t>(2 * first), system_.attempts.size());
+}
+
+TEST_F(StepControllerTest, LeavesAnEventThatHasHappened) {
+  StepChoice choice;
+  choice.event = [] { return 0.0; };
+  choice.within = 1e-3;
+  EXPECT_FALSE(controller_.advance(state_, choice).error);
+  EXPECT_EQ(state_.y[0], 1);
+}
+
+TEST_F(StepControllerTest, GoesBackWhenATrialFails) {
+  StepChoice choice;
+  choice.within = 1e-3;
+  bool asked = false;
+  choice.event = [&] {
+    if (std::exchange(asked, true)) system_.longest = 0;  // after the whole step was solved
+    return state_.y[0] - 0.25;
+  };
+  EXPECT_TRUE(controller_.advance(state_, choice).error);
   expect_untouched();
 }
 
