@@ -58,9 +58,27 @@ Outcome to_outcome(v1::StepOutcome outcome) {
       return Outcome::peer_lost;
     case v1::STEP_OUTCOME_LIMIT:
       return Outcome::limit;
+    case v1::STEP_OUTCOME_NOT_WRITTEN:
+      return Outcome::not_written;
+    case v1::STEP_OUTCOME_REJECTED_BY_PEER:
+      return Outcome::rejected_by_peer;
     default:
       return Outcome::accepted;
   }
+}
+
+v1::Comparison to_proto(Condition::Kind kind) {
+  switch (kind) {
+    case Condition::less:
+      return v1::COMPARISON_LESS;
+    case Condition::less_or_equal:
+      return v1::COMPARISON_LESS_OR_EQUAL;
+    case Condition::greater:
+      return v1::COMPARISON_GREATER;
+    case Condition::greater_or_equal:
+      return v1::COMPARISON_GREATER_OR_EQUAL;
+  }
+  return v1::COMPARISON_UNSPECIFIED;
 }
 
 std::shared_ptr<grpc::ChannelCredentials> channel_credentials(const Credentials& credentials) {
@@ -151,6 +169,18 @@ struct Simulation::Impl {
     if (found != variables.end()) return found->second;
     throw Error("the model has no variable \"" + name + "\"", 5, "NO_SUCH_VARIABLE", {});
   }
+  void put(const StepOptions& options, v1::StepRequest& request) const {
+    if (options.step_size) request.set_step_size_s(*options.step_size);
+    request.set_exact(options.exact);
+    if (!options.until) return;
+    const Condition& until = *options.until;
+    v1::Condition& out = *request.mutable_until();
+    out.set_handle(variable(until.variable).handle());
+    out.set_element(until.element);
+    out.set_comparison(to_proto(until.kind));
+    out.set_threshold(until.threshold);
+    if (until.locate_within != 0) out.set_locate_within_s(until.locate_within);
+  }
   StepResult advance(const v1::StepRequest& request) {
     CallContext context(*server);
     v1::StepReply reply;
@@ -163,6 +193,11 @@ struct Simulation::Impl {
     result.iterations = reply.iterations();
     result.solver_seconds = reply.solver_seconds();
     result.peer_wait_seconds = reply.peer_wait_seconds();
+    result.step_size = reply.step_size_s();
+    result.next_step_size = reply.next_step_size_s();
+    result.largest_step_size = reply.largest_step_size_s();
+    result.preferred_step_size = reply.preferred_step_size_s();
+    result.condition_met = reply.condition_met();
     result.failure = reply.failure().message();
     return result;
   }
@@ -216,17 +251,19 @@ Simulation::~Simulation() {
 
 const std::string& Simulation::name() const { return impl_->info.name(); }
 
-StepResult Simulation::step(std::int64_t count) {
+StepResult Simulation::step(std::int64_t count, const StepOptions& options) {
   v1::StepRequest request;
   request.set_simulation(name());
   request.set_steps(count);
+  impl_->put(options, request);
   return impl_->advance(request);
 }
 
-StepResult Simulation::run_until(double time) {
+StepResult Simulation::run_until(double time, const StepOptions& options) {
   v1::StepRequest request;
   request.set_simulation(name());
   request.set_until_time_s(time);
+  impl_->put(options, request);
   return impl_->advance(request);
 }
 

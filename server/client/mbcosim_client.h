@@ -13,6 +13,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -61,7 +62,16 @@ struct LoadOptions {
   std::vector<Port> ports = {};
 };
 
-enum class Outcome { accepted, finished, not_converged, interrupted, peer_lost, limit };
+enum class Outcome {
+  accepted,
+  finished,
+  not_converged,
+  interrupted,
+  peer_lost,
+  limit,
+  not_written,  ///< accepted, but its results could not be written
+  rejected_by_peer
+};
 
 /// What an advance did. A failure is no exception: the simulation stands at its last accepted step.
 struct StepResult {
@@ -71,21 +81,45 @@ struct StepResult {
   double time = 0;        ///< its time [s]
   int iterations = 0;     ///< linear solutions of the last step
   double solver_seconds = 0, peer_wait_seconds = 0;
-  std::string failure;  ///< empty unless the step failed
+  double step_size = 0;            ///< of the last step [s]
+  double next_step_size = 0;       ///< that the deck would take [s]
+  double largest_step_size = 0;    ///< left until the deck's final time [s]
+  double preferred_step_size = 0;  ///< of the peer that rejected the step [s]; 0: it did not say
+  bool condition_met = false;      ///< `StepOptions::until` holds
+  std::string failure;             ///< empty unless the step failed
   bool ok() const { return outcome == Outcome::accepted || outcome == Outcome::finished; }
+};
+
+/// A comparison of one number of a variable with a threshold, in the variable's unit.
+struct Condition {
+  enum Kind { less, less_or_equal, greater, greater_or_equal };
+  std::string variable;
+  Kind kind = greater_or_equal;
+  double threshold = 0;
+  int element = 0;
+  /// The step in which it turns true is shortened until it ends at most so long after that [s]; 0:
+  /// it is found at the end of a step.
+  double locate_within = 0;
+};
+
+struct StepOptions {
+  std::optional<double> step_size = {};  ///< of each step [s]; none: the deck's
+  bool exact = false;  ///< of `run_until`: the last step is shortened, so that it ends there
+  std::optional<Condition> until = {};  ///< ends after the first step for which it holds
 };
 
 /// What a peer gets: n points, global frame unless agreed otherwise, SI units.
 struct Motion {
   std::int64_t step = 0;
-  double time = 0;         ///< of the values [s]
-  double target_time = 0;  ///< for which an answer is wanted [s]
-  int iteration = 0;       ///< of a tight step, or pass of a window, from 1; 0: explicit
-  std::vector<double> x;   ///< positions [m] (3n)
-  std::vector<double> R;   ///< orientations, node frame to the port's: by rows (9n) unless agreed
-                           ///< otherwise
-  std::vector<double> v;   ///< velocities [m/s] (3n)
-  std::vector<double> w;   ///< angular velocities [rad/s] (3n)
+  double time = 0;                ///< of the values [s]
+  double target_time = 0;         ///< for which an answer is wanted [s]
+  bool target_estimated = false;  ///< the step may turn out to have another length
+  int iteration = 0;              ///< of a tight step, or pass of a window, from 1; 0: explicit
+  std::vector<double> x;          ///< positions [m] (3n)
+  std::vector<double> R;  ///< orientations, node frame to the port's: by rows (9n) unless agreed
+                          ///< otherwise
+  std::vector<double> v;  ///< velocities [m/s] (3n)
+  std::vector<double> w;  ///< angular velocities [rad/s] (3n)
   std::vector<double> a, wp;    ///< accelerations [m/s², rad/s²] (3n) when agreed, else empty
   std::vector<double> signals;  ///< of a signal port; of a modal one: amplitudes, then their rates
   std::vector<double> forces, moments;  ///< of a motion port: reactions [N], [N·m] (3n)
@@ -104,6 +138,12 @@ struct Loads {
   bool unfinished = false;  ///< an implicit step must not end with this answer
   /// On the reference node [N], [N·m] (3 each), for ports of a deck that want them.
   std::vector<double> reference_force = {}, reference_moment = {};
+};
+
+/// Thrown by the function of a coupled peer: the step must not be done.
+struct Reject {
+  double preferred_step_size = 0;  ///< that the peer would take [s]; 0: unknown
+  std::string text = {};
 };
 
 enum class Mode { port_default, loose, staggered, tight, window };
@@ -169,6 +209,8 @@ class Peer {
   void answer(const Loads& loads);
   /// The peer cannot compute; the step fails with this text.
   void fail(const std::string& why);
+  /// The step must not be done; it ends with Outcome::rejected_by_peer.
+  void reject(const Reject& rejection);
   std::int64_t exchanges() const;
   const PortLayout& layout() const;
   /// Ends a `next` that waits, from any thread; the peer can only be closed then.
@@ -193,15 +235,15 @@ class Simulation {
   Simulation& operator=(Simulation&&) noexcept;
   ~Simulation();
   const std::string& name() const;  ///< "simulations/4f3a…"
-  StepResult step(std::int64_t count = 1);
-  StepResult run_until(double time);
+  StepResult step(std::int64_t count = 1, const StepOptions& options = {});
+  StepResult run_until(double time, const StepOptions& options = {});
   std::vector<double> read(const std::string& variable) const;
   void write(const std::string& variable, const std::vector<double>& values);
   /// Attaches a peer that asks for exchanges itself: `Peer::next`. It needs a thread other than the
   /// one that steps.
   Peer attach(const std::string& port, const PeerOptions& options = {});
   /// Attaches a peer whose own thread calls `answer` at each exchange; an exception in it fails the
-  /// step.
+  /// step, a Reject rejects it.
   Peer couple(const std::string& port, Answer answer, const PeerOptions& options = {});
 
  private:

@@ -116,6 +116,7 @@ void take(const v1::ServerExchange& in, Motion& motion) {
   motion.step = in.step();
   motion.time = in.time_s();
   motion.target_time = in.target_time_s();
+  motion.target_estimated = in.target_estimated();
   motion.iteration = in.iteration();
   take(in.positions_m(), motion.x);
   take(in.rotations(), motion.R);
@@ -143,6 +144,7 @@ void put_tangent(const Loads& loads, Tangent form, v1::PeerExchange* out) {
 
 void put(const Loads& loads, v1::PeerExchange* out) {
   out->clear_failure();
+  out->clear_reject();
   put(loads.forces, out->mutable_forces_n());
   put(loads.moments, out->mutable_moments_nm());
   put(loads.signals, out->mutable_signals());
@@ -285,12 +287,24 @@ void Peer::Impl::fail(const std::string& why) {
   write(message);
 }
 
+void Peer::Impl::reject(const Reject& rejection) {
+  v1::PeerMessage message;
+  message.mutable_exchange()->set_index(in.exchange().index());
+  v1::Rejection* reject = message.mutable_exchange()->mutable_reject();
+  if (rejection.preferred_step_size != 0)
+    reject->set_preferred_step_size_s(rejection.preferred_step_size);
+  reject->set_text(rejection.text);
+  write(message);
+}
+
 void Peer::Impl::serve(Answer function) {
   thread = std::thread([this, function = std::move(function)] {
     Motion motion;
     while (next(motion)) {
       try {
         answer(function(motion));
+      } catch (const Reject& rejection) {
+        reject(rejection);
       } catch (const std::exception& error) {
         fail(error.what());
       }
@@ -315,6 +329,7 @@ Peer::~Peer() = default;
 bool Peer::next(Motion& motion) { return impl_->next(motion); }
 void Peer::answer(const Loads& loads) { impl_->answer(loads); }
 void Peer::fail(const std::string& why) { impl_->fail(why); }
+void Peer::reject(const Reject& rejection) { impl_->reject(rejection); }
 std::int64_t Peer::exchanges() const { return impl_->exchanges; }
 const PortLayout& Peer::layout() const { return impl_->layout; }
 void Peer::interrupt() { impl_->wire->cancel(); }

@@ -21,6 +21,7 @@ struct Peer::Impl {
   bool next(Motion& motion);
   void answer(const Loads& loads);
   void fail(const std::string& why);
+  void reject(const Reject& rejection);
   void serve(Answer answer);  ///< in a thread of its own
   void start_heart(const PeerOptions& options);
   void stop_heart();

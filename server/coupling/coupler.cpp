@@ -95,6 +95,7 @@ void Coupler::fill(Line& line, const Simulation& simulation, double target_time,
   out->set_step(simulation.step_number());
   out->set_time_s(simulation.time());
   out->set_target_time_s(target_time);
+  line.target_time = target_time;
   out->set_iteration(iteration);
   line.port->model().fill(simulation, line.agreement, out);
 }
@@ -102,7 +103,7 @@ void Coupler::fill(Line& line, const Simulation& simulation, double target_time,
 void Coupler::reset() {
   for (Line& line : lines_) {
     line.history.clear();
-    line.sent_for = -1;
+    line.sent_for = line.answered_for = -1;
     line.port->forget();
   }
 }
@@ -114,32 +115,47 @@ void Coupler::await_peers(const CancelToken& cancel) {
   for (Line& line : lines_) line.port->await_peer(cancel);
 }
 
-void Coupler::prepare(const Simulation& simulation) {
+// Explicit peers cannot go back: who has answered is not asked again when a step is repeated.
+bool Coupler::asks(const Line& line, std::int64_t step) const {
+  if (line.agreement.is_implicit() || line.port->is_idle()) return false;
+  if (line.history.empty()) return true;
+  return line.answered_for != step && step % line.agreement.every == 0;
+}
+
+void Coupler::prepare(const Simulation& simulation, double length, bool estimated) {
   const std::int64_t step = simulation.step_number();
-  target_time_ = simulation.time() + simulation.next_step_size();
+  target_time_ = simulation.time() + length;
   for (Line& line : lines_) {
     const Agreement now = line.port->agreement();
     if (now.hold != line.agreement.hold) line.history = InputHistory(now.held_answers());
     line.agreement = now;
-    const bool idle = line.port->is_idle();
-    line.due = !idle && !now.is_implicit() && (step % now.every == 0 || line.history.empty());
+    line.due = asks(line, step);
     const bool on_its_way = line.sent_for == step && line.port->is_waiting();
     if (!line.due || on_its_way) continue;
     line.sent_for = -1;
     fill(line, simulation, target_time_, 0);
+    line.message.mutable_exchange()->set_target_estimated(estimated ||
+                                                          now.mode == v1::COUPLING_MODE_STAGGERED);
   }
 }
 
 void Coupler::take_answer(Line& line, const CancelToken& cancel) {
+  const std::int64_t step = line.sent_for;
   line.sent_for = -1;
-  if (const auto answer = line.port->take(cancel)) line.history.add(target_time_, answer->values);
+  const auto answer = line.port->take(cancel);
+  if (!answer) return;
+  line.history.add(line.target_time, answer->values);
+  line.answered_for = step;
 }
 
 // All peers compute at the same time: everything is sent before the first answer is awaited.
 void Coupler::exchange(const CancelToken& cancel) {
   const Stopwatch watch(waited_);
-  for (Line& line : lines_)
-    if (line.due && line.sent_for < 0) line.port->send(line.message, line.agreement.generation);
+  for (Line& line : lines_) {
+    if (!line.due || line.sent_for >= 0) continue;
+    line.sent_for = line.message.exchange().step();
+    line.port->send(line.message, line.agreement.generation);
+  }
   for (Line& line : lines_)
     if (line.due) take_answer(line, cancel);
 }
@@ -157,6 +173,7 @@ void Coupler::finish(const Simulation& simulation) {
       continue;
     if (!line.port->has_peer()) continue;
     fill(line, simulation, simulation.time() + simulation.next_step_size(), 0);
+    line.message.mutable_exchange()->set_target_estimated(true);
     line.port->send(line.message, line.agreement.generation);
     line.sent_for = simulation.step_number();
   }
@@ -171,9 +188,12 @@ void Coupler::start(Line& line, const Simulation& simulation) {
   line.settled = false;
 }
 
-void Coupler::start_passes(const Simulation& simulation) {
-  for (Line& line : lines_)
-    if (line.agreement.is_window()) start(line, simulation);
+void Coupler::start_passes(const Simulation& simulation, bool again) {
+  for (Line& line : lines_) {
+    if (!line.agreement.is_window()) continue;
+    if (again) line.port->notify(false, simulation.step_number(), simulation.time());
+    start(line, simulation);
+  }
 }
 
 void Coupler::start_iterations(Simulation& simulation) {

@@ -14,7 +14,8 @@ namespace mbcosim::server {
 
 /// Order within step k (see `Coupling` in the proto):
 ///
-///   explicit ports   prepare (state k−1) · exchange · apply · step · finish (staggered: state k)
+///   explicit ports   prepare (state k−1) · exchange · apply · step · finish (staggered: state k);
+///                    who has answered for step k is not asked again when it is repeated
 ///   tight ports      within the step, before each residual: exchange at the iterate · apply
 ///   window ports     passes: apply · step · exchange · test; redone from state k−1 until all agree
 ///
@@ -35,15 +36,18 @@ class Coupler {
   bool has_tight() const;
 
   void await_peers(const CancelToken& cancel);
-  void prepare(const Simulation& simulation);
-  void exchange(const CancelToken& cancel);  ///< throws PeerLost
+  /// `length`: of the step [s]; `estimated`: it may become shorter.
+  void prepare(const Simulation& simulation, double length, bool estimated);
+  void exchange(const CancelToken& cancel);  ///< throws PeerLost, PeerRejected, as all exchanges do
   void apply(Simulation& simulation);
   void finish(const Simulation& simulation);
   /// The simulation went to another state: what peers answered before says nothing any more.
   void reset();
 
   // --- window ports: redo the step
-  void start_passes(const Simulation& simulation);
+  /// `again`: the passes before agreed, but the step is done anew with another length; the peers
+  /// are told that it is rejected.
+  void start_passes(const Simulation& simulation, bool again);
   void apply_window(Simulation& simulation) const;
   /// One exchange at the end of a pass. True: all interfaces agree. Throws PeerLost.
   bool exchange_window(const Simulation& simulation, int pass, const CancelToken& cancel);
@@ -71,7 +75,9 @@ class Coupler {
     InputHistory history{1};
     v1::ServerMessage message;
     bool due = false;
-    std::int64_t sent_for = -1;  ///< step whose motion is on its way; −1: none
+    std::int64_t sent_for = -1;      ///< step whose motion is on its way; −1: none
+    double target_time = 0;          ///< of the last message [s]
+    std::int64_t answered_for = -1;  ///< explicit: step whose motion was answered; −1: none
     FixedPoint fixed_point{Acceleration::none, 1};
     Eigen::VectorXd interface;  ///< window, tight: values applied
     bool settled = false;       ///< tight: the last answer was what is applied
@@ -80,6 +86,7 @@ class Coupler {
   void add(PortModel model, const Simulation& simulation);
   void fill(Line& line, const Simulation& simulation, double target_time, int iteration);
   void take_answer(Line& line, const CancelToken& cancel);
+  bool asks(const Line& line, std::int64_t step) const;
   void start(Line& line, const Simulation& simulation);
   void apply_interface(const Line& line, Simulation& simulation) const;
   bool take_interface(Line& line, const CancelToken& cancel);

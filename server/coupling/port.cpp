@@ -2,6 +2,7 @@
 
 #include <google/protobuf/util/time_util.h>
 
+#include <cmath>
 #include <thread>
 
 #include "wire/refusal.h"
@@ -14,6 +15,16 @@ constexpr int kSpins = 200;  // looks before sleeping: quick peers answer within
 
 std::string in_port(const std::string& name, const std::string& text) {
   return "port \"" + name + "\": " + text;
+}
+
+constexpr std::size_t kLongestText = 500;  // that a peer may add to a message
+
+PeerRejected to_rejection(const std::string& name, const v1::Rejection& rejection) {
+  PeerRejected rejected;
+  rejected.text = in_port(name, "the peer rejects the step");
+  if (!rejection.text().empty()) rejected.text += ": " + rejection.text().substr(0, kLongestText);
+  if (rejection.has_preferred_step_size_s()) rejected.preferred = rejection.preferred_step_size_s();
+  return rejected;
 }
 
 }  // namespace
@@ -58,6 +69,7 @@ void Port::attach(PeerLink* link, const v1::Welcome& welcome) {
     awaited_ = false;
     answer_.reset();
     peer_failure_.clear();
+    rejection_.reset();
   }
   changed_.notify_all();
 }
@@ -94,8 +106,12 @@ void Port::deliver(const v1::PeerExchange& answer) {
                                                "; the last one sent is " + std::to_string(index_)));
     if (answer.index() < index_ || !awaited_) return;
     peer_failure_ = answer.failure();
+    rejection_.reset();
     Answer values;
-    if (peer_failure_.empty()) {
+    if (answer.has_reject()) {
+      check_rejection(answer.reject());
+      rejection_ = to_rejection(model_.name(), answer.reject());
+    } else if (peer_failure_.empty()) {
       const std::string wrong = model_.decode(answer, agreement_, &values);
       if (!wrong.empty()) throw Refusal(v1::REASON_BAD_ARGUMENT, in_port(model_.name(), wrong));
     }
@@ -103,6 +119,15 @@ void Port::deliver(const v1::PeerExchange& answer) {
     if (recorder_) received_ = answer;
   }
   changed_.notify_all();
+}
+
+void Port::check_rejection(const v1::Rejection& rejection) const {
+  if (!rejection.has_preferred_step_size_s()) return;
+  const double preferred = rejection.preferred_step_size_s();
+  if (preferred > 0 && std::isfinite(preferred)) return;
+  throw Refusal(v1::REASON_BAD_ARGUMENT,
+                in_port(model_.name(), "`reject.preferred_step_size_s` must be positive, got " +
+                                           std::to_string(preferred)));
 }
 
 // ------------------------------------------------------------------ the session's thread
@@ -189,8 +214,9 @@ std::optional<Answer> Port::take(const CancelToken& cancel) {
   if (recorder_ && answered) recorder_->received(model_.name(), received_);
   if (!answered)
     return go_on_without(late ? "the peer did not answer in time" : "the peer is gone");
+  if (rejection_) throw PeerRejected(*rejection_);
   if (!peer_failure_.empty())
-    return go_on_without("the peer failed: " + peer_failure_.substr(0, 500));
+    return go_on_without("the peer failed: " + peer_failure_.substr(0, kLongestText));
   return std::move(answer_);
 }
 

@@ -39,6 +39,12 @@ struct PeerLost {
   std::string text;
 };
 
+/// A peer will not take part in a step of this length.
+struct PeerRejected {
+  std::string text;
+  std::optional<double> preferred;  ///< length that it would take [s]
+};
+
 /// Thread-safe: the session's thread exchanges, the peer's thread attaches, delivers and detaches.
 class Port {
  public:
@@ -77,7 +83,8 @@ class Port {
   /// Sends what `model().fill` put into `message` for the peer of this handshake. Does not throw:
   /// `take` tells.
   void send(v1::ServerMessage& message, int generation);
-  /// The answer to the last `send`, or nothing when the policy goes on without. Throws PeerLost.
+  /// The answer to the last `send`, or nothing when the policy goes on without. Throws PeerLost,
+  /// PeerRejected.
   std::optional<Answer> take(const CancelToken& cancel);
   bool is_waiting() const;  ///< was a message sent whose answer was not taken?
   void forget();            ///< gives up the answer that is on its way
@@ -88,6 +95,7 @@ class Port {
   using Clock = std::chrono::steady_clock;
   void send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message);
   bool pull(std::unique_lock<std::mutex>& guard);
+  void check_rejection(const v1::Rejection& rejection) const;
   [[noreturn]] void lose(const std::string& why);
   std::optional<Answer> go_on_without(const std::string& why);
 
@@ -104,6 +112,7 @@ class Port {
   v1::PeerExchange received_;  ///< what `answer_` was made of, for the record
   std::optional<Answer> answer_;
   std::string peer_failure_;  ///< the peer could not compute
+  std::optional<PeerRejected> rejection_;
   std::optional<Clock::time_point> waiting_since_;
   std::atomic<Clock::rep> heard_{0};  ///< when the peer last sent something
   v1::PeerMessage pulled_;            ///< of the session's thread

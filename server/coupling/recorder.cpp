@@ -81,6 +81,12 @@ void Recorder::inputs(const v1::Values& values) {
   add(entry);
 }
 
+void Recorder::chosen(const v1::StepRequest& step) {
+  v1::RecordEntry entry;
+  *entry.mutable_chosen() = step;
+  add(entry);
+}
+
 void Recorder::read(std::size_t size, const std::function<bool(const std::string&)>& piece) const {
   for (std::size_t at = 0;; at += size) {
     std::string part;

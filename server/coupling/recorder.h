@@ -26,6 +26,8 @@ class Recorder {
   void stepped(bool accepted, std::int64_t step, double time);
   void restored(std::int64_t step, double time);
   void inputs(const v1::Values& values);
+  /// What was chosen of the step that follows.
+  void chosen(const v1::StepRequest& step);
 
   /// Passes the record on in pieces of about `size` bytes; false from `piece` ends it.
   void read(std::size_t size, const std::function<bool(const std::string&)>& piece) const;

@@ -133,6 +133,8 @@ class ModelReplay {
         attach(entry);
       else if (entry.has_inputs())
         write(entry.inputs());
+      else if (entry.has_chosen())
+        chosen_ = entry.chosen();
       else if (entry.detached())
         leaving_.push_back(entry.port());
       else if (entry.has_accepted() || entry.has_failed())
@@ -177,7 +179,7 @@ class ModelReplay {
     const bool accepted = entry.has_accepted();
     const v1::StepNotice& notice = accepted ? entry.accepted() : entry.failed();
     ++outcome_.steps;
-    v1::StepRequest request;
+    const v1::StepRequest request = std::exchange(chosen_, {});
     v1::StepReply reply;
     server::Call nobody;
     session_.step(request, nobody, &reply);
@@ -203,6 +205,7 @@ class ModelReplay {
   std::map<std::string, PortRecord> ports_;
   std::map<std::string, std::unique_ptr<RecordedPeer>> peers_;
   std::vector<std::string> leaving_;
+  v1::StepRequest chosen_;  ///< the next step
   Outcome outcome_;
 };
 

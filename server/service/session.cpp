@@ -139,9 +139,8 @@ void Session::check(const v1::StepRequest& request) const {
                   "`steps` must not be negative, got " + std::to_string(request.steps()));
   if (request.has_until_time_s() && std::isnan(request.until_time_s()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`until_time_s` is not a number");
-  if (request.step_size_s() != 0)
-    throw Refusal(v1::REASON_NOT_SERVED,
-                  "`step_size_s` is not served: the deck's strategy sets the step");
+  if (request.exact() && !request.has_until_time_s())
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`exact` belongs to `until_time_s`, which is missing");
   if (request.has_until()) variables_.check_condition(request.until());
   variables_.check(request.outputs());
   variables_.check_inputs(request.inputs());

@@ -101,11 +101,16 @@ class Session {
   void check(const v1::StepRequest& request) const;
   void check_step(std::int64_t expected) const;
   bool wants_more(const Advance& advance) const;
+  bool choose(Advance& advance);
   bool begin(Advance& advance);
   bool run_slice(Advance& advance);
   bool run_coupled_step(Advance& advance);
   void step_coupled(Advance& advance);
   void lose_peer(Advance& advance, const std::string& why);
+  void reject_step(Advance& advance, const PeerRejected& rejected);
+  void end_unsolved(Advance& advance, v1::StepOutcome outcome);
+  void tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason reason,
+                    const std::string& why);
   StepReport attempt(Advance& advance);
   StepReport attempt_in_slot(Advance& advance);
   void set_policy(v1::NonConvergencePolicy kind, double minimum);

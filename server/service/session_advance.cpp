@@ -4,7 +4,9 @@
 #include <spdlog/spdlog.h>
 
 #include <optional>
+#include <utility>
 
+#include "service/step_choice.h"
 #include "wire/convert.h"
 #include "wire/refusal.h"
 
@@ -55,12 +57,11 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
   const Clock::time_point start = Clock::now();
   require_usable();
   check(request);
-  Advance advance{request, *reply, {}, 1, INFINITY, false, false, {}};
+  Advance advance{request, *reply, {}, 1, {}, false, false, {}};
   const SteppingClaim claim(*this, call, advance.token);
   if (request.has_steps()) advance.steps_left = request.steps();
   if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
     advance.steps_left = INT64_MAX;
-  if (request.has_until_time_s()) advance.until = request.until_time_s();
   const bool coupled = !coupler_.ports().empty();
   while (!(coupled ? run_coupled_step(advance) : run_slice(advance))) {
     advance.deliver();
@@ -78,7 +79,15 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
 
 bool Session::wants_more(const Advance& advance) const {
   return !advance.ended && advance.steps_left > 0 && !simulation_->finished() &&
-         simulation_->time() + 0.5 * simulation_->next_step_size() <= advance.until;
+         goes_on(advance.request, *simulation_);
+}
+
+// Is there a next step? Its choice is made then.
+bool Session::choose(Advance& advance) {
+  if (!wants_more(advance)) return false;
+  advance.choice =
+      next_choice(advance.request, advance.reply.steps_done() == 0, variables_, *simulation_);
+  return true;
 }
 
 // For a client that did not get the reply and asks again.
@@ -94,6 +103,7 @@ bool Session::begin(Advance& advance) {
   const v1::StepRequest& request = advance.request;
   if (replay(request, &advance.reply)) return true;
   if (request.has_expected_step()) check_step(request.expected_step());
+  check_choice(request, *simulation_);
   variables_.write(request.inputs(), *simulation_);
   if (recorder_ && request.inputs().handles_size() > 0) recorder_->inputs(request.inputs());
   advance.started = true;
@@ -114,7 +124,7 @@ bool Session::run_slice(Advance& advance) {
   }
   const SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
   const Clock::time_point slice_end = Clock::now() + kSlice;
-  while (wants_more(advance)) {
+  while (choose(advance)) {
     if (!slot || advance.token.cancelled()) {
       advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
       break;
@@ -128,8 +138,14 @@ bool Session::run_slice(Advance& advance) {
 }
 
 StepReport Session::attempt(Advance& advance) {
+  if (recorder_ && !is_the_decks(advance.choice))
+    recorder_->chosen(request_of(advance.choice, advance.request, *simulation_));
   try {
-    return simulation_->step(&advance.token);
+    auto report = simulation_->step(advance.choice, &advance.token);
+    if (!report) throw Refusal(report.error());
+    return std::move(*report);
+  } catch (const Refusal&) {
+    throw;
   } catch (const std::exception& error) {
     spdlog::error("{}: {}", identity_.id, error.what());
     status_.fail("internal error while stepping");
@@ -160,6 +176,7 @@ void Session::account(Advance& advance, const StepReport& report) {
   }
   if (!is_accepted(report.outcome)) return;
   account_pieces(reply, report);
+  if (report.restarted) reply.set_restarted_steps(reply.restarted_steps() + 1);
   --advance.steps_left;
   if (!telemetry_.empty()) telemetry_.publish(*simulation_, advance.pending);
   if (advance.request.has_until() && variables_.holds(advance.request.until(), *simulation_)) {
@@ -177,6 +194,8 @@ void Session::account_pieces(v1::StepReply& reply, const StepReport& report) {
 
 void Session::finish(Advance& advance) {
   v1::StepReply& reply = advance.reply;
+  reply.set_next_step_size_s(simulation_->next_step_size());
+  reply.set_largest_step_size_s(simulation_->largest_step_size());
   reply.set_step(simulation_->step_number());
   reply.set_time_s(simulation_->time());
   variables_.read(*simulation_, advance.request.outputs(), reply.mutable_outputs());
@@ -191,7 +210,7 @@ bool Session::run_coupled_step(Advance& advance) {
     std::lock_guard lock(lock_);
     if (begin(advance)) return true;
     if (!advance.pending.empty()) return false;
-    if (!wants_more(advance)) {
+    if (!choose(advance)) {
       finish(advance);
       return true;
     }
@@ -201,7 +220,8 @@ bool Session::run_coupled_step(Advance& advance) {
     coupler_.await_peers(advance.token);
     {
       std::lock_guard lock(lock_);
-      coupler_.prepare(*simulation_);
+      coupler_.prepare(*simulation_, length_of(advance.choice, *simulation_),
+                       bool(advance.choice.event));
     }
     coupler_.exchange(advance.token);
     std::lock_guard lock(lock_);
@@ -209,6 +229,9 @@ bool Session::run_coupled_step(Advance& advance) {
   } catch (const PeerLost& lost) {
     coupler_.notify(false, *simulation_);
     lose_peer(advance, lost.text);
+  } catch (const PeerRejected& rejected) {
+    coupler_.notify(false, *simulation_);
+    reject_step(advance, rejected);
   }
   advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() +
                                       coupler_.waited_seconds());
@@ -260,12 +283,13 @@ class Session::ExchangeInStep {
     StepPasses passes;
     passes.most = coupler().maximum_passes();
     passes.begin = [this](int pass) {
-      if (pass == 1) coupler().start_passes(simulation());
+      if (pass == 1) coupler().start_passes(simulation(), std::exchange(agreed_, false));
       coupler().apply_window(simulation());
       if (pass > 1) coupler().start_iterations(simulation());
     };
     passes.agrees = [this](int pass) {
-      return wait([&] { return coupler().exchange_window(simulation(), pass, advance_.token); });
+      return agreed_ = wait(
+                 [&] { return coupler().exchange_window(simulation(), pass, advance_.token); });
     };
     simulation().set_passes(std::move(passes));
   }
@@ -281,6 +305,7 @@ class Session::ExchangeInStep {
   Session& session_;
   Advance& advance_;
   Slot& slot_;
+  bool agreed_ = false;  ///< the interfaces, in the last pass
 };
 
 StepReport Session::attempt_in_slot(Advance& advance) {
@@ -299,19 +324,34 @@ StepReport Session::attempt_in_slot(Advance& advance) {
 
 void Session::lose_peer(Advance& advance, const std::string& why) {
   std::lock_guard lock(lock_);
+  if (advance.token.cancelled())
+    end_unsolved(advance, v1::STEP_OUTCOME_INTERRUPTED);
+  else
+    tell_failure(advance, v1::STEP_OUTCOME_PEER_LOST, v1::REASON_PEER_LOST, why);
+}
+
+void Session::reject_step(Advance& advance, const PeerRejected& rejected) {
+  std::lock_guard lock(lock_);
+  tell_failure(advance, v1::STEP_OUTCOME_REJECTED_BY_PEER, v1::REASON_REJECTED_BY_PEER,
+               rejected.text);
+  if (rejected.preferred) advance.reply.set_preferred_step_size_s(*rejected.preferred);
+}
+
+void Session::end_unsolved(Advance& advance, v1::StepOutcome outcome) {
   advance.ended = true;
   if (recorder_) recorder_->stepped(false, simulation_->step_number(), simulation_->time());
   status_.publish(*simulation_);
-  if (advance.token.cancelled()) {
-    advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
-    return;
-  }
-  advance.reply.set_outcome(v1::STEP_OUTCOME_PEER_LOST);
+  advance.reply.set_outcome(outcome);
+}
+
+void Session::tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason reason,
+                           const std::string& why) {
+  end_unsolved(advance, outcome);
   v1::SolverFailure* failure = advance.reply.mutable_failure();
-  failure->set_reason(v1::REASON_PEER_LOST);
+  failure->set_reason(reason);
   failure->set_message(utf8(why));
   failure->set_step(simulation_->step_number() + 1);
-  failure->set_time_s(simulation_->time() + simulation_->next_step_size());
+  failure->set_time_s(simulation_->time() + length_of(advance.choice, *simulation_));
   status_.remember_failure(failure->message());
 }
 

@@ -1,8 +1,6 @@
 /// Internal to Session: one call of `step` in progress.
 #pragma once
 
-#include <cmath>
-
 #include "service/session.h"
 
 namespace mbcosim::server {
@@ -13,7 +11,7 @@ struct Session::Advance {
   v1::StepReply& reply;
   CancelToken token;
   std::int64_t steps_left = 1;
-  double until = INFINITY;
+  StepChoice choice;  ///< of the next step
   bool started = false, ended = false;
   TelemetryHub::Pending pending;  ///< samples not yet delivered
 

@@ -1,6 +1,8 @@
 #include "service/variable_access.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "wire/convert.h"
 #include "wire/refusal.h"
@@ -85,6 +87,19 @@ bool VariableAccess::holds(const v1::Condition& condition, const Simulation& sim
   values.clear();
   simulation.get(condition.handle(), values);
   return compare(condition.comparison(), values[condition.element()], condition.threshold());
+}
+
+double VariableAccess::distance_behind(const v1::Condition& condition,
+                                       const Simulation& simulation) const {
+  thread_local std::vector<double> values;
+  values.clear();
+  simulation.get(condition.handle(), values);
+  const double value = values[condition.element()];
+  const bool rising = condition.comparison() == v1::COMPARISON_GREATER ||
+                      condition.comparison() == v1::COMPARISON_GREATER_OR_EQUAL;
+  const double distance = rising ? value - condition.threshold() : condition.threshold() - value;
+  if (compare(condition.comparison(), value, condition.threshold())) return distance;
+  return std::isnan(distance) ? distance : std::min(distance, -std::numeric_limits<double>::min());
 }
 
 }  // namespace mbcosim::server

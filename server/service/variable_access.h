@@ -29,6 +29,8 @@ class VariableAccess {
   void read(const Simulation& simulation, const google::protobuf::RepeatedField<int>& handles,
             google::protobuf::RepeatedField<double>* out) const;
   bool holds(const v1::Condition& condition, const Simulation& simulation) const;
+  /// How far the condition is behind, in the variable's unit: not negative where it holds.
+  double distance_behind(const v1::Condition& condition, const Simulation& simulation) const;
 
  private:
   const std::vector<Variable>& variables_;

@@ -44,6 +44,7 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_SINGULAR:
     case v1::REASON_EVALUATION:
     case v1::REASON_PEER_LOST:
+    case v1::REASON_REJECTED_BY_PEER:
     case v1::REASON_READER_STALLED:
       return Code::ABORTED;
     case v1::REASON_LIMIT_EXCEEDED:

@@ -102,15 +102,15 @@ class Bench:
         ended(wire, reasons, code)
         return wire.status
 
-    def step(self, count=1):
+    def step(self, count=1, **fields):
         """Steps in a thread of its own; join() gives the reply."""
-        return Stepping(self.stub, self.info.name, count)
+        return Stepping(self.stub, self.info.name, count, fields)
 
 
 class Stepping(threading.Thread):
-    def __init__(self, stub, name, count):
+    def __init__(self, stub, name, count, fields):
         super().__init__(daemon=True)
-        self._stub, self._request, self.reply = stub, simulations_pb2.StepRequest(simulation=name, steps=count), None
+        self._stub, self._request, self.reply = stub, simulations_pb2.StepRequest(simulation=name, steps=count, **fields), None
         self.start()
 
     def run(self):
@@ -234,6 +234,7 @@ def staggered(bench):
     for k in range(4):
         values = exchange(wire)
         require((values.index, values.step) == (k + 1, k), f"exchange {values.index} of step {values.step} as number {k + 1}")
+        require(values.target_estimated, f"`target_estimated` is missing in exchange {k + 1}")
         if k < 3:
             answer(wire, values.index)
     require(stepping.result("ACCEPTED").step == 3, "three steps were asked for")
@@ -274,6 +275,33 @@ def rejected(bench):
     require(notice.step == 0 and notice.time_s == 0, f"`rejected` names step {notice.step} to go back to")
     reply = stepping.result("PEER_LOST")
     require("no wind" in reply.failure.message and reply.step == 0, f"the failure: {reply.failure.message}, step {reply.step}")
+
+
+def refused_length(mode):
+    """The peer rejects the step; the client repeats it with the length preferred."""
+    def check(bench):
+        wire, _ = bench.attach(mode=mode)
+        explicit = mode == types.COUPLING_MODE_LOOSE
+        stepping = bench.step()
+        wire.send(pb.PeerMessage(exchange=pb.PeerExchange(
+            index=exchange(wire).index, reject=pb.Rejection(preferred_step_size_s=STEP / 4, text="too long"))))
+        reply = stepping.result("REJECTED_BY_PEER")
+        require(reply.preferred_step_size_s == STEP / 4 and reply.step == 0, f"preferred {reply.preferred_step_size_s}, step {reply.step}")
+        require("too long" in reply.failure.message, f"the failure: {reply.failure.message}")
+        if not explicit:
+            require(exchange(wire, "rejected").step == 0, "`rejected` names another step")
+        stepping = bench.step(step_size_s=STEP / 4)
+        values = exchange(wire)
+        require(math.isclose(values.target_time_s, STEP / 4, rel_tol=1e-9), f"target time {values.target_time_s} of the shorter step")
+        answer(wire, values.index)
+        while not explicit:  # until it is accepted
+            message = wire.receive(WAIT)
+            require(message not in (None, END), f"neither `exchange` nor `accepted`; {wire.status}")
+            if message.WhichOneof("content") == "accepted":
+                break
+            answer(wire, message.exchange.index)
+        require(math.isclose(stepping.result("ACCEPTED").time_s, STEP / 4, rel_tol=1e-9), "the step has another length")
+    return check
 
 
 def heartbeats(bench):
@@ -353,6 +381,8 @@ BAD, TURN = (["BAD_ARGUMENT"], grpc.StatusCode.INVALID_ARGUMENT), (["OUT_OF_TURN
 CHECKS = {
     "handshake": handshake, "loose": loose, "orientations": orientation, "staggered": staggered,
     "tight": implicit(types.COUPLING_MODE_TIGHT), "window": implicit(types.COUPLING_MODE_WINDOW), "rejected": rejected,
+    "loose peer rejects": refused_length(types.COUPLING_MODE_LOOSE), "tight peer rejects": refused_length(types.COUPLING_MODE_TIGHT),
+    "window peer rejects": refused_length(types.COUPLING_MODE_WINDOW),
     "heartbeats": heartbeats, "too few forces": wrong_answer(*BAD, forces=[1.0, 2.0]),
     "not a number": wrong_answer(*BAD, forces=[math.nan] * 3 * NODES),
     "moments of another length": wrong_answer(*BAD, moments_nm=[1.0]), "signals on nodes": wrong_answer(*BAD, signals=[1.0]),

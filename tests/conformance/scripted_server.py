@@ -25,7 +25,8 @@ FAULTS = [
     "notice in LOOSE", "no notice of acceptance", "iteration stands still", "forces are ignored", "wrong lengths are taken",
     "not a number is taken", "answers in advance are taken", "answers are taken twice", "waits for ever", "labels in another order",
     "negative quaternion", "refuses without a reason", "a second peer is let in", "first mismatch only", "heartbeats end the stream",
-    "no notice of rejection", "any version is spoken", "accelerations unasked", "two exchanges at once",
+    "no notice of rejection", "any version is spoken", "accelerations unasked", "two exchanges at once", "rejections are ignored",
+    "preference untold", "estimate untold", "lengths are ignored",
 ]
 
 
@@ -43,6 +44,10 @@ def turned(axis_angle):
     x, y, z = axis_angle / angle
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
+
+
+class Rejected(Exception):
+    """By the peer: the length that it prefers, and its words."""
 
 
 class Attached:
@@ -74,6 +79,7 @@ class Session:
 
     def __init__(self, name, fault):
         self.name, self.fault = name, fault
+        self.t, self.h = 0.0, STEP  # time of step k and length of the next one
         self.k, self.x, self.v, self.forces = 0, np.array([[0, 0, 0], [1, 2, 3.0]]), np.array([[0, 1, 0], [0, 0, 0.0]]), np.zeros((2, 3))
         self.peer, self.in_flight, self.lock = None, False, threading.Lock()
 
@@ -88,18 +94,19 @@ class Session:
         peer.index += 2 if fault == "index skips" and peer.index else 1
         peer.answered, peer.answer = False, None
         out = pb.ServerExchange(index=peer.index - (fault == "index from zero"), step=step + (fault == "step of the future"),
-                                time_s=step * STEP, target_time_s=(step if iteration else step + 1) * STEP, iteration=iteration)
+                                time_s=self.t + (self.h if iteration else 0), target_time_s=self.t + self.h, iteration=iteration,
+                                target_estimated=peer.mode == types.COUPLING_MODE_STAGGERED and fault != "estimate untold")
         if fault == "target time of the past":
             out.target_time_s = out.time_s
         if fault == "iteration stands still":
             out.iteration = min(iteration, 1)
-        x, v = (self.x + STEP * self.v, self.v + STEP * self.forces) if iteration else (self.x, self.v)
+        x, v = (self.x + self.h * self.v, self.v + self.h * self.forces) if iteration else (self.x, self.v)
         out.positions_m.extend(x.ravel()[:5 if fault == "an array too short" else 6])
         out.velocities_m_s.extend(v.ravel())
         out.angular_velocities_rad_s.extend([*SPIN, 0, 0, 0])
         if fault == "accelerations unasked":
             out.accelerations_m_s2.extend([0.0] * 6)
-        angle = SPIN * step * STEP
+        angle = SPIN * out.time_s
         if peer.hello.rotation_form == types.ROTATION_FORM_QUATERNION:
             half = np.linalg.norm(angle) / 2
             quaternion = np.array([math.cos(half), *(angle / 2 * np.sinc(half / math.pi))])
@@ -113,7 +120,7 @@ class Session:
 
     def notice(self, kind):
         if self.fault != f"no notice of {'acceptance' if kind == 'accepted' else 'rejection'}":
-            self.peer.out.put(pb.ServerMessage(**{kind: pb.StepNotice(step=self.k, time_s=self.k * STEP)}))
+            self.peer.out.put(pb.ServerMessage(**{kind: pb.StepNotice(step=self.k, time_s=self.t)}))
 
     def deliver(self, peer, message):
         """A message of the peer after `hello`. Raises Refused."""
@@ -129,7 +136,7 @@ class Session:
         twice = answer.index == peer.index and peer.answered and peer.answer is not None and fault != "answers are taken twice"
         if in_advance or twice:
             raise Refused(grpc.StatusCode.FAILED_PRECONDITION, "OUT_OF_TURN", f"answer {answer.index} of {peer.index}")
-        lengths = [len(answer.forces_n) in (6, 6 * bool(not answer.failure)), len(answer.moments_nm) in (0, 6), not answer.signals]
+        lengths = [len(answer.forces_n) in (6, 6 * bool(not answer.failure and not answer.HasField("reject"))), len(answer.moments_nm) in (0, 6), not answer.signals]
         if not all(lengths) and fault != "wrong lengths are taken":
             raise Refused(grpc.StatusCode.INVALID_ARGUMENT, "BAD_ARGUMENT", "an array of the wrong length")
         if not all(map(math.isfinite, answer.forces_n)) and fault != "not a number is taken":
@@ -148,6 +155,8 @@ class Session:
             peer.changed.wait_for(lambda: peer.answered or peer.gone, timeout)
             if not peer.answered:
                 return "the peer is gone" if peer.gone else "the peer did not answer in time"
+            if peer.answer.HasField("reject") and self.fault != "rejections are ignored":
+                raise Rejected(peer.answer.reject.preferred_step_size_s, peer.answer.reject.text)
             if peer.answer.failure:
                 return "the peer failed: " + peer.answer.failure
             forces = np.zeros(6)
@@ -158,10 +167,19 @@ class Session:
 
     # ------------------------------------------------------------ steps
 
-    def step(self):
-        """Text: why the step failed."""
+    def step(self, length):
+        """Text: why the step failed. Raises Rejected."""
         if self.peer is None or self.peer.gone:
             return "no peer"
+        self.h = length
+        try:
+            return self._solve()
+        except Rejected:
+            if self.peer.mode in IMPLICIT:
+                self.notice("rejected")
+            raise
+
+    def _solve(self):
         if self.peer.mode in IMPLICIT:
             for iteration in range(1, ITERATIONS + 1):
                 self.motion(self.k + 1, iteration)
@@ -176,9 +194,9 @@ class Session:
             why = self.wait()
             if why:
                 return why
-        self.v = self.v + STEP * self.forces
-        self.x = self.x + STEP * self.v
-        self.k += 1
+        self.v = self.v + self.h * self.forces
+        self.x = self.x + self.h * self.v
+        self.k, self.t, self.h = self.k + 1, self.t + self.h, STEP
         if self.peer.mode in IMPLICIT or self.fault == "notice in LOOSE":
             self.notice("accepted")
         if self.peer.mode == types.COUPLING_MODE_STAGGERED:
@@ -225,7 +243,7 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
     # ------------------------------------------------------------ Simulations
 
     def _info(self, session):
-        return simulations_pb2.SimulationInfo(name=session.name, model_digest=DIGEST, step=session.k, time_s=session.k * STEP)
+        return simulations_pb2.SimulationInfo(name=session.name, model_digest=DIGEST, step=session.k, time_s=session.t)
 
     def GetServerInfo(self, request, context):
         return simulations_pb2.ServerInfo(version="scripted")
@@ -252,13 +270,21 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
         reply = simulations_pb2.StepReply(outcome=simulations_pb2.STEP_OUTCOME_ACCEPTED)
         with session.lock:
             for _ in range(request.steps):
-                why = session.step()
+                own = request.HasField("step_size_s") and self.fault != "lengths are ignored"
+                try:
+                    why = session.step(request.step_size_s if own else STEP)
+                except Rejected as rejected:
+                    reply.outcome = simulations_pb2.STEP_OUTCOME_REJECTED_BY_PEER
+                    if self.fault != "preference untold":
+                        reply.preferred_step_size_s = rejected.args[0]
+                    reply.failure.message, reply.failure.reason = rejected.args[1], common_pb2.REASON_REJECTED_BY_PEER
+                    break
                 if why:
                     reply.outcome = simulations_pb2.STEP_OUTCOME_PEER_LOST
                     reply.failure.message, reply.failure.reason = why, common_pb2.REASON_PEER_LOST
                     break
                 reply.steps_done += 1
-        reply.step, reply.time_s = session.k, session.k * STEP
+        reply.step, reply.time_s = session.k, session.t
         return reply
 
     # ------------------------------------------------------------ Coupling
@@ -303,7 +329,7 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
         peer = session.peer
         threading.Thread(target=self._read, args=(session, peer, requests), daemon=True).start()
         yield pb.ServerMessage(welcome=pb.Welcome(protocol_version=1, layout=session.layout(), model_digest=DIGEST, step_size_s=STEP,
-                                                  step=session.k, time_s=session.k * STEP))
+                                                  step=session.k, time_s=session.t))
         while True:
             message = peer.out.get()
             if message is None:

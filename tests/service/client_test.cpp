@@ -192,6 +192,49 @@ TEST_P(Coupled, OptionsOfTheExchange) {
   EXPECT_EQ(seen.x.at(0), 0.5);
 }
 
+TEST(Client, ChoosesLengthsAndEnds) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body());
+  StepOptions options;
+  options.step_size = 3e-3;
+  const StepResult one = simulation.step(1, options);
+  EXPECT_TRUE(one.ok()) << one.failure;
+  EXPECT_EQ(one.time, 3e-3);
+  EXPECT_EQ(one.step_size, 3e-3);
+  EXPECT_GT(one.next_step_size, 0);
+  EXPECT_GT(one.largest_step_size, 0);
+  StepOptions exact;
+  exact.exact = true;
+  EXPECT_EQ(simulation.run_until(.1 / 3, exact).time, .1 / 3);
+  options.step_size = -1;
+  EXPECT_THROW(simulation.step(1, options), Error);
+  StepOptions until;
+  until.until = Condition{"node.structural.1.X", Condition::greater, .05, 1, 1e-8};
+  const StepResult found = simulation.step(10000, until);
+  EXPECT_TRUE(found.condition_met);
+  EXPECT_NEAR(simulation.read("node.structural.1.X")[1], .05, 1e-7);
+}
+
+TEST_P(Coupled, RejectsAStepAndGetsAShorterOne) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  const Peer peer = simulation.couple(
+      "spring",
+      [](const Motion& motion) -> Loads {
+        if (motion.target_time - motion.time > 5e-4) throw Reject{4e-4, "too long"};
+        return spring(motion);
+      },
+      options());
+  const StepResult rejected = simulation.step();
+  EXPECT_EQ(rejected.outcome, Outcome::rejected_by_peer);
+  EXPECT_EQ(rejected.preferred_step_size, 4e-4);
+  EXPECT_NE(rejected.failure.find("too long"), std::string::npos) << rejected.failure;
+  EXPECT_EQ(rejected.step, 0);
+  StepOptions shorter;
+  shorter.step_size = rejected.preferred_step_size;
+  EXPECT_EQ(simulation.step(1, shorter).time, 4e-4);
+}
+
 TEST_P(Coupled, ALateOrDeadPeerIsGivenUpInItsTime) {
   Server server = connect();
   Simulation simulation = server.load_text(body(), with_port());

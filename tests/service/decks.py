@@ -25,3 +25,31 @@ def endless():
 def impossible():
     """A body whose steps cannot converge: one iteration, a tolerance out of reach, a fast spin in long steps."""
     return body(final_time="10.", step="0.05", tolerance="1.e-14", iterations="1", spin="1., 20., 1.")
+
+
+OSCILLATOR_STEP, OSCILLATOR_END = 0.01, 10.0
+
+_OSCILLATOR = """
+begin: data; problem: initial value; end: data;
+begin: initial value;
+  initial time: 0.; time step: 0.01;
+  method: ms, 0.6; tolerance: 1.e-9; max iterations: 20; derivatives tolerance: 1.e-2; derivatives coefficient: 1.e-5;
+  final time: 10.;
+end: initial value;
+begin: control data; structural nodes: 2; rigid bodies: 1; joints: %d; end: control data;
+begin: nodes;
+  structural: 1, dynamic, null, eye, 3., 0.2, 0., null;
+  structural: 2, static, null, eye, null, null;
+end: nodes;
+begin: elements;
+  body: 1, 1, 1., null, eye;
+  joint: 1, clamp, 2, node, node;
+  joint: 2, deformable displacement joint, 2, null, 1, null, linear elastic isotropic, 100.;
+%s
+end: elements;
+"""
+
+# A mass at node 1, thrown from the rest position of a spring of 100 N/m to the ground, and with another one of `stiffness` beside it.
+OSCILLATOR = _OSCILLATOR % (2, "")
+OSCILLATOR_WITH_SPRING = _OSCILLATOR % (
+    3, "  joint: 3, deformable displacement joint, 2, null, 1, null, linear elastic isotropic, {stiffness};")

@@ -184,12 +184,14 @@ class Stepper:
     async def __aexit__(self, *_):
         await self.close()
 
-    async def step(self, values=None, count=1, *, timeout=None):
-        """Takes `count` steps; `values`: numbers of the stepper's inputs, one variable after the other. After a timeout the stream is
-        over."""
+    async def step(self, values=None, count=1, *, step_size=None, timeout=None):
+        """Takes `count` steps, of `step_size` [s] each (default: the deck's); `values`: numbers of the stepper's inputs, one variable after the
+        other. After a timeout the stream is over."""
         request = pb.StepRequest()
         request.CopyFrom(self._request)
         request.steps = count
+        if step_size is not None:
+            request.step_size_s = step_size
         if request.inputs.handles:
             request.inputs.values.extend(np.ravel(np.asarray(values, float)))
         with translated():

@@ -27,6 +27,21 @@ def _policy(name):
     return pb.NonConvergencePolicy.Value("NON_CONVERGENCE_POLICY_" + name.upper())
 
 
+_COMPARISONS = {"<": pb.COMPARISON_LESS, "<=": pb.COMPARISON_LESS_OR_EQUAL, ">": pb.COMPARISON_GREATER,
+                ">=": pb.COMPARISON_GREATER_OR_EQUAL}
+
+
+@dataclasses.dataclass
+class Condition:
+    """A comparison of one number of a variable: `Condition("node.structural.1.X", "<", 0.5, element=2)`. With `locate_within` [s] the step in
+    which it turns true is shortened until it ends at most so long after that."""
+    variable: str
+    comparison: str         # "<", "<=", ">" or ">="
+    threshold: float        # in the variable's unit
+    element: int = 0        # which of its numbers, row-major
+    locate_within: float = None
+
+
 @dataclasses.dataclass
 class StepResult:
     """What an advance did."""
@@ -34,6 +49,11 @@ class StepResult:
     steps_done: int
     step: int               # number of the last accepted step
     time: float             # its time [s]
+    step_size: float        # length of the last step [s]
+    next_step_size: float   # that the deck would take [s]
+    largest_step_size: float  # left until the deck's final time [s]
+    preferred_step_size: float  # of the peer that rejected the step [s]; None: it did not say
+    condition_met: bool     # `until` holds
     iterations: int         # linear solutions in the last step
     total_iterations: int
     residual_error: float
@@ -227,17 +247,20 @@ class SimulationCalls:
     # ---------------------------------------------------------------- advancing
 
     @call
-    def step(self, count=1, *, inputs=None, outputs=(), timeout=None):
-        """Takes `count` steps. Raises StepFailed when one does not converge."""
-        return (yield from self._advance(pb.StepRequest(steps=count), inputs, outputs, timeout))
+    def step(self, count=1, *, step_size=None, until=None, inputs=None, outputs=(), timeout=None):
+        """Takes `count` steps, of `step_size` [s] each (default: the deck's), or fewer when `until`, a Condition, holds before. Raises
+        StepFailed when one does not converge, or a peer rejects it."""
+        request = pb.StepRequest(steps=count, step_size_s=step_size)
+        return (yield from self._advance(request, until, inputs, outputs, timeout))
 
     @call
-    def run_until(self, time, *, inputs=None, outputs=(), progress=None, timeout=None):
-        """Steps until `time` [s] or the deck's end. `progress(RunProgress)` is called about twice a second."""
-        request = pb.StepRequest(until_time_s=time)
+    def run_until(self, time, *, exact=False, step_size=None, until=None, inputs=None, outputs=(), progress=None, timeout=None):
+        """Steps until `time` [s] or the deck's end; with `exact` the last step is shortened so that it ends there. `step_size` and `until` as in
+        `step`. `progress(RunProgress)` is called about twice a second."""
+        request = pb.StepRequest(until_time_s=time, exact=exact, step_size_s=step_size)
         if progress is None:
-            return (yield from self._advance(request, inputs, outputs, timeout))
-        yield from self._fill(request, inputs, outputs)
+            return (yield from self._advance(request, until, inputs, outputs, timeout))
+        yield from self._fill(request, until, inputs, outputs)
         done = []
 
         def take(message):
@@ -254,15 +277,21 @@ class SimulationCalls:
         """Stops whatever advances this simulation, from any thread or client."""
         return (yield Call("Simulations/Interrupt", pb.InterruptRequest(name=self.name), timeout, repeatable=True)).was_stepping
 
-    def _fill(self, request, inputs, outputs):
+    def _fill(self, request, until, inputs, outputs):
         request.simulation = self.name
+        if until is not None:
+            request.until.handle, = yield from self._handles([until.variable])
+            request.until.element, request.until.threshold = until.element, until.threshold
+            request.until.comparison = _COMPARISONS[until.comparison]
+            if until.locate_within is not None:
+                request.until.locate_within_s = until.locate_within
         if inputs:
             yield from self._handles(inputs)
             request.inputs.CopyFrom(self.pack(inputs))
         request.outputs.extend((yield from self._handles(outputs)))
 
-    def _advance(self, request, inputs, outputs, timeout):
-        yield from self._fill(request, inputs, outputs)
+    def _advance(self, request, until, inputs, outputs, timeout):
+        yield from self._fill(request, until, inputs, outputs)
         request.request_id = uuid.uuid4().hex
         return self.result((yield Call("Simulations/Step", request, timeout, repeatable=True)), outputs)
 
@@ -270,7 +299,9 @@ class SimulationCalls:
         """A reply as a StepResult; raises StepFailed when the reply tells a failure."""
         self.step_number, self.time = reply.step, reply.time_s
         outcome = enum_name(pb.StepOutcome, reply.outcome, "STEP_OUTCOME_")
-        result = StepResult(outcome, reply.steps_done, reply.step, reply.time_s, reply.iterations, reply.total_iterations,
+        preferred = reply.preferred_step_size_s if reply.HasField("preferred_step_size_s") else None
+        result = StepResult(outcome, reply.steps_done, reply.step, reply.time_s, reply.step_size_s, reply.next_step_size_s,
+                            reply.largest_step_size_s, preferred, reply.condition_met, reply.iterations, reply.total_iterations,
                             reply.residual_error, reply.solver_seconds, self.split(outputs, reply.outputs), reply)
         if reply.HasField("failure"):
             reason = enum_name(common_pb2.Reason, reply.failure.reason, "REASON_")

@@ -27,6 +27,18 @@ class Motion:
     signals: np.ndarray    # of a signal port; of a modal one: the amplitudes, then their rates
     forces: np.ndarray     # of a motion port: reactions [N], and moments [N m]
     moments: np.ndarray
+    target_estimated: bool  # the step may turn out to have another length
+
+
+class Reject(Exception):
+    """Raised by a peer's function, or returned as an answer: the step must not be done. It ends with outcome REJECTED_BY_PEER.
+
+    `preferred_step_size` is what the peer would take [s]; None: unknown.
+    """
+
+    def __init__(self, preferred_step_size=None, text=""):
+        super().__init__(text)
+        self.preferred_step_size, self.text = preferred_step_size, text
 
 
 @dataclasses.dataclass
@@ -132,7 +144,7 @@ def motion(fields, rotation):
         rows(_E.POSITIONS_M_FIELD_NUMBER), rotations, rows(_E.VELOCITIES_M_S_FIELD_NUMBER),
         rows(_E.ANGULAR_VELOCITIES_RAD_S_FIELD_NUMBER), rows(_E.ACCELERATIONS_M_S2_FIELD_NUMBER),
         rows(_E.ANGULAR_ACCELERATIONS_RAD_S2_FIELD_NUMBER), rows(_E.SIGNALS_FIELD_NUMBER, 1).ravel(),
-        rows(_E.FORCES_N_FIELD_NUMBER), rows(_E.MOMENTS_NM_FIELD_NUMBER))
+        rows(_E.FORCES_N_FIELD_NUMBER), rows(_E.MOMENTS_NM_FIELD_NUMBER), bool(fields.get(_E.TARGET_ESTIMATED_FIELD_NUMBER, 0)))
 
 
 def index(fields):
@@ -150,6 +162,11 @@ def _put(field, values):
 def answer(number, value, kind):
     """What a peer's function returned as the answer to exchange `number` on a port of this kind (of `mbcosim.v1.PortKind`)."""
     out = pb.PeerExchange(index=number)
+    if isinstance(value, Reject):
+        out.reject.text = value.text
+        if value.preferred_step_size is not None:
+            out.reject.preferred_step_size_s = value.preferred_step_size
+        return pb.PeerMessage(exchange=out)
     loads = _loads(value, kind)
     _put(out.forces_n, loads.forces)
     _put(out.moments_nm, loads.moments)
@@ -179,7 +196,9 @@ def _loads(value, kind):
 
 
 def failure(number, error):
-    """The answer of a peer that cannot compute."""
+    """The answer of a peer that cannot compute, or rejects the step."""
+    if isinstance(error, Reject):
+        return answer(number, error, None)
     return pb.PeerMessage(exchange=pb.PeerExchange(index=number, failure=f"{type(error).__name__}: {error}"))
 
 
