@@ -12,7 +12,7 @@ import pytest
 import decks
 import mbcosim
 import mbcosim.aio
-from conftest import TIME_FACTOR
+from conftest import TIME_FACTOR, wait_for
 from mbcosim.v1 import simulations_pb2 as pb
 from relay import BlackHole
 from test_coupling import PORT, spring
@@ -74,12 +74,22 @@ SERVER_CALLS = {
 }
 
 
+def stop(pid):
+    """SIGSTOP, and every thread has obeyed."""
+    def state(task):
+        with open(f"/proc/{pid}/task/{task}/stat") as file:
+            return file.read().rsplit(")", 1)[1].split()[0]
+
+    os.kill(pid, signal.SIGSTOP)
+    wait_for(lambda: all(state(task) == "T" for task in os.listdir(f"/proc/{pid}/task")))
+
+
 @pytest.fixture(params=["stopped", "black hole"])
 def falls_silent(request, tmp_path, start_daemon):
     """(address, function after which the server says nothing any more)"""
     daemon = start_daemon()
     if request.param == "stopped":
-        yield daemon.address, lambda: os.kill(daemon.process.pid, signal.SIGSTOP)
+        yield daemon.address, lambda: stop(daemon.process.pid)
         os.kill(daemon.process.pid, signal.SIGCONT)
         return
     hole = BlackHole(str(tmp_path), daemon.address)
