@@ -136,9 +136,10 @@ class Spring:
         self.asked, self.refuse_longer_than, self.prefers = [], refuse_longer_than, prefers
 
     def __call__(self, motion):
-        self.asked.append((motion.step, motion.time, motion.target_time, motion.target_estimated))
         start = motion.time if motion.iteration == 0 else self.start
-        if motion.target_time - start > self.refuse_longer_than:
+        too_long = motion.target_time - start > self.refuse_longer_than
+        self.asked.append((motion.step, motion.time, motion.target_time, motion.target_estimated))
+        if too_long:
             raise mbcosim.Reject(self.prefers, "too long for me")
         return -STIFFNESS * motion.x
 
@@ -190,8 +191,10 @@ def test_a_staggered_peer_rejects_the_step_after(swinging):
     spring = Spring()
     with swinging.couple("spring", spring, mode="staggered"):
         swinging.step()
+        wait_for(lambda: len(spring.asked) == 2)
         spring.refuse_longer_than = 0.005
         swinging.step()  # its exchange was answered before
+        wait_for(lambda: len(spring.asked) == 3)
         with pytest.raises(mbcosim.StepFailed, match="too long") as caught:
             swinging.step()
         assert caught.value.result.preferred_step_size is None and caught.value.result.step == 2
