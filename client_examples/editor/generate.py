@@ -37,8 +37,11 @@ def head(words, scope):
 def grammar(groups):
     served = {g["name"]: [w["word"] for w in g["words"] if w["served"]] for g in groups}
     refused = {g["name"]: [w["word"] for w in g["words"] if not w["served"]] for g in groups}
-    cards = sum((served[name] for name in ("statement", "initial value card", "control card", "node", "element")), ["file", "problem"])
-    types = sum((served[name] for name in ("joint", "force", "couple", "genel", "electric", "hydraulic", "file driver")), [])
+    blocks = ("statement", "initial value card", "inverse dynamics card", "control card", "node", "element")
+    families = ("joint", "jointregularization", "force", "couple", "genel", "electric", "thermal", "bulk", "hydraulic",
+                "userdefined", "file driver")
+    cards = sum((served[name] for name in blocks), ["file", "problem"])
+    types = sum((served[name] for name in families), [])
     objects = sum((served[name] for name in ("drive", "law", "function", "fluid")), [])
     known = set(types) | set(objects) | set(cards)
     unknown = [word for words in refused.values() for word in words if word not in known]

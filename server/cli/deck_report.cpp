@@ -1,11 +1,50 @@
 #include "cli/deck_report.h"
 
 #include <algorithm>
+#include <filesystem>
+
+#include "model/output_row.h"
 
 namespace mbcosim::cli {
 
-DeckReport load_path(const std::string& deck, const SymbolValues& symbols) {
-  return read_deck(FolderSource(".", /*unrestricted=*/true), deck, {.symbols = symbols});
+namespace {
+
+/// The user's files; notes the names of those that were read.
+class NotedFiles : public FolderSource {
+ public:
+  explicit NotedFiles(std::vector<std::string>* read)
+      : FolderSource(".", /*unrestricted=*/true), read_(read) {}
+  Result<std::string> read(const std::string& name) const override {
+    if (read_) read_->push_back(name);
+    return FolderSource::read(name);
+  }
+
+ private:
+  std::vector<std::string>* read_;
+};
+
+/// The names that a run may write.
+std::vector<std::string> result_names(const std::string& prefix) {
+  std::vector<std::string> names;
+  for (const char* end : {"out", "log", "nc"}) names.push_back(prefix + "." + end);
+  for (int k = 0; k < static_cast<int>(OutputFile::count); ++k)
+    names.push_back(prefix + "." + extension(static_cast<OutputFile>(k)));
+  return names;
+}
+
+}  // namespace
+
+DeckReport load_path(const std::string& deck, const SymbolValues& symbols,
+                     std::vector<std::string>* read) {
+  return read_deck(NotedFiles(read), deck, {.symbols = symbols});
+}
+
+std::string input_to_overwrite(const std::string& prefix, const std::vector<std::string>& read) {
+  std::error_code unknown;  // of a path that does not exist
+  for (const std::string& name : result_names(prefix))
+    for (const std::string& input : read)
+      if (std::filesystem::equivalent(name, input, unknown)) return input;
+  return {};
 }
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out) {

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "cli/commands.h"
 #include "simulation/load.h"
@@ -10,7 +11,12 @@
 namespace mbcosim::cli {
 
 /// Reads a deck from the user's own files, without the restrictions that uploaded decks are under.
-DeckReport load_path(const std::string& deck, const SymbolValues& symbols = {});
+/// `read` gets the names of all files that it consists of; may be null.
+DeckReport load_path(const std::string& deck, const SymbolValues& symbols = {},
+                     std::vector<std::string>* read = nullptr);
+
+/// One of the files `read` that results with this prefix would overwrite; empty: none.
+std::string input_to_overwrite(const std::string& prefix, const std::vector<std::string>& read);
 
 /// Diagnostics as text, one after another.
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out);

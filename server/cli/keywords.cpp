@@ -9,13 +9,18 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// [{"name": "joint", "title": "Joints", "words": [{"word": "clamp", "served": true}]}]
+/// [{"name": "joint", "title": "Joints", "words": [{"word": "clamp", "served": true}, {"word":
+/// "rotation", "served": false, "dead": true, "reason": "…"}]}]
 Json to_json(const std::vector<VocabularyGroup>& groups) {
   Json list = Json::array();
   for (const VocabularyGroup& group : groups) {
     Json words = Json::array();
     for (const VocabularyWord& word : group.words) {
       words.push_back({{"word", word.word}, {"served", word.served}});
+      if (!word.reason.empty()) {
+        words.back()["dead"] = word.dead;
+        words.back()["reason"] = word.reason;
+      }
       if (!word.sizes.empty()) words.back()["sizes"] = word.sizes;
     }
     list.push_back({{"name", group.name}, {"title", group.title}, {"words", words}});
@@ -27,7 +32,10 @@ void print(const std::vector<VocabularyGroup>& groups) {
   for (const VocabularyGroup& group : groups) {
     std::printf("%s\n", group.name.c_str());
     for (const VocabularyWord& word : group.words) {
-      std::printf("  %s%s\n", word.word.c_str(), word.served ? "" : "  (not supported)");
+      std::printf("  %s%s\n", word.word.c_str(),
+                  word.served ? ""
+                  : word.dead ? "  (dead)"
+                              : "  (not supported)");
     }
   }
 }

@@ -1,6 +1,9 @@
 /// mbcosim: runs and inspects decks on the command line.
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <new>
 
 #include "cli/commands.h"
@@ -69,10 +72,20 @@ void add_symbols(CLI::App& app, mbcosim::SymbolValues& symbols) {
       ->allow_extra_args(false);
 }
 
+/// A full device or a closed pipe: `exit_code` is no success then.
+int finished(int exit_code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
+  std::fprintf(stderr, "error: cannot write to the standard output: %s\n", std::strerror(errno));
+  return exit_code == mbcosim::cli::kDone ? mbcosim::cli::kRefused : exit_code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   using namespace mbcosim::cli;
+  // Files beyond their limit and closed pipes are errors of the calls that write.
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
   CLI::App app{"Multibody and co-simulation solver for decks in MBDyn's input language.",
                "mbcosim"};
   app.set_version_flag("--version", std::string("mbcosim ") + MBCOSIM_VERSION);
@@ -98,6 +111,8 @@ int main(int argc, char** argv) {
                    "Longest wait for an external code [s]")
       ->capture_default_str()
       ->check(CLI::Range(1e-3, 1e6));
+  run_app->add_flag("--real-time", run_options.real_time,
+                    "Hold the run back to the wall clock; steps that end late are counted");
   run_app->callback([&] { exit_code = run(run_options); });
 
   std::string deck;
@@ -153,5 +168,5 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "error: %s\n", e.what());
     return kNumericalFailure;
   }
-  return exit_code;
+  return finished(exit_code);
 }

@@ -4,6 +4,7 @@
 #include "cli/commands.h"
 #include "cli/deck_report.h"
 #include "cli/interrupt.h"
+#include "cli/pace.h"
 #include "cli/progress.h"
 #include "mbdyn/channels.h"
 #include "output/result_files.h"
@@ -11,19 +12,32 @@
 namespace mbcosim::cli {
 namespace {
 
-StepReport run_to_end(Simulation& simulation, const CancelToken* cancel, bool quiet) {
+void tell(const Pace& pace, std::int64_t steps) {
+  if (pace.late() > 0)
+    std::fprintf(stderr, "note: %lld of %lld steps ended late, the latest by %.3g s\n",
+                 static_cast<long long>(pace.late()), static_cast<long long>(steps),
+                 pace.worst_delay());
+}
+
+StepReport run_to_end(Simulation& simulation, const CancelToken* cancel,
+                      const RunOptions& options) {
   const double final_time = simulation.model().initial_value.final_time;
   Progress progress(stderr, simulation.time(), final_time);
-  if (quiet || !progress.visible()) return simulation.run_until(final_time, cancel);
+  const bool visible = !options.quiet && progress.visible();
+  if (!visible && !options.real_time) return simulation.run_until(final_time, cancel);
+  Pace pace(simulation.time());
   StepReport total, last;
   do {
     last = simulation.step(cancel);
+    if (options.real_time) pace.wait_for(last.time, cancel);
     last.steps_done += total.steps_done;
     last.total_iterations += total.total_iterations;
     last.solver_seconds += total.solver_seconds;
     total = last;
-    progress.update(total);
+    if (visible) progress.update(total);
   } while (total.outcome == StepOutcome::accepted);
+  if (options.real_time) tell(pace, total.steps_done);
+  if (!visible) return total;
   progress.clear();
   if (total.outcome == StepOutcome::finished) {
     std::fprintf(stderr, "done: %lld steps, %lld iterations, t = %.10g s, %.3f s in the solver\n",
@@ -39,12 +53,15 @@ ExitCode complain(const Error& error) {
 }
 
 ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& writer,
-                  const CancelToken* cancel, bool quiet) {
+                  const CancelToken* cancel, const RunOptions& options) {
   auto simulation = Simulation::create(model, cancel, writer);
   if (!simulation) return complain(simulation.error());
   if ((*simulation)->finished()) return kDone;
-  const StepReport done = run_to_end(**simulation, cancel, quiet);
+  const StepReport done = run_to_end(**simulation, cancel, options);
   if (done.error) return complain(*done.error);
+  if (done.outcome == StepOutcome::finished && done.time < model->initial_value.final_time)
+    std::fprintf(stderr, "note: the run ended at t = %.9g; the reason stands in its .out file\n",
+                 done.time);
   return done.outcome == StepOutcome::interrupted ? kInterrupted : kDone;
 }
 
@@ -83,10 +100,20 @@ ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWri
 
 int run(const RunOptions& options) {
   InterruptGuard interrupt;
-  const LoadReport report = load_path(options.deck, options.symbols);
+  std::vector<std::string> read;
+  const LoadReport report = load_path(options.deck, options.symbols, &read);
   std::fputs(report.printed.c_str(), stdout);
   print_diagnostics(report.diagnostics, stderr);
   if (!report.ok()) return exit_code_of(report);
+  const bool nothing = report.model->unknowns == 0 && report.model->elements.empty();
+  if (nothing && report.printed.empty()) {  // else a calculation
+    std::fprintf(stderr,
+                 "%s: error: there is nothing to run: the deck has no nodes and no elements\n"
+                 "  hint: a deck consists of the blocks data, initial value, control data, nodes "
+                 "and elements\n",
+                 options.deck.c_str());
+    return kDeckRefused;
+  }
   const std::vector<const DeckChannel*> channels = deck_channels(*report.model);
   const bool coupled = options.deck_sockets && !channels.empty();
   for (const StructuralPort& port : report.model->structural_ports)
@@ -94,14 +121,21 @@ int run(const RunOptions& options) {
       std::fprintf(stderr, "note: nobody is coupled to port \"%s\"; its loads stay zero\n",
                    port.name.c_str());
 
-  const auto writer =
-      make_result_writer(*report.model, options.prefix.empty() ? options.deck : options.prefix);
-  const ExitCode exit_code = coupled
-                                 ? simulate_coupled(report.model, writer, interrupt, options)
-                                 : simulate(report.model, writer, interrupt.token(), options.quiet);
+  const std::string prefix = options.prefix.empty() ? options.deck : options.prefix;
+  if (const std::string input = input_to_overwrite(prefix, read); !input.empty()) {
+    std::fprintf(stderr,
+                 "error: the results would overwrite \"%s\", which the deck consists of\n"
+                 "  hint: choose other names with `-o PREFIX`\n",
+                 input.c_str());
+    return kRefused;
+  }
+  const auto writer = make_result_writer(*report.model, prefix);
+  const ExitCode exit_code = coupled ? simulate_coupled(report.model, writer, interrupt, options)
+                                     : simulate(report.model, writer, interrupt.token(), options);
+  const bool said = !writer->status();
   const auto written = writer->finish();
-  if (!written) return complain(written.error());
-  return exit_code;
+  if (!written && !said) complain(written.error());
+  return written ? exit_code : kRefused;
 }
 
 }  // namespace mbcosim::cli

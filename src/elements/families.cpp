@@ -16,6 +16,9 @@ const Registry& full_registry() {
     register_control(r);
     register_hydraulics(r);
     register_modal(r);
+    register_thermal(r);
+    register_user_elements(r);
+    register_bulk(r);
     register_drives(r);
     register_laws(r);
     register_unsupported(r);

@@ -17,6 +17,9 @@ void register_electric(Registry& registry);    ///< sensors and motors
 void register_control(Registry& registry);     ///< `electric: …, discrete control`
 void register_hydraulics(Registry& registry);  ///< elements and fluids
 void register_modal(Registry& registry);       ///< modal joint, modal force
+void register_thermal(Registry& registry);
+void register_user_elements(Registry& registry);  ///< what MBDyn has in run-time loaded modules
+void register_bulk(Registry& registry);
 
 void register_unsupported(Registry& registry);  ///< words of the language that are refused by name
 

@@ -21,13 +21,9 @@ void refuse_elements(Registry& r) {
           "aerodynamic external modal"});
   refuse(r, "elements", "induced velocity element", {"induced velocity", "rotor"});
   refuse(r, "elements", "aerodynamics", {"aero modal", "air properties", "gust"});
-  refuse(r, "elements", "thermal element", {"thermal"});
-  refuse(r, "elements", "bulk element", {"bulk"});
-  refuse(r, "elements", "element of a run-time loaded module", {"user defined", "loadable"});
-  refuse(r, "elements", "beam", {"hbeam"});
   refuse(r, "elements", "joint regularization", {"joint regularization"});
   refuse(r, "elements", "output element",
-         {"output element", "stream output", "stream motion output", "RTAI output"});
+         {"output element", "stream output", "stream motion output"});
   refuse(r, "elements", "element",
          {"inertia", "automatic structural", "genel", "hydraulic", "electric", "beam", "beam2",
           "beam3", "force", "couple", "joint", "body", "gravity"});
@@ -44,7 +40,6 @@ void refuse_types(Registry& r) {
           "cardano pin",
           "cardano rotation",
           "clamp",
-          "coincidence",
           "deformable axial joint",
           "deformable displacement hinge",
           "deformable displacement joint",
@@ -55,11 +50,9 @@ void refuse_types(Registry& r) {
           "drive displacement",
           "drive displacement pin",
           "drive hinge",
-          "gimbal hinge",
           "gimbal rotation",
           "imposed displacement",
           "imposed displacement pin",
-          "imposed kinematics",
           "imposed orientation",
           "in line",
           "in plane",
@@ -68,9 +61,6 @@ void refuse_types(Registry& r) {
           "linear acceleration",
           "linear velocity",
           "modal",
-          "offset displacement joint",
-          "plane displacement",
-          "plane displacement pin",
           "plane hinge",
           "plane pin",
           "point contact",
@@ -81,7 +71,6 @@ void refuse_types(Registry& r) {
           "rod",
           "rod bezier",
           "rod with offset",
-          "rotation",
           "screw",
           "spherical hinge",
           "spherical pin",
@@ -93,25 +82,24 @@ void refuse_types(Registry& r) {
           "universal pin",
           "universal rotation",
           "viscous body"});
-  for (const char* head : {"force", "couple"})
-    refuse(
-        r, head, "force",
-        {"absolute", "absolute displacement", "absolute internal", "absolute internal displacement",
-         "abstract", "abstract internal", "conservative", "external modal",
-         "external modal mapping", "external structural", "external structural mapping", "follower",
-         "follower internal", "modal", "total", "total internal"});
+  refuse(r, "couple", "couple",
+         {"absolute", "absolute internal", "conservative", "follower", "follower internal",
+          "total internal"});
+  refuse(
+      r, "force", "force",
+      {"absolute", "absolute displacement", "absolute internal", "absolute internal displacement",
+       "abstract", "abstract internal", "conservative", "external modal", "external modal mapping",
+       "external structural", "external structural mapping", "follower", "follower internal",
+       "modal", "total", "total internal"});
   refuse(r, "genel", "genel",
-         {"clamp", "cross spring damper", "cross spring damper support", "cross spring support",
-          "distance", "mass", "rotor trim", "scalar filter", "spring", "spring damper",
-          "spring damper support", "spring support", "state space MIMO", "state space SISO",
-          "swash plate"});
+         {"clamp", "cross spring support", "distance", "mass", "rotor trim", "scalar filter",
+          "spring", "spring support", "state space MIMO", "state space SISO", "swash plate"});
   refuse(r, "electric", "electric element",
          {"accelerometer", "discrete control", "displacement", "motor"});
   refuse(r, "hydraulic", "hydraulic element",
          {"accumulator", "actuator", "control valve", "control valve2", "dynamic control valve",
-          "dynamic pipe", "flow valve", "full pipe", "full pipe new", "imposed flow",
-          "imposed pressure", "minor loss", "orifice", "pipe", "pressure flow control valve",
-          "pressure valve", "tank", "three way minor loss"});
+          "dynamic pipe", "flow valve", "minor loss", "orifice", "pipe",
+          "pressure flow control valve", "pressure valve", "tank", "three way minor loss"});
 }
 
 void refuse_objects(Registry& r) {
@@ -135,7 +123,6 @@ void refuse_objects(Registry& r) {
           "meter",
           "mult",
           "node",
-          "octave",
           "parabolic",
           "periodic",
           "piecewise linear",
@@ -144,7 +131,6 @@ void refuse_objects(Registry& r) {
           "random",
           "sample and hold",
           "scalar function",
-          "sh",
           "sine",
           "step",
           "step5",
@@ -159,8 +145,6 @@ void refuse_objects(Registry& r) {
           "cubic elastic generic",
           "double linear elastic",
           "double linear viscoelastic",
-          "hookean linear elastic isotropic",
-          "hookean linear viscoelastic isotropic",
           "inverse square elastic",
           "invariant angular",
           "isotropic hardening elastic",
@@ -169,7 +153,6 @@ void refuse_objects(Registry& r) {
           "linear elastic generic",
           "linear elastic generic axial torsion coupling",
           "linear elastic isotropic",
-          "linear elastic orthotropic",
           "linear viscoelastic",
           "linear viscoelastic bistop",
           "linear viscoelastic generic",
@@ -180,9 +163,6 @@ void refuse_objects(Registry& r) {
           "linear viscous isotropic",
           "linear time variant viscoelastic generic",
           "log elastic",
-          "mooney rivlin elastic",
-          "neo hookean elastic",
-          "neo hookean viscoelastic",
           "nlp elastic",
           "nlp viscoelastic",
           "nlp viscous",
@@ -192,16 +172,15 @@ void refuse_objects(Registry& r) {
           "scalar function elastic",
           "scalar function elastic isotropic",
           "scalar function elastic orthotropic",
-          "scalar function viscoelastic isotropic",
-          "scalar function viscoelastic orthotropic",
           "shock absorber",
           "symbolic elastic",
-          "symbolic elastic isotropic",
           "symbolic viscoelastic",
           "symbolic viscous",
           "turbulent viscoelastic"});
-  refuse(r, "file driver", "file driver",
-         {"fixed step", "variable step", "socket", "stream", "RTAI input"});
+  refuse(r, "law", "law of solid elements",
+         {"hookean linear elastic isotropic", "hookean linear viscoelastic isotropic",
+          "mooney rivlin elastic", "neo hookean elastic", "neo hookean viscoelastic"});
+  refuse(r, "file driver", "file driver", {"fixed step", "variable step", "socket", "stream"});
   refuse(r, "function", "scalar function",
          {"chebychev", "const", "cubic spline", "div", "exp", "linear", "log", "mul", "multilinear",
           "pow", "sub", "sum"});

@@ -4,6 +4,8 @@
 
 #include "input/cards.h"
 #include "input/deck.h"
+#include "model/drive_trace.h"
+#include "model/model_part.h"
 
 namespace mbcosim {
 
@@ -89,8 +91,31 @@ void read_drive_output(DeckCard& card, NamedDrive& d) {
         default:
           d.output_value = card.yes_no("output");
       }
-    } while (card.more() && card.peek_word() != "output");
+    } while (card.more() && card.peek_word() != "output" && card.peek_word() != "outputtrace");
   }
+}
+
+void drop_missing_derivative(DeckCard& card, const Drive& drive, bool& wanted) {
+  if (!wanted || drive.has_derivative()) return;
+  card.warn("this drive has no derivative to write");
+  wanted = false;
+}
+
+/// `output trace, {value, {yes|no} [, derivative, {yes|no}] | {yes|no}}`: a bare `yes` adds the
+/// derivative where there is one.
+void read_drive_trace(DeckCard& card, const NamedDrive& d) {
+  if (!card.keyword("output trace")) return;
+  DriveTraces::Trace trace{d.label, d.drive, false, false};
+  if (card.keyword("value")) {
+    trace.value = card.yes_no("trace of the value");
+    if (card.keyword("derivative")) trace.derivative = card.yes_no("trace of the derivative");
+  } else {
+    trace.value = card.yes_no("output trace");
+    trace.derivative = trace.value && d.drive->has_derivative();
+  }
+  drop_missing_derivative(card, *d.drive, trace.derivative);
+  if (trace.value || trace.derivative)
+    part<DriveTraces>(card.builder()).traces.push_back(std::move(trace));
 }
 
 void read_drive_caller(DeckCard& card) {
@@ -103,10 +128,8 @@ void read_drive_caller(DeckCard& card) {
   if (card.peek_word() != "output")
     deck.drives_without_output.push_back(static_cast<int>(card.model().drives.size()));
   read_drive_output(card, d);
-  if (d.output_derivative && !d.drive->has_derivative()) {
-    card.warn("this drive has no derivative to write");
-    d.output_derivative = false;
-  }
+  drop_missing_derivative(card, *d.drive, d.output_derivative);
+  read_drive_trace(card, d);
   card.expect_end();
   deck.drives[d.label] = {d.drive, card.head()};
   deck.drive_depth[d.label] = card.drive_depth();
@@ -209,9 +232,29 @@ void read_c81_data(DeckCard& card) {
   card.deck().c81_data[label] = {true, card.head()};
   card.warn("without effect: aerodynamic elements are not supported yet");
 }
+
+/// "libs/libmodule-wheel2.la" -> "wheel2".
+std::string module_name(std::string file) {
+  if (const std::size_t slash = file.rfind('/'); slash != std::string::npos)
+    file.erase(0, slash + 1);
+  for (const char* suffix : {".la", ".so"})
+    if (file.ends_with(suffix)) file.erase(file.size() - 3);
+  for (const char* prefix : {"lib", "module-"})
+    if (file.starts_with(prefix)) file.erase(0, std::string_view(prefix).size());
+  return file;
+}
+
 void read_module_load(DeckCard& card) {
-  card.fail_at(card.head(),
-               "\"module load\" (run-time loaded module) is not supported: decks load no code");
+  const std::string name = module_name(card.quoted("name of the module"));
+  const SourceSpan where = card.last();
+  for (const char* known : {"wheel2", "inline_friction", "asynchronous_machine"}) {
+    if (name != known) continue;
+    while (card.more()) card.skip();  // arguments of the module
+    card.note("the elements of \"" + name + "\" are built in; nothing is loaded");
+    return;
+  }
+  card.fail_at(where, "module \"" + name + "\" is not served: decks load no code",
+               "built in are the elements of wheel2, inline_friction and asynchronous_machine");
 }
 
 }  // namespace

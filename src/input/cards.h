@@ -12,13 +12,23 @@ namespace mbcosim {
 bool read_anywhere_card(DeckCard& card);
 void read_data_card(DeckCard& card);
 void read_initial_value_card(DeckCard& card);
+/// Cards of the block `inverse dynamics`, which stands in the place of `initial value`.
+void read_inverse_dynamics_card(DeckCard& card);
 void read_control_card(DeckCard& card);
 void read_node_card(DeckCard& card);
 void read_driver_card(DeckCard& card);
 void read_element_card(DeckCard& card);
 
+/// The part in inverse dynamics of the elements that a card just read (those from number `before`
+/// on): what their type has, then `inverse dynamics, ...` when it is there.
+void set_inverse_role(DeckCard& card, std::size_t before);
+void read_inverse_role(DeckCard& card, std::size_t before);
+/// When the deck is read: nodes and elements of an inverse dynamics problem.
+void finish_inverse_dynamics(Deck& deck);
+
 /// The words that `read_initial_value_card` and `read_control_card` accept.
 std::vector<std::string> initial_value_words();
+std::vector<std::string> inverse_dynamics_words();
 std::vector<std::string> control_words();
 
 /// Kinds of nodes as cards name them.

@@ -5,6 +5,8 @@
 #include "input/deck.h"
 #include "input/suggest.h"
 #include "model/family.h"
+#include "model/model_part.h"
+#include "model/user_elements.h"
 
 namespace mbcosim {
 
@@ -35,6 +37,9 @@ void read_use(DeckCard& card) {
         break;
       case 3:
         c.assemble_beams = true;
+        break;
+      case 6:
+        part<UserElementsInAssembly>(card.builder());
         break;
       case 7:
         closed = true;
@@ -183,12 +188,15 @@ void read_default_beam_output(DeckCard& card) {
 
 void read_output_results(DeckCard& card) {
   ControlSettings& c = control(card);
-  if (card.required("result format", {"netcdf", "text"}) == 1) return;
+  const int format = card.required("result format", {"netcdf", "text", "adams", "motion view"});
+  if (format == 1) return;
+  if (format >= 2)
+    card.fail("this format is written by special builds of the reference solver only",
+              "write `output results: netcdf`", "not-supported");
   c.netcdf = true;
-  while (card.more()) {
+  while (card.more())
     if (card.required("option", {"sync", "no text", "classic", "netcdf4"}) == 1)
       card.warn("`no text` is ignored: the text files are written beside the NetCDF file");
-  }
 }
 
 void read_title(DeckCard& card) { card.model().title = card.quoted("title"); }
@@ -269,11 +277,31 @@ void read_air_flag(DeckCard& card) {
 }
 
 void read_restart(DeckCard& card) {
-  ignore_rest(card, "restart files are not written; use checkpoints");
+  switch (card.one_of({"iterations", "time", "times"})) {
+    case 0:
+      card.integer_at_least("iterations between two restart files", 1);
+      break;
+    case 1:
+      card.real_above("time between two restart files", 0, false);
+      break;
+    case 2: {
+      const int count = card.integer_at_least("number of restart files", 1);
+      for (int k = 0; k < count; ++k) card.real("time of a restart file");
+      break;
+    }
+    default:
+      break;
+  }
+  card.keyword("with solution array");
+  card.warn_at(card.head(), "restart files are not written",
+               "snapshots of the service (`CreateSnapshot`) keep a run, and its checkpoints");
 }
 void ignored(DeckCard& card) { ignore_rest(card, "this card has no effect"); }
 void read_solution_array(DeckCard& card) {
-  card.fail_at(card.head(), "\"read solution array\" is not supported; use checkpoints");
+  card.fail_at(card.head(),
+               "\"read solution array\" is not served: the file depends on the machine and "
+               "the build that wrote it",
+               "restore a snapshot of the service instead", "not-supported");
 }
 void read_output_file_name(DeckCard& card) {
   card.fail_at(card.head(), "\"output file name\" is obsolete",
@@ -334,7 +362,9 @@ bool read_count(DeckCard& card) {
   for (const FamilyFacts& f : all_families())
     if (*f.old_count_card && card.statement().word == f.old_count_card)
       warn_old_name(card, card.head(), kind_names(*kind).card);
-  card.deck().counts[static_cast<int>(*kind)].declared = card.more() ? card.count("count") : 0;
+  Count& count = card.deck().counts[static_cast<int>(*kind)];
+  count.where = card.head();
+  count.declared = card.more() ? card.count("count") : 0;
   return true;
 }
 

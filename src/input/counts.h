@@ -44,6 +44,7 @@ std::optional<Kind> kind_of_count_card(std::string_view word);
 struct Count {
   std::optional<int> declared;  ///< nothing: no count card
   int found = 0;
+  SourceSpan where;  ///< of the count card
 };
 
 using Counts = std::array<Count, kKinds>;

@@ -36,7 +36,8 @@ void Deck::count_entity(DeckCard& card, Kind kind, int label) {
   card.set_subject("");
   card.fail(std::string(names.singular) + " " + std::to_string(label) +
                 " exceeds the declared number (" + number + ")",
-            std::string("see the card \"") + names.card + "\" of the control data");
+            std::string("see the card \"") + names.card + "\" of the control data" +
+                (count.where.file >= 0 ? " at " + reading.place(count.where) : ""));
 }
 
 }  // namespace mbcosim

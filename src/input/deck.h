@@ -62,7 +62,7 @@ struct Deck {
   SourceSpan method_where;
   SourceSpan final_time_where, strategy_where;
   bool output_rate_set = false;   ///< by `output frequency` or `output meter`
-  bool inverse_dynamics = false;  ///< refused: nothing more is read
+  bool inverse_dynamics = false;  ///< is it the problem?
 
   std::unordered_map<int, std::size_t> frames;  ///< label -> index in Model::frames
   LabelMap<DrivePtr> drives;

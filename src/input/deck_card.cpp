@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "input/deck.h"
+#include "input/refusals.h"
 #include "input/suggest.h"
 
 namespace mbcosim {
@@ -288,12 +289,26 @@ void DeckCard::fail_unsupported(SourceSpan where, const std::string& word,
 
 void DeckCard::refuse_unsupported(SourceSpan where, const std::string& context,
                                   const std::string& word) {
+  refuse_for_good(where, context, word);
   const auto group = registry().not_supported.find(context);
   if (group == registry().not_supported.end()) return;
   const auto entry = group->second.find(word);
   if (entry == group->second.end()) return;
   const auto shown = registry().display.find(word);
   fail_unsupported(where, shown == registry().display.end() ? word : shown->second, entry->second);
+}
+
+void DeckCard::refuse_for_good(SourceSpan where, const std::string& context,
+                               const std::string& word) {
+  const auto group = refusals().find(context);
+  if (group == refusals().end()) return;
+  const auto entry = group->second.find(word);
+  if (entry == group->second.end()) return;
+  const Refusal& refusal = entry->second;
+  deck_.reading.fail(where,
+                     (subject_.empty() ? "" : subject_ + ": ") + "\"" + refusal.word +
+                         "\" is not served: " + refusal.reason,
+                     refusal.remedy, "not-supported");
 }
 
 void DeckCard::warn_at(SourceSpan where, const std::string& message, const std::string& hint) {

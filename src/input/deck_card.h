@@ -134,6 +134,8 @@ class DeckCard final : public Card, public BeamOutputDefault {
                                      const std::string& what);
   /// The same, when `word` is registered as such in `context` ("elements", "joint", "drive", ...).
   void refuse_unsupported(SourceSpan where, const std::string& context, const std::string& word);
+  /// The same for words that will not be served, with the reason and what to write instead.
+  void refuse_for_good(SourceSpan where, const std::string& context, const std::string& word);
   /// For `driven`: what follows, as a statement of its own.
   Statement rest_as_statement() { return cursor_.rest_as_statement(); }
   Hint hint();  ///< reads a quoted hint
@@ -235,10 +237,9 @@ class DeckCard final : public Card, public BeamOutputDefault {
   void read_order(NodeDof& dof, bool dynamic);
 
   Hint* use_hint(std::string_view name);
-  /// What `read` makes of the hint `name`, whose first word may be `form`; without one, `given`.
+  /// What `read` makes of the hint `name`; without one, `given`.
   template <class Given, class Read>
-  Given from_hint(std::string_view name, std::string_view form, Given given, Read read);
-  int sample(DeckCard& arguments, std::string_view what);
+  Given from_hint(std::string_view name, Given given, Read read);
 
   Deck& deck_;
   std::vector<Hint>* hints_ = nullptr;

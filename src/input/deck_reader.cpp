@@ -4,6 +4,7 @@
 
 #include "input/cards.h"
 #include "input/suggest.h"
+#include "model/inverse_problem.h"
 
 namespace mbcosim {
 
@@ -40,7 +41,7 @@ void DeckReader::record(const DeckError& error, const DeckCard& card) {
 
 void DeckReader::read() {
   Reading& reading = deck_.reading;
-  while (!done_ && !reading.full() && !reading.exited && !deck_.inverse_dynamics) {
+  while (!done_ && !reading.full() && !reading.exited) {
     const std::optional<Statement> statement = statements_.next();
     if (!statement) break;
     reading.set_trail(statement->trail);
@@ -48,7 +49,7 @@ void DeckReader::read() {
     if (done_) warn_about_rest(*statement);
   }
   reading.set_trail(-1);
-  if (!reading.full() && !reading.exited && !deck_.inverse_dynamics) finish();
+  if (!reading.full() && !reading.exited) finish();
 }
 
 void DeckReader::read_statement(const Statement& statement) {
@@ -78,7 +79,7 @@ void DeckReader::dispatch(DeckCard& card) {
     case Block::data:
       return read_data_card(card);
     case Block::initial_value:
-      return read_initial_value_card(card);
+      return is_inverse() ? read_inverse_dynamics_card(card) : read_initial_value_card(card);
     case Block::control_data:
       return read_control_card(card);
     case Block::nodes:
@@ -97,6 +98,13 @@ void DeckReader::dispatch(DeckCard& card) {
 
 // ------------------------------------------------------------------------------------------------
 // blocks
+
+/// The block of the solution has the name of the problem.
+std::string DeckReader::block_name(int block) const {
+  return block == static_cast<int>(Block::initial_value) && is_inverse() ? "inverse dynamics"
+                                                                         : kBlockNames[block];
+}
+bool DeckReader::is_inverse() const { return deck_.inverse_dynamics; }
 
 void DeckReader::open(Block block, const std::string& name, SourceSpan where) {
   block_ = latest_ = block;
@@ -122,9 +130,8 @@ void DeckReader::check_order(DeckCard& card, Block block) {
   }
   const Block last_required = std::min(block, Block::nodes);
   for (int b = static_cast<int>(latest_) + 1; b < static_cast<int>(last_required); ++b) {
-    deck_.reading.report(
-        deck_.reading.diagnostic(Severity::error, "block-order", card.last(),
-                                 std::string("block \"") + kBlockNames[b] + "\" expected"));
+    deck_.reading.report(deck_.reading.diagnostic(Severity::error, "block-order", card.last(),
+                                                  "block \"" + block_name(b) + "\" expected"));
     return;
   }
 }
@@ -145,17 +152,17 @@ void DeckReader::begin(DeckCard& card) {
   if (name == "multistep") warn_old_name(card, card.last(), "initial value");
   Block block = Block::foreign;
   for (int b = 1; b <= static_cast<int>(Block::elements); ++b)
-    if (normalized(kBlockNames[b]) == word) block = static_cast<Block>(b);
+    if (normalized(block_name(b)) == word) block = static_cast<Block>(b);
   if (block == Block::foreign) {
     const Block latest = latest_;
     open(block, name, card.head());
     latest_ = latest;
-    card.fail_at(
-        where, "unknown block \"" + name + "\"",
-        suggestion(name, {"data", "initial value", "control data", "nodes", "drivers", "elements"}),
-        "unknown-word");
+    card.fail_at(where, "unknown block \"" + name + "\"",
+                 suggestion(name, {"data", block_name(static_cast<int>(Block::initial_value)),
+                                   "control data", "nodes", "drivers", "elements"}),
+                 "unknown-word");
   }
-  const std::string written = kBlockNames[static_cast<int>(block)];
+  const std::string written = block_name(static_cast<int>(block));
   const Block latest = latest_;
   try {
     check_order(card, block);
@@ -165,6 +172,7 @@ void DeckReader::begin(DeckCard& card) {
     throw;
   }
   open(block, written, card.head());
+  if (block == Block::initial_value && is_inverse()) part<InverseProblem>(deck_.builder);
   if (card.more())
     card.fail_at(card.next(), "unexpected argument after \"" + written + "\"", "",
                  "unexpected-argument");
@@ -205,18 +213,20 @@ void DeckReader::warn_about_rest(const Statement& last) {
 void DeckReader::check_counts() {
   Reading& reading = deck_.reading;
   std::string missing;
+  SourceSpan where = begun_;
   for (int k = 0; k < kKinds; ++k) {
     const Count& count = deck_.counts[k];
     const int lack = count.declared ? *count.declared - count.found : 0;
     if (lack <= 0) continue;
     const KindNames& names = kind_names(static_cast<Kind>(k));
+    if (missing.empty() && count.where.file >= 0) where = count.where;
     missing += (missing.empty() ? "" : ", ") + std::to_string(lack) + " " +
                (lack == 1 ? names.singular : names.plural);
   }
   if (!missing.empty())
-    reading.report(reading.diagnostic(Severity::error, "missing-entities", begun_,
+    reading.report(reading.diagnostic(Severity::error, "missing-entities", where,
                                       "end of the deck: " + missing + " missing",
-                                      "see the counts of the control data"));
+                                      "correct the counts of the control data or add what lacks"));
 }
 
 void DeckReader::check_parameters() {
@@ -280,6 +290,7 @@ void DeckReader::finish() {
   check_parameters();
   check_initial_value();
   Model& model = deck_.builder.model();
+  if (is_inverse()) finish_inverse_dynamics(deck_);
   const InitialValueSettings& iv = model.initial_value;
   if (iv.final_time < iv.initial_time && deck_.final_time_where.file >= 0)
     reading.warn(deck_.final_time_where,

@@ -19,6 +19,8 @@ class DeckReader {
   void dispatch(DeckCard& card);
   void begin(DeckCard& card);
   void end(DeckCard& card);
+  std::string block_name(int block) const;
+  bool is_inverse() const;  ///< is the problem one of inverse dynamics?
   void open(Block block, const std::string& name, SourceSpan where);
   void close();
   void check_order(DeckCard& card, Block block);

@@ -28,7 +28,7 @@ const Registry::ElementReader& typed_reader(DeckCard& card, const Registry::Head
                                             ElementInfo& info) {
   const Registry& registry = card.registry();
   const std::string& word = card.statement().word;
-  const std::string what = word + " type";
+  const std::string what = registry.display.at(word) + " type";
   if (!card.more()) card.fail(what + " missing", "", "missing-argument");
   const SourceSpan where = card.next();
   const std::string type = card.peek_word();
@@ -137,7 +137,10 @@ void read_element(DeckCard& card, Driven* driven = nullptr) {
       e.set->info(e.index).hints = std::move(samples);
     }
   }
+  set_inverse_role(card, before);
+  read_inverse_role(card, before);
   read_trailing_output(card, f, before);
+  read_inverse_role(card, before);
   card.expect_end();
   if (counted_later && card.model().elements.size() > before)
     card.deck().count_entity(card, kind_of(f), info.label);

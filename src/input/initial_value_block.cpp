@@ -344,7 +344,7 @@ void read_data_card(DeckCard& card) {
       "problem", {"initial value", "multistep", "inverse dynamics", "parallel initial value"})) {
     case 2:
       card.deck().inverse_dynamics = true;
-      card.fail_unsupported(card.last(), "inverse dynamics", "problem");
+      break;
     case 3:
       card.fail_unsupported(card.last(), "parallel initial value", "problem");
     case 1:

@@ -18,6 +18,8 @@ set(SOURCES
   functions.cpp
   hints.cpp
   initial_value_block.cpp
+  inverse_dynamics_block.cpp
+  late_drive.cpp
   lexer.cpp
   machine.cpp
   model_functions.cpp
@@ -26,6 +28,7 @@ set(SOURCES
   nodes_block.cpp
   parser.cpp
   plugin.cpp
+  refusals.cpp
   run_strings.cpp
   reading.cpp
   shared_objects.cpp

@@ -163,8 +163,9 @@ void read_structural_node(DeckCard& card, int label, StructuralNode node) {
       node.scale = card.keyword("default") ? deck.structural_scale : card.real("scale", 1);
     read_node_output(card, node);
     const bool moving = node.has_momentum() || node.kind == StructuralKind::modal;
-    node.accelerations |= moving && deck.output.accelerations;
-    if (moving) read_dynamic_output(card, node);
+    const bool accelerated = moving || deck.inverse_dynamics;
+    node.accelerations |= accelerated && deck.output.accelerations;
+    if (accelerated) read_dynamic_output(card, node);
   }
   card.expect_end();
   if (control.is_static && node.kind == StructuralKind::dynamic)

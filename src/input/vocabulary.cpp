@@ -4,6 +4,7 @@
 
 #include "input/cards.h"
 #include "input/functions.h"
+#include "input/refusals.h"
 #include "input/symbols.h"
 
 namespace mbcosim {
@@ -37,7 +38,13 @@ class Collector {
     const auto refused = registry_.not_supported.find(context);
     if (refused != registry_.not_supported.end())
       for (const auto& entry : refused->second)
-        if (!words.count(entry.first)) words[entry.first] = {shown(entry.first), false, {}};
+        if (!words.count(entry.first))
+          words[entry.first] = {shown(entry.first), false, "", false, {}};
+    const auto never = refusals().find(context);
+    if (never != refusals().end())
+      for (const auto& [word, refusal] : never->second)
+        if (!words.count(word))
+          words[word] = {refusal.word, false, sentence(refusal), refusal.dead, {}};
     VocabularyGroup g{std::move(name), std::move(title), {}};
     for (const auto& entry : words) g.words.push_back(entry.second);
     std::sort(g.words.begin(), g.words.end(),
@@ -54,6 +61,9 @@ class Collector {
   std::vector<VocabularyGroup> groups;
 
  private:
+  static std::string sentence(const Refusal& r) {
+    return r.remedy.empty() ? r.reason : r.reason + "; " + r.remedy;
+  }
   std::string shown(const std::string& word) const {
     const auto found = registry_.display.find(word);
     return found == registry_.display.end() ? word : found->second;
@@ -78,7 +88,8 @@ std::vector<std::string> constant_names() {
 
 void add_blocks(Collector& c) {
   c.plain("block", "Blocks",
-          {"data", "initial value", "control data", "nodes", "drivers", "elements"});
+          {"data", "initial value", "inverse dynamics", "control data", "nodes", "drivers",
+           "elements"});
   c.plain("statement", "Statements that may stand anywhere",
           {"begin",
            "end",
@@ -106,6 +117,7 @@ void add_blocks(Collector& c) {
            "scalar function",
            "hydraulic fluid"});
   c.plain("initial value card", "Cards of `initial value`", initial_value_words());
+  c.plain("inverse dynamics card", "Cards of `inverse dynamics`", inverse_dynamics_words());
   c.plain("control card", "Cards of `control data`", control_words());
   c.plain("node", "Nodes",
           {"structural", "abstract", "electric", "hydraulic", "thermal", "parameter"});
@@ -116,12 +128,17 @@ void add_elements(Collector& c, const Registry& registry) {
   for (const char* word : {"bind", "driven", "output"}) heads[word].word = word;
   c.group("element", "Elements and statements of the block `elements`", std::move(heads),
           "elements");
-  const std::pair<const char*, const char*> families[] = {{"joint", "Joints"},
-                                                          {"force", "Forces"},
-                                                          {"couple", "Couples"},
-                                                          {"genel", "Genels"},
-                                                          {"electric", "Electric elements"},
-                                                          {"hydraulic", "Hydraulic elements"}};
+  const std::pair<const char*, const char*> families[] = {
+      {"joint", "Joints"},
+      {"force", "Forces"},
+      {"couple", "Couples"},
+      {"genel", "Genels"},
+      {"electric", "Electric elements"},
+      {"thermal", "Thermal elements"},
+      {"bulk", "Bulk elements"},
+      {"userdefined", "User defined elements"},
+      {"jointregularization", "Joint regularizations"},
+      {"hydraulic", "Hydraulic elements"}};
   for (const auto& [head, title] : families) {
     const auto found = registry.heads.find(head);
     c.group(head, title, found == registry.heads.end() ? Words{} : c.of(found->second.types), head);

@@ -12,6 +12,8 @@ namespace mbcosim {
 struct VocabularyWord {
   std::string word;        ///< as written in documentation, "revolute hinge"
   bool served = true;      ///< false: known and refused by name
+  std::string reason;      ///< why it will never be served; else empty
+  bool dead = false;       ///< the reference solver refuses it, too
   std::vector<int> sizes;  ///< of constitutive laws: 1, 3, 6
 };
 

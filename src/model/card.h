@@ -130,9 +130,9 @@ class Card {
   virtual void set_current(const std::string& name, double value) = 0;
 
   /// The drive of a `driven` element's datum: `given` as the card has it or, with the hint
-  /// `<name>{<number>}`, the number that the hint's expression had when the element became active.
+  /// `<name>{<drive>}`, that drive, made anew whenever the element becomes active.
   virtual DrivePtr hinted(std::string_view name, DrivePtr given) = 0;
-  /// The same for `<name>{<x>, <y>, <z> [, <drive>]}`; the drive multiplies the vector.
+  /// The same for `<name>{<vector drive>}`.
   virtual Vec3DrivePtr hinted(std::string_view name, Vec3DrivePtr given) = 0;
 
   // ------------------------------------------------------------------ references to nodes and

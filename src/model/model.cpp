@@ -1,5 +1,6 @@
 #include "model/model.h"
 
+#include "model/inverse_problem.h"
 #include "model/output_row.h"
 
 namespace mbcosim {
@@ -100,7 +101,13 @@ NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) 
   if (context.phase == Phase::input) return r;
   const std::vector<double>& yp = context.state->yp;
   if (n.kind == StructuralKind::modal) return {at(yp, n.first + 6), at(yp, n.first + 9)};
-  if (!n.has_momentum()) return r;
+  if (!n.has_momentum()) {
+    if (const InverseProblem* inverse = inverse_problem(*this)) {
+      const double* a = &context.state->memory[inverse->memory + 6 * node];
+      r = {Vec3(a[0], a[1], a[2]), Vec3(a[3], a[4], a[5])};
+    }
+    return r;
+  }
   Inertia inertia;
   for (const ElementRef& body : node_bodies[node])
     if (body.set->is_active(*context.state, body.index))

@@ -1,7 +1,7 @@
 /// Private data of structural nodes (MBDyn input manual, "structural node", private data).
 #include <array>
 
-#include "model/model.h"
+#include "model/inverse_problem.h"
 
 namespace mbcosim {
 
@@ -59,8 +59,9 @@ Vec3 vector_datum(const Model& model, const EvalContext& context, int node, int 
       break;
   }
   // Unknown to the derivatives phase until it is over: as drive arguments accelerations start from
-  // zero.
-  if (context.phase == Phase::derivatives) return Vec3::Zero();
+  // zero. As in MBDyn those of dummy nodes do so in record 0, too.
+  const bool dummy_at_start = model.structural[node].is_dummy() && context.state->step == 0;
+  if (context.phase == Phase::derivatives || dummy_at_start) return Vec3::Zero();
   const NodeAcceleration a = model.node_acceleration(context, node);
   const Vec3 global = group == kXPP || group == kxPP ? a.a : a.wp;
   return group == kxPP || group == komegaP ? Vec3(s.R.transpose() * global) : global;
@@ -78,7 +79,7 @@ int Model::structural_datum(int node, std::string_view name) const {
     if (word != kNames[g]) continue;
     const StructuralNode& n = structural[node];
     if (needs_acceleration(g) && !n.has_momentum() && n.kind != StructuralKind::modal &&
-        !n.is_dummy())
+        !n.is_dummy() && !inverse_problem(*this))
       return -1;
     if (g == kPE) return index >= 0 && index <= 3 ? g * kSlots + index : -1;
     return index >= 1 && index <= 3 ? g * kSlots + index - 1 : -1;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "model/drive_trace.h"
+#include "model/inverse_problem.h"
+
 namespace mbcosim {
 
 namespace {
@@ -17,8 +20,8 @@ void write_structural(const EvalContext& context, int index, OutputRow& row) {
     row.orientation("R", s.R, node.description);
   row.vec3("XP", "m/s", s.v);
   row.vec3("Omega", "rad/s", s.w);
-  if (node.accelerations &&
-      (node.has_momentum() || node.kind == StructuralKind::modal || node.is_dummy())) {
+  if (node.accelerations && (node.has_momentum() || node.kind == StructuralKind::modal ||
+                             node.is_dummy() || inverse_problem(*context.model))) {
     const NodeAcceleration a = context.model->node_acceleration(context, index);
     row.vec3("XPP", "m/s^2", a.a);
     row.vec3("OmegaP", "rad/s^2", a.wp);
@@ -56,18 +59,30 @@ void write_scalar(const EvalContext& context, const ScalarNode& node, OutputRow&
   row.end();
 }
 
+void write_drive(const EvalContext& context, OutputFile file, int label, const Drive& drive,
+                 bool value, bool derivative, OutputRow& row) {
+  if (!value && !derivative) return;
+  row.begin(file, label);
+  if (value) row.scalar("value", "", drive.value(context));
+  if (derivative && drive.has_derivative())
+    row.scalar("derivative", "", derivative_in_time(drive, context));
+  row.end();
+}
+
 void write_drives(const EvalContext& context, OutputRow& row) {
-  for (const NamedDrive& d : context.model->drives) {
-    if (!d.output_value && !d.output_derivative) continue;
-    row.begin(OutputFile::drv, d.label);
-    if (d.output_value) row.scalar("value", "", d.drive->value(context));
-    if (d.output_derivative && d.drive->has_derivative())
-      row.scalar("derivative", "", derivative_in_time(*d.drive, context));
-    row.end();
-  }
+  for (const NamedDrive& d : context.model->drives)
+    write_drive(context, OutputFile::drv, d.label, *d.drive, d.output_value, d.output_derivative,
+                row);
 }
 
 }  // namespace
+
+void write_traces(const EvalContext& context, OutputRow& row) {
+  const DriveTraces* traces = find_part<DriveTraces>(*context.model);
+  if (!traces) return;
+  for (const DriveTraces::Trace& t : traces->traces)
+    write_drive(context, OutputFile::trc, t.label, *t.drive, t.value, t.derivative, row);
+}
 
 void write_record(const EvalContext& context, OutputRow& row) {
   const Model& model = *context.model;

@@ -36,6 +36,10 @@ class BothWriters : public ResultWriter {
   void samples(const EvalContext& context) override {
     each([&](ResultWriter& w) { w.samples(context); });
   }
+  Status status() const override {
+    Status first = first_->status();
+    return first ? second_->status() : first;
+  }
   Status finish() override {
     Status first = first_->finish(), second = second_->finish();
     return first ? second : first;

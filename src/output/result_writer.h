@@ -35,6 +35,8 @@ class ResultWriter {
   virtual void record(const EvalContext& context) = 0;
   /// After the initial solution and every accepted step: rows of elements that took samples.
   virtual void samples(const EvalContext&) {}
+  /// ErrorKind::io, with the path and the reason, when something could not be written so far.
+  virtual Status status() const { return ok(); }
   /// Flushes; ErrorKind::io when something could not be written (now or earlier).
   virtual Status finish() = 0;
 };

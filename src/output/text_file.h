@@ -8,7 +8,8 @@
 
 namespace mbcosim {
 
-/// A file that collects text and writes it in large pieces; created with the first byte.
+/// A file that collects text and writes it in large pieces; created with the first byte. What
+/// cannot be written whole ends after its last whole line.
 class TextFile {
  public:
   static constexpr std::size_t kBuffer = 1 << 16;
@@ -34,29 +35,22 @@ class TextFile {
     std::memcpy(p, s.data(), s.size());
     commit(p + s.size());
   }
-  bool flush() {
-    if (used_ == 0) return !failed_;
-    if (!file_ && !failed_) file_ = std::fopen(path_.c_str(), "wb");
-    if (!file_ || std::fwrite(text_.data(), 1, used_, file_) != used_) failed_ = true;
-    used_ = 0;
-    return !failed_;
-  }
-  void create() {
-    if (!file_ && !failed_) file_ = std::fopen(path_.c_str(), "wb");
-    if (!file_) failed_ = true;
-  }
-  bool finish() {
-    flush();
-    if (file_ && std::fflush(file_) != 0) failed_ = true;
-    return !failed_;
-  }
+  bool flush();
+  void create();
+  bool finish();
+  /// What went wrong with which path; empty: nothing.
+  const std::string& error() const { return error_; }
 
  private:
+  void fail();
+  void end_at_last_line(std::size_t written);
+
   std::string path_;
   std::string text_;
   std::size_t used_ = 0;
+  long size_ = 0;  ///< bytes in the file
   std::FILE* file_ = nullptr;
-  bool failed_ = false;
+  std::string error_;
 };
 
 }  // namespace mbcosim

@@ -39,9 +39,9 @@ class TextWriter : public ResultWriter, private OutputRow {
     out_.create();
     log_.create();
     log_.text(model_log(model));
+    samples_.open(model, prefix_);
     if (has_joint_output(model)) files_[static_cast<std::size_t>(OutputFile::jnt)].create();
     if (model.control.output_reference_frames) write_reference_frames(model, *this);
-    samples_.open(model, prefix_);
   }
   void derivatives(double time, int iterations, double error) override {
     out_.text("# Derivatives solution step at time " + general(time) + " performed in " +
@@ -81,25 +81,41 @@ class TextWriter : public ResultWriter, private OutputRow {
     TextFile file;
     file.open(prefix_ + eigen_suffix(report) + ".m");
     file.text(eigen_file(report, *model_));
-    if (!file.finish()) failed_ = true;
+    if (!file.finish() && error_.empty()) error_ = file.error();
   }
   void record(const EvalContext& context) override { write_record(context, *this); }
-  void samples(const EvalContext& context) override { samples_.write(*context.state); }
+  void samples(const EvalContext& context) override {
+    samples_.write(*context.state);
+    write_traces(context, *this);
+  }
+  Status status() const override {
+    if (!error_.empty()) return not_written(error_);
+    for (const TextFile* f : {&out_, &log_})
+      if (!f->error().empty()) return not_written(f->error());
+    for (const TextFile& f : files_)
+      if (!f.error().empty()) return not_written(f.error());
+    return ok();
+  }
   Status finish() override {
-    bool fine = out_.finish() && log_.finish() && samples_.finish() && !failed_;
-    for (TextFile& f : files_) fine = f.finish() && fine;
-    if (fine) return ok();
-    Error e;
-    e.kind = ErrorKind::io;
-    e.reason = "OUTPUT_NOT_WRITTEN";
-    e.message = "cannot write the result files " + prefix_ + ".*";
-    return e;
+    out_.finish();
+    log_.finish();
+    for (TextFile& f : files_) f.finish();
+    if (!samples_.finish() && error_.empty())
+      error_ = "cannot write the samples \"" + prefix_ + ".*\"";
+    return status();
   }
 
  private:
   static constexpr std::size_t kField =
       48;  ///< bytes of one field, with margin for the largest precision used
 
+  static Error not_written(const std::string& what) {
+    Error e;
+    e.kind = ErrorKind::io;
+    e.reason = "OUTPUT_NOT_WRITTEN";
+    e.message = what;
+    return e;
+  }
   void header() {
     out_.text(
         "# Key for lines starting with \"Step\":\n# Step Time TStep NIter ResErr SolErr SolConv "
@@ -119,7 +135,7 @@ class TextWriter : public ResultWriter, private OutputRow {
     const auto end = std::to_chars(digits, digits + sizeof digits, label).ptr;
     const int count = static_cast<int>(end - digits);
     char* p = current_->room(32);
-    if (file != OutputFile::frc)
+    if (file != OutputFile::frc && file != OutputFile::trc)
       for (int k = count; k < 8; ++k) *p++ = ' ';
     std::memcpy(p, digits, count);
     current_->commit(p + count);
@@ -156,7 +172,7 @@ class TextWriter : public ResultWriter, private OutputRow {
   std::string prefix_;
   const Model* model_ = nullptr;
   int precision_ = 6;
-  bool failed_ = false;
+  std::string error_;  ///< of files other than the members
   std::array<TextFile, static_cast<std::size_t>(OutputFile::count)> files_;
   TextFile out_, log_;
   SampleFiles samples_;

@@ -6,12 +6,14 @@
 #include <mutex>
 #include <utility>
 
+#include "model/end_of_run.h"
 #include "output/result_writer.h"
 #include "simulation/linearize.h"
 #include "simulation/state_bytes.h"
 #include "simulation/variables.h"
 #include "solver/control.h"
 #include "solver/eigenanalysis.h"
+#include "solver/inverse_dynamics.h"
 #include "solver/step_controller.h"
 #include "solver/stepper.h"
 
@@ -27,6 +29,12 @@ Error make_error(ErrorKind kind, std::string reason, std::string message) {
   return e;
 }
 
+Error no_equations_of_motion() {
+  return make_error(ErrorKind::precondition, "INVERSE_DYNAMICS",
+                    "an inverse dynamics problem prescribes the motion: there is nothing to "
+                    "linearize");
+}
+
 bool same_layout(const State& a, const State& b) {
   return a.y.size() == b.y.size() && a.rotation.size() == b.rotation.size() &&
          a.memory.size() == b.memory.size() && a.variables.size() == b.variables.size() &&
@@ -37,15 +45,21 @@ bool same_layout(const State& a, const State& b) {
 
 struct Simulation::Impl {
   explicit Impl(ModelPtr m)
-      : model(std::move(m)), stepper(*model), final_time(model->initial_value.final_time) {}
+      : model(std::move(m)),
+        stepper(*model),
+        inverse(inverse_problem(*model) ? std::make_unique<InverseDynamics>(*model) : nullptr),
+        controller(inverse ? static_cast<StepSystem&>(*inverse) : stepper),
+        final_time(model->initial_value.final_time) {}
 
   ModelPtr model;
   State state;
   Stepper stepper;
-  StepController controller{stepper};
+  std::unique_ptr<InverseDynamics> inverse;  ///< of an inverse dynamics problem
+  StepController controller;
   double final_time;  ///< [s]
   std::shared_ptr<ResultWriter> writer;
   TimeKeeping time_keeping = TimeKeeping::summed;
+  bool ended = false;  ///< a drive ended the run before its final time
   std::function<void(StartEvent)> start_observer;
   mutable std::once_flag variables_once;
   mutable std::unique_ptr<Variables> variables;
@@ -55,10 +69,9 @@ struct Simulation::Impl {
     return *variables;
   }
 
-  /// After a step: positions are read with the step's context.
-  EvalContext context() const {
-    return model->context(state, state.step == 0 ? Phase::derivatives : Phase::step);
-  }
+  /// At an accepted state; also before the first step, when the derivatives phase is over and
+  /// accelerations are known.
+  EvalContext context() const { return model->context(state, Phase::step); }
 
   bool meter() const {
     const ControlSettings& c = model->control;
@@ -81,13 +94,15 @@ struct Simulation::Impl {
   }
 
   bool is_finished() const {
-    return model->initial_value.abort_after != InitialValueSettings::AbortAfter::never || at_end();
+    return model->initial_value.abort_after != InitialValueSettings::AbortAfter::never || ended ||
+           at_end();
   }
 
   Status start();
   void tell(StartEvent event) const {
     if (start_observer) start_observer(event);
   }
+  Status start_inverse();
   /// The deck's eigenanalyses with times in (after, until].
   Status analyse_modes(double after, double until);
   StepReport step(const CancelToken* cancel, const StepChoice& choice = {});
@@ -110,11 +125,15 @@ struct Simulation::Impl {
 Status Simulation::Impl::start() {
   const InitialValueSettings& s = model->initial_value;
   using AbortAfter = InitialValueSettings::AbortAfter;
-  if (writer) writer->begin(*model);
+  if (writer) {
+    writer->begin(*model);
+    if (auto status = writer->status(); !status) return status;
+  }
   if (s.abort_after == AbortAfter::input) {
     record();
     return ok();
   }
+  if (inverse) return start_inverse();
   if (auto status = stepper.assemble(state); !status) return status;
   state.control[control::kExactTime] = time_keeping == TimeKeeping::exact ? 1 : 0;
   if (s.abort_after == AbortAfter::assembly || s.final_time < s.initial_time) {
@@ -153,6 +172,15 @@ Status Simulation::Impl::start() {
   return analyse_modes(std::nextafter(s.initial_time, -HUGE_VAL), s.initial_time);
 }
 
+/// Inverse dynamics begins with the record at the initial time.
+Status Simulation::Impl::start_inverse() {
+  inverse->begin(state);
+  state.control[control::kExactTime] = time_keeping == TimeKeeping::exact ? 1 : 0;
+  const PhaseReport report = inverse->attempt(state, {.h = model->initial_value.time_step});
+  if (report.error) return *report.error;
+  return write(report.newton, state.time);
+}
+
 Status Simulation::Impl::analyse_modes(double after, double until) {
   if (!writer) return ok();
   int index = 0, count = 0;
@@ -184,6 +212,7 @@ Status Simulation::Impl::write(const NewtonReport& newton, double previous_time)
   line.recorded = record();
   writer->step(line);
   writer->samples(context());
+  if (auto status = writer->status(); !status) return status;
   return analyse_modes(previous_time, state.time);
 } catch (const EvaluationError& e) {
   return evaluation_failure(state, e);
@@ -226,6 +255,7 @@ StepReport Simulation::Impl::step(const CancelToken* cancel, const StepChoice& c
   const double previous_time = state.time;
   const auto begin = std::chrono::steady_clock::now();
   stepper.set_cancelled(cancel);
+  if (inverse) inverse->set_cancelled(cancel);
   PhaseReport phase = controller.advance(state, choice);
   report.flagged = phase.flagged;
   report.restarted = phase.restarted;
@@ -239,6 +269,13 @@ StepReport Simulation::Impl::step(const CancelToken* cancel, const StepChoice& c
   report.total_iterations = phase.newton.iterations;
   report.residual_error = phase.newton.residual_error;
   report.solution_error = phase.newton.solution_error;
+  if (phase.error && phase.error->reason == kEndOfRun) {
+    ended = true;
+    report.outcome = StepOutcome::finished;
+    if (writer)
+      writer->note("# The run ends before its final time: " + phase.error->message + "\n");
+    return report;
+  }
   if (phase.error) {
     report.outcome = phase.error->kind == ErrorKind::cancelled ? StepOutcome::interrupted
                                                                : StepOutcome::not_converged;
@@ -278,6 +315,7 @@ std::unique_ptr<Simulation> Simulation::prepare(ModelPtr model,
 
 Status Simulation::start(const CancelToken* cancel) {
   impl_->stepper.set_cancelled(cancel);
+  if (impl_->inverse) impl_->inverse->set_cancelled(cancel);
   Status status = ok();
   try {
     status = impl_->start();
@@ -428,6 +466,7 @@ Status Simulation::restore(const State& state) {
     return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL",
                       "the state belongs to another model: its layout differs");
   impl_->state = state;
+  impl_->ended = false;
   return ok();
 }
 
@@ -437,11 +476,13 @@ Linearization Simulation::linearize() const {
 
 Result<InputsOutputs> Simulation::linearize(std::span<const int> inputs,
                                             std::span<const int> outputs) const {
+  if (impl_->inverse) return no_equations_of_motion();
   return linearize_inputs_outputs(*impl_->model, impl_->state, impl_->all_variables(), inputs,
                                   outputs);
 }
 
 Result<Spectrum> Simulation::eigen(int count, std::complex<double> shift) const {
+  if (impl_->inverse) return no_equations_of_motion();
   return mbcosim::eigen(linearize(), count, shift);
 }
 
@@ -461,7 +502,7 @@ std::unique_ptr<Simulation> Simulation::fork() const {
   // The pivots are chosen on the matrix of the derivatives phase, as in every simulation of this
   // model.
   State start = make_initial_state(*impl->model);
-  if (impl->stepper.assemble(start)) (void)impl->stepper.solve_derivatives(start);
+  if (!impl->inverse && impl->stepper.assemble(start)) (void)impl->stepper.solve_derivatives(start);
   return std::unique_ptr<Simulation>(new Simulation(std::move(impl)));
 }
 

@@ -4,6 +4,8 @@
 #include <Eigen/SparseLU>
 #include <map>
 
+#include "model/model_part.h"
+#include "model/user_elements.h"
 #include "solver/newton.h"
 #include "solver/null_space.h"
 #include "solver/singularity.h"
@@ -52,6 +54,8 @@ class Assembly {
         return model_.control.assemble_bodies;
       case Family::force:
         return model_.control.assemble_forces;
+      case Family::loadable:
+        return find_part<UserElementsInAssembly>(model_) != nullptr;
       case Family::beam:
         return model_.control.assemble_beams;
       default:

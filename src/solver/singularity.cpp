@@ -20,6 +20,18 @@ Eigen::SparseMatrix<double> sparse(const Model& model, const std::vector<double>
       model.row_index.data(), values.data());
 }
 
+/// Is the unknown with the largest share one of a node with bodies?
+bool is_of_bodies(const Model& model, const VecX& share) {
+  int largest = 0;
+  share.cwiseAbs().maxCoeff(&largest);
+  for (std::size_t k = 0; k < model.structural.size(); ++k) {
+    const StructuralNode& n = model.structural[k];
+    if (n.first >= 0 && largest >= n.first && largest < n.first + n.unknowns())
+      return !model.node_bodies[k].empty();
+  }
+  return false;
+}
+
 Singularity look(const Model& model, const std::vector<double>& values, double threshold) {
   Singularity r;
   if (values.size() != model.row_index.size()) return r;
@@ -28,6 +40,7 @@ Singularity look(const Model& model, const std::vector<double>& values, double t
   if (r.rank_loss == 0) return r;
   r.undetermined = owners_of(model, null.right, kNamed);
   r.redundant = owners_of(model, null.left, kNamed);
+  r.massless = is_of_bodies(model, null.right);
   return r;
 }
 
@@ -69,7 +82,11 @@ std::string Singularity::remedy() const {
   const auto of_node = [](const WorstEquation& w) {
     return w.owner.find(" node ") != std::string::npos;
   };
-  if (std::all_of(undetermined.begin(), undetermined.end(), of_node))
+  const bool nodes = std::all_of(undetermined.begin(), undetermined.end(), of_node);
+  if (nodes && massless)
+    return "the bodies there have no inertia for these motions: give them mass and moments of "
+           "inertia, or constrain the motions (a point mass wants a displacement node)";
+  if (nodes)
     return "no element holds these: give the node a body, a joint (`clamp` for the ground) or "
            "another element, or remove it";
   return "remove redundant constraints, or regularize one of their joints: `joint regularization: "

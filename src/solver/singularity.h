@@ -14,6 +14,7 @@ struct Singularity {
   std::vector<WorstEquation> undetermined;  ///< unknowns with the largest share in the null space
   std::vector<WorstEquation>
       redundant;                ///< equations with the largest share in the left null space
+  bool massless = false;        ///< undetermined are nodes that have bodies: without inertia
   std::string text() const;     ///< "the matrix is singular" and the details
   std::string details() const;  ///< rank loss, unknowns, equations, the remedy
   std::string remedy() const;   ///< what the author of the deck can do

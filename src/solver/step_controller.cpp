@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string>
 
+#include "model/end_of_run.h"
 #include "solver/control.h"
 
 namespace mbcosim {
@@ -30,6 +31,11 @@ class StrategyMemory {
 
 bool is_cancelled(const PhaseReport& phase) {
   return phase.error && phase.error->kind == ErrorKind::cancelled;
+}
+
+/// Would a shorter step not help?
+bool is_final(const PhaseReport& phase) {
+  return is_cancelled(phase) || (phase.error && phase.error->reason == kEndOfRun);
 }
 
 /// Time goes on as if a step in pieces had been one.
@@ -94,7 +100,7 @@ Error not_agreed(const State& end, int passes) {
 Error evaluation_failure(const State& state, const EvaluationError& cause) {
   Error error;
   error.kind = ErrorKind::evaluation;
-  error.reason = "EVALUATION_FAILED";
+  error.reason = dynamic_cast<const EndOfRun*>(&cause) ? kEndOfRun : "EVALUATION_FAILED";
   error.message = "t = " + std::to_string(state.time) + ": " + cause.what();
   error.failure.time = state.time;
   error.failure.step = static_cast<long>(state.step);
@@ -190,7 +196,7 @@ PhaseReport StepController::solve_by_policy(State& state, const State& start, St
   whole.accept_unconverged = accept && !by_strategy;
   PhaseReport phase =
       by_strategy ? solve_by_strategy(state, start, whole) : attempt(state, start, whole);
-  if (!phase.error || is_cancelled(phase)) return phase;
+  if (!phase.error || is_final(phase)) return phase;
   if (policy_.kind == StepPolicy::cut)
     return solve_in_pieces(state, start, whole, std::move(phase));
   if (!accept || !by_strategy) return phase;
@@ -201,7 +207,7 @@ PhaseReport StepController::solve_by_policy(State& state, const State& start, St
 
 PhaseReport StepController::solve_by_strategy(State& state, const State& start, StepAttempt next) {
   PhaseReport phase = attempt(state, start, next);
-  while (phase.error && !is_cancelled(phase)) {
+  while (phase.error && !is_final(phase)) {
     next.h = system_.retry_step_size(state, next.h);
     if (next.h <= 0) break;
     next.chosen = false;
@@ -228,7 +234,7 @@ PhaseReport StepController::solve_in_pieces(State& state, const State& start,
   for (std::int64_t done = 0, length = all; done < all;) {
     if (phase.error) {
       length /= 2;
-      if (length == 0 || is_cancelled(phase)) break;
+      if (length == 0 || is_final(phase)) break;
     }
     end_attempt(!phase.error);
     state.step = start.step;
@@ -251,7 +257,7 @@ PhaseReport StepController::solve_in_pieces(State& state, const State& start,
     char text[80];
     std::snprintf(text, sizeof text, "\n  the step was cut down to pieces of %.6g s",
                   whole.h / static_cast<double>(all));
-    if (!is_cancelled(phase)) phase.error->message += text;
+    if (!is_final(phase)) phase.error->message += text;
     return phase;
   }
   phase.newton.iterations = iterations;

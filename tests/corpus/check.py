@@ -104,7 +104,7 @@ def main():
     if not (args.corpus / "run.py").exists():
         print(f"SKIPPED: no deck corpus at {args.corpus} (set the CMake variable MBCOSIM_CORPUS)")
         return SKIPPED
-    core = [name for name in (args.corpus / "core.txt").read_text().split("\n") if name and not name.startswith("#")]
+    core = [name for name in (args.corpus / "words.txt").read_text().split("\n") if name and not name.startswith("#")]
     if args.others:
         surprises = list(other_surprises(args))
     else:

@@ -13,7 +13,7 @@ import subprocess
 import sys
 
 BEGIN, END = "<!-- feature tables -->", "<!-- end of the feature tables -->"
-SERVED, REFUSED = {"yes", "partly", "ignored"}, {"not yet", "no"}
+SERVED, REFUSED = {"yes", "partly", "ignored"}, {"not yet", "no", "dead"}
 # Expressions have their own short lists in the text; their words are not features one by one.
 PLAIN = {"expression function", "constant"}
 # Cards of the language proper: a word of these groups is known to the reader even where it is refused.
@@ -42,7 +42,9 @@ def allowed(group, word):
     """Statuses that a row may have."""
     if group["name"] in ANY_STATUS:
         return SERVED | REFUSED
-    return SERVED if word["served"] else REFUSED
+    if word["served"]:
+        return SERVED
+    return {"dead"} if word.get("dead") else {"no"} if "reason" in word else {"not yet"}
 
 
 def complaints(groups, tables):
@@ -69,7 +71,8 @@ def written(groups, tables):
         for word in group["words"]:
             status, note = tables.get(group["title"], {}).get(word["word"], ("", ""))
             if status not in allowed(group, word):
-                status = "yes" if word["served"] else "not yet"
+                status, note = "yes" if word["served"] else min(allowed(group, word)), ""
+            note = word.get("reason", note)
             if not note and "sizes" in word and word["sizes"] != [1, 3, 6]:
                 note = "for " + " and ".join(f"{n} component{'s' * (n > 1)}" for n in word["sizes"])
             lines.append(f"| `{word['word']}` | {status} | {note} |")

@@ -45,7 +45,7 @@ TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "cli
              "tests"}
 FORMATTED = ["src", "server", "client_examples", "tests"]
 # Families of elements know what all elements share and themselves, and of each other no more than this.
-FAMILY_ARROWS = {"ports": {"modal"}}
+FAMILY_ARROWS = {"ports": {"modal"}, "user": {"joints"}}
 # The names of files that every folder may have: they mean the same everywhere.
 COMMON_NAMES = {"register.cpp", "readers.h"}
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([a-z_0-9]+)/', re.MULTILINE)

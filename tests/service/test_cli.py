@@ -1,6 +1,7 @@
 """The command line: exit codes, output, and the same numbers as the service."""
 import json
 import os
+import resource
 import signal
 import subprocess
 import time
@@ -71,6 +72,79 @@ def test_wrong_usage_exits_with_4(deck):
     assert mbcosim().returncode == 4
     assert mbcosim("run").returncode == 4
     assert mbcosim("run", str(deck), "-o", "/nonexistent/folder/x").returncode == 4
+
+
+def test_results_that_cannot_be_written_fail_before_the_first_step(tmp_path):
+    deck = tmp_path / "deck"
+    deck.write_text(decks.body(final_time=1e9))
+    run = mbcosim("run", str(deck), "-o", str(tmp_path / "no" / "x"))
+    assert run.returncode == 4
+    assert f'cannot write "{tmp_path}/no/x.out": No such file or directory' in run.stderr
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full device")
+def test_a_full_device_ends_the_run_at_the_step(tmp_path):
+    deck = tmp_path / "deck"
+    deck.write_text(decks.body(final_time=1e9))
+    (tmp_path / "x.mov").symlink_to("/dev/full")
+    run = mbcosim("run", str(deck), "-o", str(tmp_path / "x"))
+    assert run.returncode == 4 and 'x.mov": No space left on device' in run.stderr
+
+
+def test_a_file_beyond_its_limit_is_an_error_and_ends_with_a_whole_line(tmp_path):
+    deck = tmp_path / "deck"
+    deck.write_text(decks.body(final_time=1e9))
+    limit = 100000
+
+    def small_files():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    run = subprocess.run([MBCOSIM, "run", str(deck), "-o", str(tmp_path / "x")], stderr=subprocess.PIPE, text=True, timeout=60,
+                         preexec_fn=small_files)
+    assert run.returncode == 4 and "File too large" in run.stderr
+    sizes = [(tmp_path / f"x.{end}").stat().st_size for end in ("mov", "out")]
+    assert max(sizes) > limit - 500
+    for end in ("mov", "out", "ine"):
+        assert (tmp_path / f"x.{end}").read_bytes().endswith(b"\n")
+
+
+def test_results_never_overwrite_the_deck(tmp_path):
+    (tmp_path / "x.log").write_text(decks.body())
+    (tmp_path / "main").write_text('include: "x.log";\n')
+    for deck in ("x.log", "main"):
+        run = mbcosim("run", deck, "-o", "x", cwd=tmp_path)
+        assert run.returncode == 4 and 'would overwrite "x.log"' in run.stderr
+    assert (tmp_path / "x.log").read_text() == decks.body()
+    os.link(tmp_path / "x.log", tmp_path / "y.mov")
+    assert mbcosim("run", "x.log", "-o", "y", cwd=tmp_path).returncode == 4
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full device")
+def test_a_full_standard_output_is_an_error(deck):
+    for arguments in (["describe", str(deck)], ["describe", str(deck), "--json"], ["keywords"]):
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            run = subprocess.run([MBCOSIM, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+        assert run.returncode == 4 and "cannot write to the standard output" in run.stderr
+
+
+def test_a_reader_that_left_is_an_error_and_no_death(deck):
+    run = subprocess.run(["sh", "-c", f"({MBCOSIM} keywords; echo $? >&2) | true"], stderr=subprocess.PIPE, text=True, timeout=60)
+    assert run.stderr.strip().splitlines()[-1] in ("0", "4")  # 0: it was faster than the reader
+
+
+def test_a_deck_of_nothing_is_refused(tmp_path):
+    for text in ("", "# nothing\n"):
+        (tmp_path / "empty").write_text(text)
+        run = mbcosim("run", str(tmp_path / "empty"))
+        assert run.returncode == 2 and "no nodes and no elements" in run.stderr
+
+
+def test_a_run_in_real_time_lasts_as_long_as_the_model(tmp_path):
+    deck = tmp_path / "deck"
+    deck.write_text(decks.body(final_time=0.4))
+    begun = time.monotonic()
+    assert mbcosim("run", str(deck), "--real-time").returncode == 0
+    assert time.monotonic() - begun > 0.38
 
 
 def test_messages_name_files_as_they_were_typed(deck, tmp_path):

@@ -2,6 +2,8 @@
 #include <string>
 
 #include "elements/beams/beam.h"
+#include "elements/beams/beam_slider.h"
+#include "elements/beams/helicoidal_beam.h"
 #include "elements/families.h"
 #include "model/card.h"
 #include "model/laws/law_parts.h"
@@ -174,6 +176,8 @@ void register_beams(Registry& registry) {
   registry.element("beam2", Family::beam, read_beam<2>);
   registry.element("beam3", Family::beam, read_beam<3>);
   registry.element("beam", Family::beam, read_beam<3>);
+  registry.element("hbeam", Family::beam, read_helicoidal_beam);
+  registry.typed("joint", Family::joint, {"beam slider"}, read_beam_slider);
 }
 
 }  // namespace mbcosim

@@ -5,6 +5,7 @@
 #include "elements/bodies/readers.h"
 #include "elements/families.h"
 #include "model/card.h"
+#include "model/inverse_problem.h"
 
 namespace mbcosim {
 
@@ -14,13 +15,17 @@ void warn_about_inertia(Card& card, const Mat3& j) {
   const Vec3 principal =
       Eigen::SelfAdjointEigenSolver<Mat3>(Mat3(0.5 * (j + j.transpose())), Eigen::EigenvaluesOnly)
           .eigenvalues();
-  if (principal(0) < -1e-9 * j.norm()) {
-    char text[120];
-    std::snprintf(text, sizeof text,
-                  "the inertia matrix is indefinite: principal moments %.6g, %.6g, %.6g",
-                  principal(0), principal(1), principal(2));
-    card.warn(text, "inertia is given about the centre of mass, not about the node");
-  }
+  const double rounding = 1e-9 * j.norm();
+  char moments[80];
+  std::snprintf(moments, sizeof moments, "principal moments %.6g, %.6g, %.6g", principal(0),
+                principal(1), principal(2));
+  if (principal(0) < -rounding)
+    card.warn(std::string("the inertia matrix is indefinite: ") + moments,
+              "inertia is given about the centre of mass, not about the node");
+  else if (principal(2) > principal(0) + principal(1) + rounding)
+    card.warn(std::string("no body has this inertia: ") + moments +
+                  "; none can be larger than the sum of the other two",
+              "inertia is given about the centre of mass; check its axes and units");
 }
 
 namespace {
@@ -52,7 +57,8 @@ void read_body(Card& card, ElementInfo& info) {
   if (card.keyword("variable mass")) return read_variable_body(card, info, node);
   const StructuralNode& n = card.model().structural[node];
   if (n.kind == StructuralKind::static_displacement ||
-      (n.kind == StructuralKind::static_ && !card.model().control.is_static))
+      (n.kind == StructuralKind::static_ && !card.model().control.is_static &&
+       !inverse_problem(card.model())))
     card.fail("structural node " + std::to_string(n.label) +
               " is static; a body needs a dynamic node");
   if (n.is_displacement()) {
@@ -96,6 +102,8 @@ void read_gravity(Card& card, ElementInfo& info) {
       card.warn_at(card.next(), "gravity: type missing, `uniform` assumed");
     g.uniform = card.vec3_drive("acceleration of gravity");
   }
+  g.label = 1;             // the card has none; .grv has this one
+  g.output = info.output;  // `default output`
   if (card.keyword("output")) g.output = card.yes_no("output");
   card.model().gravity = std::move(g);
 }

@@ -221,6 +221,7 @@ void register_forces(Registry& registry) {
   couple({"follower"}, kind(read_couple, true));
   couple({"absolute internal", "conservative internal"}, kind(read_internal_couple, false));
   couple({"follower internal"}, kind(read_internal_couple, true));
+  couple({"total internal"}, read_total_internal_force);
 }
 
 }  // namespace mbcosim

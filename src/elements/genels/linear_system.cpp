@@ -138,12 +138,13 @@ void StateSpace::start(const GeneralView& u, State& state) const {
     if (x0_.size() != 0) state.y[k] = x0_(i);
     if (xp0_.size() != 0) state.yp[k] = xp0_(i);
   }
-  if (x0_.size() == 0 || system_.E.size() != 0) return;
+  if (system_.E.size() != 0) return;
   // Without E the rates follow from the start values, so that the outputs start with consistent
   // rates, too.
   VecX input_values(system_.inputs());
   for (int j = 0; j < system_.inputs(); ++j) input_values(j) = input(u, j);
-  const VecX rate = system_.A * x0_ + system_.B * input_values;
+  VecX rate = system_.B * input_values;
+  if (x0_.size() != 0) rate += system_.A * x0_;
   for (int i = 0; i < system_.order(); ++i) state.yp[u.unknown(first_state_ + i)] = rate(i);
 }
 

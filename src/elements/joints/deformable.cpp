@@ -72,6 +72,12 @@ void read_deformable_displacement(Card& card, ElementInfo& info) {
   add_element(card.builder(), info, e);
 }
 
+void read_deformable_displacement_hinge(Card& card, ElementInfo& info) {
+  card.warn("`deformable displacement hinge` is the old name of `deformable displacement joint`");
+  info.type = "deformable displacement joint";
+  read_deformable_displacement(card, info);
+}
+
 // ------------------------------------------------------------------ deformable joint
 
 void DeformableJoint::output(const Local<double>& u, OutputRow& row) const {

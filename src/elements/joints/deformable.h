@@ -179,6 +179,8 @@ void read_hinge_motion(Card& card, HingeMotion& e, bool with_offsets);
 
 void read_deformable_hinge(Card& card, ElementInfo& info);
 void read_deformable_displacement(Card& card, ElementInfo& info);
+/// The same by its old name.
+void read_deformable_displacement_hinge(Card& card, ElementInfo& info);
 void read_deformable_joint(Card& card, ElementInfo& info);
 void read_deformable_axial_joint(Card& card, ElementInfo& info);
 void read_viscous_body(Card& card, ElementInfo& info);

@@ -6,8 +6,10 @@
 #include "elements/joints/guide.h"
 #include "elements/joints/imposed.h"
 #include "elements/joints/invariant.h"
+#include "elements/joints/point_contact.h"
 #include "elements/joints/revolute.h"
 #include "elements/joints/rod.h"
+#include "elements/joints/rod_bezier.h"
 #include "elements/joints/screw.h"
 #include "elements/joints/spherical.h"
 #include "elements/joints/tikhonov.h"
@@ -35,6 +37,8 @@ void register_joints(Registry& registry) {
   joint({"distance with offset"}, read_distance_with_offset);
   joint({"rod"}, read_rod);
   joint({"rod with offset"}, read_rod_with_offset);
+  joint({"rod bezier"}, read_rod_bezier);
+  joint({"point contact"}, read_point_contact);
   joint({"total joint"}, read_total_joint);
   joint({"total pin joint"}, read_total_pin_joint);
   joint({"imposed displacement"}, read_imposed_displacement);
@@ -53,6 +57,7 @@ void register_joints(Registry& registry) {
   joint({"drive displacement pin"}, read_drive_displacement_pin);
   joint({"deformable hinge"}, read_deformable_hinge);
   joint({"deformable displacement joint"}, read_deformable_displacement);
+  joint({"deformable displacement hinge"}, read_deformable_displacement_hinge);
   joint({"deformable joint"}, read_deformable_joint);
   joint({"deformable axial joint"}, read_deformable_axial_joint);
   joint({"invariant deformable hinge"}, read_invariant_hinge);

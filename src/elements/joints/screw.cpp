@@ -2,6 +2,13 @@
 
 namespace mbcosim {
 
+void Screw::set_origin(const Model& model) {
+  const StructuralNode &first = model.structural[a.node], &second = model.structural[b.node];
+  const Vec3 e = (first.R * a.Rh).col(2);
+  angle0 = e.dot(vector_of_rotation<double>(first.R.transpose() * second.R));
+  advance0 = e.dot(input_point(model, b) - input_point(model, a));
+}
+
 void Screw::start(Start& s) const {
   s.memory(0) = motion(s.u).angle;
   s.memory(1) = 0;
@@ -47,6 +54,7 @@ void read_screw(Card& card, ElementInfo& info) {
     card.fail_at(card.next(), "screw: `pitch` is missing", "give `pitch, <advance per turn>`",
                  "missing-argument");
   e.lead = card.real("pitch") / (2 * kPi);
+  e.set_origin(card.model());
   if (!card.keyword("friction")) {
     add_element(card.builder(), info, e);
     return;

@@ -1,24 +1,27 @@
 #pragma once
 
 #include "elements/joints/friction.h"
+#include "math/rotation_vector.h"
 
 namespace mbcosim {
 
 /// Screw: advance along an axis of node 1 in proportion to the rotation about it.
 ///
 ///   e = axis 3 of H₁ = R₁ Rh, φ = vec(R₁ᵀR₂), θ = e·φ + 2π·turns, s = x₂ + R₂ q − x₁, d = s − R₁ p
-///   unknown     F [N];  row (h θ − e·d)/c,  h = pitch/2π
+///   unknown     F [N];  row (h (θ − θ₀) − (e·d − d₀))/c,  h = pitch/2π
 ///   loads       node 2 (F e, R₂q × F e − h F g), node 1 (−F e, −s × F e + h F (g − e × φ))
 ///               with g = R₁ Γ⁻ᵀ(φ) e
 ///
 /// As in MBDyn the components of e are global and those of φ are of node 1, so that a node 1 that
 /// is not aligned with the global frame changes the effective pitch; the loads are those that do no
-/// work for this very constraint.
+/// work for this very constraint. θ₀ and d₀ are those of the configuration as read; the joint takes
+/// no part in the initial assembly.
 struct Screw : TwoAttachments {  // a: p and Rh, b: q
   double lead = 0;               ///< h: advance per radian [m]
+  double angle0 = 0;             ///< θ₀ [rad]
+  double advance0 = 0;           ///< d₀ [m]
 
   static constexpr int width = 13;
-  static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -37,7 +40,7 @@ struct Screw : TwoAttachments {  // a: p and Rh, b: q
     const Mat<T> relative = u.R(0).transpose() * u.R(1);
     m.phi = vector_of_rotation(relative);
     m.angle = m.e.dot(m.phi);
-    m.g = u.R(0) * inverse_transposed_gamma(m.phi, m.e);
+    m.g = u.R(0) * inverse_transposed_rotation_gamma(m.phi, m.e);
     m.q = arm_b(u);
     m.s = u.x(1) + m.q - u.x(0);
     m.d = m.s - arm_a(u);
@@ -50,29 +53,16 @@ struct Screw : TwoAttachments {  // a: p and Rh, b: q
     const T moment = u.own(0) * lead;
     r.load(0, -F, (m.g - m.e.cross(m.phi)) * moment - m.s.cross(F));
     r.load(1, F, m.q.cross(F) - m.g * moment);
-    r.own(0, ((m.angle + full_turns(u, value_of(m.angle))) * lead - m.e.dot(m.d)) / u.c());
+    const T turned = m.angle + (full_turns(u, value_of(m.angle)) - angle0);
+    r.own(0, (turned * lead - (m.e.dot(m.d) - advance0)) / u.c());
   }
   /// 2π·turns that make the angle continue that of the last accepted step.
   template <class T>
   static double full_turns(const Local<T>& u, double angle) {
     return 2 * kPi * UnwrappedAngle::turns(angle, u.memory(0), u.memory(1));
   }
-  /// Γ⁻ᵀ(φ) a, where δφ = Γ⁻¹(φ) δθ for R = Rot(φ), δθ in the fixed frame.
-  template <class T>
-  static Vec<T> inverse_transposed_gamma(const Vec<T>& phi, const Vec<T>& a) {
-    using std::sqrt;
-    using std::tan;
-    const T square = phi.dot(phi);
-    T k;  // (1 − (φ/2) cot(φ/2))/φ²
-    if (value_of(square) < 1e-4) {
-      k = (square / 60.0 + 1.0) / 12.0 + square * square / 30240.0;
-    } else {
-      const T half = sqrt(square) * 0.5;
-      k = (T(1.0) - half / tan(half)) / square;
-    }
-    const Vec<T> turned = phi.cross(a);
-    return a + turned * 0.5 + phi.cross(turned) * k;
-  }
+  /// Takes the nodes as they were read for θ₀ and d₀.
+  void set_origin(const Model& model);
   void start(Start& s) const;
   void after_convergence(const Local<double>& u, State& state) const;
   void output_columns(const Local<double>& u, OutputRow& row, double friction_moment) const;
@@ -128,11 +118,6 @@ struct ScrewFriction : Screw {
   void after_convergence(const Local<double>& u, State& s) const {
     Screw::after_convergence(u, s);
     friction.after_convergence(u, s, 1, memory, contact(u));
-  }
-  /// Friction takes no part in the assembly.
-  void assembly_residual(const Local<TimeDual>& u, Residual<TimeDual>& r) const {
-    Screw::residual(u, r);
-    r.own(1, TimeDual::variable(-u.own(1).v, 0, -u.own(1).d[0]));
   }
   void output(const Local<double>& u, OutputRow& row) const;
   std::string row_name(int k) const { return k == 0 ? Screw::row_name(k) : friction.row_name(); }

@@ -5,12 +5,17 @@
 
 namespace mbcosim {
 
-/// Tikhonov regularization of a joint's constraints: row k of the joint gets −εₖ λₖ, so that
-/// redundant constraints leave a matrix that can be factored. It adds to rows of another element,
-/// hence a set of its own and not an ElementSetOf.
+/// Regularization of a joint: each row k of its unknowns λₖ gets + εₖ λₖ/c (in the initial assembly
+/// + εₖ λₖ), so that redundant constraints leave a matrix that can be factored. With the sign of
+/// the rows of this program, which are those of the reference solver; whether the joint yields or
+/// is driven away depends on it. It adds to rows of another element, hence a set of its own and not
+/// an ElementSetOf.
 class TikhonovSet final : public ElementSet {
  public:
-  void add(ElementInfo info, ElementRef joint, std::vector<double> coefficients);
+  /// `matrix_only`: the constraints stay exact, Newton's matrix is regularized.
+  void add(ElementInfo info, ElementRef joint, std::vector<double> coefficients, bool matrix_only);
+  /// The coefficients of a joint's regularization (unknowns of the joint); empty without one.
+  std::vector<double> coefficients(ElementRef joint) const;
 
   int size() const override { return static_cast<int>(slots_.size()); }
   const ElementInfo& info(int i) const override { return slots_[i].info; }
@@ -49,14 +54,17 @@ class TikhonovSet final : public ElementSet {
   struct Slot {
     ElementInfo info;
     ElementRef joint;
-    std::vector<double> epsilon;  ///< one per algebraic unknown of the joint
-    std::vector<int> rows;        ///< those unknowns
+    std::vector<double> epsilon;  ///< ε (unknowns of the joint)
+    bool matrix_only;
+    std::vector<char> differential;  ///< (unknowns of the joint)
+    std::vector<int> rows;           ///< those unknowns
     std::vector<int> positions;
   };
   std::vector<Slot> slots_;
 };
 
-/// `joint regularization : <joint label> , tikhonov , { list , <ε1> , … | <ε> } ;`
+/// `joint regularization : <joint label> , { tikhonov | jacobian } [ , { list , <ε1> , … | <ε> } ]
+/// ;`
 void register_tikhonov(Registry& registry);
 
 }  // namespace mbcosim

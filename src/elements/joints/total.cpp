@@ -1,6 +1,7 @@
 #include "elements/joints/total.h"
 
 #include "elements/joints/imposed.h"
+#include "model/inverse_problem.h"
 
 namespace mbcosim {
 
@@ -220,25 +221,44 @@ TotalConstraint::Kind read_status(Card& card, std::initializer_list<std::string_
                                           : TotalConstraint::Kind::free;
 }
 
+void refuse_velocity_constraints(Card& card, const TotalConstraint& c) {
+  for (int i = 0; i < 3; ++i)
+    if (c.translation[i] == TotalConstraint::Kind::velocity ||
+        c.rotation[i] == TotalConstraint::Kind::velocity)
+      card.fail("velocity constraints have no part in inverse dynamics",
+                "prescribe the position with its two time derivatives");
+}
+
 }  // namespace
 
 TotalConstraint read_total_constraint(Card& card, bool with_drives) {
   TotalConstraint c;
   const Vec3DrivePtr zero = make_constant_vec3_drive(Vec3::Zero());
-  c.displacement = zero;
-  c.angle = zero;
+  for (Vec3DrivePtr* drive : {&c.displacement, &c.angle, &c.displacement_rate,
+                              &c.displacement_acceleration, &c.angle_rate, &c.angle_acceleration})
+    *drive = zero;
+  const bool inverse = inverse_problem(card.model()) != nullptr;
   if (card.keyword("position constraint")) {
     for (auto& kind : c.translation)
       kind = read_status(card, {"inactive", "active", "position", "velocity"});
     if (with_drives)
       c.displacement = card.hinted("position-drive3", card.vec3_drive("imposed displacement"));
+    if (inverse) {
+      c.displacement_rate = card.vec3_drive("velocity of the imposed displacement");
+      c.displacement_acceleration = card.vec3_drive("acceleration of the imposed displacement");
+    }
   }
   if (card.keyword("orientation constraint")) {
     for (auto& kind : c.rotation)
       kind = read_status(card, {"inactive", "active", "rotation", "angular velocity"});
     if (with_drives)
       c.angle = card.hinted("orientation-drive3", card.vec3_drive("imposed rotation"));
+    if (inverse) {
+      c.angle_rate = card.vec3_drive("angular velocity of the imposed rotation");
+      c.angle_acceleration = card.vec3_drive("angular acceleration of the imposed rotation");
+    }
   }
+  if (inverse) refuse_velocity_constraints(card, c);
   return c;
 }
 

@@ -12,6 +12,8 @@ struct TotalConstraint {
   Kind rotation[3] = {Kind::free, Kind::free, Kind::free};
   Vec3DrivePtr displacement;  ///< X_d [m, m/s]
   Vec3DrivePtr angle;         ///< θ_d: rotation vector [rad, rad/s]
+  /// Inverse dynamics: Ẋ_d, Ẍ_d, and the angular velocity and acceleration of Rot(θ_d). Else null.
+  Vec3DrivePtr displacement_rate, displacement_acceleration, angle_rate, angle_acceleration;
 
   int count() const;
   bool all_rotations() const;

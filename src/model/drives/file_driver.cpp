@@ -7,6 +7,7 @@
 
 #include "model/context.h"
 #include "model/diagnostic.h"
+#include "model/end_of_run.h"
 #include "model/state.h"
 
 namespace mbcosim {
@@ -23,11 +24,11 @@ double TableDriver::value(const EvalContext&, int channel, double t) const {
   const int last = table_.rows() - 1;
   const double first_time = table_.time(0), last_time = table_.time(last);
   if (t < first_time && options_.bail_lower)
-    throw EvaluationError("file driver: time " + std::to_string(t) +
-                          " is before the first sample (bailout)");
+    throw EndOfRun("file driver: time " + std::to_string(t) +
+                   " is before the first sample (bailout)");
   if (t > last_time && options_.bail_upper)
-    throw EvaluationError("file driver: time " + std::to_string(t) +
-                          " is after the last sample (bailout)");
+    throw EndOfRun("file driver: time " + std::to_string(t) +
+                   " is after the last sample (bailout)");
   const bool edge_is_outside = !table_.times.empty();
   if (t < first_time || (edge_is_outside && t == first_time))
     return options_.pad_zeros ? 0.0 : sample(0, channel);

@@ -58,6 +58,17 @@ double resolved(Card& card, const HeaderNumber& n, const std::string& text, cons
   return v;
 }
 
+/// Refuses a table that would end the run before its first step.
+FileDriverPtr make_table_driver(Card& card, SampleTable table, const TableOptions& options) {
+  const double t = card.model().initial_value.initial_time, first = table.time(0),
+               last = table.time(table.rows() - 1);
+  if ((options.bail_lower && t < first) || (options.bail_upper && t > last))
+    card.fail("file driver: the initial time " + std::to_string(t) + " is outside the samples, " +
+                  std::to_string(first) + " to " + std::to_string(last),
+              "`bailout` ends the run there; start it within the samples or use `pad zeroes`");
+  return std::make_shared<TableDriver>(std::move(table), options);
+}
+
 FileDriverPtr read_fixed_step(Card& card) {
   const int rows = card.keyword("count") ? -1 : read_count(card, "number of steps");
   SampleTable table;
@@ -78,7 +89,7 @@ FileDriverPtr read_fixed_step(Card& card) {
   table.dt = resolved(card, dt, samples.time_step, "time step");
   if (!(table.dt > 0))
     card.fail("the time step of the file driver must be positive, got " + std::to_string(table.dt));
-  return std::make_shared<TableDriver>(std::move(table), options);
+  return make_table_driver(card, std::move(table), options);
 }
 
 FileDriverPtr read_variable_step(Card& card) {
@@ -95,7 +106,7 @@ FileDriverPtr read_variable_step(Card& card) {
     table.times.push_back(v[0]);
     table.values.insert(table.values.end(), v + 1, v + columns);
   }
-  return std::make_shared<TableDriver>(std::move(table), options);
+  return make_table_driver(card, std::move(table), options);
 }
 
 /// Channels of a driver whose values come from a peer, not from the deck.
@@ -192,7 +203,6 @@ void register_file_drivers(Registry& registry) {
   registry.file_driver({"variable step"}, read_variable_step);
   registry.file_driver({"stream"}, read_stream);
   registry.file_driver({"socket"}, read_socket);
-  registry.unsupported("file driver", "RTAI input", "real-time mailbox input");
 }
 
 }  // namespace mbcosim

@@ -25,8 +25,13 @@ struct Area {
   }
 
  private:
+  /// At a jump of the area, where a drive has no derivative, that of the value there.
   static double slope(const Drive& d, const EvalContext& context, double x) {
-    if (d.has_derivative()) return d.derivative(context, x);
+    if (d.has_derivative()) try {
+        return d.derivative(context, x);
+      } catch (const EvaluationError&) {
+        return 0;
+      }
     const double h = 1e-6 * std::max(1.0, std::abs(x));
     return (d.value(context, x + h) - d.value(context, x - h)) / (2 * h);
   }

@@ -40,6 +40,40 @@ const ElementCard kCards[] = {
     {"beam",
      "beam: 90, 1, null, 2, null, 3, null, euler, .1,.2,.1, linear elastic generic, diag, "
      "10.,20.,30.,1.,2.,3., same, same;"},
+    {"hbeam",
+     "hbeam: 90, 1, position, .1,.2,.3, orientation, euler, .1,.2,.3, 2, position, .3,.1,.2, "
+     "orientation, euler, .2,.1,.1, linear elastic generic, diag, 10.,20.,30.,1.,2.,3.;"},
+    {"joint: beam slider",
+     "beam3: 89, 1, null, 2, null, 3, null, euler, .1,.2,.1, linear elastic generic, diag, "
+     "10.,20.,30.,1.,2.,3., same, same; joint: 90, beam slider, 8, .1,.2,.3, hinge, euler, "
+     ".1,.2,.3, type, classic, 1, 89, .1,0.,.2, 0.,.1,.1, .2,.1,0., initial node, 2;"},
+    {"joint: rod bezier",
+     "joint: 90, rod bezier, 1, .1,.2,.3, .4,.1,.2, 2, -.2,.3,.1, .3,.2,.1, 1.2, integration "
+     "order, 3, integration segments, 2, linear viscoelastic, 10., 1.;"},
+    {"joint: point contact", "joint: 90, point contact, 1, 2, .6,0.,.8, 40.;"},
+    {"joint: deformable displacement hinge",
+     "joint: 90, deformable displacement hinge, 1, .1,.2,.3, hinge, euler, .1,.2,.3, 2, "
+     ".3,.2,.1, hinge, euler, .3,.2,.1, linear viscoelastic, 3., 2.;"},
+    {"joint regularization: jacobian",
+     "joint: 90, spherical hinge, 1, .1,.2,.3, 2, -.4,.5,.6; joint regularization: 90, "
+     "jacobian, 0.;"},
+    {"couple: total internal",
+     "couple: 90, total internal, 1, position, .1,.2,.3, 2, position, .3,.2,.1, force, 1.,2.,3., "
+     "const, 2., moment, 3.,1.,2., const, 1.;"},
+    {"thermal: capacitance", "thermal: 90, capacitance, 41, 2.5;"},
+    {"thermal: resistance", "thermal: 90, resistance, 41, 42, .7;"},
+    {"thermal: source", "thermal: 90, source, 41, ramp, 1., 0., 1., 0.;"},
+    {"bulk: spring support", "bulk: 90, spring support, 1, structural, 2, const, 3.;"},
+    {"user defined: wheel2",
+     "user defined: 90, wheel2, 1, .1,1.,.2, 2, .1,.2,-2.5, .1,.2,1., 2., .8, 1.2, 50., 1.25, 10., "
+     "slip, linear, .3, .2, linear, .1, .4, const, .5, threshold, .3, .6;"},
+    {"user defined: inline friction",
+     "user defined: 90, inline friction, node1, 1, offset, .1,.2,.3, hinge, euler, .1,.2,.3, "
+     "node2, 2, offset, .3,.2,.1, coulomb friction coefficient, .3, micro slip displacement, .4, "
+     "viscous friction coefficient, .2;"},
+    {"user defined: asynchronous_machine",
+     "user defined: 90, asynchronous_machine, rotor, 1, stator, 2, MK, 2.3, sK, .4, OmegaS, const, "
+     "30., M0, .5, MP0, .3;"},
     {"joint: clamp", "joint: 90, clamp, 1, node, node;"},
     {"joint: spherical hinge", "joint: 90, spherical hinge, 1, .1,.2,.3, 2, -.4,.5,.6;"},
     {"joint: distance", "joint: 90, distance, 1, 2, const, 1.3;"},
@@ -321,7 +355,8 @@ const std::set<std::string> kConstant = {"automatic structural",
                                          "force: external structural mapping",
                                          "output element: stream",
                                          "stream motion output",
-                                         "stream output"};
+                                         "stream output",
+                                         "thermal: source"};
 
 std::string nodes_of(const std::string& card) {
   std::string text =
@@ -334,6 +369,9 @@ std::string nodes_of(const std::string& card) {
     text += "structural: 7, modal, .2,.1,.3, euler, .1,.3,.2, .1,.2,.3, .3,.2,.1;";
   for (int label = 11; label <= 16; ++label)
     text += "abstract: " + std::to_string(label) + ", differential;";
+  if (card.find("beam slider") != card.npos)
+    text += "structural: 8, dynamic, .9,.2,.4, euler, .2,.3,-.1, .2,.1,.3, .1,.4,.2;";
+  if (card.find("thermal") != card.npos) text += "thermal: 41, value, 3.; thermal: 42, value, 5.;";
   text += "electric: 21; electric: 22;";
   for (int label = 31; label <= 36; ++label)
     if (card.find(" " + std::to_string(label) + ",") != card.npos)

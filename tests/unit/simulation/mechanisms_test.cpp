@@ -351,7 +351,7 @@ double bricard_energy(const DeckRun& run) {
 
 TEST(Bricard, MovesWithARegularizedHinge) {
   const int steps = 4000;
-  DeckRun run(bricard(4, steps, kBricardHinge + "joint regularization: 6, tikhonov, 1e-8;\n", 1));
+  DeckRun run(bricard(4, steps, kBricardHinge + "joint regularization: 6, jacobian, 1e-8;\n", 1));
   const double start = bricard_energy(run);
   double lowest = 10, worst = 0;
   for (int k = 0; k < steps / 20; ++k) {
