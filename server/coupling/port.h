@@ -23,6 +23,8 @@ class PeerLink {
   /// False: the peer is gone. Returns at `deadline` at the latest, the link being broken then.
   virtual bool send(const v1::ServerMessage& message,
                     std::chrono::steady_clock::time_point deadline) = 0;
+  /// Sends a sign of life, unless other messages are on their way anyway.
+  virtual void beat(const v1::ServerMessage&) {}
   /// May the session's thread fetch answers itself? That saves a change of threads.
   virtual bool pulls() const { return false; }
   enum class Pulled { message, nothing, closed };

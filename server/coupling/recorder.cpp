@@ -3,6 +3,8 @@
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/util/delimited_message_util.h>
 
+#include "wire/refusal.h"
+
 namespace mbcosim::server {
 
 v1::StepNotice step_notice(std::int64_t step, double time) {
@@ -17,13 +19,25 @@ void Recorder::add(const v1::RecordEntry& entry) {
   if (full_) return;
   const v1::RecordEntry* kept = &entry;
   v1::RecordEntry end;
-  if (static_cast<std::int64_t>(bytes_.size() + entry.ByteSizeLong()) > most_bytes_) {
+  if (!has_room(static_cast<std::int64_t>(bytes_.size() + entry.ByteSizeLong()))) {
     end.set_cut_off(true);
     kept = &end;
     full_ = true;
   }
   google::protobuf::io::StringOutputStream out(&bytes_);
   google::protobuf::util::SerializeDelimitedToZeroCopyStream(*kept, &out);
+}
+
+// At the end of the server's memory the record ends as at its own limit.
+bool Recorder::has_room(std::int64_t bytes) {
+  constexpr std::int64_t kSlab = 1 << 20;
+  if (bytes > most_bytes_) return false;
+  try {
+    while (memory_.bytes() < bytes) memory_.grow(kSlab);
+    return true;
+  } catch (const Refusal&) {
+    return false;
+  }
 }
 
 void Recorder::attached(const std::string& port, const v1::Welcome& welcome) {
@@ -87,16 +101,9 @@ void Recorder::chosen(const v1::StepRequest& step) {
   add(entry);
 }
 
-void Recorder::read(std::size_t size, const std::function<bool(const std::string&)>& piece) const {
-  for (std::size_t at = 0;; at += size) {
-    std::string part;
-    {
-      const std::lock_guard guard(mutex_);
-      if (at >= bytes_.size()) return;
-      part = bytes_.substr(at, size);
-    }
-    if (!piece(part)) return;
-  }
+std::string Recorder::read(std::size_t at, std::size_t size) const {
+  const std::lock_guard guard(mutex_);
+  return at < bytes_.size() ? bytes_.substr(at, size) : std::string();
 }
 
 }  // namespace mbcosim::server

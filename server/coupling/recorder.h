@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <mutex>
 #include <string>
 
 #include "mbcosim/v1/record.pb.h"
+#include "wire/memory.h"
 
 namespace mbcosim::server {
 
@@ -16,7 +16,8 @@ v1::StepNotice step_notice(std::int64_t step, double time);
 /// `cut_off`.
 class Recorder {
  public:
-  explicit Recorder(std::int64_t most_bytes) : most_bytes_(most_bytes) {}
+  Recorder(std::int64_t most_bytes, MemoryBudget& memory)
+      : most_bytes_(most_bytes), memory_(memory) {}
   void add(const v1::RecordEntry& entry);
   void attached(const std::string& port, const v1::Welcome& welcome);
   void detached(const std::string& port);
@@ -29,12 +30,15 @@ class Recorder {
   /// What was chosen of the step that follows.
   void chosen(const v1::StepRequest& step);
 
-  /// Passes the record on in pieces of about `size` bytes; false from `piece` ends it.
-  void read(std::size_t size, const std::function<bool(const std::string&)>& piece) const;
+  /// At most `size` bytes of the record from `at` on; empty: there are no more.
+  std::string read(std::size_t at, std::size_t size) const;
 
  private:
+  bool has_room(std::int64_t bytes);
+
   const std::int64_t most_bytes_;
-  mutable std::mutex mutex_;  // protects the two below
+  mutable std::mutex mutex_;  // protects all below
+  MemoryShare memory_;        ///< at least that of `bytes_`
   std::string bytes_;
   bool full_ = false;
 };

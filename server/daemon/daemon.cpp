@@ -1,9 +1,8 @@
 #include "daemon/daemon.h"
 
 #include <arpa/inet.h>
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
-#include <grpcpp/health_check_service_interface.h>
+#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -14,6 +13,13 @@
 #include <fstream>
 #include <sstream>
 #include <thread>
+
+#include "grpc/health/v1/health.grpc.pb.h"
+#include "rpc/reflection.h"
+#include "service/coupling_service.h"
+#include "service/reduction_service.h"
+#include "service/simulations_service.h"
+#include "service/telemetry_service.h"
 
 namespace mbcosim::server {
 namespace {
@@ -63,9 +69,10 @@ void add_channel_arguments(grpc::ServerBuilder& builder, const ServiceLimits& li
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
-  grpc::ResourceQuota quota("mbcosimd");
-  quota.SetMaxThreads(limits.open_calls + 16);
-  builder.SetResourceQuota(quota);
+  // A connection that does not come to its point ends; what it may carry is refused by name before
+  // this bound, which holds for Unix sockets, too, where connections cannot be told apart.
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 10000);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, limits.connection_calls + 32);
 }
 
 int worker_count(int wanted) {
@@ -76,20 +83,74 @@ Authenticator make_authenticator(const std::string& tokens_file) {
   return tokens_file.empty() ? Authenticator() : Authenticator::from_file(tokens_file);
 }
 
+/// Throws when options contradict each other. Fills in the share that one identity gets of what
+/// there is: half, where there are several.
+Config checked(Config config) {
+  const bool tls = !config.tls_certificate.empty();
+  if (tls == config.tls_key.empty())
+    throw std::runtime_error("--tls-certificate and --tls-key belong together");
+  if (!config.tls_client_ca.empty() && !tls)
+    throw std::runtime_error(
+        "--tls-client-ca needs --tls-certificate and --tls-key: without TLS no "
+        "certificate is ever asked for");
+  int& own = config.limits.identity_sessions;
+  if (config.limits.memory_bytes == 0) config.limits.memory_bytes = MemoryBudget::default_bytes();
+  const bool several = !config.tokens_file.empty() || !config.tls_client_ca.empty();
+  if (own == 0) own = several ? std::max(1, config.limits.sessions / 2) : config.limits.sessions;
+  return config;
+}
+
 }  // namespace
 
 Daemon::Daemon(const Config& config)
-    : config_(config),
+    : config_(checked(config)),
       authenticator_(make_authenticator(config.tokens_file)),
       slots_(worker_count(config.workers)),
+      lanes_(config.limits.sessions, worker_count(config.workers)),
+      admission_({config.limits.open_calls, config.limits.identity_calls,
+                  config.limits.identity_streams, config.limits.connection_calls}),
+      memory_(config_.limits.memory_bytes),
+      runtime_{
+          lanes_,
+          timer_,
+          admission_,
+          memory_,
+          authenticator_,
+          [this](const std::string& method, const std::string& identity, const Refusal& refusal) {
+            log_.refused(method, identity, refusal);
+            metrics_.count_failure(refusal.reason());
+          }},
       store_(config_.limits, metrics_),
-      parts_{config_, authenticator_, store_, watch_, slots_, metrics_},
-      simulations_(parts_),
-      telemetry_(parts_),
-      coupling_(parts_),
-      reduction_(parts_) {
-  grpc::EnableDefaultHealthCheckService(true);
-  if (config_.reflection) grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+      gate_(runtime_),
+      health_({"mbcosim.v1.Simulations", "mbcosim.v1.Coupling", "mbcosim.v1.Telemetry",
+               "mbcosim.v1.Reduction"}),
+      parts_{config_, store_, slots_, metrics_, log_, runtime_, gate_} {
+  add_methods();
+  listen();
+  if (config_.shared_memory) open_shared_memory();
+  if (!config_.http.empty()) open_http();
+}
+
+void Daemon::expose_metrics() {
+  if (config_.metrics.empty()) return;
+  if (!is_loopback(config_.metrics) && !config_.insecure)
+    throw std::runtime_error("refused to serve metrics on " + config_.metrics +
+                             ": they are told to anybody; an address other than loopback needs "
+                             "--insecure");
+  metrics_.expose(config_.metrics);
+}
+
+void Daemon::add_methods() {
+  add_simulations(gate_, parts_);
+  add_telemetry(gate_, parts_);
+  add_coupling(gate_, parts_);
+  add_reduction(gate_, parts_);
+  health_.add_to(gate_, !config_.health_credentials);
+  if (config_.reflection) add_reflection(gate_);
+}
+
+void Daemon::listen() {
+  grpc::EnableDefaultHealthCheckService(false);
   grpc::ServerBuilder builder;
   add_channel_arguments(builder, config_.limits);
   std::vector<int> ports(config_.listen.size(), 0);
@@ -97,11 +158,8 @@ Daemon::Daemon(const Config& config)
     check_listener(config_.listen[i]);
     builder.AddListeningPort(config_.listen[i], credentials_for(config_.listen[i]), &ports[i]);
   }
-  builder.RegisterService(&simulations_);
-  builder.RegisterService(&telemetry_);
-  builder.RegisterService(&coupling_);
-  builder.RegisterService(&reduction_);
-  if (!config_.metrics.empty()) metrics_.expose(config_.metrics);
+  builder.RegisterCallbackGenericService(&gate_);
+  expose_metrics();
   const mode_t old_mask = ::umask(0177);  // sockets get mode 0600
   server_ = builder.BuildAndStart();
   ::umask(old_mask);
@@ -113,8 +171,6 @@ Daemon::Daemon(const Config& config)
                          : address.substr(0, address.rfind(':') + 1) + std::to_string(ports[i]);
     spdlog::info("listening on {}", bound);
   }
-  if (config_.shared_memory) open_shared_memory();
-  if (!config_.http.empty()) open_http();
 }
 
 void Daemon::open_shared_memory() {
@@ -125,7 +181,7 @@ void Daemon::open_shared_memory() {
       spdlog::warn("no shared memory beside {}: the path of its socket would be too long", address);
       continue;
     }
-    shared_memory_.push_back(std::make_unique<SharedMemoryService>(path, parts_, coupling_));
+    shared_memory_.push_back(std::make_unique<SharedMemoryService>(path, parts_));
     spdlog::info("shared memory for peers through {}", path);
   }
 }
@@ -143,7 +199,7 @@ void Daemon::open_http() {
   door_ = std::make_unique<http::Door>(
       options,
       http::DoorParts{server_->InProcessChannel(arguments), authenticator_,
-                      [this] { return metrics_.text(); }, [this] { return !watch_.closing(); }});
+                      [this] { return metrics_.text(); }, [this] { return !gate_.closing(); }});
   spdlog::info("serving HTTP on {}", door_->address());
   std::printf("page: %s\n", door_->page_address().c_str());  // not logged: it holds a secret
   std::fflush(stdout);
@@ -151,6 +207,7 @@ void Daemon::open_http() {
 
 Daemon::~Daemon() {
   if (server_) shut_down();
+  lanes_.stop(std::chrono::hours(1));  // jobs use what is destroyed next
 }
 
 void Daemon::check_listener(const std::string& address) const {
@@ -160,13 +217,17 @@ void Daemon::check_listener(const std::string& address) const {
   }
   if (address.rfind(':') == std::string::npos)
     throw std::runtime_error("listener \"" + address + "\" is neither unix:PATH nor HOST:PORT");
+  if (config_.insecure) return;
   const bool tls = !config_.tls_certificate.empty();
   const bool identified = !config_.tls_client_ca.empty() || !config_.tokens_file.empty();
-  if (is_loopback(address) || config_.insecure || (tls && identified)) return;
-  throw std::runtime_error("refused to listen on " + address +
-                           ": an address other than loopback needs --tls-certificate and --tls-key "
-                           "with --tls-client-ca or "
-                           "--tokens, or --insecure");
+  if (!identified)
+    throw std::runtime_error("refused to listen on " + address +
+                             ": every account that reaches a TCP address would be admin; it needs "
+                             "--tokens or --tls-client-ca, or --insecure");
+  if (!tls && !is_loopback(address))
+    throw std::runtime_error("refused to listen on " + address +
+                             ": an address other than loopback also needs --tls-certificate and "
+                             "--tls-key, or --insecure");
 }
 
 std::shared_ptr<grpc::ServerCredentials> Daemon::credentials_for(const std::string& address) const {
@@ -180,27 +241,32 @@ std::shared_ptr<grpc::ServerCredentials> Daemon::credentials_for(const std::stri
   return grpc::SslServerCredentials(options);
 }
 
-void Daemon::shut_down() {
+bool Daemon::shut_down() {
+  constexpr std::chrono::seconds kLastJobs(1);
   spdlog::info("shutting down");
-  if (auto* health = server_->GetHealthCheckService()) health->SetServingStatus(false);
-  watch_.cancel_all();
+  health_.stop();
+  gate_.close();
   store_.close_all();
   shared_memory_.clear();
   door_.reset();
   server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace);
   server_.reset();
-  spdlog::info("stopped");
+  const bool ended = lanes_.stop(kLastJobs);
+  spdlog::info(ended ? "stopped" : "stopped; work that went on is dropped");
+  return ended;
 }
 
 int check_health(const std::string& address) {
-  const auto stub =
-      v1::Simulations::NewStub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  const auto stub = grpc::health::v1::Health::NewStub(
+      grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(3));
-  v1::ServerInfo info;
-  const grpc::Status status = stub->GetServerInfo(&context, {}, &info);
-  const bool alive = status.ok() || status.error_code() == grpc::StatusCode::UNAUTHENTICATED;
-  return alive ? 0 : 1;
+  grpc::health::v1::HealthCheckResponse response;
+  const grpc::Status status = stub->Check(&context, {}, &response);
+  const bool asks_credentials = status.error_code() == grpc::StatusCode::UNAUTHENTICATED;
+  const bool serves =
+      status.ok() && response.status() == grpc::health::v1::HealthCheckResponse::SERVING;
+  return serves || asks_credentials ? 0 : 1;
 }
 
 }  // namespace mbcosim::server

@@ -8,12 +8,10 @@
 #include <vector>
 
 #include "http/door.h"
+#include "rpc/health.h"
 #include "service/config.h"
-#include "service/coupling_service.h"
-#include "service/reduction_service.h"
+#include "service/parts.h"
 #include "service/shared_memory_service.h"
-#include "service/simulations_service.h"
-#include "service/telemetry_service.h"
 
 namespace mbcosim::server {
 
@@ -23,11 +21,14 @@ class Daemon {
   explicit Daemon(const Config& config);
   ~Daemon();
 
-  /// Stops accepting, interrupts running steps at an iteration boundary, ends streams. Returns when
-  /// all calls have ended.
-  void shut_down();
+  /// Stops accepting, interrupts running steps at an iteration boundary, ends streams. False: some
+  /// work goes on after the grace is over; the process must end without the daemon's destructor.
+  bool shut_down();
 
  private:
+  void add_methods();
+  void expose_metrics();
+  void listen();
   void open_shared_memory();
   void open_http();
   void check_listener(const std::string& address) const;
@@ -36,14 +37,17 @@ class Daemon {
   const Config config_;
   const Authenticator authenticator_;
   Metrics metrics_;
+  EventLog log_;
   SolverSlots slots_;
+  Lanes lanes_;
+  Timer timer_;
+  Admission admission_;
+  MemoryBudget memory_;
+  const Runtime runtime_;
   SessionStore store_;
-  CallWatch watch_;
-  Parts parts_;
-  SimulationsService simulations_;
-  TelemetryService telemetry_;
-  CouplingService coupling_;
-  ReductionService reduction_;
+  Gate gate_;
+  Health health_;
+  const Parts parts_;
   std::unique_ptr<grpc::Server> server_;
   std::vector<std::unique_ptr<SharedMemoryService>> shared_memory_;  ///< one for each Unix socket
   std::unique_ptr<http::Door> door_;

@@ -1,11 +1,15 @@
 #include "daemon/logging.h"
 
+#include <google/protobuf/stubs/logging.h>
+#include <grpc/support/log.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <memory>
 #include <nlohmann/json.hpp>
+
+#include "service/event_log.h"
 
 namespace mbcosim::server {
 namespace {
@@ -24,6 +28,31 @@ class JsonMessage : public spdlog::custom_flag_formatter {
   }
 };
 
+/// Are there not too many of them? What clients send makes libraries talk.
+bool may_talk() {
+  static Rate rate(20);
+  std::int64_t missed = 0;
+  return rate.pass(Rate::Clock::now(), &missed);
+}
+
+/// gRPC's own lines, without the place in its sources.
+void log_grpc(gpr_log_func_args* args) {
+  if (!may_talk()) return;
+  const auto level = args->severity == GPR_LOG_SEVERITY_ERROR  ? spdlog::level::warn
+                     : args->severity == GPR_LOG_SEVERITY_INFO ? spdlog::level::info
+                                                               : spdlog::level::debug;
+  spdlog::log(level, "gRPC: {}", printable(args->message));
+}
+
+void log_protobuf(google::protobuf::LogLevel severity, const char*, int,
+                  const std::string& message) {
+  if (!may_talk()) return;
+  const auto level = severity >= google::protobuf::LOGLEVEL_ERROR     ? spdlog::level::warn
+                     : severity == google::protobuf::LOGLEVEL_WARNING ? spdlog::level::info
+                                                                      : spdlog::level::debug;
+  spdlog::log(level, "protobuf: {}", printable(message.substr(0, 500)));
+}
+
 }  // namespace
 
 void start_logging(const Config& config) {
@@ -37,6 +66,8 @@ void start_logging(const Config& config) {
   logger->set_formatter(std::move(formatter));
   logger->set_level(spdlog::level::from_str(config.log_level));
   spdlog::set_default_logger(logger);
+  gpr_set_log_function(log_grpc);
+  google::protobuf::SetLogHandler(log_protobuf);
 }
 
 }  // namespace mbcosim::server

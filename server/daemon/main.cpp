@@ -1,7 +1,9 @@
 /// mbcosimd: serves simulations over gRPC until SIGTERM or SIGINT.
 #include <signal.h>
+#include <spdlog/spdlog.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 
 #include "daemon/daemon.h"
@@ -24,7 +26,10 @@ int main(int argc, char** argv) {
     Daemon daemon(invocation.config);
     int signal_number = 0;
     sigwait(&signals, &signal_number);
-    daemon.shut_down();
+    if (!daemon.shut_down()) {
+      spdlog::shutdown();
+      std::_Exit(0);
+    }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "mbcosimd: error: %s\n", error.what());
     return 4;

@@ -4,6 +4,10 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+
+#include "rpc/auth.h"
 
 namespace mbcosim::server {
 namespace {
@@ -31,7 +35,25 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
       "Nested `for` and `if`, nested brackets of a statement");
   add("--limit-unknowns", limits.engine.unknowns, "Unknowns of one model");
   add("--limit-message-bytes", limits.message_bytes, "Bytes of one message");
+  app.add_option("--limit-memory", limits.memory_bytes,
+                 "Bytes of models, states, snapshots, records, buffers and uploads; 0: 60 % of the "
+                 "machine's or the container's")
+      ->group("Limits")
+      ->capture_default_str()
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--limit-identity-sessions", limits.identity_sessions,
+                 "Simulations of one identity; 0: half of all where callers show credentials")
+      ->group("Limits")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
   add("--limit-open-calls", limits.open_calls, "Calls and streams at once");
+  add("--limit-identity-calls", limits.identity_calls,
+      "Calls with one answer at once, of one identity");
+  add("--limit-identity-streams", limits.identity_streams, "Streams at once, of one identity");
+  add("--limit-connection-calls", limits.connection_calls,
+      "Calls and streams at once over one connection");
+  add("--limit-shared-memory-peers", limits.shared_memory_peers, "Peers over shared memory");
   add("--limit-http-connections", limits.http_connections, "Connections served at once over HTTP");
   add("--limit-http-streams", limits.http_streams, "Streams of one identity over HTTP");
   add("--limit-telemetry-samples", limits.telemetry_samples,
@@ -44,12 +66,25 @@ void add_environment_names(CLI::App& app) {
   for (CLI::Option* option : app.get_options()) {
     if (option->get_lnames().empty()) continue;
     const std::string& name = option->get_lnames().front();
-    if (name == "help" || name == "version" || name == "print-config") continue;
+    if (name == "help" || name == "version" || name == "print-config" || name == "hash-token" ||
+        name == "check")
+      continue;
     std::string variable = "MBCOSIMD_";
     for (const char c : name)
       variable += c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
     option->envname(variable);
   }
+}
+
+int print_hash() {
+  std::string token;
+  if (!std::getline(std::cin, token) || token.empty() ||
+      token.find_first_of(" \t\r#") != std::string::npos) {
+    std::fprintf(stderr, "mbcosimd: error: expected a token without blanks, one line\n");
+    return 4;
+  }
+  std::printf("%s\n", hash_of_token(token).c_str());
+  return 0;
 }
 
 }  // namespace
@@ -68,7 +103,8 @@ Invocation read_options(int argc, char** argv) {
   CLI::App app{"Multibody co-simulation server.", "mbcosimd"};
   app.set_version_flag("--version", std::string("mbcosimd ") + MBCOSIM_VERSION);
   app.set_config("--config", "", "File of options, one `name=value` a line");
-  bool print_config = false;
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  bool print_config = false, hash_token = false;
   std::int64_t lease = config.limits.lease.count(), grace = config.shutdown_grace.count();
 
   app.add_option("--listen", config.listen,
@@ -76,7 +112,8 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--model-root", config.model_root, "Folder of decks that clients may name")
       ->check(CLI::ExistingDirectory);
   app.add_option("--workers", config.workers, "Simulations that step at once; 0: one per core")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(CLI::Range(0, 4096));
   app.add_option("--metrics", config.metrics, "HOST:PORT of Prometheus metrics");
   app.add_option("--http", config.http,
                  "HOST:PORT of the page, of calls over HTTP (Connect, gRPC-Web) and of /metrics");
@@ -84,8 +121,12 @@ Invocation read_options(int argc, char** argv) {
                  "Web site under which a proxy shows this daemon: https://HOST")
       ->group("Security");
   app.add_option("--shutdown-grace", grace, "Seconds that open calls get on SIGTERM")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(CLI::Range(0, 86400));
   app.add_flag("--reflection,!--no-reflection", config.reflection, "Serve gRPC reflection");
+  app.add_flag("--health-credentials", config.health_credentials,
+               "Health asks for credentials when the service does")
+      ->group("Security");
   app.add_flag(
       "--shared-memory,!--no-shared-memory", config.shared_memory,
       "Beside each unix:PATH, let peers of this host exchange through shared memory: PATH.shm");
@@ -105,16 +146,23 @@ Invocation read_options(int argc, char** argv) {
                  "PEM file; clients need a certificate of this authority")
       ->group("Security")
       ->check(CLI::ExistingFile);
-  app.add_option("--tokens", config.tokens_file, "File of lines `TOKEN ROLE IDENTITY [EXPIRY]`")
+  app.add_option("--tokens", config.tokens_file,
+                 "File of lines `TOKEN ROLE NAME [EXPIRY]`; tokens themselves or as --hash-token "
+                 "prints them")
       ->group("Security")
       ->check(CLI::ExistingFile);
-  app.add_flag("--insecure", config.insecure, "Allow addresses other than loopback without TLS")
+  app.add_flag("--insecure", config.insecure,
+               "Allow TCP without credentials, and addresses other than loopback without TLS")
       ->group("Security");
   add_limits(app, config.limits, lease);
   add_environment_names(app);
   app.add_option("--check", invocation.check_address,
                  "Ask whether a daemon serves at ADDRESS; exit code 0 or 1")
       ->configurable(false);
+  app.add_flag("--hash-token", hash_token,
+               "Read a token from the standard input and print it as the tokens file keeps it")
+      ->configurable(false)
+      ->group("Security");
   app.add_flag("--print-config", print_config, "Print the options in force and exit")
       ->configurable(false);
 
@@ -122,6 +170,10 @@ Invocation read_options(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     invocation.exit_code = app.exit(error) == 0 ? 0 : 4;
+    return invocation;
+  }
+  if (hash_token) {
+    invocation.exit_code = print_hash();
     return invocation;
   }
   config.limits.lease = std::chrono::seconds(lease);

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "http/connection.h"
-#include "service/auth.h"
+#include "rpc/auth.h"
 
 namespace mbcosim::server::http {
 

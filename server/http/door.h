@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "service/auth.h"
+#include "rpc/auth.h"
 
 struct mg_connection;
 struct mg_context;

@@ -118,7 +118,8 @@ class ModelReplay {
         slots_(1),
         session_(
             {}, load_simulation(deck, options_of(record.front().header()), record.front().header()),
-            {slots_, limits_, metrics_}, options_of(record.front().header())) {
+            {slots_, limits_, metrics_, log_, memory_, lanes_, timer_},
+            options_of(record.front().header())) {
     for (const v1::RecordEntry& entry : record)
       if (!entry.port().empty()) ports_[entry.port()].entries.push_back(&entry);
   }
@@ -199,8 +200,12 @@ class ModelReplay {
   const std::vector<v1::RecordEntry>& record_;
   const double tolerance_;
   server::SolverSlots slots_;
+  server::MemoryBudget memory_{server::MemoryBudget::default_bytes()};
+  server::Lanes lanes_{1, 1};
+  server::Timer timer_;
   server::ServiceLimits limits_;
   server::Metrics metrics_;
+  server::EventLog log_;
   Session session_;
   std::map<std::string, PortRecord> ports_;
   std::map<std::string, std::unique_ptr<RecordedPeer>> peers_;

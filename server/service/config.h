@@ -19,7 +19,13 @@ struct ServiceLimits {
   std::int64_t record_bytes = 256LL << 20;  ///< of what crosses the ports of one simulation
   int bundle_files = 10000;
   int message_bytes = 16 << 20;
-  int open_calls = 512;              ///< calls and streams at once
+  std::int64_t memory_bytes = 0;  ///< of all work; 0: a share of the machine's or container's
+  int identity_sessions = 0;    ///< of one identity; 0: half of `sessions` where there are several
+  int open_calls = 4096;        ///< calls and streams at once
+  int identity_calls = 256;     ///< calls with one answer at once, of one identity
+  int identity_streams = 512;   ///< streams at once, of one identity
+  int connection_calls = 1024;  ///< calls and streams at once over one connection
+  int shared_memory_peers = 64;
   int http_connections = 64;         ///< served at once through the HTTP door
   int http_streams = 16;             ///< of one identity through the HTTP door
   int telemetry_samples = 1 << 16;   ///< buffer of one subscription
@@ -34,12 +40,13 @@ struct Config {
   int checkpoint_every = 1000;      ///< accepted steps between checkpoints
   int workers = 0;                  ///< simulations that step at once; 0: one per core
   std::string tls_certificate, tls_key, tls_client_ca;  ///< PEM files
-  std::string tokens_file;  ///< lines `TOKEN ROLE IDENTITY [EXPIRY in Unix seconds]`
-  bool insecure = false;    ///< allows non-loopback addresses without TLS
+  std::string tokens_file;                              ///< see Authenticator::from_file
+  bool insecure = false;  ///< allows TCP without credentials, other than loopback without TLS
   bool reflection = true;
-  bool shared_memory = true;  ///< beside each Unix socket, for peers on this host
-  std::string metrics;        ///< HOST:PORT of Prometheus metrics; empty: none
-  std::string http;           ///< HOST:PORT of the page, calls over HTTP and metrics; empty: none
+  bool health_credentials = false;  ///< health asks for credentials when the service does
+  bool shared_memory = true;        ///< beside each Unix socket, for peers on this host
+  std::string metrics;              ///< HOST:PORT of Prometheus metrics; empty: none
+  std::string http;  ///< HOST:PORT of the page, calls over HTTP and metrics; empty: none
   std::vector<std::string> http_origins;  ///< web sites that are this daemon: "https://HOST"
   std::string log_level = "info", log_format = "text";
   std::chrono::seconds shutdown_grace{5};

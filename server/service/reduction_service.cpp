@@ -1,13 +1,14 @@
 #include "service/reduction_service.h"
 
+#include <optional>
+
 #include "input/sources.h"
+#include "mbcosim/v1/reduction.pb.h"
 #include "reduction/job.h"
 #include "service/upload.h"
 
 namespace mbcosim::server {
 namespace {
-
-using Stream = ReductionService::Stream;
 
 constexpr const char* kFileName = "body.fem";
 
@@ -62,75 +63,98 @@ v1::ReduceReply message_of(const ReductionReport& report) {
   return reply;
 }
 
-void send_file(const std::string& text, Stream* stream) {
-  constexpr std::size_t kPiece = 1 << 20;
-  v1::ReduceReply reply;
-  reply.mutable_chunk()->set_path(kFileName);
-  for (std::size_t at = 0; at < text.size(); at += kPiece) {
-    reply.mutable_chunk()->set_data(text.substr(at, kPiece));
-    if (!stream->Write(reply)) return;
-  }
-}
-
-/// Sends what is being done, at most ten times a second and at each new phase.
+/// Tells what is being done, at most ten times a second and at each new phase.
 class ProgressSender {
  public:
-  explicit ProgressSender(Stream* stream) : stream_(stream) {}
+  explicit ProgressSender(Exchange& exchange) : exchange_(exchange) {}
   void send(const std::string& phase, double fraction) {
     const auto now = std::chrono::steady_clock::now();
     if (phase == last_.progress().phase() && now - sent_ < std::chrono::milliseconds(100)) return;
+    if (!exchange_.all_written()) return;
     sent_ = now;
     last_.mutable_progress()->set_phase(phase);
     last_.mutable_progress()->set_fraction(fraction);
-    stream_->Write(last_);
+    exchange_.write(serialized(last_));
   }
 
  private:
-  Stream* stream_;
+  Exchange& exchange_;
   v1::ReduceReply last_;
   std::chrono::steady_clock::time_point sent_;
 };
 
-}  // namespace
+class ReduceHandler final : public Upload<v1::ReduceRequest> {
+ public:
+  explicit ReduceHandler(const Parts& parts)
+      : parts_(parts), bundle_(parts.config.limits, parts.runtime.memory) {}
 
-grpc::Status ReductionService::Reduce(grpc::ServerContext* context, Stream* stream) {
-  return serve(parts_, *context, "Reduce", Role::control, [&](const Caller&) {
-    Call call(parts_.watch, *context);
+ private:
+  void add(Exchange&, v1::ReduceRequest& message, MemoryShare) override {
+    if (!header_) {
+      if (!message.has_header())
+        throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `header`");
+      header_ = message.header();
+      return;
+    }
+    if (!message.has_chunk())
+      throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` there are only `chunk` messages");
+    bundle_.add(message.chunk());
+  }
+  void complete(Exchange& exchange) override {
+    if (!header_) throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `header`");
     try {
-      answer(stream, call);
+      answer(exchange);
     } catch (const ReductionError& error) {
       refuse(error);
     }
-  });
-}
-
-void ReductionService::answer(Stream* stream, Call& call) {
-  v1::ReduceRequest message;
-  if (!stream->Read(&message) || !message.has_header())
-    throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `header`");
-  const v1::ReduceHeader header = message.header();
-  Bundle bundle(parts_.config.limits);
-  while (stream->Read(&message)) {
-    if (!message.has_chunk())
-      throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` there are only `chunk` messages");
-    bundle.add(message.chunk());
   }
-  const BundleSource files(bundle.take());
-  const ReductionJob job = read_request(header, files);
-  const FeModel model = load(job, files, parts_.config.limits.engine);
+  void answer(Exchange& exchange) {
+    ProgressSender sender(exchange);
+    const CallToken token(exchange.call());
+    const BundleSource files(bundle_.take());
+    const ReductionJob job = read_request(*header_, files);
+    const FeModel model = within(exchange.runtime().memory, &token, &model_share_,
+                                 [&] { return load(job, files, parts_.config.limits.engine); });
+    const auto reduction =
+        reduce(model, job.options, [&](const std::string& phase, double fraction) {
+          sender.send(phase, fraction);
+          return !exchange.call().cancelled();
+        });
+    if (!reduction) throw Refusal(reduction.error());
+    std::string text = write_fem_text(reduction->data, reduction->comments);
+    Guard guard(mutex_);
+    exchange.write(serialized(message_of(reduction->report)));
+    text_ = std::move(text);
+  }
+  void on_written(Exchange& exchange) override {
+    exchange.post(Lane::work, [this, &exchange] { send_piece(exchange); });
+  }
+  void send_piece(Exchange& exchange) {
+    constexpr std::size_t kPiece = 1 << 20;
+    Guard guard(mutex_);
+    if (!text_ || !exchange.all_written()) return;
+    if (sent_ >= text_->size()) return exchange.finish(grpc::Status::OK);
+    v1::ReduceReply reply;
+    reply.mutable_chunk()->set_path(kFileName);
+    reply.mutable_chunk()->set_data(text_->substr(sent_, kPiece));
+    sent_ += kPiece;
+    exchange.write(serialized(reply));
+  }
 
-  CancelToken waiting;
-  call.attach(&waiting);
-  const SolverSlots::Slot slot = parts_.slots.acquire(waiting);
-  call.attach(nullptr);
-  ProgressSender sender(stream);
-  const auto reduction = reduce(model, job.options, [&](const std::string& phase, double fraction) {
-    sender.send(phase, fraction);
-    return !call.cancelled();
-  });
-  if (!reduction) throw Refusal(reduction.error());
-  if (stream->Write(message_of(reduction->report)))
-    send_file(write_fem_text(reduction->data, reduction->comments), stream);
+  const Parts& parts_;
+  std::optional<v1::ReduceHeader> header_;
+  Bundle bundle_;
+  MemoryShare model_share_;
+  Mutex mutex_;
+  std::optional<std::string> text_ TS_GUARDED_BY(mutex_);  ///< when the report has been sent
+  std::size_t sent_ TS_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace
+
+void add_reduction(Gate& gate, const Parts& parts) {
+  gate.add("/mbcosim.v1.Reduction/Reduce",
+           stream(Role::control, [&parts] { return std::make_unique<ReduceHandler>(parts); }));
 }
 
 }  // namespace mbcosim::server

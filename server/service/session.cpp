@@ -18,10 +18,12 @@ Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shar
       model_(&simulation->model()),
       variables_(simulation->variables()),
       lease_(identity_.lease),
-      snapshots_(identity_.id, digest_text(model_->digest), shared.limits),
+      snapshots_(identity_.id, digest_text(model_->digest), shared.limits, shared.memory),
+      telemetry_(std::make_shared<TelemetryHub>(shared.memory, shared.lanes, shared.timer)),
       simulation_(std::move(simulation)),
-      recorder_(options.record_ports() ? std::make_unique<Recorder>(shared.limits.record_bytes)
-                                       : nullptr),
+      recorder_(options.record_ports()
+                    ? std::make_unique<Recorder>(shared.limits.record_bytes, shared.memory)
+                    : nullptr),
       coupler_(options.ports(), *simulation_, identity_.lease, recorder_.get()) {
   status_.set_display_name(identity_.display_name);
   set_policy(options.non_convergence_policy(), options.minimum_step_s());
@@ -105,6 +107,8 @@ void Session::fill(v1::SimulationInfo* out) const {
     text += (text.empty() ? "port " : ", port ") + wait.port() + since;
     *out->add_waits() = std::move(wait);
   }
+  const std::string subscribers = telemetry_->waiting_for();
+  if (!subscribers.empty()) text += (text.empty() ? "" : ", ") + subscribers;
   out->set_waiting_for(text);
 }
 
@@ -190,9 +194,12 @@ void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariables
 
 // ------------------------------------------------------------------ telemetry
 
-void Session::subscribe(std::shared_ptr<TelemetryBuffer> buffer) {
-  for (const int handle : buffer->handles()) variables_.check(handle);
-  telemetry_.add(std::move(buffer));
+void Session::subscribe(const SubscriptionPtr& subscription,
+                        const google::protobuf::RepeatedField<int>& handles) {
+  variables_.check(handles);
+  std::int64_t values = 0;
+  for (const int handle : handles) values += variables()[handle].size;
+  telemetry_->add(subscription, values);
 }
 
 // ------------------------------------------------------------------ end of life
@@ -200,7 +207,7 @@ void Session::subscribe(std::shared_ptr<TelemetryBuffer> buffer) {
 void Session::close() {
   lease_.end();
   status_.interrupt();
-  telemetry_.close();
+  telemetry_->close();
 }
 
 Session::Use::Use(Session& session) : lease_(session.lease_) {

@@ -8,8 +8,9 @@
 
 #include "coupling/coupler.h"
 #include "mbcosim/v1/simulations.pb.h"
-#include "service/call_watch.h"
+#include "rpc/call.h"
 #include "service/config.h"
+#include "service/event_log.h"
 #include "service/fair_mutex.h"
 #include "service/lease.h"
 #include "service/metrics.h"
@@ -18,6 +19,7 @@
 #include "service/telemetry_hub.h"
 #include "service/variable_access.h"
 #include "simulation/simulation.h"
+#include "wire/memory.h"
 
 namespace mbcosim::server {
 
@@ -35,12 +37,18 @@ class Session {
     SolverSlots& slots;
     const ServiceLimits& limits;
     Metrics& metrics;
+    EventLog& log;
+    MemoryBudget& memory;
+    Lanes& lanes;
+    Timer& timer;
   };
   using Progress = std::function<void()>;  ///< called between slices of a long advance
 
   Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
           const v1::CreateOptions& options = {});
 
+  /// What the model and the state take, held until the end.
+  void set_memory(MemoryShare share) { memory_ = std::move(share); }
   const Identity& identity() const { return identity_; }
   const Model& model() const { return *model_; }
   const std::vector<Variable>& variables() const { return variables_.variables(); }
@@ -69,8 +77,10 @@ class Session {
                     v1::Snapshot* out);
   std::unique_ptr<Simulation> fork(int snapshot);  ///< negative: the current state
 
-  void subscribe(std::shared_ptr<TelemetryBuffer> buffer);
-  void unsubscribe(const std::shared_ptr<TelemetryBuffer>& buffer) { telemetry_.remove(buffer); }
+  /// Throws NO_SUCH_VARIABLE.
+  void subscribe(const SubscriptionPtr& subscription,
+                 const google::protobuf::RepeatedField<int>& handles);
+  TelemetryHub& telemetry() { return *telemetry_; }
 
   /// Throws NO_SUCH_PORT. The port lives as long as the session.
   Port& port(const std::string& name) const;
@@ -100,6 +110,8 @@ class Session {
   void remember(const v1::StepReply& reply);
   void check(const v1::StepRequest& request) const;
   void check_step(std::int64_t expected) const;
+  bool must_wait(const Advance& advance) const;
+  void wait_for_subscribers();
   bool wants_more(const Advance& advance) const;
   bool choose(Advance& advance);
   bool begin(Advance& advance);
@@ -126,11 +138,13 @@ class Session {
   const Model* const model_;
   const VariableAccess variables_;
 
+  MemoryShare memory_;
+
   // Thread-safe by themselves.
   Lease lease_;
   SessionStatus status_;
   SnapshotShelf snapshots_;
-  TelemetryHub telemetry_;
+  const std::shared_ptr<TelemetryHub> telemetry_;
 
   FairMutex lock_;  // protects the four below
   std::unique_ptr<Simulation> simulation_;

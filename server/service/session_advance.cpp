@@ -57,24 +57,34 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
   const Clock::time_point start = Clock::now();
   require_usable();
   check(request);
-  Advance advance{request, *reply, {}, 1, {}, false, false, {}};
+  Advance advance{request, *reply, {}, 1, {}, false, false};
   const SteppingClaim claim(*this, call, advance.token);
   if (request.has_steps()) advance.steps_left = request.steps();
   if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
     advance.steps_left = INT64_MAX;
   const bool coupled = !coupler_.ports().empty();
   while (!(coupled ? run_coupled_step(advance) : run_slice(advance))) {
-    advance.deliver();
+    wait_for_subscribers();
     if (progress) progress();
   }
-  while (!advance.deliver()) {
-  }
+  while (must_wait(advance)) wait_for_subscribers();
   if (!advance.started) return;  // a repeated request: the stored reply, as it was
   reply->set_total_seconds(seconds_since(start));
   remember(*reply);
   shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
                                 reply->solver_seconds());
   if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
+}
+
+// Does a subscriber keep the session waiting?
+bool Session::must_wait(const Advance& advance) const {
+  return telemetry_->blocked() && !advance.token.cancelled();
+}
+
+// Without lock and slot: nobody else waits for a slow reader.
+void Session::wait_for_subscribers() {
+  constexpr std::chrono::milliseconds kSlice(20);  // longest wait before looking round
+  if (telemetry_->blocked()) telemetry_->wait_for_room(kSlice);
 }
 
 bool Session::wants_more(const Advance& advance) const {
@@ -117,7 +127,7 @@ bool Session::begin(Advance& advance) {
 bool Session::run_slice(Advance& advance) {
   std::lock_guard lock(lock_);
   if (begin(advance)) return true;
-  if (!advance.pending.empty()) return false;
+  if (must_wait(advance)) return false;
   if (!wants_more(advance)) {
     finish(advance);
     return true;
@@ -131,7 +141,7 @@ bool Session::run_slice(Advance& advance) {
     }
     account(advance, attempt(advance));
     if (!wants_more(advance)) break;
-    if (!advance.pending.empty() || lock_.contended() || Clock::now() >= slice_end) return false;
+    if (must_wait(advance) || lock_.contended() || Clock::now() >= slice_end) return false;
   }
   finish(advance);
   return true;
@@ -173,12 +183,14 @@ void Session::account(Advance& advance, const StepReport& report) {
   if (report.error && report.outcome != StepOutcome::interrupted) {
     to_proto(*report.error, reply.mutable_failure());
     status_.remember_failure(reply.failure().message());
+    shared_.log.step_failed(identity_.id, simulation_->step_number() + 1,
+                            reply.failure().message());
   }
   if (!is_accepted(report.outcome)) return;
   account_pieces(reply, report);
   if (report.restarted) reply.set_restarted_steps(reply.restarted_steps() + 1);
   --advance.steps_left;
-  if (!telemetry_.empty()) telemetry_.publish(*simulation_, advance.pending);
+  if (!telemetry_->empty()) telemetry_->publish(*simulation_);
   if (advance.request.has_until() && variables_.holds(advance.request.until(), *simulation_)) {
     reply.set_condition_met(true);
     advance.ended = true;
@@ -209,7 +221,7 @@ bool Session::run_coupled_step(Advance& advance) {
   {
     std::lock_guard lock(lock_);
     if (begin(advance)) return true;
-    if (!advance.pending.empty()) return false;
+    if (must_wait(advance)) return false;
     if (!choose(advance)) {
       finish(advance);
       return true;
@@ -353,6 +365,7 @@ void Session::tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason
   failure->set_step(simulation_->step_number() + 1);
   failure->set_time_s(simulation_->time() + length_of(advance.choice, *simulation_));
   status_.remember_failure(failure->message());
+  shared_.log.step_failed(identity_.id, failure->step(), failure->message());
 }
 
 }  // namespace mbcosim::server

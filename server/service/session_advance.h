@@ -13,14 +13,6 @@ struct Session::Advance {
   std::int64_t steps_left = 1;
   StepChoice choice;  ///< of the next step
   bool started = false, ended = false;
-  TelemetryHub::Pending pending;  ///< samples not yet delivered
-
-  /// Waits a moment for subscribers that block. True: all samples are delivered.
-  bool deliver() {
-    if (pending.empty()) return true;
-    if (token.cancelled()) pending.clear();
-    return pending.deliver();
-  }
 };
 
 }  // namespace mbcosim::server

@@ -1,4 +1,5 @@
-/// Linearization and eigenvalues of a session's current state.
+/// Linearization and eigenvalues of a session's current state. They take no slot of the steps: the
+/// lane of heavy work bounds them, at a lower priority, so that a few of them starve no step.
 #include <complex>
 
 #include "service/session.h"
@@ -78,8 +79,6 @@ void Session::linearize(const v1::LinearizeRequest& request, v1::LinearizeReply*
   variables_.check(request.inputs());
   variables_.check(request.outputs());
   require_rest();
-  CancelToken never;
-  const SolverSlots::Slot slot = shared_.slots.acquire(never);
   Linearization system;
   InputsOutputs io;
   {
@@ -104,8 +103,6 @@ void Session::eigenvalues(const v1::ComputeEigenvaluesRequest& request,
   if (!std::isfinite(request.shift_hz()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`shift_hz` must be finite");
   require_rest();
-  CancelToken never;
-  const SolverSlots::Slot slot = shared_.slots.acquire(never);
   Linearization system;
   {
     std::lock_guard lock(lock_);

@@ -9,6 +9,7 @@ void Session::save(const std::string& display_name, v1::Snapshot* out) {
   State state;
   {
     std::lock_guard lock(lock_);
+    snapshots_.check_room(size_of(simulation_->state()));
     state = simulation_->snapshot();
   }
   snapshots_.add(std::move(state), display_name, out);

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <random>
 
+#include "threads/top_frame.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -15,10 +16,10 @@ SessionStore::SessionStore(const ServiceLimits& limits, Metrics& metrics)
 
 SessionStore::~SessionStore() {
   {
-    std::lock_guard guard(mutex_);
+    Guard guard(mutex_);
     stop_ = true;
   }
-  stop_signal_.notify_one();
+  changed_.notify_all();
   lease_thread_.join();
 }
 
@@ -29,31 +30,57 @@ std::string SessionStore::new_id() {
   return text;
 }
 
-SessionStore::Place::Place(SessionStore& store) : store_(store) {
-  std::lock_guard guard(store_.mutex_);
-  if (static_cast<int>(store_.sessions_.size()) + store_.places_ >= store_.limits_.sessions)
-    throw limit_refusal("sessions", store_.limits_.sessions,
-                        "the server has as many simulations as are allowed");
-  ++store_.places_;
+// ------------------------------------------------------------------ creations
+
+SessionStore::Place::Place(SessionStore& store, const std::string& request_id, const Caller& caller,
+                           const Call& call)
+    : store_(store), request_(caller.identity, request_id) {
+  constexpr std::chrono::milliseconds kLook(20);  // how soon the end of the call is noticed
+  Guard guard(store_.mutex_);
+  if (!request_id.empty()) {
+    while (store_.creations_.count(request_) > 0 && !call.cancelled())
+      store_.changed_.wait_for(store_.mutex_, kLook);
+    if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+    known_ = store_.find_request(request_);
+    if (known_) return;
+  }
+  store_.check_room(caller.identity);
+  store_.places_.insert(caller.identity);
+  if (!request_id.empty()) store_.creations_.insert(request_);
 }
 
 SessionStore::Place::~Place() {
-  std::lock_guard guard(store_.mutex_);
-  --store_.places_;
+  if (known_) return;
+  Guard guard(store_.mutex_);
+  store_.places_.erase(store_.places_.find(request_.first));
+  store_.creations_.erase(request_);
+  store_.changed_.notify_all();
 }
 
-SessionPtr SessionStore::find_request(const std::string& request_id, const Caller& caller) const {
-  if (request_id.empty()) return nullptr;
-  std::lock_guard guard(mutex_);
+void SessionStore::check_room(const std::string& owner) const {
+  if (static_cast<int>(sessions_.size() + places_.size()) >= limits_.sessions)
+    throw limit_refusal("sessions", limits_.sessions,
+                        "the server has as many simulations as are allowed");
+  const auto own = std::count_if(sessions_.begin(), sessions_.end(), [&](const auto& entry) {
+    return entry.second->identity().owner == owner;
+  });
+  if (own + static_cast<std::ptrdiff_t>(places_.count(owner)) >= limits_.identity_sessions)
+    throw limit_refusal("identity_sessions", limits_.identity_sessions,
+                        owner + " has as many simulations as one identity may have");
+}
+
+SessionPtr SessionStore::find_request(const Request& request) const {
   for (const auto& [id, session] : sessions_) {
     const Session::Identity& identity = session->identity();
-    if (identity.request_id == request_id && identity.owner == caller.identity) return session;
+    if (identity.owner == request.first && identity.request_id == request.second) return session;
   }
   return nullptr;
 }
 
+// ------------------------------------------------------------------ sessions
+
 void SessionStore::add(SessionPtr session) {
-  std::lock_guard guard(mutex_);
+  Guard guard(mutex_);
   const std::string id = session->identity().id;
   spdlog::info("{} created for {}", id, session->identity().owner);
   order_.push_back(id);
@@ -63,7 +90,7 @@ void SessionStore::add(SessionPtr session) {
 }
 
 SessionPtr SessionStore::get(const std::string& id, const Caller& caller) const {
-  std::lock_guard guard(mutex_);
+  Guard guard(mutex_);
   const auto found = sessions_.find(id);
   if (found == sessions_.end() || !caller.may_touch(found->second->identity().owner))
     throw Refusal(v1::REASON_NO_SUCH_SIMULATION,
@@ -72,7 +99,7 @@ SessionPtr SessionStore::get(const std::string& id, const Caller& caller) const 
 }
 
 std::vector<SessionPtr> SessionStore::list(const Caller& caller) const {
-  std::lock_guard guard(mutex_);
+  Guard guard(mutex_);
   std::vector<SessionPtr> result;
   for (const std::string& id : order_) {
     const SessionPtr& session = sessions_.at(id);
@@ -82,39 +109,50 @@ std::vector<SessionPtr> SessionStore::list(const Caller& caller) const {
 }
 
 void SessionStore::remove(const std::string& id, const Caller& caller) {
-  const SessionPtr session = get(id, caller);
+  drop(get(id, caller)->identity().id);
+}
+
+void SessionStore::drop(const std::string& id) {
+  SessionPtr session;
+  {
+    Guard guard(mutex_);
+    const auto found = sessions_.find(id);
+    if (found == sessions_.end()) return;
+    session = std::move(found->second);
+    sessions_.erase(found);
+    std::erase(order_, id);
+    metrics_.set_sessions(static_cast<int>(sessions_.size()));
+  }
   session->close();
-  std::lock_guard guard(mutex_);
-  if (sessions_.erase(id) == 0) return;
-  std::erase(order_, id);
-  metrics_.set_sessions(static_cast<int>(sessions_.size()));
   spdlog::info("{} deleted", id);
 }
 
 void SessionStore::close_all() {
-  std::lock_guard guard(mutex_);
+  Guard guard(mutex_);
   for (const auto& [id, session] : sessions_) session->close();
 }
 
 void SessionStore::close_expired() {
-  std::vector<SessionPtr> expired;
+  std::vector<std::string> expired;
   {
-    std::lock_guard guard(mutex_);
+    Guard guard(mutex_);
     const auto now = std::chrono::steady_clock::now();
     for (const auto& [id, session] : sessions_)
-      if (session->lease().expire(now)) expired.push_back(session);
+      if (session->lease().expire(now)) expired.push_back(id);
   }
-  for (const SessionPtr& session : expired) {
-    spdlog::info("{}: lease over", session->identity().id);
-    remove(session->identity().id, Caller{"", Role::admin});
+  for (const std::string& id : expired) {
+    spdlog::info("{}: lease over", id);
+    drop(id);
   }
 }
 
 void SessionStore::watch_leases() {
-  std::unique_lock guard(mutex_);
-  while (!stop_signal_.wait_for(guard, std::chrono::milliseconds(200), [&] { return stop_; })) {
+  constexpr std::chrono::milliseconds kPeriod(200);
+  Guard guard(mutex_);
+  while (!stop_) {
+    changed_.wait_for(mutex_, kPeriod);
     guard.unlock();
-    close_expired();
+    run_caught("leases", [this] { close_expired(); });
     guard.lock();
   }
 }

@@ -1,16 +1,17 @@
 /// All simulations of a daemon.
 #pragma once
 
-#include <condition_variable>
 #include <map>
 #include <memory>
-#include <mutex>
+#include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
-#include "service/auth.h"
+#include "rpc/auth.h"
 #include "service/session.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::server {
 
@@ -22,42 +23,66 @@ class SessionStore {
   SessionStore(const ServiceLimits& limits, Metrics& metrics);
   ~SessionStore();
 
-  /// A place for one more session, taken before the work of creating it starts.
+  /// A place for one more session, taken before the work of creating it starts. A creation with a
+  /// request id is done once: who repeats it waits for the first and gets its session.
   class Place {
    public:
-    explicit Place(SessionStore& store);  ///< throws Refusal when all places are taken
+    /// Throws LIMIT_EXCEEDED when all places are taken, CANCELLED when the call ends first.
+    Place(SessionStore& store, const std::string& request_id, const Caller& caller,
+          const Call& call);
     ~Place();
     Place(const Place&) = delete;
     Place& operator=(const Place&) = delete;
+    /// The session that the caller created earlier with this request id, or null.
+    const SessionPtr& known() const { return known_; }
 
    private:
     SessionStore& store_;
+    const std::pair<std::string, std::string> request_;  ///< owner and request id
+    SessionPtr known_;
   };
 
-  /// The session that the caller created earlier with this request id, or null.
-  SessionPtr find_request(const std::string& request_id, const Caller& caller) const;
   void add(SessionPtr session);
   /// Throws NOT_FOUND; other people's sessions are not found either.
   SessionPtr get(const std::string& id, const Caller& caller) const;
   std::vector<SessionPtr> list(const Caller& caller) const;  ///< in the order of creation
   void remove(const std::string& id, const Caller& caller);
+  /// Ends a session; nothing when it is gone already.
+  void drop(const std::string& id);
   void close_all();
 
   static std::string new_id();
 
  private:
+  using Request = std::pair<std::string, std::string>;
+  SessionPtr find_request(const Request& request) const TS_REQUIRES(mutex_);
+  void check_room(const std::string& owner) const TS_REQUIRES(mutex_);
   void watch_leases();
   void close_expired();
 
   const ServiceLimits& limits_;
   Metrics& metrics_;
-  mutable std::mutex mutex_;
-  std::map<std::string, SessionPtr> sessions_;
-  std::vector<std::string> order_;
-  int places_ = 0;
-  bool stop_ = false;
-  std::condition_variable stop_signal_;
+  mutable Mutex mutex_;
+  std::map<std::string, SessionPtr> sessions_ TS_GUARDED_BY(mutex_);
+  std::vector<std::string> order_ TS_GUARDED_BY(mutex_);
+  std::multiset<std::string> places_ TS_GUARDED_BY(mutex_);  ///< owners of creations under way
+  std::set<Request> creations_ TS_GUARDED_BY(mutex_);        ///< under way, with a request id
+  bool stop_ TS_GUARDED_BY(mutex_) = false;
+  Condition changed_;
   std::thread lease_thread_;
+};
+
+/// A session found and kept alive. Throws NO_SUCH_SIMULATION.
+class SessionHold {
+ public:
+  SessionHold(const SessionStore& store, const std::string& id, const Caller& caller)
+      : session_(store.get(id, caller)), use_(*session_) {}
+  Session& operator*() const { return *session_; }
+  Session* operator->() const { return session_.get(); }
+
+ private:
+  const SessionPtr session_;
+  const Session::Use use_;
 };
 
 }  // namespace mbcosim::server

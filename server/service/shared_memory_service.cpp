@@ -6,8 +6,13 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
+#include <optional>
 #include <system_error>
+
+#include "service/peer_seat.h"
+#include "threads/top_frame.h"
 
 namespace mbcosim::server {
 namespace {
@@ -17,6 +22,8 @@ constexpr int kLookMs = 50;       // how soon the end of the service is noticed
 constexpr int kRequestMs = 5000;  // longest wait for a new client's first packet
 constexpr int kMostWaiting = 64;  // clients not yet accepted
 constexpr auto kHelloWait = std::chrono::seconds(10);
+constexpr auto kHandshake = std::chrono::seconds(10);  // for the peer to take its welcome
+constexpr auto kLongestBeat = std::chrono::milliseconds(500);
 
 sockaddr_un name_of(const std::string& path) {
   sockaddr_un name{};
@@ -63,10 +70,10 @@ bool same_user(int socket) {
 }
 
 /// The session's thread fetches answers itself; between exchanges the connection's thread looks.
-class SharedMemoryStream : public PeerStream {
+class SharedMemoryStream : public PeerLink {
  public:
-  SharedMemoryStream(shm::Channel& channel, const CallWatch& watch, const std::atomic<bool>& stop)
-      : channel_(channel), watch_(watch), stop_(stop) {}
+  SharedMemoryStream(shm::Channel& channel, const Gate& gate, const std::atomic<bool>& stop)
+      : channel_(channel), gate_(gate), stop_(stop) {}
   ~SharedMemoryStream() override { channel_.close(); }
 
   bool send(const v1::ServerMessage& message, Clock::time_point deadline) override {
@@ -77,7 +84,9 @@ class SharedMemoryStream : public PeerStream {
       return false;
     }
   }
-  void hang_up() override { channel_.close(); }
+  void beat(const v1::ServerMessage& message) override {
+    send(message, Clock::now() + kLongestBeat);
+  }
   bool pulls() const override { return true; }
   Pulled pull(v1::PeerMessage* message, Clock::time_point until) override {
     try {
@@ -110,20 +119,27 @@ class SharedMemoryStream : public PeerStream {
     return pulled == Pulled::message;
   }
 
-  bool read(v1::PeerMessage* message) override {
-    if (!std::exchange(greeted_, true)) return read_hello(message);
+  /// The next message, while the heart beats. False: the peer has ended, or is silent for too long.
+  bool read(v1::PeerMessage* message, Heart& heart) {
+    const int wait = wait_of(heart);
     while (true) {
-      const bool ended = readable(channel_.socket(), kLookMs);
+      const bool ended = readable(channel_.socket(), wait);
       throw_refusal();
       if (look(message)) return true;  // what the peer sent before its end still counts
       if (ended || channel_.closed()) return false;
       if (is_closing())
         throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
+      if (heart.needed() && !heart.beat()) return false;
     }
   }
 
  private:
-  bool is_closing() const { return watch_.closing() || stop_.load(); }
+  static int wait_of(const Heart& heart) {
+    if (!heart.needed()) return kLookMs;
+    const auto period = std::chrono::duration_cast<std::chrono::milliseconds>(heart.period());
+    return static_cast<int>(std::clamp<std::int64_t>(period.count(), 1, kLookMs));
+  }
+  bool is_closing() const { return gate_.closing() || stop_.load(); }
   bool look(v1::PeerMessage* message) {
     try {
       return channel_.try_receive(message) == shm::Channel::Received::message;
@@ -137,20 +153,16 @@ class SharedMemoryStream : public PeerStream {
   }
 
   shm::Channel& channel_;
-  const CallWatch& watch_;
+  const Gate& gate_;
   const std::atomic<bool>& stop_;
-  bool greeted_ = false;
   std::mutex mutex_;
   std::optional<Refusal> refusal_;
 };
 
 }  // namespace
 
-SharedMemoryService::SharedMemoryService(const std::string& path, Parts parts,
-                                         CouplingService& coupling)
-    : path_(path), parts_(parts), coupling_(coupling), listener_(listen_on(path)), thread_([this] {
-        accept_loop();
-      }) {}
+SharedMemoryService::SharedMemoryService(const std::string& path, const Parts& parts)
+    : path_(path), parts_(parts), listener_(listen_on(path)), thread_([this] { accept_loop(); }) {}
 
 SharedMemoryService::~SharedMemoryService() {
   stop_.store(true);
@@ -161,26 +173,35 @@ SharedMemoryService::~SharedMemoryService() {
 
 void SharedMemoryService::accept_loop() {
   while (!stop_.load()) {
-    if (readable(listener_.get(), kLookMs)) accept_one();
-    join_ended();
+    run_caught("shared memory", [this] {
+      if (readable(listener_.get(), kLookMs)) accept_one();
+      join_ended();
+    });
   }
 }
 
 void SharedMemoryService::accept_one() {
   shm::Descriptor socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC));
-  if (!socket || !same_user(socket.get())) return;
-  const std::size_t most = static_cast<std::size_t>(parts_.config.limits.open_calls);
+  if (!socket) {  // no descriptor is free, say: the client waits, this thread does not spin
+    std::this_thread::sleep_for(std::chrono::milliseconds(kLookMs));
+    return;
+  }
+  if (!same_user(socket.get())) return;
+  const std::size_t most = static_cast<std::size_t>(parts_.config.limits.shared_memory_peers);
   if (connections_.size() >= most) {
     const grpc::Status status =
-        limit_refusal("open_calls", static_cast<long long>(most), "too many peers").status();
+        limit_refusal("shared_memory_peers", static_cast<long long>(most), "too many peers")
+            .status();
     shm::send_status(socket.get(), {status.error_code(), status.error_details()});
     return;
   }
-  Connection& connection = connections_.emplace_back();
+  std::list<Connection> fresh(1);
+  Connection& connection = fresh.front();
   connection.thread = std::thread([this, &connection, socket = std::move(socket)]() mutable {
-    serve(std::move(socket));
+    run_caught("shared memory peer", [&] { serve(std::move(socket)); });
     connection.ended.store(true);
   });
+  connections_.splice(connections_.end(), fresh);
 }
 
 void SharedMemoryService::join_ended() {
@@ -198,19 +219,34 @@ void SharedMemoryService::serve(shm::Descriptor socket) {
   shm::Request request;
   if (!readable(socket.get(), kRequestMs) || !shm::read_request(socket.get(), &request)) return;
   std::optional<shm::Channel> channel;
-  const grpc::Status status = serve_caller(
-      parts_, "Attach",
-      [&] { return parts_.authenticator.check_local(request.authorization, Role::control); },
-      [&](const Caller& caller) {
-        shm::Segment segment = shm::Segment::create();
-        if (!shm::send_segment(socket.get(), segment)) return;
-        channel.emplace(std::move(socket), std::move(segment), shm::Channel::Side::server,
-                        static_cast<std::size_t>(parts_.config.limits.message_bytes));
-        SharedMemoryStream stream(*channel, parts_.watch, stop_);
-        coupling_.serve(stream, caller);
-      });
+  grpc::Status status;
+  Caller caller;
+  try {
+    caller = parts_.runtime.authenticator.check_local(request.authorization, Role::control);
+    const Admission::Ticket ticket = parts_.runtime.admission.admit(caller.identity, "", true);
+    shm::Segment segment = shm::Segment::create();
+    if (!shm::send_segment(socket.get(), segment)) return;
+    channel.emplace(std::move(socket), std::move(segment), shm::Channel::Side::server,
+                    static_cast<std::size_t>(parts_.config.limits.message_bytes));
+    serve_peer(*channel, caller);
+  } catch (...) {
+    status = status_of_exception(parts_.runtime, "shared memory", caller.identity);
+  }
   shm::send_status(channel ? channel->socket() : socket.get(),
                    {status.error_code(), status.error_details()});
+}
+
+void SharedMemoryService::serve_peer(shm::Channel& channel, const Caller& caller) {
+  if (parts_.gate.closing())
+    throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
+  SharedMemoryStream stream(channel, parts_.gate, stop_);
+  v1::PeerMessage message;
+  if (!stream.read_hello(&message) || !message.has_hello())
+    throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `hello`");
+  PeerSeat seat(parts_, message.hello(), caller, stream);
+  if (!stream.send(seat.welcome(), Clock::now() + kHandshake)) return;
+  seat.begin();
+  while (stream.read(&message, seat.heart())) seat.receive(message);
 }
 
 }  // namespace mbcosim::server

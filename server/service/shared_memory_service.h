@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "service/coupling_service.h"
+#include "service/parts.h"
 #include "shared_memory/channel.h"
 
 namespace mbcosim::server {
@@ -15,7 +15,7 @@ namespace mbcosim::server {
 class SharedMemoryService {
  public:
   /// Throws std::runtime_error with a message for the operator.
-  SharedMemoryService(const std::string& path, Parts parts, CouplingService& coupling);
+  SharedMemoryService(const std::string& path, const Parts& parts);
   ~SharedMemoryService();
   SharedMemoryService(const SharedMemoryService&) = delete;
   SharedMemoryService& operator=(const SharedMemoryService&) = delete;
@@ -29,10 +29,10 @@ class SharedMemoryService {
   void accept_one();
   void join_ended();
   void serve(shm::Descriptor socket);
+  void serve_peer(shm::Channel& channel, const Caller& caller);
 
   const std::string path_;
-  const Parts parts_;
-  CouplingService& coupling_;
+  const Parts& parts_;
   shm::Descriptor listener_;
   std::atomic<bool> stop_{false};
   std::list<Connection> connections_;  ///< of the accepting thread

@@ -14,29 +14,45 @@ std::int64_t size_of(const State& s) {
                                    s.rotation.size() * sizeof(NodeRotation) + sizeof(State));
 }
 
-int split_snapshot_name(const std::string& name, std::string* simulation) {
+int number_of_snapshot(const std::string& name, std::string* simulation) {
   static constexpr std::string_view kInfix = "/snapshots/";
   const std::size_t at = name.find(kInfix);
-  if (at == std::string::npos) return -1;
   int number = -1;
-  const char* first = name.data() + at + kInfix.size();
-  const char* last = name.data() + name.size();
-  const auto [end, error] = std::from_chars(first, last, number);
-  if (error != std::errc() || end != last || number < 1) return -1;
+  if (at != std::string::npos) {
+    const char* first = name.data() + at + kInfix.size();
+    const char* last = name.data() + name.size();
+    const auto [end, error] = std::from_chars(first, last, number);
+    if (error != std::errc() || end != last) number = -1;
+  }
+  if (number < 1)
+    throw Refusal(v1::REASON_NO_SUCH_SNAPSHOT,
+                  "no snapshot is named \"" + name.substr(0, 100) + "\"");
   *simulation = name.substr(0, at);
   return number;
 }
 
-int SnapshotShelf::add(State state, const std::string& display_name, v1::Snapshot* out) {
-  const std::int64_t bytes = size_of(state);
+void SnapshotShelf::check_room(std::int64_t bytes) const {
   std::lock_guard guard(mutex_);
+  require_room(bytes);
+  const MemoryShare probe(memory_, bytes);
+}
+
+void SnapshotShelf::require_room(std::int64_t bytes) const {
   if (static_cast<int>(saved_.size()) >= limits_.snapshots)
     throw limit_refusal("snapshots", limits_.snapshots,
                         "the simulation has as many snapshots as are allowed");
   if (bytes_ + bytes > limits_.snapshot_bytes)
     throw limit_refusal("snapshot_bytes", limits_.snapshot_bytes,
                         "the simulation's snapshots would take too much memory");
-  const auto added = saved_.emplace(next_, Saved{display_name, std::move(state), bytes}).first;
+}
+
+int SnapshotShelf::add(State state, const std::string& display_name, v1::Snapshot* out) {
+  const std::int64_t bytes = size_of(state);
+  std::lock_guard guard(mutex_);
+  require_room(bytes);
+  MemoryShare share(memory_, bytes);
+  const auto added =
+      saved_.emplace(next_, Saved{display_name, std::move(state), std::move(share)}).first;
   bytes_ += bytes;
   fill(next_, added->second, out);
   return next_++;
@@ -49,7 +65,7 @@ State SnapshotShelf::get(int number) const {
 
 void SnapshotShelf::remove(int number) {
   std::lock_guard guard(mutex_);
-  bytes_ -= find(number).bytes;
+  bytes_ -= find(number).share.bytes();
   saved_.erase(number);
 }
 
@@ -72,7 +88,7 @@ void SnapshotShelf::fill(int number, const Saved& saved, v1::Snapshot* out) cons
   out->set_time_s(saved.state.time);
   out->set_display_name(saved.display_name);
   out->set_model_digest(digest_);
-  out->set_size_bytes(saved.bytes);
+  out->set_size_bytes(saved.share.bytes());
 }
 
 }  // namespace mbcosim::server

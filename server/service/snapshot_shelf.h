@@ -9,6 +9,7 @@
 #include "mbcosim/v1/simulations.pb.h"
 #include "model/state.h"
 #include "service/config.h"
+#include "wire/memory.h"
 
 namespace mbcosim::server {
 
@@ -20,9 +21,15 @@ std::int64_t size_of(const State& state);
 class SnapshotShelf {
  public:
   /// `simulation`: name of the simulation; `digest`: of its model, for descriptions.
-  SnapshotShelf(std::string simulation, std::string digest, const ServiceLimits& limits)
-      : simulation_(std::move(simulation)), digest_(std::move(digest)), limits_(limits) {}
+  SnapshotShelf(std::string simulation, std::string digest, const ServiceLimits& limits,
+                MemoryBudget& memory)
+      : simulation_(std::move(simulation)),
+        digest_(std::move(digest)),
+        limits_(limits),
+        memory_(memory) {}
 
+  /// Throws LIMIT_EXCEEDED when there is no room for a state of so many bytes.
+  void check_room(std::int64_t bytes) const;
   /// Keeps a state. Throws LIMIT_EXCEEDED.
   int add(State state, const std::string& display_name, v1::Snapshot* out);
   /// A copy of a saved state. Throws NO_SUCH_SNAPSHOT.
@@ -34,21 +41,23 @@ class SnapshotShelf {
   struct Saved {
     std::string display_name;
     State state;
-    std::int64_t bytes = 0;
+    MemoryShare share;
   };
+  void require_room(std::int64_t bytes) const;
   const Saved& find(int number) const;
   void fill(int number, const Saved& saved, v1::Snapshot* out) const;
 
   const std::string simulation_, digest_;
   const ServiceLimits& limits_;
+  MemoryBudget& memory_;
   mutable std::mutex mutex_;  // protects all below
   std::map<int, Saved> saved_;
   int next_ = 1;
   std::int64_t bytes_ = 0;
 };
 
-/// Number in "simulations/ID/snapshots/N" after splitting off the simulation's name; -1: not such a
-/// name.
-int split_snapshot_name(const std::string& name, std::string* simulation);
+/// Number in "simulations/ID/snapshots/N"; `simulation` gets its name. Throws NO_SUCH_SNAPSHOT when
+/// it is no such name.
+int number_of_snapshot(const std::string& name, std::string* simulation);
 
 }  // namespace mbcosim::server

@@ -1,47 +1,117 @@
-/// The subscribers of one session.
+/// Samples on their way from a stepping session to its subscribers.
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <list>
 #include <memory>
-#include <mutex>
-#include <utility>
+#include <string>
 #include <vector>
 
-#include "service/telemetry_buffer.h"
+#include "mbcosim/v1/telemetry.pb.h"
+#include "rpc/lanes.h"
 #include "simulation/simulation.h"
+#include "threads/mutex.h"
+#include "threads/timer.h"
+#include "wire/memory.h"
 
 namespace mbcosim::server {
 
-/// Thread-safe.
-class TelemetryHub {
- public:
-  /// Samples that did not find room with a subscriber that blocks.
-  class Pending {
-   public:
-    bool empty() const { return waiting_.empty(); }
-    void clear() { waiting_.clear(); }
-    /// Waits a moment for room. True: all are delivered. Needs no lock: nobody else waits.
-    bool deliver();
+struct Feed;
 
-   private:
-    friend class TelemetryHub;
-    std::vector<std::pair<std::shared_ptr<TelemetryBuffer>, v1::Sample>> waiting_;
+/// What one subscriber asked for, and how far it has come.
+struct Subscription {
+  struct Options {
+    std::vector<int> handles;
+    std::int64_t every = 1;
+    v1::OverflowPolicy policy = v1::OVERFLOW_POLICY_DROP_OLDEST;
+    std::int64_t capacity = 1024;  ///< samples kept for it
+    std::chrono::milliseconds block_timeout{10000};
+    std::string identity;        ///< whose it is
+    std::function<void()> wake;  ///< there may be something to take
   };
-
-  void add(std::shared_ptr<TelemetryBuffer> buffer);
-  void remove(const std::shared_ptr<TelemetryBuffer>& buffer);
-  bool empty() const { return !some_.load(std::memory_order_relaxed); }
-  /// Offers the values at the simulation's state to all who want them.
-  void publish(const Simulation& simulation, Pending& pending);
-  /// Ends all subscriptions, now and from now on.
-  void close();
+  explicit Subscription(Options o) : options(std::move(o)) {}
 
  private:
-  std::mutex mutex_;  // protects the three below
-  std::vector<std::shared_ptr<TelemetryBuffer>> buffers_;
-  std::vector<double> values_;
-  bool closed_ = false;
-  std::atomic<bool> some_{false};
+  friend class TelemetryHub;
+  const Options options;
+  // All below belong to the hub, under its lock.
+  Feed* feed = nullptr;
+  std::int64_t first = 0, next = 0;  ///< numbers in the feed: of the first sample, of the next
+  std::int64_t stride = 1;           ///< grows with DECIMATE
+  struct Kept {
+    std::shared_ptr<const std::string> sample;
+    std::int64_t sequence;
+  };
+  std::deque<Kept> kept;  ///< with DECIMATE: thinned out, so they are not the feed's
+  MemoryShare share;      ///< of those
+  std::int64_t sequence = 0, dropped = 0, total_dropped = 0;
+  std::chrono::steady_clock::time_point blocks_since{};  ///< it keeps the session waiting; else 0
+  bool stalled = false;
+};
+using SubscriptionPtr = std::shared_ptr<Subscription>;
+
+/// The subscribers of one session. Equal subscriptions share one feed: a sample is evaluated and
+/// serialized once however many read it, and one that nobody takes costs nothing more.
+/// Subscribers are woken by threads of a pool, together and at most every few milliseconds.
+/// Thread-safe.
+class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
+ public:
+  TelemetryHub(MemoryBudget& memory, Lanes& lanes, Timer& timer);
+  ~TelemetryHub();
+
+  /// `values`: numbers of one sample. Throws LIMIT_EXCEEDED when the samples that may be kept would
+  /// take too much memory.
+  void add(const SubscriptionPtr& subscription, std::int64_t values) TS_EXCLUDES(mutex_);
+  void remove(const SubscriptionPtr& subscription) TS_EXCLUDES(mutex_);
+  /// Ends all subscriptions, now and from now on: what is kept can still be taken.
+  void close() TS_EXCLUDES(mutex_);
+
+  // --- the session's thread
+  bool empty() const { return !some_.load(std::memory_order_relaxed); }
+  /// Keeps the values at the simulation's state for all who want them.
+  void publish(const Simulation& simulation) TS_EXCLUDES(mutex_);
+  /// Does a subscriber with policy BLOCK have no room for another sample?
+  bool blocked() const { return blocked_.load(std::memory_order_relaxed); }
+  /// Waits for room, at most `slice`. Who blocks longer than it may is stalled.
+  void wait_for_room(std::chrono::milliseconds slice) TS_EXCLUDES(mutex_);
+  /// For whom and since when the session waits: "subscriber ann since 0.4 s"; empty: for nobody.
+  std::string waiting_for() const TS_EXCLUDES(mutex_);
+
+  // --- a subscriber
+  enum class Taken { samples, nothing, closed, stalled };
+  /// Moves samples of up to about `most_bytes` into `batch`, a serialized TelemetryBatch.
+  Taken take(Subscription& subscription, std::size_t most_bytes, std::string* batch)
+      TS_EXCLUDES(mutex_);
+
+ private:
+  void drop_what_is_late(Subscription& s) TS_REQUIRES(mutex_);
+  void keep_for(Subscription& s, const Feed& feed) TS_REQUIRES(mutex_);
+  void decimate(Subscription& s) TS_REQUIRES(mutex_);
+  std::string sample(const Simulation& simulation, const Feed& feed) TS_REQUIRES(mutex_);
+  void look_for_blocks() TS_REQUIRES(mutex_);
+  void schedule() TS_REQUIRES(mutex_);
+  void wake_all() TS_EXCLUDES(mutex_);
+  void rest() TS_EXCLUDES(mutex_);
+
+  MemoryBudget& memory_;
+  Lanes& lanes_;
+  Timer& timer_;
+  mutable Mutex mutex_;
+  Condition room_;
+  std::list<Feed> feeds_ TS_GUARDED_BY(mutex_);
+  std::vector<SubscriptionPtr> subscriptions_ TS_GUARDED_BY(mutex_);
+  // Those with policy BLOCK, and with DECIMATE.
+  std::vector<SubscriptionPtr> blockers_ TS_GUARDED_BY(mutex_), decimators_ TS_GUARDED_BY(mutex_);
+  std::vector<double> values_ TS_GUARDED_BY(mutex_);
+  v1::Sample scratch_ TS_GUARDED_BY(mutex_);
+  bool closed_ TS_GUARDED_BY(mutex_) = false;
+  bool scheduled_ TS_GUARDED_BY(mutex_) = false;  ///< a round of waking comes
+  bool news_ TS_GUARDED_BY(mutex_) = false;       ///< since the last round
+  std::atomic<bool> some_{false}, blocked_{false};
 };
 
 }  // namespace mbcosim::server

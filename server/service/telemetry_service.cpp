@@ -1,26 +1,35 @@
 #include "service/telemetry_service.h"
 
 #include <google/protobuf/util/time_util.h>
+#include <grpcpp/support/slice.h>
+
+#include <optional>
 
 namespace mbcosim::server {
 namespace {
 
-TelemetryBuffer::Options make_options(const v1::SubscribeRequest& request,
-                                      const ServiceLimits& limits) {
-  TelemetryBuffer::Options options;
+constexpr std::size_t kBatchBytes = 256 << 10;  // about that much of samples in one message
+
+Subscription::Options make_options(const v1::SubscribeRequest& request, const Session& session,
+                                   const Caller& caller, const ServiceLimits& limits) {
+  Subscription::Options options;
+  options.identity = caller.identity;
   options.handles.assign(request.handles().begin(), request.handles().end());
   if (request.every() < 0) throw Refusal(v1::REASON_BAD_ARGUMENT, "`every` must not be negative");
   if (request.every() > 0) options.every = request.every();
-  if (request.policy() != v1::OVERFLOW_POLICY_UNSPECIFIED) options.policy = request.policy();
   if (!v1::OverflowPolicy_IsValid(request.policy()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`policy` is unknown");
+  if (request.policy() != v1::OVERFLOW_POLICY_UNSPECIFIED) options.policy = request.policy();
+  if (options.policy == v1::OVERFLOW_POLICY_BLOCK && caller.identity != session.identity().owner)
+    throw Refusal(v1::REASON_ROLE_TOO_LOW,
+                  "only the owner of a simulation may subscribe with policy BLOCK: it keeps the "
+                  "simulation waiting");
   if (request.buffer_samples() < 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`buffer_samples` must not be negative");
   if (request.buffer_samples() > limits.telemetry_samples)
     throw limit_refusal("telemetry_samples", limits.telemetry_samples,
                         "the buffer is larger than allowed");
-  if (request.buffer_samples() > 0)
-    options.capacity = static_cast<std::size_t>(request.buffer_samples());
+  if (request.buffer_samples() > 0) options.capacity = request.buffer_samples();
   if (request.has_block_timeout()) {
     options.block_timeout = std::chrono::milliseconds(
         google::protobuf::util::TimeUtil::DurationToMilliseconds(request.block_timeout()));
@@ -28,43 +37,79 @@ TelemetryBuffer::Options make_options(const v1::SubscribeRequest& request,
   return options;
 }
 
+grpc::ByteBuffer buffer_of(const std::string& bytes) {
+  const grpc::Slice slice(bytes);
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+class SubscribeHandler final : public OneRequest<v1::SubscribeRequest> {
+ public:
+  explicit SubscribeHandler(const Parts& parts) : OneRequest(Lane::quick), parts_(parts) {}
+
+ private:
+  void serve(Exchange& exchange, const v1::SubscribeRequest& request) override {
+    session_.emplace(parts_.store, request.simulation(), exchange.caller());
+    Subscription::Options options =
+        make_options(request, **session_, exchange.caller(), parts_.config.limits);
+    v1::TelemetryBatch first;
+    first.set_every(options.every);
+    options.wake = [this, weak = exchange.weak_from_this()] {
+      if (const auto self = weak.lock()) self->guarded([&] { pump(*self); });
+    };
+    {
+      Guard guard(mutex_);
+      if (over_) return;
+      subscription_ = std::make_shared<Subscription>(std::move(options));
+      (*session_)->subscribe(subscription_, request.handles());
+    }
+    exchange.write(serialized(first));
+  }
+  void on_written(Exchange& exchange) override {
+    exchange.post(Lane::quick, [this, &exchange] { pump(exchange); });
+  }
+  // Sends what there is, unless the client has not taken the last batch.
+  void pump(Exchange& exchange) {
+    Guard guard(mutex_);
+    if (!subscription_ || !exchange.all_written()) return;
+    switch ((*session_)->telemetry().take(*subscription_, kBatchBytes, &batch_)) {
+      case TelemetryHub::Taken::samples:
+        return exchange.write(buffer_of(batch_));
+      case TelemetryHub::Taken::nothing:
+        return;
+      case TelemetryHub::Taken::closed:
+        return exchange.finish(grpc::Status::OK);
+      case TelemetryHub::Taken::stalled:
+        throw Refusal(v1::REASON_READER_STALLED,
+                      "the reader stood still longer than `block_timeout`");
+    }
+  }
+  void on_done(Exchange& exchange, bool) override {
+    SubscriptionPtr subscription;
+    {
+      Guard guard(mutex_);
+      over_ = true;
+      subscription = std::move(subscription_);  // nothing is pumped from now on
+    }
+    if (!subscription) return;
+    (*session_)->telemetry().remove(subscription);
+    // The session may end with its last user, which takes a while.
+    parts_.runtime.lanes.post(Lane::quick, exchange.caller().identity,
+                              [self = exchange.shared_from_this(), this] { session_.reset(); });
+  }
+
+  const Parts& parts_;
+  std::optional<SessionHold> session_;
+  Mutex mutex_;
+  SubscriptionPtr subscription_ TS_GUARDED_BY(mutex_);
+  bool over_ TS_GUARDED_BY(mutex_) = false;
+  std::string batch_ TS_GUARDED_BY(mutex_);
+};
+
 }  // namespace
 
-grpc::Status TelemetryService::Subscribe(grpc::ServerContext* context,
-                                         const v1::SubscribeRequest* request,
-                                         grpc::ServerWriter<v1::TelemetryBatch>* writer) {
-  return serve(parts_, *context, "Subscribe", Role::observe, [&](const Caller& caller) {
-    const SessionPtr session = parts_.store.get(request->simulation(), caller);
-    const Session::Use use(*session);
-    const Call call(parts_.watch, *context);
-    const auto buffer =
-        std::make_shared<TelemetryBuffer>(make_options(*request, parts_.config.limits));
-    session->subscribe(buffer);
-    struct Unsubscribe {
-      Session& session;
-      const std::shared_ptr<TelemetryBuffer>& buffer;
-      ~Unsubscribe() { session.unsubscribe(buffer); }
-    } const unsubscribe{*session, buffer};
-
-    constexpr std::chrono::milliseconds kLook{20};  // how soon a cancelled call is noticed
-    v1::TelemetryBatch batch;
-    batch.set_every(request->every() > 0 ? request->every() : 1);
-    bool open = writer->Write(batch);
-    while (open && !call.cancelled()) {
-      switch (buffer->take(&batch, kLook)) {
-        case TelemetryBuffer::Taken::samples:
-          open = writer->Write(batch);
-          break;
-        case TelemetryBuffer::Taken::nothing:
-          break;
-        case TelemetryBuffer::Taken::closed:
-          return;
-        case TelemetryBuffer::Taken::stalled:
-          throw Refusal(v1::REASON_READER_STALLED,
-                        "the reader stood still longer than `block_timeout`");
-      }
-    }
-  });
+void add_telemetry(Gate& gate, const Parts& parts) {
+  gate.add("/mbcosim.v1.Telemetry/Subscribe",
+           stream(Role::observe, [&parts] { return std::make_unique<SubscribeHandler>(parts); }));
 }
 
 }  // namespace mbcosim::server

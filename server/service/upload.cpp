@@ -64,43 +64,49 @@ void Bundle::add(const v1::FileChunk& chunk) {
   if (bytes_ > limits_.engine.deck_bytes)
     throw limit_refusal("deck_bytes", limits_.engine.deck_bytes,
                         "the bundle is larger than allowed");
+  share_.grow(static_cast<std::int64_t>(chunk.path().size() + chunk.data().size()));
   files_[chunk.path()] += chunk.data();
   if (static_cast<int>(files_.size()) > limits_.bundle_files)
     throw limit_refusal("bundle_files", limits_.bundle_files,
                         "the bundle has more files than allowed");
 }
 
-Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceLimits& limits) {
-  Upload upload;
-  v1::UploadRequest message;
-  if (!reader->Read(&message) || !message.has_header())
-    throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an upload must be `header`");
-  upload.header = message.header();
-  if (upload.header.source_case() == v1::UploadHeader::SOURCE_NOT_SET)
-    throw Refusal(v1::REASON_BAD_ARGUMENT,
-                  "the header must have `bundle_main_file` or `model_root_file`");
-  Bundle bundle(limits);
-  while (reader->Read(&message)) {
-    if (!message.has_chunk())
-      throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` an upload has only `chunk` messages");
-    if (!upload.header.has_bundle_main_file())
-      throw Refusal(v1::REASON_OUT_OF_TURN, "a deck of the model root takes no `chunk` messages");
-    bundle.add(message.chunk());
+void DeckUpload::add(v1::UploadRequest& message, MemoryShare share) {
+  if (!header_) {
+    if (!message.has_header())
+      throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an upload must be `header`");
+    if (message.header().source_case() == v1::UploadHeader::SOURCE_NOT_SET)
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    "the header must have `bundle_main_file` or `model_root_file`");
+    header_ = std::move(*message.mutable_header());
+    header_share_ = std::move(share);
+    return;
   }
-  upload.files = bundle.take();
-  return upload;
+  if (!message.has_chunk())
+    throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` an upload has only `chunk` messages");
+  if (!header_->has_bundle_main_file())
+    throw Refusal(v1::REASON_OUT_OF_TURN, "a deck of the model root takes no `chunk` messages");
+  bundle_.add(message.chunk());
 }
 
-LoadReport load(const Upload& upload, const Config& config) {
-  if (upload.header.has_model_root_file())
-    return load_from_root(upload.header.model_root_file(), upload.header.options(), config);
-  const std::string& main_file = upload.header.bundle_main_file();
+const v1::UploadHeader& DeckUpload::header() const {
+  if (!header_)
+    throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an upload must be `header`");
+  return *header_;
+}
+
+LoadReport load(DeckUpload& upload, const Config& config) {
+  const v1::UploadHeader& header = upload.header();
+  if (header.has_model_root_file())
+    return load_from_root(header.model_root_file(), header.options(), config);
+  const std::string& main_file = header.bundle_main_file();
   check_name(main_file);
-  if (upload.files.count(main_file) == 0)
+  std::map<std::string, std::string> files = upload.take_files();
+  if (files.count(main_file) == 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
-  return load_deck(BundleSource(upload.files), main_file, config.limits.engine,
-                   attachments(upload.header.options()));
+  return load_deck(BundleSource(std::move(files)), main_file, config.limits.engine,
+                   attachments(header.options()));
 }
 
 }  // namespace mbcosim::server

@@ -2,38 +2,49 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 
-#include "mbcosim/v1/simulations.grpc.pb.h"
+#include "mbcosim/v1/simulations.pb.h"
 #include "service/config.h"
+#include "wire/memory.h"
 
 namespace mbcosim::server {
-
-struct Upload {
-  v1::UploadHeader header;
-  std::map<std::string, std::string> files;  ///< by name within the bundle
-};
 
 /// Files that arrive in pieces.
 class Bundle {
  public:
-  explicit Bundle(const ServiceLimits& limits) : limits_(limits) {}
+  Bundle(const ServiceLimits& limits, MemoryBudget& memory) : limits_(limits), share_(memory) {}
   /// Appends a piece. Throws Refusal for a bad name or an exceeded limit.
   void add(const v1::FileChunk& chunk);
   std::map<std::string, std::string> take() { return std::move(files_); }
 
  private:
   const ServiceLimits& limits_;
+  MemoryShare share_;
   std::int64_t bytes_ = 0;
   std::map<std::string, std::string> files_;
 };
 
-/// Collects the messages of an upload. Throws Refusal.
-Upload read_upload(grpc::ServerReader<v1::UploadRequest>* reader, const ServiceLimits& limits);
+/// A deck on its way in. Throws Refusal for messages out of turn.
+class DeckUpload {
+ public:
+  DeckUpload(const ServiceLimits& limits, MemoryBudget& memory) : bundle_(limits, memory) {}
+  /// `share`: of the message.
+  void add(v1::UploadRequest& message, MemoryShare share);
+  /// Throws OUT_OF_TURN when none has come.
+  const v1::UploadHeader& header() const;
+  std::map<std::string, std::string> take_files() { return bundle_.take(); }
+
+ private:
+  MemoryShare header_share_;
+  std::optional<v1::UploadHeader> header_;
+  Bundle bundle_;
+};
 
 /// Reads the deck. Throws Refusal when the model root or the file in it is not to be had; a wrong
 /// deck is in the report.
-LoadReport load(const Upload& upload, const Config& config);
+LoadReport load(DeckUpload& upload, const Config& config);
 /// Ports that need equations of their own in the model.
 std::vector<PortAttachment> attachments(const v1::CreateOptions& options);
 

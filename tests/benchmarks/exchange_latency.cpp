@@ -210,8 +210,11 @@ class DirectLink : public server::PeerLink {
 Coupled couple_in_process(v1::CouplingMode mode, int numbers, int count) {
   server::Config config;
   server::Metrics metrics;
+  server::EventLog log;
   server::SolverSlots slots(1);
-  server::CallWatch watch;
+  server::MemoryBudget memory(server::MemoryBudget::default_bytes());
+  server::Lanes lanes(1, 1);
+  server::Timer timer;
   const mbcosim::LoadReport loaded = mbcosim::load_deck(
       mbcosim::BundleSource(std::map<std::string, std::string>{{"deck", deck(numbers)}}), "deck");
   v1::CreateOptions session_options;
@@ -221,7 +224,8 @@ Coupled couple_in_process(v1::CouplingMode mode, int numbers, int count) {
   definition->add_output_variables("stream.wide");
   definition->add_input_variables("stream.wide");
   auto simulation = mbcosim::Simulation::create(loaded.model);
-  server::Session session({}, std::move(*simulation), {slots, config.limits, metrics},
+  server::Session session({}, std::move(*simulation),
+                          {slots, config.limits, metrics, log, memory, lanes, timer},
                           session_options);
   server::Port& port = session.port("loop");
   server::Agreement agreement;
@@ -233,8 +237,7 @@ Coupled couple_in_process(v1::CouplingMode mode, int numbers, int count) {
   v1::StepRequest request;
   request.set_steps(count);
   v1::StepReply reply;
-  grpc::ServerContext context;
-  server::Call call(watch, context);
+  server::Call call;
   session.step(request, call, &reply);
   port.detach();
   return {intervals.samples(), 1e6 * reply.solver_seconds() / double(intervals.exchanges())};
@@ -322,8 +325,9 @@ int run(int count) {
   const Place unix_socket{"unix:" + sockets + ".d", "unix:" + sockets + ".e"};
   const Place loopback{"127.0.0.1:" + std::to_string(port),
                        "127.0.0.1:" + std::to_string(port + 1)};
-  const pid_t daemon = start(folder + "/mbcosimd", {"--listen", unix_socket.daemon, "--listen",
-                                                    loopback.daemon, "--log-level", "warn"});
+  const pid_t daemon =
+      start(folder + "/mbcosimd", {"--listen", unix_socket.daemon, "--insecure", "--listen",
+                                   loopback.daemon, "--log-level", "warn"});
   const pid_t echo =
       start(folder + "/exchange_latency", {"--echo", unix_socket.echo, loopback.echo});
   client::Server::connect(unix_socket.daemon, 30);

@@ -6,7 +6,7 @@ cd "$(dirname "$0")/../.."
 build=${1:-build}
 [ $# -gt 0 ] && shift
 port=$((20000 + RANDOM % 20000))
-"$build/bin/mbcosimd" --listen "127.0.0.1:$port" --log-level warn &
+"$build/bin/mbcosimd" --listen "127.0.0.1:$port" --insecure --log-level warn &
 daemon=$!
 trap 'kill $daemon; wait $daemon || true' EXIT
 for _ in $(seq 100); do

@@ -69,7 +69,11 @@ class TwoSessions : public testing::Test {
   SolverSlots slots_{2};
   ServiceLimits limits_;
   Metrics metrics_;
-  Session::Shared shared_{slots_, limits_, metrics_};
+  EventLog log_;
+  MemoryBudget memory_{1 << 30};
+  Lanes lanes_{1, 1};
+  Timer timer_;
+  Session::Shared shared_{slots_, limits_, metrics_, log_, memory_, lanes_, timer_};
   Session mistaken_{named("simulations/a"), simulation_that_fails_at(.25), shared_};
   Session other_{named("simulations/b"), simulation_that_fails_at(1e9), shared_};
 };

@@ -53,7 +53,8 @@ class Shelf : public testing::Test {
     return s;
   }
   const ServiceLimits limits_ = limits();
-  SnapshotShelf shelf_{"simulations/1", "digest", limits_};
+  MemoryBudget memory_{1 << 20};
+  SnapshotShelf shelf_{"simulations/1", "digest", limits_, memory_};
   v1::Snapshot out_;
 };
 

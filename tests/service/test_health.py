@@ -66,8 +66,54 @@ def test_a_public_address_needs_protection():
         assert run.returncode == 4 and "--insecure" in run.stderr
 
 
+def refused(*options, **environment):
+    """What a daemon that does not start has to say."""
+    run = subprocess.run([DAEMON, "--listen", "unix:/tmp/mbcosim-never.sock", *options], stderr=subprocess.PIPE, text=True, timeout=30,
+                         env=dict(os.environ, **environment))
+    assert run.returncode == 4, run.stderr
+    return run.stderr
+
+
+def test_loopback_without_credentials_needs_insecure():
+    assert "--insecure" in refused("--listen", "127.0.0.1:0")
+
+
+def test_what_is_wrong_is_an_error_at_the_start(tmp_path):
+    config = tmp_path / "config"
+    config.write_text("workerz=3\n")
+    assert "workerz" in refused("--config", str(config))
+    assert "--workers" in refused("--workers", "-3")
+    ca = tmp_path / "ca.pem"
+    ca.write_text("none")
+    assert "--tls-client-ca needs --tls-certificate" in refused("--tls-client-ca", str(ca))
+    assert "belong together" in refused("--tls-certificate", str(ca))
+    assert "refused to serve metrics on 0.0.0.0:0" in refused("--metrics", "0.0.0.0:0")
+    tokens = tmp_path / "tokens"
+    for line, error in (("t control ann next-year", "line 1: \"next-year\" is no date"),
+                        ("t control ann 2026-02-31", "is no date"), ("t control ann 1 more", "nothing is expected after"),
+                        ("t boss ann", "none of observe, control, admin"), ("sha256:12 control ann", "64 hexadecimal digits"),
+                        ("t control", "expected TOKEN ROLE NAME")):
+        tokens.write_text(line + "\n")
+        assert error in refused("--tokens", str(tokens))
+    tokens.write_text("t control ann\n")
+    tokens.chmod(0o620)
+    assert "chmod go-w" in refused("--tokens", str(tokens))
+
+
+def test_tokens_may_stand_hashed_in_their_file(start_daemon, tmp_path):
+    run = subprocess.run([DAEMON, "--hash-token"], input="s3cret\n", stdout=subprocess.PIPE, text=True, check=True)
+    assert run.stdout.startswith("sha256:") and "s3cret" not in run.stdout
+    tokens = tmp_path / "tokens"
+    tokens.write_text(run.stdout.strip() + " control ann 2099-12-31\n")
+    daemon = start_daemon("--tokens", str(tokens))
+    with daemon.connect(token="s3cret") as ann:
+        assert ann.info().identity == "token:ann"
+    with pytest.raises(mbcosim.NotAllowed):
+        daemon.connect(token=run.stdout.strip())
+
+
 def test_loopback_tcp_on_request(start_daemon):
-    daemon = start_daemon("--listen", "127.0.0.1:0")
+    daemon = start_daemon("--listen", "127.0.0.1:0", "--insecure")
     wait_for(lambda: "127.0.0.1:" in daemon.log())
     port = daemon.log().split("listening on 127.0.0.1:")[1].split()[0]
     with mbcosim.connect(f"127.0.0.1:{port}") as server, server.load_text(decks.body()) as simulation:
@@ -103,3 +149,30 @@ def test_print_config_and_environment():
     run = subprocess.run([DAEMON, "--print-config"], stdout=subprocess.PIPE, text=True, env=environment)
     assert run.returncode == 0 and "limit-sessions=7" in run.stdout
     assert subprocess.run([DAEMON, "--no-such-option"], stderr=subprocess.DEVNULL).returncode == 4
+
+
+def certificate(folder, name, subject, signer=None, extra=()):
+    """Files NAME.key and NAME.pem; self-signed without a signer."""
+    key, pem = folder / f"{name}.key", folder / f"{name}.pem"
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2",
+                    "-keyout", key, "-out", pem, "-subj", subject, *extra,
+                    *(["-CA", folder / f"{signer}.pem", "-CAkey", folder / f"{signer}.key"] if signer else [])],
+                   check=True, stderr=subprocess.DEVNULL)
+    return pem.read_bytes(), key.read_bytes()
+
+
+def test_certificates_give_identities_of_one_form(start_daemon, tmp_path):
+    ca, _ = certificate(tmp_path, "ca", "/CN=authority")
+    certificate(tmp_path, "server", "/CN=localhost", "ca", ["-addext", "subjectAltName=DNS:localhost"])
+    clients = {"cert:spiffe://plant/robot": certificate(tmp_path, "a", "/CN=robot", "ca", ["-addext", "subjectAltName=URI:spiffe://plant/robot"]),
+               "cert:CN=arm,O=Plant": certificate(tmp_path, "b", "/O=Plant/CN=arm", "ca")}
+    daemon = start_daemon("--listen", "localhost:0", "--tls-certificate", str(tmp_path / "server.pem"), "--tls-key",
+                          str(tmp_path / "server.key"), "--tls-client-ca", str(tmp_path / "ca.pem"))
+    wait_for(lambda: "listening on localhost:" in daemon.log())
+    address = "localhost:" + daemon.log().split("listening on localhost:")[1].split()[0]
+    for identity, (pem, key) in clients.items():
+        with mbcosim.connect(address, credentials=grpc.ssl_channel_credentials(ca, key, pem)) as server:
+            info = server.info()
+            assert (info.identity, info.role) == (identity, "control")
+    with pytest.raises(mbcosim.Error):
+        mbcosim.connect(address, credentials=grpc.ssl_channel_credentials(ca), timeout=3)

@@ -15,6 +15,12 @@ const char* role_name(Role role);
 /// Whether two secrets are equal, in a time that does not tell where they differ.
 bool same_text(const std::string& a, const std::string& b);
 
+/// How a token is kept: "sha256:" and 64 hexadecimal digits. Tokens are long and random, so a quick
+/// hash without salt tells nobody what they are.
+std::string hash_of_token(const std::string& token);
+
+/// One form for all who call: "local", "token:NAME", "cert:" and the first URI among the
+/// alternative names of a certificate, else its subject as in RFC 4514. Never empty.
 struct Caller {
   std::string identity;
   Role role = Role::observe;
@@ -27,13 +33,14 @@ struct Caller {
 /// role admin: the Unix socket's mode decides who can connect.
 class Authenticator {
  public:
-  /// Reads lines `TOKEN ROLE IDENTITY [EXPIRY]`; `#` starts a comment. Throws std::runtime_error
-  /// that names the line.
+  /// Reads lines `TOKEN ROLE NAME [EXPIRY]`, the token itself or its hash; `#` starts a comment.
+  /// EXPIRY: "2027-01-31", the last day in UTC, or Unix seconds. Throws std::runtime_error that
+  /// names the line, or tells that others may write the file.
   static Authenticator from_file(const std::string& path);
   Authenticator() = default;
 
   /// Throws Refusal: UNAUTHENTICATED, or PERMISSION_DENIED when the role is below `required`.
-  Caller check(const grpc::ServerContext& context, Role required) const;
+  Caller check(const grpc::ServerContextBase& context, Role required) const;
   /// The same for a caller on this host that gRPC does not know: `authorization` is "Bearer TOKEN".
   Caller check_local(const std::string& authorization, Role required) const;
   /// Whether callers that gRPC does not know must show a token.
@@ -41,10 +48,11 @@ class Authenticator {
 
  private:
   struct Token {
-    std::string text;
+    std::string hash;
     Caller caller;
     std::time_t expiry = 0;  ///< 0: never
   };
+  static Token read_token(const std::string& line, int number);
   Caller caller_of(const std::string& authorization) const;
   static const Caller& require(const Caller& caller, Role required);
   const Token* find(const std::string& text) const;

@@ -1,0 +1,178 @@
+#include "rpc/auth.h"
+
+#include <grpc/grpc_security_constants.h>
+#include <openssl/crypto.h>
+#include <openssl/sha.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+constexpr std::string_view kHash = "sha256:";
+
+[[noreturn]] void refuse_line(int line, const std::string& what) {
+  throw std::runtime_error("tokens file, line " + std::to_string(line) + ": " + what);
+}
+
+Role role_of(const std::string& name, int line) {
+  for (const Role role : {Role::observe, Role::control, Role::admin})
+    if (name == role_name(role)) return role;
+  refuse_line(line, "role \"" + name + "\" is none of observe, control, admin");
+}
+
+/// "2027-01-31" → its end in UTC; Unix seconds.
+std::time_t time_of(const std::string& text, int line) {
+  std::int64_t seconds = 0;
+  const char* last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, seconds);
+  if (error == std::errc() && end == last && seconds > 0) return static_cast<std::time_t>(seconds);
+  std::tm day{};
+  const char* rest = ::strptime(text.c_str(), "%Y-%m-%d", &day);
+  const std::tm asked = day;
+  if (rest && *rest == '\0' && text.size() == 10) {
+    const std::time_t start = ::timegm(&day);
+    if (day.tm_mday == asked.tm_mday && day.tm_mon == asked.tm_mon) return start + 24 * 3600 - 1;
+  }
+  refuse_line(line, "\"" + text + "\" is no date; an expiry is YYYY-MM-DD or Unix seconds");
+}
+
+bool is_hash(const std::string& text) {
+  return text.compare(0, kHash.size(), kHash) == 0 &&
+         text.size() == kHash.size() + 2 * SHA256_DIGEST_LENGTH &&
+         text.find_first_not_of("0123456789abcdef", kHash.size()) == std::string::npos;
+}
+
+/// Who may write the file may let anybody in.
+void check_writers(const std::string& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0) throw std::runtime_error("cannot read the tokens file");
+  if ((info.st_mode & (S_IWGRP | S_IWOTH)) != 0)
+    throw std::runtime_error("others than its owner may write the tokens file: chmod go-w " + path);
+}
+
+}  // namespace
+
+bool same_text(const std::string& a, const std::string& b) {
+  return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
+std::string hash_of_token(const std::string& token) {
+  unsigned char digest[SHA256_DIGEST_LENGTH];
+  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), digest);
+  std::string text(kHash);
+  constexpr const char* kDigits = "0123456789abcdef";
+  for (const unsigned char byte : digest) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 15];
+  }
+  return text;
+}
+
+const char* role_name(Role role) {
+  constexpr const char* kNames[] = {"observe", "control", "admin"};
+  return kNames[static_cast<int>(role)];
+}
+
+// ------------------------------------------------------------------ the file
+
+Authenticator Authenticator::from_file(const std::string& path) {
+  check_writers(path);
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error("cannot read the tokens file");
+  Authenticator result;
+  result.tokens_required_ = true;
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    line = line.substr(0, line.find('#'));
+    if (line.find_first_not_of(" \t\r") != std::string::npos)
+      result.tokens_.push_back(read_token(line, number));
+  }
+  return result;
+}
+
+Authenticator::Token Authenticator::read_token(const std::string& line, int number) {
+  std::istringstream words(line);
+  std::string text, role, name, expiry, more;
+  if (!(words >> text >> role >> name)) refuse_line(number, "expected TOKEN ROLE NAME [EXPIRY]");
+  Token token;
+  const bool hashed = text.compare(0, kHash.size(), kHash) == 0;
+  if (hashed && !is_hash(text))
+    refuse_line(number, "after \"sha256:\" there must be 64 hexadecimal digits");
+  token.hash = hashed ? text : hash_of_token(text);
+  token.caller = {"token:" + name, role_of(role, number)};
+  if (words >> expiry) token.expiry = time_of(expiry, number);
+  if (words >> more) refuse_line(number, "nothing is expected after the expiry");
+  return token;
+}
+
+// ------------------------------------------------------------------ calls
+
+const Authenticator::Token* Authenticator::find(const std::string& text) const {
+  const std::string hash = hash_of_token(text);
+  const Token* found = nullptr;
+  for (const Token& token : tokens_)  // all of them, so that the time tells nothing
+    if (same_text(token.hash, hash)) found = &token;
+  return found;
+}
+
+Caller Authenticator::caller_of(const std::string& authorization) const {
+  constexpr std::string_view kScheme = "Bearer ";
+  if (authorization.compare(0, kScheme.size(), kScheme) != 0)
+    throw Refusal(v1::REASON_UNAUTHENTICATED, "a bearer token is required");
+  const Token* token = find(authorization.substr(kScheme.size()));
+  if (!token) throw Refusal(v1::REASON_UNAUTHENTICATED, "unknown bearer token");
+  if (token->expiry != 0 && token->expiry < std::time(nullptr))
+    throw Refusal(v1::REASON_UNAUTHENTICATED, "the bearer token has expired");
+  return token->caller;
+}
+
+const Caller& Authenticator::require(const Caller& caller, Role required) {
+  if (caller.role >= required) return caller;
+  throw Refusal(v1::REASON_ROLE_TOO_LOW, std::string("the call needs role ") + role_name(required) +
+                                             ", the caller has " + role_name(caller.role));
+}
+
+namespace {
+
+/// Of a client certificate that gRPC has verified.
+std::string identity_of(const grpc::AuthContext& auth) {
+  for (const char* property : {GRPC_PEER_URI_PROPERTY_NAME, GRPC_X509_SUBJECT_PROPERTY_NAME}) {
+    const auto values = auth.FindPropertyValues(property);
+    if (!values.empty() && !values.front().empty())
+      return "cert:" + std::string(values.front().data(), values.front().size());
+  }
+  throw Refusal(v1::REASON_UNAUTHENTICATED,
+                "the client's certificate has neither a URI among its names nor a subject");
+}
+
+}  // namespace
+
+Caller Authenticator::check(const grpc::ServerContextBase& context, Role required) const {
+  const auto auth = context.auth_context();
+  if (tokens_required_) {
+    const auto& metadata = context.client_metadata();
+    const auto header = metadata.find("authorization");
+    return require(caller_of(header == metadata.end()
+                                 ? ""
+                                 : std::string(header->second.data(), header->second.size())),
+                   required);
+  }
+  if (auth && auth->IsPeerAuthenticated())
+    return require({identity_of(*auth), Role::control}, required);
+  return require({"local", Role::admin}, required);
+}
+
+Caller Authenticator::check_local(const std::string& authorization, Role required) const {
+  return require(tokens_required_ ? caller_of(authorization) : Caller{"local", Role::admin},
+                 required);
+}
+
+}  // namespace mbcosim::server

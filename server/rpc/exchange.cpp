@@ -1,0 +1,312 @@
+#include "rpc/exchange.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <new>
+
+namespace mbcosim::server {
+namespace {
+
+constexpr std::chrono::seconds kLinger{10};  // that long an ended call waits for its client to read
+
+Refusal shutting_down() {
+  return Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
+}
+
+/// Refuses a call when there is not even memory to look at it.
+class RefusedCall final : public grpc::ServerGenericBidiReactor {
+ public:
+  explicit RefusedCall(const grpc::Status& status) { Finish(status); }
+  void OnDone() override { delete this; }
+};
+
+}  // namespace
+
+grpc::Status status_of_exception(const Runtime& runtime, const std::string& method,
+                                 const std::string& identity) {
+  const auto told = [&](const Refusal& refusal) {
+    if (runtime.on_refusal) runtime.on_refusal(method, identity, refusal);
+    return refusal.status();
+  };
+  try {
+    throw;
+  } catch (const Refusal& refusal) {
+    return told(refusal);
+  } catch (const std::bad_alloc&) {
+    return told(limit_refusal("memory", 0, "the server is out of memory"));
+  } catch (const std::exception& error) {
+    spdlog::error("{}: {}", method, error.what());
+    return told(Refusal(v1::REASON_INTERNAL, "internal error in " + method));
+  }
+}
+
+void Handler::start(Exchange& exchange) { exchange.read(Exchange::kMessageWait); }
+
+// ------------------------------------------------------------------ beginning
+
+void Exchange::start(const Method* method) {
+  guarded([&] {
+    grpc::GenericCallbackServerContext* context = nullptr;
+    {
+      Guard guard(mutex_);
+      self_ = shared_from_this();
+      context = context_;
+    }
+    if (gate_.closing()) throw shutting_down();
+    if (!method)
+      throw Refusal(v1::REASON_NOT_SERVED, "no method is named \"" + method_.substr(0, 100) + "\"");
+    if (!method->open) caller_ = runtime_.authenticator.check(*context, method->role);
+    if (method->counted != Counted::no) take_place(*context, method->counted == Counted::stream);
+    stream_ = method->counted == Counted::stream;
+    handler_ = method->make();
+    handler_->start(*this);
+  });
+}
+
+void Exchange::take_place(const grpc::GenericCallbackServerContext& context, bool stream) {
+  constexpr std::string_view kTcp[] = {"ipv4:", "ipv6:"};
+  const std::string peer = context.peer();
+  const bool told_apart = std::any_of(std::begin(kTcp), std::end(kTcp), [&](std::string_view kind) {
+    return peer.compare(0, kind.size(), kind) == 0;
+  });
+  Admission::Ticket ticket =
+      runtime_.admission.admit(caller_.identity, told_apart ? peer : "", stream);
+  Guard guard(mutex_);
+  ticket_ = std::move(ticket);
+}
+
+void Exchange::guarded(const std::function<void()>& body) noexcept {
+  try {
+    try {
+      body();
+    } catch (...) {
+      finish(status_of_exception(runtime_, method_, caller_.identity));
+    }
+  } catch (...) {  // no memory for a status either
+    hang_up();
+  }
+}
+
+// ------------------------------------------------------------------ for handlers
+
+void Exchange::read(std::optional<Clock::duration> longest) {
+  Guard guard(mutex_);
+  if (!context_ || finished_) return;
+  if (longest) {
+    wait_ = runtime_.timer.after(*longest, [weak = weak_from_this(), wait = *longest] {
+      if (const auto self = weak.lock()) self->message_is_late(wait);
+    });
+  }
+  StartRead(&in_);
+}
+
+void Exchange::message_is_late(Clock::duration longest) {
+  {
+    Guard guard(mutex_);
+    if (wait_ == 0) return;
+  }
+  guarded([&] {
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(longest).count();
+    throw Refusal(v1::REASON_OUT_OF_TURN,
+                  "no message came within " + std::to_string(seconds) + " s");
+  });
+}
+
+void Exchange::write(grpc::ByteBuffer message) {
+  Guard guard(mutex_);
+  if (!context_ || end_) return;
+  queue_.push_back(std::move(message));
+  go_on();
+}
+
+bool Exchange::all_written() const {
+  Guard guard(mutex_);
+  return !writing_;
+}
+
+bool Exchange::write_by(grpc::ByteBuffer message, Clock::time_point deadline) {
+  Guard guard(mutex_);
+  while (writing_ && !end_ && Clock::now() < deadline) written_.wait_until(mutex_, deadline);
+  if (writing_ || end_ || !context_) return false;
+  queue_.push_back(std::move(message));
+  go_on();
+  return true;
+}
+
+void Exchange::finish(grpc::Status status) {
+  Guard guard(mutex_);
+  want_finish(std::move(status));
+}
+
+void Exchange::end(grpc::ByteBuffer message) {
+  Guard guard(mutex_);
+  if (!context_ || end_) return;
+  queue_.push_back(std::move(message));
+  want_finish(grpc::Status::OK);
+}
+
+void Exchange::hang_up() {
+  Guard guard(mutex_);
+  if (context_) context_->TryCancel();
+}
+
+void Exchange::post(Lane lane, std::function<void()> work) {
+  {
+    Guard guard(mutex_);
+    ++jobs_;
+  }
+  runtime_.lanes.post(lane, caller_.identity, [self = shared_from_this(), work = std::move(work)] {
+    if (!self->call_.cancelled()) self->guarded(work);
+    self->end_job();
+  });
+}
+
+void Exchange::end_job() {
+  Guard guard(mutex_);
+  --jobs_;
+  if (closing_ && jobs_ == 0) want_finish(shutting_down().status());
+}
+
+void Exchange::shut_down() {
+  call_.cancel();
+  Guard guard(mutex_);
+  closing_ = true;
+  if (jobs_ == 0) want_finish(shutting_down().status());
+}
+
+// ------------------------------------------------------------------ writing
+
+void Exchange::want_finish(grpc::Status status) {
+  if (!context_ || end_) return;
+  end_ = std::move(status);
+  written_.notify_all();
+  go_on();
+  if (finished_) return;
+  linger_ = runtime_.timer.after(kLinger, [weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->hang_up();
+  });
+}
+
+// Starts what may be started: gRPC takes one write at a time.
+void Exchange::go_on() {
+  if (writing_ || finished_) return;
+  if (queue_.empty()) {
+    if (!end_) return;
+    finished_ = true;
+    Finish(*end_);
+    return;
+  }
+  out_ = std::move(queue_.front());
+  queue_.pop_front();
+  if (end_ && queue_.empty()) {
+    finished_ = true;
+    StartWriteAndFinish(&out_, {}, *end_);
+    return;
+  }
+  writing_ = true;
+  StartWrite(&out_);
+}
+
+// ------------------------------------------------------------------ from gRPC
+
+void Exchange::OnReadDone(bool ok) {
+  Timer::Id wait = 0;
+  {
+    Guard guard(mutex_);
+    wait = std::exchange(wait_, 0);
+  }
+  if (wait != 0) runtime_.timer.cancel(wait);
+  if (call_.cancelled()) return;
+  guarded([&] {
+    if (!ok) return handler_->on_half_close(*this);
+    grpc::ByteBuffer message;
+    message.Swap(&in_);
+    handler_->on_message(*this, std::move(message));
+  });
+}
+
+void Exchange::OnWriteDone(bool ok) {
+  {
+    Guard guard(mutex_);
+    writing_ = false;
+    out_.Clear();
+    if (!ok) queue_.clear();
+    go_on();
+    if (writing_ || end_) return;
+  }
+  written_.notify_all();
+  if (ok) guarded([&] { handler_->on_written(*this); });
+}
+
+void Exchange::OnCancel() {
+  call_.cancel();
+  Guard guard(mutex_);
+  queue_.clear();
+  if (end_) {
+    go_on();
+    return;
+  }
+  end_ = grpc::Status::CANCELLED;
+  written_.notify_all();
+  go_on();
+}
+
+void Exchange::OnDone() {
+  bool delivered = false;
+  Timer::Id linger = 0, wait = 0;
+  std::shared_ptr<Exchange> self;
+  {
+    Guard guard(mutex_);
+    delivered = !context_->IsCancelled();
+    context_ = nullptr;
+    ticket_ = {};
+    linger = std::exchange(linger_, 0);
+    wait = std::exchange(wait_, 0);
+    self = std::move(self_);
+  }
+  call_.cancel();
+  written_.notify_all();
+  if (linger != 0) runtime_.timer.cancel(linger);
+  if (wait != 0) runtime_.timer.cancel(wait);
+  gate_.forget(this);
+  if (handler_) guarded([&] { handler_->on_done(*this, delivered); });
+  // The handler of a stream may hold the last share of a simulation, which takes a while to free.
+  if (stream_) guarded([&] { runtime_.lanes.post(Lane::quick, caller_.identity, [self] {}); });
+}
+
+// ------------------------------------------------------------------ the gate
+
+grpc::ServerGenericBidiReactor* Gate::CreateReactor(grpc::GenericCallbackServerContext* context) {
+  try {
+    const auto exchange = std::make_shared<Exchange>(*this, runtime_, context);
+    {
+      Guard guard(mutex_);
+      calls_.emplace(exchange.get(), exchange);
+    }
+    const auto found = methods_.find(context->method());
+    exchange->start(found == methods_.end() ? nullptr : &found->second);
+    return exchange.get();
+  } catch (const std::exception&) {
+    return new RefusedCall({grpc::StatusCode::RESOURCE_EXHAUSTED, "the server is out of memory"});
+  }
+}
+
+void Gate::forget(Exchange* exchange) {
+  Guard guard(mutex_);
+  calls_.erase(exchange);
+}
+
+void Gate::close() {
+  std::vector<std::shared_ptr<Exchange>> calls;
+  {
+    Guard guard(mutex_);
+    closing_.store(true);
+    for (const auto& [exchange, weak] : calls_)
+      if (auto call = weak.lock()) calls.push_back(std::move(call));
+  }
+  for (const auto& call : calls) call->call().cancel();  // first: a step ends before its peers do
+  for (const auto& call : calls) call->shut_down();
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,173 @@
+/// One call over gRPC, unary or stream: messages in, messages out, a status.
+#pragma once
+
+#include <grpcpp/generic/async_generic_service.h>
+
+#include <atomic>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "rpc/admission.h"
+#include "rpc/auth.h"
+#include "rpc/call.h"
+#include "rpc/lanes.h"
+#include "threads/timer.h"
+#include "wire/memory.h"
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+
+class Exchange;
+class Gate;
+
+/// What a method does with one call. `on_…` come from gRPC's threads, messages one after the other,
+/// and must not wait: work is posted to a lane. What they throw ends the call.
+class Handler {
+ public:
+  virtual ~Handler() = default;
+  /// The first thing. Default: reads, with a bound on the wait.
+  virtual void start(Exchange& exchange);
+  /// The message that `read` asked for.
+  virtual void on_message(Exchange& exchange, grpc::ByteBuffer message) = 0;
+  /// The client sends no more. Also called when it vanishes: what counts is known in `on_done`.
+  virtual void on_half_close(Exchange& exchange) = 0;
+  /// All that was written has left.
+  virtual void on_written(Exchange&) {}
+  /// Last; `delivered`: the client got the status, it was not cancelled before.
+  virtual void on_done(Exchange&, bool /*delivered*/) {}
+};
+
+enum class Counted { call, stream, no };
+
+/// How a method is served.
+struct Method {
+  Role role = Role::observe;
+  bool open = false;  ///< no credentials are asked for
+  Counted counted = Counted::call;
+  std::function<std::unique_ptr<Handler>()> make;
+};
+
+/// What all exchanges of a daemon share; outlives them.
+struct Runtime {
+  Lanes& lanes;
+  Timer& timer;
+  Admission& admission;
+  MemoryBudget& memory;
+  const Authenticator& authenticator;
+  std::function<void(const std::string& method, const std::string& identity, const Refusal&)>
+      on_refusal;
+};
+
+/// A refusal, or anything else that was thrown, as the status of a call, which is told to
+/// `runtime.on_refusal`. Call it in a handler of exceptions.
+grpc::Status status_of_exception(const Runtime& runtime, const std::string& method,
+                                 const std::string& identity);
+
+/// Thread-safe. Lives until gRPC and all work posted have let go of it.
+class Exchange final : public grpc::ServerGenericBidiReactor,
+                       public std::enable_shared_from_this<Exchange> {
+ public:
+  using Clock = std::chrono::steady_clock;
+  /// Longest wait for a message that the protocol wants next.
+  static constexpr std::chrono::seconds kMessageWait{10};
+  /// Longest rest of a stream that has no reason to stay open.
+  static constexpr std::chrono::minutes kIdleStream{5};
+
+  Exchange(Gate& gate, const Runtime& runtime, grpc::GenericCallbackServerContext* context)
+      : gate_(gate), runtime_(runtime), method_(context->method()), context_(context) {}
+
+  /// Checks who calls and how much there is already; from then on the handler acts. `method`: null
+  /// when there is none of that name.
+  void start(const Method* method);
+  /// The server ends: work is interrupted, idle streams end with SHUTTING_DOWN.
+  void shut_down() TS_EXCLUDES(mutex_);
+
+  // --- for handlers
+  const Caller& caller() const { return caller_; }
+  const std::string& method() const { return method_; }
+  Call& call() { return call_; }
+  const Runtime& runtime() const { return runtime_; }
+  /// Asks for the next message; with a bound the call ends when none comes.
+  void read(std::optional<Clock::duration> longest = std::nullopt) TS_EXCLUDES(mutex_);
+  /// Sends, after what is on its way. Nobody waits; ask `all_written` first where it may be much.
+  void write(grpc::ByteBuffer message) TS_EXCLUDES(mutex_);
+  bool all_written() const TS_EXCLUDES(mutex_);
+  /// Sends when what is on its way has left by then; waits for that. False: it has not, or the call
+  /// is over.
+  bool write_by(grpc::ByteBuffer message, Clock::time_point deadline) TS_EXCLUDES(mutex_);
+  /// Ends the call once everything is written; what comes later is dropped.
+  void finish(grpc::Status status) TS_EXCLUDES(mutex_);
+  /// Sends a last message and ends the call well.
+  void end(grpc::ByteBuffer message) TS_EXCLUDES(mutex_);
+  /// Breaks the call off now.
+  void hang_up() TS_EXCLUDES(mutex_);
+  /// Does work in a lane, unless the call is over by then. What it throws ends the call.
+  void post(Lane lane, std::function<void()> work) TS_EXCLUDES(mutex_);
+  /// Calls `body`; what it throws ends the call.
+  void guarded(const std::function<void()>& body) noexcept;
+
+ private:
+  void OnReadDone(bool ok) override TS_EXCLUDES(mutex_);
+  void OnWriteDone(bool ok) override TS_EXCLUDES(mutex_);
+  void OnCancel() override TS_EXCLUDES(mutex_);
+  void OnDone() override TS_EXCLUDES(mutex_);
+  void take_place(const grpc::GenericCallbackServerContext& context, bool stream)
+      TS_EXCLUDES(mutex_);
+  void go_on() TS_REQUIRES(mutex_);
+  void end_job() TS_EXCLUDES(mutex_);
+  void message_is_late(Clock::duration longest) TS_EXCLUDES(mutex_);
+  void want_finish(grpc::Status status) TS_REQUIRES(mutex_);
+
+  Gate& gate_;
+  const Runtime& runtime_;
+  const std::string method_;
+  Caller caller_;
+  Call call_;
+  bool stream_ = false;
+  std::unique_ptr<Handler> handler_;
+  grpc::ByteBuffer in_;  ///< of the one read that may be under way
+
+  mutable Mutex mutex_;
+  Condition written_;
+  grpc::GenericCallbackServerContext* context_ TS_GUARDED_BY(mutex_);  ///< null after the end
+  std::shared_ptr<Exchange> self_ TS_GUARDED_BY(mutex_);               ///< gRPC's share
+  Admission::Ticket ticket_ TS_GUARDED_BY(mutex_);
+  Timer::Id wait_ TS_GUARDED_BY(mutex_) = 0;    ///< for a message
+  Timer::Id linger_ TS_GUARDED_BY(mutex_) = 0;  ///< for a client that does not read the end
+  grpc::ByteBuffer out_ TS_GUARDED_BY(mutex_);  ///< under way
+  std::deque<grpc::ByteBuffer> queue_ TS_GUARDED_BY(mutex_);
+  std::optional<grpc::Status> end_ TS_GUARDED_BY(mutex_);
+  bool writing_ TS_GUARDED_BY(mutex_) = false, finished_ TS_GUARDED_BY(mutex_) = false;
+  bool closing_ TS_GUARDED_BY(mutex_) = false;
+  int jobs_ TS_GUARDED_BY(mutex_) = 0;
+};
+
+/// Answers every call to the server from its table of methods.
+class Gate final : public grpc::CallbackGenericService {
+ public:
+  explicit Gate(const Runtime& runtime) : runtime_(runtime) {}
+  /// "/mbcosim.v1.Simulations/Step". Before the server starts.
+  void add(const std::string& path, Method method) { methods_.emplace(path, std::move(method)); }
+  const std::map<std::string, Method>& methods() const { return methods_; }
+  grpc::ServerGenericBidiReactor* CreateReactor(
+      grpc::GenericCallbackServerContext* context) override;
+  /// Refuses new calls, ends idle ones and interrupts the others.
+  void close() TS_EXCLUDES(mutex_);
+  bool closing() const { return closing_.load(); }
+
+ private:
+  friend class Exchange;
+  void forget(Exchange* exchange) TS_EXCLUDES(mutex_);
+
+  const Runtime& runtime_;
+  std::map<std::string, Method> methods_;
+  std::atomic<bool> closing_{false};
+  Mutex mutex_;
+  std::map<Exchange*, std::weak_ptr<Exchange>> calls_ TS_GUARDED_BY(mutex_);
+};
+
+}  // namespace mbcosim::server

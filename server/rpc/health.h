@@ -1,0 +1,41 @@
+/// grpc.health.v1: answered on gRPC's own threads, so that it waits behind nothing.
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "rpc/exchange.h"
+
+namespace mbcosim::server {
+
+/// Thread-safe. Outlives the gate's server.
+class Health {
+ public:
+  static constexpr int kWatchers = 256;  ///< at once, of all callers
+
+  /// `services`: full names, besides "" for the server.
+  explicit Health(std::vector<std::string> services)
+      : services_(services.begin(), services.end()) {}
+  /// `open`: no credentials are asked for.
+  void add_to(Gate& gate, bool open);
+  /// Tells watchers, once, that the server does not serve any more.
+  void stop() TS_EXCLUDES(mutex_);
+
+ private:
+  class Check;
+  class Watch;
+  bool knows(const std::string& service) const {
+    return service.empty() || services_.count(service) > 0;
+  }
+  /// A serialized HealthCheckResponse.
+  grpc::ByteBuffer answer(const std::string& service) const TS_REQUIRES(mutex_);
+
+  const std::set<std::string> services_;
+  mutable Mutex mutex_;
+  bool serving_ TS_GUARDED_BY(mutex_) = true;
+  std::set<Watch*> watchers_ TS_GUARDED_BY(mutex_);
+};
+
+}  // namespace mbcosim::server

@@ -1,0 +1,63 @@
+/// Where the work of calls is done; never on gRPC's own threads.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "threads/work_pool.h"
+
+namespace mbcosim::server {
+
+enum class Lane {
+  quick,    ///< never waits: looks something up, tells somebody
+  work,     ///< may wait for a session's step
+  advance,  ///< steps: at most one call of each session
+  heavy     ///< computes for long: decks, eigenvalues, reductions
+};
+
+/// One pool for each kind of work, so that none waits behind another. Thread-safe.
+class Lanes {
+ public:
+  /// `sessions`: simulations that may be alive; `cores`: that may compute.
+  Lanes(int sessions, int cores)
+      : quick_({"quick", 4, 3, 0}),
+        work_({"work", 96, 64, 0}),
+        advance_({"advance", sessions, sessions, 0}),
+        heavy_({"heavy", heavy_threads(cores), heavy_threads(cores) - 1, 5}) {}
+
+  void post(Lane lane, const std::string& owner, WorkPool::Job job) {
+    pool(lane).post(owner, std::move(job));
+  }
+  /// Drops what has not started. True: what had started has ended within `wait`.
+  bool stop(std::chrono::milliseconds wait) {
+    const auto end = std::chrono::steady_clock::now() + wait;
+    bool ended = true;
+    for (const Lane lane : {Lane::heavy, Lane::advance, Lane::work, Lane::quick}) {
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+          end - std::chrono::steady_clock::now());
+      ended = pool(lane).stop(std::max(left, std::chrono::milliseconds(0))) && ended;
+    }
+    return ended;
+  }
+
+ private:
+  static int heavy_threads(int cores) { return std::max(4, 2 * cores); }
+  WorkPool& pool(Lane lane) {
+    switch (lane) {
+      case Lane::quick:
+        return quick_;
+      case Lane::work:
+        return work_;
+      case Lane::advance:
+        return advance_;
+      case Lane::heavy:
+        break;
+    }
+    return heavy_;
+  }
+
+  WorkPool quick_, work_, advance_, heavy_;
+};
+
+}  // namespace mbcosim::server

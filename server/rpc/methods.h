@@ -1,0 +1,169 @@
+/// Typed methods: what a call is made of, so that a handler converts, calls and converts back.
+#pragma once
+
+#include <grpcpp/impl/codegen/proto_utils.h>
+#include <grpcpp/support/byte_buffer.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "rpc/exchange.h"
+
+namespace mbcosim::server {
+
+/// The bytes in one piece.
+std::string joined(const grpc::ByteBuffer& bytes);
+
+/// Throws BAD_ARGUMENT when the bytes are no such message. Large ones are counted: a message may
+/// take hundreds of times its bytes. `share` holds what it takes.
+template <class Message>
+void parse(const Runtime& runtime, grpc::ByteBuffer& bytes, Message* message, MemoryShare* share) {
+  constexpr std::size_t kSmall = 4096;
+  bool good = false;
+  if (bytes.Length() <= kSmall) {
+    good = grpc::SerializationTraits<Message>::Deserialize(&bytes, message).ok();
+  } else {
+    const MemoryShare whole(runtime.memory, static_cast<std::int64_t>(bytes.Length()));
+    const std::string text = joined(bytes);
+    bytes.Clear();
+    good = within(runtime.memory, nullptr, share, [&] { return message->ParseFromString(text); });
+  }
+  if (!good)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "the message is no " + std::string(Message::descriptor()->full_name()));
+}
+
+template <class Message>
+grpc::ByteBuffer serialized(const Message& message) {
+  grpc::ByteBuffer bytes;
+  bool own = false;
+  const grpc::Status status = grpc::SerializationTraits<Message>::Serialize(message, &bytes, &own);
+  if (!status.ok()) throw Refusal(v1::REASON_INTERNAL, "an answer cannot be serialized");
+  return bytes;
+}
+
+/// The method's work: who calls, and what tells it to stop.
+struct CallFrame {
+  const Caller& caller;
+  Call& call;
+  MemoryBudget& memory;
+};
+
+inline CallFrame frame_of(Exchange& exchange) {
+  return {exchange.caller(), exchange.call(), exchange.runtime().memory};
+}
+
+/// One message in.
+template <class Request>
+class OneRequest : public Handler {
+ public:
+  explicit OneRequest(Lane lane) : lane_(lane) {}
+  void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
+    exchange.post(lane_, [this, &exchange, bytes = std::move(message)]() mutable {
+      parse(exchange.runtime(), bytes, &request_, &share_);
+      bytes.Clear();
+      serve(exchange, request_);
+    });
+  }
+  void on_half_close(Exchange&) override {
+    throw Refusal(v1::REASON_OUT_OF_TURN, "the call came without its message");
+  }
+
+ protected:
+  virtual void serve(Exchange& exchange, const Request& request) = 0;
+  Lane lane() const { return lane_; }
+
+ private:
+  const Lane lane_;
+  MemoryShare share_;  ///< of the request
+  Request request_;
+};
+
+/// One message in, one out.
+template <class Request, class Reply>
+class Unary final : public OneRequest<Request> {
+ public:
+  using Body = std::function<void(const CallFrame&, const Request&, Reply*)>;
+  Unary(Lane lane, Body body) : OneRequest<Request>(lane), body_(std::move(body)) {}
+
+ private:
+  void serve(Exchange& exchange, const Request& request) override {
+    Reply reply;
+    body_(frame_of(exchange), request, &reply);
+    exchange.end(serialized(reply));
+  }
+  const Body body_;
+};
+
+/// One message in, a series out: the next is made when the client has taken the last.
+template <class Request, class Reply>
+class Series final : public OneRequest<Request> {
+ public:
+  /// Fills the next message; false: there is none.
+  using Source = std::function<bool(Reply*)>;
+  using Body = std::function<Source(const CallFrame&, const Request&)>;
+  Series(Lane lane, Body body) : OneRequest<Request>(lane), body_(std::move(body)) {}
+
+ private:
+  void serve(Exchange& exchange, const Request& request) override {
+    source_ = body_(frame_of(exchange), request);
+    go_on(exchange);
+  }
+  void on_written(Exchange& exchange) override {
+    exchange.post(this->lane(), [this, &exchange] { go_on(exchange); });
+  }
+  void go_on(Exchange& exchange) {
+    Reply reply;
+    if (source_(&reply))
+      exchange.write(serialized(reply));
+    else
+      exchange.finish(grpc::Status::OK);
+  }
+  const Body body_;
+  Source source_;
+};
+
+/// Many messages in until the client closes its side, then the work.
+template <class Request>
+class Upload : public Handler {
+ public:
+  void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
+    exchange.post(Lane::work, [this, &exchange, bytes = std::move(message)]() mutable {
+      MemoryShare share;
+      Request request;
+      parse(exchange.runtime(), bytes, &request, &share);
+      add(exchange, request, std::move(share));
+      exchange.read(Exchange::kMessageWait);
+    });
+  }
+  void on_half_close(Exchange& exchange) override {
+    exchange.post(Lane::heavy, [this, &exchange] { complete(exchange); });
+  }
+
+ protected:
+  /// `share`: of the request, to be kept with what is kept of it.
+  virtual void add(Exchange& exchange, Request& request, MemoryShare share) = 0;
+  virtual void complete(Exchange& exchange) = 0;
+};
+
+template <class Request, class Reply>
+Method unary(Role role, Lane lane, typename Unary<Request, Reply>::Body body) {
+  return {role, false, Counted::call,
+          [lane, body] { return std::make_unique<Unary<Request, Reply>>(lane, body); }};
+}
+
+template <class Request, class Reply>
+Method series(Role role, Lane lane, typename Series<Request, Reply>::Body body) {
+  return {role, false, Counted::stream,
+          [lane, body] { return std::make_unique<Series<Request, Reply>>(lane, body); }};
+}
+
+/// A method whose handler is made by `make`.
+template <class Make>
+Method stream(Role role, Make make) {
+  return {role, false, Counted::stream, std::move(make)};
+}
+
+}  // namespace mbcosim::server

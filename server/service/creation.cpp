@@ -1,0 +1,237 @@
+/// Methods that make simulations, or only look at a deck.
+#include <google/protobuf/util/time_util.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "service/protocol.h"
+#include "service/simulations_service.h"
+#include "service/upload.h"
+#include "wire/convert.h"
+
+namespace mbcosim::server {
+namespace {
+
+using google::protobuf::util::TimeUtil;
+
+[[noreturn]] void refuse_deck(const LoadReport& report) {
+  Error error;
+  error.kind = ErrorKind::deck;
+  error.diagnostics = report.diagnostics;
+  const auto first =
+      std::find_if(report.diagnostics.begin(), report.diagnostics.end(),
+                   [](const Diagnostic& d) { return d.severity == Severity::error; });
+  if (first == report.diagnostics.end()) {
+    error.message = "the deck cannot be read";
+  } else {
+    error.message = utf8(first->file + ":" + std::to_string(first->line) + ":" +
+                         std::to_string(first->column) + ": error: " + first->message);
+    constexpr std::string_view kLimit = "limit-";
+    if (first->code == "port") throw Refusal(v1::REASON_BAD_ARGUMENT, utf8(first->message));
+    if (first->code.compare(0, kLimit.size(), kLimit) == 0) {
+      error.kind = ErrorKind::limit;
+      error.reason = first->code.substr(kLimit.size());
+      std::replace(error.reason.begin(), error.reason.end(), '-', '_');
+    }
+  }
+  throw Refusal(error);
+}
+
+Session::Identity make_identity(const v1::CreateOptions& options, const Caller& caller,
+                                const ServiceLimits& limits) {
+  Session::Identity identity;
+  identity.id = SessionStore::new_id();
+  identity.display_name = options.display_name();
+  identity.owner = caller.identity;
+  identity.request_id = options.request_id();
+  identity.lease = limits.lease;
+  if (options.has_lease()) {
+    const std::chrono::milliseconds lease(TimeUtil::DurationToMilliseconds(options.lease()));
+    if (lease <= std::chrono::milliseconds(0))
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`lease` must be positive");
+    if (lease > identity.lease)
+      throw limit_refusal("lease_seconds", limits.lease.count(),
+                          "the lease is longer than allowed");
+    identity.lease = lease;
+  }
+  return identity;
+}
+
+/// A simulation whose creator vanished before it learned the name: nobody would ever delete it. So
+/// what the call has made goes with the call, and half an upload leaves nothing behind.
+class Fresh {
+ public:
+  explicit Fresh(const Parts& parts) : parts_(parts) {}
+
+  /// `make` makes the simulation, counted as the new session's.
+  template <class Make>
+  SessionPtr add(const v1::CreateOptions& options, Exchange& exchange, Make make)
+      TS_EXCLUDES(mutex_) {
+    const CallToken token(exchange.call());
+    MemoryShare share;
+    auto session = within(parts_.runtime.memory, &token, &share, [&] {
+      return std::make_shared<Session>(
+          make_identity(options, exchange.caller(), parts_.config.limits), make(token),
+          Session::Shared{parts_.slots, parts_.config.limits, parts_.metrics, parts_.log,
+                          parts_.runtime.memory, parts_.runtime.lanes, parts_.runtime.timer},
+          options);
+    });
+    session->set_memory(std::move(share));
+    Guard guard(mutex_);
+    if (lost_) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+    parts_.store.add(session);
+    name_ = session->identity().id;
+    return session;
+  }
+  /// The call has ended, and its client may not know the name.
+  void lose(const std::string& owner) TS_EXCLUDES(mutex_) {
+    Guard guard(mutex_);
+    lost_ = true;
+    if (name_.empty()) return;
+    parts_.runtime.lanes.post(Lane::quick, owner,
+                              [&store = parts_.store, name = name_] { store.drop(name); });
+  }
+
+ private:
+  const Parts& parts_;
+  Mutex mutex_;
+  std::string name_ TS_GUARDED_BY(mutex_);
+  bool lost_ TS_GUARDED_BY(mutex_) = false;
+};
+
+/// The model of a deck at its initial solution.
+std::unique_ptr<Simulation> initial_solution(const LoadReport& report, bool summed_time,
+                                             const CancelToken& token) {
+  if (!report.ok()) refuse_deck(report);
+  auto simulation = Simulation::create(report.model, &token, nullptr,
+                                       summed_time ? TimeKeeping::summed : TimeKeeping::exact);
+  if (!simulation) throw Refusal(simulation.error());
+  return std::move(*simulation);
+}
+
+// ------------------------------------------------------------------ CreateSimulation
+
+class CreateHandler final : public Upload<v1::UploadRequest> {
+ public:
+  explicit CreateHandler(const Parts& parts)
+      : parts_(parts), upload_(parts.config.limits, parts.runtime.memory), fresh_(parts) {}
+
+ private:
+  void add(Exchange&, v1::UploadRequest& request, MemoryShare share) override {
+    upload_.add(request, std::move(share));
+    check_protocol(upload_.header().options().protocol());
+  }
+  void complete(Exchange& exchange) override {
+    const v1::CreateOptions& options = upload_.header().options();
+    v1::CreateSimulationReply reply;
+    reply.set_protocol_version(kProtocolVersion);
+    const SessionStore::Place place(parts_.store, options.request_id(), exchange.caller(),
+                                    exchange.call());
+    if (place.known())
+      place.known()->fill(reply.mutable_simulation());
+    else
+      create(exchange, options, &reply);
+    exchange.end(serialized(reply));
+  }
+  void create(Exchange& exchange, const v1::CreateOptions& options,
+              v1::CreateSimulationReply* reply) {
+    LoadReport report;
+    fresh_
+        .add(options, exchange,
+             [&](const CancelToken& token) {
+               report = load(upload_, parts_.config);
+               return initial_solution(report, options.summed_time(), token);
+             })
+        ->fill(reply->mutable_simulation());
+    to_proto(report.diagnostics, reply->mutable_diagnostics());
+    reply->set_printed(utf8(report.printed));
+  }
+  void on_done(Exchange& exchange, bool delivered) override {
+    if (!delivered) fresh_.lose(exchange.caller().identity);
+  }
+
+  const Parts& parts_;
+  DeckUpload upload_;
+  Fresh fresh_;
+};
+
+// ------------------------------------------------------------------ ValidateModel
+
+class ValidateHandler final : public Upload<v1::UploadRequest> {
+ public:
+  explicit ValidateHandler(const Parts& parts)
+      : parts_(parts), upload_(parts.config.limits, parts.runtime.memory) {}
+
+ private:
+  void add(Exchange&, v1::UploadRequest& request, MemoryShare share) override {
+    upload_.add(request, std::move(share));
+  }
+  void complete(Exchange& exchange) override {
+    const CallToken token(exchange.call());
+    MemoryShare share;
+    const v1::ValidateModelReply reply =
+        within(exchange.runtime().memory, &token, &share, [&] { return look(); });
+    exchange.end(serialized(reply));
+  }
+
+  v1::ValidateModelReply look() {
+    const LoadReport report = load(upload_, parts_.config);
+    v1::ValidateModelReply reply;
+    reply.set_ok(report.ok());
+    to_proto(report.diagnostics, reply.mutable_diagnostics());
+    reply.set_printed(utf8(report.printed));
+    if (report.ok()) to_proto(*report.model, reply.mutable_description());
+    return reply;
+  }
+
+  const Parts& parts_;
+  DeckUpload upload_;
+};
+
+// ------------------------------------------------------------------ ForkSimulation
+
+class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
+ public:
+  explicit ForkHandler(const Parts& parts) : OneRequest(Lane::work), parts_(parts), fresh_(parts) {}
+
+ private:
+  void serve(Exchange& exchange, const v1::ForkSimulationRequest& request) override {
+    const v1::CreateOptions& options = request.options();
+    check_protocol(options.protocol());
+    v1::CreateSimulationReply reply;
+    reply.set_protocol_version(kProtocolVersion);
+    const SessionStore::Place place(parts_.store, options.request_id(), exchange.caller(),
+                                    exchange.call());
+    if (place.known()) {
+      place.known()->fill(reply.mutable_simulation());
+    } else {
+      std::string simulation = request.simulation();
+      const int snapshot =
+          request.has_snapshot() ? number_of_snapshot(request.snapshot(), &simulation) : -1;
+      const SessionHold source(parts_.store, simulation, exchange.caller());
+      fresh_.add(options, exchange, [&](const CancelToken&) { return source->fork(snapshot); })
+          ->fill(reply.mutable_simulation());
+    }
+    exchange.end(serialized(reply));
+  }
+  void on_done(Exchange& exchange, bool delivered) override {
+    if (!delivered) fresh_.lose(exchange.caller().identity);
+  }
+
+  const Parts& parts_;
+  Fresh fresh_;
+};
+
+}  // namespace
+
+void add_creation(Gate& gate, const Parts& parts) {
+  gate.add(simulations_path("CreateSimulation"),
+           stream(Role::control, [&parts] { return std::make_unique<CreateHandler>(parts); }));
+  gate.add(simulations_path("ValidateModel"),
+           stream(Role::observe, [&parts] { return std::make_unique<ValidateHandler>(parts); }));
+  gate.add(simulations_path("ForkSimulation"), {Role::control, false, Counted::call, [&parts] {
+                                                  return std::make_unique<ForkHandler>(parts);
+                                                }});
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,48 @@
+/// What all services of the daemon share.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "rpc/methods.h"
+#include "service/config.h"
+#include "service/event_log.h"
+#include "service/session_store.h"
+
+namespace mbcosim::server {
+
+/// The parts of a daemon that handlers use. All of it outlives the services.
+struct Parts {
+  const Config& config;
+  SessionStore& store;
+  SolverSlots& slots;
+  Metrics& metrics;
+  EventLog& log;
+  const Runtime& runtime;
+  const Gate& gate;
+};
+
+template <class Request>
+const std::string& simulation_in(const Request& request) {
+  if constexpr (requires { request.simulation(); })
+    return request.simulation();
+  else
+    return request.name();
+}
+
+/// A method that works on one simulation, which is found and kept alive meanwhile.
+template <class Request, class Reply, class Body>
+Method on_session(const Parts& parts, Role role, Lane lane, Body body) {
+  return unary<Request, Reply>(
+      role, lane,
+      [&parts, body = std::move(body)](const CallFrame& frame, const Request& request,
+                                       Reply* reply) {
+        const SessionHold session(parts.store, simulation_in(request), frame.caller);
+        if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*, Call&>)
+          body(*session, request, reply, frame.call);
+        else
+          body(*session, request, reply);
+      });
+}
+
+}  // namespace mbcosim::server

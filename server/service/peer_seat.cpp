@@ -1,0 +1,66 @@
+#include "service/peer_seat.h"
+
+#include <algorithm>
+
+#include "coupling/handshake.h"
+
+namespace mbcosim::server {
+
+Heart::Heart(PeerLink& link, const Port& port, const Agreement& agreement)
+    : link_(link),
+      port_(port),
+      agreement_(agreement),
+      next_(Clock::now() + agreement.heartbeat_interval) {}
+
+Heart::Clock::duration Heart::period() const {
+  const auto timeout = agreement_.heartbeat_timeout;
+  const auto listen =
+      std::max<std::chrono::milliseconds>(timeout / 4, std::chrono::milliseconds(1));
+  return beats() && (timeout == kNever || agreement_.heartbeat_interval < listen)
+             ? agreement_.heartbeat_interval
+             : listen;
+}
+
+bool Heart::beat() {
+  if (agreement_.heartbeat_timeout > kNever && port_.silence() > agreement_.heartbeat_timeout)
+    return false;
+  if (!beats() || Clock::now() < next_) return true;
+  v1::ServerMessage message;
+  message.mutable_heartbeat()->set_count(++count_);
+  link_.beat(message);
+  next_ += agreement_.heartbeat_interval;
+  return true;
+}
+
+PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& caller, PeerLink& link)
+    : parts_(parts),
+      identity_(caller.identity),
+      session_(parts.store, hello.simulation(), caller),
+      link_(link),
+      port_(session_->port(hello.port())) {
+  v1::SimulationInfo info;
+  session_->fill(&info);
+  const Agreement agreement = agree(hello, port_.model(), info.model_digest(), info.next_step_s());
+  heart_.emplace(link, port_, agreement);
+  port_.reserve(agreement);
+  v1::Welcome* welcome = welcome_.mutable_welcome();
+  welcome->set_protocol_version(kProtocolVersion);
+  port_.fill(welcome->mutable_layout());
+  welcome->set_model_digest(info.model_digest());
+  welcome->set_step_size_s(info.next_step_s());
+  welcome->set_step(info.step());
+  welcome->set_time_s(info.time_s());
+  fill_agreed(hello, agreement, welcome->mutable_agreed());
+}
+
+PeerSeat::~PeerSeat() {
+  port_.detach();
+  parts_.log.detached(session_->identity().id, port_.model().name(), identity_);
+}
+
+void PeerSeat::begin() {
+  port_.attach(&link_, welcome_.welcome());
+  parts_.log.attached(session_->identity().id, port_.model().name(), identity_);
+}
+
+}  // namespace mbcosim::server

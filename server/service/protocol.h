@@ -1,0 +1,23 @@
+/// Versions of the protocol that the server speaks.
+#pragma once
+
+#include <string>
+
+#include "mbcosim/v1/common.pb.h"
+#include "wire/protocol.h"
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+
+/// Throws VERSION_MISMATCH unless the client speaks a version of the server's.
+inline void check_protocol(const v1::VersionRange& range) {
+  if (range.lowest() == 0 && range.highest() == 0) return;
+  if (range.lowest() <= kProtocolVersion && kProtocolVersion <= range.highest()) return;
+  const std::string version = std::to_string(kProtocolVersion);
+  throw Refusal(v1::REASON_VERSION_MISMATCH,
+                "the server speaks protocol version " + version + ", the client " +
+                    std::to_string(range.lowest()) + " to " + std::to_string(range.highest()),
+                {{"lowest", version}, {"highest", version}});
+}
+
+}  // namespace mbcosim::server

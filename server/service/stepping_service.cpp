@@ -1,0 +1,155 @@
+/// Methods that advance simulations.
+#include <google/protobuf/util/time_util.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <optional>
+
+#include "service/simulations_service.h"
+
+namespace mbcosim::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using google::protobuf::util::TimeUtil;
+
+// ------------------------------------------------------------------ StepStream
+
+/// Between its steps an open stream costs no thread.
+class StepStreamHandler final : public Handler {
+ public:
+  explicit StepStreamHandler(const Parts& parts) : parts_(parts) {}
+
+ private:
+  // Clients open the stream before they know when they will step.
+  void start(Exchange& exchange) override { exchange.read(Exchange::kIdleStream); }
+  void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
+    exchange.post(Lane::advance, [this, &exchange, bytes = std::move(message)]() mutable {
+      parse(exchange.runtime(), bytes, &request_, &share_);
+      step(exchange);
+    });
+  }
+  void step(Exchange& exchange) {
+    if (!session_) {
+      name_ = request_.simulation();
+      session_.emplace(parts_.store, name_, exchange.caller());
+    }
+    if (!request_.simulation().empty() && request_.simulation() != name_)
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    "all messages of a stream must name the same simulation");
+    reply_.Clear();
+    (*session_)->step(request_, exchange.call(), &reply_);
+    const bool taken = exchange.all_written();  // the last reply, by the client
+    wants_next_.store(true);
+    exchange.write(serialized(reply_));
+    if (taken) read_next(exchange);
+  }
+  void read_next(Exchange& exchange) {
+    if (wants_next_.exchange(false)) exchange.read();
+  }
+  void on_written(Exchange& exchange) override { read_next(exchange); }
+  void on_half_close(Exchange& exchange) override { exchange.finish(grpc::Status::OK); }
+
+  const Parts& parts_;
+  std::string name_;
+  std::optional<SessionHold> session_;
+  MemoryShare share_;  ///< of the request
+  v1::StepRequest request_;
+  v1::StepReply reply_;
+  std::atomic<bool> wants_next_{false};
+};
+
+// ------------------------------------------------------------------ Run
+
+/// Progress of a run at an even pace.
+class Progress {
+ public:
+  Progress(const Session& session, const v1::RunRequest& request) : session_(session) {
+    session_.fill(&info_);
+    start_step_ = info_.step();
+    start_time_ = info_.time_s();
+    steps_ = request.step().has_steps() ? request.step().steps() : -1;
+    end_time_ = info_.final_time_s();
+    if (request.step().has_until_time_s())
+      end_time_ = std::min(end_time_, request.step().until_time_s());
+    const auto wanted = request.has_progress_interval()
+                            ? TimeUtil::DurationToMilliseconds(request.progress_interval())
+                            : 500;
+    interval_ = std::chrono::milliseconds(std::max<std::int64_t>(wanted, 20));
+  }
+
+  /// Sends what is due, unless the client has not taken the last one.
+  void send(Exchange& exchange) {
+    const Clock::time_point now = Clock::now();
+    if (now - last_ < interval_ || !exchange.all_written()) return;
+    last_ = now;
+    session_.fill(&info_);
+    const double elapsed = std::chrono::duration<double>(now - started_).count();
+    const double fraction = done_fraction();
+    v1::RunProgress* progress = message_.mutable_progress();
+    progress->set_step(info_.step());
+    progress->set_time_s(info_.time_s());
+    progress->set_fraction(fraction);
+    progress->set_remaining_seconds(fraction > 0 ? elapsed * (1 - fraction) / fraction : -1);
+    exchange.write(serialized(message_));
+  }
+
+ private:
+  double done_fraction() const {
+    double fraction = -1;
+    if (steps_ > 0)
+      fraction = static_cast<double>(info_.step() - start_step_) / static_cast<double>(steps_);
+    if (std::isfinite(end_time_) && end_time_ > start_time_)
+      fraction = std::max(fraction, (info_.time_s() - start_time_) / (end_time_ - start_time_));
+    return std::min(fraction, 1.0);
+  }
+
+  const Session& session_;
+  v1::SimulationInfo info_;
+  v1::RunReply message_;
+  std::int64_t start_step_ = 0, steps_ = -1;
+  double start_time_ = 0, end_time_ = 0;
+  std::chrono::milliseconds interval_{500};
+  Clock::time_point started_ = Clock::now(), last_ = started_;
+};
+
+class RunHandler final : public OneRequest<v1::RunRequest> {
+ public:
+  explicit RunHandler(const Parts& parts) : OneRequest(Lane::advance), parts_(parts) {}
+
+ private:
+  void serve(Exchange& exchange, const v1::RunRequest& request) override {
+    const SessionHold session(parts_.store, request.step().simulation(), exchange.caller());
+    Progress progress(*session, request);
+    v1::RunReply done;
+    session->step(request.step(), exchange.call(), done.mutable_done(),
+                  [&] { progress.send(exchange); });
+    exchange.end(serialized(done));
+  }
+
+  const Parts& parts_;
+};
+
+}  // namespace
+
+void add_stepping(Gate& gate, const Parts& parts) {
+  gate.add(simulations_path("Step"),
+           on_session<v1::StepRequest, v1::StepReply>(
+               parts, Role::control, Lane::advance,
+               [](Session& session, const v1::StepRequest& request, v1::StepReply* reply,
+                  Call& call) { session.step(request, call, reply); }));
+  gate.add(simulations_path("StepStream"),
+           stream(Role::control, [&parts] { return std::make_unique<StepStreamHandler>(parts); }));
+  gate.add(simulations_path("Run"),
+           stream(Role::control, [&parts] { return std::make_unique<RunHandler>(parts); }));
+  gate.add(
+      simulations_path("Interrupt"),
+      unary<v1::InterruptRequest, v1::InterruptReply>(
+          Role::control, Lane::quick,
+          [&parts](const CallFrame& frame, const auto& request, auto* reply) {
+            reply->set_was_stepping(parts.store.get(request.name(), frame.caller)->interrupt());
+          }));
+}
+
+}  // namespace mbcosim::server

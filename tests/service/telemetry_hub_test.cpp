@@ -1,0 +1,193 @@
+#include "service/telemetry_hub.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+using namespace std::chrono_literals;
+using Taken = TelemetryHub::Taken;
+
+constexpr const char* kDeck =
+    "begin: data; problem: initial value; end: data;"
+    "begin: initial value; initial time: 0.; final time: 1.; time step: 1.e-3; method: ms, .6;"
+    " tolerance: 1.e-9; max iterations: 20; end: initial value;"
+    "begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;"
+    "begin: nodes; structural: 1, dynamic, null, eye, null, .01, 2., .01; end: nodes;"
+    "begin: elements; body: 1, 1, 1., null, diag, 1., 2., 3.; end: elements;";
+
+class Telemetry : public testing::Test {
+ protected:
+  SubscriptionPtr subscribe(v1::OverflowPolicy policy, std::int64_t capacity) {
+    Subscription::Options options;
+    options.handles = {0};
+    options.policy = policy;
+    options.capacity = capacity;
+    options.block_timeout = 10ms;
+    options.identity = "ann";
+    options.wake = [this] { ++woken_; };
+    auto subscription = std::make_shared<Subscription>(std::move(options));
+    hub_->add(subscription, 1);
+    return subscription;
+  }
+  void step(int count) {
+    for (int i = 0; i < count; ++i) {
+      ASSERT_EQ(simulation_->step().outcome, StepOutcome::accepted);
+      hub_->publish(*simulation_);
+    }
+  }
+  v1::TelemetryBatch take(Subscription& subscription) {
+    std::string bytes;
+    EXPECT_EQ(hub_->take(subscription, 1 << 20, &bytes), Taken::samples);
+    v1::TelemetryBatch batch;
+    EXPECT_TRUE(batch.ParseFromString(bytes));
+    return batch;
+  }
+  static std::vector<std::int64_t> steps(const v1::TelemetryBatch& batch) {
+    std::vector<std::int64_t> result;
+    for (const auto& sample : batch.samples()) result.push_back(sample.step());
+    return result;
+  }
+  using Steps = std::vector<std::int64_t>;
+
+  std::atomic<int> woken_{0};
+  MemoryBudget memory_{64 << 20};
+  Lanes lanes_{1, 1};
+  Timer timer_;
+  LoadReport loaded_ =
+      load_deck(BundleSource(std::map<std::string, std::string>{{"deck", kDeck}}), "deck");
+  std::unique_ptr<Simulation> simulation_ = std::move(*Simulation::create(loaded_.model));
+  std::shared_ptr<TelemetryHub> hub_ = std::make_shared<TelemetryHub>(memory_, lanes_, timer_);
+};
+
+TEST_F(Telemetry, SamplesArriveOnceInOrderWithTheirNumbers) {
+  const auto s = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 10);
+  step(3);
+  const v1::TelemetryBatch batch = take(*s);
+  EXPECT_EQ(steps(batch), (Steps{1, 2, 3}));
+  EXPECT_EQ(batch.samples(2).sequence(), 3);
+  EXPECT_EQ(batch.samples(0).values_size(), 1);
+  std::string bytes;
+  EXPECT_EQ(hub_->take(*s, 1 << 20, &bytes), Taken::nothing);
+}
+
+TEST_F(Telemetry, DropOldestKeepsTheNewestAndCounts) {
+  const auto s = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 3);
+  step(5);
+  v1::TelemetryBatch batch = take(*s);
+  EXPECT_EQ(steps(batch), (Steps{3, 4, 5}));
+  EXPECT_EQ(batch.dropped(), 2);
+  EXPECT_EQ(batch.samples(0).sequence(), 3);
+  step(1);
+  batch = take(*s);
+  EXPECT_EQ(batch.dropped(), 0);
+  EXPECT_EQ(batch.total_dropped(), 2);
+  EXPECT_EQ(batch.samples(0).sequence(), 6);
+}
+
+TEST_F(Telemetry, DecimateWidensTheIntervalAndCounts) {
+  const auto s = subscribe(v1::OVERFLOW_POLICY_DECIMATE, 4);
+  step(5);  // 1 2 3 4 are full: 2 and 4 go
+  v1::TelemetryBatch batch = take(*s);
+  EXPECT_EQ(steps(batch), (Steps{1, 3, 5}));
+  EXPECT_EQ(batch.every(), 2);
+  EXPECT_EQ(batch.dropped(), 2);
+  EXPECT_EQ(batch.samples(2).sequence(), 5);
+  step(4);
+  EXPECT_EQ(steps(take(*s)), (Steps{7, 9}));
+}
+
+TEST_F(Telemetry, DecimateKeepsTheWholeTimeForAReaderThatComesLate) {
+  const auto s = subscribe(v1::OVERFLOW_POLICY_DECIMATE, 8);
+  step(200);
+  const v1::TelemetryBatch batch = take(*s);
+  EXPECT_LE(batch.samples_size(), 8);
+  EXPECT_GE(batch.samples_size(), 4);
+  EXPECT_EQ(batch.samples(0).step(), 1);
+  EXPECT_EQ(batch.samples(1).step() - batch.samples(0).step(), batch.every());
+  EXPECT_GT(batch.samples(batch.samples_size() - 1).step(), 150);
+}
+
+TEST_F(Telemetry, DecimateOfABufferForOneSampleDeliversAndGoesOn) {
+  const auto s = subscribe(v1::OVERFLOW_POLICY_DECIMATE, 1);
+  std::int64_t last = 0;
+  for (int round = 0; round < 5; ++round) {
+    step(50);
+    std::string bytes;
+    if (hub_->take(*s, 1 << 20, &bytes) != Taken::samples) continue;
+    v1::TelemetryBatch batch;
+    ASSERT_TRUE(batch.ParseFromString(bytes));
+    ASSERT_EQ(batch.samples_size(), 1);
+    EXPECT_GT(batch.samples(0).step(), last);
+    last = batch.samples(0).step();
+  }
+  EXPECT_GT(last, 0);
+}
+
+TEST_F(Telemetry, BlockMakesTheSessionWaitAndIsNamed) {
+  const auto s = subscribe(v1::OVERFLOW_POLICY_BLOCK, 2);
+  step(2);
+  EXPECT_FALSE(hub_->blocked());
+  step(1);
+  EXPECT_TRUE(hub_->blocked());
+  EXPECT_EQ(hub_->waiting_for().rfind("subscriber ann since", 0), 0u);
+  EXPECT_EQ(steps(take(*s)), (Steps{1, 2, 3}));
+  EXPECT_FALSE(hub_->blocked());
+  EXPECT_EQ(hub_->waiting_for(), "");
+}
+
+TEST_F(Telemetry, BlockGivesUpOnAReaderThatStandsStill) {
+  const auto s = subscribe(v1::OVERFLOW_POLICY_BLOCK, 1);
+  step(2);
+  ASSERT_TRUE(hub_->blocked());
+  for (int i = 0; i < 20 && hub_->blocked(); ++i) hub_->wait_for_room(2ms);
+  EXPECT_FALSE(hub_->blocked());
+  std::string bytes;
+  EXPECT_EQ(hub_->take(*s, 1 << 20, &bytes), Taken::stalled);
+}
+
+TEST_F(Telemetry, WhatIsKeptAtTheEndCanStillBeTaken) {
+  const auto s = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 10);
+  step(2);
+  hub_->close();
+  EXPECT_EQ(steps(take(*s)), (Steps{1, 2}));
+  std::string bytes;
+  EXPECT_EQ(hub_->take(*s, 1 << 20, &bytes), Taken::closed);
+}
+
+TEST_F(Telemetry, EqualSubscriptionsShareTheirMemoryAndAllAreWoken) {
+  const auto first = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 1000);
+  const std::int64_t one = memory_.used();
+  EXPECT_GT(one, 1000 * 8);
+  std::vector<SubscriptionPtr> others;
+  for (int i = 0; i < 100; ++i) others.push_back(subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 1000));
+  EXPECT_EQ(memory_.used(), one);
+  step(1);
+  for (int i = 0; i < 500 && woken_ < 101; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_GE(woken_, 101);
+  EXPECT_EQ(steps(take(*others.back())), (Steps{1}));
+  for (const auto& s : others) hub_->remove(s);
+  hub_->remove(first);
+  EXPECT_EQ(memory_.used(), 0);
+}
+
+TEST_F(Telemetry, ASubscriptionThatWouldTakeTooMuchMemoryIsRefused) {
+  Subscription::Options options;
+  options.handles.assign(100'000, 0);
+  options.wake = [] {};
+  const auto s = std::make_shared<Subscription>(std::move(options));
+  try {
+    hub_->add(s, 100'000);
+    FAIL() << "accepted";
+  } catch (const Refusal& refusal) {
+    EXPECT_EQ(refusal.reason(), v1::REASON_LIMIT_EXCEEDED);
+  }
+  EXPECT_EQ(memory_.used(), 0);
+}
+
+}  // namespace
+}  // namespace mbcosim::server
