@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, and runs every test. Works on Debian 12 as root or with sudo.
 #
-# usage: tests/run.sh [--asan | --tsan | --fuzz] [--quick] [ctest arguments …]
+# usage: tests/run.sh [--asan | --tsan | --fuzz] [--hostile [SECONDS]] [--quick] [ctest arguments …]
 #        tests/run.sh --tidy [REVISION | --all]
 #   --asan   address and undefined-behaviour sanitizers, in build-asan/
 #   --tsan   thread sanitizer, in build-tsan/
 #   --fuzz   fuzzes the deck reader for 60 seconds (clang), in build-fuzz/; no other test
+#   --hostile  hostile clients against the daemon for SECONDS (default: 300); no other test
 #   --quick  skips the tests labelled `slow`
 #   --tidy   clang-tidy on the sources changed since REVISION (default: the commit before the last), instead of the tests
 set -euo pipefail
@@ -14,14 +15,19 @@ cd "$(dirname "$0")/.."
 preset=release
 arguments=()
 tidy=
+hostile=
 while [ $# -gt 0 ]; do
   case $1 in
     --asan) preset=asan ;;
     --tsan) preset=tsan ;;
     --fuzz) exec tests/fuzz/run.sh 60 ;;
+    --hostile)
+      hostile=300
+      [[ ${2:-} =~ ^[0-9]+$ ]] && hostile=$2 && shift
+      ;;
     --quick) arguments+=(--label-exclude slow) ;;
     --tidy) tidy=yes ;;
-    -h | --help) sed -n '2,10s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,11s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) arguments+=("$1") ;;
   esac
   shift
@@ -40,4 +46,8 @@ case $preset in  # what bounds on time are multiplied by
 esac
 export TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp history_size=7 ${TSAN_OPTIONS:-}"
 export ASAN_OPTIONS="detect_leaks=1 ${ASAN_OPTIONS:-}" LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp ${LSAN_OPTIONS:-}"
+if [ -n "$hostile" ]; then
+  export PYTHONPATH=$PWD/$folder/python PYTHONDONTWRITEBYTECODE=1
+  exec /usr/bin/python3 tests/hostile/hostile.py $folder/bin --seconds "$hostile" --seed "$(date +%s)"
+fi
 exec ctest --test-dir $folder --output-on-failure --parallel "$jobs" "${arguments[@]}"

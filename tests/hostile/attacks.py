@@ -1,0 +1,320 @@
+#!/usr/bin/env python3
+"""One hostile client. usage: attacks.py KIND ADDRESS TCP TOKEN SEED SECONDS; prints the statuses it got as JSON.
+
+All of them stay on this machine (ADDRESS is a Unix socket, TCP a loopback address) and within bounds of their own.
+"""
+import collections
+import json
+import os
+import random
+import socket
+import sys
+import threading
+import time
+
+import grpc
+
+from fuzzer import Fuzzer
+from google.protobuf import descriptor_pool, message_factory
+from google.protobuf.duration_pb2 import Duration
+from mbcosim.v1 import coupling_pb2, reduction_pb2, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
+
+BODY = """
+begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.e9; time step: 1.e-3; method: ms, 0.6; tolerance: 1.e-9;
+  max iterations: 20; end: initial value;
+begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;
+begin: nodes; structural: 1, dynamic, null, eye, 0., 1., 0., 0.1, 5., 0.1; end: nodes;
+begin: elements; body: 1, 1, 1., null, diag, 1., 2., 3.; end: elements;
+"""
+LOOP = 'set: integer i = 0; begin: data; problem: initial value; end: data; for: i = 0; i < 900000; i = i + 1; ' \
+       'set: real x = sin(i) * cos(i); endfor;'
+
+
+class Attacker:
+    def __init__(self, address, tcp, token, seed, seconds):
+        self.address, self.tcp, self.seed = address, tcp, seed
+        self.metadata = [("authorization", f"Bearer {token}")]
+        self.random = random.Random(seed)
+        self.start, self.seconds = time.monotonic(), seconds
+        self.codes = collections.Counter()
+        self.internal = []
+        self.channel = self.open()
+        self.stub = simulations_pb2_grpc.SimulationsStub(self.channel)
+
+    def open(self):
+        return grpc.insecure_channel(self.address, options=[("grpc.use_local_subchannel_pool", 1)])
+
+    def going(self):
+        return time.monotonic() - self.start - self.seconds < 0
+
+    def count(self, error, what=""):
+        code = error.code().name if error is not None and error.code() is not None else "OK"
+        self.codes[code] += 1
+        if code in ("INTERNAL", "UNKNOWN"):
+            self.internal.append(f"{what}: {error.details()}")
+
+    def call(self, function, *arguments, timeout=5, **options):
+        """The result, or None."""
+        try:
+            result = function(*arguments, metadata=self.metadata, timeout=timeout, **options)
+            self.codes["OK"] += 1
+            return result
+        except grpc.RpcError as error:
+            self.count(error, str(getattr(function, "_method", function)))
+            return None
+
+    def create(self, deck=BODY, **options):
+        reply = self.call(self.stub.CreateSimulation, iter([
+            pb.UploadRequest(header=pb.UploadHeader(bundle_main_file="deck", options=pb.CreateOptions(**options))),
+            pb.UploadRequest(chunk={"path": "deck", "data": deck.encode()})]))
+        return reply.simulation.name if reply else None
+
+    # ------------------------------------------------------------ kinds
+
+    def fuzz(self):
+        """Every method of the contract, with random messages, deadlines and cancellations."""
+        fuzzer = Fuzzer(self.random)
+        pool = descriptor_pool.Default()
+        methods = []
+        for file in ("mbcosim/v1/simulations.proto", "mbcosim/v1/telemetry.proto", "mbcosim/v1/coupling.proto",
+                     "mbcosim/v1/reduction.proto"):
+            for service in pool.FindFileByName(file).services_by_name.values():
+                methods += [(service, method) for method in service.methods]
+        get_class = getattr(message_factory, "GetMessageClass", None) or message_factory.MessageFactory().GetPrototype
+        while self.going():
+            if self.random.random() < 0.05 or "simulation" not in fuzzer.known:
+                name = self.create(lease=Duration(seconds=self.random.choice([1, 20])),
+                                   record_ports=self.random.random() < 0.3,
+                                   ports=[{"name": "p", "kind": 4, "output_variables": ["time"]}] if self.random.random() < 0.3 else [])
+                if name:
+                    for field in ("simulation", "name"):
+                        fuzzer.learn(field, name)
+                    snapshot = self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
+                    if snapshot:
+                        fuzzer.learn("snapshot", snapshot.name)
+                        fuzzer.learn("name", snapshot.name)
+                fuzzer.learn("port", "p")
+            service, method = self.random.choice(methods)
+            self.send(service, method, fuzzer, get_class)
+
+    def send(self, service, method, fuzzer, get_class):
+        path = f"/{service.full_name}/{method.name}"
+        request, reply = get_class(method.input_type), get_class(method.output_type)
+        kind = ("stream" if method.client_streaming else "unary") + ("_stream" if method.server_streaming else "_unary")
+        call = getattr(self.channel, kind)(path, request_serializer=request.SerializeToString,
+                                           response_deserializer=reply.FromString)
+        deadline = self.random.choice([0.01, 0.2, 1.5])
+        if method.client_streaming:
+            messages = iter([fuzzer.message(request) for _ in range(self.random.randrange(5))])
+        else:
+            messages = fuzzer.message(request)
+        try:
+            if method.server_streaming:
+                stream = call(messages, metadata=self.metadata, timeout=deadline)
+                for i, _ in enumerate(stream):
+                    if i > self.random.randrange(50):
+                        stream.cancel()
+            elif self.random.random() < 0.2:
+                future = call.future(messages, metadata=self.metadata, timeout=deadline)
+                time.sleep(self.random.random() * 0.01)
+                future.cancel()
+            else:
+                call(messages, metadata=self.metadata, timeout=deadline)
+            self.codes["OK"] += 1
+        except grpc.RpcError as error:
+            self.count(error, path)
+        except grpc.FutureCancelledError:
+            self.codes["CANCELLED"] += 1
+
+    def cancel(self):
+        """Uploads, steps, runs and analyses broken off at every point."""
+        name = None
+        while self.going():
+            name = name or self.create()
+            if not name:
+                time.sleep(0.05)
+                continue
+            stop = threading.Event()
+
+            def half():
+                yield pb.UploadRequest(header=pb.UploadHeader(bundle_main_file="deck"))
+                yield pb.UploadRequest(chunk={"path": "deck", "data": BODY.encode()})
+                stop.wait(5)
+
+            what = self.random.randrange(6)
+            options = dict(metadata=self.metadata, timeout=5)
+            if what == 0:
+                future = self.stub.CreateSimulation.future(half(), **options)
+            elif what == 1:
+                future = self.stub.Step.future(pb.StepRequest(simulation=name, steps=100000), **options)
+            elif what == 2:
+                future = self.stub.ComputeEigenvalues.future(pb.ComputeEigenvaluesRequest(simulation=name), **options)
+            elif what == 3:
+                future = self.stub.Linearize.future(pb.LinearizeRequest(simulation=name), **options)
+            elif what == 4:
+                future = self.stub.Run(pb.RunRequest(step=pb.StepRequest(simulation=name, steps=100000)), **options)
+            else:
+                future = self.stub.ForkSimulation.future(pb.ForkSimulationRequest(
+                    simulation=name, options=pb.CreateOptions(lease=Duration(seconds=1))), **options)
+            time.sleep(self.random.choice([0, 0.0005, 0.002, 0.01, 0.05]))
+            future.cancel()
+            stop.set()
+            self.codes["CANCELLED"] += 1
+            if self.random.random() < 0.02:
+                self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(name=name))
+                name = None
+
+    def race(self):
+        """Create, fork with short leases, delete, restore, step: from four threads on the same simulations."""
+        names, snapshots = [], []
+
+        def work(seed):
+            rng = random.Random(seed)
+            while self.going():
+                what = rng.randrange(7)
+                name = rng.choice(names) if names else None
+                if what == 0 or not name:
+                    made = self.create(lease=Duration(seconds=2))
+                    if made:
+                        names.append(made)
+                        del names[:-10]
+                elif what == 1:
+                    forked = self.call(self.stub.ForkSimulation, pb.ForkSimulationRequest(
+                        simulation=name, options=pb.CreateOptions(lease=Duration(nanos=150_000_000))))
+                    if forked:
+                        names.append(forked.simulation.name)
+                elif what == 2:
+                    self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(name=name))
+                elif what == 3:
+                    saved = self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
+                    if saved:
+                        snapshots.append(saved.name)
+                        del snapshots[:-10]
+                elif what == 4 and snapshots:
+                    self.call(self.stub.RestoreSnapshot, pb.RestoreSnapshotRequest(name=rng.choice(snapshots)))
+                else:
+                    self.call(self.stub.Step, pb.StepRequest(simulation=name, steps=rng.choice([1, 50])))
+
+        threads = [threading.Thread(target=work, args=(self.seed + i,)) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+
+    def slow(self):
+        """Streams whose replies nobody reads."""
+        name = self.create()
+        telemetry = telemetry_pb2_grpc.TelemetryStub(self.channel)
+        calls = []
+        while self.going():
+            if not name:
+                name = self.create()
+                continue
+            handles = [0] * self.random.choice([1, 100, 10000])
+            policy = self.random.choice([1, 2, 3])
+            calls.append(telemetry.Subscribe(telemetry_pb2.SubscribeRequest(
+                simulation=name, handles=handles, policy=policy, block_timeout=Duration(seconds=1)), metadata=self.metadata))
+            calls.append(self.stub.ExportSnapshot(pb.ExportSnapshotRequest(simulation=name), metadata=self.metadata))
+            calls.append(self.stub.StepStream((pb.StepRequest(simulation=name, outputs=[0] * 1000) for _ in range(500)),
+                                              metadata=self.metadata))
+            self.call(self.stub.Step, pb.StepRequest(simulation=name, steps=200))
+            while len(calls) > 200:
+                calls.pop(self.random.randrange(len(calls))).cancel()
+        for call in calls:
+            call.cancel()
+
+    def silent(self):
+        """Streams that say nothing, more than one identity may have."""
+        stop = threading.Event()
+
+        def silence():
+            stop.wait()
+            return
+            yield
+
+        paths = ["/mbcosim.v1.Coupling/Attach", "/mbcosim.v1.Simulations/StepStream",
+                 "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"]
+        calls = []
+        while self.going():
+            path = self.random.choice(paths)
+            stream = self.channel.stream_stream(path, request_serializer=bytes, response_deserializer=bytes)
+            calls.append(stream(silence(), metadata=self.metadata if self.random.random() < 0.8 else None))
+            time.sleep(0.01)
+            if len(calls) >= 250:
+                done = [call for call in calls if call.done()]
+                for call in done:
+                    self.count(call if call.code() is not grpc.StatusCode.OK else None)
+                    calls.remove(call)
+                if not done:
+                    calls.pop(0).cancel()
+        stop.set()
+        for call in calls:
+            call.cancel()
+
+    def half_open(self):
+        """Connections that never come to their point, or talk nonsense."""
+        path = self.address[len("unix:"):]
+        host, port = self.tcp.rsplit(":", 1)
+        held = []
+        preface = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+        while self.going():
+            try:
+                if self.random.random() < 0.5:
+                    connection = socket.socket(socket.AF_UNIX)
+                    connection.settimeout(1)
+                    connection.connect(path)
+                else:
+                    connection = socket.create_connection((host, int(port)), 1)
+                cut = self.random.randrange(len(preface) + 1)
+                connection.sendall(self.random.choice([b"", preface[:cut], preface, preface + self.random.randbytes(60),
+                                                       self.random.randbytes(200)]))
+                held.append(connection)
+                self.codes["OK"] += 1
+            except OSError:
+                self.codes["REFUSED"] += 1
+            while len(held) > 150:
+                held.pop(self.random.randrange(len(held))).close()
+            time.sleep(0.005)
+
+    def greedy(self):
+        """What takes much memory for few bytes."""
+        name = None
+        while self.going():
+            name = name or self.create(lease=Duration(seconds=30))
+            what = self.random.randrange(5)
+            if what == 0:
+                self.call(self.stub.CreateSimulation, iter([
+                    pb.UploadRequest(header=pb.UploadHeader(bundle_main_file="deck", options=pb.CreateOptions(ports=[{}] * 300_000)))]))
+            elif what == 1:
+                self.call(self.stub.ReadVariables, pb.ReadVariablesRequest(simulation=name, handles=[0] * 2_000_000))
+            elif what == 2:
+                self.create(LOOP)
+            elif what == 3 and name:
+                stream = telemetry_pb2_grpc.TelemetryStub(self.channel).Subscribe(
+                    telemetry_pb2.SubscribeRequest(simulation=name, handles=[0] * 100_000, buffer_samples=65536), metadata=self.metadata,
+                    timeout=1)
+                try:
+                    next(stream)
+                except grpc.RpcError as error:
+                    self.count(error)
+            else:
+                self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
+
+
+KINDS = ["fuzz", "cancel", "race", "slow", "silent", "half_open", "greedy"]
+
+
+def main():
+    kind, address, tcp, token, seed, seconds = sys.argv[1:]
+    os.nice(19)
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    attacker = Attacker(address, tcp, token, int(seed), float(seconds))
+    getattr(attacker, kind)()
+    print(json.dumps({"codes": attacker.codes, "internal": attacker.internal[:20]}))
+    sys.stdout.flush()
+    os._exit(0)  # streams that were left open end with the process
+
+
+if __name__ == "__main__":
+    main()

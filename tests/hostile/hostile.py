@@ -1,0 +1,191 @@
+#!/usr/bin/env python3
+"""The daemon under attack. usage: hostile.py BIN [--seconds N] [--seed N] [--kinds a,b]
+
+Starts a daemon with tokens, lets hostile clients do their worst from one core at nice 19 (attacks.py), and watches a
+bystander with a token of its own. Fails on: the daemon's death or hang, INTERNAL from its code, a thread or memory that
+stays, a bystander's p99 above 5 times its quiet value (and above 50 ms: below, the scheduler decides), a SIGTERM that
+does not end it in time. The seed is printed; the same one gives the same requests, though not the same interleaving.
+"""
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+import grpc
+
+import attacks
+from mbcosim.v1 import simulations_pb2 as pb, simulations_pb2_grpc
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+FACTOR = float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
+MEMORY = 400 << 20  # the daemon's budget
+GRACE = 2
+
+
+def start(program, folder):
+    tokens = os.path.join(folder, "tokens")
+    with open(tokens, "w") as file:
+        file.write("bob-token control bob\n")
+        file.writelines(f"{kind}-token control mallory-{kind}\n" for kind in attacks.KINDS)
+    os.chmod(tokens, 0o600)
+    address = f"unix:{folder}/mbcosim.sock"
+    log = open(os.path.join(folder, "log"), "w")
+    daemon = subprocess.Popen([os.path.join(program, "mbcosimd"), "--listen", address, "--listen", "127.0.0.1:0",
+                               "--tokens", tokens, "--limit-memory", str(MEMORY), "--shutdown-grace", str(GRACE)],
+                              stderr=log, preexec_fn=lambda: limit_descriptors(512))
+    for _ in range(int(200 * FACTOR)):
+        text = open(log.name).read()
+        if "listening on 127.0.0.1:" in text:
+            break
+        time.sleep(0.05)
+    tcp = "127.0.0.1:" + text.split("listening on 127.0.0.1:")[1].split()[0]
+    return daemon, address, tcp, log.name
+
+
+def limit_descriptors(most):
+    import resource
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+
+
+class Bystander:
+    """Steps a simulation of its own and asks for health, and keeps the times that takes."""
+
+    def __init__(self, address):
+        self.channel = grpc.insecure_channel(address)
+        self.stub = simulations_pb2_grpc.SimulationsStub(self.channel)
+        self.metadata = [("authorization", "Bearer bob-token")]
+        self.health = self.channel.unary_unary("/grpc.health.v1.Health/Check", request_serializer=bytes,
+                                               response_deserializer=bytes)
+        self.name = self.stub.CreateSimulation(iter([
+            pb.UploadRequest(header=pb.UploadHeader(bundle_main_file="deck")),
+            pb.UploadRequest(chunk={"path": "deck", "data": attacks.BODY.encode()})]), metadata=self.metadata,
+            timeout=30).simulation.name
+        self.step = 0
+        self.errors = []
+
+    def once(self):
+        start = time.monotonic()
+        reply = self.stub.Step(pb.StepRequest(simulation=self.name, steps=5, outputs=[0]), metadata=self.metadata, timeout=30)
+        assert self.health(b"", timeout=30) == b"\x08\x01"
+        took = time.monotonic() - start
+        self.step += 5
+        assert reply.step == self.step, (reply.step, self.step)
+        return took
+
+    def watch(self, seconds):
+        """p99 of many rounds."""
+        times, start = [], time.monotonic()
+        while time.monotonic() - start - seconds < 0:
+            try:
+                times.append(self.once())
+            except (grpc.RpcError, AssertionError) as error:
+                self.errors.append(repr(error)[:500])
+                break
+            time.sleep(0.005)
+        times.sort()
+        return times[int(0.99 * (len(times) - 1))] if times else float("inf")
+
+
+def memory_of(pid):
+    with open(f"/proc/{pid}/status") as file:
+        return int(next(line for line in file if line.startswith("VmRSS")).split()[1]) << 10
+
+
+def threads_of(pid):
+    return len(os.listdir(f"/proc/{pid}/task"))
+
+
+def watch_memory(pid, peak, stop):
+    while not stop.wait(0.2):
+        try:
+            peak[0] = max(peak[0], memory_of(pid))
+        except OSError:
+            return
+
+
+def attack(kinds, address, tcp, seed, seconds):
+    rng = random.Random(seed)
+    return {kind: subprocess.Popen([sys.executable, os.path.join(HERE, "attacks.py"), kind, address, tcp, f"{kind}-token",
+                                    str(rng.randrange(1 << 30)), str(seconds)], stdout=subprocess.PIPE, text=True)
+            for kind in kinds}
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("bin")
+    parser.add_argument("--seconds", type=float, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kinds", default=",".join(attacks.KINDS))
+    options = parser.parse_args()
+    print(f"seed {options.seed}", flush=True)
+    faults = []
+    with tempfile.TemporaryDirectory() as folder:
+        daemon, address, tcp, log = start(options.bin, folder)
+        bystander = Bystander(address)
+        quiet = bystander.watch(min(5, options.seconds / 4))
+        threads = threads_of(daemon.pid)
+        peak, stop = [0], threading.Event()
+        threading.Thread(target=watch_memory, args=(daemon.pid, peak, stop), daemon=True).start()
+        attackers = attack(options.kinds.split(","), address, tcp, options.seed, options.seconds)
+        loud = bystander.watch(options.seconds)
+        for kind, attacker in attackers.items():
+            try:
+                text, _ = attacker.communicate(timeout=60 * FACTOR)
+                result = json.loads(text) if text else {"codes": {}, "internal": ["the attacker itself failed"]}
+            except subprocess.TimeoutExpired:
+                attacker.kill()
+                result = {"codes": {}, "internal": [f"{kind} hangs"]}
+            print(f"  {kind:12} {result['codes']}", flush=True)
+            faults += [f"{kind}: {text}" for text in result["internal"]]
+        stop.set()
+        faults += judge(daemon, bystander, quiet, loud, threads, peak[0], log)
+    for fault in faults:
+        print("FAULT", fault)
+    sys.exit(1 if faults else 0)
+
+
+def judge(daemon, bystander, quiet, loud, threads, peak, log):
+    print(f"bystander p99: quiet {1e3 * quiet:.1f} ms, under attack {1e3 * loud:.1f} ms; memory at most {peak >> 20} MB", flush=True)
+    if daemon.poll() is not None:
+        yield f"the daemon ended with {daemon.returncode}: {open(log).read()[-2000:]}"
+        return
+    yield from bystander.errors
+    if loud > max(5 * quiet, 0.05 * FACTOR):
+        yield "the bystander was slowed down more than 5 times"
+    if peak > MEMORY + (300 << 20):  # besides the budget: the program, gRPC's buffers, the allocator's rest
+        yield f"memory of {peak >> 20} MB, with a budget of {MEMORY >> 20} MB"
+    timeout = time.monotonic() + 30 * FACTOR
+    while threads_of(daemon.pid) > threads + 4 and time.monotonic() < timeout:
+        time.sleep(0.2)
+    if threads_of(daemon.pid) > threads + 4:
+        yield f"{threads_of(daemon.pid)} threads are left, {threads} were there before"
+    with grpc.insecure_channel(bystander_address(bystander), options=[("grpc.use_local_subchannel_pool", 1)]) as fresh:
+        try:
+            simulations_pb2_grpc.SimulationsStub(fresh).GetServerInfo(pb.GetServerInfoRequest(), metadata=bystander.metadata,
+                                                                      timeout=10 * FACTOR, wait_for_ready=True)
+        except grpc.RpcError as error:
+            yield f"a new connection is not served: {error.code()}"
+    if "uncaught" in open(log).read():
+        yield "an exception came to the top of a thread: " + open(log).read().split("uncaught")[1][:200]
+    daemon.send_signal(signal.SIGTERM)
+    try:
+        code = daemon.wait((GRACE + 3) * FACTOR)
+        if code != 0:
+            yield f"the daemon ended with {code}"
+    except subprocess.TimeoutExpired:
+        daemon.kill()
+        yield "SIGTERM did not end the daemon within its grace"
+
+
+def bystander_address(bystander):
+    return bystander.channel._channel.target().decode()
+
+
+if __name__ == "__main__":
+    main()
