@@ -259,13 +259,12 @@ def test_a_silent_peer_is_gone_though_no_step_asks_it(server, processes, daemon)
 
 # ---------------------------------------------------------------- lost and repeated messages
 
-def test_an_unreliable_line_gives_the_same_bits(server, daemon, tmp_path, monkeypatch):
+def test_an_unreliable_line_gives_the_same_bits(server, daemon, tmp_path):
     """A relay loses 1 % of the requests and 1 % of the replies, and repeats 1 % of the requests."""
     steps = 10_000 if os.environ.get("MBCOSIM_NIGHTLY") else 1_500
-    monkeypatch.setattr(mbcosim.simulation, "_ATTEMPTS", 10)
     relay, found = Unreliable(str(tmp_path), daemon.address, part=0.02, seed=4), []
     for address in (daemon.address, relay.address):
-        with oscillator(server) as simulation, mbcosim.connect(address) as line:
+        with oscillator(server) as simulation, mbcosim.connect(address, reconnect=30) as line:
             with simulation.couple("spring", spring):
                 far = line.attach(simulation.name)
                 for k in range(steps):

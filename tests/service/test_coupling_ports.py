@@ -340,7 +340,6 @@ def test_tangent_of_a_modal_port(server):
     ('stream output: 1, create, yes;', "output elements: 1;", "`stream name` expected"),
     ('stream output: 1, stream name, "", 1, drive, time;', "output elements: 1;", "name of the stream is empty"),
     ('stream output: 1, stream name, "a", output every, 0, 1, drive, time;', "output elements: 1;", "at least 1"),
-    ('stream output: 1, stream name, "a", echo, "f", 1, drive, time;', "output elements: 1;", "`echo` is not supported"),
     ('stream output: 1, stream name, "a", 0;', "output elements: 1;", "number of channels"),
     ('force: 1, external modal, grpc, port, "a", 3;', "forces: 1;", "joint 3"),
     ('force: 1, external modal, grpc, port, "a", reference node, 1, type, all;', "forces: 1;", "needs a modal joint"),

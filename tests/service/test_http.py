@@ -302,7 +302,7 @@ def test_tokens_and_roles_are_those_of_grpc(start_daemon, tmp_path):
         status, reply = door.call(f"Simulations/{method}", Authorization=f"Bearer {token}")
         return status, reply.get("code")
 
-    assert door.call("Simulations/GetServerInfo", Authorization="Bearer eye")[1]["identity"] == "watcher"
+    assert door.call("Simulations/GetServerInfo", Authorization="Bearer eye")[1]["identity"] == "token:watcher"
     assert call("Step", "eye") == (403, "permission_denied")
     assert call("Step", "hand") == (404, "not_found")
     assert call("ListSimulations", "old") == (401, "unauthenticated")

