@@ -69,8 +69,9 @@ class ProgressSender {
   explicit ProgressSender(Exchange& exchange) : exchange_(exchange) {}
   void send(const std::string& phase, double fraction) {
     const auto now = std::chrono::steady_clock::now();
-    if (phase == last_.progress().phase() && now - sent_ < std::chrono::milliseconds(100)) return;
-    if (!exchange_.all_written()) return;
+    const bool goes_on = phase == last_.progress().phase();
+    const bool soon = now - sent_ < std::chrono::milliseconds(100);
+    if (goes_on && (soon || !exchange_.all_written())) return;
     sent_ = now;
     last_.mutable_progress()->set_phase(phase);
     last_.mutable_progress()->set_fraction(fraction);

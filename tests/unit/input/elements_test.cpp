@@ -3,6 +3,7 @@
 
 #include "deck_fixture.h"
 #include "simulation/describe.h"
+#include "simulation/load.h"
 #include "simulation/units.h"
 
 #include <nlohmann/json.hpp>
@@ -132,9 +133,9 @@ TEST(Describe, ListsWhatTheModelHas) {
       "abstract: 5, value, 2.;");
   d.control = "title: \"arm\";";
   d.initial_value = "final time: forever;";
-  const ModelPtr model = model_of(d);
-  ASSERT_TRUE(model);
-  const ModelDescription description = describe(*model);
+  const DeckReport report = read_deck(BundleSource({{"deck.mbd", d.text()}}), "deck.mbd", {});
+  ASSERT_TRUE(report.ok()) << findings(report.diagnostics);
+  const ModelDescription description = describe(*report.model, {}, report.symbols);
   ASSERT_EQ(description.nodes.size(), 3u);
   EXPECT_EQ(description.nodes[1].name, "base");
   EXPECT_EQ(description.nodes[2].data, (std::vector<std::string>{"x", "xP"}));
