@@ -189,8 +189,8 @@ void read_external_modal(Card& card, ElementInfo& info) {
   }
   ElementPort port;
   if (joints) {
-    channel.modes = static_cast<int>(
-        modal_port(card.model(), *joints, joint, false, true).mode_numbers.size());
+    channel.modes =
+        static_cast<int>(modal_port(card.model(), *joints, joint, false, true).mode_numbers.size());
     port = modal_port(card.model(), *joints, joint, type != 1, type != 0);
   } else {
     port.kind = ElementPort::Kind::modal;
