@@ -36,8 +36,6 @@ struct ServiceLimits {
 struct Config {
   std::vector<std::string> listen;  ///< "unix:PATH" or "HOST:PORT"; empty: the default socket
   std::string model_root;           ///< folder of decks that clients may name; empty: none
-  std::string state_dir;            ///< folder of checkpoints; empty: none
-  int checkpoint_every = 1000;      ///< accepted steps between checkpoints
   int workers = 0;                  ///< simulations that step at once; 0: one per core
   std::string tls_certificate, tls_key, tls_client_ca;  ///< PEM files
   std::string tokens_file;                              ///< see Authenticator::from_file
