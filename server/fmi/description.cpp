@@ -119,7 +119,7 @@ std::string describe_fmi2(const DescriptionHead& head, const std::vector<Entry>&
   set(root, "guid", head.token);
   pugi::xml_node kind = root.append_child("CoSimulation");
   set(kind, "modelIdentifier", head.identifier);
-  set(kind, "canHandleVariableCommunicationStepSize", false);
+  set(kind, "canHandleVariableCommunicationStepSize", head.variable_steps);
   set(kind, "canNotUseMemoryManagementFunctions", true);
   set(kind, "canGetAndSetFMUstate", true);
   set(kind, "canSerializeFMUstate", true);
@@ -160,8 +160,7 @@ std::string describe_fmi3(const DescriptionHead& head, const std::vector<Entry>&
   set(kind, "canSerializeFMUState", true);
   set(kind, "providesDirectionalDerivatives", true);
   set(kind, "providesAdjointDerivatives", true);
-  set(kind, "canHandleVariableCommunicationStepSize", false);
-  set(kind, "fixedInternalStepSize", exact(head.step));
+  set(kind, "canHandleVariableCommunicationStepSize", head.variable_steps);
   add_units(root, entries);
   add_common(root, head);
   pugi::xml_node variables = root.append_child("ModelVariables");

@@ -14,6 +14,7 @@ struct DescriptionHead {
   std::string token;
   std::string description;
   double start_time = 0, stop_time = 0, step = 0;  ///< default experiment [s]
+  bool variable_steps = true;                      ///< communication steps may have any length
 };
 
 std::string describe_fmi2(const DescriptionHead& head, const std::vector<Entry>& scalars);

@@ -109,7 +109,8 @@ DescriptionHead head_of(const ExportOptions& options, const Model& model,
                         const std::string& token) {
   const InitialValueSettings& s = model.initial_value;
   const std::string stem = fs::path(options.output).stem().string();
-  return {stem, identifier_of(stem), token, model.title, s.initial_time, s.final_time, s.time_step};
+  return {stem,           identifier_of(stem), token,       model.title,
+          s.initial_time, s.final_time,        s.time_step, s.strategy != StepStrategy::factor};
 }
 
 void count(const std::vector<Entry>& entries, ExportReport& report) {

@@ -283,21 +283,18 @@ Status Instance::check_step(double time, double length) {
   return Status::ok;
 }
 
-/// Steps of the deck's length until `length` is used up.
-mbcosim::Status Instance::advance(double length) {
+/// Steps of the deck's length; what is left at the end is a step of its own, which ends at `end`.
+mbcosim::Status Instance::advance(double length, double end) {
   double left = length;
   while (left > kRounding * length) {
     const double h = simulation_->next_step_size();
-    if (!(h > 0) || h > left * (1 + kRounding)) {
-      Error error;
-      error.kind = ErrorKind::argument;
-      error.message = "a step of " + number(length) + " s is no multiple of the deck's step, " +
-                      number(h) + " s";
-      return error;
-    }
-    const StepReport report = simulation_->step();
-    if (report.error) return *report.error;
-    left -= report.step_size;
+    const bool whole = h > 0 && h <= left * (1 + kRounding);
+    StepChoice choice;
+    if (!whole) choice.end = end;
+    const auto report = whole ? Result<StepReport>(simulation_->step()) : simulation_->step(choice);
+    if (!report) return report.error();
+    if (report->error) return *report->error;
+    left = whole ? left - report->step_size : 0;
   }
   return ok();
 }
@@ -306,7 +303,7 @@ Status Instance::do_step(double time, double length) {
   if (const Status status = check_step(time, length); status != Status::ok) return status;
   const State before = simulation_->snapshot();
   ++revision_;
-  if (const auto done = advance(length); !done) {
+  if (const auto done = advance(length, time + length); !done) {
     (void)simulation_->restore(before);
     if (standard_ == Standard::fmi2) mode_ = Mode::step_failed;
     return discard(done.error().message);

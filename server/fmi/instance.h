@@ -97,7 +97,7 @@ class Instance {
   void read(const Variable& variable, std::vector<double>& all, std::vector<double>& out) const;
   Status may_set(const Variable& variable);
   bool write(const Variable& variable, std::span<const double> values);
-  mbcosim::Status advance(double length);
+  mbcosim::Status advance(double length, double end);
   Status check_step(double time, double length);
   mbcosim::Status compute_derivative(std::span<const std::uint32_t> unknowns,
                                      std::span<const std::uint32_t> knowns);

@@ -1,5 +1,6 @@
 """FMUs of decks, run by the importer beside this file: numbers of `mbcosim run` bit for bit, states, misuse."""
 import ctypes
+import math
 import os
 import random
 import re
@@ -114,6 +115,52 @@ def test_several_steps_of_the_deck_at_once_change_no_bit(exported, standard):
             assert other.do_step(time, count * step) == OK
             time += count * step
             assert one[outputs] == other[outputs]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_random_step_lengths_keep_the_order_of_the_method(exported, standard):
+    """Below the deck's step each length is one step: halves of all of them leave a quarter of the difference (second order)."""
+    fmu = exported("pendulum", standard)
+    start, _, step = fmu.experiment()
+    x = ["node.structural.2.X"] if standard == "3" else [f"node.structural.2.X[{i}]" for i in (1, 2, 3)]
+    dice = random.Random(7)
+    lengths = [step * dice.uniform(0.3, 0.95) for _ in range(60)]
+
+    def run(instance, parts):
+        time = start
+        for length in lengths:
+            for _ in range(parts):
+                assert instance.do_step(time, length / parts) == OK
+                time += length / parts
+        return time, instance[x]
+
+    ends = []
+    for parts in (1, 2, 4):
+        with instance_of(fmu) as instance:
+            instance.initialize()
+            state = instance.get_state()
+            end, position = run(instance, parts)
+            instance.set_state(state)
+            assert run(instance, parts) == (end, position)
+            ends.append(position)
+    coarse, fine = math.dist(ends[0], ends[1]), math.dist(ends[1], ends[2])
+    assert 1e-9 < fine and 3.5 < coarse / fine < 4.5
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_steps_longer_than_the_deck_s_end_where_they_should(exported, standard):
+    fmu = exported("pendulum", standard)
+    start, _, step = fmu.experiment()
+    x = ["node.structural.2.X"] if standard == "3" else [f"node.structural.2.X[{i}]" for i in (1, 2, 3)]
+    with instance_of(fmu) as instance, instance_of(fmu) as parts:
+        instance.initialize(), parts.initialize()
+        assert instance.do_step(start, 3.7 * step) == OK
+        for k in range(3):
+            assert parts.do_step(start + k * step, step) == OK
+        assert parts.do_step(start + 3 * step, 0.7 * step) == OK
+        assert instance[x] == pytest.approx(parts[x], abs=1e-12)
+        assert instance.do_step(start + 3 * step, step) == ERROR  # it stands at 3.7 steps
+        assert "stands at" in instance.log[-1][2]
 
 
 @pytest.mark.parametrize("standard", STANDARDS)
@@ -244,9 +291,18 @@ def to_error(i):
     assert i.do_step(0.0, -1.0) == ERROR
 
 
+def push(i):
+    """A force that leads to where the deck's drive fails within 0.1 s, not within 0.01 s."""
+    if i.archive.version == "3.0":
+        i["stream.push"] = [0.0, -1e4]
+    else:
+        i["stream.push[2]"] = [-1e4]
+
+
 def to_failed(i):
     i.initialize()
-    assert i.do_step(0.0, 0.003) == DISCARD
+    push(i)
+    assert i.do_step(0.0, 0.1) == DISCARD
 
 
 MODES = [to_instantiated, to_initialization, to_step, to_terminated, to_error, to_failed]
@@ -384,14 +440,11 @@ def test_null_instances_are_refused(ports, standard):
 @pytest.mark.parametrize("standard", STANDARDS)
 def test_a_step_that_fails_is_discarded_and_changes_nothing(ports, standard):
     fmu = ports(standard)
-    push = ["stream.push"] if standard == "3" else ["stream.push[1]", "stream.push[2]"]
-    values = [0.0, -1e4]
     with instance_of(fmu) as instance, instance_of(fmu) as other:
         instance.initialize(), other.initialize()
         outputs = fmu.names("output")
         state = instance.get_state()
-        for k, name in enumerate(push):
-            instance[name] = values if standard == "3" else [values[k]]
+        push(instance)
         before = instance[outputs]  # loads are outputs, too: they follow the inputs at once
         assert instance.do_step(0.0, 0.1) == DISCARD
         assert any(status == DISCARD and category == "logStatusDiscard" for status, category, _ in instance.log)
@@ -408,7 +461,8 @@ def test_log_categories_can_be_switched(ports, standard):
         assert instance.set_logging(False) == OK and instance.set_logging(True, ["logStatusDiscard"]) == OK
         instance.initialize()
         instance.log.clear()
-        assert instance.do_step(0.0, 0.003) == DISCARD and len(instance.log) == 1
+        push(instance)
+        assert instance.do_step(0.0, 0.1) == DISCARD and len(instance.log) == 1
         instance.log.clear()
         instance.set_logging(False, ["logStatusDiscard"])
         instance.set_logging(False, ["no such"])
