@@ -86,7 +86,7 @@ def position(server, steps):
 
 def main():
     options = example.options(__doc__, "controllers.png", steps=3000)
-    with mbcosim.connect(options.address) as server:
+    with mbcosim.connect_or_start(options.address) as server:
         times, cart, angle, force = balance(server, options.steps)
         servo_times, command, stroke, valve = position(server, options.steps)
 

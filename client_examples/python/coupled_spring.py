@@ -30,7 +30,7 @@ def swing(server, **options):
 
 def main():
     options = example.options(__doc__, "coupled_spring.png")
-    with mbcosim.connect(options.address) as server:
+    with mbcosim.connect_or_start(options.address) as server:
         runs = {"loose": swing(server), "window, IQN-ILS": swing(server, mode="window", acceleration="iqn_ils")}
 
     picture, axes = example.figure(figsize=(8, 4))

@@ -4,8 +4,8 @@ import os
 import sys
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-# The package with its generated stubs: of PYTHONPATH, or of the usual build; not the sources beside this file.
-for folder in [*os.environ.get("PYTHONPATH", "").split(os.pathsep), os.path.join(HERE, "..", "..", "build", "python")]:
+# The package with its generated stubs: of PYTHONPATH, of the usual build, or as installed; not the sources beside this file.
+for folder in [*os.environ.get("PYTHONPATH", "").split(os.pathsep), os.path.join(HERE, "..", "..", "build", "python"), *sys.path]:
     if os.path.isdir(os.path.join(folder, "mbcosim", "v1")):
         sys.path.insert(0, folder)
         break
@@ -16,13 +16,15 @@ def model(name):
     return os.path.join(HERE, "..", "models", name)
 
 
-def options(description, plot, steps=None, second=False):
-    """--address of the server, --plot file, --steps if it has a default, --second server if it can be used."""
+def options(description, plot, steps=None, second=False, deck=None):
+    """--address of the server, --plot file; --steps and --deck if they have a default; --second server if it can be used."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--address", help="of the server; default: the one of this user")
+    parser.add_argument("--address", help="of the server; default: the daemon of this user, or one started for the run")
     parser.add_argument("--plot", default=plot, help="picture to write; default: %(default)s")
     if second:
         parser.add_argument("--second", help="address of the second server; default: one is started")
+    if deck is not None:
+        parser.add_argument("--deck", default=deck, help="model; default: %(default)s")
     if steps is not None:
         parser.add_argument("--steps", type=int, default=steps, help="length of the runs; default: %(default)s")
     return parser.parse_args()

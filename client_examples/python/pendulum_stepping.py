@@ -25,7 +25,7 @@ def swing(simulation, steps, push):
 
 def main():
     options = example.options(__doc__, "pendulum.png")
-    with mbcosim.connect(options.address) as server, server.load(example.model("pendulum.mbd")) as pendulum:
+    with mbcosim.connect_or_start(options.address) as server, server.load(example.model("pendulum.mbd")) as pendulum:
         before = swing(pendulum, SAVED, 0.0)
         saved = pendulum.snapshot()
         free = swing(pendulum, STEPS - SAVED, 0.0)

@@ -48,7 +48,7 @@ def control(simulation):
 
 def main():
     options = example.options(__doc__, "servo.png")
-    with mbcosim.connect(options.address) as server, server.load(example.model("actuated_beam_servo.mbd")) as simulation:
+    with mbcosim.connect_or_start(options.address) as server, server.load(example.model("actuated_beam_servo.mbd")) as simulation:
         times, wanted, tip, valve, lower, upper = control(simulation)
 
     picture, axes = example.figure(4, figsize=(8, 10), sharex=True)

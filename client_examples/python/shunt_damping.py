@@ -24,7 +24,7 @@ def vibrate(server, deck):
 
 def main():
     options = example.options(__doc__, "shunt.png")
-    with mbcosim.connect(options.address) as server:
+    with mbcosim.connect_or_start(options.address) as server:
         runs = {"open": vibrate(server, "cantilever_piezo_open.mbd"), "shunted": vibrate(server, "cantilever_piezo_shunt.mbd")}
 
     picture, axes = example.figure(2, figsize=(8, 6), sharex=True)

@@ -67,7 +67,7 @@ def swing(server, steps, acceleration):
 
 def main():
     options = example.options(__doc__, "stiff.png", steps=200)
-    with mbcosim.connect(options.address) as server:
+    with mbcosim.connect_or_start(options.address) as server:
         runs = {name: swing(server, options.steps, method) for method, name in METHODS.items()}
 
     picture, axes = example.figure(2, figsize=(8, 7), sharex=True)

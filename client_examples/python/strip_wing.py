@@ -81,7 +81,7 @@ def fly(server, speed, steps, with_tangent):
 
 def main():
     options = example.options(__doc__, "wing.png", steps=700)
-    with mbcosim.connect(options.address) as server:
+    with mbcosim.connect_or_start(options.address) as server:
         runs = {speed: fly(server, speed, options.steps, True) for speed in SPEEDS}
         plain = fly(server, SPEEDS[0], options.steps, False)
 

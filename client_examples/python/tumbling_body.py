@@ -3,19 +3,13 @@
 
 usage: tumbling_body.py [--address ADDRESS] [--deck DECK] [--plot FILE.png]
 """
-import argparse
 import os
-import sys
 
 import numpy as np
+from tqdm import tqdm
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-BUILT = os.path.join(HERE, "..", "..", "build", "python")
-if os.path.isdir(BUILT):
-    sys.path.insert(0, BUILT)
-
-import mbcosim  # noqa: E402
-from tqdm import tqdm  # noqa: E402
+import example
+import mbcosim
 
 SPIN, ROTATION = "node.structural.1.Omega", "node.structural.1.R"
 INERTIA = np.diag([1.0, 2.0, 3.0])  # of the deck, node frame [kg m^2]
@@ -36,27 +30,17 @@ def simulate(simulation):
 
 
 def plot(times, spins, path):
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(8, 4))
+    picture, axes = example.figure(figsize=(8, 4))
     for axis, label in enumerate("xyz"):
-        axes.plot(times, spins[:, axis], label=f"about {label}")
-    axes.set(xlabel="time [s]", ylabel="spin in the body's frame [rad/s]", title="Tumbling body")
-    axes.legend()
-    figure.tight_layout()
-    figure.savefig(path, dpi=120)
+        axes[0, 0].plot(times, spins[:, axis], label=f"about {label}")
+    axes[0, 0].set(xlabel="time [s]", ylabel="spin in the body's frame [rad/s]", title="Tumbling body")
+    axes[0, 0].legend()
+    picture.savefig(path, dpi=120)
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--address", help="of the server; default: the one of this user")
-    parser.add_argument("--deck", default=os.path.join(HERE, "..", "models", "tumbling.mbd"))
-    parser.add_argument("--plot", default="tumbling.png")
-    options = parser.parse_args()
-
-    with mbcosim.connect(options.address) as server, server.load(options.deck, name="tumbling body") as simulation:
+    options = example.options(__doc__, "tumbling.png", deck=example.model("tumbling.mbd"))
+    with mbcosim.connect_or_start(options.address) as server, server.load(options.deck, name="tumbling body") as simulation:
         times, spins, energy = simulate(simulation)
     plot(times, spins, options.plot)
 

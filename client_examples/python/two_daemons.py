@@ -6,11 +6,6 @@ usage: two_daemons.py [--address ADDRESS] [--second ADDRESS] [--plot FILE.png] [
 
 Without --second a second daemon is started for the run.
 """
-import contextlib
-import os
-import subprocess
-import tempfile
-
 import numpy as np
 
 import example
@@ -68,23 +63,14 @@ def fall_whole(server, steps):
     return np.array([r.time for r in results]), np.array([r.values[TIP][2] for r in results])
 
 
-@contextlib.contextmanager
 def second_server(address):
     """A connection to the second daemon, which is started when no address is given."""
-    with contextlib.ExitStack() as stack:
-        if not address:
-            folder = stack.enter_context(tempfile.TemporaryDirectory())
-            address = f"unix:{folder}/second.sock"
-            program = os.environ.get("MBCOSIM_BIN", os.path.join(example.HERE, "..", "..", "build", "bin"))
-            daemon = subprocess.Popen([os.path.join(program, "mbcosimd"), "--listen", address, "--log-level", "warn"])
-            stack.callback(daemon.wait)
-            stack.callback(daemon.terminate)
-        yield stack.enter_context(mbcosim.connect(address, timeout=30))
+    return mbcosim.connect(address) if address else mbcosim.local()
 
 
 def main():
     options = example.options(__doc__, "halves.png", steps=200, second=True)
-    with mbcosim.connect(options.address) as first, second_server(options.second) as second:
+    with mbcosim.connect_or_start(options.address) as first, second_server(options.second) as second:
         heights, exchanges = fall_in_two(first, second, options.steps)
         times, expected = fall_whole(first, options.steps)
 

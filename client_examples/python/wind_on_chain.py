@@ -39,7 +39,7 @@ def swing(server, force, steps):
 
 def main():
     options = example.options(__doc__, "chain.png", steps=3000)
-    with mbcosim.connect(options.address) as server:
+    with mbcosim.connect_or_start(options.address) as server:
         still, _ = swing(server, lambda motion: 0 * motion.x, options.steps)
         windy, middle = swing(server, drag, options.steps)
 

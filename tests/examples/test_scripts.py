@@ -3,6 +3,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -14,6 +15,9 @@ SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "
 def address(tmp_path_factory):
     address = f"unix:{tmp_path_factory.mktemp('run')}/s"
     daemon = subprocess.Popen([os.path.join(BIN, "mbcosimd"), "--listen", address, "--log-level", "warn"])
+    while not os.path.exists(address[len("unix:"):]):
+        assert daemon.poll() is None
+        time.sleep(0.01)
     yield address
     daemon.terminate()
     assert daemon.wait(20) == 0

@@ -27,6 +27,7 @@ class Daemon:
         command = [os.path.join(BIN, "mbcosimd"), "--listen", self.address, "--shutdown-grace", "1", *options]
         with open(self._output_path, "wb") as output:
             self.process = subprocess.Popen(command, stdout=output, stderr=self._log, stdin=subprocess.DEVNULL)
+        wait_for(lambda: os.path.exists(self.address[len("unix:"):]) or not self.alive(), 30)
 
     def connect(self, **options):
         return mbcosim.connect(self.address, timeout=30, **options)

@@ -2,21 +2,28 @@
 
     import mbcosim
 
-    with mbcosim.connect() as server, server.load("pendulum.mbd") as simulation:
-        simulation.run_until(1.0)
-        print(simulation.time, simulation["node.structural.1.X"])
+    with mbcosim.local() as server, server.load("pendulum.mbd") as simulation:
+        history = simulation.simulate(until=1.0)
+        history.plot(save="pendulum.png")
+
+`local` starts a private daemon; `connect` uses one that runs.
 """
+from ._version import __version__
+from .access import default_address
+from .analysis import Modes, StateSpace
 from .calls import Condition, StepResult
-from .client import Server, connect, default_address
+from .client import Server, connect
 from .coupling import Peer, modal_port, motion_port, signal_port, structural_port
 from .errors import (DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
                      StepFailed, TimedOut, Unavailable)
 from .exchange import Loads, Motion, Reject
+from .histories import History
+from .local import LocalServer, connect_or_start, local
 from .simulation import Simulation, Snapshot, Stepper, Subscription
 
 __all__ = [
-    "connect", "default_address", "Server", "Simulation", "Snapshot", "StepResult", "Stepper", "Subscription", "Motion", "Loads",
-    "Condition", "Reject",
-    "Peer", "modal_port", "motion_port",
-    "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound", "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable",
+    "__version__", "connect", "connect_or_start", "local", "default_address", "Server", "LocalServer", "Simulation", "Snapshot", "StepResult",
+    "Stepper", "Subscription", "History", "StateSpace", "Modes", "Motion", "Loads", "Condition", "Reject", "Peer", "modal_port",
+    "motion_port", "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound",
+    "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable",
 ]

@@ -20,9 +20,9 @@ import numpy as np
 
 from mbcosim.v1 import coupling_pb2, simulations_pb2 as pb
 
-from . import exchange
+from . import access, exchange
+from .access import Attempts, default_address
 from .calls import ServerCalls, SimulationCalls, SnapshotCalls
-from .client import default_address
 from .coupling import open_stream
 from .errors import PreconditionFailed, TimedOut, Unavailable, from_rpc_error, translated
 from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Retries, Stubs, metadata, parting, runs_calls
@@ -30,13 +30,21 @@ from .simulation import subscribe_request
 
 
 @contextlib.asynccontextmanager
-async def connect(address=None, *, token=None, credentials=None, timeout=10.0, reconnect=0.0):
-    """A connection; waits until the server answers, at most `timeout` seconds. See mbcosim.connect."""
-    server = Server(address or default_address(), token, credentials, reconnect)
+async def connect(address=None, *, token=None, tls=None, ca=None, certificate=None, key=None, credentials=None, timeout=None, reconnect=0.0):
+    """A connection; for the arguments see mbcosim.connect."""
+    secured = credentials or access.credentials(tls, ca, certificate, key)
+    server = Server(address or default_address(), token or access.default_token(), secured, reconnect)
     try:
-        with translated():
-            await server._connection.stubs.simulations.GetServerInfo(
-                pb.GetServerInfoRequest(), metadata=server.metadata, timeout=timeout, wait_for_ready=True)
+        attempts = Attempts(server.address, timeout)
+        while True:
+            try:
+                with translated():
+                    await server._connection.stubs.simulations.GetServerInfo(
+                        pb.GetServerInfoRequest(), metadata=server.metadata, timeout=attempts.left())
+                break
+            except Unavailable as error:
+                attempts.again(error)
+                await asyncio.sleep(Attempts.PAUSE)
         yield server
     finally:
         await server.close()
@@ -101,7 +109,15 @@ async def _bounded(seconds, awaitable, cancel, what):
 
 @runs_calls(awaited)
 class Snapshot(SnapshotCalls):
-    """A saved state of a simulation."""
+    """A saved state of a simulation. With `async with`: at the end of the block the simulation goes back to it, and it is forgotten."""
+
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *_):
+        with parting():
+            await self.restore(timeout=PARTING)
+            await self.delete(timeout=PARTING)
 
 
 @runs_calls(awaited)

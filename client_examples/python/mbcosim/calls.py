@@ -12,6 +12,7 @@ from mbcosim.v1 import common_pb2, reduction_pb2, simulations_pb2 as pb
 from . import bundle
 from .errors import StepFailed, enum_name
 from .rpc import USUAL, Call, call
+from .words import choice, pick, remedy
 
 
 def _matrix(message):
@@ -24,7 +25,7 @@ def _matrix(message):
 
 
 def _policy(name):
-    return pb.NonConvergencePolicy.Value("NON_CONVERGENCE_POLICY_" + name.upper())
+    return choice(pb.NonConvergencePolicy, "NON_CONVERGENCE_POLICY_", name, "policy")
 
 
 _COMPARISONS = {"<": pb.COMPARISON_LESS, "<=": pb.COMPARISON_LESS_OR_EQUAL, ">": pb.COMPARISON_GREATER,
@@ -178,6 +179,10 @@ class SimulationCalls:
         self.printed = printed
         self.step_number, self.time = info.step, info.time_s
 
+    def __repr__(self):
+        title = f" \"{self.info.display_name}\"" if self.info.display_name else ""
+        return f"<{type(self).__name__} {self.name}{title}, step {self.step_number}, t = {self.time:g} s of {self.info.final_time_s:g} s>"
+
     # ---------------------------------------------------------------- variables
 
     @call
@@ -205,7 +210,7 @@ class SimulationCalls:
         try:
             return self._known[name]
         except KeyError:
-            raise KeyError(f"no variable is named {name!r}; see Simulation.variables") from None
+            raise KeyError(f"no variable is named {name!r}; {remedy(name, self._known)}") from None
 
     @call
     def read(self, names, *, timeout=USUAL):
@@ -282,7 +287,7 @@ class SimulationCalls:
         if until is not None:
             request.until.handle, = yield from self._handles([until.variable])
             request.until.element, request.until.threshold = until.element, until.threshold
-            request.until.comparison = _COMPARISONS[until.comparison]
+            request.until.comparison = pick(_COMPARISONS, until.comparison, "comparison")
             if until.locate_within is not None:
                 request.until.locate_within_s = until.locate_within
         if inputs:
@@ -446,6 +451,9 @@ class SnapshotCalls:
         self._simulation, self._connection = simulation, simulation._connection
         self.name, self.step, self.time, self.display_name = info.name, info.step, info.time_s, info.display_name
         self.size_bytes = info.size_bytes
+
+    def __repr__(self):
+        return f"<{type(self).__name__} {self.display_name or self.name}, step {self.step}, t = {self.time:g} s, {self.size_bytes} bytes>"
 
     @call
     def restore(self, *, timeout=USUAL):

@@ -1,42 +1,51 @@
 """Connections to a server. Every call takes `timeout=` [s]."""
-import os
 import threading
+import time
 
 import grpc
 
 from mbcosim.v1 import simulations_pb2
 
+from . import access
+from .access import default_address
 from .calls import ServerCalls
-from .errors import translated
+from .errors import Unavailable, translated
 from .rpc import CHANNEL_OPTIONS, PARTING, Connection, blocking, runs_calls
 from .simulation import Simulation
 
 
-def default_address():
-    """The socket that `mbcosimd` listens on by default, or $MBCOSIM_ADDRESS."""
-    if os.environ.get("MBCOSIM_ADDRESS"):
-        return os.environ["MBCOSIM_ADDRESS"]
-    runtime = os.environ.get("XDG_RUNTIME_DIR")
-    return f"unix:{runtime}/mbcosim.sock" if runtime else f"unix:/tmp/mbcosim-{os.getuid()}/mbcosim.sock"
+def connect(address=None, *, token=None, tls=None, ca=None, certificate=None, key=None, credentials=None, timeout=None, reconnect=0.0):
+    """A connection to the server at `address` ("unix:PATH" or "HOST:PORT"; default: $MBCOSIM_ADDRESS, or the socket of this user's daemon).
 
-
-def connect(address=None, *, token=None, credentials=None, timeout=10.0, reconnect=0.0):
-    """A connection to the server at `address` ("unix:PATH" or "HOST:PORT"); waits until it answers.
-
-    token        bearer token
-    credentials  grpc.ChannelCredentials for TLS
-    timeout      seconds until Unavailable is raised
+    token        bearer token; default: $MBCOSIM_TOKEN, or what the file $MBCOSIM_TOKEN_FILE holds
+    tls          True: TLS; default: where $MBCOSIM_TLS is 1 or one of the next is given
+    ca           PEM file of the authority that signed the server's certificate; default: $MBCOSIM_TLS_CA, or those this machine trusts
+    certificate  PEM file of the client's own certificate, `key` that of its key; default: $MBCOSIM_TLS_CERTIFICATE, $MBCOSIM_TLS_KEY
+    credentials  grpc.ChannelCredentials instead of the four before
+    timeout      seconds to wait for a server that is starting; without, Unavailable is raised as soon as nobody listens there
     reconnect    seconds for which calls that may be repeated are tried again when the server cannot be reached
     """
-    server = Server(address or default_address(), token, credentials, reconnect)
+    secured = credentials or access.credentials(tls, ca, certificate, key)
+    server = Server(address or default_address(), token or access.default_token(), secured, reconnect)
     try:
-        with translated():
-            server.simulations.GetServerInfo(simulations_pb2.GetServerInfoRequest(), metadata=server.metadata, timeout=timeout,
-                                             wait_for_ready=True)
+        await_answer(server, timeout)
     except Exception:
         server.close()
         raise
     return server
+
+
+def await_answer(server, timeout):
+    """Waits until a server answers; see access.Attempts."""
+    attempts = access.Attempts(server.address, timeout)
+    while True:
+        try:
+            with translated():
+                return server.simulations.GetServerInfo(simulations_pb2.GetServerInfoRequest(), metadata=server.metadata,
+                                                        timeout=attempts.left())
+        except Unavailable as error:
+            attempts.again(error)
+            time.sleep(attempts.PAUSE)
 
 
 @runs_calls(blocking)
@@ -57,6 +66,9 @@ class Server(ServerCalls):
     @property
     def _channel(self):
         return self._connection.channel
+
+    def __repr__(self):
+        return f"<mbcosim.Server at {self.address}>"
 
     def __enter__(self):
         return self

@@ -59,10 +59,12 @@ class TimedOut(Unavailable):
 class StepFailed(Error):
     """A step failed; the simulation stands at its last accepted step.
 
-    `failure` is a `mbcosim.v1.SolverFailure`; `result` the StepResult, None when the initial solution failed.
+    `failure` is a `mbcosim.v1.SolverFailure`; `result` the StepResult, None when the initial solution failed; `history` what
+    Simulation.simulate had kept until then, else None.
     """
 
     result = None
+    history = None
 
 
 _CLASSES = {

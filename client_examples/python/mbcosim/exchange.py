@@ -6,6 +6,8 @@ import numpy as np
 
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
+from .words import choice
+
 _ROTATION_SIZE = {"matrix": 9, "vector": 3, "quaternion": 4, "euler_123": 3}
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _EMPTY = np.zeros(0)
@@ -79,7 +81,7 @@ def hello(simulation, port, *, mode=None, rotation="matrix", frame=None, acceler
 
 def _enum(kind, prefix, name):
     """Value of a choice; None leaves it to the server."""
-    return 0 if name is None else kind.Value(prefix + name.upper())
+    return choice(kind, prefix, name, prefix.lower().strip("_").replace("_", " "))
 
 
 # ---------------------------------------------------------------- received

@@ -6,10 +6,14 @@ import numpy as np
 
 from mbcosim.v1 import simulations_pb2 as pb, telemetry_pb2
 
+from .analysis import Analysis
 from .calls import SimulationCalls, SnapshotCalls
 from .coupling import Peer
 from .errors import translated
+from .histories import Histories
+from .objects import ModelObjects
 from .rpc import PARTING, USUAL, blocking, bounded, parting, runs_calls
+from .words import pick
 
 _POLICIES = {"block": telemetry_pb2.OVERFLOW_POLICY_BLOCK, "drop_oldest": telemetry_pb2.OVERFLOW_POLICY_DROP_OLDEST,
              "decimate": telemetry_pb2.OVERFLOW_POLICY_DECIMATE}
@@ -17,17 +21,25 @@ _POLICIES = {"block": telemetry_pb2.OVERFLOW_POLICY_BLOCK, "drop_oldest": teleme
 
 def subscribe_request(simulation, handles, every, policy, buffer):
     """`mbcosim.v1.SubscribeRequest`."""
-    return telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=handles, every=every, policy=_POLICIES[policy],
+    return telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=handles, every=every, policy=pick(_POLICIES, policy, "policy"),
                                           buffer_samples=buffer)
 
 
 @runs_calls(blocking)
 class Snapshot(SnapshotCalls):
-    """A saved state of a simulation."""
+    """A saved state of a simulation. As a context manager: at the end of the block the simulation goes back to it, and it is forgotten."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        with parting():
+            self.restore(timeout=PARTING)
+            self.delete(timeout=PARTING)
 
 
 @runs_calls(blocking)
-class Simulation(SimulationCalls):
+class Simulation(ModelObjects, Histories, Analysis, SimulationCalls):
     """A simulation. As a context manager it is deleted from the server at the end (unless it was attached)."""
     _snapshot_class = Snapshot
 

@@ -1,0 +1,215 @@
+"""Values over time with their units: what Simulation.simulate returns."""
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from .calls import StepResult
+from .errors import StepFailed
+from .words import remedy
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+Array = npt.NDArray[np.float64]
+Input = Union[float, Sequence[float], Array, Callable[[float], Any]]
+
+
+def needed(module: str, purpose: str, package: str = "") -> Any:
+    """A module that only some functions need; where it is missing the error says how to get it."""
+    import importlib
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        name = package or module.split(".")[0]
+        raise ImportError(f"{purpose} needs {name}: pip install {name}, or apt-get install python3-{name}") from None
+
+
+class History(Mapping[str, Array]):
+    """Times [s] and, by name, values of variables at those times: the first axis is time.
+
+    `history["node.structural.2.X"]` is an array (instants x 3); units are in `units`. See also plot, animate, to_pandas, to_xarray.
+    """
+
+    def __init__(self, time: Array, values: dict[str, Array], units: dict[str, str], title: str = "") -> None:
+        self.time, self._values, self.units, self.title = time, values, units, title
+
+    def __getitem__(self, name: str) -> Array:
+        try:
+            return self._values[name]
+        except KeyError:
+            raise KeyError(f"the history has no {name!r}; {remedy(name, self._values)}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else "empty"
+        lines = [f"  {name} {list(v.shape[1:]) or ''}{' [' + self.units[name] + ']' if self.units[name] else ''}" for name, v in self.items()]
+        return "\n".join([f"<History, {len(self.time)} instants, {span}>", *lines])
+
+    def columns(self) -> dict[str, Array]:
+        """One column for each number: `name`, or `name[1]`, `name[2]`, … as in decks."""
+        found = {}
+        for name, values in self.items():
+            flat = values.reshape(len(values), -1)
+            for k in range(flat.shape[1]):
+                found[name if values.ndim == 1 else f"{name}[{k + 1}]"] = flat[:, k]
+        return found
+
+    def to_pandas(self) -> Any:
+        """A pandas.DataFrame with one column for each number, indexed by time [s]; units in `attrs["units"]`."""
+        pandas = needed("pandas", "a data frame")
+        frame = pandas.DataFrame(self.columns(), index=pandas.Index(self.time, name="time [s]"))
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset with the dimension `time`; units as attributes."""
+        xarray = needed("xarray", "a data set")
+        data = {name: (["time", *(f"{name} {axis + 1}" for axis in range(values.ndim - 1))], values, {"units": self.units[name]})
+                for name, values in self.items()}
+        return xarray.Dataset(data, coords={"time": ("time", self.time, {"units": "s"})}, attrs={"title": self.title})
+
+    def save(self, path: Union[str, "os.PathLike[str]"]) -> None:
+        """Writes a table with one column for each number, units in its heading."""
+        columns = self.columns()
+        heads = ["time [s]"]
+        for name in columns:
+            unit = self.units[name.split("[")[0]] if name not in self.units else self.units[name]
+            heads.append(f"{name} [{unit}]" if unit else name)
+        np.savetxt(path, np.column_stack([self.time, *columns.values()]), delimiter=",", header=",".join(heads), comments="")
+
+    def plot(self, names: Union[None, str, Iterable[str]] = None, *, axes: Any = None, save: Optional[str] = None) -> Any:
+        """Draws variables over time, one row of axes for each unit; see plots.plot_history."""
+        from . import plots
+        return plots.plot_history(self, names, axes=axes, save=save)
+
+    def animate(self, *, lines: Any = None, view: Any = "auto", seconds: Optional[float] = None, frames_per_second: int = 25,
+                save: Optional[str] = None) -> Any:
+        """Moves the points whose positions the history has; see plots.animate_history."""
+        from . import plots
+        return plots.animate_history(self, lines=lines, view=view, seconds=seconds, frames_per_second=frames_per_second, save=save)
+
+
+class _Rows:
+    """Collects results on the way."""
+
+    def __init__(self, simulation: Simulation, names: list[str]) -> None:
+        self._simulation, self._names = simulation, names
+        first = simulation.read(names) if names else {}
+        self._times = [simulation.time]
+        self._values = {name: [first[name]] for name in names}
+
+    def add(self, result: StepResult) -> None:
+        self._times.append(result.time)
+        for name in self._names:
+            self._values[name].append(result.values[name])
+
+    def history(self) -> History:
+        known = self._simulation.variables
+        values = {name: np.array(rows, dtype=float) for name, rows in self._values.items()}
+        title: str = self._simulation.info.display_name
+        return History(np.array(self._times, dtype=float), values, {name: known[name].unit for name in self._names}, title)
+
+
+def bar(total: float, show: bool, unit: str = "s") -> Any:
+    """A progress bar, in terminals and notebooks; without `show` one that shows nothing."""
+    if not show:
+        return _NoBar()
+    tqdm = needed("tqdm.auto", "a progress bar", "tqdm")
+    return tqdm.tqdm(total=total, unit=unit, bar_format="{l_bar}{bar}| {n:.4g}/{total:.4g} {unit} [{elapsed}<{remaining}]")
+
+
+class _NoBar:
+    def __enter__(self) -> _NoBar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def update(self, _: float) -> None:
+        """Nothing to show."""
+
+
+def _numbers(inputs: Mapping[str, Input], time: float) -> list[float]:
+    """Values of all inputs at a time, one after the other."""
+    numbers: list[float] = []
+    for value in inputs.values():
+        numbers.extend(np.ravel(np.asarray(value(time) if callable(value) else value, float)))
+    return numbers
+
+
+def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Optional[float], steps: Optional[int], every: int,
+         progress: bool, timeout: Optional[float]) -> History:
+    rows, done, start = _Rows(simulation, names), 0, simulation.time
+    total = float(steps) if end is None and steps is not None else float(end or 0.0) - start
+    size = simulation.info.next_step_s
+    with simulation.stepper(names, list(inputs)) as stepper, bar(total, progress, "s" if end is not None else "step") as shown:
+        while True:
+            left = steps - done if end is None and steps is not None else round((float(end or 0.0) - simulation.time) / size) if size > 0 else 0
+            if left <= 0:
+                break
+            before = simulation.time
+            try:
+                result = stepper.step(_numbers(inputs, before), count=min(every, left), timeout=timeout)
+            except StepFailed as error:
+                error.history = rows.history()
+                raise
+            rows.add(result)
+            done += result.steps_done
+            shown.update(result.time - before if end is not None else result.steps_done)
+            size = result.next_step_size
+            if result.outcome != "ACCEPTED":
+                break
+    return rows.history()
+
+
+class Histories:
+    """What a simulation can do beyond single steps."""
+
+    def simulate(self: Any, outputs: Union[None, str, Iterable[str]] = None, *, until: Optional[float] = None, steps: Optional[int] = None,
+                 every: int = 1, inputs: Optional[Mapping[str, Input]] = None, progress: bool = False,
+                 timeout: Optional[float] = None) -> History:
+        """Advances and keeps what the outputs are on the way, the present state included.
+
+        outputs   names of variables; default: the positions of all structural nodes
+        until     time [s]; default: the deck's end
+        steps     number of the deck's steps, instead of `until`
+        every     steps from one kept instant to the next
+        inputs    by name: numbers that hold, or functions of time [s] that are asked at every kept instant and hold until the next
+        progress  shows a bar (needs tqdm)
+        timeout   seconds that one advance may take
+
+        When a step fails, StepFailed.history has what there was until then.
+        """
+        if until is not None and steps is not None:
+            raise ValueError("say how long with `until` or with `steps`, not with both")
+        if every < 1:
+            raise ValueError(f"`every` must be at least 1, got {every}")
+        names = self._positions() if outputs is None else [outputs] if isinstance(outputs, str) else list(outputs)
+        end = until if until is not None or steps is not None else self.info.final_time_s
+        return _run(self, names, {self.inputs.name(k): v for k, v in (inputs or {}).items()}, end, steps, every, progress, timeout)
+
+    def _positions(self: Any) -> list[str]:
+        return [name for name in self.variables if name.startswith("node.structural.") and name.endswith(".X")]
+
+    def what_if(self: Any, cases: Mapping[str, Mapping[str, Input]], outputs: Union[None, str, Iterable[str]] = None,
+                **options: Any) -> dict[str, History]:
+        """The histories that different inputs would lead to from the present state, by the names of the cases; this simulation stays where
+        it is. Options as of `simulate`.
+
+            simulation.what_if({"open": {"valve": 1.0}, "closed": {"valve": 0.0}}, ["node.structural.8.X"], until=2.0)
+        """
+        found = {}
+        for name, inputs in cases.items():
+            with self.fork(name=name) as branch:
+                found[name] = branch.simulate(outputs, inputs=inputs, **options)
+        return found

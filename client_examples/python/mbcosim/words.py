@@ -1,0 +1,38 @@
+"""Words that people choose from, and names that they mistype."""
+from __future__ import annotations
+
+import difflib
+from typing import Any, Iterable, Optional
+
+
+def listed(names: Iterable[object], most: int = 12) -> str:
+    """`'a', 'b', 'c'`; of many the first ones."""
+    every = [repr(name) for name in names]
+    return ", ".join(every[:most]) + (f", … ({len(every)} in all)" if len(every) > most else "")
+
+
+def remedy(name: object, known: Iterable[object], most: int = 12) -> str:
+    """What to say about a name that is not among the known ones: near ones, else all."""
+    known = list(known)
+    near = difflib.get_close_matches(str(name), [k for k in known if isinstance(k, str)], 3)
+    if near:
+        return f"did you mean {' or '.join(map(repr, near))}?"
+    return f"known: {listed(known, most)}" if known else "there are none"
+
+
+def choice(kind: Any, prefix: str, word: Optional[str], what: str) -> int:
+    """Value of a protobuf enum by its name without prefix, in any case; None leaves the choice to the server (0)."""
+    if word is None:
+        return 0
+    if isinstance(word, str) and prefix + word.upper() in kind.keys() and kind.Value(prefix + word.upper()) != 0:
+        return int(kind.Value(prefix + word.upper()))
+    words = [key[len(prefix):].lower() for key, value in kind.items() if value != 0]
+    raise ValueError(f"{what}: no choice is called {word!r}; choose from {listed(words)}")
+
+
+def pick(choices: dict[str, Any], word: str, what: str) -> Any:
+    """Value of a word of a table."""
+    try:
+        return choices[word]
+    except (KeyError, TypeError):
+        raise ValueError(f"{what}: no choice is called {word!r}; choose from {listed(choices)}") from None

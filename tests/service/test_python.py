@@ -1,0 +1,317 @@
+"""The Python client for daily use: a daemon of one's own, the model's parts as objects, histories, what-if, linear models, pictures."""
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import decks
+import mbcosim
+from conftest import MODELS, TIME_FACTOR, wait_for
+from mbcosim import access
+from test_analysis import OSCILLATOR, S
+from test_health import certificate
+
+
+def model(name):
+    return os.path.join(MODELS, name)
+
+
+@pytest.fixture
+def swing(server, pendulum):
+    with server.load(pendulum) as simulation:
+        yield simulation
+
+
+# ---------------------------------------------------------------- a daemon of one's own
+
+def running(process_id):
+    """Is a process there and no zombie?"""
+    try:
+        with open(f"/proc/{process_id}/stat") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def daemon_of(server):
+    """Process of the daemon that a private server keeps."""
+    with open(f"/proc/{server.process_id}/task/{server.process_id}/children") as file:
+        children = file.read().split()
+    return next(int(child) for child in children if "mbcosimd" in os.readlink(f"/proc/{child}/exe"))
+
+
+def test_a_private_daemon_lives_as_long_as_its_connection(pendulum):
+    with mbcosim.local() as server:
+        process, folder = daemon_of(server), os.path.dirname(server.address[len("unix:"):])
+        assert server.load(pendulum).step().step == 1
+        assert os.stat(folder).st_mode & 0o777 == 0o700
+    assert not running(process) and not os.path.exists(folder)
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_a_private_daemon_ends_with_a_program_that_is_killed(how):
+    program = "import mbcosim, time; s = mbcosim.local(); print(s.process_id, flush=True); time.sleep(600)"
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as child:
+        keeper = int(child.stdout.readline())
+        assert running(keeper)
+        child.send_signal(how)
+    wait_for(lambda: not running(keeper))
+
+
+def test_a_private_daemon_that_cannot_start_says_why():
+    with pytest.raises(mbcosim.Unavailable, match="ended with .* before it listened: (.|\n)*--no-such-option"):
+        mbcosim.local("--no-such-option")
+
+
+def test_a_missing_program_is_named_with_its_remedy(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("MBCOSIM_BIN", str(tmp_path))
+    monkeypatch.setattr(access, "__file__", str(tmp_path / "a" / "b" / "access.py"))
+    with pytest.raises(FileNotFoundError, match="neither on the PATH nor in .MBCOSIM_BIN"):
+        mbcosim.local()
+
+
+@pytest.mark.parametrize("address", ["unix:/tmp/mbcosim-no-such-folder/s", "localhost:1"])
+def test_connect_without_a_daemon_says_so_at_once_and_how_to_start_one(address):
+    start = time.monotonic()
+    with pytest.raises(mbcosim.Unavailable) as caught:
+        mbcosim.connect(address)
+    assert time.monotonic() - start < 3 * TIME_FACTOR
+    assert str(caught.value).startswith(f"no daemon listens at {address}. Start one in a terminal with `mbcosimd --listen {address} &`")
+
+
+def test_connect_or_start_takes_the_users_daemon_where_it_runs(daemon, monkeypatch, tmp_path):
+    monkeypatch.delenv("MBCOSIM_ADDRESS", raising=False)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    with mbcosim.connect_or_start() as server:
+        assert isinstance(server, mbcosim.LocalServer)
+    os.symlink(daemon.address[len("unix:"):], tmp_path / "mbcosim.sock")
+    with mbcosim.connect_or_start() as server:
+        assert not isinstance(server, mbcosim.LocalServer)
+
+
+def test_the_environment_gives_address_and_token(start_daemon, tmp_path, monkeypatch):
+    tokens = tmp_path / "tokens"
+    tokens.write_text("secret control anna\n")
+    tokens.chmod(0o600)
+    daemon = start_daemon("--tokens", str(tokens))
+    monkeypatch.setenv("MBCOSIM_ADDRESS", daemon.address)
+    with pytest.raises(mbcosim.NotAllowed):
+        mbcosim.connect(timeout=30)
+    monkeypatch.setenv("MBCOSIM_TOKEN", "secret")
+    with mbcosim.connect() as server:
+        assert server.info().identity == "token:anna"
+    monkeypatch.delenv("MBCOSIM_TOKEN")
+    monkeypatch.setenv("MBCOSIM_TOKEN_FILE", str(tmp_path / "token"))
+    (tmp_path / "token").write_text("secret\n")
+    with mbcosim.connect() as server:
+        assert server.info().identity == "token:anna"
+
+
+def test_tls_takes_the_names_of_files_from_arguments_or_the_environment(start_daemon, tmp_path, monkeypatch):
+    certificate(tmp_path, "ca", "/CN=authority")
+    certificate(tmp_path, "server", "/CN=localhost", "ca", ["-addext", "subjectAltName=DNS:localhost"])
+    certificate(tmp_path, "arm", "/CN=arm", "ca")
+    daemon = start_daemon("--listen", "localhost:0", "--tls-certificate", str(tmp_path / "server.pem"), "--tls-key", str(tmp_path / "server.key"),
+                          "--tls-client-ca", str(tmp_path / "ca.pem"))
+    wait_for(lambda: "listening on localhost:" in daemon.log())
+    address = "localhost:" + daemon.log().split("listening on localhost:")[1].split()[0]
+    files = {"ca": tmp_path / "ca.pem", "certificate": tmp_path / "arm.pem", "key": tmp_path / "arm.key"}
+    with mbcosim.connect(address, **files) as server:
+        assert server.info().identity == "cert:CN=arm"
+    with pytest.raises(mbcosim.Unavailable, match="does the server use TLS"):
+        mbcosim.connect(address)
+    for name, path in files.items():
+        monkeypatch.setenv(f"MBCOSIM_TLS_{name.upper()}", str(path))
+    with mbcosim.connect(address) as server:
+        assert server.info().identity == "cert:CN=arm"
+
+
+def test_wrong_files_of_tls_are_named():
+    with pytest.raises(ValueError, match="go together"):
+        mbcosim.connect("localhost:1", certificate="client.pem")
+    with pytest.raises(ValueError, match="ca: cannot read 'no.pem': No such file or directory"):
+        mbcosim.connect("localhost:1", ca="no.pem")
+
+
+# ---------------------------------------------------------------- the model's parts
+
+NAMED = decks.body().replace("structural: 1, dynamic", 'structural: 1, name, "top", dynamic').replace(
+    "structural nodes: 1;", "structural nodes: 1; parameter nodes: 1; abstract nodes: 1; genels: 1;").replace(
+    "end: nodes;", 'parameter: 1, name, "valve", 0.5; abstract: 1; end: nodes;').replace(
+    "end: elements;", "genel: 1, spring support, 1, abstract, algebraic, linear elastic, 1.; end: elements;")
+
+
+def test_parts_are_found_by_label_by_name_and_by_family(server):
+    with server.load_text(NAMED) as simulation:
+        top = simulation.nodes["top"]
+        assert top.label == 1 and simulation.nodes[1].name == "top" and simulation.nodes["parameter", 1].name == "valve"
+        assert len(simulation.nodes) == 3 and ("abstract", 1) in simulation.nodes
+        assert simulation.elements["body", 1].mass == 1.0
+        assert top.position.shape == (3,) and top.orientation.shape == (3, 3)
+        assert list(top.position) == list(simulation["node.structural.1.X"])
+        assert top["angular_velocity"] == pytest.approx(simulation["node.structural.1.Omega"])
+        assert {"position", "XP", "load"} <= set(dir(top))
+        assert repr(top).startswith('<dynamic node 1 "top", t = 0 s>\n  X[3] [m], global: position')
+
+
+def test_inputs_are_set_by_the_names_of_their_nodes(server):
+    with server.load_text(NAMED) as simulation:
+        simulation.inputs["valve"] = 0.2
+        assert simulation["node.parameter.1.x"] == simulation.inputs["valve"] == 0.2
+        simulation.nodes["top"].load = [0, 0, 6.0, 0, 0, 0]
+        simulation.step(100)
+        assert simulation.nodes["top"].velocity[2] == pytest.approx(0.6, rel=2e-2)  # of 1 kg after 0.1 s, and the method's first step
+        assert "node.structural.1.load" in simulation.inputs and "time" in simulation.outputs
+
+
+def test_the_reaction_of_a_hinge_is_what_moves_the_body(swing):
+    swing.step(60)
+    needed = swing.nodes[2].acceleration - np.array([0, 0, -9.81])  # of 1 kg
+    assert np.linalg.norm(needed) > 5 and swing.joints[2].reaction == pytest.approx(needed, abs=1e-8)
+    with pytest.raises(AttributeError, match="clamp 1 has no 'angle'; known: "):
+        swing.joints[1].angle
+
+
+def test_words_that_are_wrong_are_answered_with_those_that_are_right(swing):
+    for call, text in (
+            (lambda: swing.nodes[7], "no node is called 7; known: 1, 2"),
+            (lambda: swing.nodes[2].posision, "dynamic node 2 has no 'posision'; did you mean 'position'?"),
+            (lambda: setattr(swing.nodes[2], "position", [0, 0, 0]), "'position' of dynamic node 2 cannot be set; known: 'load'"),
+            (lambda: swing.inputs["valve"], "no input is called 'valve'; known: 'node.structural.1.load', 'node.structural.2.load'"),
+            (lambda: swing["node.structural.2.XX"], "no variable is named 'node.structural.2.XX'; did you mean 'node.structural.2.X"),
+            (lambda: swing.update(policy="fale"), "policy: no choice is called 'fale'; choose from 'fail', 'cut_step', 'accept_flagged'"),
+            (lambda: swing.couple("p", mode="tigth"), "no choice is called 'tigth'; choose from 'loose', 'staggered', 'tight', 'window'"),
+            (lambda: swing.subscribe([], policy="x"), "no choice is called 'x'; choose from 'block', 'drop_oldest', 'decimate'"),
+            (lambda: swing.step(until=mbcosim.Condition("time", "=", 1)), "comparison: no choice is called '='; choose from '<', '<='")):
+        with pytest.raises((KeyError, AttributeError, ValueError)) as caught:
+            call()
+        assert text in caught.value.args[0]
+
+
+# ---------------------------------------------------------------- histories, what if
+
+def test_a_history_has_what_single_steps_give(server, pendulum):
+    name = "node.structural.2.X"
+    with server.load(pendulum) as one, server.load(pendulum) as other:
+        history = one.simulate([name], until=0.5, every=10)
+        rows = [other[name], *(other.step(10, outputs=[name]).values[name] for _ in range(10))]
+    np.testing.assert_array_equal(history[name], rows)
+    assert history.time == pytest.approx(np.linspace(0, 0.5, 11)) and history.units == {name: "m"}
+    assert list(history.columns()) == [f"{name}[{k}]" for k in (1, 2, 3)]
+    with pytest.raises(KeyError, match="did you mean 'node.structural.2.X'"):
+        history["node.structural.2.Y"]
+
+
+def test_a_history_ends_with_the_deck_and_counts_what_is_left(swing):
+    history = swing.simulate(steps=7, every=3)
+    assert list(np.round(history.time / 0.005)) == [0, 3, 6, 7] and len(history) == 2  # positions of both nodes
+    swing.simulate(every=300)
+    assert swing.time == pytest.approx(5.0)
+    for wrong in ({"until": 1.0, "steps": 3}, {"every": 0}):
+        with pytest.raises(ValueError):
+            swing.simulate(**wrong)
+
+
+def test_a_history_survives_the_step_that_failed(server):
+    with server.load_text(decks.impossible()) as simulation:
+        with pytest.raises(mbcosim.StepFailed) as caught:
+            simulation.simulate()
+    assert list(caught.value.history.time) == [0.0]
+
+
+def test_inputs_may_be_functions_of_time(server):
+    name = "node.structural.1.load"
+    with server.load_text(decks.body(spin="0., 0., 0.")) as simulation:
+        history = simulation.simulate(["node.structural.1.XP"], until=0.5, inputs={name: lambda t: [2 * t, 0, 0, 0, 0, 0]})
+    assert history["node.structural.1.XP"][-1, 0] == pytest.approx(0.25, rel=1e-2)  # the integral of 2 t, held from step to step
+
+
+def test_a_history_is_a_table(swing, tmp_path):
+    history = swing.simulate(["node.structural.2.X", "time"], steps=3)
+    history.save(tmp_path / "h.csv")
+    lines = (tmp_path / "h.csv").read_text().splitlines()
+    assert lines[0] == "time [s],node.structural.2.X[1] [m],node.structural.2.X[2] [m],node.structural.2.X[3] [m],time [s]"
+    assert len(lines) == 5
+    for module, convert in (("pandas", history.to_pandas), ("xarray", history.to_xarray)):
+        try:
+            __import__(module)
+        except ImportError:
+            with pytest.raises(ImportError, match=f"needs {module}: pip install {module}, or apt-get install python3-{module}"):
+                convert()
+            continue
+        table = convert()
+        assert "node.structural.2.X[1]" in table if module == "pandas" else table["node.structural.2.X"].attrs["units"] == "m"
+
+
+def test_a_snapshot_as_a_block_leaves_the_state_as_it_was(swing):
+    swing.step(10)
+    before = swing["node.structural.2.X"]
+    with swing.snapshot() as start:
+        swing.step(50)
+        assert start.step == 10
+    assert swing.step_number == 10 and list(swing["node.structural.2.X"]) == list(before) and swing.snapshots() == []
+
+
+def test_what_if_tries_inputs_and_stays_where_it_is(swing, server):
+    before = len(server.list())
+    found = swing.what_if({"free": {}, "pushed": {"structural.2.load": [0, 0, 3, 0, 0, 0]}}, ["node.structural.2.X"], until=0.5)
+    free, pushed = (found[name]["node.structural.2.X"][-1, 2] for name in ("free", "pushed"))
+    assert free < pushed - 0.1 and swing.time == 0 and len(server.list()) == before
+
+
+# ---------------------------------------------------------------- linear models
+
+def test_the_state_space_of_an_oscillator_answers_as_its_closed_form(server):
+    with server.load_text(OSCILLATOR) as simulation:
+        system = simulation.state_space("structural.1.load", ["node.structural.1.X"])
+    along = system.only("node.structural.1.load[1]", "node.structural.1.X[1]")
+    s = 2j * np.pi * np.array([0.1, 3.0, 30.0])
+    assert along.response([0.1, 3.0, 30.0])[:, 0, 0] == pytest.approx(1 / (2 * s * s + 8 * s + 800), rel=1e-6)
+    assert sorted(along.poles, key=np.imag) == pytest.approx([np.conj(S), S], abs=1e-6)
+    gains = np.linspace(0, 4000, 9)
+    for gain, poles in zip(gains, along.root_locus(gains)):  # 2 s^2 + 8 s + 800 + k = 0
+        assert sorted(poles, key=np.imag) == pytest.approx(sorted(np.roots([2, 8, 800 + gain]), key=np.imag), rel=1e-6)
+    with pytest.raises(ValueError, match="6 inputs and 3 outputs"):
+        system.root_locus(gains)
+
+
+def test_modes_of_a_wing_are_ordered_and_scaled(server):
+    with server.load(model("wing.mbd")) as simulation:
+        modes = simulation.modes(8, shift_hz=5)
+    assert list(modes.frequencies_hz) == sorted(modes.frequencies_hz) and modes.shapes.shape == (len(modes), 9, 3)
+    assert np.abs(modes.shapes).reshape(len(modes), -1).max(1) == pytest.approx(1)
+    assert np.abs(modes.shape(1)[-1]).max() == pytest.approx(1) and np.abs(modes.shape(1)[0]).max() < 1e-9  # tip and clamped root
+    with pytest.raises(IndexError, match="there is no mode 99"):
+        modes.shape(99)
+
+
+# ---------------------------------------------------------------- pictures
+
+def test_pictures_and_films_are_written(swing, server, tmp_path):
+    pytest.importorskip("matplotlib").use("Agg")
+    from PIL import Image
+    history = swing.simulate(until=0.4, every=4)
+    history.plot("node.structural.2.X[3]", save=tmp_path / "h.png")
+    history.animate(frames_per_second=10, save=str(tmp_path / "h.gif"))
+    history.animate(frames_per_second=5, save=str(tmp_path / "h%02d.png"))
+    with Image.open(tmp_path / "h.gif") as film:
+        assert film.n_frames == 5
+    assert sorted(path.name for path in tmp_path.glob("h0*.png")) == ["h00.png", "h01.png", "h02.png"]
+    with server.load_text(OSCILLATOR) as simulation:
+        along = simulation.state_space("structural.1.load", "node.structural.1.X").only("node.structural.1.load[1]", "node.structural.1.X[1]")
+        simulation.modes().animate(1, frames=2, save=str(tmp_path / "m%d.png"))
+    along.plot_bode(save=tmp_path / "b.png")
+    along.plot_root_locus([0, 100, 1000], save=tmp_path / "r.png")
+    for name in ("h.png", "b.png", "r.png", "m1.png"):
+        assert (tmp_path / name).stat().st_size > 5000
+    with pytest.raises(ValueError, match="view: no choice is called 'top'"):
+        history.animate(view="top", save=str(tmp_path / "x.gif"))
+
+
+def test_the_clients_version_is_that_of_the_server(server):
+    assert mbcosim.__version__ == server.info().version
