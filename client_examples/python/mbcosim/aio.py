@@ -10,27 +10,37 @@
 
     asyncio.run(main())
 """
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import inspect
 import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from typing import Any, Optional, TypeVar
 
 import grpc
 import numpy as np
+import numpy.typing as npt
 
-from mbcosim.v1 import coupling_pb2, simulations_pb2 as pb
+from mbcosim.v1 import common_pb2, coupling_pb2, simulations_pb2 as pb, telemetry_pb2
 
 from . import access, exchange
 from .access import Attempts, default_address
-from .calls import ServerCalls, SimulationCalls, SnapshotCalls
-from .coupling import open_stream
+from .calls import ServerCalls, SimulationCalls, SnapshotCalls, StepResult
+from .coupling import Answer, open_stream
 from .errors import PreconditionFailed, TimedOut, Unavailable, from_rpc_error, translated
-from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Retries, Stubs, metadata, parting, runs_calls
+from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Awaiting, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
 from .simulation import subscribe_request
+
+T = TypeVar("T")
+Self = TypeVar("Self")
 
 
 @contextlib.asynccontextmanager
-async def connect(address=None, *, token=None, tls=None, ca=None, certificate=None, key=None, credentials=None, timeout=None, reconnect=0.0):
+async def connect(address: Optional[str] = None, *, token: Optional[str] = None, tls: Optional[bool] = None, ca: Optional[access.Path] = None,
+                  certificate: Optional[access.Path] = None, key: Optional[access.Path] = None, credentials: Any = None,
+                  timeout: Optional[float] = None, reconnect: float = 0.0) -> AsyncIterator[Server]:
     """A connection; for the arguments see mbcosim.connect."""
     secured = credentials or access.credentials(tls, ca, certificate, key)
     server = Server(address or default_address(), token or access.default_token(), secured, reconnect)
@@ -53,20 +63,21 @@ async def connect(address=None, *, token=None, tls=None, ca=None, certificate=No
 class Connection:
     """A channel whose calls are awaited."""
 
-    def __init__(self, channel, token, reconnect):
+    def __init__(self, channel: Any, token: Optional[str], reconnect: float) -> None:
         self.channel, self.metadata, self.reconnect = channel, metadata(token), reconnect
         self.stubs = Stubs(channel)
 
-    async def run(self, calls):
+    async def run(self, calls: Calls[T]) -> T:
         """Makes the calls of a generator one after the other; its result."""
-        reply = None
+        reply: Any = None
         try:
             while True:
                 reply = await self.perform(calls.send(reply))
         except StopIteration as end:
-            return end.value
+            result: T = end.value
+            return result
 
-    async def perform(self, call):
+    async def perform(self, call: Call) -> Any:
         retries = Retries(call, self.reconnect)
         while True:
             try:
@@ -80,7 +91,7 @@ class Connection:
                     continue
                 raise
 
-    async def _once(self, call):
+    async def _once(self, call: Call) -> Any:
         answer = self.stubs.method(call.method)(call.request, metadata=self.metadata, timeout=call.timeout)
         if call.each is None:
             return await answer
@@ -91,14 +102,15 @@ class Connection:
         return None
 
 
-def awaited(function):
+def awaited(function: Callable[..., Calls[T]]) -> Callable[..., Awaitable[T]]:
     """The generator `function` as a coroutine function."""
-    async def method(self, *arguments, **options):
-        return await self._connection.run(function(self, *arguments, **options))
+    async def method(self: Any, *arguments: Any, **options: Any) -> T:
+        result: T = await self._connection.run(function(self, *arguments, **options))
+        return result
     return method
 
 
-async def _bounded(seconds, awaitable, cancel, what):
+async def _bounded(seconds: Optional[float], awaitable: Awaitable[T], cancel: Callable[[], object], what: str) -> T:
     """What `awaitable` gives; after `seconds` (None: never) `cancel` is called and TimedOut raised."""
     try:
         return await asyncio.wait_for(awaitable, seconds)
@@ -108,44 +120,45 @@ async def _bounded(seconds, awaitable, cancel, what):
 
 
 @runs_calls(awaited)
-class Snapshot(SnapshotCalls):
+class Snapshot(Awaiting, SnapshotCalls):
     """A saved state of a simulation. With `async with`: at the end of the block the simulation goes back to it, and it is forgotten."""
 
-    async def __aenter__(self):
+    async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_):
+    async def __aexit__(self, *_: object) -> None:
         with parting():
             await self.restore(timeout=PARTING)
             await self.delete(timeout=PARTING)
 
 
 @runs_calls(awaited)
-class Simulation(SimulationCalls):
+class Simulation(Awaiting, SimulationCalls[Snapshot]):
     """A simulation; `async with` deletes it at the end (unless it was attached)."""
     _snapshot_class = Snapshot
 
-    async def __aenter__(self):
+    async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_):
+    async def __aexit__(self, *_: object) -> None:
         if self._owned:
             with parting():
                 await self.delete(timeout=PARTING)
 
     @property
-    def variables(self):
+    def variables(self) -> dict[str, common_pb2.Variable]:
         """`mbcosim.v1.Variable` by name, once `describe` was called."""
         if self._description is None:
             raise PreconditionFailed("the variables are not known yet: await Simulation.describe() first")
         return self._known
 
-    async def stepper(self, outputs=(), inputs=(), *, timeout=USUAL):
+    async def stepper(self, outputs: Iterable[str] = (), inputs: Iterable[str] = (), *, timeout: Optional[float] = USUAL) -> Stepper:
         """An open stream for stepping with the least delay; see Stepper."""
+        outputs = list(outputs)
         handles = await self.handles([*outputs, *inputs], timeout=timeout)
-        return Stepper(self, list(outputs), handles[:len(outputs)], handles[len(outputs):])
+        return Stepper(self, outputs, handles[:len(outputs)], handles[len(outputs):])
 
-    async def couple(self, port, answer=None, **options):
+    async def couple(self, port: str, answer: Optional[Answer] = None, **options: Any) -> Peer:
         """Attaches a peer to a port. `answer` may be a coroutine function; for the options see coupling.Peer."""
         timeout = options.pop("timeout", USUAL)
         peer = Peer(self, answer, options.get("rotation", "matrix"), options.get("heartbeat_timeout"),
@@ -153,7 +166,8 @@ class Simulation(SimulationCalls):
         await peer._attach(exchange.hello(self, port, heartbeat_interval=peer._heartbeat_interval, **options), timeout)
         return peer
 
-    async def subscribe(self, names, *, every=1, policy="drop_oldest", buffer=1024, timeout=USUAL):
+    async def subscribe(self, names: Iterable[str], *, every: int = 1, policy: str = "drop_oldest", buffer: int = 1024,
+                        timeout: Optional[float] = USUAL) -> Subscription:
         """Samples of variables every so many steps, whoever advances; see Subscription."""
         names = list(names)
         request = subscribe_request(self, await self.handles(names, timeout=timeout), every, policy, buffer)
@@ -164,18 +178,18 @@ class Simulation(SimulationCalls):
 
 
 @runs_calls(awaited)
-class Server(ServerCalls):
+class Server(Awaiting, ServerCalls[Simulation]):
     """A connection; made by `connect`."""
     _simulation_class = Simulation
 
-    def __init__(self, address, token, credentials, reconnect):
+    def __init__(self, address: str, token: Optional[str], credentials: Any, reconnect: float) -> None:
         channel = (grpc.aio.secure_channel(address, credentials, CHANNEL_OPTIONS) if credentials
                    else grpc.aio.insecure_channel(address, CHANNEL_OPTIONS))
         self.address = address
         self._connection = Connection(channel, token, reconnect)
         self.metadata = self._connection.metadata
 
-    async def close(self):
+    async def close(self) -> None:
         """Closes the connection. Simulations on the server live on for their lease."""
         await self._connection.channel.close()
 
@@ -187,20 +201,21 @@ class Stepper:
             x = (await stepper.step()).values["node.structural.1.X"]
     """
 
-    def __init__(self, simulation, outputs, output_handles, input_handles):
+    def __init__(self, simulation: Simulation, outputs: list[str], output_handles: Iterable[int], input_handles: Iterable[int]) -> None:
         self._simulation, self._outputs = simulation, outputs
         self._request = pb.StepRequest(simulation=simulation.name, outputs=output_handles)
         self._request.inputs.handles.extend(input_handles)
         connection = simulation._connection
         self._stream = connection.stubs.simulations.StepStream(metadata=connection.metadata)
 
-    async def __aenter__(self):
+    async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_):
+    async def __aexit__(self, *_: object) -> None:
         await self.close()
 
-    async def step(self, values=None, count=1, *, step_size=None, timeout=None):
+    async def step(self, values: Optional[npt.ArrayLike] = None, count: int = 1, *, step_size: Optional[float] = None,
+                   timeout: Optional[float] = None) -> StepResult:
         """Takes `count` steps, of `step_size` [s] each (default: the deck's); `values`: numbers of the stepper's inputs, one variable after the
         other. After a timeout the stream is over."""
         request = pb.StepRequest()
@@ -214,7 +229,7 @@ class Stepper:
             reply = await _bounded(timeout, self._exchange(request), self._stream.cancel, "the step")
         return self._simulation.result(reply, self._outputs)
 
-    async def _exchange(self, request):
+    async def _exchange(self, request: pb.StepRequest) -> pb.StepReply:
         try:
             await self._stream.write(request)
             reply = await self._stream.read()
@@ -222,9 +237,10 @@ class Stepper:
             reply = grpc.aio.EOF
         if reply is grpc.aio.EOF:
             raise await _status(self._stream)
-        return reply
+        answer: pb.StepReply = reply
+        return answer
 
-    async def close(self, *, timeout=PARTING):
+    async def close(self, *, timeout: Optional[float] = PARTING) -> None:
         """Ends the stream."""
         if self._stream.done():
             return
@@ -239,18 +255,18 @@ class Subscription:
     `dropped` counts the samples that the server dropped because they were not read in time.
     """
 
-    def __init__(self, simulation, names, request):
+    def __init__(self, simulation: Simulation, names: list[str], request: telemetry_pb2.SubscribeRequest) -> None:
         self._simulation, self._names, self.dropped = simulation, names, 0
         connection = simulation._connection
         self._stream = connection.stubs.telemetry.Subscribe(request, metadata=connection.metadata)
 
-    async def __aenter__(self):
+    async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_):
+    async def __aexit__(self, *_: object) -> None:
         self.close()
 
-    async def __aiter__(self):
+    async def __aiter__(self) -> AsyncIterator[tuple[int, float, dict[str, Any]]]:
         try:
             while True:
                 with translated():
@@ -264,12 +280,12 @@ class Subscription:
             if not self._stream.cancelled():
                 raise
 
-    def close(self):
+    def close(self) -> None:
         """Ends the subscription."""
         self._stream.cancel()
 
 
-async def _status(stream):
+async def _status(stream: Any) -> grpc.RpcError:
     """How a stream ended, as an exception of grpc."""
     code, details = await stream.code(), await stream.details()
     return grpc.aio.AioRpcError(code, await stream.initial_metadata(), await stream.trailing_metadata(), details)
@@ -282,15 +298,18 @@ class Peer(exchange.Course):
             await peer.answer(-100.0 * motion.x)
     """
 
-    def __init__(self, simulation, answer, rotation, heartbeat_timeout, server_timeout):
+    def __init__(self, simulation: Simulation, answer: Optional[Answer], rotation: str, heartbeat_timeout: Optional[float],
+                 server_timeout: Optional[float]) -> None:
         super().__init__(rotation)
-        self._connection, self._function, self._task, self._heart = simulation._connection, answer, None, None
+        self._connection, self._function = simulation._connection, answer
+        self._task: Optional[asyncio.Task[None]] = None
+        self._heart: Optional[asyncio.Task[None]] = None
         self._beats, self._silence = heartbeat_timeout, server_timeout
         self._heartbeat_interval = None if server_timeout is None else server_timeout / 3
-        self._waiting_since = None
+        self._waiting_since: Optional[float] = None
         self._writing = asyncio.Lock()
 
-    async def _attach(self, hello, timeout):
+    async def _attach(self, hello: coupling_pb2.PeerMessage, timeout: Optional[float]) -> None:
         self._stream = open_stream(self._connection.channel)(metadata=self._connection.metadata)
         self.welcome = await _bounded(timeout, self._shake_hands(hello), self._stream.cancel, "attaching the peer")
         loop = asyncio.get_running_loop()
@@ -299,23 +318,24 @@ class Peer(exchange.Course):
         if self._function is not None:
             self._task = loop.create_task(self._serve())
 
-    async def _shake_hands(self, hello):
+    async def _shake_hands(self, hello: coupling_pb2.PeerMessage) -> coupling_pb2.Welcome:
         try:
             await self._stream.write(hello)
             data = await self._stream.read()
             if data is not grpc.aio.EOF:
-                return exchange.receive(data)[1]
+                welcome: coupling_pb2.Welcome = exchange.receive(data)[1]
+                return welcome
         except (grpc.RpcError, asyncio.InvalidStateError):
             pass
         raise from_rpc_error(await _status(self._stream)) from None
 
-    async def __aenter__(self):
+    async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_):
+    async def __aexit__(self, *_: object) -> None:
         await self.close()
 
-    async def close(self):
+    async def close(self) -> None:
         """Leaves the port."""
         if self._heart is not None:
             self._heart.cancel()
@@ -326,7 +346,7 @@ class Peer(exchange.Course):
         if self._task is not None:
             await asyncio.wait([self._task], timeout=PARTING / 2)
 
-    async def __aiter__(self):
+    async def __aiter__(self) -> AsyncIterator[exchange.Motion]:
         """Every Motion until the stream ends."""
         while True:
             self._waiting_since = time.monotonic()
@@ -344,19 +364,19 @@ class Peer(exchange.Course):
         if status.code() not in (grpc.StatusCode.OK, grpc.StatusCode.CANCELLED):
             self.error = self.error or from_rpc_error(status)
 
-    async def answer(self, value):
+    async def answer(self, value: Any) -> None:
         """Answers the last motion."""
         await self._write(self._answer(value))
 
-    async def fail(self, error):
+    async def fail(self, error: BaseException) -> None:
         """The peer cannot answer the last motion; the step fails with this text."""
         await self._write(self._failure(error))
 
-    async def _write(self, message):
+    async def _write(self, message: coupling_pb2.PeerMessage) -> None:
         async with self._writing:  # the heart writes, too
             await self._stream.write(message)
 
-    async def _beat(self):
+    async def _beat(self) -> None:
         """Sends signs of life, and looks for those of the server."""
         count = 0
         while not self._stream.done():
@@ -374,7 +394,8 @@ class Peer(exchange.Course):
             except (grpc.RpcError, asyncio.InvalidStateError):
                 return
 
-    async def _serve(self):
+    async def _serve(self) -> None:
+        assert self._function is not None
         async for motion in self:
             try:
                 value = self._function(motion)

@@ -83,7 +83,7 @@ def _follow(before: Optional[ComplexArray], values: ComplexArray) -> ComplexArra
         return values[np.argsort(values.imag)]
     left, ordered = list(values), []
     for value in before:
-        nearest = min(range(len(left)), key=lambda k: abs(left[k] - value))
+        nearest = int(np.argmin(np.abs(np.array(left) - value)))
         ordered.append(left.pop(nearest))
     return np.array(ordered)
 

@@ -1,18 +1,24 @@
 """Decks on disk as bundles to upload."""
+from __future__ import annotations
+
 import os
 import re
+from collections.abc import Iterator, Mapping
+from typing import Union
 
 from mbcosim.v1 import common_pb2, reduction_pb2, simulations_pb2
 
+Path = Union[str, "os.PathLike[str]"]
 CHUNK_BYTES = 1 << 20
 _QUOTED = re.compile(rb'"([^"\n]{1,1000})"')
 
 
-def collect(deck):
+def collect(deck: Path) -> tuple[str, dict[str, bytes]]:
     """Name of the main file, and the bytes of it and of every file below its folder that it names in quotes, by name."""
     folder = os.path.realpath(os.path.dirname(os.path.abspath(deck)))
     main = os.path.basename(deck)
-    files, waiting = {}, [main]
+    files: dict[str, bytes] = {}
+    waiting = [main]
     while waiting:
         name = waiting.pop()
         if name in files:
@@ -24,7 +30,7 @@ def collect(deck):
     return main, files
 
 
-def _names_of(text, current, folder):
+def _names_of(text: str, current: str, folder: str) -> list[str]:
     """Names within the bundle that a quoted text may stand for: relative to the including file or to the deck."""
     found = []
     for base in {current, ""}:
@@ -36,7 +42,7 @@ def _names_of(text, current, folder):
     return found
 
 
-def collect_job(job):
+def collect_job(job: Path) -> tuple[str, dict[str, bytes]]:
     """Name of a job file of the reduction, and the bytes of it and of the files beside it that it names, by name."""
     folder, main = os.path.split(os.path.abspath(job))
     with open(job, "rb") as file:
@@ -50,20 +56,20 @@ def collect_job(job):
     return main, files
 
 
-def _chunks(files):
+def _chunks(files: Mapping[str, bytes]) -> Iterator[common_pb2.FileChunk]:
     for name, data in files.items():
         for start in range(0, max(len(data), 1), CHUNK_BYTES):
             yield common_pb2.FileChunk(path=name, data=data[start:start + CHUNK_BYTES])
 
 
-def requests(header, files):
+def requests(header: simulations_pb2.UploadHeader, files: Mapping[str, bytes]) -> Iterator[simulations_pb2.UploadRequest]:
     """The messages of an upload."""
     yield simulations_pb2.UploadRequest(header=header)
     for chunk in _chunks(files):
         yield simulations_pb2.UploadRequest(chunk=chunk)
 
 
-def reduce_requests(header, files):
+def reduce_requests(header: reduction_pb2.ReduceHeader, files: Mapping[str, bytes]) -> Iterator[reduction_pb2.ReduceRequest]:
     """The messages of a reduction."""
     yield reduction_pb2.ReduceRequest(header=header)
     for chunk in _chunks(files):

@@ -2,20 +2,32 @@
 
 Each method marked with `call` is a generator that yields `rpc.Call`s; see rpc.runs_calls.
 """
+from __future__ import annotations
+
 import dataclasses
 import uuid
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Generic, Optional, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from mbcosim.v1 import common_pb2, reduction_pb2, simulations_pb2 as pb
+from mbcosim.v1 import common_pb2, coupling_types_pb2, reduction_pb2, simulations_pb2 as pb
 
 from . import bundle
 from .errors import StepFailed, enum_name
-from .rpc import USUAL, Call, call
+from .rpc import USUAL, Call, Calls, call
 from .words import choice, pick, remedy
 
 
-def _matrix(message):
+Array = npt.NDArray[np.float64]
+Values = Mapping[str, npt.ArrayLike]  # by name
+SimulationKind = TypeVar("SimulationKind", bound="SimulationCalls[Any]")
+SnapshotKind = TypeVar("SnapshotKind", bound="SnapshotCalls")
+list_of = list  # ServerCalls has a method of that name
+
+
+def _matrix(message: pb.Matrix) -> Array:
     """`mbcosim.v1.Matrix` as a numpy array."""
     if not message.sparse:
         return np.array(message.values).reshape(message.rows, message.columns)
@@ -24,7 +36,7 @@ def _matrix(message):
     return full
 
 
-def _policy(name):
+def _policy(name: str) -> Any:
     return choice(pb.NonConvergencePolicy, "NON_CONVERGENCE_POLICY_", name, "policy")
 
 
@@ -40,7 +52,7 @@ class Condition:
     comparison: str         # "<", "<=", ">" or ">="
     threshold: float        # in the variable's unit
     element: int = 0        # which of its numbers, row-major
-    locate_within: float = None
+    locate_within: Optional[float] = None
 
 
 @dataclasses.dataclass
@@ -53,40 +65,45 @@ class StepResult:
     step_size: float        # length of the last step [s]
     next_step_size: float   # that the deck would take [s]
     largest_step_size: float  # left until the deck's final time [s]
-    preferred_step_size: float  # of the peer that rejected the step [s]; None: it did not say
+    preferred_step_size: Optional[float]  # of the peer that rejected the step [s]; None: it did not say
     condition_met: bool     # `until` holds
     iterations: int         # linear solutions in the last step
     total_iterations: int
     residual_error: float
     solver_seconds: float
-    values: dict            # outputs by name, numpy arrays or floats
+    values: dict[str, Any]  # outputs by name, numpy arrays or floats
     reply: pb.StepReply     # all the server said
 
 
-class ServerCalls:
+class ServerCalls(Generic[SimulationKind]):
     """Calls that name no simulation, or make one."""
 
-    def _make(self, info, diagnostics=(), printed="", owned=True):
+    _simulation_class: type[SimulationKind]
+    _connection: Any
+
+    def _make(self, info: pb.SimulationInfo, diagnostics: Iterable[common_pb2.Diagnostic] = (), printed: str = "",
+              owned: bool = True) -> SimulationKind:
         return self._simulation_class(self._connection, info, list(diagnostics), printed, owned)
 
     @call
-    def info(self, *, timeout=USUAL):
+    def info(self, *, timeout: Optional[float] = USUAL) -> Calls[pb.ServerInfo]:
         """`mbcosim.v1.ServerInfo`: version, limits, identity, role."""
-        return (yield Call("Simulations/GetServerInfo", pb.GetServerInfoRequest(), timeout, repeatable=True))
+        reply: pb.ServerInfo = yield Call("Simulations/GetServerInfo", pb.GetServerInfoRequest(), timeout, repeatable=True)
+        return reply
 
     @call
-    def load(self, deck, **options):
+    def load(self, /, deck: bundle.Path, **options: Any) -> Calls[SimulationKind]:
         """Creates a simulation from a deck on this machine and the files that it names. For options see load_bundle."""
         main, files = bundle.collect(deck)
         return (yield from self._create(pb.UploadHeader(bundle_main_file=main), files, **options))
 
     @call
-    def load_text(self, text, **options):
+    def load_text(self, /, text: str, **options: Any) -> Calls[SimulationKind]:
         """Creates a simulation from a deck given as text. For options see load_bundle."""
         return (yield from self._create(pb.UploadHeader(bundle_main_file="deck"), {"deck": text.encode()}, **options))
 
     @call
-    def load_bundle(self, main, files, **options):
+    def load_bundle(self, /, main: str, files: Mapping[str, bytes], **options: Any) -> Calls[SimulationKind]:
         """Creates a simulation from files (bytes by name) whose main one is `main`.
 
         name          for people
@@ -101,12 +118,13 @@ class ServerCalls:
         return (yield from self._create(pb.UploadHeader(bundle_main_file=main), files, **options))
 
     @call
-    def load_from_root(self, deck, **options):
+    def load_from_root(self, /, deck: str, **options: Any) -> Calls[SimulationKind]:
         """Creates a simulation from a deck under the server's model root. For options see load_bundle."""
         return (yield from self._create(pb.UploadHeader(model_root_file=deck), {}, **options))
 
-    def _create(self, header, files, *, name="", lease=None, ports=(), policy="fail", minimum_step=0.0, record=False,
-                summed_time=False, timeout=None):
+    def _create(self, header: pb.UploadHeader, files: Mapping[str, bytes], *, name: str = "", lease: Optional[float] = None,
+                ports: Iterable[coupling_types_pb2.PortDefinition] = (), policy: str = "fail", minimum_step: float = 0.0,
+                record: bool = False, summed_time: bool = False, timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = uuid.uuid4().hex
         header.options.display_name = name
         header.options.ports.extend(ports)
@@ -120,14 +138,16 @@ class ServerCalls:
         return self._make(reply.simulation, reply.diagnostics, reply.printed)
 
     @call
-    def validate(self, deck, *, timeout=None):
+    def validate(self, deck: bundle.Path, *, timeout: Optional[float] = None) -> Calls[pb.ValidateModelReply]:
         """`mbcosim.v1.ValidateModelReply` about a deck on this machine."""
         main, files = bundle.collect(deck)
         header = pb.UploadHeader(bundle_main_file=main)
-        return (yield Call("Simulations/ValidateModel", bundle.requests(header, files), timeout))
+        reply: pb.ValidateModelReply = yield Call("Simulations/ValidateModel", bundle.requests(header, files), timeout)
+        return reply
 
     @call
-    def reduce(self, job, *, progress=None, timeout=None, **options):
+    def reduce(self, /, job: bundle.Path, *, progress: Optional[Callable[[str, float], object]] = None, timeout: Optional[float] = None,
+               **options: object) -> Calls[tuple[reduction_pb2.ReduceReport, bytes]]:
         """Reduces a finite element model: `job` is a job file on this machine, beside the files that it names.
 
         Options of the job can be given here: basis="complement", max_frequency=100. `progress(phase, fraction)` is called on the
@@ -136,9 +156,10 @@ class ServerCalls:
         main, files = bundle.collect_job(job)
         header = reduction_pb2.ReduceHeader(main_file=main)
         header.options.update({name.replace("_", "-"): str(value) for name, value in options.items()})
-        reports, data = [], bytearray()
+        reports: list[reduction_pb2.ReduceReport] = []
+        data = bytearray()
 
-        def take(reply):
+        def take(reply: reduction_pb2.ReduceReply) -> None:
             if reply.HasField("chunk"):
                 data.extend(reply.chunk.data)
             elif reply.HasField("report"):
@@ -150,9 +171,10 @@ class ServerCalls:
         return reports[-1], bytes(data)
 
     @call
-    def list(self, *, timeout=USUAL):
+    def list(self, *, timeout: Optional[float] = USUAL) -> Calls[list_of[pb.SimulationInfo]]:
         """`mbcosim.v1.SimulationInfo` of every simulation of this identity."""
-        request, found = pb.ListSimulationsRequest(), []
+        request = pb.ListSimulationsRequest()
+        found: list_of[pb.SimulationInfo] = []
         while True:
             reply = yield Call("Simulations/ListSimulations", request, timeout, repeatable=True)
             found += reply.simulations
@@ -161,79 +183,86 @@ class ServerCalls:
             request.page_token = reply.next_page_token
 
     @call
-    def attach(self, name, *, timeout=USUAL):
+    def attach(self, name: str, *, timeout: Optional[float] = USUAL) -> Calls[SimulationKind]:
         """A simulation that exists on the server, by its name."""
         info = yield Call("Simulations/GetSimulation", pb.GetSimulationRequest(name=name), timeout, repeatable=True)
         return self._make(info, owned=False)
 
 
-class SimulationCalls:
+class SimulationCalls(Generic[SnapshotKind]):
     """Calls on one simulation, and what turns names and arrays into messages and back."""
 
-    def __init__(self, connection, info, diagnostics, printed, owned):
+    _snapshot_class: type[SnapshotKind]
+
+    def __init__(self, connection: Any, info: pb.SimulationInfo, diagnostics: list_of[common_pb2.Diagnostic], printed: str,
+                 owned: bool) -> None:
         self._connection, self._owned = connection, owned
-        self._known, self._description = {}, None
-        self.name = info.name
+        self._known: dict[str, common_pb2.Variable] = {}
+        self._description: Optional[pb.ModelDescription] = None
+        self.name: str = info.name
         self.info = info
         self.diagnostics = diagnostics
         self.printed = printed
         self.step_number, self.time = info.step, info.time_s
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         title = f" \"{self.info.display_name}\"" if self.info.display_name else ""
         return f"<{type(self).__name__} {self.name}{title}, step {self.step_number}, t = {self.time:g} s of {self.info.final_time_s:g} s>"
 
     # ---------------------------------------------------------------- variables
 
     @call
-    def describe(self, *, timeout=USUAL):
+    def describe(self, *, timeout: Optional[float] = USUAL) -> Calls[pb.ModelDescription]:
         """`mbcosim.v1.ModelDescription`: nodes, elements, variables."""
         return (yield from self._describe(timeout))
 
-    def _describe(self, timeout):
-        self._description = yield Call("Simulations/DescribeSimulation", pb.DescribeSimulationRequest(name=self.name), timeout,
-                                       repeatable=True)
-        self._known.update((v.name, v) for v in self._description.variables)
-        return self._description
+    def _describe(self, timeout: Optional[float]) -> Calls[pb.ModelDescription]:
+        description: pb.ModelDescription = yield Call(
+            "Simulations/DescribeSimulation", pb.DescribeSimulationRequest(name=self.name), timeout, repeatable=True)
+        self._description = description
+        self._known.update((v.name, v) for v in description.variables)
+        return description
 
     @call
-    def handles(self, names, *, timeout=USUAL):
+    def handles(self, names: Iterable[str], *, timeout: Optional[float] = USUAL) -> Calls[list_of[int]]:
         """Integer handles of variables, for calls on the hot path."""
         return (yield from self._handles(names, timeout))
 
-    def _handles(self, names, timeout=USUAL):
+    def _handles(self, names: Iterable[str], timeout: Optional[float] = USUAL) -> Calls[list_of[int]]:
+        names = list(names)
         if any(name not in self._known for name in names) and self._description is None:
             yield from self._describe(timeout)
         return [self._variable(name).handle for name in names]
 
-    def _variable(self, name):
+    def _variable(self, name: str) -> common_pb2.Variable:
         try:
             return self._known[name]
         except KeyError:
             raise KeyError(f"no variable is named {name!r}; {remedy(name, self._known)}") from None
 
     @call
-    def read(self, names, *, timeout=USUAL):
+    def read(self, names: Iterable[str], *, timeout: Optional[float] = USUAL) -> Calls[dict[str, Any]]:
         """Values at the last accepted step, by name."""
         return (yield from self._read(names, timeout))
 
-    def _read(self, names, timeout):
+    def _read(self, names: Iterable[str], timeout: Optional[float]) -> Calls[dict[str, Any]]:
         request = pb.ReadVariablesRequest(simulation=self.name, handles=(yield from self._handles(names, timeout)))
         return self.split(names, (yield Call("Simulations/ReadVariables", request, timeout, repeatable=True)).values)
 
     @call
-    def write(self, values, *, timeout=USUAL):
+    def write(self, values: Values, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Sets inputs, by name."""
         yield from self._write(values, timeout)
 
-    def _write(self, values, timeout):
+    def _write(self, values: Values, timeout: Optional[float]) -> Calls[None]:
         yield from self._handles(values, timeout)
         request = pb.WriteVariablesRequest(simulation=self.name, values=self.pack(values))
         yield Call("Simulations/WriteVariables", request, timeout, repeatable=True)
 
-    def split(self, names, values):
+    def split(self, names: Iterable[str], values: Any) -> dict[str, Any]:
         """Numbers of several variables, one after the other, as arrays by name."""
-        numbers, found, at = np.fromiter(values, float, len(values)), {}, 0
+        numbers, at = np.fromiter(values, float, len(values)), 0
+        found: dict[str, Any] = {}
         for name in names:
             variable = self._variable(name)
             part = numbers[at:at + variable.size]
@@ -241,7 +270,7 @@ class SimulationCalls:
             at += variable.size
         return found
 
-    def pack(self, values):
+    def pack(self, values: Values) -> common_pb2.Values:
         """`mbcosim.v1.Values` of inputs by name."""
         packed = common_pb2.Values()
         for name, value in values.items():
@@ -252,25 +281,29 @@ class SimulationCalls:
     # ---------------------------------------------------------------- advancing
 
     @call
-    def step(self, count=1, *, step_size=None, until=None, inputs=None, outputs=(), timeout=None):
+    def step(self, count: int = 1, *, step_size: Optional[float] = None, until: Optional[Condition] = None, inputs: Optional[Values] = None,
+             outputs: Iterable[str] = (), timeout: Optional[float] = None) -> Calls[StepResult]:
         """Takes `count` steps, of `step_size` [s] each (default: the deck's), or fewer when `until`, a Condition, holds before. Raises
         StepFailed when one does not converge, or a peer rejects it."""
         request = pb.StepRequest(steps=count, step_size_s=step_size)
         return (yield from self._advance(request, until, inputs, outputs, timeout))
 
     @call
-    def run_until(self, time, *, exact=False, step_size=None, until=None, inputs=None, outputs=(), progress=None, timeout=None):
+    def run_until(self, time: float, *, exact: bool = False, step_size: Optional[float] = None, until: Optional[Condition] = None,
+                  inputs: Optional[Values] = None, outputs: Iterable[str] = (), progress: Optional[Callable[[pb.RunProgress], Any]] = None,
+                  timeout: Optional[float] = None) -> Calls[StepResult]:
         """Steps until `time` [s] or the deck's end; with `exact` the last step is shortened so that it ends there. `step_size` and `until` as in
         `step`. `progress(RunProgress)` is called about twice a second."""
         request = pb.StepRequest(until_time_s=time, exact=exact, step_size_s=step_size)
         if progress is None:
             return (yield from self._advance(request, until, inputs, outputs, timeout))
         yield from self._fill(request, until, inputs, outputs)
-        done = []
+        done: list_of[pb.StepReply] = []
+        wanted = progress
 
-        def take(message):
+        def take(message: pb.RunReply) -> Any:
             if message.HasField("progress"):
-                progress(message.progress)
+                wanted(message.progress)
             else:
                 done.append(message.done)
 
@@ -278,11 +311,12 @@ class SimulationCalls:
         return self.result(done[-1], outputs)
 
     @call
-    def interrupt(self, *, timeout=USUAL):
+    def interrupt(self, *, timeout: Optional[float] = USUAL) -> Calls[bool]:
         """Stops whatever advances this simulation, from any thread or client."""
-        return (yield Call("Simulations/Interrupt", pb.InterruptRequest(name=self.name), timeout, repeatable=True)).was_stepping
+        reply: pb.InterruptReply = yield Call("Simulations/Interrupt", pb.InterruptRequest(name=self.name), timeout, repeatable=True)
+        return reply.was_stepping
 
-    def _fill(self, request, until, inputs, outputs):
+    def _fill(self, request: pb.StepRequest, until: Optional[Condition], inputs: Optional[Values], outputs: Iterable[str]) -> Calls[None]:
         request.simulation = self.name
         if until is not None:
             request.until.handle, = yield from self._handles([until.variable])
@@ -295,12 +329,13 @@ class SimulationCalls:
             request.inputs.CopyFrom(self.pack(inputs))
         request.outputs.extend((yield from self._handles(outputs)))
 
-    def _advance(self, request, until, inputs, outputs, timeout):
+    def _advance(self, request: pb.StepRequest, until: Optional[Condition], inputs: Optional[Values], outputs: Iterable[str],
+                 timeout: Optional[float]) -> Calls[StepResult]:
         yield from self._fill(request, until, inputs, outputs)
         request.request_id = uuid.uuid4().hex
         return self.result((yield Call("Simulations/Step", request, timeout, repeatable=True)), outputs)
 
-    def result(self, reply, outputs=()):
+    def result(self, reply: pb.StepReply, outputs: Iterable[str] = ()) -> StepResult:
         """A reply as a StepResult; raises StepFailed when the reply tells a failure."""
         self.step_number, self.time = reply.step, reply.time_s
         outcome = enum_name(pb.StepOutcome, reply.outcome, "STEP_OUTCOME_")
@@ -322,46 +357,46 @@ class SimulationCalls:
     # ---------------------------------------------------------------- states
 
     @call
-    def snapshot(self, name="", *, timeout=USUAL):
+    def snapshot(self, name: str = "", *, timeout: Optional[float] = USUAL) -> Calls[SnapshotKind]:
         """Saves the state."""
         request = pb.CreateSnapshotRequest(simulation=self.name, display_name=name)
         return self._snapshot_class(self, (yield Call("Simulations/CreateSnapshot", request, timeout)))
 
     @call
-    def snapshots(self, *, timeout=USUAL):
+    def snapshots(self, *, timeout: Optional[float] = USUAL) -> Calls[list_of[SnapshotKind]]:
         """All saved states."""
         request = pb.ListSnapshotsRequest(simulation=self.name)
         reply = yield Call("Simulations/ListSnapshots", request, timeout, repeatable=True)
         return [self._snapshot_class(self, info) for info in reply.snapshots]
 
     @call
-    def restore(self, snapshot, *, timeout=USUAL):
+    def restore(self, snapshot: SnapshotCalls, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Goes to a saved state."""
         yield from self._restore(snapshot, timeout)
 
-    def _restore(self, snapshot, timeout):
+    def _restore(self, snapshot: SnapshotCalls, timeout: Optional[float]) -> Calls[None]:
         self._stand((yield Call("Simulations/RestoreSnapshot", pb.RestoreSnapshotRequest(name=snapshot.name), timeout)))
 
-    def _stand(self, info):
+    def _stand(self, info: pb.SimulationInfo) -> pb.SimulationInfo:
         self.info = info
         self.step_number, self.time = info.step, info.time_s
         return info
 
     @call
-    def export_state(self, *, timeout=USUAL):
+    def export_state(self, *, timeout: Optional[float] = USUAL) -> Calls[bytes]:
         """The current state as bytes."""
         return (yield from self._collect("Simulations/ExportSnapshot", pb.ExportSnapshotRequest(simulation=self.name), timeout))
 
-    def _collect(self, method, request, timeout):
+    def _collect(self, method: str, request: Any, timeout: Optional[float]) -> Calls[bytes]:
         """The bytes that a method streams."""
-        parts = []
+        parts: list_of[bytes] = []
         yield Call(method, request, timeout, each=lambda message: parts.append(message.data))
         return b"".join(parts)
 
     @call
-    def import_state(self, data, *, restore=True, name="", timeout=None):
+    def import_state(self, data: bytes, *, restore: bool = True, name: str = "", timeout: Optional[float] = None) -> Calls[SnapshotKind]:
         """Adds a saved state from bytes and, with `restore`, goes to it."""
-        def messages():
+        def messages() -> Iterator[pb.ImportSnapshotRequest]:
             yield pb.ImportSnapshotRequest(
                 header=pb.ImportSnapshotHeader(simulation=self.name, display_name=name, restore=restore))
             for start in range(0, len(data), 1 << 20):
@@ -373,7 +408,8 @@ class SimulationCalls:
         return snapshot
 
     @call
-    def fork(self, snapshot=None, *, name="", ports=(), timeout=None):
+    def fork(self, snapshot: Optional[SnapshotCalls] = None, *, name: str = "",
+             ports: Iterable[coupling_types_pb2.PortDefinition] = (), timeout: Optional[float] = None) -> Calls[Any]:
         """A new simulation at a saved state or the current one, sharing the model."""
         request = pb.ForkSimulationRequest(options=pb.CreateOptions(display_name=name, ports=ports,
                                                                     request_id=uuid.uuid4().hex))
@@ -387,7 +423,7 @@ class SimulationCalls:
     # ---------------------------------------------------------------- analysis
 
     @call
-    def eigenvalues(self, count=0, *, shift_hz=0.0, vectors=False, timeout=None):
+    def eigenvalues(self, count: int = 0, *, shift_hz: float = 0.0, vectors: bool = False, timeout: Optional[float] = None) -> Calls[Any]:
         """Eigenvalues [1/s] about the current state, nearest to `shift_hz` first; 0: all finite ones. With `vectors` also
         the eigenvectors, one a column."""
         request = pb.ComputeEigenvaluesRequest(simulation=self.name, count=count, shift_hz=shift_hz, eigenvectors=vectors)
@@ -396,32 +432,34 @@ class SimulationCalls:
         return (values, _matrix(reply.vectors_real) + 1j * _matrix(reply.vectors_imaginary)) if vectors else values
 
     @call
-    def linearize(self, inputs=(), outputs=(), *, timeout=None):
+    def linearize(self, inputs: Iterable[str] = (), outputs: Iterable[str] = (), *, timeout: Optional[float] = None) -> Calls[tuple[Array, ...]]:
         """State space matrices A, B, C, D about the current state, for variables by name."""
         reply = yield from self._linearize(inputs, outputs, False, timeout)
         return tuple(_matrix(m) for m in (reply.a, reply.b, reply.c, reply.d))
 
     @call
-    def linearize_descriptor(self, inputs=(), outputs=(), *, timeout=None):
+    def linearize_descriptor(self, inputs: Iterable[str] = (), outputs: Iterable[str] = (), *, timeout: Optional[float] = None) -> Calls[tuple[Array, ...]]:
         """Matrices E, A, B, C, D of E dx/dt = A x + B u, y = C x + D u with all unknowns of the model."""
         reply = yield from self._linearize(inputs, outputs, True, timeout)
         return tuple(_matrix(m) for m in (reply.e, reply.a, reply.b, reply.c, reply.d))
 
-    def _linearize(self, inputs, outputs, descriptor, timeout):
+    def _linearize(self, inputs: Iterable[str], outputs: Iterable[str], descriptor: bool, timeout: Optional[float]) -> Calls[pb.LinearizeReply]:
         request = pb.LinearizeRequest(simulation=self.name, inputs=(yield from self._handles(inputs)),
                                       outputs=(yield from self._handles(outputs)), descriptor_form=descriptor)
-        return (yield Call("Simulations/Linearize", request, timeout, repeatable=True))
+        reply: pb.LinearizeReply = yield Call("Simulations/Linearize", request, timeout, repeatable=True)
+        return reply
 
     # ---------------------------------------------------------------- the simulation itself
 
     @call
-    def refresh(self, *, timeout=USUAL):
+    def refresh(self, *, timeout: Optional[float] = USUAL) -> Calls[pb.SimulationInfo]:
         """Asks the server where the simulation stands."""
         return self._stand((yield Call("Simulations/GetSimulation", pb.GetSimulationRequest(name=self.name), timeout,
                                        repeatable=True)))
 
     @call
-    def update(self, *, name=None, policy=None, minimum_step=None, timeout=USUAL):
+    def update(self, *, name: Optional[str] = None, policy: Optional[str] = None, minimum_step: Optional[float] = None,
+               timeout: Optional[float] = USUAL) -> Calls[pb.SimulationInfo]:
         """Changes choices made at creation; see Server.load_bundle."""
         request = pb.UpdateSimulationRequest(name=self.name)
         if name is not None:
@@ -434,12 +472,12 @@ class SimulationCalls:
         return self.info
 
     @call
-    def record(self, *, timeout=None):
+    def record(self, *, timeout: Optional[float] = None) -> Calls[bytes]:
         """All that crossed the ports so far, as bytes for `mbcosim replay`. The simulation must have been created with `record`."""
         return (yield from self._collect("Simulations/GetRecord", pb.GetRecordRequest(name=self.name), timeout))
 
     @call
-    def delete(self, *, timeout=USUAL):
+    def delete(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Ends the simulation."""
         yield Call("Simulations/DeleteSimulation", pb.DeleteSimulationRequest(name=self.name), timeout)
 
@@ -447,25 +485,25 @@ class SimulationCalls:
 class SnapshotCalls:
     """A saved state of a simulation."""
 
-    def __init__(self, simulation, info):
+    def __init__(self, simulation: SimulationCalls[Any], info: pb.Snapshot) -> None:
         self._simulation, self._connection = simulation, simulation._connection
         self.name, self.step, self.time, self.display_name = info.name, info.step, info.time_s, info.display_name
         self.size_bytes = info.size_bytes
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.display_name or self.name}, step {self.step}, t = {self.time:g} s, {self.size_bytes} bytes>"
 
     @call
-    def restore(self, *, timeout=USUAL):
+    def restore(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Goes to this state."""
         yield from self._simulation._restore(self, timeout)
 
     @call
-    def export(self, *, timeout=USUAL):
+    def export(self, *, timeout: Optional[float] = USUAL) -> Calls[bytes]:
         """The state as bytes."""
         return (yield from self._simulation._collect("Simulations/ExportSnapshot", pb.ExportSnapshotRequest(snapshot=self.name), timeout))
 
     @call
-    def delete(self, *, timeout=USUAL):
+    def delete(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Forgets the state."""
         yield Call("Simulations/DeleteSnapshot", pb.DeleteSnapshotRequest(name=self.name), timeout)

@@ -1,6 +1,9 @@
 """Connections to a server. Every call takes `timeout=` [s]."""
+from __future__ import annotations
+
 import threading
 import time
+from typing import Any, Optional, TypeVar
 
 import grpc
 
@@ -10,11 +13,15 @@ from . import access
 from .access import default_address
 from .calls import ServerCalls
 from .errors import Unavailable, translated
-from .rpc import CHANNEL_OPTIONS, PARTING, Connection, blocking, runs_calls
+from .rpc import CHANNEL_OPTIONS, PARTING, Blocking, Connection, blocking, runs_calls
 from .simulation import Simulation
 
+Self = TypeVar("Self", bound="Server")
 
-def connect(address=None, *, token=None, tls=None, ca=None, certificate=None, key=None, credentials=None, timeout=None, reconnect=0.0):
+
+def connect(address: Optional[str] = None, *, token: Optional[str] = None, tls: Optional[bool] = None, ca: Optional[access.Path] = None,
+            certificate: Optional[access.Path] = None, key: Optional[access.Path] = None, credentials: Any = None,
+            timeout: Optional[float] = None, reconnect: float = 0.0) -> Server:
     """A connection to the server at `address` ("unix:PATH" or "HOST:PORT"; default: $MBCOSIM_ADDRESS, or the socket of this user's daemon).
 
     token        bearer token; default: $MBCOSIM_TOKEN, or what the file $MBCOSIM_TOKEN_FILE holds
@@ -35,25 +42,26 @@ def connect(address=None, *, token=None, tls=None, ca=None, certificate=None, ke
     return server
 
 
-def await_answer(server, timeout):
+def await_answer(server: Server, timeout: Optional[float]) -> simulations_pb2.ServerInfo:
     """Waits until a server answers; see access.Attempts."""
     attempts = access.Attempts(server.address, timeout)
     while True:
         try:
             with translated():
-                return server.simulations.GetServerInfo(simulations_pb2.GetServerInfoRequest(), metadata=server.metadata,
-                                                        timeout=attempts.left())
+                info: simulations_pb2.ServerInfo = server.simulations.GetServerInfo(
+                    simulations_pb2.GetServerInfoRequest(), metadata=server.metadata, timeout=attempts.left())
+                return info
         except Unavailable as error:
             attempts.again(error)
             time.sleep(attempts.PAUSE)
 
 
 @runs_calls(blocking)
-class Server(ServerCalls):
+class Server(Blocking, ServerCalls[Simulation]):
     """A connection. Use it as a context manager, or call close()."""
     _simulation_class = Simulation
 
-    def __init__(self, address, token=None, credentials=None, reconnect=0.0):
+    def __init__(self, address: str, token: Optional[str] = None, credentials: Any = None, reconnect: float = 0.0) -> None:
         channel = (grpc.secure_channel(address, credentials, CHANNEL_OPTIONS) if credentials
                    else grpc.insecure_channel(address, CHANNEL_OPTIONS))
         self.address = address
@@ -64,19 +72,19 @@ class Server(ServerCalls):
             stubs.simulations, stubs.reduction, stubs.coupling, stubs.telemetry)
 
     @property
-    def _channel(self):
+    def _channel(self) -> Any:
         return self._connection.channel
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<mbcosim.Server at {self.address}>"
 
-    def __enter__(self):
+    def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def close(self):
+    def close(self) -> None:
         """Closes the connection. Simulations on the server live on for their lease."""
         closing = threading.Thread(target=self._channel.close, daemon=True)  # waits for calls that a silent server holds
         closing.start()

@@ -7,12 +7,17 @@
     with server.load("beam.mbd", ports=ports) as simulation, simulation.couple("tip", spring):
         simulation.run_until(1.0)
 """
+from __future__ import annotations
+
 import queue
 import threading
 import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any, Optional
 
 import grpc
 import numpy as np
+import numpy.typing as npt
 
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
@@ -20,8 +25,14 @@ from . import exchange
 from .errors import Unavailable, from_rpc_error, translated
 from .rpc import PARTING, USUAL, bounded
 
+if TYPE_CHECKING:
+    from .simulation import Simulation
 
-def structural_port(name, nodes, *, offsets=None, reference=None):
+Answer = Callable[[exchange.Motion], Any]  # see Peer
+
+
+def structural_port(name: str, nodes: Iterable[int], *, offsets: Optional[npt.ArrayLike] = None,
+                    reference: Optional[int] = None) -> types.PortDefinition:
     """A port on structural nodes: motion out, forces and moments in. `offsets`: n x 3 in the nodes' frames [m]."""
     port = types.PortDefinition(name=name, kind=types.PORT_KIND_STRUCTURAL, node_labels=list(nodes))
     if offsets is not None:
@@ -31,23 +42,23 @@ def structural_port(name, nodes, *, offsets=None, reference=None):
     return port
 
 
-def signal_port(name, outputs, inputs):
+def signal_port(name: str, outputs: Iterable[str], inputs: Iterable[str]) -> types.PortDefinition:
     """A port of scalars: variables out, inputs in, by name."""
     return types.PortDefinition(name=name, kind=types.PORT_KIND_SIGNAL, output_variables=list(outputs),
                                 input_variables=list(inputs))
 
 
-def motion_port(name, nodes, *, positions_only=False):
+def motion_port(name: str, nodes: Iterable[int], *, positions_only: bool = False) -> types.PortDefinition:
     """A port that imposes the motion of nodes: reactions out, positions and orientations in."""
     return types.PortDefinition(name=name, kind=types.PORT_KIND_MOTION, node_labels=list(nodes), positions_only=positions_only)
 
 
-def modal_port(name, joint):
+def modal_port(name: str, joint: int) -> types.PortDefinition:
     """A port on a modal joint: amplitudes and their rates out, generalized forces in."""
     return types.PortDefinition(name=name, kind=types.PORT_KIND_MODAL, modal_joint_label=joint)
 
 
-def open_stream(channel):
+def open_stream(channel: Any) -> Any:
     """The method `Coupling.Attach` of a channel, without parsing what the server sends."""
     return channel.stream_stream("/mbcosim.v1.Coupling/Attach", request_serializer=pb.PeerMessage.SerializeToString,
                                  response_deserializer=None)
@@ -73,11 +84,12 @@ class Peer(exchange.Course):
     After the end `error` has what ended the stream, None when it ended in good order.
     """
 
-    def __init__(self, simulation, port, answer=None, *, rotation="matrix", heartbeat_timeout=None, server_timeout=None, timeout=USUAL,
-                 **options):
+    def __init__(self, simulation: Simulation, port: str, answer: Optional[Answer] = None, *, rotation: str = "matrix",
+                 heartbeat_timeout: Optional[float] = None, server_timeout: Optional[float] = None, timeout: Optional[float] = USUAL,
+                 **options: Any) -> None:
         super().__init__(rotation)
         self._function = answer
-        self._out = queue.SimpleQueue()
+        self._out: queue.SimpleQueue[Optional[pb.PeerMessage]] = queue.SimpleQueue()
         self._out.put(exchange.hello(
             simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout,
             heartbeat_interval=None if server_timeout is None else server_timeout / 3, **options))
@@ -86,20 +98,20 @@ class Peer(exchange.Course):
         with bounded(timeout, self._stream.cancel, "attaching the peer"), translated():
             self.welcome = exchange.receive(next(self._stream))[1]
         self._closing = threading.Event()
-        self._waiting_since = None
+        self._waiting_since: Optional[float] = None
         if heartbeat_timeout is not None or server_timeout is not None:
             threading.Thread(target=self._beat, args=(heartbeat_timeout, server_timeout), daemon=True).start()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         if answer is not None:
             self._thread.start()
 
-    def __enter__(self):
+    def __enter__(self) -> Peer:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def close(self):
+    def close(self) -> None:
         """Leaves the port."""
         self._closing.set()
         self._out.put(None)
@@ -107,7 +119,7 @@ class Peer(exchange.Course):
             self._thread.join(PARTING)
         self._stream.cancel()
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[exchange.Motion]:
         """Every Motion until the stream ends."""
         try:
             while True:
@@ -123,15 +135,15 @@ class Peer(exchange.Course):
             if error.code() != grpc.StatusCode.CANCELLED:
                 self.error = self.error or from_rpc_error(error)
 
-    def answer(self, value):
+    def answer(self, value: Any) -> None:
         """Answers the last motion."""
         self._out.put(self._answer(value))
 
-    def fail(self, error):
+    def fail(self, error: BaseException) -> None:
         """The peer cannot answer the last motion; the step fails with this text."""
         self._out.put(self._failure(error))
 
-    def _beat(self, own, servers):
+    def _beat(self, own: Optional[float], servers: Optional[float]) -> None:
         """Sends signs of life, and looks for those of the server."""
         count = 0
         while not self._closing.wait(min(t for t in (own, servers) if t is not None) / 3):
@@ -144,7 +156,8 @@ class Peer(exchange.Course):
                 count += 1
                 self._out.put(pb.PeerMessage(heartbeat=pb.Heartbeat(count=count)))
 
-    def _serve(self):
+    def _serve(self) -> None:
+        assert self._function is not None
         for motion in self:
             try:
                 self.answer(self._function(motion))

@@ -1,9 +1,17 @@
 """Server errors as exceptions with the server's details."""
+from __future__ import annotations
+
 import contextlib
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Optional
 
 import grpc
 
 from mbcosim.v1 import common_pb2
+
+if TYPE_CHECKING:
+    from .calls import StepResult
+    from .histories import History
 
 
 class Error(Exception):
@@ -14,19 +22,19 @@ class Error(Exception):
     metadata  particulars by name, as text
     """
 
-    def __init__(self, message, code=None, reason="", metadata=None):
+    def __init__(self, message: Optional[str], code: Any = None, reason: str = "", metadata: Optional[Mapping[str, str]] = None) -> None:
         super().__init__(message)
         self.code = code
         self.reason = reason
         self.metadata = dict(metadata or {})
-        self.diagnostics = []
-        self.failure = None
+        self.diagnostics: list[common_pb2.Diagnostic] = []
+        self.failure: Optional[common_pb2.SolverFailure] = None
 
 
 class DeckError(Error):
     """The deck is wrong; `diagnostics` has every finding."""
 
-    def __str__(self):
+    def __str__(self) -> str:
         if not self.diagnostics:
             return super().__str__()
         return "\n".join(diagnostic_text(d) for d in self.diagnostics)
@@ -63,8 +71,8 @@ class StepFailed(Error):
     Simulation.simulate had kept until then, else None.
     """
 
-    result = None
-    history = None
+    result: Optional[StepResult] = None
+    history: Optional[History] = None
 
 
 _CLASSES = {
@@ -79,12 +87,12 @@ _CLASSES = {
 }
 
 
-def enum_name(kind, value, prefix):
+def enum_name(kind: Any, value: int, prefix: str) -> str:
     """Name of a value without its prefix; one that this client does not know: "UNKNOWN_17"."""
-    return kind.Name(value)[len(prefix):] if value in kind.values() else f"UNKNOWN_{value}"
+    return str(kind.Name(value))[len(prefix):] if value in kind.values() else f"UNKNOWN_{value}"
 
 
-def diagnostic_text(diagnostic):
+def diagnostic_text(diagnostic: common_pb2.Diagnostic) -> str:
     """`file:line:column: error: message`, the line and a caret."""
     severity = {1: "error", 2: "warning", 3: "note"}.get(diagnostic.severity, "error")
     place = ":".join(str(part) for part in (diagnostic.file, diagnostic.line, diagnostic.column) if part)
@@ -95,14 +103,15 @@ def diagnostic_text(diagnostic):
     return text + (f"\n  {diagnostic.hint}" if diagnostic.hint else "")
 
 
-def from_rpc_error(rpc_error):
+def from_rpc_error(rpc_error: Any) -> Error:
     """The exception that tells what a grpc.RpcError carries."""
     code = rpc_error.code()
     status = common_pb2.ErrorStatus()
     for key, value in rpc_error.trailing_metadata() or ():
         if key == "grpc-status-details-bin":
             status.ParseFromString(value)
-    info, failure, diagnostics = common_pb2.ErrorInfo(), None, []
+    info, failure = common_pb2.ErrorInfo(), None
+    diagnostics: list[common_pb2.Diagnostic] = []
     for detail in status.details:
         if detail.type_url.endswith("google.rpc.ErrorInfo"):
             info.ParseFromString(detail.value)
@@ -118,7 +127,7 @@ def from_rpc_error(rpc_error):
 
 
 @contextlib.contextmanager
-def translated():
+def translated() -> Iterator[None]:
     """Turns grpc errors raised inside into exceptions of this module."""
     try:
         yield

@@ -1,14 +1,21 @@
 """What crosses a port, as numpy arrays. Received arrays are views of the message's bytes: read-only, nothing is copied."""
+from __future__ import annotations
+
 import dataclasses
 import struct
+from collections.abc import Iterator
+from typing import Any, Optional, Union
 
 import numpy as np
+import numpy.typing as npt
 
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
+from .errors import Error
 from .words import choice
 
 _ROTATION_SIZE = {"matrix": 9, "vector": 3, "quaternion": 4, "euler_123": 3}
+Array = npt.NDArray[np.float64]
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _EMPTY = np.zeros(0)
 
@@ -20,15 +27,15 @@ class Motion:
     time: float            # of the values [s]
     target_time: float     # for which an answer is wanted [s]
     iteration: int         # of a tight step, or pass of a window, from 1; 0: explicit
-    x: np.ndarray
-    rotations: np.ndarray  # n x 3 x 3 for "matrix", n x 4 for "quaternion", else n x 3
-    v: np.ndarray
-    w: np.ndarray
-    a: np.ndarray          # empty unless agreed
-    wp: np.ndarray
-    signals: np.ndarray    # of a signal port; of a modal one: the amplitudes, then their rates
-    forces: np.ndarray     # of a motion port: reactions [N], and moments [N m]
-    moments: np.ndarray
+    x: Array
+    rotations: Array  # n x 3 x 3 for "matrix", n x 4 for "quaternion", else n x 3
+    v: Array
+    w: Array
+    a: Array          # empty unless agreed
+    wp: Array
+    signals: Array    # of a signal port; of a modal one: the amplitudes, then their rates
+    forces: Array     # of a motion port: reactions [N], and moments [N m]
+    moments: Array
     target_estimated: bool  # the step may turn out to have another length
 
 
@@ -38,7 +45,7 @@ class Reject(Exception):
     `preferred_step_size` is what the peer would take [s]; None: unknown.
     """
 
-    def __init__(self, preferred_step_size=None, text=""):
+    def __init__(self, preferred_step_size: Optional[float] = None, text: str = "") -> None:
         super().__init__(text)
         self.preferred_step_size, self.text = preferred_step_size, text
 
@@ -46,21 +53,22 @@ class Reject(Exception):
 @dataclasses.dataclass
 class Loads:
     """What a peer answers with, when forces alone do not say it. Arrays of n rows for n nodes."""
-    forces: object = None            # n x 3 [N]
-    moments: object = None           # n x 3 about the points [N m]; None: zero
-    reference_force: object = None   # 3 [N], on the reference node of a deck's port that wants it
-    reference_moment: object = None  # 3 [N m]
-    signals: object = None           # of signal and modal ports
-    positions: object = None         # of motion ports: n x 3 imposed at `target_time` [m]
-    rotations: object = None         # of motion ports, in the form agreed
-    stiffness: object = None         # d(force, moment)/d(position, rotation): 6n x 6n, or n x 6 x 6 blocks
-    damping: object = None           # the same with respect to (velocity, angular velocity)
+    forces: Optional[npt.ArrayLike] = None            # n x 3 [N]
+    moments: Optional[npt.ArrayLike] = None           # n x 3 about the points [N m]; None: zero
+    reference_force: Optional[npt.ArrayLike] = None   # 3 [N], on the reference node of a deck's port that wants it
+    reference_moment: Optional[npt.ArrayLike] = None  # 3 [N m]
+    signals: Optional[npt.ArrayLike] = None           # of signal and modal ports
+    positions: Optional[npt.ArrayLike] = None         # of motion ports: n x 3 imposed at `target_time` [m]
+    rotations: Optional[npt.ArrayLike] = None         # of motion ports, in the form agreed
+    stiffness: Optional[npt.ArrayLike] = None         # d(force, moment)/d(position, rotation): 6n x 6n, or n x 6 x 6 blocks
+    damping: Optional[npt.ArrayLike] = None           # the same with respect to (velocity, angular velocity)
     unfinished: bool = False         # the step must not end with this answer
 
 
-def hello(simulation, port, *, mode=None, rotation="matrix", frame=None, accelerations=False, every=1, hold="zero_order",
-          peer_timeout=10.0, policy="fail_step", acceleration="none", relaxation=0.5, tolerance=1e-6, maximum_passes=50,
-          check_model=True, tangent="none", heartbeat_interval=None, heartbeat_timeout=None):
+def hello(simulation: Any, port: str, *, mode: Optional[str] = None, rotation: str = "matrix", frame: Optional[str] = None,
+          accelerations: bool = False, every: int = 1, hold: str = "zero_order", peer_timeout: float = 10.0, policy: str = "fail_step",
+          acceleration: str = "none", relaxation: float = 0.5, tolerance: float = 1e-6, maximum_passes: int = 50, check_model: bool = True,
+          tangent: str = "none", heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None) -> pb.PeerMessage:
     """First message of a peer."""
     message = pb.Hello(
         simulation=simulation.name, port=port, rotation_form=_enum(types.RotationForm, "ROTATION_FORM_", rotation),
@@ -79,14 +87,14 @@ def hello(simulation, port, *, mode=None, rotation="matrix", frame=None, acceler
     return pb.PeerMessage(hello=message)
 
 
-def _enum(kind, prefix, name):
+def _enum(kind: Any, prefix: str, name: Optional[str]) -> Any:
     """Value of a choice; None leaves it to the server."""
     return choice(kind, prefix, name, prefix.lower().strip("_").replace("_", " "))
 
 
 # ---------------------------------------------------------------- received
 
-def _varint(data, at):
+def _varint(data: Any, at: int) -> tuple[int, int]:
     value = shift = 0
     while True:
         byte = data[at]
@@ -97,11 +105,12 @@ def _varint(data, at):
         shift += 7
 
 
-def _fields(data, at):
+def _fields(data: Any, at: int) -> Iterator[tuple[int, Any]]:
     """Number and value of every field: int, float or memoryview."""
     while at < len(data):
         key, at = _varint(data, at)
         number, kind = key >> 3, key & 7
+        value: Any
         if kind == _VARINT:
             value, at = _varint(data, at)
         elif kind == _FIXED64:
@@ -118,7 +127,7 @@ def _fields(data, at):
         yield number, value
 
 
-def receive(data):
+def receive(data: bytes) -> tuple[Optional[str], Any]:
     """A message of the server: (name, content); the content of an "exchange" is a dict of its fields by number."""
     number, content = next(_fields(data, 0))
     if number == pb.ServerMessage.EXCHANGE_FIELD_NUMBER:
@@ -131,9 +140,9 @@ def receive(data):
 _E = pb.ServerExchange
 
 
-def motion(fields, rotation):
+def motion(fields: dict[int, Any], rotation: str) -> Motion:
     """The fields of an exchange as a Motion."""
-    def rows(number, width=3):
+    def rows(number: int, width: int = 3) -> Array:
         data = fields.get(number)
         return (np.frombuffer(data, "<f8") if data is not None else _EMPTY).reshape(-1, width)
 
@@ -149,19 +158,19 @@ def motion(fields, rotation):
         rows(_E.FORCES_N_FIELD_NUMBER), rows(_E.MOMENTS_NM_FIELD_NUMBER), bool(fields.get(_E.TARGET_ESTIMATED_FIELD_NUMBER, 0)))
 
 
-def index(fields):
+def index(fields: dict[int, Any]) -> int:
     """Number of an exchange."""
-    return fields[_E.INDEX_FIELD_NUMBER]
+    return int(fields[_E.INDEX_FIELD_NUMBER])
 
 
 # ---------------------------------------------------------------- answers
 
-def _put(field, values):
+def _put(field: Any, values: Any) -> None:
     if values is not None:
         field.extend(np.ravel(np.asarray(values, float)))
 
 
-def answer(number, value, kind):
+def answer(number: int, value: Any, kind: Optional[int]) -> pb.PeerMessage:
     """What a peer's function returned as the answer to exchange `number` on a port of this kind (of `mbcosim.v1.PortKind`)."""
     out = pb.PeerExchange(index=number)
     if isinstance(value, Reject):
@@ -180,13 +189,13 @@ def answer(number, value, kind):
     out.unfinished = loads.unfinished
     for field, block in (("stiffness", loads.stiffness), ("damping", loads.damping)):
         if block is not None:
-            block = np.asarray(block, float)
-            _put(getattr(out.tangent, field), block)
-            out.tangent.block_diagonal = block.ndim == 3
+            numbers = np.asarray(block, float)
+            _put(getattr(out.tangent, field), numbers)
+            out.tangent.block_diagonal = numbers.ndim == 3
     return pb.PeerMessage(exchange=out)
 
 
-def _loads(value, kind):
+def _loads(value: Any, kind: Optional[int]) -> Loads:
     if isinstance(value, Loads):
         return value
     if kind in (types.PORT_KIND_SIGNAL, types.PORT_KIND_MODAL):
@@ -197,7 +206,7 @@ def _loads(value, kind):
     return Loads(*values)
 
 
-def failure(number, error):
+def failure(number: int, error: BaseException) -> pb.PeerMessage:
     """The answer of a peer that cannot compute, or rejects the step."""
     if isinstance(error, Reject):
         return answer(number, error, None)
@@ -213,11 +222,16 @@ class Course:
     rejected   (step, time) to go back to, of those that failed
     """
 
-    def __init__(self, rotation):
-        self.error, self.exchanges, self.accepted, self.rejected = None, 0, [], []
+    welcome: pb.Welcome
+
+    def __init__(self, rotation: str) -> None:
+        self.error: Optional[Error] = None
+        self.exchanges = 0
+        self.accepted: list[tuple[int, float]] = []
+        self.rejected: list[tuple[int, float]] = []
         self._rotation, self._index = rotation, 0
 
-    def _take(self, data):
+    def _take(self, data: bytes) -> Optional[Motion]:
         """The Motion of a message; None when it tells something else, which is noted."""
         name, content = receive(data)
         if name == "exchange":
@@ -227,13 +241,13 @@ class Course:
             getattr(self, name).append((content.step, content.time_s))
         return None
 
-    def _answer(self, value):
+    def _answer(self, value: Any) -> pb.PeerMessage:
         """The message that answers the last motion."""
         message = answer(self._index, value, self.welcome.layout.kind)
         self.exchanges += 1
         return message
 
-    def _failure(self, error):
+    def _failure(self, error: BaseException) -> pb.PeerMessage:
         """The message that says that there is no answer to the last motion."""
         self.exchanges += 1
         return failure(self._index, error)

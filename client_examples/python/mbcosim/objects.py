@@ -104,7 +104,7 @@ class Part:
     @property
     def title(self) -> str:
         """`revolute hinge 2 "hinge"`."""
-        word = f"{self.kind} node" if self.prefix.startswith("node.structural") else self.kind or self.family
+        word: str = f"{self.kind} node" if self.prefix.startswith("node.structural") else self.kind or self.family
         return f"{word} {self.label}" + (f' "{self.name}"' if self.name else "")
 
     def __repr__(self) -> str:
@@ -134,7 +134,7 @@ class Parts(Mapping[Key, Part]):
         if found:
             pairs = " or ".join(repr((part.family, part.label)) for part in found)
             raise KeyError(f"{len(found)} {self._what} are called {key!r}; say {pairs}")
-        known = [part.name for part in self._parts if part.name] if isinstance(key, str) else [part.label for part in self._parts]
+        known: list[object] = [part.name if isinstance(key, str) else part.label for part in self._parts if part.name or not isinstance(key, str)]
         raise KeyError(f"no {self._what.rstrip('s')} is called {key!r}; {remedy(key, known)}")
 
     def __iter__(self) -> Iterator[Key]:

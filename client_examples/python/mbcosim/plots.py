@@ -120,7 +120,8 @@ class _Scene:
 
     def show(self, instant: int, title: str) -> None:
         """Moves all to an instant."""
-        for artist, line in [*zip(self._bars, self._lines), (self._dots, slice(None))]:
+        everything = list(range(self._positions.shape[1]))
+        for artist, line in [*zip(self._bars, self._lines), (self._dots, everything)]:
             shown = self._shown(self._positions[instant, line])
             artist.set_data(*shown[:2])
             if self._plane is None:

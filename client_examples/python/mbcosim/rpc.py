@@ -1,15 +1,25 @@
 """How calls travel: what may be asked again, how long each may take, how a silent server is noticed."""
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import functools
 import threading
 import time
+from collections.abc import Callable, Coroutine, Generator, Iterator
+from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, cast, overload
 
 import grpc
 
 from mbcosim.v1 import coupling_pb2_grpc, reduction_pb2_grpc, simulations_pb2_grpc, telemetry_pb2_grpc
 
 from .errors import TimedOut, Unavailable, translated
+
+if TYPE_CHECKING:
+    from typing_extensions import Concatenate, ParamSpec
+    P = ParamSpec("P")
+T = TypeVar("T")
+_Class = TypeVar("_Class", bound=type)
 
 USUAL = 30.0    # seconds that a call which advances nothing may take
 PARTING = 2.0   # seconds that leaving a `with` block may take
@@ -39,21 +49,42 @@ class Call:
     each        of a method that streams: called with every message
     """
     method: str
-    request: object
-    timeout: float = None
+    request: Any
+    timeout: Optional[float] = None
     repeatable: bool = False
-    each: object = None
+    each: Optional[Callable[[Any], Any]] = None
 
 
-def call(function):
+Calls = Generator[Call, Any, T]  # is sent the replies, one after the other
+
+
+class Blocking:
+    """What runs calls at once."""
+
+
+class Awaiting:
+    """What runs calls as coroutines."""
+
+
+if TYPE_CHECKING:
+    class Method(Generic[P, T]):
+        """A method marked with `call`, as the two clients see it."""
+        @overload
+        def __get__(self, of: Blocking, owner: Any = ...) -> Callable[P, T]: ...
+        @overload
+        def __get__(self, of: Awaiting, owner: Any = ...) -> Callable[P, Coroutine[Any, Any, T]]: ...
+        def __get__(self, of: Any, owner: Any = None) -> Any: ...
+
+
+def call(function: Callable[Concatenate[Any, P], Calls[T]]) -> Method[P, T]:
     """Marks a generator that yields Calls, is sent their replies and returns a result. Blocking and asyncio clients run the same ones."""
-    function.is_call = True
-    return function
+    setattr(function, "is_call", True)
+    return cast("Method[P, T]", function)
 
 
-def runs_calls(drive):
+def runs_calls(drive: Callable[[Any], Any]) -> Callable[[_Class], _Class]:
     """Class decorator: `drive(generator function)` makes methods of those that are marked with `call`."""
-    def decorate(cls):
+    def decorate(cls: _Class) -> _Class:
         for base in reversed(cls.__mro__[1:]):
             for name, function in vars(base).items():
                 if getattr(function, "is_call", False):
@@ -62,7 +93,7 @@ def runs_calls(drive):
     return decorate
 
 
-def metadata(token):
+def metadata(token: Optional[str]) -> list[tuple[str, str]]:
     """What says who calls."""
     return [("authorization", f"Bearer {token}")] if token else []
 
@@ -70,13 +101,13 @@ def metadata(token):
 class Stubs:
     """The methods of a channel by name."""
 
-    def __init__(self, channel):
-        self.simulations = simulations_pb2_grpc.SimulationsStub(channel)
-        self.reduction = reduction_pb2_grpc.ReductionStub(channel)
-        self.coupling = coupling_pb2_grpc.CouplingStub(channel)
-        self.telemetry = telemetry_pb2_grpc.TelemetryStub(channel)
+    def __init__(self, channel: Any) -> None:
+        self.simulations: Any = simulations_pb2_grpc.SimulationsStub(channel)  # type: ignore[no-untyped-call]
+        self.reduction: Any = reduction_pb2_grpc.ReductionStub(channel)  # type: ignore[no-untyped-call]
+        self.coupling: Any = coupling_pb2_grpc.CouplingStub(channel)  # type: ignore[no-untyped-call]
+        self.telemetry: Any = telemetry_pb2_grpc.TelemetryStub(channel)  # type: ignore[no-untyped-call]
 
-    def method(self, name):
+    def method(self, name: str) -> Any:
         service, method = name.split("/")
         return getattr(getattr(self, service.lower()), method)
 
@@ -84,11 +115,12 @@ class Stubs:
 class Retries:
     """Whether a call that was lost on the way is asked again: until `reconnect` seconds are over, and at least a few times."""
 
-    def __init__(self, call, reconnect):
+    def __init__(self, call: Call, reconnect: float) -> None:
         self._allowed, self._reconnect = call.repeatable, reconnect
-        self._end, self._attempts = None, 0
+        self._end: Optional[float] = None
+        self._attempts = 0
 
-    def again(self, error):
+    def again(self, error: Unavailable) -> tuple[float, float]:
         """Seconds to pause, and seconds to wait for a connection after that; raises `error` when there is no use in it."""
         if self._end is None:
             self._end = time.monotonic() + max(self._reconnect, _AGAIN)
@@ -96,26 +128,26 @@ class Retries:
         left = self._end - time.monotonic()
         if not self._allowed or isinstance(error, TimedOut) or left <= 0 or (not self._reconnect and self._attempts > 4):
             raise error
-        return min(_PAUSE * 2 ** min(self._attempts - 1, 5), left), left
+        return min(_PAUSE * 2.0 ** min(self._attempts - 1, 5), left), left
 
 
 class Connection:
     """A channel whose calls block."""
 
-    def __init__(self, channel, token, reconnect):
+    def __init__(self, channel: Any, token: Optional[str], reconnect: float) -> None:
         self.channel, self.metadata, self.reconnect = channel, metadata(token), reconnect
         self.stubs = Stubs(channel)
 
-    def run(self, calls):
+    def run(self, calls: Calls[T]) -> T:
         """Makes the calls of a generator one after the other; its result."""
-        reply = None
+        reply: Any = None
         try:
             while True:
                 reply = self.perform(calls.send(reply))
         except StopIteration as end:
-            return end.value
+            return cast(T, end.value)
 
-    def perform(self, call):
+    def perform(self, call: Call) -> Any:
         retries = Retries(call, self.reconnect)
         while True:
             try:
@@ -126,7 +158,7 @@ class Connection:
                 time.sleep(pause)
                 self._await_connection(left, error)
 
-    def _once(self, call):
+    def _once(self, call: Call) -> Any:
         method = self.stubs.method(call.method)
         if call.each is not None:
             return self._stream(method, call)
@@ -134,7 +166,7 @@ class Connection:
             return method(call.request, metadata=self.metadata)
         return self._bounded(method, call)
 
-    def _bounded(self, method, call):
+    def _bounded(self, method: Any, call: Call) -> Any:
         """As a future: what gRPC does not end at its deadline (an upload that nobody reads) ends soon after it."""
         future = method.future(call.request, metadata=self.metadata, timeout=call.timeout)
         try:
@@ -143,34 +175,37 @@ class Connection:
             future.cancel()
             raise TimedOut(f"{call.method} took longer than {call.timeout} s", grpc.StatusCode.DEADLINE_EXCEEDED) from None
 
-    def _stream(self, method, call):
+    def _stream(self, method: Any, call: Call) -> None:
         messages = method(call.request, metadata=self.metadata, timeout=call.timeout)
         latest = None if call.timeout is None else call.timeout + _AGAIN
         with bounded(latest, messages.cancel, call.method):
             for message in messages:
+                assert call.each is not None
                 call.each(message)
 
-    def _await_connection(self, seconds, error):
+    def _await_connection(self, seconds: float, error: Unavailable) -> None:
         try:
             grpc.channel_ready_future(self.channel).result(seconds)
         except grpc.FutureTimeoutError:
             raise error from None
 
 
-def blocking(function):
+def blocking(function: Callable[..., Calls[T]]) -> Callable[..., T]:
     """The generator `function` as a method that blocks."""
-    return lambda self, *arguments, **options: self._connection.run(function(self, *arguments, **options))
+    def method(self: Any, *arguments: Any, **options: Any) -> T:
+        return cast(T, self._connection.run(function(self, *arguments, **options)))
+    return method
 
 
 @contextlib.contextmanager
-def bounded(seconds, cancel, what):
+def bounded(seconds: Optional[float], cancel: Callable[[], object], what: str) -> Iterator[None]:
     """Calls `cancel` when the block takes longer than `seconds` (None: never); then TimedOut is raised."""
     if seconds is None:
         yield
         return
     over = threading.Event()
 
-    def stop():
+    def stop() -> None:
         over.set()
         cancel()
 
@@ -188,7 +223,7 @@ def bounded(seconds, cancel, what):
 
 
 @contextlib.contextmanager
-def parting():
+def parting() -> Iterator[None]:
     """Ends what is on the server as far as it can be reached: what cannot ends with its lease."""
     try:
         yield

@@ -1,86 +1,94 @@
 """Simulations on the server: step, read, write, save, restore, watch. Every call takes `timeout=` [s]."""
+from __future__ import annotations
+
 import queue
+from collections.abc import Iterable, Iterator
+from typing import Any, Optional, TypeVar
 
 import grpc
 import numpy as np
+import numpy.typing as npt
 
-from mbcosim.v1 import simulations_pb2 as pb, telemetry_pb2
+from mbcosim.v1 import common_pb2, simulations_pb2 as pb, telemetry_pb2
 
 from .analysis import Analysis
-from .calls import SimulationCalls, SnapshotCalls
-from .coupling import Peer
+from .calls import SimulationCalls, SnapshotCalls, StepResult
+from .coupling import Answer, Peer
 from .errors import translated
 from .histories import Histories
 from .objects import ModelObjects
-from .rpc import PARTING, USUAL, blocking, bounded, parting, runs_calls
+from .rpc import PARTING, USUAL, Blocking, blocking, bounded, parting, runs_calls
 from .words import pick
 
+Self = TypeVar("Self")
 _POLICIES = {"block": telemetry_pb2.OVERFLOW_POLICY_BLOCK, "drop_oldest": telemetry_pb2.OVERFLOW_POLICY_DROP_OLDEST,
              "decimate": telemetry_pb2.OVERFLOW_POLICY_DECIMATE}
 
 
-def subscribe_request(simulation, handles, every, policy, buffer):
+def subscribe_request(simulation: SimulationCalls[Any], handles: Iterable[int], every: int, policy: str,
+                      buffer: int) -> telemetry_pb2.SubscribeRequest:
     """`mbcosim.v1.SubscribeRequest`."""
     return telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=handles, every=every, policy=pick(_POLICIES, policy, "policy"),
                                           buffer_samples=buffer)
 
 
 @runs_calls(blocking)
-class Snapshot(SnapshotCalls):
+class Snapshot(Blocking, SnapshotCalls):
     """A saved state of a simulation. As a context manager: at the end of the block the simulation goes back to it, and it is forgotten."""
 
-    def __enter__(self):
+    def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         with parting():
             self.restore(timeout=PARTING)
             self.delete(timeout=PARTING)
 
 
 @runs_calls(blocking)
-class Simulation(ModelObjects, Histories, Analysis, SimulationCalls):
+class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Snapshot]):
     """A simulation. As a context manager it is deleted from the server at the end (unless it was attached)."""
     _snapshot_class = Snapshot
 
     @property
-    def _stub(self):
+    def _stub(self) -> Any:
         return self._connection.stubs.simulations
 
-    def _call(self, method, request):
+    def _call(self, method: Any, request: Any) -> Any:
         with translated():
             return method(request, metadata=self._connection.metadata)
 
-    def __enter__(self):
+    def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         if self._owned:
             with parting():
                 self.delete(timeout=PARTING)
 
     @property
-    def variables(self):
+    def variables(self) -> dict[str, common_pb2.Variable]:
         """`mbcosim.v1.Variable` by name."""
         if self._description is None:
             self.describe()
         return self._known
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> Any:
         return self.read([name])[name]
 
-    def __setitem__(self, name, value):
+    def __setitem__(self, name: str, value: npt.ArrayLike) -> None:
         self.write({name: value})
 
-    def stepper(self, outputs=(), inputs=(), *, timeout=USUAL):
+    def stepper(self, outputs: Iterable[str] = (), inputs: Iterable[str] = (), *, timeout: Optional[float] = USUAL) -> Stepper:
         """An open stream for stepping with the least delay; see Stepper."""
         return Stepper(self, outputs, inputs, timeout)
 
-    def couple(self, port, answer=None, **options):
+    def couple(self, port: str, answer: Optional[Answer] = None, **options: Any) -> Peer:
         """Attaches a peer to a port; see coupling.Peer."""
         return Peer(self, port, answer, **options)
 
-    def subscribe(self, names, *, every=1, policy="drop_oldest", buffer=1024, timeout=USUAL):
+    def subscribe(self, names: Iterable[str], *, every: int = 1, policy: str = "drop_oldest", buffer: int = 1024,
+                  timeout: Optional[float] = USUAL) -> Subscription:
         """Samples of variables every so many steps, whoever advances; see Subscription."""
         return Subscription(self, list(names), every, policy, buffer, timeout)
 
@@ -93,21 +101,22 @@ class Stepper:
                 x = stepper.step().values["node.structural.1.X"]
     """
 
-    def __init__(self, simulation, outputs, inputs, timeout=USUAL):
+    def __init__(self, simulation: Simulation, outputs: Iterable[str], inputs: Iterable[str], timeout: Optional[float] = USUAL) -> None:
         self._simulation, self._outputs = simulation, list(outputs)
-        self._requests = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[Optional[pb.StepRequest]] = queue.SimpleQueue()
         self._request = pb.StepRequest(simulation=simulation.name, outputs=simulation.handles(self._outputs, timeout=timeout))
         self._inputs = list(inputs)
         self._request.inputs.handles.extend(simulation.handles(self._inputs, timeout=timeout))
         self._replies = simulation._stub.StepStream(iter(self._requests.get, None), metadata=simulation._connection.metadata)
 
-    def __enter__(self):
+    def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def step(self, values=None, count=1, *, step_size=None, timeout=None):
+    def step(self, values: Optional[npt.ArrayLike] = None, count: int = 1, *, step_size: Optional[float] = None,
+             timeout: Optional[float] = None) -> StepResult:
         """Takes `count` steps, of `step_size` [s] each (default: the deck's); `values`: numbers of the stepper's inputs, one variable after the
         other. After a timeout the stream is over."""
         request = pb.StepRequest()
@@ -122,7 +131,7 @@ class Stepper:
             reply = next(self._replies)
         return self._simulation.result(reply, self._outputs)
 
-    def close(self, *, timeout=PARTING):
+    def close(self, *, timeout: Optional[float] = PARTING) -> None:
         """Ends the stream."""
         self._requests.put(None)
         if not self._replies.is_active():
@@ -138,7 +147,8 @@ class Subscription:
     `dropped` counts the samples that the server dropped because they were not read in time.
     """
 
-    def __init__(self, simulation, names, every, policy, buffer, timeout=USUAL):
+    def __init__(self, simulation: Simulation, names: list[str], every: int, policy: str, buffer: int,
+                 timeout: Optional[float] = USUAL) -> None:
         self._simulation, self._names = simulation, names
         request = subscribe_request(simulation, simulation.handles(names, timeout=timeout), every, policy, buffer)
         connection = simulation._connection
@@ -147,13 +157,13 @@ class Subscription:
         with bounded(timeout, self._stream.cancel, "the subscription"), translated():
             next(self._stream)  # the server's word that no step is missed from now on
 
-    def __enter__(self):
+    def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[tuple[int, float, dict[str, Any]]]:
         try:
             for batch in self._stream:
                 self.dropped = batch.total_dropped
@@ -164,6 +174,6 @@ class Subscription:
                 with translated():
                     raise
 
-    def close(self):
+    def close(self) -> None:
         """Ends the subscription."""
         self._stream.cancel()
