@@ -80,7 +80,7 @@ export function launch(): Promise<Browser> {
     executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
     args: [
       '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync',
-      '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+      '--disable-gpu', '--enable-unsafe-swiftshader',  // as on a machine without a graphics card
     ],
   });
 }
@@ -122,7 +122,7 @@ interface Inside {
       session?: { playing: { value: string } };
       sample?: { step: number; time: number };
     };
-    scene: { view: { nodeMatrix(index: number): number[]; picture(): Promise<Blob> } };
+    scene: { view: { nodeMatrix(index: number): number[]; picture(): Promise<Blob>; drawCalls: number; canvas: HTMLCanvasElement } };
   };
 }
 
@@ -163,6 +163,25 @@ export function recorded(page: Page): Promise<number[]> {
 /** Waits until the page looks at this step. */
 export async function atStep(page: Page, step: number): Promise<void> {
   await until(page, (wanted) => (window as unknown as Inside).mbcosim.desk.sample?.step === wanted, step);
+}
+
+/** Calls to the graphics card for the last picture. */
+export function drawCalls(page: Page): Promise<number> {
+  return page.evaluate(() => (window as unknown as Inside).mbcosim.scene.view.drawCalls);
+}
+
+/** Pictures a second, while the page replays what it recorded. */
+export async function frameRate(page: Page, seconds: number): Promise<number> {
+  return page.evaluate((wanted) => new Promise<number>((resolve) => {
+    const { view } = (window as unknown as { mbcosim: { scene: { view: { render(ratio: number): void } } } }).mbcosim.scene, render = view.render;
+    let frames = 0;
+    view.render = (ratio) => (++frames, render.call(view, ratio));
+    const start = performance.now();
+    setTimeout(() => {
+      view.render = render;
+      resolve((1000 * frames) / (performance.now() - start));
+    }, 1000 * wanted);
+  }), seconds);
 }
 
 /** How many colours the scene has, and the part of it that is not background. */

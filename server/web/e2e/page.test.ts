@@ -1,11 +1,11 @@
 import type { Browser } from 'playwright-core';
-import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { atStep, decks, launch, picture, recorded, scene, shown, until, View, visit, type Visit } from './bench';
+import { atStep, decks, drawCalls, frameRate, launch, picture, recorded, scene, shown, until, View, visit, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -53,6 +53,43 @@ describe('each example deck', () => {
       expect(colours).toBeGreaterThan(20);
       expect(covered).toBeGreaterThan(0.002);
     });
+  });
+});
+
+/** A field of pendulums, one body and one joint each. */
+function pendulums(count: number): string {
+  const rows = (row: (label: number, x: number, y: number) => string) => Array.from({ length: count }, (_, i) => row(i + 1, i % 40, Math.floor(i / 40))).join('\n');
+  return `begin: data; problem: initial value; end: data;
+begin: initial value;
+  initial time: 0.; final time: 100.; time step: 0.005; method: ms, 0.6; tolerance: 1.e-6; max iterations: 10;
+  derivatives tolerance: 1.e-3; derivatives max iterations: 10;
+end: initial value;
+begin: control data; structural nodes: ${count}; rigid bodies: ${count}; joints: ${count}; gravity; end: control data;
+begin: nodes;
+${rows((label, x, y) => `  structural: ${label}, dynamic, ${x}., ${y}., 0., eye, null, null;`)}
+end: nodes;
+begin: elements;
+${rows((label, x, y) => `  body: ${label}, ${label}, 1., null, diag, .02, .03, .04;
+  joint: ${label}, spherical pin, ${label}, position, reference, node, .3, 0., .2, position, reference, global, ${x} + .3, ${y}., .2;`)}
+  gravity: uniform, 0., 0., -1., const, 9.81;
+end: elements;
+`;
+}
+
+describe('a thousand bodies', () => {
+  test('are drawn in a few calls, where the service says', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(1000));
+    await withPage(join(folder, 'pendulums.mbd'), async (visited, view) => {
+      const { page } = visited;
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      await expectSceneOf(visited, view);
+      expect(await drawCalls(page)).toBeLessThan(12);
+      await page.getByRole('button', { name: 'Replay what was recorded, in a loop' }).click();
+      console.log(`1000 bodies: ${(await frameRate(page, 3)).toFixed(1)} pictures a second`);
+    });
+    rmSync(folder, { recursive: true });
   });
 });
 

@@ -1,5 +1,6 @@
 /** A model's shape: points that hang on nodes, and what hangs on points. Plain data, as recordings keep it. */
-import { add, IDENTITY, mat3, multiply, rotate, vec3, type Mat3, type Vec3 } from './algebra';
+import { add, IDENTITY, mat3, rotate, vec3, type Mat3, type Vec3 } from './algebra';
+import { valueOf, type Layout, type Sample } from './recording';
 
 export interface NodeShape {
   label: number;
@@ -58,64 +59,94 @@ export interface Geometry {
   centre: Vec3;
 }
 
-/** Where the nodes are, and what else a sample tells. */
+/** Where the nodes are, and what else a sample tells. Batches read its arrays; whoever made it may fill it anew. */
 export interface Pose {
-  position(node: number): Vec3;
-  orientation(node: number): Mat3;
+  /** Positions of the nodes, three numbers each. */
+  readonly x: Float64Array;
+  /** Their orientations by rows, nine numbers each. */
+  readonly R: Float64Array;
   /** One number of a variable; NaN: not known. */
   value(handle: number, element: number): number;
 }
 
-export function pointAt(pose: Pose, point: PointShape): Vec3 {
-  if (point.node < 0) return point.offset;
-  return add(pose.position(point.node), rotate(pose.orientation(point.node), point.offset));
+export function positionOf(pose: Pose, node: number): Vec3 {
+  return vec3(pose.x, 3 * node);
 }
 
-/** Orientation of something that is fixed to a point: `local` to global. */
-export function orientationAt(pose: Pose, point: PointShape, local: Mat3): Mat3 {
-  return point.node < 0 ? local : multiply(pose.orientation(point.node), local);
+export function orientationOf(pose: Pose, node: number): Mat3 {
+  return mat3(pose.R, 9 * node);
+}
+
+export function pointAt(pose: Pose, point: PointShape): Vec3 {
+  if (point.node < 0) return point.offset;
+  return add(positionOf(pose, point.node), rotate(orientationOf(pose, point.node), point.offset));
 }
 
 /** The pose in which the model was described. */
 export function initialPose(nodes: readonly NodeShape[]): Pose {
-  return {
-    position: (node) => nodes[node].position,
-    orientation: (node) => nodes[node].orientation ?? IDENTITY,
-    value: () => NaN,
-  };
+  const x = new Float64Array(3 * nodes.length), R = new Float64Array(9 * nodes.length);
+  nodes.forEach((node, i) => {
+    x.set(node.position, 3 * i);
+    R.set(node.orientation ?? IDENTITY, 9 * i);
+  });
+  return { x, R, value: () => NaN };
 }
 
-/** The pose that a sample's numbers tell; nodes that it does not have stay where they were described. */
-export function poseOf(nodes: readonly NodeShape[], values: ArrayLike<number>, offset: (handle: number) => number | undefined): Pose {
-  return {
-    position(node) {
-      const at = offset(nodes[node].positionHandle);
-      return at === undefined ? nodes[node].position : vec3(values, at);
-    },
-    orientation(node) {
-      const handle = nodes[node].orientationHandle;
-      const at = handle === undefined ? undefined : offset(handle);
-      return at === undefined ? nodes[node].orientation ?? IDENTITY : mat3(values, at);
-    },
-    value(handle, element) {
-      const at = offset(handle);
-      return at === undefined ? NaN : values[at + element];
-    },
-  };
+/** Turns samples into poses; nodes that a sample does not have stay where they were described. Nothing is made anew: it is itself the pose. */
+export class PoseReader implements Pose {
+  readonly x: Float64Array;
+  readonly R: Float64Array;
+  private sample?: Sample;
+  private layout?: Layout;
+  /** Where the position and the orientation of each node stand in samples of the layout; −1: nowhere. */
+  private readonly places: Int32Array;
+
+  constructor(private readonly nodes: readonly NodeShape[]) {
+    const { x, R } = initialPose(nodes);
+    this.x = x;
+    this.R = R;
+    this.places = new Int32Array(2 * nodes.length);
+  }
+
+  read(sample: Sample): Pose {
+    this.sample = sample;
+    if (sample.layout !== this.layout) this.find(sample.layout);
+    const { x, R, places } = this, { values } = sample;
+    for (let node = 0; 2 * node < places.length; ++node) {
+      const from = places[2 * node], turned = places[2 * node + 1];
+      if (from >= 0) for (let k = 0; k < 3; ++k) x[3 * node + k] = values[from + k];
+      if (turned >= 0) for (let k = 0; k < 9; ++k) R[9 * node + k] = values[turned + k];
+    }
+    return this;
+  }
+
+  private find(layout: Layout): void {
+    this.layout = layout;
+    this.nodes.forEach((node, i) => {
+      this.places[2 * i] = layout.offset(node.positionHandle) ?? -1;
+      this.places[2 * i + 1] = node.orientationHandle === undefined ? -1 : layout.offset(node.orientationHandle) ?? -1;
+    });
+  }
+
+  value(handle: number, element: number): number {
+    return this.sample ? valueOf(this.sample, handle, element) : NaN;
+  }
 }
 
 /** Points of a flexible body in global coordinates, three numbers each, with the deformation enlarged `factor` times. */
 export function deformedPoints(body: FlexibleBody, pose: Pose, amplitudes: readonly number[], factor: number, out: Float32Array): void {
   const modes = body.amplitudes.length;
-  const x = body.node < 0 ? body.fixedPosition : pose.position(body.node);
-  const R = body.node < 0 ? body.fixedOrientation : pose.orientation(body.node);
+  const x = body.node < 0 ? body.fixedPosition : positionOf(pose, body.node);
+  const R = body.node < 0 ? body.fixedOrientation : orientationOf(pose, body.node);
+  const local = [0, 0, 0];
   for (let i = 0; 3 * i < body.positions.length; ++i) {
-    const local = [0, 1, 2].map((row) => {
+    for (let row = 0; row < 3; ++row) {
+      const shape = (3 * i + row) * modes;
       let deformation = 0;
-      for (let mode = 0; mode < modes; ++mode) deformation += body.shapes[(3 * i + row) * modes + mode] * amplitudes[mode];
-      return body.positions[3 * i + row] + factor * deformation;
-    }) as unknown as Vec3;
-    out.set(add(x, rotate(R, local)), 3 * i);
+      for (let mode = 0; mode < modes; ++mode) deformation += body.shapes[shape + mode] * amplitudes[mode];
+      local[row] = body.positions[3 * i + row] + factor * deformation;
+    }
+    for (let row = 0; row < 3; ++row) out[3 * i + row] = x[row] + R[3 * row] * local[0] + R[3 * row + 1] * local[1] + R[3 * row + 2] * local[2];
   }
 }
 

@@ -1,6 +1,6 @@
 /** Eigenmodes as motions of the nodes. */
 import { add, multiply, norm, rotationOf, type Vec3 } from './algebra';
-import type { NodeShape, Pose } from './geometry';
+import { orientationOf, positionOf, type NodeShape, type Pose } from './geometry';
 
 export interface Mode {
   /** Eigenvalue in 1/s. */
@@ -77,12 +77,28 @@ export function amplitude(mode: Mode, reach: number): number {
   return rotation > 0 ? 0.5 / rotation : 0;
 }
 
-/** `base`, moved by the mode at a phase in radians. */
-export function moved(base: Pose, mode: Mode, phase: number, factor: number): Pose {
-  const cos = factor * Math.cos(phase), sin = factor * Math.sin(phase);
-  return {
-    position: (node) => add(base.position(node), vector(mode.motion, 12 * node, cos, sin)),
-    orientation: (node) => multiply(rotationOf(vector(mode.motion, 12 * node + 3, cos, sin)), base.orientation(node)),
-    value: base.value,
-  };
+/** A pose moved by a mode; it is filled anew by each `move`. */
+export class MovedPose implements Pose {
+  readonly x: Float64Array;
+  readonly R: Float64Array;
+
+  constructor(private base: Pose) {
+    this.x = new Float64Array(base.x.length);
+    this.R = new Float64Array(base.R.length);
+  }
+
+  /** `base`, moved by the mode at a phase in radians. */
+  move(base: Pose, mode: Mode, phase: number, factor: number): Pose {
+    this.base = base;
+    const cos = factor * Math.cos(phase), sin = factor * Math.sin(phase);
+    for (let node = 0; 3 * node < this.x.length; ++node) {
+      this.x.set(add(positionOf(base, node), vector(mode.motion, 12 * node, cos, sin)), 3 * node);
+      this.R.set(multiply(rotationOf(vector(mode.motion, 12 * node + 3, cos, sin)), orientationOf(base, node)), 9 * node);
+    }
+    return this;
+  }
+
+  value(handle: number, element: number): number {
+    return this.base.value(handle, element);
+  }
 }

@@ -1,6 +1,7 @@
 import { describe, expect, test } from 'vitest';
 import { rotationOf, type Mat3 } from '../src/algebra';
-import { deformedPoints, finish, initialPose, pointAt, poseOf, type FlexibleBody, type NodeShape } from '../src/geometry';
+import { deformedPoints, finish, initialPose, orientationOf, pointAt, PoseReader, positionOf, type FlexibleBody, type NodeShape } from '../src/geometry';
+import { Layout } from '../src/recording';
 
 const R = rotationOf([0, 0, Math.PI / 2]);
 const nodes: NodeShape[] = [
@@ -20,12 +21,16 @@ describe('points', () => {
   });
 
   test('follow a sample, and stay where the sample says nothing', () => {
-    const offsets = new Map([[0, 1]]);
-    const pose = poseOf(nodes, [9, 5, 6, 7], (handle) => offsets.get(handle));
-    close(pose.position(0), [5, 6, 7]);
-    close(pose.orientation(0), R);
-    close(pose.position(1), [3, 4, 0]);
+    const layout = new Layout([{ handle: 5, size: 1 }, { handle: 0, size: 3 }]);
+    const reader = new PoseReader(nodes), pose = reader.read({ step: 1, time: 0, layout, values: Float64Array.of(9, 5, 6, 7) });
+    close(positionOf(pose, 0), [5, 6, 7]);
+    close(orientationOf(pose, 0), R);
+    close(positionOf(pose, 1), [3, 4, 0]);
     expect(pose.value(0, 2)).toBe(7);
+    const wider = new Layout([{ handle: 2, size: 3 }, { handle: 0, size: 3 }]);
+    expect(reader.read({ step: 2, time: 1, layout: wider, values: Float64Array.of(1, 2, 3, 4, 5, 6) })).toBe(pose);
+    close(positionOf(pose, 0), [4, 5, 6]);
+    close(positionOf(pose, 1), [1, 2, 3]);
     expect(pose.value(8, 0)).toBeNaN();
   });
 });

@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 import type { NodeShape } from '../src/geometry';
-import { initialPose } from '../src/geometry';
-import { amplitude, damping, frequency, modesOf, moved, unknownsOfNodes } from '../src/modes';
+import { initialPose, orientationOf, positionOf } from '../src/geometry';
+import { amplitude, damping, frequency, modesOf, MovedPose, unknownsOfNodes } from '../src/modes';
 
 const nodes: NodeShape[] = [
   { label: 1, kind: 'static', name: '', position: [0, 0, 0], orientation: [1, 0, 0, 0, 1, 0, 0, 0, 1], positionHandle: 0 },
@@ -28,10 +28,11 @@ test('a mode has one frequency, damping and motion of a conjugate pair', () => {
   expect(frequency(mode)).toBeCloseTo(4 / (2 * Math.PI), 12);
   expect(damping(mode)).toBeCloseTo(0.3 / Math.hypot(0.3, 4), 12);
   expect(amplitude(mode, 0.01)).toBeCloseTo(0.5, 12);
-  const pose = moved(initialPose(nodes), mode, 0, 0.5);
-  expect(pose.position(0)).toEqual([0, 0, 0]);
-  expect(pose.position(1)).toEqual([1, 0, 0.01]);
-  const quarter = moved(initialPose(nodes), mode, Math.PI / 2, 0.5);
-  expect(quarter.position(1)[2]).toBeCloseTo(0, 12);
-  expect(quarter.orientation(1)[5]).toBeCloseTo(Math.sin(0.25), 12);  // turned about x by −0.25 rad
+  const base = initialPose(nodes), pose = new MovedPose(base);
+  pose.move(base, mode, 0, 0.5);
+  expect(positionOf(pose, 0)).toEqual([0, 0, 0]);
+  expect(positionOf(pose, 1)).toEqual([1, 0, 0.01]);
+  pose.move(base, mode, Math.PI / 2, 0.5);
+  expect(positionOf(pose, 1)[2]).toBeCloseTo(0, 12);
+  expect(orientationOf(pose, 1)[5]).toBeCloseTo(Math.sin(0.25), 12);  // turned about x by −0.25 rad
 });

@@ -1,17 +1,18 @@
 /** The scene with its tools. */
-import type { Vec3 } from '../algebra';
+import { vec3, type Vec3 } from '../algebra';
 import type { Desk } from '../desk';
 import { h, icon, iconButton } from '../dom';
 import { number } from '../format';
-import { amplitude, moved, type Mode } from '../modes';
-import { pointAt, poseOf } from '../geometry';
+
+import { PoseReader } from '../geometry';
+import { amplitude, MovedPose, type Mode } from '../modes';
 import type { Layer } from '../scene/build';
 import { DARK, LIGHT } from '../scene/palette';
 import { View, type ViewName } from '../scene/view';
 import type { Session } from '../session';
 
 const LAYERS: [Layer, string][] = [
-  ['bodies', 'bodies'], ['joints', 'joints'], ['lines', 'beams and rods'], ['surfaces', 'shells'], ['flexible', 'flexible bodies'],
+  ['bodies', 'bodies'], ['joints', 'joints'], ['beams', 'beams'], ['lines', 'rods and springs'], ['surfaces', 'shells'], ['flexible', 'flexible bodies'],
   ['forces', 'forces and moments'], ['links', 'links to nodes'], ['nodes', 'nodes'],
 ];
 const TRAIL_SAMPLES = 2000;
@@ -24,8 +25,10 @@ export class ScenePanel {
   /** Nodes whose paths are drawn, by index. */
   private readonly trails = new Set<number>();
   private readonly hud = h('div', { class: 'hud', role: 'status', 'aria-live': 'off' });
+  private reader = new PoseReader([]);
   private other?: Session;
-  private mode?: { mode: Mode; factor: number };
+  private otherReader = new PoseReader([]);
+  private mode?: { mode: Mode; factor: number; pose: MovedPose };
   private unwatchOther = () => {};
 
   constructor(private readonly desk: Desk) {
@@ -37,6 +40,8 @@ export class ScenePanel {
       this.trails.clear();
       this.compareWith(undefined);
       this.view.follow(-1);
+      this.mode = undefined;
+      this.reader = new PoseReader(shown?.geometry.nodes ?? []);
       if (shown) this.view.show(shown.geometry);
     });
     desk.selected.watch((id) => this.view.select(id));
@@ -70,6 +75,7 @@ export class ScenePanel {
     this.unwatchOther();
     this.other?.close();
     this.other = session;
+    this.otherReader = new PoseReader(session?.geometry.nodes ?? []);
     this.view.compare(session?.geometry);
     this.unwatchOther = session ? session.changed.watch(() => this.desk.invalidate()) : () => {};
   }
@@ -78,7 +84,7 @@ export class ScenePanel {
   animate(mode: Mode | undefined, size: number): void {
     const extent = this.desk.shown.value?.geometry.extent ?? 1;
     const idle = this.mode === undefined;
-    this.mode = mode && { mode, factor: amplitude(mode, size * extent) };
+    this.mode = mode && { mode, factor: amplitude(mode, size * extent), pose: new MovedPose(this.reader) };
     if (this.mode && idle) this.vibrate();
     else this.desk.invalidate();
   }
@@ -94,9 +100,9 @@ export class ScenePanel {
   private update(): void {
     const shown = this.desk.shown.value, sample = this.desk.sample;
     if (!shown || !sample) return this.hud.replaceChildren();
-    const pose = poseOf(shown.geometry.nodes, sample.values, (handle) => sample.layout.offset(handle));
+    const pose = this.reader.read(sample);
     const phase = (performance.now() / 1000) * 2 * Math.PI * MODE_HERTZ;
-    this.view.setPose(this.mode ? moved(pose, this.mode.mode, phase, this.mode.factor) : pose);
+    this.view.setPose(this.mode ? this.mode.pose.move(pose, this.mode.mode, phase, this.mode.factor) : pose);
     this.updateOther(sample.time);
     this.view.setTrails([...this.trails].map((node) => this.path(node)));
     this.hud.replaceChildren(h('strong', {}, `${number(sample.time, 6)} s`), h('div', { class: 'soft' }, `step ${sample.step}`));
@@ -105,7 +111,7 @@ export class ScenePanel {
   private updateOther(time: number): void {
     const recording = this.other?.recording;
     const sample = recording && (this.desk.cursor.value === undefined ? recording.last : recording.samples[recording.indexAt(time)]);
-    if (this.other && sample) this.view.setGhostPose(poseOf(this.other.geometry.nodes, sample.values, (handle) => sample.layout.offset(handle)));
+    if (this.other && sample) this.view.setGhostPose(this.otherReader.read(sample));
   }
 
   private path(node: number): Vec3[] {
@@ -113,11 +119,10 @@ export class ScenePanel {
     if (!shown || !last) return [];
     const samples = shown.recording.samples, end = shown.recording.indexAt(last.time);
     const stride = Math.max(1, Math.ceil((end + 1) / TRAIL_SAMPLES));
-    const path: Vec3[] = [];
+    const path: Vec3[] = [], handle = shown.geometry.nodes[node].positionHandle;
     for (let i = 0; i <= end; i += stride) {
-      const sample = samples[i];
-      const pose = poseOf(shown.geometry.nodes, sample.values, (handle) => sample.layout.offset(handle));
-      path.push(pointAt(pose, { name: '', node, offset: [0, 0, 0] }));
+      const at = samples[i].layout.offset(handle);
+      if (at !== undefined) path.push(vec3(samples[i].values, at));
     }
     return path;
   }

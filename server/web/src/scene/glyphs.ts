@@ -3,7 +3,7 @@ import * as THREE from 'three';
 import { mergeGeometries } from 'three/examples/jsm/utils/BufferGeometryUtils.js';
 
 export type GlyphName =
-  | 'sphere' | 'ball' | 'clamp' | 'hinge' | 'slider' | 'plate' | 'cross' | 'octahedron' | 'spring' | 'drive' | 'box' | 'node' | 'wheel';
+  | 'sphere' | 'ball' | 'clamp' | 'hinge' | 'slider' | 'plate' | 'cross' | 'octahedron' | 'spring' | 'drive' | 'box' | 'node' | 'wheel' | 'wing' | 'disc' | 'sensor';
 
 function merged(...parts: THREE.BufferGeometry[]): THREE.BufferGeometry {
   return mergeGeometries(parts);
@@ -47,6 +47,9 @@ const MAKERS: Record<GlyphName, (d: Detail) => THREE.BufferGeometry> = {
   ),
   wheel: (d) => merged(torus(0.45, 0.1, d), cylinderAlong('z', 0.08, 0.6, d)),
   box: () => box(0.6, 0.6, 0.6),
+  wing: (d) => new THREE.CylinderGeometry(0.5, 0.5, 1.2, d.round(24)).scale(1, 1, 0.16),
+  disc: (d) => merged(torus(0.62, 0.03, d), torus(0.36, 0.03, d), cylinderAlong('z', 0.12, 0.4, d)),
+  sensor: (d) => merged(box(0.46, 0.46, 0.2), cylinderAlong('z', 0.07, 0.7, d)),
 };
 
 /** What is drawn in place of the above where there are many. */
@@ -54,10 +57,11 @@ const PLAIN: Partial<Record<GlyphName, (d: Detail) => THREE.BufferGeometry>> = {
   node: () => new THREE.OctahedronGeometry(0.5),
   ball: () => new THREE.OctahedronGeometry(0.45, 1),
   spring: () => new THREE.CylinderGeometry(0.25, 0.25, 0.9, 8).rotateX(Math.PI / 2),
+  sphere: () => new THREE.SphereGeometry(1, 8, 5),
 };
 
 /** Above so many of a kind, each is drawn with fewer corners. */
-const MANY = 120;
+export const MANY = 120;
 const made = new Map<string, THREE.BufferGeometry>();
 
 export function glyph(name: GlyphName, count: number): THREE.BufferGeometry {
@@ -83,4 +87,17 @@ const JOINTS: [RegExp, GlyphName][] = [
 /** What a joint of this type looks like. */
 export function jointGlyph(type: string): GlyphName {
   return JOINTS.find(([pattern]) => pattern.test(type))?.[1] ?? 'octahedron';
+}
+
+const FAMILIES: [RegExp, GlyphName][] = [
+  [/rotor|induced velocity|inflow/, 'disc'],
+  [/aero|aircraft|wing/, 'wing'],
+  [/accelerometer|displacement|sensor|electric/, 'sensor'],
+  [/motor/, 'wheel'],
+];
+
+/** What an element looks like that nothing but its points shows. */
+export function elementGlyph(family: string, type: string): GlyphName {
+  if (family === 'joint') return jointGlyph(type);
+  return FAMILIES.find(([pattern]) => pattern.test(`${type} ${family}`))?.[1] ?? 'box';
 }

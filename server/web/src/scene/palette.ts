@@ -15,6 +15,8 @@ export interface Palette {
   moment: string;
   reaction: string;
   flexible: string;
+  strained: string;
+  velocity: string;
   other: string;
   trail: string;
   selected: string;
@@ -35,6 +37,8 @@ export const DARK: Palette = {
   moment: '#b980ff',
   reaction: '#ff9f6b',
   flexible: '#5cb8ff',
+  strained: '#ffb347',
+  velocity: '#4fd1c5',
   other: '#9aa7b4',
   trail: '#ffd166',
   selected: '#ffe14d',
@@ -55,6 +59,8 @@ export const LIGHT: Palette = {
   moment: '#7a3fd0',
   reaction: '#c8602a',
   flexible: '#1469b8',
+  strained: '#c44f00',
+  velocity: '#007f86',
   other: '#6a7785',
   trail: '#b07a00',
   selected: '#d6006c',

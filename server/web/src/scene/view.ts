@@ -3,11 +3,15 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { LineMaterial } from 'three/examples/jsm/lines/LineMaterial.js';
 import type { Vec3 } from '../algebra';
-import { initialPose, type Geometry, type Pose } from '../geometry';
-import { FlexibleBatch } from './batches';
-import { build, type Drawn, type Layer } from './build';
+import { initialPose, positionOf, type Geometry, type Pose } from '../geometry';
+import { FlexibleBatch } from './batches/flexible';
+import { Drawn, type Layer } from './build';
+import { Grid } from './grid';
 import type { Palette } from './palette';
+import { isSoftware, Quality, rendererName } from './quality';
+import { drawnBy } from './solids';
 import { Trails } from './trails';
+import { triad } from './triad';
 
 /** Views along axes: where the camera stands, and what is up. */
 export const VIEWS = {
@@ -30,10 +34,10 @@ export class View {
   private readonly orthographic = new THREE.OrthographicCamera();
   private camera: THREE.PerspectiveCamera | THREE.OrthographicCamera = this.perspective;
   private controls: OrbitControls;
-  private readonly triad = new THREE.Scene();
+  private readonly triad = triad();
   private readonly triadCamera = new THREE.PerspectiveCamera(30, 1, 0.1, 10);
   private readonly hidden = new Set<Layer>();
-  private grid?: THREE.Group;
+  private grid?: Grid;
   private drawn?: Drawn;
   private ghost?: Drawn;
   private trails?: Trails;
@@ -45,10 +49,22 @@ export class View {
   private followedAt?: THREE.Vector3;
   private deformation = 1;
   private dirty = true;
+  /** Drawn with all pixels since it last changed. */
+  private fine = false;
+  /** When the last picture was begun; undefined: the page has had its turn since. */
+  private begun?: number;
+  private calls = 0;
+  private readonly size = new THREE.Vector2();
+  private readonly quality: Quality;
   private pressedAt?: [number, number];
 
   constructor(parent: HTMLElement, private palette: Palette) {
-    this.renderer = new THREE.WebGLRenderer({ antialias: true });
+    const software = isSoftware(rendererName());
+    drawnBy(!software);
+    this.renderer = new THREE.WebGLRenderer({ antialias: !software });
+    this.renderer.info.autoReset = false;
+    const sharp = Math.min(devicePixelRatio, 2);
+    this.quality = software ? new Quality([1, 0.75, 0.5], 2) : new Quality([sharp, 1, 0.75], sharp);
     this.canvas = this.renderer.domElement;
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute('aria-label', 'The model in three dimensions. Arrow keys turn it, + and − zoom.');
@@ -57,16 +73,10 @@ export class View {
     this.renderer.autoClear = false;
     this.controls = this.newControls();
     this.addLights(this.scene);
-    this.addLights(this.triad);
-    this.addTriad();
     this.listen();
     new ResizeObserver(() => this.resize()).observe(parent);
     this.resize();
-    const frame = () => {
-      requestAnimationFrame(frame);
-      if (this.dirty) this.render();
-    };
-    frame();
+    requestAnimationFrame((now) => this.frame(now));
   }
 
   // ---- what is shown
@@ -74,11 +84,12 @@ export class View {
   show(geometry: Geometry, keepView = false): void {
     this.clear();
     this.geometry = geometry;
-    this.drawn = build(geometry, this.palette);
+    this.drawn = new Drawn(geometry, this.palette);
     this.addBatches(this.drawn, 1);
     this.trails = new Trails(new THREE.Color(this.palette.trail));
     this.scene.add(this.trails.object);
-    this.addGrid(geometry);
+    this.grid = new Grid(geometry, this.palette);
+    this.scene.add(this.grid.object);
     this.setPose(initialPose(geometry.nodes));
     this.setDeformation(this.deformation);
     if (!keepView) this.look('iso');
@@ -87,7 +98,7 @@ export class View {
   /** Another simulation in the same picture, pale. */
   compare(geometry: Geometry | undefined): void {
     if (this.ghost) this.removeBatches(this.ghost);
-    this.ghost = geometry && build(geometry, this.palette);
+    this.ghost = geometry && new Drawn(geometry, this.palette);
     if (this.ghost) this.addBatches(this.ghost, 0.25);
     if (geometry) this.setGhostPose(initialPose(geometry.nodes));
     this.invalidate();
@@ -95,14 +106,14 @@ export class View {
 
   setPose(pose: Pose): void {
     this.pose = pose;
-    for (const { layer, batch } of this.drawn?.batches ?? []) if (!this.hidden.has(layer)) batch.update(pose);
+    this.drawn?.update(pose);
     this.moveWithNode();
     this.invalidate();
   }
 
   setGhostPose(pose: Pose): void {
     this.ghostPose = pose;
-    for (const { layer, batch } of this.ghost?.batches ?? []) if (!this.hidden.has(layer)) batch.update(pose);
+    this.ghost?.update(pose);
     this.invalidate();
   }
 
@@ -121,7 +132,7 @@ export class View {
   }
 
   setGrid(visible: boolean): void {
-    if (this.grid) this.grid.visible = visible;
+    if (this.grid) this.grid.object.visible = visible;
     this.invalidate();
   }
 
@@ -141,7 +152,7 @@ export class View {
   setPalette(palette: Palette): void {
     this.palette = palette;
     if (!this.geometry) return this.invalidate();
-    const pose = this.pose, ghostPose = this.ghostPose, grid = this.grid?.visible ?? true;
+    const pose = this.pose, ghostPose = this.ghostPose, grid = this.grid?.object.visible ?? true;
     this.show(this.geometry, true);
     if (pose) this.setPose(pose);
     if (ghostPose) this.setGhostPose(ghostPose);
@@ -152,9 +163,7 @@ export class View {
 
   /** What is drawn for a node: its matrix, 16 numbers by columns, as the graphics card has it. */
   nodeMatrix(index: number): number[] {
-    const matrix = new THREE.Matrix4();
-    this.drawn?.nodes.object.getMatrixAt(index, matrix);
-    return matrix.toArray();
+    return Array.from(this.drawn?.nodes.matrices.subarray(16 * index, 16 * index + 16) ?? []);
   }
 
   // ---- how it is looked at
@@ -162,7 +171,7 @@ export class View {
   look(name: ViewName): void {
     const { from, up } = VIEWS[name];
     const extent = this.geometry?.extent ?? 1, centre = this.middle();
-    const target = this.followed >= 0 && this.pose ? this.pose.position(this.followed) : centre;
+    const target = this.followed >= 0 && this.pose ? positionOf(this.pose, this.followed) : centre;
     this.controls.target.set(...target);
     for (const camera of [this.perspective, this.orthographic]) {
       camera.up.set(up[0], up[1], up[2]);
@@ -190,7 +199,7 @@ export class View {
     const count = this.geometry?.nodes.length ?? 0;
     if (!this.pose || count === 0) return this.geometry?.centre ?? [0, 0, 0];
     const box = new THREE.Box3();
-    for (let node = 0; node < count; ++node) box.expandByPoint(new THREE.Vector3(...this.pose.position(node)));
+    for (let node = 0; node < count; ++node) box.expandByPoint(new THREE.Vector3(...positionOf(this.pose, node)));
     return box.getCenter(new THREE.Vector3()).toArray();
   }
 
@@ -215,7 +224,7 @@ export class View {
 
   private moveWithNode(): void {
     if (this.followed < 0 || !this.pose) return;
-    const at = new THREE.Vector3(...this.pose.position(this.followed));
+    const at = new THREE.Vector3(...positionOf(this.pose, this.followed));
     const moved = at.clone().sub(this.followedAt ?? this.controls.target);
     this.controls.target.add(moved);
     this.camera.position.add(moved);
@@ -247,12 +256,22 @@ export class View {
   }
 
   picture(): Promise<Blob | null> {
-    this.render();  // what was drawn before is gone from the buffer
+    this.render(this.quality.still);  // what was drawn before is gone from the buffer
     return new Promise((resolve) => this.canvas.toBlob(resolve, 'image/png'));
   }
 
   invalidate(): void {
     this.dirty = true;
+  }
+
+  /** Calls to the graphics card in the last picture. */
+  get drawCalls(): number {
+    return this.calls;
+  }
+
+  /** Length of the grid's cells; 0: nothing is shown. */
+  get cell(): number {
+    return this.grid?.cell ?? 0;
   }
 
   // ---- the inside
@@ -275,7 +294,7 @@ export class View {
   private clear(): void {
     if (this.drawn) this.removeBatches(this.drawn);
     if (this.trails) this.scene.remove(this.trails.object);
-    if (this.grid) this.scene.remove(this.grid);
+    if (this.grid) this.scene.remove(this.grid.object);
     this.drawn = undefined;
   }
 
@@ -286,42 +305,9 @@ export class View {
     scene.add(sun);
   }
 
-  private addGrid(geometry: Geometry): void {
-    const cell = 10 ** Math.floor(Math.log10(geometry.extent / 2));
-    const cells = 2 * Math.ceil(geometry.extent / cell) + 2;
-    this.grid = new THREE.Group();
-    for (const [parts, opacity] of [[10, 0.28], [2, 0.55], [1, 1]]) this.grid.add(this.gridLines(cells, cell, parts, opacity));
-    const lowest = Math.min(0, ...geometry.nodes.map((node) => node.position[2]));
-    this.grid.position.set(Math.round(geometry.centre[0] / cell) * cell, Math.round(geometry.centre[1] / cell) * cell, lowest - 0.02 * geometry.extent);
-    this.scene.add(this.grid);
-  }
-
-  private gridLines(cells: number, cell: number, parts: number, opacity: number): THREE.GridHelper {
-    const lines = new THREE.GridHelper(cells * cell, cells * parts, this.palette.grid, this.palette.grid);
-    lines.rotateX(Math.PI / 2);
-    Object.assign(lines.material, { transparent: true, opacity });
-    return lines;
-  }
-
-  private addTriad(): void {
-    const axes: [THREE.Vector3, string][] = [
-      [new THREE.Vector3(1, 0, 0), '#e5484d'],
-      [new THREE.Vector3(0, 1, 0), '#30a46c'],
-      [new THREE.Vector3(0, 0, 1), '#3e8bff'],
-    ];
-    for (const [axis, colour] of axes) {
-      const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis);
-      const material = new THREE.MeshBasicMaterial({ color: colour });
-      const shaft = new THREE.Mesh(new THREE.CylinderGeometry(0.035, 0.035, 0.7, 12).translate(0, 0.35, 0), material);
-      const head = new THREE.Mesh(new THREE.ConeGeometry(0.1, 0.25, 16).translate(0, 0.8, 0), material);
-      for (const mesh of [shaft, head]) mesh.quaternion.copy(turn), this.triad.add(mesh);
-    }
-  }
-
   private resize(): void {
     const parent = this.canvas.parentElement;
     const width = Math.max(parent?.clientWidth ?? 1, 1), height = Math.max(parent?.clientHeight ?? 1, 1);
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height);
     this.perspective.aspect = width / height;
     this.perspective.updateProjectionMatrix();
@@ -335,11 +321,29 @@ export class View {
     this.invalidate();
   }
 
-  private render(): void {
+  /** Once for each turn of the page: draws what changed, and once more, finely, what then rests. */
+  private frame(now: number): void {
+    requestAnimationFrame((next) => this.frame(next));
+    if (this.begun !== undefined) this.quality.took(this.begun, now);
+    this.begun = undefined;
+    if (this.dirty) {
+      this.begun = now;
+      this.render(this.quality.ratio);
+      this.fine = this.quality.ratio >= this.quality.still;
+    } else if (!this.fine && this.quality.rests(now)) {
+      this.render(this.quality.still);
+      this.fine = true;
+    }
+  }
+
+  private render(ratio: number): void {
     this.dirty = false;
-    const { width, height } = this.renderer.getSize(new THREE.Vector2());
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    this.renderer.getSize(this.size);
+    const { width, height } = this.size;
     this.renderer.setClearColor(this.palette.background);
     this.renderer.setViewport(0, 0, width, height);
+    this.renderer.info.reset();
     this.renderer.clear();
     this.renderer.render(this.scene, this.camera);
     this.triadCamera.position.copy(this.camera.position).sub(this.controls.target).setLength(4.2);
@@ -349,6 +353,7 @@ export class View {
     this.renderer.clearDepth();
     this.renderer.setViewport(8, 8, corner, corner);
     this.renderer.render(this.triad, this.triadCamera);
+    this.calls = this.renderer.info.render.calls;
   }
 
   private listen(): void {

@@ -1,0 +1,77 @@
+/** Arrows: loads, reactions, velocities. */
+import * as THREE from 'three';
+import type { Pose } from '../../geometry';
+import type { Points } from '../points';
+import { solids, type Solids } from '../solids';
+import type { Batch } from './batch';
+import { writeBar } from './matrices';
+
+export interface ArrowItem {
+  id: string;
+  point: number;
+  /** Its global components at a pose. */
+  read(pose: Pose, out: number[]): void;
+}
+
+const SHAFT = new THREE.CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0);
+const HEAD = new THREE.ConeGeometry(1, 1, 16).translate(0, -0.5, 0);
+/** Parts of the longest arrow. */
+const WIDTH = 0.022, HEAD_LENGTH = 0.2, HEAD_WIDTH = 0.38;
+
+/** The longest arrow seen so far has the length `reach`. Loads push at their points with their tips; others begin there. */
+export class ArrowBatch implements Batch {
+  readonly object = new THREE.Group();
+  private readonly shafts: Solids;
+  private readonly heads: Solids;
+  private readonly vectors: number[][];
+  private largest = 0;
+  private readonly direction = [0, 0, 1];
+  private readonly place = [0, 0, 0];
+
+  constructor(private readonly items: ArrowItem[], private readonly points: Points, private readonly colour: THREE.Color, private readonly reach: number, private readonly tipAtPoint: boolean) {
+    this.shafts = solids(SHAFT, items.length);
+    this.heads = solids(HEAD, items.length);
+    this.vectors = items.map(() => [0, 0, 0]);
+    this.object.add(this.shafts.object, this.heads.object);
+    this.highlight(undefined, colour);
+  }
+
+  update(pose: Pose): void {
+    this.items.forEach((item, i) => {
+      const vector = this.vectors[i];
+      item.read(pose, vector);
+      for (let k = 0; k < 3; ++k) if (!Number.isFinite(vector[k])) vector[k] = 0;
+      this.largest = Math.max(this.largest, Math.hypot(vector[0], vector[1], vector[2]));
+    });
+    this.items.forEach((_, i) => this.write(i));
+    this.shafts.moved();
+    this.heads.moved();
+  }
+
+  private write(i: number): void {
+    const { direction, place, vectors, points, reach } = this;
+    const size = Math.hypot(vectors[i][0], vectors[i][1], vectors[i][2]);
+    const length = this.largest > 0 ? (reach * size) / this.largest : 0;
+    const head = Math.min(reach * HEAD_LENGTH, length), from = 3 * this.items[i].point;
+    for (let k = 0; k < 3; ++k) direction[k] = size > 0 ? vectors[i][k] / size : Number(k === 2);
+    const begin = this.tipAtPoint ? -length : 0;
+    for (let k = 0; k < 3; ++k) place[k] = points.x[from + k] + begin * direction[k];
+    writeBar(this.shafts.matrices, 16 * i, place, direction, Math.max(length - head, 0), length > 0 ? reach * WIDTH : 0);
+    for (let k = 0; k < 3; ++k) place[k] += length * direction[k];
+    writeBar(this.heads.matrices, 16 * i, place, direction, head, head * HEAD_WIDTH);
+  }
+
+  idOf(hit: THREE.Intersection): string | undefined {
+    const copy = [this.shafts, this.heads].find((part) => part.object === hit.object)?.copyOf(hit);
+    return copy === undefined ? undefined : this.items[copy]?.id;
+  }
+
+  highlight(id: string | undefined, selected: THREE.Color): void {
+    for (const part of [this.shafts, this.heads]) this.items.forEach((item, i) => part.paint(i, item.id === id ? selected : this.colour));
+  }
+
+  dispose(): void {
+    this.shafts.dispose();
+    this.heads.dispose();
+  }
+}

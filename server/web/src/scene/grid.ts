@@ -1,0 +1,49 @@
+/** The ground: lines at round distances that fade out, in one call. */
+import * as THREE from 'three';
+import type { Geometry } from '../geometry';
+import type { Palette } from './palette';
+
+/** Parts of a cell between its lines. */
+const PARTS = 5;
+/** Pieces of each line: it fades from piece to piece. */
+const PIECES = 12;
+const FAINT = 0.38, STRONG = 0.95;
+
+export class Grid {
+  readonly object: THREE.LineSegments;
+  /** Length of a cell. */
+  readonly cell: number;
+
+  constructor(geometry: Geometry, palette: Palette) {
+    this.cell = 10 ** Math.floor(Math.log10(geometry.extent / 1.5));
+    const reach = Math.ceil((1.2 * geometry.extent) / this.cell) * this.cell;
+    const lines = this.lines(reach, new THREE.Color(palette.grid), new THREE.Color(palette.background));
+    this.object = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ vertexColors: true }));
+    const lowest = geometry.nodes.reduce((least, node) => Math.min(least, node.position[2]), 0);
+    const [x, y] = geometry.centre.map((value) => Math.round(value / this.cell) * this.cell);
+    this.object.position.set(x, y, lowest - 0.02 * geometry.extent);
+    this.object.renderOrder = -1;
+  }
+
+  private lines(reach: number, line: THREE.Color, ground: THREE.Color): THREE.BufferGeometry {
+    const positions: number[] = [], colours: number[] = [], colour = new THREE.Color();
+    const corner = (x: number, y: number, strength: number) => {
+      const part = Math.max(0, 1 - Math.hypot(x, y) / reach);
+      positions.push(x, y, 0);
+      colours.push(...colour.lerpColors(ground, line, strength * Math.min(1, 1.8 * part)).toArray());
+    };
+    const step = this.cell / PARTS, count = Math.round(reach / step);
+    for (let i = -count; i <= count; ++i) {
+      const at = i * step, strength = i % PARTS === 0 ? STRONG : FAINT, half = Math.sqrt(Math.max(reach ** 2 - at ** 2, 0));
+      for (let piece = 0; piece < PIECES; ++piece) {
+        const from = -half + (2 * half * piece) / PIECES, to = -half + (2 * half * (piece + 1)) / PIECES;
+        corner(from, at, strength), corner(to, at, strength);
+        corner(at, from, strength), corner(at, to, strength);
+      }
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.Float32BufferAttribute(positions, 3));
+    geometry.setAttribute('color', new THREE.Float32BufferAttribute(colours, 3));
+    return geometry;
+  }
+}

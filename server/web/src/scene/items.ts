@@ -1,0 +1,131 @@
+/** From a model's shape to the things that are drawn, by kind. */
+import { IDENTITY, inertiaEllipsoid, norm, type Mat3, type Vec3 } from '../algebra';
+import { BeamCurve } from '../beam_curve';
+import { initialPose, orientationOf, type ElementShape, type Geometry, type Pose } from '../geometry';
+import type { ArrowItem } from './batches/arrows';
+import type { BarItem } from './batches/bars';
+import type { BeamItem } from './batches/beams';
+import type { FaceItem } from './batches/faces';
+import type { GlyphItem } from './batches/glyphs';
+import type { LineItem } from './batches/lines';
+import { elementGlyph, type GlyphName } from './glyphs';
+import { coil, straight } from './line_items';
+import { Points } from './points';
+
+/** Stations along a beam; fewer where there are many. */
+const BEAM_STATIONS = 13, MANY_BEAMS = 150;
+
+export class Items {
+  readonly points: Points;
+  readonly links: LineItem[] = [];
+  readonly springs: LineItem[] = [];
+  readonly others: LineItem[] = [];
+  readonly beams: BeamItem[] = [];
+  readonly barrels: BarItem[] = [];
+  readonly rods: BarItem[] = [];
+  readonly joints = new Map<GlyphName, GlyphItem[]>();
+  readonly bodies: GlyphItem[] = [];
+  readonly faces: FaceItem[] = [];
+  readonly forces: ArrowItem[] = [];
+  readonly moments: ArrowItem[] = [];
+  /** Glyphs' size. */
+  readonly size: number;
+  private readonly pose: Pose;
+  private readonly stations: number;
+
+  constructor(readonly geometry: Geometry) {
+    this.points = new Points(geometry.nodes.length);
+    this.size = glyphSize(geometry);
+    this.pose = initialPose(geometry.nodes);
+    const beams = geometry.elements.reduce((sum, element) => sum + Number(isBeam(element)), 0);
+    this.stations = beams > MANY_BEAMS ? 5 : BEAM_STATIONS;
+    for (const element of geometry.elements) this.collect(element);
+    this.points.update(this.pose);
+  }
+
+  private collect(element: ElementShape): void {
+    const points = element.points.map((point) => this.points.add(point));
+    element.points.forEach((shape, i) => {
+      if (shape.node >= 0 && norm(shape.offset) > 0) this.links.push(straight(element.id, [shape.node, points[i]], this.points));
+    });
+    this.addMasses(element, points);
+    for (const line of element.lines) this.addLine(element, line.points.map((index) => points[index]));
+    for (const surface of element.surfaces) this.faces.push({ id: element.id, points: surface.points.map((index) => points[index]) });
+    for (const arrow of element.arrows) (arrow.moment ? this.moments : this.forces).push(loadArrow(element.id, points[arrow.point], arrow));
+    this.addGlyph(element, points);
+  }
+
+  private addMasses(element: ElementShape, points: number[]): void {
+    const least = 0.3 * this.size;  // a point mass is seen, too
+    for (const mass of element.masses) {
+      const axes = inertiaEllipsoid(mass.mass, mass.moments);
+      this.bodies.push({ id: element.id, point: points[mass.point], local: mass.axes, size: axes.map((axis) => Math.max(axis, least)) as unknown as Vec3 });
+    }
+  }
+
+  private addLine(element: ElementShape, points: number[]): void {
+    const word = `${element.family} ${element.type}`;
+    if (isBeam(element)) this.addBeam(element.id, points);
+    else if (/actuator/.test(word) && points.length === 2) this.addActuator(element.id, points);
+    else if (/rod|spring|viscous/.test(word) && points.length === 2) this.springs.push(coil(element.id, points, 0.3 * this.size, this.points));
+    else this.others.push(straight(element.id, points, this.points));
+  }
+
+  private addBeam(id: string, points: number[]): void {
+    this.points.update(this.pose);
+    const nodes = points.map((point) => this.points.node(point));
+    const curve = new BeamCurve(points, nodes, this.points.x, (node) => (node < 0 ? IDENTITY : orientationOf(this.pose, node)), this.stations);
+    this.beams.push({ id, curve, width: 0.22 * this.size, height: 0.11 * this.size });
+  }
+
+  /** A barrel that keeps its length, and a rod that comes out of it. */
+  private addActuator(id: string, [from, to]: number[]): void {
+    this.points.update(this.pose);
+    const x = this.points.x, length = Math.hypot(...[0, 1, 2].map((k) => x[3 * to + k] - x[3 * from + k]));
+    const barrel = 0.62 * length, rod = 0.7 * length;
+    this.barrels.push({ id, from, to, span: () => [0, barrel], radius: 0.34 * this.size });
+    this.rods.push({ id, from, to, span: (now) => [Math.max(now - rod, 0), now], radius: 0.15 * this.size });
+  }
+
+  /** Where nothing else shows the element, or a joint stands at a hinge. */
+  private addGlyph(element: ElementShape, points: number[]): void {
+    if (element.lines.length + element.surfaces.length + element.masses.length + element.arrows.length > 0) return;
+    if (points.length === 0 || this.geometry.bodies.some((body) => `joint:${body.joint}` === element.id)) return;
+    const frame = element.frames[0], name = elementGlyph(element.family, element.type), size = this.size;
+    this.addItem(name, { id: element.id, point: points[frame?.point ?? 0], local: frame?.orientation ?? IDENTITY, size: [size, size, size] });
+    if (name === 'spring' && points.length === 2) this.springs.push(coil(element.id, points, 0.3 * size, this.points));
+    else if (points.length > 1) this.others.push(straight(element.id, points, this.points));
+  }
+
+  private addItem(name: GlyphName, item: GlyphItem): void {
+    const list = this.joints.get(name);
+    if (list) list.push(item);
+    else this.joints.set(name, [item]);
+  }
+}
+
+function isBeam(element: ElementShape): boolean {
+  return element.lines.length > 0 && (/beam/.test(`${element.family} ${element.type}`) || element.lines.some((line) => line.curved));
+}
+
+function loadArrow(id: string, point: number, { handle, sign }: { handle: number; sign: number }): ArrowItem {
+  return {
+    id,
+    point,
+    read(pose, out) {
+      for (let k = 0; k < 3; ++k) out[k] = sign * pose.value(handle, k);
+    },
+  };
+}
+
+/** Joints and nodes are small against the model, and against the distance between its nodes. */
+export function glyphSize(geometry: Geometry): number {
+  const nodes = Math.max(geometry.nodes.length, 1);
+  return geometry.extent * Math.min(0.05, Math.max(0.012, 0.22 / Math.sqrt(nodes)));
+}
+
+/** A glyph for each node. */
+export function nodeItems(geometry: Geometry, size: number): GlyphItem[] {
+  const sizes: Vec3 = [size, size, size], local: Mat3 = IDENTITY;
+  return geometry.nodes.map((node, point) => ({ id: `node.structural:${node.label}`, point, local, size: sizes }));
+}

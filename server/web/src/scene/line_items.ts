@@ -1,0 +1,44 @@
+/** Lines of several forms between points. */
+import type { LineItem } from './batches/lines';
+import type { Points } from './points';
+
+const COILS = 8, CORNERS_OF_A_COIL = 12;
+/** Ends of a spring that are straight, as parts of its length. */
+const STRAIGHT = 0.12;
+
+export function straight(id: string, points: number[], table: Points): LineItem {
+  return {
+    id,
+    corners: points.length,
+    fill(out) {
+      for (let i = 0; i < points.length; ++i) for (let k = 0; k < 3; ++k) out[3 * i + k] = table.x[3 * points[i] + k];
+    },
+  };
+}
+
+/** A helix between two points: it is seen to lengthen. */
+export function coil(id: string, [from, to]: number[], radius: number, table: Points): LineItem {
+  const turns = COILS * CORNERS_OF_A_COIL, corners = turns + 3;
+  const ring = Array.from({ length: CORNERS_OF_A_COIL }, (_, i) => [Math.cos((2 * Math.PI * i) / CORNERS_OF_A_COIL), Math.sin((2 * Math.PI * i) / CORNERS_OF_A_COIL)]);
+  return {
+    id,
+    corners,
+    fill(out) {
+      const x = table.x, a = 3 * from, b = 3 * to;
+      const dx = x[b] - x[a], dy = x[b + 1] - x[a + 1], dz = x[b + 2] - x[a + 2], length = Math.hypot(dx, dy, dz) || 1;
+      // u and v: across the line, of unit length
+      const flat = Math.abs(dx) < 0.9 * length;
+      let ux = flat ? 0 : dz, uy = flat ? -dz : 0, uz = flat ? dy : -dx;
+      const size = Math.hypot(ux, uy, uz) || 1;
+      ux /= size, uy /= size, uz /= size;
+      const vx = (dy * uz - dz * uy) / length, vy = (dz * ux - dx * uz) / length, vz = (dx * uy - dy * ux) / length;
+      for (let k = 0; k < 3; ++k) out[k] = x[a + k], out[3 * (corners - 1) + k] = x[b + k];
+      for (let i = 0; i <= turns; ++i) {
+        const part = STRAIGHT + ((1 - 2 * STRAIGHT) * i) / turns, [cos, sin] = ring[i % CORNERS_OF_A_COIL], at = 3 * (i + 1);
+        out[at] = x[a] + part * dx + radius * (cos * ux + sin * vx);
+        out[at + 1] = x[a + 1] + part * dy + radius * (cos * uy + sin * vy);
+        out[at + 2] = x[a + 2] + part * dz + radius * (cos * uz + sin * vz);
+      }
+    },
+  };
+}
