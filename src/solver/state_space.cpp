@@ -1,5 +1,7 @@
 #include "solver/state_space.h"
 
+#include <cmath>
+
 #include "solver/shifted_pencil.h"
 
 namespace mbcosim {
@@ -19,6 +21,50 @@ Error state_space_error(ErrorKind kind, std::string message) {
 
 MatX final_range(MatX t) { return restrict_to_final_range(t); }
 
+/// T ẋ = (1 + σT) x + b u with the ranges of Tᵏ and (Tᵀ)ᵏ.
+struct Split {
+  MatX t, b, right, left;
+  VecX scale;  ///< x = scale · (x of this system), by rows
+
+  bool is_consistent() const { return left.cols() == right.cols(); }
+};
+
+/// Powers of two that make rows and columns of S⁻¹ T S alike in size (Parlett and Reinsch,
+/// Numerische Mathematik 13, 1969).
+VecX balancing_scale(MatX t) {
+  constexpr int kSweeps = 20;
+  constexpr double kGain = 0.95;
+  VecX scale = VecX::Ones(t.rows());
+  bool changed = true;
+  for (int sweep = 0; sweep < kSweeps && changed; ++sweep) {
+    changed = false;
+    for (Eigen::Index i = 0; i < t.rows(); ++i) {
+      const double own = std::abs(t(i, i));
+      const double column = t.col(i).lpNorm<1>() - own, row = t.row(i).lpNorm<1>() - own;
+      if (!(column > 0) || !(row > 0)) continue;
+      const double f = std::exp2(std::round(0.5 * std::log2(row / column)));
+      if (f == 1 || column * f + row / f > kGain * (column + row)) continue;
+      t.col(i) *= f;
+      t.row(i) /= f;
+      scale(i) *= f;
+      changed = true;
+    }
+  }
+  return scale;
+}
+
+/// Decisions about the rank depend on the units of the unknowns. Where they contradict each other
+/// (the ranges of Tᵏ and its transpose have the same dimension) they are taken again in balanced
+/// units.
+Split split(const MatX& t, const MatX& b) {
+  Split plain{t, b, final_range(t), final_range(t.transpose()), VecX::Ones(t.rows())};
+  if (plain.is_consistent()) return plain;
+  const VecX s = balancing_scale(t), inverse = s.cwiseInverse();
+  const MatX balanced = inverse.asDiagonal() * t * s.asDiagonal();
+  return {balanced, inverse.asDiagonal() * b, final_range(balanced),
+          final_range(balanced.transpose()), s};
+}
+
 }  // namespace
 
 Result<StateSpace> state_space(const Linearization& system, const InputsOutputs& io) {
@@ -31,8 +77,15 @@ Result<StateSpace> state_space(const Linearization& system, const InputsOutputs&
     return state_space_error(ErrorKind::singular,
                              "the linearized system is singular: constraints are redundant or "
                              "something is undetermined");
-  const MatX &t = pencil.t, b = pencil.lu.solve(io.b);
-  const MatX right = final_range(t), left = final_range(t.transpose());
+  const Split parts = split(pencil.t, pencil.lu.solve(io.b));
+  if (!parts.is_consistent())
+    return state_space_error(
+        ErrorKind::singular,
+        "the number of states cannot be told (" + std::to_string(parts.right.cols()) + " or " +
+            std::to_string(parts.left.cols()) +
+            "): the unknowns differ too much in size; the descriptor form needs no such decision");
+  const MatX &t = parts.t, &b = parts.b, &right = parts.right, &left = parts.left;
+  const MatX c0 = io.c0 * parts.scale.asDiagonal(), c1 = io.c1 * parts.scale.asDiagonal();
   const Eigen::PartialPivLU<MatX> cross_basis(left.transpose() * right);
   const MatX regular = cross_basis.solve(left.transpose() * t * right),
              b_regular = cross_basis.solve(left.transpose() * b);
@@ -46,9 +99,9 @@ Result<StateSpace> state_space(const Linearization& system, const InputsOutputs&
   const MatX nilpotent = t - right * regular * cross_basis.solve(left.transpose());
   const MatX direct =
       -(MatX::Identity(t.rows(), t.cols()) + kShift * nilpotent).partialPivLu().solve(b_nilpotent);
-  result.c = io.c0 * right + io.c1 * right * result.a;
-  result.d = io.d0 + io.c0 * direct + io.c1 * right * result.b;
-  const MatX by_rate = io.c1 * direct + io.c0 * nilpotent * direct;
+  result.c = c0 * right + c1 * right * result.a;
+  result.d = io.d0 + c0 * direct + c1 * right * result.b;
+  const MatX by_rate = c1 * direct + c0 * nilpotent * direct;
   if (by_rate.size() > 0 &&
       by_rate.cwiseAbs().maxCoeff() > kRateTolerance * (1 + result.d.cwiseAbs().maxCoeff()))
     return state_space_error(
