@@ -12,6 +12,7 @@ namespace mbcosim::cli {
 /// Exit codes of `mbcosim`, the same for every subcommand.
 enum ExitCode {
   kDone = 0,
+  kDiffer = 1,
   kDeckRefused = 2,
   kNumericalFailure = 3,
   kRefused = 4,
@@ -36,6 +37,33 @@ struct ReduceCommand {
   std::vector<std::pair<std::string, std::string>> options;  ///< of the command line
 };
 
+/// Columns of a result file to draw.
+struct CurveRequest {
+  std::string ending;  ///< "mov", "jnt", …
+  int label = 0;
+  std::string quantity;  ///< a word for columns, or the number of one, from 1
+};
+
+struct PlotCommand {
+  std::string prefix;  ///< of the result files
+  std::vector<CurveRequest> curves;
+  std::string picture;  ///< file to write; empty: the terminal
+};
+
+struct DiffCommand {
+  std::string first, second;  ///< prefixes of result files
+  double relative = 1e-6;     ///< tolerance, of the largest value of a column
+  double absolute = 0;        ///< differences up to this one do not count
+};
+
+struct EigCommand {
+  std::string deck;
+  SymbolValues symbols;
+  int count = 0;     ///< eigenvalues nearest to `shift`; 0: all finite ones
+  double shift = 0;  ///< [Hz]
+  double time = 0;   ///< about the state at this time [s]
+};
+
 int run(const RunOptions& options);
 int validate(const std::string& deck, const SymbolValues& symbols, bool json);
 int describe(const std::string& deck, const SymbolValues& symbols, bool json);
@@ -49,6 +77,15 @@ int hand_over(const std::string& subcommand, const std::vector<std::string>& arg
 /// Shows a deck in a browser, at `http` ("HOST:PORT"): becomes `mbcosim-view` when the deck can be
 /// read.
 int view(const std::string& deck, const std::string& http);
+/// Writes a commented deck of a kind: "pendulum", "beam", "hydraulic", "coupled"; to KIND.mbd
+/// without `output`.
+int init(const std::string& kind, const std::string& output);
+/// Draws columns of result files over time.
+int plot(const PlotCommand& command);
+/// Compares two sets of result files; kDiffer when they differ beyond the tolerance.
+int diff(const DiffCommand& command);
+/// Prints eigenvalues of a deck as frequencies and damping.
+int eig(const EigCommand& command);
 /// The words of the input language, served or refused by name.
 int keywords(bool json);
 

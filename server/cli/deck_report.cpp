@@ -1,7 +1,11 @@
 #include "cli/deck_report.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
+#include <string_view>
 
 #include "model/output_row.h"
 
@@ -32,6 +36,37 @@ std::vector<std::string> result_names(const std::string& prefix) {
   return names;
 }
 
+/// On terminals, unless NO_COLOR is set (no-color.org).
+bool shows_colours(std::FILE* out) {
+  const char* none = std::getenv("NO_COLOR");
+  const char* terminal = std::getenv("TERM");
+  return ::isatty(::fileno(out)) != 0 && !(none && *none) &&
+         !(terminal && std::string_view(terminal) == "dumb");
+}
+
+/// The first line bold with its severity in colour, carets green.
+std::string coloured(const Diagnostic& diagnostic) {
+  std::string text = diagnostic.text();
+  const std::string severity = diagnostic.severity == Severity::error     ? "error:"
+                               : diagnostic.severity == Severity::warning ? "warning:"
+                                                                          : "note:";
+  const char* colour = diagnostic.severity == Severity::error     ? "\x1b[1;31m"
+                       : diagnostic.severity == Severity::warning ? "\x1b[1;35m"
+                                                                  : "\x1b[1;36m";
+  if (const std::size_t at = text.find(severity); at != std::string::npos)
+    text = "\x1b[1m" + text.substr(0, at) + colour + severity + "\x1b[0m" +
+           text.substr(at + severity.size());
+  for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) {
+    const std::size_t mark = text.find_first_not_of(" \t", at + 1);
+    const std::size_t end = text.find('\n', at + 1);
+    if (mark == std::string::npos || text[mark] != '^') continue;
+    text.insert(end == std::string::npos ? text.size() : end, "\x1b[0m");
+    text.insert(mark, "\x1b[1;32m");
+    break;
+  }
+  return text;
+}
+
 }  // namespace
 
 DeckReport load_path(const std::string& deck, const SymbolValues& symbols,
@@ -48,8 +83,9 @@ std::string input_to_overwrite(const std::string& prefix, const std::vector<std:
 }
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out) {
+  const bool colours = shows_colours(out);
   for (const Diagnostic& d : diagnostics) {
-    const std::string text = d.text();
+    const std::string text = colours ? coloured(d) : d.text();
     std::fwrite(text.data(), 1, text.size(), out);
     if (text.empty() || text.back() != '\n') std::fputc('\n', out);
   }

@@ -7,13 +7,15 @@
 #include <new>
 
 #include "cli/commands.h"
+#include "cli/shell.h"
 #include "input/symbol_values.h"
 #include "reduction/job.h"
 
 namespace {
 
 constexpr const char* kFooter =
-    "Exit codes: 0 done, 2 deck refused, 3 numerical failure, 4 refused or limit exceeded, "
+    "Exit codes: 0 done, 1 results differ, 2 deck refused, 3 numerical failure, 4 refused or limit "
+    "exceeded, "
     "5 an external code is missing or lost, 130 interrupted.\n"
     "The daemon is `mbcosimd`; clients are under client_examples/.";
 
@@ -70,6 +72,93 @@ void add_symbols(CLI::App& app, mbcosim::SymbolValues& symbols) {
          "Give a symbol of the deck another value: NAME=VALUE takes the place of what its first "
          "declaration says; numbers, TRUE, FALSE or text")
       ->allow_extra_args(false);
+}
+
+/// `--node 3 z` and its like, any number of times.
+void add_curve(CLI::App& app, const std::string& name, const std::string& ending,
+               std::vector<mbcosim::cli::CurveRequest>& curves, const char* help) {
+  app.add_option_function<std::vector<std::pair<int, std::string>>>(
+         name,
+         [ending, &curves](const std::vector<std::pair<int, std::string>>& wanted) {
+           for (const auto& [label, quantity] : wanted) curves.push_back({ending, label, quantity});
+         },
+         help)
+      ->type_name("LABEL QUANTITY");
+}
+
+void add_plot(CLI::App& app, mbcosim::cli::PlotCommand& command, int& exit_code) {
+  CLI::App* plot =
+      app.add_subcommand("plot", "Draw results over time: on the terminal, or into a picture");
+  plot->add_option("prefix", command.prefix, "Prefix of the result files of a run")->required();
+  add_curve(*plot, "--node", "mov", command.curves,
+            "Of a node: x y z, e1 e2 e3 (Euler angles), vx.., wx.., ax.., the vectors X E V W, or "
+            "the number of a column of .mov after the label");
+  add_curve(*plot, "--joint", "jnt", command.curves,
+            "Of a joint: fx fy fz mx my mz in its frame, Fx .. Mz in the global one, the vectors "
+            "f m F M, or the number of a column of .jnt after the label");
+  plot->add_option_function<std::vector<std::tuple<std::string, int, std::string>>>(
+          "--column",
+          [&command](const std::vector<std::tuple<std::string, int, std::string>>& wanted) {
+            for (const auto& [ending, label, column] : wanted)
+              command.curves.push_back({ending, label, column});
+          },
+          "Of any result file: its ending (hyd, abs, frc, ..), label, number of the column after "
+          "the label")
+      ->type_name("ENDING LABEL NUMBER");
+  plot->add_option("--png", command.picture,
+                   "Picture to write (.png, .svg or .pdf), by gnuplot or Python's matplotlib");
+  plot->callback([&] {
+    if (command.curves.empty())
+      throw CLI::ValidationError("plot", "say what to draw: --node 3 z, --joint 5 F");
+    exit_code = mbcosim::cli::plot(command);
+  });
+}
+
+void add_diff(CLI::App& app, mbcosim::cli::DiffCommand& command, int& exit_code) {
+  CLI::App* diff =
+      app.add_subcommand("diff", "Compare the results of two runs; exit code 1 when they differ");
+  diff->add_option("first", command.first, "Prefix of result files")->required();
+  diff->add_option("second", command.second, "Prefix of result files")->required();
+  diff->add_option("--relative", command.relative,
+                   "Tolerance, as a part of the largest value of the column")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  diff->add_option("--absolute", command.absolute, "Differences up to this one do not count")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  diff->callback([&] { exit_code = mbcosim::cli::diff(command); });
+}
+
+void add_eig(CLI::App& app, mbcosim::cli::EigCommand& command, int& exit_code) {
+  CLI::App* eig =
+      app.add_subcommand("eig", "Print the eigenvalues of a deck: frequencies and damping");
+  eig->add_option("deck", command.deck, "Main file of the deck")->required();
+  add_symbols(*eig, command.symbols);
+  eig->add_option("-n,--count", command.count,
+                  "How many, those nearest to --near; 0: all finite ones")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  eig->add_option("--near", command.shift, "Frequency [Hz] near which they are wanted")
+      ->capture_default_str();
+  eig->add_option("--time", command.time, "Run the deck to this time [s] first");
+  eig->callback([&] { exit_code = mbcosim::cli::eig(command); });
+}
+
+/// What a user meets first and what shells are told.
+void add_starts(CLI::App& app, std::string& word, std::string& output, int& exit_code) {
+  CLI::App* init = app.add_subcommand("init", "Write a commented deck to start from");
+  init->add_option("kind", word, "pendulum, beam, hydraulic or coupled")->required();
+  init->add_option("-o,--output", output, "File to write; default: KIND.mbd");
+  init->callback([&] { exit_code = mbcosim::cli::init(word, output); });
+  CLI::App* completion = app.add_subcommand(
+      "completion", "Print a completion script: source <(mbcosim completion bash)");
+  completion->add_option("shell", word, "bash, zsh or fish")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  completion->callback(
+      [&] { std::fputs(mbcosim::cli::completion_script(app, word).c_str(), stdout); });
+  CLI::App* man = app.add_subcommand("man", "Print the manual page: mbcosim man | man -l -");
+  man->callback([&] { std::fputs(mbcosim::cli::manual_page(app).c_str(), stdout); });
 }
 
 /// A full device or a closed pipe: `exit_code` is no success then.
@@ -143,6 +232,14 @@ int main(int argc, char** argv) {
   fem_app->callback([&] { exit_code = fem_info(deck, json, convert); });
 
   add_programs(app, exit_code);
+  PlotCommand plot_command;
+  add_plot(app, plot_command, exit_code);
+  DiffCommand diff_command;
+  add_diff(app, diff_command, exit_code);
+  EigCommand eig_command;
+  add_eig(app, eig_command, exit_code);
+  std::string word, output;
+  add_starts(app, word, output, exit_code);
 
   std::string http = "127.0.0.1:0";
   CLI::App* view_app = app.add_subcommand(

@@ -1,0 +1,66 @@
+/// `mbcosim eig`: eigenvalues of a deck about its initial or a later state.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "cli/commands.h"
+#include "cli/deck_report.h"
+#include "cli/interrupt.h"
+#include "solver/eigen_spectrum.h"
+
+namespace mbcosim::cli {
+namespace {
+
+/// Oscillations by frequency with the sign of the imaginary part left out, then real eigenvalues.
+std::vector<Eigen::Index> order(const Eigen::VectorXcd& values) {
+  const double noise = 1e-9 * (values.size() > 0 ? values.cwiseAbs().maxCoeff() : 0);
+  std::vector<Eigen::Index> indices(static_cast<std::size_t>(values.size()));
+  std::iota(indices.begin(), indices.end(), 0);
+  std::erase_if(indices, [&](Eigen::Index k) { return values(k).imag() < -noise; });
+  std::sort(indices.begin(), indices.end(), [&](Eigen::Index a, Eigen::Index b) {
+    const bool real_a = values(a).imag() <= noise, real_b = values(b).imag() <= noise;
+    if (real_a != real_b) return real_b;
+    return real_a ? values(a).real() > values(b).real() : values(a).imag() < values(b).imag();
+  });
+  return indices;
+}
+
+void print(const Eigen::VectorXcd& values, double time) {
+  constexpr double kNoise = 1e-6;  // of an undamped mode [%]
+  std::printf("eigenvalues at t = %.9g s\n  %16s %16s %14s %12s\n", time, "real [1/s]",
+              "imaginary [rad/s]", "frequency [Hz]", "damping [%]");
+  for (const Eigen::Index k : order(values)) {
+    const std::complex<double> value = values(k);
+    const double size = std::abs(value), percent = size > 0 ? -100 * value.real() / size : 0;
+    std::printf("  %16.8g %16.8g %14.8g %12.4g\n", value.real(), value.imag(),
+                value.imag() / (2 * std::numbers::pi), std::abs(percent) < kNoise ? 0 : percent);
+  }
+}
+
+}  // namespace
+
+int eig(const EigCommand& command) {
+  InterruptGuard interrupt;
+  const LoadReport report = load_path(command.deck, command.symbols);
+  print_diagnostics(report.diagnostics, stderr);
+  if (!report.ok()) return exit_code_of(report);
+  const auto fail = [](const Error& error) {
+    print_error(error, stderr);
+    return exit_code_of(error);
+  };
+  auto simulation = Simulation::create(report.model, interrupt.token());
+  if (!simulation) return fail(simulation.error());
+  if (command.time > (*simulation)->time()) {
+    const StepReport done = (*simulation)->run_until(command.time, interrupt.token());
+    if (done.error) return fail(*done.error);
+    if (done.outcome == StepOutcome::interrupted) return kInterrupted;
+  }
+  const auto spectrum = eigen(linearize(*report.model, (*simulation)->state()), command.count,
+                              {0, 2 * std::numbers::pi * command.shift});
+  if (!spectrum) return fail(spectrum.error());
+  print(spectrum->values, (*simulation)->time());
+  return kDone;
+}
+
+}  // namespace mbcosim::cli

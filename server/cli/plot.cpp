@@ -1,0 +1,141 @@
+/// `mbcosim plot`: curves of a run's result files.
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <map>
+
+#include "cli/chart.h"
+#include "cli/commands.h"
+#include "cli/deck_report.h"
+#include "cli/result_table.h"
+
+namespace mbcosim::cli {
+namespace {
+
+/// Columns of a table that a word stands for, from 1; the label does not count.
+using Words = std::map<std::string, std::vector<int>>;
+
+const Words& node_words() {
+  static const Words words = {
+      {"x", {1}},       {"y", {2}},       {"z", {3}},       {"e1", {4}},        {"e2", {5}},
+      {"e3", {6}},      {"vx", {7}},      {"vy", {8}},      {"vz", {9}},        {"wx", {10}},
+      {"wy", {11}},     {"wz", {12}},     {"ax", {13}},     {"ay", {14}},       {"az", {15}},
+      {"X", {1, 2, 3}}, {"E", {4, 5, 6}}, {"V", {7, 8, 9}}, {"W", {10, 11, 12}}};
+  return words;
+}
+
+const Words& joint_words() {
+  static const Words words = {
+      {"fx", {1}},      {"fy", {2}},      {"fz", {3}},      {"mx", {4}},
+      {"my", {5}},      {"mz", {6}},      {"Fx", {7}},      {"Fy", {8}},
+      {"Fz", {9}},      {"Mx", {10}},     {"My", {11}},     {"Mz", {12}},
+      {"f", {1, 2, 3}}, {"m", {4, 5, 6}}, {"F", {7, 8, 9}}, {"M", {10, 11, 12}}};
+  return words;
+}
+
+Error plot_error(std::string message) {
+  Error error;
+  error.kind = ErrorKind::argument;
+  error.message = std::move(message);
+  return error;
+}
+
+/// Columns by a word, or by a number.
+Result<std::vector<int>> columns_of(const std::string& word, const Words& words) {
+  if (const auto found = words.find(word); found != words.end()) return found->second;
+  int number = 0;
+  const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (code == std::errc() && end == word.data() + word.size() && number > 0)
+    return std::vector<int>{number};
+  std::string known;
+  for (const auto& [name, columns] : words) known += " " + name;
+  return plot_error("\"" + word + "\" is no quantity; there are" + known +
+                    ", and the numbers of columns after the label, from 1");
+}
+
+std::string labels(const ResultTable& table) {
+  std::string text;
+  for (const auto& [label, rows] : table.rows) text += " " + std::to_string(label);
+  return text.empty() ? " none" : text;
+}
+
+std::string name_of(int column, const Words& words) {
+  for (const auto& [name, columns] : words)
+    if (columns.size() == 1 && columns.front() == column) return name;
+  return "column " + std::to_string(column);
+}
+
+Result<Curve> curve_of(const ResultTable& table, const std::vector<double>& times, int label,
+                       int column, std::string name) {
+  const auto rows = table.rows.find(label);
+  if (rows == table.rows.end())
+    return plot_error(table.path + " has no label " + std::to_string(label) + "; there are" +
+                      labels(table));
+  Curve curve;
+  curve.name = std::move(name);
+  for (std::size_t k = 0; k < rows->second.size(); ++k) {
+    const std::vector<double>& row = rows->second[k];
+    if (static_cast<int>(row.size()) < column)
+      return plot_error(table.path + ": the rows of label " + std::to_string(label) + " have " +
+                        std::to_string(row.size()) + " columns, not " + std::to_string(column));
+    if (k >= times.size()) break;
+    curve.x.push_back(times[k]);
+    curve.y.push_back(row[static_cast<std::size_t>(column) - 1]);
+  }
+  return curve;
+}
+
+/// Adds the curves of one request.
+Status add_curves(const std::string& prefix, const CurveRequest& request,
+                  const std::vector<double>& times, std::vector<Curve>& curves) {
+  static const Words none;
+  const Words& words = request.ending == "mov"   ? node_words()
+                       : request.ending == "jnt" ? joint_words()
+                                                 : none;
+  const auto columns = columns_of(request.quantity, words);
+  if (!columns) return columns.error();
+  const auto table = read_table(prefix, request.ending);
+  if (!table) return table.error();
+  for (const int column : *columns) {
+    const std::string what = request.ending == "mov"   ? "node "
+                             : request.ending == "jnt" ? "joint "
+                                                       : request.ending + " ";
+    auto curve = curve_of(*table, times, request.label, column,
+                          what + std::to_string(request.label) + " " + name_of(column, words));
+    if (!curve) return curve.error();
+    curves.push_back(std::move(*curve));
+  }
+  return ok();
+}
+
+int terminal_columns() {
+  winsize size{};
+  constexpr int kUsual = 80;
+  return ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsual;
+}
+
+}  // namespace
+
+int plot(const PlotCommand& command) {
+  const auto fail = [](const Error& error) {
+    print_error(error, stderr);
+    return exit_code_of(error);
+  };
+  const auto times = read_times(command.prefix);
+  if (!times) return fail(times.error());
+  std::vector<Curve> curves;
+  for (const CurveRequest& request : command.curves)
+    if (const auto added = add_curves(command.prefix, request, *times, curves); !added)
+      return fail(added.error());
+  constexpr const char* kTime = "time [s]";
+  constexpr int kLines = 20;
+  if (command.picture.empty()) {
+    std::fputs(text_chart(curves, kTime, terminal_columns(), kLines).c_str(), stdout);
+    return kDone;
+  }
+  const auto drawn = picture(curves, kTime, command.prefix, command.picture);
+  return drawn ? static_cast<int>(kDone) : static_cast<int>(fail(drawn.error()));
+}
+
+}  // namespace mbcosim::cli
