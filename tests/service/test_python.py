@@ -280,6 +280,15 @@ def test_the_state_space_of_an_oscillator_answers_as_its_closed_form(server):
         system.root_locus(gains)
 
 
+def test_a_wing_has_twice_as_many_states_as_its_nodes_can_move(server):
+    """Beams, whose unknowns differ in size by twelve orders."""
+    with server.load(model("wing.mbd")) as simulation:
+        system, values = simulation.state_space("structural.9.load", ["node.structural.9.X"]), simulation.eigenvalues(12, shift_hz=5)
+    assert len(system.A) == 2 * 6 * 8
+    for value in values[values.imag > 0]:
+        assert np.abs(system.poles - value).min() < 1e-6 * abs(value)
+
+
 def test_modes_of_a_wing_are_ordered_and_scaled(server):
     with server.load(model("wing.mbd")) as simulation:
         modes = simulation.modes(8, shift_hz=5)
