@@ -217,3 +217,27 @@ def test_the_quarter_car_takes_the_bump_as_its_equations_say(tmp_path):
     assert body.max() > 0.04
     np.testing.assert_allclose(body, np.interp(run.time[until], instants, exact[:, 0]), atol=1e-4)
     np.testing.assert_allclose(wheel, np.interp(run.time[until], instants, exact[:, 1]), atol=1e-4)
+
+
+def test_the_pendulum_is_swung_up_and_held_as_its_equations_say(tmp_path):
+    run = Run(tmp_path, "swing_up")
+    cart, pole, length, inertia, g, push, gain = 1., 0.2, 0.5, 1e-3, 9.81, 3., 20.
+    about = inertia + pole * length**2
+
+    def rate(_, y):  # of cart and pendulum under the law of Astrom and Furuta, with the deck's catch
+        x, angle, v, w = y
+        energy = about * w * w / 2 + pole * g * length * (math.cos(angle) - 1)
+        near = (1 + math.tanh(40 * (math.cos(angle) - 0.9))) / 2
+        force = (1 - near) * ((cart + pole) * push * math.tanh(gain * energy * w * math.cos(angle) / push) - x - v)
+        force += near * (3 * x + 5 * v + 40 * math.sin(angle) + 9 * w)
+        mass = np.array([[cart + pole, pole * length * math.cos(angle)], [pole * length * math.cos(angle), about]])
+        load = np.array([force + pole * length * w * w * math.sin(angle), pole * g * length * math.sin(angle)])
+        return np.concatenate([y[2:], np.linalg.solve(mass, load)])
+
+    exact = integrate(rate, [0, 2.8, 0, 0], run.time[-1], len(run.time) - 1)
+    place = run.nodes[1][:, 0]
+    angle = np.unwrap(np.arctan2(run.nodes[2][:, 0] - place, run.nodes[2][:, 2]))
+    draw("swing_up", {"angle [rad]": (run.time, angle), "cart [m]": (run.time, place)}, "time [s]", "")
+    assert angle[0] == pytest.approx(2.8) and np.abs(angle[run.time > 4]).max() < 0.05  # caught, at the first attempt
+    np.testing.assert_allclose(place, exact[:, 0], atol=1e-3)
+    np.testing.assert_allclose(angle, exact[:, 1], atol=1e-3)
