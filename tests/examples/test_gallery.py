@@ -3,6 +3,7 @@ import math
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 
 import numpy as np
@@ -241,3 +242,48 @@ def test_the_pendulum_is_swung_up_and_held_as_its_equations_say(tmp_path):
     assert angle[0] == pytest.approx(2.8) and np.abs(angle[run.time > 4]).max() < 0.05  # caught, at the first attempt
     np.testing.assert_allclose(place, exact[:, 0], atol=1e-3)
     np.testing.assert_allclose(angle, exact[:, 1], atol=1e-3)
+
+
+def test_the_jib_of_the_crane_sags_and_swings_as_a_cantilever_with_a_mass_at_its_end(tmp_path):
+    shutil.copy(MODELS / "modal_crane_jib.fem", tmp_path)
+    run = Run(tmp_path, "modal_crane")
+    length, line, stiffness, load, g, rope = 10., 100., 2e7, 500., 9.81, 6.
+    tip, body = run.nodes[3], run.nodes[4]
+    draw("modal_crane", {"end of the jib": (tip[:, 0], tip[:, 1]), "load": (body[:, 0], body[:, 1])}, "x [m]", "y [m]")
+
+    def frequency_equation(x):  # Blevins, table 8-8
+        return 1 + math.cos(x) * math.cosh(x) - load / (line * length) * x * (math.sin(x) * math.cosh(x) - math.cos(x) * math.sinh(x))
+
+    low, high = 1.0, 1.87
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if frequency_equation(middle) > 0 else (low, middle)
+    omega = low**2 * math.sqrt(stiffness / (line * length**4))
+    sag = load * g * length**3 / (3 * stiffness) + line * g * length**4 / (8 * stiffness)
+    still = run.time < 4  # before it turns: a fit of all frequencies and decays near the closed form
+    t, z = run.time[still], tip[still, 2]
+
+    def misfit(w, decay):
+        basis = np.array([np.ones_like(t), np.exp(-decay * t) * np.cos(w * t), np.exp(-decay * t) * np.sin(w * t)]).T
+        factors, residual, *_ = np.linalg.lstsq(basis, z, rcond=None)
+        return residual[0], factors
+
+    scan = [(misfit(w, decay)[0], w, decay) for w in np.linspace(0.95, 1.05, 101) * omega for decay in np.linspace(0, 0.4, 21)]
+    _, found, decay = min(scan)
+    assert found == pytest.approx(omega, rel=5e-3)  # the masses of the finite elements are lumped
+    assert -misfit(found, decay)[1][0] == pytest.approx(sag, rel=1e-2)
+
+    def rate(t, y):  # of a rope's direction and its rate, below the end of a rigid jib that turns as the deck says
+        s = min(max(t - 4, 0.), 10.)
+        turned = math.pi / 20 * (s - 10 / (2 * math.pi) * math.sin(math.pi / 5 * s))
+        speed, gain = math.pi / 20 * (1 - math.cos(math.pi / 5 * s)), math.pi / 20 * math.pi / 5 * math.sin(math.pi / 5 * s)
+        c, n = np.array([math.cos(turned), math.sin(turned), 0]), np.array([-math.sin(turned), math.cos(turned), 0])
+        pull = length * (gain * n - speed**2 * c) + np.array([0, 0, g])
+        return np.concatenate([y[3:], (-pull + (pull @ y[:3] - rope * y[3:] @ y[3:]) * y[:3]) / rope])
+
+    exact = rope * integrate(rate, [0, 0, -1, 0, 0, 0], run.time[-1], len(run.time) - 1)[:, :3]
+    swing = body[:, :3] - tip[:, :3]
+    assert np.abs(exact[:, :2]).max() > 1  # it sways far, and more where the jib gives way
+    np.testing.assert_allclose(np.linalg.norm(swing, axis=1), rope, atol=1e-5)
+    np.testing.assert_allclose(swing[:, :2], exact[:, :2], atol=0.1)
+    assert np.degrees(np.arctan2(tip[-1, 1], tip[-1, 0])) == pytest.approx(90, abs=1)
