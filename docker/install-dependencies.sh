@@ -11,7 +11,7 @@ case $what in
   build) wanted='$2 == ""' ;;
   run) wanted='$2 == "run"' ;;
   page) wanted='$2 == "" || $2 == "page"' ;;
-  start) wanted='$2 == "" || $2 == "test"' ;;
+  start) wanted='$2 == "" || $2 == "start"' ;;
   all) wanted='$2 != "run" && $2 != "fuzz"' ;;
   fuzz) wanted='$2 == "" || $2 == "fuzz"' ;;
   *) echo "usage: $0 [build|page|run|start|all|fuzz]" >&2; exit 4 ;;
