@@ -1,13 +1,13 @@
 #include "elements/element.h"
 
-namespace mbcosim::detail {
+namespace mbcosim {
 
-void gather(const EvalContext& context, const Connection& c, const ElementInfo& info,
-            bool parameters, Local<double>& u) {
+void PlacedElements::gather(const EvalContext& context, const Place& p, Local<double>& u) const {
   const Model& model = *context.model;
+  const Connection& c = p.connection;
   u.context = &context;
   u.connection = &c;
-  u.info = &info;
+  u.info = p.info;
   const bool input = context.phase == Phase::input;
   const State& state = *context.state;
   for (int k = 0; k < c.node_count; ++k) {
@@ -32,7 +32,7 @@ void gather(const EvalContext& context, const Connection& c, const ElementInfo& 
     }
     n.R = state.rotation[index].R;
     n.w = state.rotation[index].w;
-    if (parameters) {
+    if (traits_.parameters) {
       n.g = Vec3(y[3], y[4], y[5]);
       n.gp = Vec3(yp[3], yp[4], yp[5]);
     }
@@ -57,32 +57,18 @@ void gather(const EvalContext& context, const Connection& c, const ElementInfo& 
   }
 }
 
-std::string default_row_name(int k) { return "equation " + std::to_string(k + 1); }
-
-void fill_rows_columns(const Model& model, const Connection& c, bool momentum,
-                       std::vector<int>& rows, std::vector<int>& columns) {
-  for (int k = 0; k < c.node_count; ++k) {
-    const StructuralNode& node = model.structural[c.node[k]];
-    const int count = node.position_unknowns();
-    for (int i = 0; i < 6; ++i) {
-      rows.push_back(i < count ? node.equilibrium + i : -1);
-      columns.push_back(i < count ? node.first + i : -1);
-    }
-  }
-  for (int i = 0; i < c.scalar_count; ++i) {
-    rows.push_back(model.scalars[c.scalar[i]].unknown);
-    columns.push_back(model.scalars[c.scalar[i]].unknown);
-  }
-  for (int i = 0; i < c.own_count; ++i) {
-    rows.push_back(c.own + i);
-    columns.push_back(c.own + i);
-  }
-  if (!momentum) return;
-  for (int k = 0; k < c.node_count; ++k) {
-    const StructuralNode& node = model.structural[c.node[k]];
-    const int count = node.has_momentum() ? node.position_unknowns() : 0;
-    for (int i = 0; i < 6; ++i) rows.push_back(i < count ? node.first + i : -1);
-  }
+void PlacedElements::scatter(const Place& p, const Residual<double>& local, double* r) const {
+  const Connection& c = p.connection;
+  const int* row = rows_.data() + p.first_row;
+  const auto add = [&](const double* values, int count) {
+    for (int i = 0; i < count; ++i)
+      if (row[i] >= 0) r[row[i]] += values[i];
+    row += count;
+  };
+  add(local.node[0], 6 * c.node_count);
+  add(local.scalar_rows, c.scalar_count);
+  add(local.own_rows, c.own_count);
+  if (traits_.momentum) add(local.momentum_rows[0], 6 * c.node_count);
 }
 
-}  // namespace mbcosim::detail
+}  // namespace mbcosim

@@ -2,6 +2,13 @@
 
 namespace mbcosim {
 
+MBCOSIM_ROTATIONS(, TimeDual)
+MBCOSIM_ROTATIONS(, Dual<6>)
+MBCOSIM_ROTATIONS(, Dual<12>)
+MBCOSIM_ROTATIONS(, Dual<18>)
+MBCOSIM_ROTATIONS(, Dual<24>)
+#undef MBCOSIM_ROTATIONS
+
 Vec3 euler123_of_rotation(const Mat3& r) {
   const double a = std::atan2(-r(1, 2), r(2, 2));
   const double ca = std::cos(a), sa = std::sin(a);

@@ -132,6 +132,17 @@ Vec<T> vector_of_rotation(const Mat<T>& r) {
   return Vec<T>(n(0) * phi, n(1) * phi, n(2) * phi);
 }
 
+// Of dual numbers these are made once, in rotation.cpp.
+#define MBCOSIM_ROTATIONS(linkage, T)                                      \
+  linkage template Mat<T> rotation_of_vector(const Vec<T>&);               \
+  linkage template Mat<T> relative_rotation(const Mat<T>&, const Mat<T>&); \
+  linkage template Vec<T> vector_of_rotation(const Mat<T>&);
+MBCOSIM_ROTATIONS(extern, TimeDual)
+MBCOSIM_ROTATIONS(extern, Dual<6>)
+MBCOSIM_ROTATIONS(extern, Dual<12>)
+MBCOSIM_ROTATIONS(extern, Dual<18>)
+MBCOSIM_ROTATIONS(extern, Dual<24>)
+
 inline Mat3 rotation_x(double a) { return rotation_of_vector(Vec3(a, 0, 0)); }
 inline Mat3 rotation_y(double a) { return rotation_of_vector(Vec3(0, a, 0)); }
 inline Mat3 rotation_z(double a) { return rotation_of_vector(Vec3(0, 0, a)); }

@@ -34,7 +34,7 @@ std::string TotalConstraint::row_name(int k) const {
         i < 3 ? (rate ? "velocity" : "position") : (rate ? "angular velocity" : "rotation");
     return std::string(what) + " constraint " + std::to_string(i % 3 + 1);
   }
-  return detail::default_row_name(k);
+  MBCOSIM_CHECK(false, "a total constraint has no such row");
 }
 
 void TotalConstraint::assembly_multipliers(const Local<TimeDual>& u, Vec<TimeDual>& force,
