@@ -17,6 +17,7 @@ enum ExitCode {
   kNumericalFailure = 3,
   kRefused = 4,
   kPeerLost = 5,
+  kInternalError = 6,  ///< a mistake of this program
   kInterrupted = 130
 };
 

@@ -93,11 +93,13 @@ void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* ou
 
 ExitCode exit_code_of(const LoadReport& report) {
   if (report.ok()) return kDone;
-  const bool limit =
-      std::any_of(report.diagnostics.begin(), report.diagnostics.end(), [](const Diagnostic& d) {
-        return d.severity == Severity::error && d.code.compare(0, 6, "limit-") == 0;
-      });
-  return limit ? kRefused : kDeckRefused;
+  const auto any = [&](std::string_view code) {
+    return std::any_of(report.diagnostics.begin(), report.diagnostics.end(),
+                       [&](const Diagnostic& d) {
+                         return d.severity == Severity::error && d.code.starts_with(code);
+                       });
+  };
+  return any("internal") ? kInternalError : any("limit-") ? kRefused : kDeckRefused;
 }
 
 ExitCode exit_code_of(const Error& error) {
@@ -108,8 +110,9 @@ ExitCode exit_code_of(const Error& error) {
     case ErrorKind::singular:
     case ErrorKind::evaluation:
     case ErrorKind::peer:
-    case ErrorKind::internal:
       return kNumericalFailure;
+    case ErrorKind::internal:
+      return kInternalError;
     case ErrorKind::cancelled:
       return kInterrupted;
     case ErrorKind::argument:
@@ -119,7 +122,7 @@ ExitCode exit_code_of(const Error& error) {
     case ErrorKind::data_loss:
       return kRefused;
   }
-  return kNumericalFailure;
+  return kInternalError;
 }
 
 void print_error(const Error& error, std::FILE* out) {

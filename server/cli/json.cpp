@@ -6,18 +6,6 @@ namespace mbcosim::cli {
 
 using Json = nlohmann::ordered_json;
 
-const char* severity_name(Severity severity) {
-  switch (severity) {
-    case Severity::error:
-      return "error";
-    case Severity::warning:
-      return "warning";
-    case Severity::note:
-      return "note";
-  }
-  return "";
-}
-
 namespace {
 
 // Decks may hold any bytes; what is not UTF-8 is replaced, never refused.

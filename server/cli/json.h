@@ -10,6 +10,4 @@ namespace mbcosim::cli {
 /// {"ok": …, "diagnostics": [{severity, code, file, line, column, length, message, …}]}
 std::string diagnostics_json(const LoadReport& report);
 
-const char* severity_name(Severity severity);
-
 }  // namespace mbcosim::cli

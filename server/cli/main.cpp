@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kFooter =
     "Exit codes: 0 done, 1 results differ, 2 deck refused, 3 numerical failure, 4 refused or limit "
     "exceeded, "
-    "5 an external code is missing or lost, 130 interrupted.\n"
+    "5 an external code is missing or lost, 6 internal error, 130 interrupted.\n"
     "The daemon is `mbcosimd`; clients are under client_examples/.";
 
 /// `mbcosim reduce`: each option of a job is one of the command line too.
@@ -261,9 +261,9 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     std::fputs("error: out of memory\n", stderr);
     return kRefused;
-  } catch (const std::exception& e) {
+  } catch (const std::exception& e) {  // what can go wrong with a deck is not thrown to here
     std::fprintf(stderr, "error: %s\n", e.what());
-    return kNumericalFailure;
+    return kInternalError;
   }
   return finished(exit_code);
 }

@@ -26,14 +26,10 @@ StepReport run_to_end(Simulation& simulation, const CancelToken* cancel,
   const bool visible = !options.quiet && progress.visible();
   if (!visible && !options.real_time) return simulation.run_until(final_time, cancel);
   Pace pace(simulation.time());
-  StepReport total, last;
+  StepReport total;
   do {
-    last = simulation.step(cancel);
-    if (options.real_time) pace.wait_for(last.time, cancel);
-    last.steps_done += total.steps_done;
-    last.total_iterations += total.total_iterations;
-    last.solver_seconds += total.solver_seconds;
-    total = last;
+    total.add(simulation.step(cancel));
+    if (options.real_time) pace.wait_for(total.time, cancel);
     if (visible) progress.update(total);
   } while (total.outcome == StepOutcome::accepted);
   if (options.real_time) tell(pace, total.steps_done);

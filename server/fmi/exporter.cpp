@@ -10,7 +10,7 @@
 #include "fmi/archive.h"
 #include "fmi/description.h"
 #include "fmi/needed_libraries.h"
-#include "simulation/state_bytes.h"
+#include "math/hash.h"
 
 namespace mbcosim::fmi {
 namespace {
@@ -40,12 +40,6 @@ class RecordingSource : public FileSource {
   mutable std::map<std::string, std::string> files_;
 };
 
-std::string hexadecimal(std::uint64_t number) {
-  char text[20];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(number));
-  return text;
-}
-
 /// A name that a C compiler would take: letters, digits and underscores.
 std::string identifier_of(const std::string& stem) {
   std::string name;
@@ -58,7 +52,7 @@ std::string identifier_of(const std::string& stem) {
 /// Equal decks and variables make equal tokens; as a GUID of 128 bits.
 std::string make_token(const Manifest& manifest, const std::string& variables) {
   const std::uint64_t first = fnv1a(manifest.digest + variables);
-  return "{" + manifest.digest + "-" + hexadecimal(first) + "}";
+  return "{" + manifest.digest + "-" + digest_text(first) + "}";
 }
 
 std::optional<Error> unfit(const Model& model) {
@@ -144,7 +138,7 @@ mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
   Manifest manifest;
   std::map<std::string, std::string> archive;
   manifest.deck = main_file;
-  manifest.digest = hexadecimal(model.digest);
+  manifest.digest = digest_text(model.digest);
   for (const Entry& e : *entries) manifest.variables.push_back(e.variable);
   add_files(source.files(), manifest, archive);
   manifest.token = make_token(manifest, to_json(manifest));

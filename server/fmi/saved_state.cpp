@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "math/hash.h"
 #include "simulation/state_bytes.h"
 
 namespace mbcosim::fmi {

@@ -86,7 +86,7 @@ std::unique_ptr<Simulation> load_simulation(const std::string& deck,
                                       path.filename().string(), {}, server::attachments(options));
   for (const Diagnostic& d : report.diagnostics)
     if (d.severity == Severity::error) throw std::runtime_error(d.text());
-  const std::string digest = server::digest_text(report.model->digest);
+  const std::string digest = digest_text(report.model->digest);
   if (digest != header.model_digest())
     throw std::runtime_error("the deck has the digest " + digest + ", the record is of " +
                              header.model_digest());
@@ -155,7 +155,7 @@ class ModelReplay {
     v1::Hello hello = entry.from_peer().hello();
     hello.clear_step_size_s();
     Agreement agreement =
-        server::agree(hello, port.model(), server::digest_text(session_.model().digest), 0);
+        server::agree(hello, port.model(), digest_text(session_.model().digest), 0);
     agreement.timeout = std::chrono::milliseconds(20);  // who did not answer then does not now
     if (agreement.policy == v1::PEER_POLICY_WAIT) agreement.policy = v1::PEER_POLICY_FAIL_STEP;
     auto& peer = peers_[entry.port()];

@@ -27,6 +27,7 @@ using google::protobuf::util::TimeUtil;
     error.message = utf8(first->file + ":" + std::to_string(first->line) + ":" +
                          std::to_string(first->column) + ": error: " + first->message);
     constexpr std::string_view kLimit = "limit-";
+    if (first->code == "internal") error.kind = ErrorKind::internal;
     if (first->code == "port") throw Refusal(v1::REASON_BAD_ARGUMENT, utf8(first->message));
     if (first->code.compare(0, kLimit.size(), kLimit) == 0) {
       error.kind = ErrorKind::limit;

@@ -9,9 +9,10 @@ namespace mbcosim::server {
 std::int64_t size_of(const State& s) {
   const std::size_t numbers = s.y.size() + s.yp.size() + s.y1.size() + s.yp1.size() + s.y2.size() +
                               s.yp2.size() + s.memory.size() + s.variables.size() +
-                              s.external_loads.size() + s.control.size();
-  return static_cast<std::int64_t>(numbers * sizeof(double) +
-                                   s.rotation.size() * sizeof(NodeRotation) + sizeof(State));
+                              s.external_loads.size() + s.kept_matrix.size();
+  return static_cast<std::int64_t>(
+      numbers * sizeof(double) + s.rotation.size() * sizeof(NodeRotation) +
+      s.rotation_history.size() * sizeof(NodeRotationHistory) + sizeof(State));
 }
 
 int number_of_snapshot(const std::string& name, std::string* simulation) {

@@ -6,12 +6,6 @@
 
 namespace mbcosim::server {
 
-std::string digest_text(std::uint64_t digest) {
-  char text[24];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(digest));
-  return text;
-}
-
 namespace {
 
 // Length of the UTF-8 sequence that starts at `i`, or 0 when there is none.

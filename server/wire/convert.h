@@ -1,6 +1,7 @@
 /// Engine types to wire types.
 #pragma once
 
+#include "math/hash.h"
 #include "mbcosim/v1/simulations.pb.h"
 #include "simulation/simulation.h"
 
@@ -15,7 +16,6 @@ void to_proto(const Variable& variable, int handle, v1::Variable* out);
 void to_proto(const Model& model, v1::ModelDescription* out);
 v1::StepOutcome to_proto(StepOutcome outcome);
 v1::NonConvergencePolicy to_proto(const StepPolicy& policy);
-std::string digest_text(std::uint64_t digest);  ///< 16 hexadecimal digits
-std::string utf8(const std::string& text);      ///< bytes that are not UTF-8 replaced by '?'
+std::string utf8(const std::string& text);  ///< bytes that are not UTF-8 replaced by '?'
 
 }  // namespace mbcosim::server

@@ -21,10 +21,12 @@
 ///     void tangent(const Local<double>&, Tangent&) const       −∂r/∂δ in closed form
 ///     void start(Start&) const                                 initial own unknowns and memory
 ///     void after_predict(const Local<double>&, State&) const   once a step, after the prediction
+///     void accumulate(const Local<double>&, Sums&) const       before each residual and matrix:
+///         adds to what elements of other families sum up; tangents leave out that sums change
 ///     void after_convergence(const Local<double>&, State&) const
 ///     void output(const Local<double>&, OutputRow&) const      its lines: begin(…, u.label())
 ///     std::string log(const Model&, int label) const           its line of the .log file
-///     int private_datum(std::string_view) const, std::vector<std::string> private_data() const
+///     int private_datum(std::string_view) const, std::vector<Datum> private_data() const
 ///     double private_value(const Local<double>&, int) const
 ///     std::string row_name(int k) const                        meaning of own row k
 ///     void add_inertia(const Local<double>&, int node, Inertia&) const

@@ -121,29 +121,30 @@ class ElementSetOf final : public PlacedElements {
   const Slot& slot(int i) const { return slots_[i]; }
   Slot& slot(int i) { return slots_[i]; }  ///< while the model is built
 
-  void after_predict(const EvalContext& context, State& state) const override {
-    if constexpr (detail::HasAfterPredict<E>) {
-      Local<double> u;
-      for (const Slot& s : slots_) {
-        if (!active(context, s)) continue;
-        gather(context, s, u);
-        s.element.after_predict(u, state);
-      }
+  void after_predict(const EvalContext& context, State& state, ElementRange range) const override {
+    if constexpr (detail::HasAfterPredict<E>)
+      each_active(context, range,
+                  [&](const E& e, const Local<double>& u) { e.after_predict(u, state); });
+    else
+      (void)context, (void)state, (void)range;
+  }
+  bool accumulates() const override { return detail::HasAccumulate<E>; }
+  void accumulate(const EvalContext& context, ElementRange range) const override {
+    if constexpr (detail::HasAccumulate<E>) {
+      Sums sums(*context.scratch);
+      each_active(context, range,
+                  [&](const E& e, const Local<double>& u) { e.accumulate(u, sums); });
     } else {
-      (void)context, (void)state;
+      (void)context, (void)range;
     }
   }
-  void after_convergence(const EvalContext& context, State& state) const override {
-    if constexpr (detail::HasAfterConvergence<E>) {
-      Local<double> u;
-      for (const Slot& s : slots_) {
-        if (!active(context, s)) continue;
-        gather(context, s, u);
-        s.element.after_convergence(u, state);
-      }
-    } else {
-      (void)context, (void)state;
-    }
+  void after_convergence(const EvalContext& context, State& state,
+                         ElementRange range) const override {
+    if constexpr (detail::HasAfterConvergence<E>)
+      each_active(context, range,
+                  [&](const E& e, const Local<double>& u) { e.after_convergence(u, state); });
+    else
+      (void)context, (void)state, (void)range;
   }
 
   AssemblyRole assembly_role(int i) const override {
@@ -176,11 +177,11 @@ class ElementSetOf final : public PlacedElements {
     else
       return (void)i, (void)name, -1;
   }
-  std::vector<std::string> private_data(int i) const override {
+  std::vector<Datum> private_data(int i) const override {
     if constexpr (detail::HasPrivateNames<E>)
       return slots_[i].element.private_data();
     else
-      return (void)i, std::vector<std::string>();
+      return (void)i, std::vector<Datum>();
   }
   double private_value(const EvalContext& context, int i, int datum) const override {
     if constexpr (detail::HasPrivateData<E>) {
@@ -237,6 +238,17 @@ class ElementSetOf final : public PlacedElements {
   }
 
  private:
+  /// Calls function(element, what it sees) for the active ones.
+  template <class Function>
+  void each_active(const EvalContext& context, ElementRange range, Function function) const {
+    Local<double> u;
+    for (int i = range.first; i < range.last; ++i) {
+      const Slot& s = slots_[i];
+      if (!active(context, s)) continue;
+      gather(context, s, u);
+      function(s.element, u);
+    }
+  }
   void residual_of(const EvalContext& context, const Slot& s, Local<double>& u,
                    Residual<double>& local) const {
     gather(context, s, u);

@@ -20,6 +20,10 @@ concept HasAfterPredict = requires(const E& e, const Local<double>& u, State& s)
   e.after_predict(u, s);
 };
 template <class E>
+concept HasAccumulate = requires(const E& e, const Local<double>& u, Sums& s) {
+  e.accumulate(u, s);
+};
+template <class E>
 concept HasAfterConvergence = requires(const E& e, const Local<double>& u, State& s) {
   e.after_convergence(u, s);
 };

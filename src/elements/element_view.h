@@ -5,6 +5,7 @@
 #include "math/dual.h"
 #include "math/rotation.h"
 #include "math/types.h"
+#include "model/check.h"
 #include "model/context.h"
 #include "model/element_set.h"
 #include "model/model.h"
@@ -27,6 +28,9 @@ struct Connection {
   int own = -1;     ///< first own unknown
   int memory = -1;  ///< offset in State::memory
   int memory_count = 0;
+  int scratch_count = 0;  ///< doubles that it needs in Scratch::local
+  int sums = -1;          ///< offset in Scratch::sums
+  int sum_count = 0;
 };
 
 /// Handle of a scalar degree of freedom inside an element: a scalar node, or one component of a
@@ -44,15 +48,17 @@ class Connector {
   int node(int structural_node) {
     for (int k = 0; k < c_.node_count; ++k)
       if (c_.node[k] == structural_node) return k;
-    c_.node[c_.node_count] = structural_node;
-    return c_.node_count++;
+    return distinct_node(structural_node);
   }
   /// As `node`, but never merged with an equal one: local index k is the k-th call.
   int distinct_node(int structural_node) {
+    MBCOSIM_CHECK(c_.node_count < kMaxNodes, "an element has more nodes than there is room for");
     c_.node[c_.node_count] = structural_node;
     return c_.node_count++;
   }
   int scalar(int scalar_node) {
+    MBCOSIM_CHECK(c_.scalar_count < kMaxScalars,
+                  "an element has more scalar dofs than there is room for");
     c_.scalar[c_.scalar_count] = scalar_node;
     return c_.scalar_count++;
   }
@@ -71,11 +77,26 @@ class Connector {
   void memory(int count, double initial = 0) {
     const int offset = builder_.allocate_memory(count, initial);
     if (c_.memory < 0) c_.memory = offset;
+    MBCOSIM_CHECK(offset == c_.memory + c_.memory_count, "an element's memory is not in one piece");
     c_.memory_count += count;
+  }
+  /// Numbers that `Local::scratch` gives while the element is evaluated.
+  void scratch(int count) {
+    c_.scratch_count += count;
+    builder_.require_scratch(c_.scratch_count);
+  }
+  /// Numbers that elements of other families add to before the element reads them: Local::sum.
+  void sums(int count) {
+    const int offset = builder_.allocate_sums(count);
+    if (c_.sums < 0) c_.sums = offset;
+    MBCOSIM_CHECK(offset == c_.sums + c_.sum_count, "an element's sums are not in one piece");
+    c_.sum_count += count;
   }
 
  private:
   void own(int count, bool differential) {
+    MBCOSIM_CHECK(c_.own_count + count <= kMaxOwn,
+                  "an element has more unknowns than there is room for");
     for (int i = 0; i < count; ++i) c_.own_differential[c_.own_count++] = differential;
   }
   Connection& c_;
@@ -119,6 +140,19 @@ class Local {
   double time() const { return context->time; }
   double memory(int i) const { return context->state->memory[connection->memory + i]; }
   int memory_offset() const { return connection->memory; }
+  /// As many numbers as the element asked for in `connect`; what they hold at entry means nothing.
+  double* scratch() const {
+    MBCOSIM_CHECK(context->scratch, "scratch is used where there is none");
+    return context->scratch->local.data();
+  }
+  /// What other elements have summed up for this one in the present evaluation.
+  double sum(int i) const { return sum_at(connection->sums + i); }
+  int sums_offset() const { return connection->sums; }
+  /// The same of another element, by its `ElementSet::first_sum`.
+  double sum_at(int offset) const {
+    MBCOSIM_CHECK(context->scratch && offset >= 0, "sums are read where there are none");
+    return context->scratch->sums[offset];
+  }
   int label() const { return info->label; }
   T drive(const DrivePtr& d) const { return d->value_as<T>(*context); }
   Vec<T> drive(const Vec3DrivePtr& d) const { return d->template value_as<T>(*context); }
@@ -169,6 +203,20 @@ class Residual {
   T momentum_rows[kMaxNodes][6];
   T scalar_rows[kMaxScalars];
   T own_rows[kMaxOwn];
+};
+
+/// What elements sum over others, open for contributions; offsets as in ElementSet::first_sum.
+class Sums {
+ public:
+  explicit Sums(Scratch& scratch) : sums_(scratch.sums) {}
+  double& operator[](int offset) {
+    MBCOSIM_CHECK(offset >= 0 && offset < static_cast<int>(sums_.size()),
+                  "a sum of no element is added to");
+    return sums_[offset];
+  }
+
+ private:
+  std::vector<double>& sums_;
 };
 
 /// Initial values of an element's own unknowns and memory.

@@ -43,6 +43,13 @@ int GeneralConnection::memory(int count, double initial) {
   return offset - memory_;
 }
 
+int GeneralConnection::scratch(int count) {
+  const int offset = scratch_count_;
+  scratch_count_ += count;
+  builder_->require_scratch(scratch_count_);
+  return offset;
+}
+
 Vec3 GeneralView::g(int structural_node) const {
   const double* y = &state().y[model().structural[structural_node].first + 3];
   return Vec3(y[0], y[1], y[2]);
@@ -177,13 +184,15 @@ void GeneralElementSet::jacobian(const EvalContext& context, const NodeSeeds* se
   }
 }
 
-void GeneralElementSet::after_predict(const EvalContext& context, State& state) const {
-  for (int i = 0; i < size(); ++i)
+void GeneralElementSet::after_predict(const EvalContext& context, State& state,
+                                      ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i)
     if (is_active(state, i)) slots_[i].element->after_predict(view(context, i), state);
 }
 
-void GeneralElementSet::after_convergence(const EvalContext& context, State& state) const {
-  for (int i = 0; i < size(); ++i)
+void GeneralElementSet::after_convergence(const EvalContext& context, State& state,
+                                          ElementRange range) const {
+  for (int i = range.first; i < range.last; ++i)
     if (is_active(state, i)) slots_[i].element->after_convergence(view(context, i), state);
 }
 

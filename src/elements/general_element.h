@@ -21,6 +21,7 @@
 #include <string_view>
 #include <vector>
 
+#include "model/check.h"
 #include "model/context.h"
 #include "model/element_set.h"
 #include "model/model.h"
@@ -45,6 +46,7 @@ class GeneralConnection {
   int algebraic(int count) { return own(count, false); }
   int differential(int count) { return own(count, true); }
   int memory(int count, double initial = 0);  ///< offset from the element's first memory slot
+  int scratch(int count);                     ///< offset in what GeneralView::scratch gives
 
  private:
   friend class GeneralElementSet;
@@ -62,7 +64,7 @@ class GeneralConnection {
   std::vector<Entry> entries_;
   std::vector<char> own_differential_;
   int size_ = 0;  ///< local rows = local columns
-  int first_own_ = -1, memory_ = -1, memory_count_ = 0;
+  int first_own_ = -1, memory_ = -1, memory_count_ = 0, scratch_count_ = 0;
   std::vector<int> rows_, columns_;  ///< model's numbers by local number, -1: none; filled by bind
   std::vector<int> parameter_;  ///< parameter nodes: offset of the value in State::memory, else -1
 };
@@ -103,6 +105,11 @@ class GeneralView {
   double drive(const DrivePtr& d) const { return d->value(context); }
   double memory(int i) const { return state().memory[connection_.memory_ + i]; }
   int memory_offset() const { return connection_.memory_; }
+  /// The numbers asked for in `connect`; what they hold at entry means nothing.
+  double* scratch() const {
+    MBCOSIM_CHECK(context.scratch, "scratch is used where there is none");
+    return context.scratch->local.data();
+  }
   /// Unknown (model's number) behind a local column; -1 when there is none.
   int unknown(int local) const { return connection_.columns_[local]; }
   double c() const { return context.c; }
@@ -206,7 +213,7 @@ class GeneralElement {
   virtual void output(const GeneralView&, OutputRow&) const {}
   virtual std::string log(const Model&, int /*label*/) const { return {}; }
   virtual int private_datum(std::string_view) const { return -1; }
-  virtual std::vector<std::string> private_data() const { return {}; }
+  virtual std::vector<Datum> private_data() const { return {}; }
   virtual double private_value(const GeneralView&, int /*datum*/) const { return 0; }
   virtual void add_inertia(const GeneralView&, int /*node*/, Inertia&) const {}
   virtual void add_momentum(const GeneralView&, State&) const {}
@@ -243,8 +250,9 @@ class GeneralElementSet final : public ElementSet, public SampledTableSource {
   void residual(const EvalContext& context, double* r, ElementRange range) const override;
   void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
                 ElementRange range) const override;
-  void after_predict(const EvalContext& context, State& state) const override;
-  void after_convergence(const EvalContext& context, State& state) const override;
+  void after_predict(const EvalContext& context, State& state, ElementRange range) const override;
+  void after_convergence(const EvalContext& context, State& state,
+                         ElementRange range) const override;
   AssemblyRole assembly_role(int i) const override { return slots_[i].element->assembly_role(); }
   void assembly_residual(const EvalContext& context, int i, double* r,
                          double* r_rate) const override;
@@ -255,7 +263,7 @@ class GeneralElementSet final : public ElementSet, public SampledTableSource {
   int private_datum(int i, std::string_view name) const override {
     return slots_[i].element->private_datum(name);
   }
-  std::vector<std::string> private_data(int i) const override {
+  std::vector<Datum> private_data(int i) const override {
     return slots_[i].element->private_data();
   }
   double private_value(const EvalContext& context, int i, int datum) const override;

@@ -34,6 +34,7 @@ class PlacedElements : public ElementSet {
   std::string row_name(int i, int k) const override;
   std::vector<int> nodes(int i) const override;
   int first_own(int i) const override { return place(i).connection.own; }
+  int first_sum(int i) const override { return place(i).connection.sums; }
 
   void bind(const Model& model, int i, int first_own) override;
   void find_structure(const std::vector<StructureProbe>& probes) override;

@@ -231,7 +231,7 @@ void read_default_scale(DeckCard& card) {
     if (all || *kind == Kind::structural_node) deck.structural_scale = s;
     for (int k = 0; k < 5; ++k)
       if (all || *kind == kind_of(static_cast<ScalarKind>(k))) deck.scalar_scale[k] = s;
-    for (int f = 0; f < static_cast<int>(Family::count); ++f)
+    for (int f = 0; f < kFamilies; ++f)
       if (all || *kind == kind_of(static_cast<Family>(f))) card.model().family_scale[f] = s;
   }
 }

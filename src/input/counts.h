@@ -21,7 +21,7 @@ enum class Kind : int {
   file_driver,
   family0
 };
-constexpr int kKinds = static_cast<int>(Kind::family0) + static_cast<int>(Family::count);
+constexpr int kKinds = static_cast<int>(Kind::family0) + kFamilies;
 
 inline Kind kind_of(Family f) {
   return static_cast<Kind>(static_cast<int>(Kind::family0) + static_cast<int>(f));

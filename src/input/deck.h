@@ -10,8 +10,8 @@
 #include <unordered_map>
 
 #include "input/counts.h"
-#include "input/digest.h"
 #include "input/reading.h"
+#include "math/hash.h"
 #include "model/beam_output.h"
 #include "model/model.h"
 #include "model/registry.h"
@@ -35,7 +35,7 @@ std::string undefined_text(const std::string& kind, int label);
 struct OutputDefaults {
   bool structural = true, accelerations = false;
   std::array<bool, 5> scalar;  ///< by ScalarKind
-  std::array<bool, static_cast<int>(Family::count)> family;
+  std::array<bool, kFamilies> family;
   OutputDefaults() {
     scalar.fill(true);
     family.fill(true);

@@ -4,6 +4,7 @@
 
 #include "input/cards.h"
 #include "input/suggest.h"
+#include "model/check.h"
 #include "model/inverse_problem.h"
 
 namespace mbcosim {
@@ -59,6 +60,9 @@ void DeckReader::read_statement(const Statement& statement) {
     dispatch(card);
   } catch (const DeckError& error) {
     record(error, card);
+  } catch (const InternalError& error) {
+    record(DeckError(reading.diagnostic(Severity::error, "internal", card.last(), error.what())),
+           card);
   } catch (const std::exception& error) {
     record(DeckError(reading.diagnostic(
                Severity::error, "error", card.last(),

@@ -74,13 +74,13 @@ void read_element_head(DeckCard& card, Family family, bool has_label, const Driv
 
 /// The trailing `output` option applies to what the reader added (after `before` elements).
 void read_trailing_output(DeckCard& card, Family family, std::size_t before) {
-  Model& model = card.model();
+  const Model& model = card.model();
   if (card.peek_word() != "output") return;
   const bool fallback = card.deck().output.family[static_cast<int>(family)];
   bool output = fallback;
   read_output_option(card, fallback, output);
   for (std::size_t i = before; i < model.elements.size(); ++i)
-    model.elements[i].set->info(model.elements[i].index).output = output;
+    card.builder().info(model.elements[i]).output = output;
 }
 
 /// Hints that the element's reader did not ask for.
@@ -132,10 +132,8 @@ void read_element(DeckCard& card, Driven* driven = nullptr) {
   refuse_self_joints(card, f, before);
   if (driven) {
     warn_of_unused(card, driven->hints);
-    if (!samples.empty()) {
-      const ElementRef e = card.model().elements[before];
-      e.set->info(e.index).hints = std::move(samples);
-    }
+    if (!samples.empty())
+      card.builder().info(card.model().elements[before]).hints = std::move(samples);
   }
   set_inverse_role(card, before);
   read_inverse_role(card, before);
@@ -157,7 +155,7 @@ void drive_existing(DeckCard& card, const Driven& driven) {
               std::to_string(driven.label));
   const ElementRef e = card.model().find_element(family, label);
   if (!e.set) card.fail_undefined(card.last(), family_name(family), label);
-  ElementInfo& info = e.set->info(e.index);
+  ElementInfo& info = card.builder().info(e);
   if (info.driven)
     card.fail(std::string(family_name(family)) + " " + std::to_string(label) +
               " is driven already");
@@ -250,7 +248,7 @@ DrivePtr read_datum(DeckCard& card, ElementRef e, const ScalarNode& node) {
     const int datum = e.set->private_datum(e.index, name);
     if (datum < 0)
       card.fail(element_name(card, e) + " has no private datum \"" + name + "\"",
-                suggestion(name, e.set->private_data(e.index)));
+                suggestion(name, e.set->data_names(e.index)));
     return std::make_shared<ElementDatum>(e, datum);
   }
   card.keyword("index");
@@ -260,7 +258,7 @@ DrivePtr read_datum(DeckCard& card, ElementRef e, const ScalarNode& node) {
                       e.set->private_datum(e.index, "ex") >= 0 ? ""
                       : n == 1                                 ? "pI."
                                                                : "pII.");
-  const std::vector<std::string> names = e.set->private_data(e.index);
+  const std::vector<std::string> names = e.set->data_names(e.index);
   if (n < 1 || n > static_cast<int>(names.size()))
     card.fail(element_name(card, e) + " has " + std::to_string(names.size()) +
               " private data; index " + std::to_string(n));
@@ -301,13 +299,13 @@ void read_output_card(DeckCard& card) {
     if (first == last) {
       const ElementRef e = model.find_element(family, first);
       if (e.set)
-        e.set->info(e.index).output = true;
+        card.builder().info(e).output = true;
       else if (!card.deck().was_refused(family_name(family), first))
         card.warn(undefined_text(family_name(family), first));
       return;
     }
     for (const ElementRef& e : model.elements) {
-      ElementInfo& info = e.set->info(e.index);
+      ElementInfo& info = card.builder().info(e);
       if (info.family == family && info.label >= first && info.label <= last) info.output = true;
     }
   });

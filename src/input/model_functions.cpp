@@ -330,7 +330,7 @@ DrivePtr element_datum(const Model& model, Family family, bool has_label, int la
   std::string owner = family_name(family);
   if (has_label) owner += " " + std::to_string(label);
   if (!element.set) fail(owner + " is not defined");
-  const std::vector<std::string> names = element.set->private_data(element.index);
+  const std::vector<std::string> names = element.set->data_names(element.index);
   const std::string name = choose_datum(names, datum, index, owner);
   const int k = element.set->private_datum(element.index, name);
   if (k < 0) fail_datum(owner, name, names);

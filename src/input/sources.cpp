@@ -11,11 +11,7 @@ namespace fs = std::filesystem;
 namespace {
 
 Error io_error(std::string message) {
-  Error e;
-  e.kind = ErrorKind::io;
-  e.message = std::move(message);
-  e.reason = "FILE";
-  return e;
+  return make_error(ErrorKind::io, "FILE", std::move(message));
 }
 
 std::string quote(const std::string& name) { return '"' + name + '"'; }

@@ -4,10 +4,8 @@
 
 namespace mbcosim {
 
-namespace {
-
-const char* severity_name(Severity s) {
-  switch (s) {
+const char* severity_name(Severity severity) {
+  switch (severity) {
     case Severity::error:
       return "error";
     case Severity::warning:
@@ -17,6 +15,16 @@ const char* severity_name(Severity s) {
   }
   return "error";
 }
+
+Error make_error(ErrorKind kind, std::string reason, std::string message) {
+  Error e;
+  e.kind = kind;
+  e.reason = std::move(reason);
+  e.message = std::move(message);
+  return e;
+}
+
+namespace {
 
 /// Bytes of the UTF-8 sequence at `text[i]`; 0 when it is none that a terminal can show.
 std::size_t shown_bytes(const std::string& text, std::size_t i) {

@@ -20,6 +20,7 @@ struct SourceSpan {
 };
 
 enum class Severity { error, warning, note };
+const char* severity_name(Severity severity);  ///< "error", "warning", "note"
 
 /// One finding about a deck.
 struct Diagnostic {
@@ -76,6 +77,9 @@ struct Error {
   std::vector<Diagnostic> diagnostics;
   SolverFailure failure;
 };
+
+/// `reason` may be empty.
+Error make_error(ErrorKind kind, std::string reason, std::string message);
 
 /// A value or an `Error`.
 template <class T>

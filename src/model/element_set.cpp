@@ -2,6 +2,16 @@
 
 namespace mbcosim {
 
+int ElementSet::first_sum(int) const { return -1; }
+
+void ElementSet::accumulate(const EvalContext&, ElementRange) const {}
+
+std::vector<std::string> ElementSet::data_names(int i) const {
+  std::vector<std::string> names;
+  for (Datum& d : private_data(i)) names.push_back(std::move(d.name));
+  return names;
+}
+
 void ElementSet::find_structure(const std::vector<StructureProbe>&) {}
 
 void ElementSet::after_assembly(const EvalContext& context, State& state, int i) const {

@@ -7,42 +7,15 @@
 
 #include "math/types.h"
 #include "model/context.h"
+#include "model/datum.h"
 #include "model/diagnostic.h"
+#include "model/family.h"
 #include "model/fwd.h"
 #include "model/state.h"
 
 namespace mbcosim {
 
 class OutputRow;
-
-/// Families that share a label space, in the order in which their unknowns are numbered, after
-/// those of the nodes.
-enum class Family {
-  joint,
-  joint_regularization,
-  plate,
-  genel,
-  induced_velocity,
-  aerodynamic,
-  aeromodal,
-  electric,
-  thermal,
-  hydraulic,
-  loadable,
-  // families without unknowns of their own
-  body,
-  beam,
-  force,
-  gravity,
-  inertia,
-  automatic_structural,
-  air_properties,
-  bulk,
-  output_element,
-  count
-};
-const char* family_name(
-    Family family);  ///< "joint", "hydraulic", ... as in private data and messages
 
 /// A number of a `driven` element that is taken anew from the model's state whenever the element
 /// becomes active (`hint` of `driven`, input manual): State::memory[memory] = source.
@@ -124,7 +97,7 @@ class ElementSet {
 
   virtual int size() const = 0;
   virtual const ElementInfo& info(int i) const = 0;
-  virtual ElementInfo& info(int i) = 0;
+  virtual ElementInfo& info(int i) = 0;  ///< while the model is built: ModelBuilder::info
 
   // --- unknowns and structure, while the model is being finished
   virtual int unknowns(int i) const = 0;                 ///< number of own unknowns of element i
@@ -133,6 +106,8 @@ class ElementSet {
   virtual std::vector<int> nodes(
       int i) const = 0;                    ///< structural nodes it is attached to (indices)
   virtual int first_own(int i) const = 0;  ///< first own unknown, as given to bind
+  /// Where element i sums over others: offset in Scratch::sums, −1 when it does not.
+  virtual int first_sum(int i) const;
   virtual void bind(const Model& model, int i,
                     int first_own) = 0;  ///< own unknowns start at first_own
   /// Looks which entries of the local matrices can differ from zero; the others stay out of the
@@ -153,8 +128,15 @@ class ElementSet {
   /// Adds −∂r/∂δ to the sparse values; seeds by structural node index.
   virtual void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
                         ElementRange range) const = 0;
-  virtual void after_predict(const EvalContext& context, State& state) const = 0;
-  virtual void after_convergence(const EvalContext& context, State& state) const = 0;
+  // --- stages around it, in the order of families (StageRank)
+  /// Once a step, after the prediction.
+  virtual void after_predict(const EvalContext& context, State& state,
+                             ElementRange range) const = 0;
+  /// Adds to what elements sum over others (Scratch::sums). Before each residual and each Jacobian.
+  virtual void accumulate(const EvalContext& context, ElementRange range) const;
+  virtual bool accumulates() const { return false; }
+  virtual void after_convergence(const EvalContext& context, State& state,
+                                 ElementRange range) const = 0;
 
   // --- initial assembly: state.y, yp hold positions and rates, multipliers λ and λ′
   // (solver/initial_assembly.h)
@@ -176,7 +158,7 @@ class ElementSet {
   virtual std::string log_line(const Model& model,
                                int i) const = 0;  ///< line of .log without newline; may be empty
   virtual int private_datum(int i, std::string_view name) const = 0;  ///< index, or -1
-  virtual std::vector<std::string> private_data(int i) const = 0;     ///< names, for describe
+  virtual std::vector<Datum> private_data(int i) const = 0;
   virtual double private_value(const EvalContext& context, int i, int datum) const = 0;
   /// Adds the inertia that element i attaches to structural node `node` (global frame, about the
   /// node).
@@ -185,6 +167,7 @@ class ElementSet {
   virtual void add_momentum(const EvalContext& context, int i, State& state) const = 0;
 
   ElementRange all() const { return {0, size()}; }
+  std::vector<std::string> data_names(int i) const;  ///< of private_data
   bool is_active(const State& state, int i) const {
     const int m = info(i).active_memory;
     return m < 0 || state.memory[m] != 0;
@@ -193,8 +176,14 @@ class ElementSet {
 
 /// Position of an element in the model.
 struct ElementRef {
-  ElementSet* set = nullptr;
+  const ElementSet* set = nullptr;
   int index = -1;
+};
+
+/// Some elements of a set, one after another.
+struct ElementSpan {
+  const ElementSet* set = nullptr;
+  ElementRange range{0, 0};
 };
 
 }  // namespace mbcosim

@@ -47,8 +47,14 @@ constexpr FamilyFacts kFamilyTable[] = {
      "joint regularizations", "", kJointRegularization, kJointRegularization},
     {Family::plate, "plate", "plates", "plates", "", kPlateHeads, kPlateFunctions},
     {Family::genel, "genel", "genels", "genels", "", kGenel, kGenel, kGenelFiles, "genel"},
-    {Family::induced_velocity, "induced velocity element", "induced velocity elements",
-     "induced velocity elements", "rotors", kInducedVelocity, kInducedVelocity},
+    {.family = Family::induced_velocity,
+     .name = "induced velocity element",
+     .plural = "induced velocity elements",
+     .count_card = "induced velocity elements",
+     .old_count_card = "rotors",
+     .heads = kInducedVelocity,
+     .functions = kInducedVelocity,
+     .rank = StageRank::collector},
     {Family::aerodynamic, "aerodynamic element", "aerodynamic elements", "aerodynamic elements", "",
      kAerodynamicHeads, kAerodynamicFunctions},
     {Family::aeromodal, "aeromodal", "aeromodals", "aeromodals", "", kAeromodal, kAeromodal},
@@ -108,7 +114,6 @@ constexpr FamilyFacts kFamilyTable[] = {
 };
 
 constexpr bool is_complete() {
-  constexpr int kFamilies = static_cast<int>(Family::count);
   if (std::size(kFamilyTable) != kFamilies) return false;
   for (int k = 0; k < kFamilies; ++k)
     if (static_cast<int>(kFamilyTable[k].family) != k) return false;
@@ -125,7 +130,6 @@ const FamilyFacts* find(std::span<const std::string_view> FamilyFacts::*words,
 
 }  // namespace
 
-const char* family_name(Family family) { return family_facts(family).name; }
 const FamilyFacts& family_facts(Family family) { return kFamilyTable[static_cast<int>(family)]; }
 std::span<const FamilyFacts> all_families() { return kFamilyTable; }
 const FamilyFacts* family_by_head(std::string_view head) { return find(&FamilyFacts::heads, head); }

@@ -1,12 +1,44 @@
 /// Families of elements: what each is called wherever a deck, a result file or a client names it.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string_view>
 
-#include "model/element_set.h"
-
 namespace mbcosim {
+
+/// Families that share a label space, in the order in which their unknowns are numbered, after
+/// those of the nodes.
+enum class Family {
+  joint,
+  joint_regularization,
+  plate,
+  genel,
+  induced_velocity,
+  aerodynamic,
+  aeromodal,
+  electric,
+  thermal,
+  hydraulic,
+  loadable,
+  // families without unknowns of their own
+  body,
+  beam,
+  force,
+  gravity,
+  inertia,
+  automatic_structural,
+  air_properties,
+  bulk,
+  output_element,
+  count
+};
+inline constexpr int kFamilies = static_cast<int>(Family::count);
+
+/// The order of families between which sums are passed on, within each stage of a step (after the
+/// prediction, accumulation, after convergence): all `contributors` come before all `collectors`.
+/// Within one rank elements keep the order of their sets.
+enum class StageRank { contributor, collector };
 
 struct FamilyFacts {
   Family family;
@@ -24,10 +56,12 @@ struct FamilyFacts {
   const char* owner = "";
   bool has_default_output = true;  ///< `default output` knows the family
   bool has_label = true;
+  StageRank rank = StageRank::contributor;
 };
 
 const FamilyFacts& family_facts(Family family);
 std::span<const FamilyFacts> all_families();
+inline const char* family_name(Family family) { return family_facts(family).name; }
 
 /// By a normalized head of the elements block, or nullptr.
 const FamilyFacts* family_by_head(std::string_view head);

@@ -9,6 +9,7 @@ namespace mbcosim {
 class Model;
 class ModelBuilder;
 struct State;
+struct Scratch;
 struct EvalContext;
 class Card;
 class Registry;

@@ -1,8 +1,9 @@
 /// Model: everything that is fixed once a deck is read. Immutable and shared between sessions and
-/// threads.
+/// threads: what is const is so to the last element.
 #pragma once
 
 #include <array>
+#include <experimental/propagate_const>
 #include <map>
 #include <memory>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "model/fwd.h"
 #include "model/node.h"
 #include "model/node_equations.h"
+#include "model/scratch.h"
 #include "model/settings.h"
 #include "model/sparse_pattern.h"
 #include "model/state.h"
@@ -83,7 +85,7 @@ class Model {
   std::vector<StructuralNode> structural;
   std::vector<ScalarNode>
       scalars;  ///< electric, thermal, abstract, hydraulic, parameter nodes in declaration order
-  std::vector<std::unique_ptr<ElementSet>> sets;
+  std::vector<std::experimental::propagate_const<std::unique_ptr<ElementSet>>> sets;
   std::vector<ElementRef> elements;  ///< in declaration order
   std::vector<NamedDrive> drives;    ///< `drive caller` cards
   std::vector<std::shared_ptr<const StepListener>> step_listeners;
@@ -99,8 +101,8 @@ class Model {
   std::vector<StreamInput> stream_inputs;
   std::vector<StructuralPort> structural_ports;
   /// `default scale` of the rows that each family of elements owns.
-  std::array<double, static_cast<int>(Family::count)> family_scale = [] {
-    std::array<double, static_cast<int>(Family::count)> a;
+  std::array<double, kFamilies> family_scale = [] {
+    std::array<double, kFamilies> a;
     a.fill(1);
     return a;
   }();
@@ -120,6 +122,9 @@ class Model {
   std::vector<NodePlace> places;  ///< (structural nodes)
   NodeEquations node_equations;   ///< rows that nodes contribute themselves
   std::vector<std::vector<ElementRef>> node_bodies;  ///< bodies attached to each structural node
+  std::vector<ElementSpan> stage_order;              ///< all elements by the rank of their family
+  std::vector<ElementSpan> accumulation;             ///< those of them that add to sums
+  ScratchSizes scratch;                              ///< what the elements need
 
   // --- kinematics
   NodeState node_state(const EvalContext& context,
@@ -156,7 +161,7 @@ class Model {
   // label -> index maps
   std::unordered_map<int, int> structural_index;
   std::unordered_map<int, int> scalar_index[5];
-  std::unordered_map<int, ElementRef> element_index[static_cast<int>(Family::count)];
+  std::unordered_map<int, ElementRef> element_index[kFamilies];
   std::unordered_map<int, int> drive_index;
 };
 
@@ -186,7 +191,12 @@ class ModelBuilder {
   /// Records the last element of `set` in declaration order and in the label index.
   ElementRef register_element(ElementSet& set);
 
+  /// What all elements have, to be changed while the model is built.
+  ElementInfo& info(const ElementRef& element);
+
   int allocate_memory(int count, double initial = 0);  ///< offset in State::memory
+  int allocate_sums(int count);                        ///< offset in Scratch::sums
+  void require_scratch(int count);                     ///< of one element: Scratch::local
   void set_memory(int offset, double value) { model_->initial_memory[offset] = value; }
   void on_step(std::shared_ptr<const StepListener> listener) {
     model_->step_listeners.push_back(std::move(listener));

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <random>
 
+#include "model/check.h"
 #include "model/model.h"
 
 namespace mbcosim {
@@ -33,6 +34,30 @@ ElementRef ModelBuilder::register_element(ElementSet& set) {
   model_->elements.push_back(ref);
   model_->element_index[static_cast<int>(info.family)].emplace(info.label, ref);
   return ref;
+}
+
+namespace {
+
+ElementSet& set_of(Model& model, const ElementRef& e) {
+  for (auto& set : model.sets)
+    if (set.get() == e.set) return *set;
+  MBCOSIM_CHECK(false, "an element of another model");
+}
+
+}  // namespace
+
+ElementInfo& ModelBuilder::info(const ElementRef& element) {
+  return set_of(*model_, element).info(element.index);
+}
+
+int ModelBuilder::allocate_sums(int count) {
+  const int offset = model_->scratch.sums;
+  model_->scratch.sums += count;
+  return offset;
+}
+
+void ModelBuilder::require_scratch(int count) {
+  model_->scratch.local = std::max(model_->scratch.local, count);
 }
 
 int ModelBuilder::allocate_memory(int count, double initial) {
@@ -137,7 +162,7 @@ void number_unknowns(Model& model) {
       add_unknowns(1, node.differential ? UnknownKind::differential : UnknownKind::algebraic,
                    node.scale);
     }
-  for (int family = 0; family < static_cast<int>(Family::count); ++family)
+  for (int family = 0; family < kFamilies; ++family)
     for (const ElementRef& e : model.elements) {
       if (static_cast<int>(e.set->info(e.index).family) != family) continue;
       const int own = e.set->unknowns(e.index);
@@ -147,7 +172,7 @@ void number_unknowns(Model& model) {
                      model.family_scale[family]);
         model.is_constraint_row.back() = !differential;
       }
-      e.set->bind(model, e.index, n - own);
+      set_of(model, e).bind(model, e.index, n - own);
     }
   model.unknowns = n;
 }
@@ -181,11 +206,14 @@ State meaningless_state(const Model& model, std::mt19937& generator) {
 void find_structure(Model& model) {
   std::mt19937 generator(20260101);
   const State states[] = {meaningless_state(model, generator), meaningless_state(model, generator)};
+  Scratch scratch(model.scratch);
+  for (double& sum : scratch.sums) sum = 0.25 + generator() * 0x1p-32;
   std::vector<StructureProbe> probes;
   for (const State& state : states) {
     StructureProbe probe;
     probe.context.model = &model;
     probe.context.state = &state;
+    probe.context.scratch = &scratch;
     probe.context.time = model.initial_value.initial_time;
     probe.context.c = probe.context.seed = 0.375;
     probe.context.uniform_gravity = Vec3(0.5, 0.75, -1.25);
@@ -193,7 +221,22 @@ void find_structure(Model& model) {
       probe.seeds.push_back({r.R + Mat3::Constant(0.125), r.R.transpose() + Mat3::Constant(0.625)});
     probes.push_back(std::move(probe));
   }
-  for (const auto& set : model.sets) set->find_structure(probes);
+  for (auto& set : model.sets) set->find_structure(probes);
+}
+
+/// All elements by the rank of their family; those of one rank in the order of their sets.
+void order_stages(Model& model) {
+  for (const StageRank rank : {StageRank::contributor, StageRank::collector})
+    for (const auto& owned : model.sets) {
+      const ElementSet& set = *owned;
+      const auto has_rank = [&](int i) { return family_facts(set.info(i).family).rank == rank; };
+      for (int first = 0, last; first < set.size(); first = last + 1) {
+        for (last = first; last < set.size() && has_rank(last);) ++last;
+        if (last == first) continue;
+        model.stage_order.push_back({&set, {first, last}});
+        if (set.accumulates()) model.accumulation.push_back(model.stage_order.back());
+      }
+    }
 }
 
 }  // namespace
@@ -206,7 +249,7 @@ Result<ModelPtr> ModelBuilder::finish() {
     model.node_equations.collect_pattern(pattern);
     for (const auto& set : model.sets) set->collect_pattern(pattern);
   };
-  for (const auto& set : model.sets) set->find_structure({});
+  for (auto& set : model.sets) set->find_structure({});
   Pattern couplings(model.unknowns);
   collect(couplings);
   model.couplings = couplings.compressed();
@@ -215,11 +258,12 @@ Result<ModelPtr> ModelBuilder::finish() {
   collect(pattern);
   pattern.finish(model);
   model.node_equations.set_positions(pattern);
-  for (const auto& set : model.sets) set->set_positions(pattern);
+  for (auto& set : model.sets) set->set_positions(pattern);
   model.node_bodies.resize(model.structural.size());
   for (const ElementRef& e : model.elements)
     if (e.set->info(e.index).family == Family::body)
       for (const int node : e.set->nodes(e.index)) model.node_bodies[node].push_back(e);
+  order_stages(model);
   sets_.clear();
   return ModelPtr(std::move(model_));
 }

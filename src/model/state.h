@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "math/types.h"
+#include "model/step_control.h"
 
 namespace mbcosim {
 
@@ -43,7 +44,8 @@ struct State {
   std::vector<NodeRotationHistory> rotation_history;  ///< (structural nodes)
   std::vector<double> memory;                         ///< what elements, laws and drives remember
   std::vector<double> variables;  ///< variables of the deck that run-time strings read or assign
-  std::vector<double> control;    ///< step control and integrator flags (solver)
+  StepControl control;
+  std::vector<double> kept_matrix;  ///< values of the matrix that `keep jacobian matrix` keeps
   /// Loads that external codes apply to structural nodes: force [N] and moment about the node
   /// [N·m], global components (6 × structural nodes), or empty when there are none.
   std::vector<double> external_loads;

@@ -94,11 +94,7 @@ Status NetcdfFile::finish() {
     id_ = -1;
   }
   if (problem_.empty()) return ok();
-  Error e;
-  e.kind = ErrorKind::io;
-  e.reason = "OUTPUT_NOT_WRITTEN";
-  e.message = "cannot write " + path_ + ": " + problem_;
-  return e;
+  return make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN", "cannot write " + path_ + ": " + problem_);
 }
 
 }  // namespace mbcosim

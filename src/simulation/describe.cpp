@@ -8,16 +8,11 @@
 #include <sstream>
 
 #include "input/value.h"
+#include "math/hash.h"
 
 namespace mbcosim {
 
 namespace {
-
-std::string hexadecimal(std::uint64_t x) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(x));
-  return text;
-}
 
 NodeDescription describe(const StructuralNode& n) {
   NodeDescription d;
@@ -54,7 +49,7 @@ ElementDescription describe(const Model& model, const ElementRef& e) {
   d.label = info.label;
   d.name = info.name;
   for (const int node : e.set->nodes(e.index)) d.nodes.push_back(model.structural[node].label);
-  d.data = e.set->private_data(e.index);
+  d.data = e.set->data_names(e.index);
   d.unknowns = e.set->unknowns(e.index);
   d.driven = info.driven != nullptr;
   return d;
@@ -233,7 +228,7 @@ ModelDescription describe(const Model& model, std::vector<Variable> variables,
                           std::vector<DeckSymbol> symbols) {
   ModelDescription d;
   d.title = model.title;
-  d.digest = hexadecimal(model.digest);
+  d.digest = digest_text(model.digest);
   d.initial_time = model.initial_value.initial_time;
   d.final_time = model.initial_value.final_time;
   d.time_step = model.initial_value.time_step;

@@ -8,11 +8,8 @@ namespace mbcosim {
 namespace {
 
 Error wrong(const std::string& text, const std::string& why) {
-  Error e;
-  e.kind = ErrorKind::argument;
-  e.reason = "BAD_FORMULA";
-  e.message = "expression \"" + text.substr(0, 200) + "\": " + why;
-  return e;
+  return make_error(ErrorKind::argument, "BAD_FORMULA",
+                    "expression \"" + text.substr(0, 200) + "\": " + why);
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ class Differences {
         state_(state),
         variables_(variables),
         outputs_(outputs),
+        scratch_(model.scratch),
         phase_(state.step == 0 ? Phase::derivatives : Phase::step) {}
 
   int output_count() const {
@@ -38,7 +39,7 @@ class Differences {
  private:
   VecX residual_of(const State& state) {
     std::vector<double> r(model_.unknowns);
-    compute_residual(model_.context(state, phase_), r);
+    compute_residual(model_.context(state, phase_), scratch_, r);
     return Eigen::Map<const VecX>(r.data(), static_cast<Eigen::Index>(r.size()));
   }
   VecX outputs_of(const State& state) {
@@ -52,6 +53,7 @@ class Differences {
   const State& state_;
   const Variables& variables_;
   std::span<const int> outputs_;
+  Scratch scratch_;
   Phase phase_;
 };
 

@@ -11,7 +11,6 @@
 #include "simulation/linearize.h"
 #include "simulation/state_bytes.h"
 #include "simulation/variables.h"
-#include "solver/control.h"
 #include "solver/eigenanalysis.h"
 #include "solver/inverse_dynamics.h"
 #include "solver/step_controller.h"
@@ -20,14 +19,6 @@
 namespace mbcosim {
 
 namespace {
-
-Error make_error(ErrorKind kind, std::string reason, std::string message) {
-  Error e;
-  e.kind = kind;
-  e.reason = std::move(reason);
-  e.message = std::move(message);
-  return e;
-}
 
 Error no_equations_of_motion() {
   return make_error(ErrorKind::precondition, "INVERSE_DYNAMICS",
@@ -38,7 +29,7 @@ Error no_equations_of_motion() {
 bool same_layout(const State& a, const State& b) {
   return a.y.size() == b.y.size() && a.rotation.size() == b.rotation.size() &&
          a.memory.size() == b.memory.size() && a.variables.size() == b.variables.size() &&
-         a.control.size() == b.control.size();
+         a.control.started == b.control.started && a.kept_matrix.size() == b.kept_matrix.size();
 }
 
 }  // namespace
@@ -88,8 +79,7 @@ struct Simulation::Impl {
   bool at_end() const {
     constexpr double kRounding =
         1e-9;  // of a step: exact times leave no step that rounding alone asks for
-    const double margin =
-        state.control.empty() || state.control[control::kExactTime] == 0 ? 0 : kRounding * state.h;
+    const double margin = state.control.exact_time ? kRounding * state.h : 0;
     return !(state.time < final_time - margin);
   }
 
@@ -135,7 +125,7 @@ Status Simulation::Impl::start() {
   }
   if (inverse) return start_inverse();
   if (auto status = stepper.assemble(state); !status) return status;
-  state.control[control::kExactTime] = time_keeping == TimeKeeping::exact ? 1 : 0;
+  state.control.exact_time = time_keeping == TimeKeeping::exact;
   if (s.abort_after == AbortAfter::assembly || s.final_time < s.initial_time) {
     record();
     return ok();
@@ -175,7 +165,7 @@ Status Simulation::Impl::start() {
 /// Inverse dynamics begins with the record at the initial time.
 Status Simulation::Impl::start_inverse() {
   inverse->begin(state);
-  state.control[control::kExactTime] = time_keeping == TimeKeeping::exact ? 1 : 0;
+  state.control.exact_time = time_keeping == TimeKeeping::exact;
   const PhaseReport report = inverse->attempt(state, {.h = model->initial_value.time_step});
   if (report.error) return *report.error;
   return write(report.newton, state.time);
@@ -219,7 +209,7 @@ Status Simulation::Impl::write(const NewtonReport& newton, double previous_time)
 }
 
 double Simulation::Impl::next_step_size() const try {
-  if (state.control.empty()) return state.h;  // the deck ends before the first phase
+  if (!state.control.started) return state.h;  // the deck ends before the first phase
   return stepper.peek_step_size(state);
 } catch (const EvaluationError&) {
   return state.h;  // the step itself will say what is wrong
@@ -366,6 +356,13 @@ void Simulation::set_load_tangents(std::vector<LoadTangent> tangents) {
 }
 LoadTangent& Simulation::load_tangent(int i) { return impl_->stepper.tangents()->tangent(i); }
 
+void StepReport::add(StepReport later) {
+  later.steps_done += steps_done;
+  later.total_iterations += total_iterations;
+  later.solver_seconds += solver_seconds;
+  *this = std::move(later);
+}
+
 StepReport Simulation::step(const CancelToken* cancel) { return step_many(1, cancel); }
 
 Status Simulation::check(const StepChoice& choice) const {
@@ -396,11 +393,7 @@ StepReport Simulation::Impl::run(const CancelToken* cancel, Next&& next) {
   total.step_size = state.h;
   if (is_finished()) total.outcome = StepOutcome::finished;
   while (const std::optional<StepChoice> choice = next()) {
-    StepReport one = step(cancel, *choice);
-    one.steps_done += total.steps_done;
-    one.total_iterations += total.total_iterations;
-    one.solver_seconds += total.solver_seconds;
-    total = std::move(one);
+    total.add(step(cancel, *choice));
     if (total.error) break;
   }
   return total;

@@ -66,6 +66,9 @@ struct StepReport {
   bool flagged = false;  ///< the last step did not converge and was accepted by StepPolicy::accept
   double solver_seconds = 0;   ///< wall time inside the solver
   std::optional<Error> error;  ///< set unless accepted or finished
+
+  /// Goes on with a later report: counts and times add up, the rest is of the last step.
+  void add(StepReport later);
 };
 
 /// How time goes on. Drives with events at the end of a step (`step`, `ramp`) tell the two apart.

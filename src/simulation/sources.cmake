@@ -1,2 +1,2 @@
 set(SOURCES simulation.cpp state_bytes.cpp variables.cpp load.cpp model_check.cpp describe.cpp formula.cpp geometry_view.cpp
-    units.cpp linearize.cpp point_motion.cpp)
+    linearize.cpp point_motion.cpp)

@@ -1,22 +1,15 @@
 #include "simulation/state_bytes.h"
 
-#include <cstdio>
 #include <cstring>
+
+#include "math/hash.h"
 
 namespace mbcosim {
 
 namespace {
 
 constexpr char kMagic[8] = {'m', 'b', 'c', 's', 't', 'a', 't', 'e'};
-constexpr std::uint32_t kVersion = 1;
-
-Error bad(ErrorKind kind, std::string reason, std::string message) {
-  Error e;
-  e.kind = kind;
-  e.reason = std::move(reason);
-  e.message = std::move(message);
-  return e;
-}
+constexpr std::uint32_t kVersion = 2;
 
 /// Writes or measures plain values one after another, little-endian as on every machine this runs
 /// on.
@@ -26,6 +19,7 @@ class Out {
   void value(const T& v) {
     bytes.append(reinterpret_cast<const char*>(&v), sizeof v);
   }
+  void value(bool flag) { value(static_cast<std::uint8_t>(flag)); }
   void array(const std::vector<double>& v) {
     value(static_cast<std::uint64_t>(v.size()));
     bytes.append(reinterpret_cast<const char*>(v.data()), v.size() * sizeof(double));
@@ -41,6 +35,12 @@ class In {
     if (bytes_.size() < sizeof v) return false;
     std::memcpy(&v, bytes_.data(), sizeof v);
     bytes_.remove_prefix(sizeof v);
+    return true;
+  }
+  bool value(bool& flag) {
+    std::uint8_t byte = 0;
+    if (!value(byte) || byte > 1) return false;
+    flag = byte == 1;
     return true;
   }
   bool array(std::vector<double>& v) {
@@ -87,18 +87,25 @@ void unflatten_rotations(const std::vector<double>& r, State& state) {
 
 template <class StateType, class Visit>
 void each_array(StateType& s, Visit visit) {
-  for (auto* v : {&s.y, &s.yp, &s.y1, &s.yp1, &s.y2, &s.yp2, &s.memory, &s.variables, &s.control,
-                  &s.external_loads})
+  for (auto* v : {&s.y, &s.yp, &s.y1, &s.yp1, &s.y2, &s.yp2, &s.memory, &s.variables,
+                  &s.kept_matrix, &s.external_loads})
     visit(*v);
 }
 
-}  // namespace
-
-std::uint64_t fnv1a(std::string_view bytes, std::uint64_t seed) {
-  std::uint64_t h = seed;
-  for (const char c : bytes) h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return h;
+template <class Control, class Visit>
+void each_member(Control& c, Visit visit) {
+  for (auto* flag :
+       {&c.started, &c.strategy.last_chance, &c.chosen_step, &c.hope_odd, &c.exact_time})
+    visit(*flag);
+  for (auto* count : {&c.regular_steps, &c.strategy.since_reduction, &c.strategy.since_raise,
+                      &c.last_iterations, &c.kept_iterations, &c.grid_count})
+    visit(*count);
+  for (auto* number : {&c.strategy_step, &c.kept_coefficient, &c.kept_algebraic_coefficient,
+                       &c.grid_start, &c.grid_step})
+    visit(*number);
 }
+
+}  // namespace
 
 std::string state_to_bytes(const State& state, std::uint64_t model_digest) {
   Out out;
@@ -109,6 +116,7 @@ std::string state_to_bytes(const State& state, std::uint64_t model_digest) {
   out.value(state.h);
   out.value(state.h_previous);
   out.value(state.step);
+  each_member(state.control, [&](const auto& v) { out.value(v); });
   each_array(state, [&](const std::vector<double>& v) { out.array(v); });
   out.array(flat_rotations(state));
   out.value(fnv1a(out.bytes));
@@ -116,8 +124,8 @@ std::string state_to_bytes(const State& state, std::uint64_t model_digest) {
 }
 
 Result<State> state_from_bytes(std::string_view bytes, std::uint64_t model_digest) {
-  const Error damaged =
-      bad(ErrorKind::data_loss, "STATE_DAMAGED", "the state's bytes are damaged or cut short");
+  const Error damaged = make_error(ErrorKind::data_loss, "STATE_DAMAGED",
+                                   "the state's bytes are damaged or cut short");
   std::uint64_t checksum = 0, digest = 0;
   if (bytes.size() < sizeof kMagic + sizeof kVersion + sizeof checksum ||
       std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
@@ -129,20 +137,19 @@ Result<State> state_from_bytes(std::string_view bytes, std::uint64_t model_diges
   std::uint32_t version = 0;
   if (!in.value(version) || !in.value(digest)) return damaged;
   if (version != kVersion)
-    return bad(ErrorKind::precondition, "STATE_VERSION",
-               "the state has format version " + std::to_string(version) + "; this program reads " +
-                   std::to_string(kVersion));
+    return make_error(ErrorKind::precondition, "STATE_VERSION",
+                      "the state has format version " + std::to_string(version) +
+                          "; this program reads " + std::to_string(kVersion) +
+                          ": it was saved by another version of mbcosim, start the run anew");
   if (digest != model_digest) {
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "the state belongs to the model with digest %016llx, this model has %016llx",
-                  static_cast<unsigned long long>(digest),
-                  static_cast<unsigned long long>(model_digest));
-    return bad(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL", text);
+    return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL",
+                      "the state belongs to the model with digest " + digest_text(digest) +
+                          ", this model has " + digest_text(model_digest));
   }
   State state;
   bool fine = in.value(state.time) && in.value(state.h) && in.value(state.h_previous) &&
               in.value(state.step);
+  each_member(state.control, [&](auto& v) { fine = fine && in.value(v); });
   each_array(state, [&](std::vector<double>& v) { fine = fine && in.array(v); });
   std::vector<double> rotations;
   fine = fine && in.array(rotations) && rotations.size() % kRotationDoubles == 0 && in.empty();

@@ -15,7 +15,4 @@ std::string state_to_bytes(const State& state, std::uint64_t model_digest);
 /// model (both digests are named) or an unknown version.
 Result<State> state_from_bytes(std::string_view bytes, std::uint64_t model_digest);
 
-/// FNV-1a of 64 bits.
-std::uint64_t fnv1a(std::string_view bytes, std::uint64_t seed = 14695981039346656037ull);
-
 }  // namespace mbcosim

@@ -4,7 +4,6 @@
 
 #include "elements/drawing.h"
 #include "simulation/geometry_view.h"
-#include "simulation/units.h"
 
 namespace mbcosim {
 
@@ -14,11 +13,9 @@ constexpr const char* kScalarName[] = {"abstract", "electric", "hydraulic", "the
 constexpr const char* kScalarUnit[] = {"", "V", "Pa", "K", ""};
 
 Error not_writable(const Variable& v) {
-  Error e;
-  e.kind = ErrorKind::argument;
-  e.reason = "VARIABLE_NOT_WRITABLE";
-  e.message = "variable \"" + v.name + "\" cannot be written; writable are inputs and parameters";
-  return e;
+  return make_error(
+      ErrorKind::argument, "VARIABLE_NOT_WRITABLE",
+      "variable \"" + v.name + "\" cannot be written; writable are inputs and parameters");
 }
 
 }  // namespace
@@ -178,13 +175,13 @@ void Variables::add_element(const Model& model, int element) {
   const ElementRef& e = model.elements[element];
   const std::string prefix = variable_prefix(e.set->info(e.index)) + ".",
                     owner = model.element_text(e);
-  for (const std::string& name : e.set->private_data(e.index)) {
+  for (const auto& [name, unit] : e.set->private_data(e.index)) {
     const int datum = e.set->private_datum(e.index, name);
     if (datum >= 0)
       add({prefix + name,
            1,
            {},
-           unit_of_datum(e.set->info(e.index).family, name),
+           std::string(unit),
            "",
            Causality::output,
            "private datum " + name,

@@ -22,12 +22,8 @@ constexpr int kSmall = 300;            ///< unknowns up to which the dense way i
 constexpr int kLargestDense = 3000;    ///< unknowns
 constexpr double kShiftOffset = 1e-2;  ///< [1/s], keeps the shift off eigenvalues at zero
 
-Error eigen_error(ErrorKind kind, std::string message) {
-  Error e;
-  e.kind = kind;
-  e.reason = "EIGENANALYSIS_FAILED";
-  e.message = "eigenanalysis: " + std::move(message);
-  return e;
+Error eigen_error(ErrorKind kind, const std::string& message) {
+  return make_error(kind, "EIGENANALYSIS_FAILED", "eigenanalysis: " + message);
 }
 
 /// Applies T; real and imaginary parts are solved together for a complex shift.

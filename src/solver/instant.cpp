@@ -8,7 +8,9 @@
 
 namespace mbcosim {
 
-void InstantSystem::compute_residual() { mbcosim::compute_residual(context(), ws_.residual); }
+void InstantSystem::compute_residual() {
+  mbcosim::compute_residual(context(), ws_.scratch, ws_.residual);
+}
 
 double InstantSystem::error(const NewtonSettings& settings) const {
   return residual_error(model_, settings, state_, ws_.residual);

@@ -6,8 +6,9 @@
 #include "elements/beams/inverse_beam.h"
 #include "elements/joints/deformable.h"
 #include "elements/joints/tikhonov.h"
-#include "solver/control.h"
+#include "solver/advance_time.h"
 #include "solver/newton.h"
+#include "solver/stages.h"
 #include "solver/system.h"
 
 namespace mbcosim {
@@ -57,7 +58,10 @@ struct GlobalInertia {
 }  // namespace
 
 InverseDynamics::InverseDynamics(const Model& model)
-    : model_(model), settings_(*inverse_problem(model)), first_(model.structural.size(), -1) {
+    : model_(model),
+      settings_(*inverse_problem(model)),
+      scratch_(std::make_unique<Scratch>(model.scratch)),
+      first_(model.structural.size(), -1) {
   for (std::size_t k = 0; k < model.structural.size(); ++k) {
     if (model.structural[k].is_dummy()) continue;
     first_[k] = n_;
@@ -82,7 +86,8 @@ InverseDynamics::InverseDynamics(const Model& model)
 
 void InverseDynamics::begin(State& state) const {
   const InitialValueSettings& s = model_.initial_value;
-  state.control.assign(control::kCount, 0.0);
+  state.control = {};
+  state.control.started = true;
   state.h = state.h_previous = s.time_step;
   state.time = s.initial_time - s.time_step;
   state.step = -1;
@@ -117,9 +122,9 @@ PhaseReport InverseDynamics::attempt(State& state, const StepAttempt& attempt) {
 /// Time and references of the next record.
 void InverseDynamics::prepare(State& state, const StepAttempt& attempt) {
   if (attempt.end)
-    control::jump_to(state, *attempt.end);
+    jump_to(state, *attempt.end);
   else
-    control::advance_time(state, attempt.h);
+    advance_time(state, attempt.h);
   state.h = state.h_previous = attempt.h;
   ++state.step;
   state.y1 = state.y;
@@ -252,9 +257,10 @@ void InverseDynamics::solve_forces(State& state) {
 void InverseDynamics::finish(State& state) const {
   for (const Joint& j : joints_)
     if (takes_part(state, j, kPosition)) j.constraint->accept(context(state), state);
-  for (const auto& set : model_.sets)
-    if (set->size() > 0 && !inverse_constraint({set.get(), 0}))
-      set->after_convergence(context(state), state);
+  accumulate(context(state), *scratch_);
+  for (const ElementSpan& s : model_.stage_order)
+    if (!inverse_constraint({s.set, s.range.first}))
+      s.set->after_convergence(context(state), state, s.range);
   for (const ElementRef& e : model_.elements)
     if (const auto* beams = beams_of(e); beams && !settings_.role(e.set->info(e.index)).ergonomy)
       accept_reference(*beams, e.index, state);
@@ -472,6 +478,7 @@ VecX InverseDynamics::spring_force(const State& state, const Spring& spring) con
 void InverseDynamics::add_springs(const State& state, bool first, VecX& right) const {
   if (ergonomy_.empty()) return;
   const State at = first ? reference(state) : state;
+  accumulate(context(at), *scratch_);
   for (const Spring& s : ergonomy_)
     if (s.element.set->is_active(state, s.element.index)) right.head(n_) += spring_force(at, s);
 }
@@ -483,6 +490,7 @@ void InverseDynamics::add_spring_matrix(const State& state, bool first, Triplets
   std::vector<double> values(model_.row_index.size(), 0.0);
   const std::vector<NodeSeeds> seeds(model_.structural.size(),
                                      NodeSeeds{Mat3::Identity(), Mat3::Zero()});
+  accumulate(context(base), *scratch_);
   for (const Spring& s : ergonomy_) {
     const int i = s.element.index;
     if (!s.element.set->is_active(state, i)) continue;
@@ -513,6 +521,7 @@ void InverseDynamics::add_spring_matrix(const State& state, bool first, Triplets
 VecX InverseDynamics::loads(const State& state) const {
   std::vector<double> r(model_.unknowns, 0.0), late(model_.unknowns, 0.0);
   bool has_late = false;
+  accumulate(context(state), *scratch_);
   for (const ElementRef& e : loads_) {
     if (!e.set->is_active(state, e.index)) continue;
     // Beams that only load the nodes are one record late, as in the reference solver.
@@ -522,6 +531,7 @@ VecX InverseDynamics::loads(const State& state) const {
   }
   if (has_late) {
     const State base = reference(state);
+    accumulate(context(base), *scratch_);
     for (const ElementRef& e : loads_)
       if (beams_of(e) && !settings_.role(e.set->info(e.index)).ergonomy &&
           e.set->is_active(state, e.index))

@@ -67,7 +67,11 @@ class InverseDynamics final : public StepSystem {
   using Triplets = std::vector<Eigen::Triplet<double>>;
   using Sparse = Eigen::SparseMatrix<double>;
 
-  EvalContext context(const State& state) const { return model_.context(state, Phase::step, 1, 1); }
+  EvalContext context(const State& state) const {
+    EvalContext c = model_.context(state, Phase::step, 1, 1);
+    c.scratch = scratch_.get();
+    return c;
+  }
   bool takes_part(const State& state, const Joint& j, Stage stage) const;
   void prepare(State& state, const StepAttempt& attempt);
   void solve(State& state, PhaseReport& report);
@@ -98,6 +102,7 @@ class InverseDynamics final : public StepSystem {
 
   const Model& model_;
   const InverseProblem& settings_;
+  const std::unique_ptr<Scratch> scratch_;  ///< of elements
   const CancelToken* cancel_ = nullptr;
   std::vector<int> nodes_;  ///< structural nodes with unknowns
   std::vector<int> first_;  ///< first of the six columns of a structural node, -1: none

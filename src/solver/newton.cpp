@@ -5,7 +5,6 @@
 #include <numeric>
 #include <optional>
 
-#include "solver/control.h"
 #include "solver/line_search.h"
 
 namespace mbcosim {
@@ -170,7 +169,7 @@ class Newton {
   /// Builds and factors the matrix when it is due; false when it cannot be factored.
   bool factor(int iterations) {
     const bool keep = settings_.keep_jacobian;
-    double* const kept = keep ? &system_.state().control[control::kCount] : nullptr;
+    double* const kept = keep ? system_.state().kept_matrix.data() : nullptr;
     const long count = keep ? kept_iterations() : iterations;
     if (count % settings_.jacobian_every == 0) {
       system_.compute_matrix();
@@ -185,15 +184,13 @@ class Newton {
 
   /// Iterations since the integrator's coefficients changed: a matrix is not kept beyond that.
   long kept_iterations() {
-    std::vector<double>& c = system_.state().control;
+    StepControl& c = system_.state().control;
     const NewtonSystem::Coefficients now = system_.coefficients();
-    double& count = c[control::kKeptIterations];
-    if (now != NewtonSystem::Coefficients{c[control::kKeptCoefficient],
-                                          c[control::kKeptAlgebraicCoefficient]})
-      count = 0;
-    c[control::kKeptCoefficient] = now.first;
-    c[control::kKeptAlgebraicCoefficient] = now.second;
-    return static_cast<long>(count++);
+    if (now != NewtonSystem::Coefficients{c.kept_coefficient, c.kept_algebraic_coefficient})
+      c.kept_iterations = 0;
+    c.kept_coefficient = now.first;
+    c.kept_algebraic_coefficient = now.second;
+    return c.kept_iterations++;
   }
 
   NewtonSystem& system_;

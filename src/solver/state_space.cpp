@@ -11,12 +11,8 @@ namespace {
 constexpr double kRateTolerance =
     1e-9;  ///< dependence on the rates of inputs, relative to that on the inputs
 
-Error state_space_error(ErrorKind kind, std::string message) {
-  Error e;
-  e.kind = kind;
-  e.reason = "LINEARIZATION_FAILED";
-  e.message = "linearization: " + std::move(message);
-  return e;
+Error state_space_error(ErrorKind kind, const std::string& message) {
+  return make_error(kind, "LINEARIZATION_FAILED", "linearization: " + message);
 }
 
 MatX final_range(MatX t) { return restrict_to_final_range(t); }

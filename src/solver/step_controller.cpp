@@ -7,27 +7,11 @@
 #include <string>
 
 #include "model/end_of_run.h"
-#include "solver/control.h"
+#include "solver/advance_time.h"
 
 namespace mbcosim {
 
 namespace {
-
-/// What the deck's strategy remembers of a step: attempts that fail do not take it back.
-class StrategyMemory {
- public:
-  explicit StrategyMemory(const State& state) {
-    for (std::size_t k = 0; k < kSlots.size(); ++k) values_[k] = state.control[kSlots[k]];
-  }
-  void put(State& state) const {
-    for (std::size_t k = 0; k < kSlots.size(); ++k) state.control[kSlots[k]] = values_[k];
-  }
-
- private:
-  static constexpr std::array kSlots{control::kSinceReduction, control::kSinceRaise,
-                                     control::kLastChance};
-  std::array<double, kSlots.size()> values_;
-};
 
 bool is_cancelled(const PhaseReport& phase) {
   return phase.error && phase.error->kind == ErrorKind::cancelled;
@@ -40,11 +24,12 @@ bool is_final(const PhaseReport& phase) {
 
 /// Time goes on as if a step in pieces had been one.
 void end_as_one(State& state, const State& start, const StepAttempt& whole) {
-  if (whole.end) return control::jump_to(state, *whole.end);
-  for (const int slot : {control::kGridStart, control::kGridStep, control::kGridCount})
-    state.control[slot] = start.control[slot];
+  if (whole.end) return jump_to(state, *whole.end);
+  state.control.grid_start = start.control.grid_start;
+  state.control.grid_step = start.control.grid_step;
+  state.control.grid_count = start.control.grid_count;
   state.time = start.time;
-  control::advance_time(state, whole.h);
+  advance_time(state, whole.h);
 }
 
 /// Lengths of a step between which its event lies: negative before `low`, not so from `high` on.
@@ -268,11 +253,11 @@ PhaseReport StepController::solve_in_pieces(State& state, const State& start,
 }
 
 PhaseReport StepController::attempt(State& state, const State& start, const StepAttempt& attempt) {
-  const StrategyMemory memory(state);
+  const StrategyMemory strategy = state.control.strategy;
   PhaseReport phase = system_.attempt(state, attempt);
   if (!phase.error) return phase;
   state = start;
-  memory.put(state);
+  state.control.strategy = strategy;
   return phase;
 }
 

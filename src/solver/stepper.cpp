@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "solver/control.h"
+#include "solver/advance_time.h"
 #include "solver/initial_assembly.h"
 #include "solver/instant.h"
 #include "solver/singularity.h"
+#include "solver/stages.h"
 #include "solver/system.h"
 
 namespace mbcosim {
@@ -141,7 +142,9 @@ Stepper::Stepper(const Model& model)
 
 Status Stepper::assemble(State& state) {
   const std::size_t matrix = (two_stages_ ? 4 : 1) * model_.row_index.size();
-  state.control.assign(control::kCount + (regular_.keep_jacobian ? matrix : 0), 0.0);
+  state.control = {};
+  state.control.started = true;
+  state.kept_matrix.assign(regular_.keep_jacobian ? matrix : 0, 0.0);
   state.h = state.h_previous = model_.initial_value.time_step;
   for (const auto& listener : model_.step_listeners)
     listener->advance(model_.context(state, Phase::assembly), state, true);
@@ -274,8 +277,8 @@ StepFormula Stepper::formula(State& state, double h, const MethodSettings& metho
       drive_or(method.rho_algebraic ? method.rho_algebraic : method.rho, context, 0);
   bool odd = false;
   if (method.method == Method::hope) {
-    odd = state.control[control::kHopeOdd] == 0;
-    state.control[control::kHopeOdd] = odd ? 1 : 0;
+    odd = !state.control.hope_odd;
+    state.control.hope_odd = odd;
   }
   return step_formula(method.method, h, state.h_previous, rho, rho_algebraic, odd);
 }
@@ -360,9 +363,8 @@ void Stepper::finish_prediction(State& state) const {
   }
 }
 
-void Stepper::after_convergence(State& state, Phase phase, double c, double ca) const {
-  const EvalContext context = model_.context(state, phase, c, ca);
-  for (const auto& set : model_.sets) set->after_convergence(context, state);
+void Stepper::after_convergence(State& state, Phase phase, double c, double ca) {
+  run_after_convergence(model_.context(state, phase, c, ca), workspace_.scratch, state);
 }
 
 void Stepper::begin_step(State& state, const StepAttempt& attempt, bool restart) const {
@@ -377,9 +379,9 @@ void Stepper::begin_step(State& state, const StepAttempt& attempt, bool restart)
   state.h_previous = restart ? attempt.h : state.h;
   state.h = attempt.h;
   if (attempt.end)
-    control::jump_to(state, *attempt.end);
+    jump_to(state, *attempt.end);
   else
-    control::advance_time(state, attempt.h);
+    advance_time(state, attempt.h);
   ++state.step;
 }
 
@@ -394,8 +396,8 @@ PhaseReport Stepper::attempt(State& state, const StepAttempt& attempt, const Met
     predict(state, f);
     finish_prediction(state);
     update_activity(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, true);
-    const EvalContext context = model_.context(state, Phase::step, f.c(), f.c_algebraic());
-    for (const auto& set : model_.sets) set->after_predict(context, state);
+    run_after_prediction(model_.context(state, Phase::step, f.c(), f.c_algebraic()),
+                         workspace_.scratch, state);
     select_pivots(state);
     report.newton = iterate(state, f, method, first, settings);
     report.flagged = attempt.accept_unconverged &&
@@ -417,38 +419,38 @@ PhaseReport Stepper::attempt(State& state, const StepAttempt& attempt) {
   NewtonSettings settings = regular_;
   if (attempt.h <= 2 * s.min_time_step)
     settings.max_residual = settings.max_residual_differential = 0;
-  const bool first = state.control[control::kRegularSteps] == 0;
-  const bool chosen = attempt.chosen || state.control[control::kChosenStep] != 0;
+  const bool first = state.control.regular_steps == 0;
+  const bool chosen = attempt.chosen || state.control.chosen_step;
   const bool restart = !first && chosen && is_two_step(s.method) && attempt.h > kLongest * state.h;
   const double strategy_length =
       attempt.chosen && s.strategy != StepStrategy::no_change ? this->strategy_length(state) : 0;
   PhaseReport report = this->attempt(state, attempt, s.method, first || restart, settings);
   if (report.error) return report;
   report.restarted = restart;
-  state.control[control::kRegularSteps] += 1;
-  state.control[control::kLastIterations] = report.newton.iterations;
-  state.control[control::kLastChance] = 0;
-  state.control[control::kChosenStep] = attempt.chosen ? 1 : 0;
-  state.control[control::kStrategyStep] = strategy_length;
+  state.control.regular_steps += 1;
+  state.control.last_iterations = report.newton.iterations;
+  state.control.strategy.last_chance = false;
+  state.control.chosen_step = attempt.chosen;
+  state.control.strategy_step = strategy_length;
   return report;
 }
 
 double Stepper::next_step_size(State& state) const {
-  SinceChange since{state.control[control::kSinceReduction], state.control[control::kSinceRaise]};
+  SinceChange since{state.control.strategy.since_reduction, state.control.strategy.since_raise};
   const double h = step_size(state, since);
-  state.control[control::kSinceReduction] = since.reduction;
-  state.control[control::kSinceRaise] = since.raise;
+  state.control.strategy.since_reduction = since.reduction;
+  state.control.strategy.since_raise = since.raise;
   return h;
 }
 
 double Stepper::peek_step_size(const State& state) const {
-  SinceChange since{state.control[control::kSinceReduction], state.control[control::kSinceRaise]};
+  SinceChange since{state.control.strategy.since_reduction, state.control.strategy.since_raise};
   return step_size(state, since);
 }
 
 double Stepper::strategy_length(const State& state) const {
-  if (state.control[control::kRegularSteps] == 0) return model_.initial_value.time_step;
-  const double kept = state.control[control::kStrategyStep];
+  if (state.control.regular_steps == 0) return model_.initial_value.time_step;
+  const double kept = state.control.strategy_step;
   return kept > 0 ? kept : state.h;
 }
 
@@ -456,7 +458,7 @@ double Stepper::step_size(const State& state, SinceChange& since) const {
   const InitialValueSettings& s = model_.initial_value;
   const double h = strategy_length(state);
   if (s.strategy == StepStrategy::no_change) return s.time_step;  // also after a step in pieces
-  if (state.control[control::kRegularSteps] < 2) return h;
+  if (state.control.regular_steps < 2) return h;
   const EvalContext context = model_.context(state, Phase::step);
   const double largest = s.max_time_step ? s.max_time_step->value(context) : HUGE_VAL;
   const double limit = largest > 0 ? largest : HUGE_VAL;
@@ -464,7 +466,7 @@ double Stepper::step_size(const State& state, SinceChange& since) const {
     return std::max(std::min(s.strategy_change->value(context), limit), s.min_time_step);
   since.reduction += 1;
   since.raise += 1;
-  const double iterations = state.control[control::kLastIterations];
+  const std::int64_t iterations = state.control.last_iterations;
   if (iterations > s.max_iterations_factor) {
     since.reduction = 0;
     return std::max(std::min(h * s.reduction, limit), s.min_time_step);
@@ -489,11 +491,11 @@ double Stepper::retry_step_size(State& state, double h) const {
   if (s.strategy != StepStrategy::factor || h <= s.min_time_step) return 0;
   if (h * s.reduction > s.min_time_step && s.reduction < 1 &&
       state.time + h * s.reduction > state.time) {
-    state.control[control::kSinceReduction] = 0;
+    state.control.strategy.since_reduction = 0;
     return h * s.reduction;
   }
-  if (state.control[control::kLastChance] != 0 || s.min_time_step <= 0) return 0;
-  state.control[control::kLastChance] = 1;
+  if (state.control.strategy.last_chance || s.min_time_step <= 0) return 0;
+  state.control.strategy.last_chance = true;
   return s.min_time_step;
 }
 

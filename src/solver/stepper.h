@@ -1,6 +1,7 @@
 /// Time stepping: the phases of a run and one attempt at a step.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -71,7 +72,7 @@ class Stepper final : public StepSystem {
                        NewtonSettings settings);
   /// Steps since the strategy last changed the length.
   struct SinceChange {
-    double reduction, raise;
+    std::int64_t reduction, raise;
   };
   double step_size(const State& state, SinceChange& since) const;
   /// From which the strategy goes on [s].
@@ -80,7 +81,7 @@ class Stepper final : public StepSystem {
   StepFormula formula(State& state, double h, const MethodSettings& method, bool first) const;
   void predict(State& state, const StepFormula& f) const;
   void finish_prediction(State& state) const;
-  void after_convergence(State& state, Phase phase, double c, double ca) const;
+  void after_convergence(State& state, Phase phase, double c, double ca);
   bool evaluate_matrix(const State& state);
   Error failure(const NewtonReport& report, const State& state, const char* phase) const;
 

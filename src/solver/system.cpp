@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "math/rotation_derivative.h"
+#include "solver/stages.h"
 
 namespace mbcosim {
 
@@ -39,7 +40,9 @@ void each_tile(const Model& model, Action action) {
 
 }  // namespace
 
-void compute_residual(const EvalContext& context, std::vector<double>& r) {
+void compute_residual(EvalContext context, Scratch& scratch, std::vector<double>& r) {
+  accumulate(context, scratch);
+  context.scratch = &scratch;
   std::fill(r.begin(), r.end(), 0.0);
   each_tile(*context.model,
             [&](const auto& part, ElementRange range) { part.residual(context, r.data(), range); });
@@ -71,7 +74,9 @@ void compute_seeds(const EvalContext& context, std::vector<NodeSeeds>& seeds) {
   }
 }
 
-void compute_jacobian(const EvalContext& context, Workspace& workspace) {
+void compute_jacobian(EvalContext context, Workspace& workspace) {
+  accumulate(context, workspace.scratch);
+  context.scratch = &workspace.scratch;
   compute_seeds(context, workspace.seeds);
   std::fill(workspace.values.begin(), workspace.values.end(), 0.0);
   each_tile(*context.model, [&](const auto& part, ElementRange range) {

@@ -8,10 +8,10 @@
 namespace mbcosim {
 
 /// r = −F at the state in `context` (n).
-void compute_residual(const EvalContext& context, std::vector<double>& r);
+void compute_residual(EvalContext context, Scratch& scratch, std::vector<double>& r);
 
 /// J = −∂r/∂δ into workspace.values; also computes the node seeds.
-void compute_jacobian(const EvalContext& context, Workspace& workspace);
+void compute_jacobian(EvalContext context, Workspace& workspace);
 
 /// How node rotations depend on the Newton increments: A = c G(g), B = ∂w/∂δ.
 NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c);

@@ -30,10 +30,12 @@ struct Workspace : NewtonScratch {
   explicit Workspace(const Model& model)
       : NewtonScratch(model.unknowns, model.row_index.size()),
         seeds(model.structural.size()),
+        scratch(model.scratch),
         solver(model.unknowns, model.column_start, model.row_index, model.couplings,
                LinearSolver::kNewtonPivots) {}
 
   std::vector<NodeSeeds> seeds;  ///< (structural nodes)
+  Scratch scratch;               ///< of elements
   State start;                   ///< from which a search along a line tries its steps
   LinearSolver solver;
   std::unique_ptr<TangentSolver>

@@ -65,7 +65,7 @@ bool measure(int elements, Cost& cost) {
   if (workspace.solver.analyze(workspace.values.data()) != LinearSolver::Outcome::ok) return false;
   cost.elements = elements;
   cost.unknowns = model.unknowns;
-  cost.part[0] = typical([&] { compute_residual(context, workspace.residual); });
+  cost.part[0] = typical([&] { compute_residual(context, workspace.scratch, workspace.residual); });
   cost.part[1] = typical([&] { compute_jacobian(context, workspace); });
   cost.part[2] = typical([&] { (void)workspace.solver.factor(workspace.values.data()); });
   cost.part[3] = typical([&] {

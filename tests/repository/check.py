@@ -32,7 +32,7 @@ ARROWS = {
     "server/mbdyn": {"math", "model", "elements", "simulation"},
     "server/peer": {"math", "model", "simulation", "client", "mbdyn", "fmi"},
     "server/cli": {"mbdyn", "math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
-    "server/wire": {"model", "solver", "simulation", "mbcosim"},
+    "server/wire": {"math", "model", "solver", "simulation", "mbcosim"},
     "server/threads": set(),
     "server/rpc": {"solver", "wire", "threads", "mbcosim", "grpc"},
     "server/coupling": {"math", "model", "simulation", "wire", "mbcosim"},

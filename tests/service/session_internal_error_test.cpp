@@ -1,22 +1,22 @@
 /// A mistake of ours in an element fails the session that has the element, and no other.
 #include <gtest/gtest.h>
 
-#include <stdexcept>
-
+#include "cli/deck_report.h"
 #include "elements/general_element.h"
+#include "model/check.h"
 #include "service/session.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {
 
-/// Row −λ; from `until` on the element throws what no input can cause.
+/// Row −λ; from `until` on a check of the element fails.
 class Mistaken final : public GeneralElement {
  public:
   explicit Mistaken(double until) : until_(until) {}
   void connect(GeneralConnection& c) override { own_ = c.algebraic(1); }
   void residual(const GeneralView& u, GeneralResidual& r) const override {
-    if (u.time() >= until_) throw std::logic_error("this test's mistake");
+    MBCOSIM_CHECK(u.time() < until_, "this test's mistake");
     r.add(own_, -u.value(own_));
   }
   void jacobian(const GeneralView&, GeneralJacobian& j) const override { j.value(own_, own_, -1.); }
@@ -86,6 +86,17 @@ TEST_F(TwoSessions, AnInternalErrorFailsOneSessionAndNoOther) {
   mistaken_.fill(&info);
   EXPECT_EQ(info.step(), 2) << "the state is that of the last accepted step";
   EXPECT_EQ(step(other_, 5).steps_done(), 5);
+}
+
+TEST(ExitCode, OfAnInternalErrorIsItsOwn) {
+  LoadReport report;
+  Diagnostic d;
+  d.code = "internal";
+  report.diagnostics.push_back(d);
+  EXPECT_EQ(cli::exit_code_of(report), cli::kInternalError);
+  Error error;
+  error.kind = ErrorKind::internal;
+  EXPECT_EQ(cli::exit_code_of(error), cli::kInternalError);
 }
 
 }  // namespace

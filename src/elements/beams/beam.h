@@ -141,7 +141,7 @@ struct Beam {
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
   int private_datum(std::string_view name) const;
-  std::vector<std::string> private_data() const;
+  std::vector<Datum> private_data() const;
   double private_value(const Local<double>& u, int datum) const;
 
   /// Sets metrics and initial tangents from the nodes as read; needs `R0`. Returns the smallest

@@ -20,7 +20,9 @@ enum Group {
   kCurvatureRate,
   kGroups
 };
-constexpr const char* kGroupNames[kGroups] = {"e", "k", "F", "M", "X", "Phi", "Omega", "eP", "kP"};
+constexpr DatumName kGroupNames[kGroups] = {{"e", ""},          {"k", "1/m"},  {"F", "N"},
+                                            {"M", "N m"},       {"X", "m"},    {"Phi", "rad"},
+                                            {"Omega", "rad/s"}, {"eP", "1/s"}, {"kP", "1/(m s)"}};
 constexpr const char* kPointPrefix[2] = {"pI.", "pII."};
 
 template <int Nodes>
@@ -74,12 +76,13 @@ std::string Beam<Nodes>::log(const Model& model, int label) const {
 }
 
 template <int Nodes>
-std::vector<std::string> Beam<Nodes>::private_data() const {
-  std::vector<std::string> names;
+std::vector<Datum> Beam<Nodes>::private_data() const {
+  std::vector<Datum> data;
   for (int a = 0; a < points; ++a)
-    for (const char* group : kGroupNames)
-      for (const char axis : {'x', 'y', 'z'}) names.push_back(prefix<Nodes>(a) + group + axis);
-  return names;
+    for (const DatumName& group : kGroupNames)
+      for (const char axis : {'x', 'y', 'z'})
+        data.push_back({prefix<Nodes>(a) + std::string(group.name) + axis, group.unit});
+  return data;
 }
 
 template <int Nodes>
@@ -89,7 +92,7 @@ int Beam<Nodes>::private_datum(std::string_view name) const {
     if (!name.starts_with(start)) continue;
     const std::string_view rest = name.substr(start.size());
     for (int group = 0; group < kGroups; ++group) {
-      const std::string_view word = kGroupNames[group];
+      const std::string_view word = kGroupNames[group].name;
       if (rest.size() != word.size() + 1 || !rest.starts_with(word)) continue;
       const int axis = rest.back() - 'x';
       if (axis >= 0 && axis < 3) return (a * kGroups + group) * 3 + axis;
@@ -125,12 +128,12 @@ double Beam<Nodes>::private_value(const Local<double>& u, int datum) const {
 
 template void Beam<2>::output(const Local<double>&, OutputRow&) const;
 template std::string Beam<2>::log(const Model&, int) const;
-template std::vector<std::string> Beam<2>::private_data() const;
+template std::vector<Datum> Beam<2>::private_data() const;
 template int Beam<2>::private_datum(std::string_view) const;
 template double Beam<2>::private_value(const Local<double>&, int) const;
 template void Beam<3>::output(const Local<double>&, OutputRow&) const;
 template std::string Beam<3>::log(const Model&, int) const;
-template std::vector<std::string> Beam<3>::private_data() const;
+template std::vector<Datum> Beam<3>::private_data() const;
 template int Beam<3>::private_datum(std::string_view) const;
 template double Beam<3>::private_value(const Local<double>&, int) const;
 

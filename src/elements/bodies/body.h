@@ -39,7 +39,7 @@ struct Body {
   std::string log(const Model& model, int label) const;
 
   static int private_datum(std::string_view name);
-  static std::vector<std::string> private_data() { return {"E", "V", "m"}; }
+  static std::vector<Datum> private_data() { return {{"E", "J"}, {"V", "J"}, {"m", "kg"}}; }
   double private_value(const Local<double>& u, int datum) const;
 };
 
@@ -64,7 +64,7 @@ struct PointMass {
   std::string log(const Model& model, int label) const;
 
   static int private_datum(std::string_view name) { return Body::private_datum(name); }
-  static std::vector<std::string> private_data() { return Body::private_data(); }
+  static std::vector<Datum> private_data() { return Body::private_data(); }
   double private_value(const Local<double>& u, int datum) const;
 };
 

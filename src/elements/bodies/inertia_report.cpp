@@ -50,28 +50,27 @@ PrincipalInertia principal_inertia(const Mat3& j) {
 namespace {
 
 /// Private data in order: X, V, Omega (3 each), J, JP (9 each, by rows), m.
-enum Datum { kX = 0, kV = 3, kOmega = 6, kJ = 9, kJP = 18, kMass = 27, kData };
+enum DatumIndex { kX = 0, kV = 3, kOmega = 6, kJ = 9, kJP = 18, kMass = 27, kData };
 
 }  // namespace
 
-std::vector<std::string> InertiaReport::private_data() const {
-  std::vector<std::string> names;
-  for (const char* word : {"X", "V", "Omega"})
-    for (int i = 1; i <= 3; ++i) names.push_back(std::string(word) + "[" + std::to_string(i) + "]");
+std::vector<Datum> InertiaReport::private_data() const {
+  std::vector<Datum> data;
+  for (const DatumName& d :
+       std::array<DatumName, 3>{{{"X", "m"}, {"V", "m/s"}, {"Omega", "rad/s"}}})
+    for (int i = 1; i <= 3; ++i)
+      data.push_back({std::string(d.name) + "[" + std::to_string(i) + "]", d.unit});
   for (const char* word : {"J", "JP"})
     for (int i = 1; i <= 3; ++i)
       for (int j = 1; j <= 3; ++j)
-        names.push_back(std::string(word) + "[" + std::to_string(i) + "," + std::to_string(j) +
-                        "]");
-  names.push_back("m");
-  return names;
+        data.push_back({std::string(word) + "[" + std::to_string(i) + "," + std::to_string(j) + "]",
+                        "kg m^2"});
+  data.push_back({"m", "kg"});
+  return data;
 }
 
 int InertiaReport::private_datum(std::string_view name) const {
-  const std::vector<std::string> names = private_data();
-  for (int k = 0; k < kData; ++k)
-    if (names[k] == name) return k;
-  return -1;
+  return index_of(private_data(), name);
 }
 
 double InertiaReport::private_value(const GeneralView& u, int datum) const {

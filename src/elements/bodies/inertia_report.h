@@ -49,7 +49,7 @@ class InertiaReport : public GeneralElement {
   void residual(const GeneralView&, GeneralResidual&) const override {}
   void jacobian(const GeneralView&, GeneralJacobian&) const override {}
   int private_datum(std::string_view name) const override;
-  std::vector<std::string> private_data() const override;
+  std::vector<Datum> private_data() const override;
   double private_value(const GeneralView& u, int datum) const override;
 
   /// The block of .log: label, name and the properties.

@@ -66,7 +66,7 @@ std::string VariableBody::log(const Model& model, int label) const {
 }
 
 int VariableBody::private_datum(std::string_view name) { return Body::private_datum(name); }
-std::vector<std::string> VariableBody::private_data() { return Body::private_data(); }
+std::vector<Datum> VariableBody::private_data() { return Body::private_data(); }
 
 double VariableBody::private_value(const Local<double>& u, int datum) const {
   const VariableInertia p = inertia(*u.context, u.label());

@@ -68,7 +68,7 @@ struct VariableBody {
   std::string log(const Model& model, int label) const;
 
   static int private_datum(std::string_view name);
-  static std::vector<std::string> private_data();
+  static std::vector<Datum> private_data();
   double private_value(const Local<double>& u, int datum) const;
 
   /// Mass properties at the time of `context`; throws EvaluationError unless the mass is positive.

@@ -41,7 +41,7 @@ void AdaptiveControl::obey_law(const GeneralView& u, double* memory) const {
   if (weight < 0)
     throw EvaluationError("discrete control " + std::to_string(u.label()) +
                           ": the weight of the controls is negative");
-  law_->control(identifier_, memory + desired_, weight, memory, control(memory));
+  law_->control(identifier_, memory + desired_, weight, memory, u.scratch(), control(memory));
 }
 
 void AdaptiveControl::add_sample(const double* y, const double* u, double* memory) const {
@@ -56,11 +56,12 @@ int AdaptiveControl::private_datum(std::string_view name) const {
   return k < 0 ? -1 : input_count() + k;
 }
 
-std::vector<std::string> AdaptiveControl::private_data() const {
-  std::vector<std::string> names = SampledControl::private_data();
-  for (int k = 1; k < identifier_.count(); ++k) names.push_back("theta[" + std::to_string(k) + "]");
-  names.push_back("forgetting");
-  return names;
+std::vector<Datum> AdaptiveControl::private_data() const {
+  std::vector<Datum> data = SampledControl::private_data();
+  for (int k = 1; k < identifier_.count(); ++k)
+    data.push_back({"theta[" + std::to_string(k) + "]", ""});
+  data.push_back({"forgetting", ""});
+  return data;
 }
 
 double AdaptiveControl::private_value(const GeneralView& u, int datum) const {

@@ -40,7 +40,7 @@ class AdaptiveControl : public SampledControl {
   void after_predict(const GeneralView& u, State& state) const override;
   /// u[i] as SampledControl; theta[k]: the k-th number of the row in the file; forgetting: λ.
   int private_datum(std::string_view name) const override;
-  std::vector<std::string> private_data() const override;
+  std::vector<Datum> private_data() const override;
   double private_value(const GeneralView& u, int datum) const override;
   bool sampled_table(SampledTable& table) const override;
 

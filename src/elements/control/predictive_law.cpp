@@ -12,13 +12,14 @@ struct PredictiveLaw::View {
   const PredictiveLaw& law;
   const ArxIdentifier& id;
   double* memory;
+  double* scratch;
 
   const double* row(int o) const { return id.coefficients(memory) + o * law.model_.regressors(); }
-  double* free(int j) const { return memory + law.free_ + (j - 1) * law.model_.outputs; }
+  double* free(int j) const { return scratch + law.free_ + (j - 1) * law.model_.outputs; }
   double* response(int unknown, int j) const {
-    return memory + law.response_ + (unknown * law.settings_.n2 + j - 1) * law.model_.outputs;
+    return scratch + law.response_ + (unknown * law.settings_.n2 + j - 1) * law.model_.outputs;
   }
-  double& matrix(int i, int j) const { return memory[law.matrix_ + i * law.unknowns() + j]; }
+  double& matrix(int i, int j) const { return scratch[law.matrix_ + i * law.unknowns() + j]; }
   /// Signals of the past and of the free prediction, as they enter it: with a period their
   /// differences.
   double y(int t, int o) const {
@@ -47,19 +48,19 @@ PredictiveLaw::Settings PredictiveLaw::deadbeat(int n2, int nu, int period) {
 void PredictiveLaw::connect(GeneralConnection& c, const ArxModel& model) {
   model_ = model;
   const int n = unknowns();
-  free_ = c.memory(settings_.n2 * model.outputs);
-  response_ = c.memory(n * settings_.n2 * model.outputs);
-  matrix_ = c.memory(n * n);
-  pivots_ = c.memory(n);
-  right_ = c.memory(n);
+  free_ = c.scratch(settings_.n2 * model.outputs);
+  response_ = c.scratch(n * settings_.n2 * model.outputs);
+  matrix_ = c.scratch(n * n);
+  pivots_ = c.scratch(n);
+  right_ = c.scratch(n);
+  residual_ = c.scratch(n);
   delta_ = c.memory(n);
-  residual_ = c.memory(n);
   own_ = c.memory(settings_.period * model.inputs);
 }
 
 void PredictiveLaw::control(const ArxIdentifier& identifier, const double* r, double weight,
-                            double* memory, double* u) const {
-  const View v{*this, identifier, memory};
+                            double* memory, double* scratch, double* u) const {
+  const View v{*this, identifier, memory, scratch};
   predict_free(v);
   for (int i = 1; i <= settings_.nu; ++i)
     for (int m = 0; m < model_.inputs; ++m) predict_response(v, i, m);
@@ -75,9 +76,9 @@ void PredictiveLaw::control(const ArxIdentifier& identifier, const double* r, do
 }
 
 void PredictiveLaw::rest(double* memory) const {
-  std::fill_n(memory + delta_, unknowns(), 0.);
-  std::fill_n(memory + residual_, unknowns(), 0.);
-  push_sample(memory + own_, settings_.period, model_.inputs, memory + residual_);
+  double* delta = memory + delta_;
+  std::fill_n(delta, unknowns(), 0.);
+  push_sample(memory + own_, settings_.period, model_.inputs, delta);
 }
 
 void PredictiveLaw::predict_free(const View& v) const {
@@ -130,7 +131,7 @@ void PredictiveLaw::normal_equations(const View& v, const double* r, double weig
       v.matrix(a, b) =
           sum_over_outputs([&](int j, int o) { return v.response(a, j)[o] * v.response(b, j)[o]; });
     v.matrix(a, a) += weight * settings_.R[a / model_.inputs];
-    v.memory[right_ + a] =
+    v.scratch[right_ + a] =
         sum_over_outputs([&](int j, int o) { return v.response(a, j)[o] * (r[o] - v.free(j)[o]); });
   }
 }
@@ -147,8 +148,8 @@ void PredictiveLaw::shift_plan(double* memory) const {
 /// H is singular.
 void PredictiveLaw::solve(const View& v) const {
   const int n = unknowns();
-  double *pivot = v.memory + pivots_, *b = v.memory + right_, *x = v.memory + delta_,
-         *rest = v.memory + residual_;
+  double *pivot = v.scratch + pivots_, *b = v.scratch + right_, *x = v.memory + delta_,
+         *rest = v.scratch + residual_;
   double largest = 0;
   for (int i = 0; i < n; ++i) largest = std::max(largest, v.matrix(i, i));
   if (!(largest > 0) || !std::isfinite(largest)) {

@@ -43,7 +43,7 @@ class PredictiveLaw {
   void connect(GeneralConnection& c, const ArxModel& model);
   /// Controls `u` of the next sample for the desired outputs `r` and the weight w.
   void control(const ArxIdentifier& identifier, const double* r, double weight, double* memory,
-               double* u) const;
+               double* scratch, double* u) const;
   /// No control is asked for: the law's own are zero.
   void rest(double* memory) const;
 
@@ -59,12 +59,14 @@ class PredictiveLaw {
 
   Settings settings_;
   ArxModel model_;
-  /// Offsets in the element's memory.
+  /// Offsets in the element's scratch.
   int free_ = 0;      ///< y_{k+1} … y_{k+n2} with δ = 0
   int response_ = 0;  ///< for each unknown δ: its share in y_{k+1} … y_{k+n2}
   int matrix_ = 0;    ///< above and on the diagonal the normal matrix, below its factor
-  int pivots_ = 0, right_ = 0, delta_ = 0, residual_ = 0;
-  int own_ = 0;  ///< the law's controls of the last N samples, latest first
+  int pivots_ = 0, right_ = 0, residual_ = 0;
+  /// Offsets in the element's memory.
+  int delta_ = 0;  ///< the plan: δ_1 … δ_nu
+  int own_ = 0;    ///< the law's controls of the last N samples, latest first
 };
 
 }  // namespace mbcosim

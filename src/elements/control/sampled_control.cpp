@@ -51,10 +51,10 @@ int SampledControl::private_datum(std::string_view name) const {
   return component_in(name, "u[", input_count());
 }
 
-std::vector<std::string> SampledControl::private_data() const {
-  std::vector<std::string> names;
-  for (int i = 1; i <= input_count(); ++i) names.push_back("u[" + std::to_string(i) + "]");
-  return names;
+std::vector<Datum> SampledControl::private_data() const {
+  std::vector<Datum> data;
+  for (int i = 1; i <= input_count(); ++i) data.push_back({"u[" + std::to_string(i) + "]", ""});
+  return data;
 }
 
 }  // namespace mbcosim

@@ -41,7 +41,7 @@ class SampledControl : public GeneralElement {
   void after_convergence(const GeneralView& u, State& state) const override;
   /// u[1], u[2], …: u_c.
   int private_datum(std::string_view name) const override;
-  std::vector<std::string> private_data() const override;
+  std::vector<Datum> private_data() const override;
   double private_value(const GeneralView& u, int datum) const override {
     return u.memory(control_ + datum);
   }

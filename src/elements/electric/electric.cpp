@@ -1,7 +1,5 @@
 #include "elements/electric/electric.h"
 
-#include <algorithm>
-
 namespace mbcosim {
 
 void Accelerometer::start(Start& s) const {
@@ -11,11 +9,7 @@ void Accelerometer::start(Start& s) const {
 
 void FilteredAccelerometer::start(Start& s) const { s.own(2) = -(s.u.R(0) * e0).dot(s.u.v(0)); }
 
-int Motor::private_datum(std::string_view name) {
-  const std::vector<std::string> names = private_data();
-  const auto found = std::find(names.begin(), names.end(), name);
-  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
-}
+int Motor::private_datum(std::string_view name) { return index_of(data_names, name); }
 
 double Motor::private_value(const Local<double>& u, int datum) const {
   switch (datum) {

@@ -146,7 +146,9 @@ struct Motor {
   void start(Start& s) const { s.own(0) = initial_current; }
   void output(const Local<double>& u, OutputRow& row) const;
   static int private_datum(std::string_view name);
-  static std::vector<std::string> private_data() { return {"M", "omega", "i", "M0", "M1"}; }
+  static constexpr std::array<DatumName, 5> data_names = {
+      {{"M", "N m"}, {"omega", "rad/s"}, {"i", "A"}, {"M0", "N m"}, {"M1", "N m/A"}}};
+  static std::vector<Datum> private_data() { return data_of(data_names); }
   double private_value(const Local<double>& u, int datum) const;
 
  private:

@@ -156,18 +156,15 @@ void StateSpace::output(const GeneralView& u, OutputRow& row) const {
 }
 
 int StateSpace::private_datum(std::string_view name) const {
-  const std::vector<std::string> names = private_data();
-  for (std::size_t k = 0; k < names.size(); ++k)
-    if (names[k] == name) return static_cast<int>(k);
-  return -1;
+  return index_of(private_data(), name);
 }
 
-std::vector<std::string> StateSpace::private_data() const {
-  std::vector<std::string> names;
+std::vector<Datum> StateSpace::private_data() const {
+  std::vector<Datum> data;
   for (const char* word : {"x", "xP"})
     for (int i = 1; i <= system_.order(); ++i)
-      names.push_back(std::string(word) + "[" + std::to_string(i) + "]");
-  return names;
+      data.push_back({std::string(word) + "[" + std::to_string(i) + "]", ""});
+  return data;
 }
 
 double StateSpace::private_value(const GeneralView& u, int datum) const {

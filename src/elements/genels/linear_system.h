@@ -50,7 +50,7 @@ class StateSpace : public GeneralElement {
   std::string row_name(int own) const override { return "state " + std::to_string(own + 1); }
   void output(const GeneralView& u, OutputRow& row) const override;
   int private_datum(std::string_view name) const override;
-  std::vector<std::string> private_data() const override;
+  std::vector<Datum> private_data() const override;
   double private_value(const GeneralView& u, int datum) const override;
 
  private:

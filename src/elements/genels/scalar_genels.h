@@ -116,7 +116,7 @@ struct GenelSpringSupport {
   void after_convergence(const Local<double>& u, State& state) const;
 
   static int private_datum(std::string_view name) { return name == "F" ? 0 : name == "X" ? 1 : -1; }
-  static std::vector<std::string> private_data() { return {"F", "X"}; }
+  static std::vector<Datum> private_data() { return {{"F", ""}, {"X", ""}}; }
   double private_value(const Local<double>& u, int datum) const {
     return datum == 0 ? force(u) : dof_position(u, l) - x0;
   }

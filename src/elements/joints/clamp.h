@@ -18,8 +18,7 @@ struct Clamp : NamedData<Clamp> {
   static constexpr int width = 12;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 6> data_names = {"Fx", "Fy", "Fz",
-                                                                 "Mx", "My", "Mz"};
+  static constexpr auto data_names = joined(kForceData, kMomentData);
 
   void connect(Connector& c) const {
     c.distinct_node(node);

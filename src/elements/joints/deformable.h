@@ -34,8 +34,7 @@ struct HingeMotion : TwoAttachments {
 struct DeformableHinge : HingeMotion, LawUser<DeformableHinge, 3> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
-  static constexpr std::array<std::string_view, 9> data_names = {"rx", "ry", "rz", "wx", "wy",
-                                                                 "wz", "Mx", "My", "Mz"};
+  static constexpr auto data_names = joined(kAngleData, kSpinData, kMomentData);
 
   template <class T>
   void arguments(const Local<T>& u, V<T>& strain, V<T>& rate) const {
@@ -60,8 +59,7 @@ struct DeformableHinge : HingeMotion, LawUser<DeformableHinge, 3> {
 struct DeformableDisplacement : HingeMotion, LawUser<DeformableDisplacement, 3> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
-  static constexpr std::array<std::string_view, 9> data_names = {"dx", "dy", "dz", "vx", "vy",
-                                                                 "vz", "Fx", "Fy", "Fz"};
+  static constexpr auto data_names = joined(kDisplacementData, kVelocityData, kForceData);
 
   template <class T>
   void arguments(const Local<T>& u, V<T>& strain, V<T>& rate) const {
@@ -86,9 +84,8 @@ struct DeformableDisplacement : HingeMotion, LawUser<DeformableDisplacement, 3> 
 struct DeformableJoint : HingeMotion, LawUser<DeformableJoint, 6> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
-  static constexpr std::array<std::string_view, 18> data_names = {
-      "dx", "dy", "dz", "rx", "ry", "rz", "vx", "vy", "vz",
-      "wx", "wy", "wz", "Fx", "Fy", "Fz", "Mx", "My", "Mz"};
+  static constexpr auto data_names =
+      joined(kDisplacementData, kAngleData, kVelocityData, kSpinData, kForceData, kMomentData);
 
   template <class T>
   void arguments(const Local<T>& u, V<T>& strain, V<T>& rate) const {
@@ -119,7 +116,7 @@ struct DeformableJoint : HingeMotion, LawUser<DeformableJoint, 6> {
 struct DeformableAxialJoint : HingeMotion, LawUser<DeformableAxialJoint, 1> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
-  static constexpr std::array<std::string_view, 3> data_names = {"rz", "wz", "Mz"};
+  static constexpr auto data_names = joined(kHingeData, std::array<DatumName, 1>{{{"Mz", "N m"}}});
 
   template <class T>
   void arguments(const Local<T>& u, V<T>& strain, V<T>& rate) const {
@@ -147,8 +144,7 @@ struct ViscousBody : LawUser<ViscousBody, 6> {
   Attachment a;
 
   static constexpr int width = 6;
-  static constexpr std::array<std::string_view, 12> data_names = {
-      "vx", "vy", "vz", "wx", "wy", "wz", "Fx", "Fy", "Fz", "Mx", "My", "Mz"};
+  static constexpr auto data_names = joined(kVelocityData, kSpinData, kForceData, kMomentData);
 
   void connect(Connector& c) const { c.distinct_node(a.node); }
   template <class T>

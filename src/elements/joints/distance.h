@@ -15,7 +15,7 @@ struct Distance : TwoAttachments, NamedData<Distance> {
 
   static constexpr int width = 16;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 1> data_names = {"d"};
+  static constexpr auto data_names = std::array<DatumName, 1>{{{"d", "m"}}};
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);

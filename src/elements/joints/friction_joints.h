@@ -120,7 +120,7 @@ struct Brake : TwoAttachments, NamedData<Brake> {
   DrivePtr force;  ///< N [N]
 
   static constexpr int width = 13;
-  static constexpr std::array<std::string_view, 3> data_names = {"rz", "wz", "Mz"};
+  static constexpr auto data_names = joined(kHingeData, std::array<DatumName, 1>{{{"Mz", "N m"}}});
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);

@@ -16,7 +16,7 @@ struct InLine : TwoAttachments, NamedData<InLine> {  // a: p and Rv, b: q
   static constexpr int width = 14;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 3> data_names = {"Fx", "Fy", "Fz"};
+  static constexpr auto data_names = kForceData;
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -56,7 +56,7 @@ struct InPlane : TwoAttachments, NamedData<InPlane> {  // a: p, b: q
   static constexpr int width = 13;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 1> data_names = {"F"};
+  static constexpr auto data_names = std::array<DatumName, 1>{{{"F", "N"}}};
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -86,7 +86,7 @@ struct Prismatic : TwoAttachments, NamedData<Prismatic> {
   static constexpr int width = 15;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 3> data_names = {"Mx", "My", "Mz"};
+  static constexpr auto data_names = kMomentData;
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -119,8 +119,7 @@ struct DriveHinge : TwoAttachments, NamedData<DriveHinge> {
 
   static constexpr int width = 15;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 6> data_names = {"rx", "ry", "rz",
-                                                                 "Mx", "My", "Mz"};
+  static constexpr auto data_names = joined(kAngleData, kMomentData);
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -154,8 +153,8 @@ struct DriveDisplacement : TwoAttachments, NamedData<DriveDisplacement> {
 
   static constexpr int width = 15;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 6> data_names = {"dx", "dy", "dz",
-                                                                 "fx", "fy", "fz"};
+  static constexpr auto data_names =
+      joined(kDisplacementData, ThreeData{{{"fx", "N"}, {"fy", "N"}, {"fz", "N"}}});
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -198,8 +197,8 @@ struct DriveDisplacementPin : NamedData<DriveDisplacementPin> {
 
   static constexpr int width = 9;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 6> data_names = {"dx", "dy", "dz",
-                                                                 "fx", "fy", "fz"};
+  static constexpr auto data_names =
+      joined(kDisplacementData, ThreeData{{{"fx", "N"}, {"fy", "N"}, {"fz", "N"}}});
 
   void connect(Connector& c) const {
     c.distinct_node(a.node);

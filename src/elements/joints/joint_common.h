@@ -2,13 +2,13 @@
 /// .log, unwrapped angles.
 #pragma once
 
-#include <array>
 #include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "elements/element.h"
+#include "elements/joints/data_tables.h"
 #include "model/card.h"
 
 namespace mbcosim {
@@ -42,20 +42,11 @@ OrientationDescription read_description(Card& card);
 void require_not_parallel(Card& card, const Vec3& a, const Vec3& b, const char* joint);
 
 // ------------------------------------------------------------------ private data
-template <std::size_t N>
-int index_of(const std::array<std::string_view, N>& names, std::string_view name) {
-  for (std::size_t i = 0; i < N; ++i)
-    if (names[i] == name) return static_cast<int>(i);
-  return -1;
-}
-
-/// Base of joints with a fixed list of private data, `Joint::data_names`.
+/// Base of joints with a fixed table of private data, `Joint::data_names`.
 template <class Joint>
 struct NamedData {
   int private_datum(std::string_view name) const { return index_of(Joint::data_names, name); }
-  std::vector<std::string> private_data() const {
-    return std::vector<std::string>(Joint::data_names.begin(), Joint::data_names.end());
-  }
+  std::vector<Datum> private_data() const { return data_of(Joint::data_names); }
 };
 
 /// Base of joints between two nodes with one attachment each.

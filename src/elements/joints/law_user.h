@@ -45,9 +45,7 @@ struct LawUser {
     }
     return index_of(Joint::data_names, name);
   }
-  std::vector<std::string> private_data() const {
-    return std::vector<std::string>(Joint::data_names.begin(), Joint::data_names.end());
-  }
+  std::vector<Datum> private_data() const { return data_of(Joint::data_names); }
   double private_value(const Local<double>& u, int datum) const {
     constexpr int own = static_cast<int>(Joint::data_names.size());
     if (datum < own) return self().own_datum(u, datum);

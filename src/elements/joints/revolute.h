@@ -22,8 +22,7 @@ struct RevolutePin : NamedData<RevolutePin> {
   static constexpr int width = 11;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 8> data_names = {"rz", "wz", "Fx", "Fy",
-                                                                 "Fz", "Mx", "My", "Mz"};
+  static constexpr auto data_names = joined(kHingeData, kForceData, kMomentData);
 
   void connect(Connector& c) const {
     c.distinct_node(a.node);
@@ -101,8 +100,7 @@ struct RevoluteHinge : RevoluteAxes, NamedData<RevoluteHinge> {
   static constexpr int width = 17;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 8> data_names = {"rz", "wz", "Fx", "Fy",
-                                                                 "Fz", "Mx", "My", "Mz"};
+  static constexpr auto data_names = joined(kHingeData, kForceData, kMomentData);
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -138,7 +136,7 @@ struct RevoluteRotation : RevoluteAxes, NamedData<RevoluteRotation> {
   static constexpr int width = 14;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 5> data_names = {"rz", "wz", "Mx", "My", "Mz"};
+  static constexpr auto data_names = joined(kHingeData, kMomentData);
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -170,8 +168,7 @@ struct AxialRotation : RevoluteAxes, NamedData<AxialRotation> {
   static constexpr int width = 18;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 8> data_names = {"rz", "wz", "Fx", "Fy",
-                                                                 "Fz", "Mx", "My", "Mz"};
+  static constexpr auto data_names = joined(kHingeData, kForceData, kMomentData);
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);

@@ -14,7 +14,8 @@ struct Rod : TwoAttachments, LawUser<Rod, 1> {
 
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
-  static constexpr std::array<std::string_view, 3> data_names = {"F", "L", "LPrime"};
+  static constexpr auto data_names =
+      std::array<DatumName, 3>{{{"F", "N"}, {"L", "m"}, {"LPrime", "m/s"}}};
 
   template <class T>
   struct Kinematics {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "elements/joints/law_user.h"
+#include "elements/joints/rod.h"
 
 namespace mbcosim {
 
@@ -28,7 +29,7 @@ struct RodBezier : LawUser<RodBezier, 1> {
 
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
-  static constexpr std::array<std::string_view, 3> data_names = {"F", "L", "LPrime"};
+  static constexpr auto data_names = Rod::data_names;
 
   void connect(Connector& c) const {
     c.distinct_node(first);

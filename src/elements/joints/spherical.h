@@ -16,7 +16,7 @@ struct SphericalHinge : TwoAttachments, NamedData<SphericalHinge> {
   static constexpr int width = 15;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 3> data_names = {"Fx", "Fy", "Fz"};
+  static constexpr auto data_names = kForceData;
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -48,7 +48,7 @@ struct SphericalPin : NamedData<SphericalPin> {
   static constexpr int width = 9;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 3> data_names = {"Fx", "Fy", "Fz"};
+  static constexpr auto data_names = kForceData;
 
   void connect(Connector& c) const {
     c.distinct_node(a.node);

@@ -33,8 +33,8 @@ class TikhonovSet final : public ElementSet {
   void residual(const EvalContext& context, double* r, ElementRange range) const override;
   void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
                 ElementRange range) const override;
-  void after_predict(const EvalContext&, State&) const override {}
-  void after_convergence(const EvalContext&, State&) const override {}
+  void after_predict(const EvalContext&, State&, ElementRange) const override {}
+  void after_convergence(const EvalContext&, State&, ElementRange) const override {}
 
   AssemblyRole assembly_role(int) const override { return AssemblyRole::custom; }
   void assembly_residual(const EvalContext& context, int i, double* r,
@@ -45,7 +45,7 @@ class TikhonovSet final : public ElementSet {
   void output(const EvalContext&, int, OutputRow&) const override {}
   std::string log_line(const Model&, int) const override { return {}; }
   int private_datum(int, std::string_view) const override { return -1; }
-  std::vector<std::string> private_data(int) const override { return {}; }
+  std::vector<Datum> private_data(int) const override { return {}; }
   double private_value(const EvalContext&, int, int) const override { return 0; }
   void add_inertia(const EvalContext&, int, int, Inertia&) const override {}
   void add_momentum(const EvalContext&, int, State&) const override {}

@@ -95,9 +95,9 @@ struct TotalJoint : NamedData<TotalJoint> {
   static constexpr int width = 18;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 24> data_names = {
-      "px", "py", "pz", "rx", "ry", "rz", "Fx", "Fy", "Fz", "Mx", "My", "Mz",
-      "dx", "dy", "dz", "tx", "ty", "tz", "vx", "vy", "vz", "wx", "wy", "wz"};
+  static constexpr auto data_names =
+      joined(kPositionData, kAngleData, kForceData, kMomentData, kDisplacementData,
+             kImposedAngleData, kVelocityData, kSpinData);
 
   void connect(Connector& c) const {
     c.distinct_node(first);

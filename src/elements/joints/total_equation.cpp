@@ -75,11 +75,11 @@ void read_total_reaction(Card& card, ElementInfo& info) {
                  "total internal reaction: the equation whose multipliers act here is missing",
                  "end the card with `total equation, <label>`", "missing-argument");
   e.equation = card.element(Family::joint);
-  auto* equations = dynamic_cast<ElementSetOf<TotalEquation>*>(e.equation.set);
-  if (!equations)
+  auto& equations = card.builder().set<ElementSetOf<TotalEquation>>();
+  if (e.equation.set != &equations)
     card.fail("total internal reaction: this joint is not a total equation",
               "give the label of a total equation");
-  auto& slot = equations->slot(e.equation.index);
+  auto& slot = equations.slot(e.equation.index);
   if (slot.element.reaction)
     card.fail("total internal reaction: the equation has a reaction already");
   const int wanted = slot.element.equation.constraint.count(), found = e.joint.constraint.count();

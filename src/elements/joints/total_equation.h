@@ -21,8 +21,7 @@ struct TotalEquation : NamedData<TotalEquation> {
 
   static constexpr int width = 24;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 6> data_names = {"dx", "dy", "dz",
-                                                                 "tx", "ty", "tz"};
+  static constexpr auto data_names = joined(kDisplacementData, kImposedAngleData);
 
   void connect(Connector& c) const {
     c.distinct_node(equation.first);

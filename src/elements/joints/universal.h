@@ -14,7 +14,7 @@ namespace mbcosim {
 struct CardanoHinge : TwoAttachments, NamedData<CardanoHinge> {
   static constexpr int width = 16;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 4> data_names = {"Fx", "Fy", "Fz", "M"};
+  static constexpr auto data_names = joined(kForceData, std::array<DatumName, 1>{{{"M", "N m"}}});
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -44,7 +44,7 @@ struct CardanoRotation : TwoAttachments, NamedData<CardanoRotation> {
 
   static constexpr int width = 13;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 1> data_names = {"M"};
+  static constexpr auto data_names = std::array<DatumName, 1>{{{"M", "N m"}}};
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -74,7 +74,7 @@ struct CardanoPin : NamedData<CardanoPin> {
 
   static constexpr int width = 10;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 4> data_names = {"Fx", "Fy", "Fz", "M"};
+  static constexpr auto data_names = joined(kForceData, std::array<DatumName, 1>{{{"M", "N m"}}});
 
   void connect(Connector& c) const {
     c.distinct_node(a.node);
@@ -105,8 +105,11 @@ struct GimbalRotation : TwoAttachments, NamedData<GimbalRotation> {
 
   static constexpr int width = 17;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 5> data_names = {"lambda[1]", "lambda[2]",
-                                                                 "lambda[3]", "theta", "phi"};
+  static constexpr auto data_names = std::array<DatumName, 5>{{{"lambda[1]", "N m"},
+                                                               {"lambda[2]", "N m"},
+                                                               {"lambda[3]", "N m"},
+                                                               {"theta", "rad"},
+                                                               {"phi", "rad"}}};
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);

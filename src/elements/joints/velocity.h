@@ -15,7 +15,7 @@ struct LinearVelocity : NamedData<LinearVelocity> {
 
   static constexpr int width = 7;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 2> data_names = {"F", "v"};
+  static constexpr auto data_names = std::array<DatumName, 2>{{{"F", "N"}, {"v", "m/s"}}};
 
   void connect(Connector& c) const {
     c.distinct_node(node);
@@ -49,7 +49,7 @@ struct AngularVelocity : NamedData<AngularVelocity> {
 
   static constexpr int width = 7;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 2> data_names = {"M", "w"};
+  static constexpr auto data_names = std::array<DatumName, 2>{{{"M", "N m"}, {"w", "rad/s"}}};
 
   void connect(Connector& c) const {
     c.distinct_node(node);
@@ -81,7 +81,7 @@ struct LinearAcceleration : NamedData<LinearAcceleration> {
   DrivePtr acceleration;
 
   static constexpr int width = 8;
-  static constexpr std::array<std::string_view, 2> data_names = {"F", "a"};
+  static constexpr auto data_names = std::array<DatumName, 2>{{{"F", "N"}, {"a", "m/s^2"}}};
 
   void connect(Connector& c) const {
     c.distinct_node(node);
@@ -115,7 +115,7 @@ struct AngularAcceleration : NamedData<AngularAcceleration> {
   DrivePtr acceleration;
 
   static constexpr int width = 8;
-  static constexpr std::array<std::string_view, 2> data_names = {"M", "wp"};
+  static constexpr auto data_names = std::array<DatumName, 2>{{{"M", "N m"}, {"wp", "rad/s^2"}}};
 
   void connect(Connector& c) const {
     c.distinct_node(node);

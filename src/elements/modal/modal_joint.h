@@ -111,8 +111,8 @@ class ModalJointSet final : public ElementSet {
   void residual(const EvalContext& context, double* r, ElementRange range) const override;
   void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
                 ElementRange range) const override;
-  void after_predict(const EvalContext&, State&) const override {}
-  void after_convergence(const EvalContext&, State&) const override {}
+  void after_predict(const EvalContext&, State&, ElementRange) const override {}
+  void after_convergence(const EvalContext&, State&, ElementRange) const override {}
 
   AssemblyRole assembly_role(int) const override { return AssemblyRole::custom; }
   void assembly_residual(const EvalContext& context, int i, double* r,
@@ -123,7 +123,7 @@ class ModalJointSet final : public ElementSet {
   void output(const EvalContext& context, int i, OutputRow& row) const override;
   std::string log_line(const Model& model, int i) const override;
   int private_datum(int i, std::string_view name) const override;
-  std::vector<std::string> private_data(int i) const override;
+  std::vector<Datum> private_data(int i) const override;
   double private_value(const EvalContext& context, int i, int datum) const override;
   void add_inertia(const EvalContext& context, int i, int node, Inertia& inertia) const override;
   void add_momentum(const EvalContext&, int, State&) const override {}

@@ -16,8 +16,10 @@ namespace {
 
 /// Private data: q, qP, qPP of a mode; position, velocity, acceleration, spin and its rate of a FEM
 /// node.
-enum Datum { kQ, kQP, kQPP, kX, kXP, kXPP, kW, kWP, kDatumCount };
-constexpr const char* kDatumNames[kDatumCount] = {"q", "qP", "qPP", "x", "xP", "xPP", "w", "wP"};
+enum DatumKind { kQ, kQP, kQPP, kX, kXP, kXPP, kW, kWP, kDatumCount };
+constexpr DatumName kDatumNames[kDatumCount] = {{"q", ""},      {"qP", ""},       {"qPP", ""},
+                                                {"x", "m"},     {"xP", "m/s"},    {"xPP", "m/s^2"},
+                                                {"w", "rad/s"}, {"wP", "rad/s^2"}};
 
 bool read_integer(std::string_view text, int& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -113,25 +115,27 @@ int ModalJointSet::private_datum(int i, std::string_view name) const {
   const std::string_view kind = name.substr(0, open),
                          argument = trimmed(name.substr(open + 1, name.size() - open - 2));
   for (int what = 0; what < kDatumCount; ++what) {
-    if (kind != kDatumNames[what]) continue;
+    if (kind != kDatumNames[what].name) continue;
     const int index = what <= kQPP ? mode_index(b, argument) : node_component(b, argument);
     return index < 0 ? -1 : index * kDatumCount + what;
   }
   return -1;
 }
 
-std::vector<std::string> ModalJointSet::private_data(int i) const {
+std::vector<Datum> ModalJointSet::private_data(int i) const {
   const ModalJoint& j = slots_[i].joint;
-  std::vector<std::string> names;
+  std::vector<Datum> data;
+  const auto add = [&](int what, const std::string& index) {
+    data.push_back(
+        {std::string(kDatumNames[what].name) + "[" + index + "]", kDatumNames[what].unit});
+  };
   for (int what = kQ; what <= kQPP; ++what)
-    for (const int mode : j.body->mode_numbers)
-      names.push_back(std::string(kDatumNames[what]) + "[" + std::to_string(mode) + "]");
+    for (const int mode : j.body->mode_numbers) add(what, std::to_string(mode));
   for (const ModalInterface& interface : j.interfaces)
     for (int what = kX; what < kDatumCount; ++what)
       for (int c = 1; c <= 3; ++c)
-        names.push_back(std::string(kDatumNames[what]) + "[" + j.body->labels[interface.fem_node] +
-                        "," + std::to_string(c) + "]");
-  return names;
+        add(what, j.body->labels[interface.fem_node] + "," + std::to_string(c));
+  return data;
 }
 
 double ModalJointSet::private_value(const EvalContext& context, int i, int datum) const {

@@ -10,11 +10,7 @@ namespace mbcosim {
 namespace {
 
 Error refusal(const PortAttachment& a, const std::string& text) {
-  Error e;
-  e.kind = ErrorKind::argument;
-  e.reason = "BAD_PORT";
-  e.message = "port \"" + a.name + "\": " + text;
-  return e;
+  return make_error(ErrorKind::argument, "BAD_PORT", "port \"" + a.name + "\": " + text);
 }
 
 /// Labels of attached elements are negative: no card has them.

@@ -64,10 +64,9 @@ struct AsynchronousMachine {
     row.scalar("omega", "rad/s", u.own(2));
     row.end();
   }
-  static int private_datum(std::string_view name) {
-    return name == "M" ? 0 : name == "omega" ? 1 : -1;
-  }
-  static std::vector<std::string> private_data() { return {"M", "omega"}; }
+  static constexpr std::array<DatumName, 2> data_names = {{{"M", "N m"}, {"omega", "rad/s"}}};
+  static int private_datum(std::string_view name) { return index_of(data_names, name); }
+  static std::vector<Datum> private_data() { return data_of(data_names); }
   static double private_value(const Local<double>& u, int datum) { return u.own(1 + datum); }
   static std::string row_name(int k) {
     return k == 0 ? "torque" : k == 1 ? "rate of the torque" : "speed of the rotor";

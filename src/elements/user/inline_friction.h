@@ -23,8 +23,14 @@ struct InlineFriction : TwoAttachments, NamedData<InlineFriction> {  // a: o₁ 
 
   static constexpr int width = 15;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr std::array<std::string_view, 8> data_names = {"lambda1", "lambda2", "tau", "mu",
-                                                                 "z",       "zP",      "v",   "Pf"};
+  static constexpr std::array<DatumName, 8> data_names = {{{"lambda1", "N"},
+                                                           {"lambda2", "N"},
+                                                           {"tau", "N"},
+                                                           {"mu", ""},
+                                                           {"z", "m"},
+                                                           {"zP", "m/s"},
+                                                           {"v", "m/s"},
+                                                           {"Pf", "W"}}};
 
   bool dry() const { return coulomb > 0; }
   void connect(Connector& c) const {

@@ -125,7 +125,7 @@ DrivePtr read_element(Card& card) {
         where, family_name(family), label,
         "elements must be defined before they are referred to; `postponed` defers a drive");
   const std::string owner = model.element_text(element);
-  const std::vector<std::string> names = element.set->private_data(element.index);
+  const std::vector<std::string> names = element.set->data_names(element.index);
   const std::string name = read_datum_name(card, owner, names);
   const int datum = element.set->private_datum(element.index, name);
   if (datum < 0) card.fail(owner + " has no private datum `" + name + "`", listed(names));

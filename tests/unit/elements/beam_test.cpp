@@ -186,13 +186,13 @@ TEST_F(StraightBeam, KeepsItsCurvatureFromStepToStep) {
   const double curvature = datum("pI.kz"), force = datum("pII.Fy");
   EXPECT_NEAR(curvature, 0.1, 1e-3);
   State& state = bench_.state;
-  set_->after_convergence(bench_.context(state), state);
+  set_->after_convergence(bench_.context(state), state, set_->all());
   for (int k = 0; k < 3; ++k) {
     NodeRotationHistory& past = state.rotation_history[nodes_[k]];
     past.R1 = past.R_ref = state.rotation[nodes_[k]].R;
     place(k, straight_[k], Vec3::Zero());
   }
-  set_->after_predict(bench_.context(state), state);
+  set_->after_predict(bench_.context(state), state, set_->all());
   EXPECT_NEAR(datum("pI.kz"), curvature, 1e-15);
   EXPECT_NEAR(datum("pII.Fy"), force, 1e-12);
 }
@@ -200,8 +200,8 @@ TEST_F(StraightBeam, KeepsItsCurvatureFromStepToStep) {
 TEST_F(StraightBeam, PrivateDataAreNamed) {
   build(straight_, LawType::elastic);
   EXPECT_EQ(set_->private_data(0).size(), 54u);
-  EXPECT_EQ(set_->private_data(0).front(), "pI.ex");
-  for (const std::string& name : set_->private_data(0)) EXPECT_GE(set_->private_datum(0, name), 0);
+  EXPECT_EQ(set_->private_data(0).front().name, "pI.ex");
+  for (const std::string& name : set_->data_names(0)) EXPECT_GE(set_->private_datum(0, name), 0);
   for (const char* name : {"ex", "pI.e", "pI.ew", "pI.Phi", "pIII.ex", ""})
     EXPECT_EQ(set_->private_datum(0, name), -1) << name;
 }

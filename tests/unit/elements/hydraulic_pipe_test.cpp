@@ -89,10 +89,10 @@ TEST(DynamicPipe, FlagChangesOnlyAfterConvergence) {
   DynamicPipeBench bench;
   bench.put({1e5, 1e5, .5, .5}, {0, 0, 0, 0});
   EXPECT_EQ(bench.printed()[14], 0);
-  bench.set().after_convergence(bench.context(), bench.state);
+  bench.set().after_convergence(bench.context(), bench.state, bench.set().all());
   EXPECT_EQ(bench.printed()[14], 1);
   bench.put({1e5, 1e5, .25, .25}, {0, 0, 0, 0});
-  bench.set().after_convergence(bench.context(), bench.state);
+  bench.set().after_convergence(bench.context(), bench.state, bench.set().all());
   EXPECT_EQ(bench.printed()[14], 1);
 }
 

@@ -248,7 +248,7 @@ TEST(Tank, StopsTheRunWhenEmpty) {
   Bench bench(2, Tank{0, 1, 1e5, 1e-4, .01, .3, .29, oil()});
   bench.state.y[bench.own] = -1e-9;
   try {
-    bench.set().after_convergence(bench.context(), bench.state);
+    bench.set().after_convergence(bench.context(), bench.state, bench.set().all());
     FAIL();
   } catch (const EvaluationError& e) {
     EXPECT_STREQ(e.what(), "hydraulic 7 (tank): the level is negative, the tank is empty");

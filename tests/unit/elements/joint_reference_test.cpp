@@ -270,7 +270,7 @@ TEST_P(JointReference, PrivateReactionsAreThePrintedOnes) {
   testing::Columns row;
   const ElementRef e = run.model().find_element(Family::joint, 1);
   e.set->output(run.context(), e.index, row);
-  const std::vector<std::string> names = e.set->private_data(e.index);
+  const std::vector<std::string> names = e.set->data_names(e.index);
   for (const std::string& name : names) {
     const int datum = e.set->private_datum(e.index, name);
     ASSERT_GE(datum, 0) << name;

@@ -273,7 +273,7 @@ TEST(ModalJoint, PrivateDataAreKinematicsOfTheFemNodes) {
   for (const char* bad :
        {"q[4]", "q[#0]", "x[tip,4]", "x[nowhere,1]", "wPP[tip,1]", "qPPP[1]", "q", "y[1]"})
     EXPECT_EQ(set.private_datum(0, bad), -1) << bad;
-  for (const std::string& name : set.private_data(0))
+  for (const std::string& name : set.data_names(0))
     EXPECT_GE(set.private_datum(0, name), 0) << name;
 }
 

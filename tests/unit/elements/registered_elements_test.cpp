@@ -14,6 +14,7 @@
 #include "elements/modal_bodies.h"
 #include "jacobian_check.h"
 #include "simulation/simulation.h"
+#include "solver/stages.h"
 #include "solver/system.h"
 
 namespace mbcosim {
@@ -419,7 +420,8 @@ class RegisteredElement : public ::testing::TestWithParam<ElementCard> {
     state.h = state.h_previous = 1e-3;
     update_rotations(model, state);
     const EvalContext predicted = model.context(state, Phase::step, kC, kC);
-    for (const auto& set : model.sets) set->after_predict(predicted, state);
+    Scratch scratch(model.scratch);
+    run_after_prediction(predicted, scratch, state);
     return state;
   }
   double number() { return number_(generator_); }
@@ -429,8 +431,9 @@ class RegisteredElement : public ::testing::TestWithParam<ElementCard> {
     return model.dense(workspace.values);
   }
   static VecX residual(const Model& model, const State& state) {
+    Scratch scratch(model.scratch);
     std::vector<double> r(model.unknowns);
-    compute_residual(model.context(state, Phase::step, kC, kC), r);
+    compute_residual(model.context(state, Phase::step, kC, kC), scratch, r);
     return Eigen::Map<const VecX>(r.data(), model.unknowns);
   }
   static VecX moved(const Model& model, State state, int column, double step) {

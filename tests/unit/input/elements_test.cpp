@@ -4,7 +4,7 @@
 #include "deck_fixture.h"
 #include "simulation/describe.h"
 #include "simulation/load.h"
-#include "simulation/units.h"
+#include "simulation/variables.h"
 
 #include <nlohmann/json.hpp>
 
@@ -189,14 +189,34 @@ TEST(Describe, PutsVariablesBelowTheirOwners) {
 }
 
 TEST(Describe, KnowsTheUnitsOfPrivateData) {
-  const std::tuple<Family, const char*, const char*> cases[] = {
-      {Family::beam, "pI.ex", ""},           {Family::beam, "pII.kPz", "1/(m s)"},
-      {Family::beam, "pI.Fx", "N"},          {Family::joint, "LPrime", "m/s"},
-      {Family::joint, "wz", "rad/s"},        {Family::joint, "constitutiveLaw.F", ""},
-      {Family::inertia, "J[1,2]", "kg m^2"}, {Family::body, "V", "J"},
-      {Family::electric, "i", "A"},          {Family::genel, "x[1]", ""}};
-  for (const auto& [family, name, unit] : cases)
-    EXPECT_EQ(unit_of_datum(family, name), unit) << name;
+  const DeckText deck{
+      .control =
+          "structural nodes: 3; rigid bodies: 1; joints: 2; beams: 1; inertia: 1;"
+          "abstract nodes: 1; genels: 1;",
+      .nodes =
+          "structural: 1, dynamic, null, eye, null, null;"
+          "structural: 2, dynamic, 1., 0., 0., eye, null, null;"
+          "structural: 3, dynamic, 2., 0., 0., eye, null, null; abstract: 4, differential;",
+      .elements =
+          "body: 1, 1, 2., null, diag, 1., 1., 1.;"
+          "joint: 2, rod, 1, 2, 1., linear viscoelastic, 10., 1.;"
+          "joint: 3, deformable hinge, 1, 2, linear elastic, 5.;"
+          "beam3: 4, 1, null, 2, null, 3, null, eye, linear elastic generic, diag, 1., 1., 1., 1., "
+          "1., 1., same, same;"
+          "inertia: 5, body, all, output, always;"
+          "genel: 6, scalar filter, 4, abstract, algebraic, drive, 1., 1, 1., 0, 1.;"};
+  const LoadReport report = load(deck);
+  ASSERT_TRUE(report.ok()) << findings(report.diagnostics);
+  const Variables variables(*report.model);
+  const std::pair<const char*, const char*> cases[] = {
+      {"beam.4.pI.ex", ""},           {"beam.4.pI.kx", "1/m"}, {"beam.4.pI.Fx", "N"},
+      {"joint.2.LPrime", "m/s"},      {"joint.2.F", "N"},      {"joint.3.wz", "rad/s"},
+      {"inertia.5.J[1,2]", "kg m^2"}, {"body.1.V", "J"},       {"genel.6.x[1]", ""}};
+  for (const auto& [name, unit] : cases) {
+    const int handle = variables.find(name);
+    ASSERT_GE(handle, 0) << name;
+    EXPECT_EQ(variables.list()[handle].unit, unit) << name;
+  }
 }
 
 }  // namespace

@@ -335,7 +335,7 @@ TEST(Identification, PrivateDataAreTheModel) {
               "node dof, 12, abstract, algebraic"));
   ASSERT_TRUE(run.ready());
   const ElementRef e = run.model().find_element(Family::electric, 99);
-  const std::vector<std::string> names = e.set->private_data(e.index);
+  const std::vector<std::string> names = e.set->data_names(e.index);
   ASSERT_EQ(names.size(), 2 + 12 + 1u);
   for (std::size_t k = 0; k < names.size(); ++k)
     EXPECT_EQ(e.set->private_datum(e.index, names[k]), static_cast<int>(k)) << names[k];

@@ -112,7 +112,8 @@ TEST_F(MatrixStructure, HoldsAllDerivativesOfTheResidual) {
       std::vector<double> delta(model.unknowns, 0.0);
       delta[column] = step;
       apply_correction(model, delta, c, c, moved);
-      compute_residual(model.context(moved, Phase::step, c, c), workspace.residual);
+      compute_residual(model.context(moved, Phase::step, c, c), workspace.scratch,
+                       workspace.residual);
       return VecX(Eigen::Map<const VecX>(workspace.residual.data(), model.unknowns));
     };
     const MatX differences = central_differences(

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "deck_run.h"
-#include "solver/control.h"
 
 namespace mbcosim {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "solver/control.h"
+#include "solver/advance_time.h"
 #include "solver/step_controller.h"
 
 namespace mbcosim {
@@ -22,13 +22,13 @@ class Scripted final : public StepSystem {
   int explained = 0;
 
   double next_step_size(State& state) const override {
-    state.control[control::kSinceRaise] += 1;
+    state.control.strategy.since_raise += 1;
     return h;
   }
   double peek_step_size(const State&) const override { return h; }
   double retry_step_size(State& state, double failed) const override {
     if (!has_strategy || failed < 0.3) return 0;
-    state.control[control::kSinceReduction] = -1;
+    state.control.strategy.since_reduction = -1;
     return failed / 2;
   }
   bool can_retry() const override { return has_strategy; }
@@ -40,9 +40,9 @@ class Scripted final : public StepSystem {
     report.newton.iterations = 1;
     ++state.step;
     if (attempt.end)
-      control::jump_to(state, *attempt.end);
+      jump_to(state, *attempt.end);
     else
-      control::advance_time(state, length);
+      advance_time(state, length);
     report.flagged = attempt.accept_unconverged && length > longest;
     if (length <= longest || report.flagged) {
       state.y[0] += length;
@@ -64,7 +64,6 @@ class StepControllerTest : public testing::Test {
   StepControllerTest() {
     state_.y = {0};
     state_.memory = {7};
-    state_.control.assign(control::kCount, 0.0);
     controller_.set_attempt_ended([this](bool accepted) { ended_.push_back(accepted); });
   }
   void expect_untouched() const {
@@ -72,7 +71,7 @@ class StepControllerTest : public testing::Test {
     EXPECT_EQ(state_.step, 0);
     EXPECT_EQ(state_.y, std::vector<double>{0});
     EXPECT_EQ(state_.memory, std::vector<double>{7});
-    EXPECT_EQ(state_.control, std::vector<double>(control::kCount, 0.0));
+    EXPECT_EQ(state_.control, StepControl());
   }
   State state_;
   Scripted system_;
@@ -85,7 +84,7 @@ TEST_F(StepControllerTest, AcceptsAStepThatIsSolved) {
   EXPECT_FALSE(report.error);
   EXPECT_EQ(state_.y[0], 1);
   EXPECT_EQ(state_.step, 1);
-  EXPECT_EQ(state_.control[control::kSinceRaise], 1) << "the strategy goes on";
+  EXPECT_EQ(state_.control.strategy.since_raise, 1) << "the strategy goes on";
 }
 
 TEST_F(StepControllerTest, TakesAFailedStepBackWhole) {
@@ -103,7 +102,7 @@ TEST_F(StepControllerTest, TriesTheShorterStepsOfTheStrategy) {
   EXPECT_THAT(system_.attempts, ElementsAre(1, 0.5, 0.25));
   EXPECT_THAT(ended_, ElementsAre(false, false));
   EXPECT_EQ(state_.y[0], 0.25);
-  EXPECT_EQ(state_.control[control::kSinceReduction], -1) << "what it remembers is kept";
+  EXPECT_EQ(state_.control.strategy.since_reduction, -1) << "what it remembers is kept";
   EXPECT_EQ(state_.memory, std::vector<double>{7});
 }
 
@@ -210,7 +209,7 @@ TEST_F(StepControllerTest, TakesALengthWithoutAskingTheStrategy) {
   EXPECT_FALSE(controller_.advance(state_, choice).error);
   EXPECT_EQ(state_.y[0], 0.7);
   EXPECT_THAT(system_.chosen, ElementsAre(true));
-  EXPECT_EQ(state_.control[control::kSinceRaise], 0);
+  EXPECT_EQ(state_.control.strategy.since_raise, 0);
 }
 
 TEST_F(StepControllerTest, TakesTheDecksOwnLengthForTheDecks) {

@@ -1,0 +1,29 @@
+#include "solver/stages.h"
+
+#include <algorithm>
+
+#include "model/model.h"
+
+namespace mbcosim {
+
+void run_after_prediction(EvalContext context, Scratch& scratch, State& state) {
+  context.scratch = &scratch;
+  for (const ElementSpan& s : context.model->stage_order)
+    s.set->after_predict(context, state, s.range);
+}
+
+void accumulate(EvalContext context, Scratch& scratch) {
+  if (context.model->accumulation.empty()) return;
+  std::fill(scratch.sums.begin(), scratch.sums.end(), 0.0);
+  context.scratch = &scratch;
+  for (const ElementSpan& s : context.model->accumulation) s.set->accumulate(context, s.range);
+}
+
+void run_after_convergence(EvalContext context, Scratch& scratch, State& state) {
+  context.scratch = &scratch;
+  accumulate(context, scratch);
+  for (const ElementSpan& s : context.model->stage_order)
+    s.set->after_convergence(context, state, s.range);
+}
+
+}  // namespace mbcosim
