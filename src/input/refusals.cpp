@@ -47,7 +47,7 @@ void refuse_dead_elements(Refusals& r) {
       "use `force: <label>, abstract` on the hydraulic node");
   add(r, "jointregularization", "dynamic",
       "it depends on the residual evaluated before, thus on how often it is evaluated",
-      "use `tikhonov`", false);
+      "use `jacobian`", false);
   add(r, "elements", "loadable", "decks load no code",
       "what is built in is written `user defined: <label>, <word>`", false);
   add(r, "elements", "RTAI output", "it needs a real-time operating system", "use `stream output`",

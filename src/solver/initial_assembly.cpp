@@ -258,8 +258,7 @@ class Assembly {
     }
     return "these constraints follow from each other: " +
            joined(owners_of(model_, by_model_row(null.left), 6)) +
-           "\n  hint: remove the redundant ones, or regularize a joint: `joint regularization: "
-           "<label>, tikhonov, 1e-8;`";
+           "\n  hint: remove the redundant ones, or regularize a joint " + kRegularization;
   }
 
   /// The constraints that stay violated, largest violation of each element first.

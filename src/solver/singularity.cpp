@@ -89,8 +89,8 @@ std::string Singularity::remedy() const {
   if (nodes)
     return "no element holds these: give the node a body, a joint (`clamp` for the ground) or "
            "another element, or remove it";
-  return "remove redundant constraints, or regularize one of their joints: `joint regularization: "
-         "<label>, tikhonov, 1e-8;`";
+  return std::string("remove redundant constraints, or regularize one of their joints ") +
+         kRegularization;
 }
 
 Singularity find_singularity(const Model& model, const std::vector<double>& values, int column) {

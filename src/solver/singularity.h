@@ -20,6 +20,14 @@ struct Singularity {
   std::string remedy() const;   ///< what the author of the deck can do
 };
 
+/// The card that lets a redundant constraint pass. Not `tikhonov`: with the sign of most rows it
+/// drives the joint away. The shares of redundant multipliers wander; an undamped method lets them
+/// grow.
+inline constexpr const char* kRegularization =
+    "in Newton's matrix alone, which leaves the motion exact: `joint regularization: <label>, "
+    "jacobian, 1e-12;` with a method that damps, as `method: ms, .6;` (a smaller number where the "
+    "iteration does not converge)";
+
 /// Rank to rounding; `column` is the column without a pivot that the sparse factorization met (-1:
 /// unknown).
 Singularity find_singularity(const Model& model, const std::vector<double>& values, int column);
