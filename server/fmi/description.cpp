@@ -109,25 +109,37 @@ std::string start_text(const Entry& e) {
   return text;
 }
 
+/// The parts that both standards have, without what the versions say of the kind of simulation.
+struct Outline {
+  pugi::xml_node kind, variables, structure;
+};
+
+Outline outline(pugi::xml_document& document, const DescriptionHead& head, const char* version,
+                const char* token, const std::vector<Entry>& entries) {
+  pugi::xml_node root = start(document, head, version);
+  set(root, token, head.token);
+  Outline parts;
+  parts.kind = root.append_child("CoSimulation");
+  set(parts.kind, "modelIdentifier", head.identifier);
+  add_units(root, entries);
+  add_common(root, head);
+  parts.variables = root.append_child("ModelVariables");
+  parts.structure = root.append_child("ModelStructure");
+  return parts;
+}
+
 }  // namespace
 
 // ------------------------------------------------------------------ FMI 2
 
 std::string describe_fmi2(const DescriptionHead& head, const std::vector<Entry>& scalars) {
   pugi::xml_document document;
-  pugi::xml_node root = start(document, head, "2.0");
-  set(root, "guid", head.token);
-  pugi::xml_node kind = root.append_child("CoSimulation");
-  set(kind, "modelIdentifier", head.identifier);
+  auto [kind, variables, structure] = outline(document, head, "2.0", "guid", scalars);
   set(kind, "canHandleVariableCommunicationStepSize", head.variable_steps);
   set(kind, "canNotUseMemoryManagementFunctions", true);
   set(kind, "canGetAndSetFMUstate", true);
   set(kind, "canSerializeFMUstate", true);
   set(kind, "providesDirectionalDerivative", true);
-  add_units(root, scalars);
-  add_common(root, head);
-  pugi::xml_node variables = root.append_child("ModelVariables");
-  pugi::xml_node structure = root.append_child("ModelStructure");
   pugi::xml_node outputs, unknowns;
   for (std::size_t k = 0; k < scalars.size(); ++k) {
     const Entry& e = scalars[k];
@@ -152,19 +164,12 @@ std::string describe_fmi2(const DescriptionHead& head, const std::vector<Entry>&
 
 std::string describe_fmi3(const DescriptionHead& head, const std::vector<Entry>& entries) {
   pugi::xml_document document;
-  pugi::xml_node root = start(document, head, "3.0");
-  set(root, "instantiationToken", head.token);
-  pugi::xml_node kind = root.append_child("CoSimulation");
-  set(kind, "modelIdentifier", head.identifier);
+  auto [kind, variables, structure] = outline(document, head, "3.0", "instantiationToken", entries);
   set(kind, "canGetAndSetFMUState", true);
   set(kind, "canSerializeFMUState", true);
   set(kind, "providesDirectionalDerivatives", true);
   set(kind, "providesAdjointDerivatives", true);
   set(kind, "canHandleVariableCommunicationStepSize", head.variable_steps);
-  add_units(root, entries);
-  add_common(root, head);
-  pugi::xml_node variables = root.append_child("ModelVariables");
-  pugi::xml_node structure = root.append_child("ModelStructure");
   for (const Entry& e : entries) {
     pugi::xml_node node = variables.append_child("Float64");
     name_variable(node, e);

@@ -53,9 +53,30 @@ Mat3 imposed_transposed(const TotalConstraint& c, const EvalContext& context) {
   return rotation_of_vector<double>(c.angle->value(context)).transpose();
 }
 
-class InverseTotal final : public TypedConstraint<TotalJoint> {
+/// What the total joint and the total pin joint have in common.
+template <class E>
+class PrescribedMotion : public TypedConstraint<E> {
  public:
-  using TypedConstraint::TypedConstraint;
+  using TypedConstraint<E>::TypedConstraint;
+
+  VecX position(const EvalContext& context) const override {
+    const Local<double> u = this->local(context);
+    const auto m = this->element_.motion(u);
+    return -picked(this->element_.constraint,
+                   m.position - u.drive(this->element_.constraint.displacement),
+                   this->element_.rotation_error(u, m));
+  }
+  VecX velocity(const EvalContext& context) const override {
+    const TotalConstraint& c = this->element_.constraint;
+    const auto m = this->element_.motion(this->local(context));
+    const Mat3 turn = m.rotation * imposed_transposed(c, context);
+    return picked(c, c.displacement_rate->value(context), turn * c.angle_rate->value(context));
+  }
+};
+
+class InverseTotal final : public PrescribedMotion<TotalJoint> {
+ public:
+  using PrescribedMotion::PrescribedMotion;
 
   MatX jacobian(const EvalContext& context,
                 const std::vector<NodeRotationHistory>& previous) const override {
@@ -76,18 +97,6 @@ class InverseTotal final : public TypedConstraint<TotalJoint> {
         });
     return J;
   }
-  VecX position(const EvalContext& context) const override {
-    const Local<double> u = local(context);
-    const auto m = element_.motion(u);
-    return -picked(element_.constraint, m.position - u.drive(element_.constraint.displacement),
-                   element_.rotation_error(u, m));
-  }
-  VecX velocity(const EvalContext& context) const override {
-    const TotalConstraint& c = element_.constraint;
-    const auto m = element_.motion(local(context));
-    const Mat3 turn = m.rotation * imposed_transposed(c, context);
-    return picked(c, c.displacement_rate->value(context), turn * c.angle_rate->value(context));
-  }
   VecX acceleration(const EvalContext& context) const override {
     const TotalConstraint& c = element_.constraint;
     const Local<double> u = local(context);
@@ -104,9 +113,9 @@ class InverseTotal final : public TypedConstraint<TotalJoint> {
   }
 };
 
-class InversePin final : public TypedConstraint<TotalPinJoint> {
+class InversePin final : public PrescribedMotion<TotalPinJoint> {
  public:
-  using TypedConstraint::TypedConstraint;
+  using PrescribedMotion::PrescribedMotion;
 
   MatX jacobian(const EvalContext& context,
                 const std::vector<NodeRotationHistory>&) const override {
@@ -120,18 +129,6 @@ class InversePin final : public TypedConstraint<TotalPinJoint> {
         },
         [&](int k, int i) { J.block<1, 3>(k, 3) = element_.Rcr.col(i).transpose(); });
     return J;
-  }
-  VecX position(const EvalContext& context) const override {
-    const Local<double> u = local(context);
-    const auto m = element_.motion(u);
-    return -picked(element_.constraint, m.position - u.drive(element_.constraint.displacement),
-                   element_.rotation_error(u, m));
-  }
-  VecX velocity(const EvalContext& context) const override {
-    const TotalConstraint& c = element_.constraint;
-    const auto m = element_.motion(local(context));
-    const Mat3 turn = m.rotation * imposed_transposed(c, context);
-    return picked(c, c.displacement_rate->value(context), turn * c.angle_rate->value(context));
   }
   VecX acceleration(const EvalContext& context) const override {
     const TotalConstraint& c = element_.constraint;
