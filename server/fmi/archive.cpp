@@ -6,10 +6,7 @@ namespace mbcosim::fmi {
 namespace {
 
 Error io_error(const std::string& path, const char* reason) {
-  Error error;
-  error.kind = ErrorKind::io;
-  error.message = "cannot write \"" + path + "\": " + reason;
-  return error;
+  return make_error(ErrorKind::io, "", "cannot write \"" + path + "\": " + reason);
 }
 
 bool add(zip_t* archive, const std::string& name, const std::string& content) {

@@ -25,12 +25,7 @@ std::vector<int> counted(int size) {
   return all;
 }
 
-Error refused(const std::string& message) {
-  Error error;
-  error.kind = ErrorKind::argument;
-  error.message = message;
-  return error;
-}
+Error refused(const std::string& message) { return make_error(ErrorKind::argument, "", message); }
 
 /// Loads are force and moment of each point, in turn: two variables with one unit each.
 std::vector<Entry> split_loads(const Entry& loads) {

@@ -17,12 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Error refused(ErrorKind kind, const std::string& message) {
-  Error error;
-  error.kind = kind;
-  error.message = message;
-  return error;
-}
+Error refused(ErrorKind kind, const std::string& message) { return make_error(kind, "", message); }
 
 /// Hands out files and keeps what was read.
 class RecordingSource : public FileSource {

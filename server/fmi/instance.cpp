@@ -405,13 +405,11 @@ mbcosim::Status Instance::compute_derivative(std::span<const std::uint32_t> unkn
   std::vector<int> rows, columns;
   const auto outputs = handles_of(unknowns, false, rows);
   const auto inputs = outputs ? handles_of(knowns, true, columns) : std::nullopt;
-  Error error;
-  error.kind = ErrorKind::argument;
-  if (!inputs) return error;
-  error.kind = ErrorKind::limit;
-  error.message = "derivatives are given for models of at most " + std::to_string(kLargest) +
-                  " unknowns; this one has " + std::to_string(model_->unknowns);
-  if (model_->unknowns > kLargest) return error;
+  if (!inputs) return make_error(ErrorKind::argument, "", "");
+  if (model_->unknowns > kLargest)
+    return make_error(ErrorKind::limit, "",
+                      "derivatives are given for models of at most " + std::to_string(kLargest) +
+                          " unknowns; this one has " + std::to_string(model_->unknowns));
   const auto io = simulation_->linearize(*inputs, *outputs);
   if (!io) return io.error();
   const auto system = state_space(simulation_->linearize(), *io);

@@ -25,10 +25,8 @@ Result<Manifest> manifest_from_json(const std::string& text) {
   try {
     return json::parse(text).get<Manifest>();
   } catch (const json::exception& e) {
-    Error error;
-    error.kind = ErrorKind::data_loss;
-    error.message = std::string("resources/mbcosim.json is damaged: ") + e.what();
-    return error;
+    return make_error(ErrorKind::data_loss, "",
+                      std::string("resources/mbcosim.json is damaged: ") + e.what());
   }
 }
 

@@ -26,12 +26,9 @@ bool is_of_the_system(const std::string& name) {
 Result<std::map<std::string, std::string>> needed_libraries(const std::string& library) {
   void* handle = ::dlmopen(LM_ID_NEWLM, library.c_str(), RTLD_LAZY | RTLD_LOCAL);
   link_map* first = nullptr;
-  if (!handle || ::dlinfo(handle, RTLD_DI_LINKMAP, &first) != 0) {
-    Error error;
-    error.kind = ErrorKind::io;
-    error.message = std::string("cannot load the engine of the FMU: ") + ::dlerror();
-    return error;
-  }
+  if (!handle || ::dlinfo(handle, RTLD_DI_LINKMAP, &first) != 0)
+    return make_error(ErrorKind::io, "",
+                      std::string("cannot load the engine of the FMU: ") + ::dlerror());
   while (first->l_prev) first = first->l_prev;
   std::map<std::string, std::string> needed;
   for (const link_map* each = first; each; each = each->l_next) {

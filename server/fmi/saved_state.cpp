@@ -52,10 +52,7 @@ struct Reader {
 };
 
 Error refused(ErrorKind kind, std::string message) {
-  Error error;
-  error.kind = kind;
-  error.message = std::move(message);
-  return error;
+  return make_error(kind, "", std::move(message));
 }
 
 }  // namespace

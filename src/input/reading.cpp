@@ -34,13 +34,10 @@ Result<std::string> Reading::read_counted(const std::string& name) {
   Result<std::string> text = source_.read(name);
   if (!text) return text;
   bytes_ += static_cast<std::int64_t>(text->size());
-  if (bytes_ > limits.deck_bytes) {
-    Error e;
-    e.kind = ErrorKind::limit;
-    e.reason = "deck-bytes";
-    e.message = "the deck and its files exceed " + std::to_string(limits.deck_bytes) + " bytes";
-    return e;
-  }
+  if (bytes_ > limits.deck_bytes)
+    return make_error(
+        ErrorKind::limit, "deck-bytes",
+        "the deck and its files exceed " + std::to_string(limits.deck_bytes) + " bytes");
   return text;
 }
 
@@ -101,13 +98,10 @@ Result<std::string> Reading::expand_environment(std::string_view name) const {
     const std::size_t begin = i + 1 + braces;
     const std::size_t end = skip_identifier(name, begin);
     const auto value = environment.find(name.substr(begin, end - begin));
-    if (value == environment.end() || (braces && char_at(name, end) != '}')) {
-      Error e;
-      e.kind = ErrorKind::deck;
-      e.message = "\"" + std::string(name.substr(begin, end - begin)) +
-                  "\" is not set; a deck sees only what its own `setenv` cards set";
-      return e;
-    }
+    if (value == environment.end() || (braces && char_at(name, end) != '}'))
+      return make_error(ErrorKind::deck, "",
+                        "\"" + std::string(name.substr(begin, end - begin)) +
+                            "\" is not set; a deck sees only what its own `setenv` cards set");
     r += value->second;
     i = end - 1 + braces;
   }

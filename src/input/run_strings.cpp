@@ -5,6 +5,7 @@
 #include "input/evaluate.h"
 #include "input/pending_string.h"
 #include "math/dual.h"
+#include "math/hash.h"
 #include "model/drive.h"
 #include "model/expression.h"
 #include "model/model.h"
@@ -61,12 +62,6 @@ class AssignmentListener : public StepListener {
   std::vector<std::shared_ptr<const PendingString>> strings_;
 };
 
-std::uint64_t hash(std::string_view s) {
-  std::uint64_t h = 0xcbf29ce484222325u;
-  for (const char c : s) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return h;
-}
-
 }  // namespace
 
 PendingString::PendingString(Reading& reading, std::string text, SourceSpan where,
@@ -78,7 +73,7 @@ PendingString::PendingString(Reading& reading, std::string text, SourceSpan wher
       arguments_(std::move(arguments)),
       currents_(reading.currents) {
   place_ = reading.place(where) + ":" + std::to_string(where.column);
-  random_key_ = hash(text_) ^ hash(place_);
+  random_key_ = fnv1a(text_) ^ fnv1a(place_);
   try {
     parse_string(text_, reading.limits, &syntax_);
   } catch (const ExpressionError& e) {

@@ -12,11 +12,7 @@ namespace mbcosim {
 namespace {
 
 Error misfit(std::string message, std::string hint) {
-  Error e;
-  e.kind = ErrorKind::argument;
-  e.message = std::move(message);
-  e.reason = std::move(hint);
-  return e;
+  return make_error(ErrorKind::argument, std::move(hint), std::move(message));
 }
 
 std::string shown(const Value& v) {

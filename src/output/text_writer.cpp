@@ -110,11 +110,7 @@ class TextWriter : public ResultWriter, private OutputRow {
       48;  ///< bytes of one field, with margin for the largest precision used
 
   static Error not_written(const std::string& what) {
-    Error e;
-    e.kind = ErrorKind::io;
-    e.reason = "OUTPUT_NOT_WRITTEN";
-    e.message = what;
-    return e;
+    return make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN", what);
   }
   void header() {
     out_.text(

@@ -327,18 +327,14 @@ ReductionBasis parse_basis(const std::string& name) {
 
 Result<Reduction> reduce(const FeModel& model, const ReductionOptions& options,
                          const ReductionProgress& progress) {
-  Error error;
   try {
     return Reducer(model, options, progress).run();
   } catch (const ReductionError& e) {
-    error.kind = e.kind;
-    error.message = e.what();
+    return make_error(e.kind, "", e.what());
   } catch (const std::bad_alloc&) {
-    error.kind = ErrorKind::limit;
-    error.message = "the reduction needs more memory than there is";
-    error.reason = "LIMIT_MEMORY";
+    return make_error(ErrorKind::limit, "LIMIT_MEMORY",
+                      "the reduction needs more memory than there is");
   }
-  return error;
 }
 
 }  // namespace mbcosim

@@ -54,14 +54,10 @@ Result<GeneralizedEigen> generalized_eigen(MatX a, MatX b, EigenSettings::Balanc
   length = std::max(1, static_cast<int>(wanted));
   std::vector<double> work(length);
   solve(work.data());
-  if (info != 0) {
-    Error e;
-    e.kind = ErrorKind::not_converged;
-    e.reason = "EIGENANALYSIS_FAILED";
-    e.message = "eigenanalysis: the QZ iteration did not converge (LAPACK info " +
-                std::to_string(info) + ")";
-    return e;
-  }
+  if (info != 0)
+    return make_error(ErrorKind::not_converged, "EIGENANALYSIS_FAILED",
+                      "eigenanalysis: the QZ iteration did not converge (LAPACK info " +
+                          std::to_string(info) + ")");
   result.first = low - 1;
   result.last = high - 1;
   if (vectors) {

@@ -58,16 +58,12 @@ Result<EigenReport> analyse_modes(const Model& model, const State& state,
   report.step = state.step;
   report.pencil = bilinear_pencil(model, state, settings.parameter / 2);
   const bool lapack = settings.solver == EigenSettings::Solver::lapack;
-  if (lapack && model.unknowns > kLargestDense) {
-    Error e;
-    e.kind = ErrorKind::limit;
-    e.reason = "EIGENANALYSIS_SIZE";
-    e.message = "eigenanalysis: " + std::to_string(model.unknowns) +
-                " unknowns are too many for a dense solver (at most " +
-                std::to_string(kLargestDense) +
-                "); use `use arpack, <number>, <basis>, <tolerance>`";
-    return e;
-  }
+  if (lapack && model.unknowns > kLargestDense)
+    return make_error(ErrorKind::limit, "EIGENANALYSIS_SIZE",
+                      "eigenanalysis: " + std::to_string(model.unknowns) +
+                          " unknowns are too many for a dense solver (at most " +
+                          std::to_string(kLargestDense) +
+                          "); use `use arpack, <number>, <basis>, <tolerance>`");
   auto solution =
       lapack ? generalized_eigen(model.dense(report.pencil.minus), model.dense(report.pencil.plus),
                                  settings.balance, settings.eigenvectors)

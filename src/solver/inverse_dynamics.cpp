@@ -99,10 +99,7 @@ PhaseReport InverseDynamics::attempt(State& state, const StepAttempt& attempt) {
     char where[96];
     std::snprintf(where, sizeof where, "inverse dynamics at t = %.9g (record %lld): ", state.time,
                   static_cast<long long>(state.step));
-    Error e;
-    e.kind = kind;
-    e.reason = reason;
-    e.message = where + message;
+    Error e = make_error(kind, reason, where + message);
     e.failure.time = state.time;
     e.failure.step = static_cast<long>(state.step);
     e.failure.iteration = report.newton.iterations;

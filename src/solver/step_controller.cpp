@@ -72,9 +72,9 @@ class Bracket {
 };
 
 Error not_agreed(const State& end, int passes) {
-  Error error;
-  error.kind = ErrorKind::not_converged;
-  error.message = "the interface did not converge in " + std::to_string(passes) + " passes";
+  Error error =
+      make_error(ErrorKind::not_converged, "",
+                 "the interface did not converge in " + std::to_string(passes) + " passes");
   error.failure.time = end.time;
   error.failure.step = static_cast<long>(end.step);
   return error;
@@ -83,10 +83,9 @@ Error not_agreed(const State& end, int passes) {
 }  // namespace
 
 Error evaluation_failure(const State& state, const EvaluationError& cause) {
-  Error error;
-  error.kind = ErrorKind::evaluation;
-  error.reason = dynamic_cast<const EndOfRun*>(&cause) ? kEndOfRun : "EVALUATION_FAILED";
-  error.message = "t = " + std::to_string(state.time) + ": " + cause.what();
+  const bool ends = dynamic_cast<const EndOfRun*>(&cause);
+  Error error = make_error(ErrorKind::evaluation, ends ? kEndOfRun : "EVALUATION_FAILED",
+                           "t = " + std::to_string(state.time) + ": " + cause.what());
   error.failure.time = state.time;
   error.failure.step = static_cast<long>(state.step);
   return error;
