@@ -99,11 +99,14 @@ std::string eigen_table(const EigenReport& report) {
 }
 
 std::string eigen_suffix(const EigenReport& report) {
-  const EigenSettings& s = report.settings;
-  const int width = s.suffix_width >= 0 ? s.suffix_width
-                                        : static_cast<int>(std::to_string(report.count - 1).size());
-  const SuffixFormat format = *SuffixFormat::parse(s.suffix_format);
-  return "_" + format.text(report.index, width);
+  return eigen_suffix(report.settings, report.index, report.count);
+}
+
+std::string eigen_suffix(const EigenSettings& settings, int index, int count) {
+  const int width = settings.suffix_width >= 0 ? settings.suffix_width
+                                               : static_cast<int>(std::to_string(count - 1).size());
+  const SuffixFormat format = *SuffixFormat::parse(settings.suffix_format);
+  return "_" + format.text(index, width);
 }
 
 std::string eigen_file(const EigenReport& report, const Model& model) {

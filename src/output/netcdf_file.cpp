@@ -1,6 +1,14 @@
 #include "output/netcdf_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <mutex>
+
 #include "output/netcdf_library.h"
+#include "output/netcdf_records.h"
 
 namespace mbcosim {
 
@@ -8,91 +16,159 @@ namespace {
 
 const NetcdfLibrary& nc() { return NetcdfLibrary::get(); }
 
+/// The library keeps a list of open files that it does not protect.
+std::mutex& library_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+template <class Function, class... Arguments>
+int locked(Function function, Arguments... arguments) {
+  const std::lock_guard lock(library_mutex());
+  return function(arguments...);
+}
+
 }  // namespace
 
 void NetcdfFile::check(int code) {
   if (code != NC_NOERR && problem_.empty()) problem_ = nc().strerror(code);
 }
 
-NetcdfFile::~NetcdfFile() {
-  if (id_ >= 0) nc().close(id_);
+bool NetcdfFile::take(std::size_t bytes) {
+  if (!works()) return false;
+  const auto count = static_cast<std::int64_t>(bytes);
+  if (budget_ && !budget_->take(count)) over_budget_ = true;
+  if (!over_budget_) bytes_ += count;
+  return !over_budget_;
 }
 
-void NetcdfFile::create(const std::string& path) {
+NetcdfFile::~NetcdfFile() { close(); }
+
+void NetcdfFile::close() {
+  if (id_ >= 0) check(locked(nc().close, id_));
+  id_ = -1;
+  defining_ = false;
+}
+
+void NetcdfFile::create(const std::string& path, ResultBudget* budget) {
   path_ = path;
+  budget_ = budget;
   problem_ = nc().problem;
-  if (!problem_.empty()) return;
-  check(nc().create(path.c_str(), NC_CLOBBER | NC_64BIT_OFFSET, &id_));
+  if (!works()) return;
+  check(locked(nc().create, path.c_str(), NC_CLOBBER | NC_64BIT_OFFSET, &id_));
   defining_ = problem_.empty();
 }
 
+void NetcdfFile::open() {
+  looks_up_ = true;
+  if (works()) check(locked(nc().open, path_.c_str(), NC_WRITE, &id_));
+}
+
+void NetcdfFile::reopen(const std::string& path, ResultBudget* budget) {
+  path_ = path;
+  budget_ = budget;
+  problem_ = nc().problem;
+  open();
+}
+
+void NetcdfFile::cut(std::size_t records, std::int64_t bytes) {
+  write();
+  close();
+  over_budget_ = false;
+  problem_ = nc().problem;
+  if (budget_) budget_->give_back(bytes_);
+  bytes_ = 0;
+  const Status done = cut_records(path_, static_cast<std::int64_t>(records));
+  if (!done) problem_ = done.error().message;
+  open();
+  (void)take(static_cast<std::size_t>(bytes));
+}
+
 void NetcdfFile::define() {
-  if (defining_ || !problem_.empty()) return;
-  check(nc().redef(id_));
+  if (defining_ || !works()) return;
+  check(locked(nc().redef, id_));
   defining_ = true;
 }
 
 void NetcdfFile::write() {
-  if (!defining_ || !problem_.empty()) return;
-  check(nc().enddef(id_));
+  if (!defining_ || !works()) return;
+  check(locked(nc().enddef, id_));
   defining_ = false;
 }
 
 int NetcdfFile::dimension(const std::string& name, std::size_t length) {
-  define();
   int id = -1;
-  if (problem_.empty())
-    check(nc().def_dim(id_, name.c_str(), length == kUnlimited ? NC_UNLIMITED : length, &id));
+  if (looks_up_ && works() && locked(nc().inq_dimid, id_, name.c_str(), &id) == NC_NOERR) return id;
+  define();
+  if (works())
+    check(
+        locked(nc().def_dim, id_, name.c_str(), length == kUnlimited ? NC_UNLIMITED : length, &id));
   return id;
 }
 
 int NetcdfFile::variable(const std::string& name, Type type, const std::vector<int>& dimensions) {
-  define();
+  constexpr std::size_t kHeader = 200;  // about, of a variable with its attributes
   int id = -1;
-  if (problem_.empty())
-    check(nc().def_var(id_, name.c_str(), type == Type::integer ? NC_INT : NC_DOUBLE,
-                       static_cast<int>(dimensions.size()), dimensions.data(), &id));
+  if (looks_up_ && works() && locked(nc().inq_varid, id_, name.c_str(), &id) == NC_NOERR) return id;
+  define();
+  if (take(kHeader + name.size()))
+    check(locked(nc().def_var, id_, name.c_str(), type == Type::integer ? NC_INT : NC_DOUBLE,
+                 static_cast<int>(dimensions.size()), dimensions.data(), &id));
   return id;
 }
 
 void NetcdfFile::attribute(int variable, const char* name, const std::string& text) {
   if (text.empty()) return;
   define();
-  if (problem_.empty())
-    check(nc().put_att_text(id_, variable < 0 ? NC_GLOBAL : variable, name, text.size(),
-                            text.c_str()));
+  if (works())
+    check(locked(nc().put_att_text, id_, variable < 0 ? NC_GLOBAL : variable, name, text.size(),
+                 text.c_str()));
 }
 
 void NetcdfFile::put(int variable, const std::vector<int>& data) {
   write();
-  if (problem_.empty() && !data.empty()) check(nc().put_var_int(id_, variable, data.data()));
+  if (!data.empty() && take(sizeof(int) * data.size()))
+    check(locked(nc().put_var_int, id_, variable, data.data()));
 }
 
 void NetcdfFile::put(int variable, const std::vector<double>& data) {
   write();
-  if (problem_.empty() && !data.empty()) check(nc().put_var_double(id_, variable, data.data()));
+  if (!data.empty() && take(sizeof(double) * data.size()))
+    check(locked(nc().put_var_double, id_, variable, data.data()));
 }
 
 void NetcdfFile::put_record(int variable, std::size_t record, const std::vector<std::size_t>& shape,
                             const double* data) {
   write();
-  if (!problem_.empty()) return;
-  std::size_t start[4] = {record, 0, 0, 0}, count[4] = {1, 1, 1, 1};
-  for (std::size_t k = 0; k < shape.size(); ++k) count[k + 1] = shape[k];
-  check(nc().put_vara_double(id_, variable, start, count, data));
+  std::size_t start[4] = {record, 0, 0, 0}, count[4] = {1, 1, 1, 1}, values = 1;
+  for (std::size_t k = 0; k < shape.size(); ++k) values *= count[k + 1] = shape[k];
+  if (take(sizeof(double) * values))
+    check(locked(nc().put_vara_double, id_, variable, start, count, data));
 }
 
 void NetcdfFile::put_record(int variable, std::size_t record, int value) {
   write();
-  if (problem_.empty()) check(nc().put_var1_int(id_, variable, &record, &value));
+  if (take(sizeof(int))) check(locked(nc().put_var1_int, id_, variable, &record, &value));
+}
+
+Status NetcdfFile::flush(bool to_disk) {
+  write();
+  if (works()) check(locked(nc().sync, id_));
+  if (!to_disk || !works()) return status();
+  const int file = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0 || fsync(file) != 0) problem_ = std::strerror(errno);
+  if (file >= 0) ::close(file);
+  return status();
 }
 
 Status NetcdfFile::finish() {
   write();
-  if (id_ >= 0) {
-    check(nc().close(id_));
-    id_ = -1;
-  }
+  close();
+  return status();
+}
+
+Status NetcdfFile::status() const {
+  if (over_budget_) return over_budget(*budget_);
   if (problem_.empty()) return ok();
   return make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN", "cannot write " + path_ + ": " + problem_);
 }

@@ -1,5 +1,5 @@
 /// A NetCDF file being written; hides the C library. The first failure is kept, later calls do
-/// nothing.
+/// nothing. Files of several threads may be written at once.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "model/diagnostic.h"
+#include "output/result_budget.h"
 
 namespace mbcosim {
 
@@ -20,7 +21,16 @@ class NetcdfFile {
   NetcdfFile(const NetcdfFile&) = delete;
   NetcdfFile& operator=(const NetcdfFile&) = delete;
 
-  void create(const std::string& path);
+  /// `budget`: of which the file's bytes are taken, headers about; null: without bound.
+  void create(const std::string& path, ResultBudget* budget = nullptr);
+  /// Goes on with a file that another NetcdfFile wrote: what it has of the definitions that follow
+  /// is found by name.
+  void reopen(const std::string& path, ResultBudget* budget);
+  /// Ends the file after so many records, when `bytes` of the budget had been taken, and goes on
+  /// there. Forgets what went wrong.
+  void cut(std::size_t records, std::int64_t bytes);
+  std::int64_t bytes() const { return bytes_; }  ///< taken of the budget
+
   /// Definitions; data mode is left and entered as needed.
   int dimension(const std::string& name, std::size_t length);
   int variable(const std::string& name, Type type, const std::vector<int>& dimensions);
@@ -34,16 +44,27 @@ class NetcdfFile {
                   const double* data);
   void put_record(int variable, std::size_t record, int value);
 
+  /// All so far is in the file.
+  Status flush(bool to_disk);
   Status finish();
+  Status status() const;
 
  private:
+  void open();
+  void close();
   void define();
   void write();
   void check(int code);
+  bool take(std::size_t bytes);
+  bool works() const { return problem_.empty() && !over_budget_; }
 
   std::string path_, problem_;
+  ResultBudget* budget_ = nullptr;
+  std::int64_t bytes_ = 0;
   int id_ = -1;
   bool defining_ = false;
+  bool looks_up_ = false;  ///< the file may have definitions already
+  bool over_budget_ = false;
 };
 
 }  // namespace mbcosim

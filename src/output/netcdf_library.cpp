@@ -17,7 +17,11 @@ NetcdfLibrary load() {
   };
   if (!library) n.problem = dlerror();
   find(n.create, "nc_create");
+  find(n.open, "nc_open");
+  find(n.sync, "nc_sync");
   find(n.close, "nc_close");
+  find(n.inq_dimid, "nc_inq_dimid");
+  find(n.inq_varid, "nc_inq_varid");
   find(n.redef, "nc_redef");
   find(n.enddef, "nc_enddef");
   find(n.def_dim, "nc_def_dim");

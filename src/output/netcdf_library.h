@@ -10,7 +10,11 @@ namespace mbcosim {
 
 struct NetcdfLibrary {
   decltype(&::nc_create) create = nullptr;
+  decltype(&::nc_open) open = nullptr;
+  decltype(&::nc_sync) sync = nullptr;
   decltype(&::nc_close) close = nullptr;
+  decltype(&::nc_inq_dimid) inq_dimid = nullptr;
+  decltype(&::nc_inq_varid) inq_varid = nullptr;
   decltype(&::nc_redef) redef = nullptr;
   decltype(&::nc_enddef) enddef = nullptr;
   decltype(&::nc_def_dim) def_dim = nullptr;

@@ -43,23 +43,15 @@ struct Field {
 
 class NetcdfWriter : public ResultWriter, public OutputRow {
  public:
-  explicit NetcdfWriter(const std::string& prefix) : prefix_(prefix) {}
+  NetcdfWriter(const std::string& prefix, ResultBudget* budget)
+      : prefix_(prefix), budget_(budget) {}
 
   bool has_named_fields() const override { return true; }
 
   void begin(const Model& model) override {
-    model_ = &model;
-    file_.create(prefix_ + ".nc");
+    file_.create(prefix_ + ".nc", budget_);
     file_.attribute(-1, "title", model.title);
-    time_dimension_ = file_.dimension("time", NetcdfFile::kUnlimited);
-    dimensions_ = {{3, file_.dimension("Vec3", 3)}};
-    step_ = define("run.step", NetcdfFile::Type::integer, {time_dimension_}, "", "integer",
-                   "time step index");
-    time_ =
-        define("time", NetcdfFile::Type::real, {time_dimension_}, "s", "real", "simulation time");
-    h_ =
-        define("run.timestep", NetcdfFile::Type::real, {time_dimension_}, "s", "real", "time step");
-    define_labels();
+    define_all(model);
   }
   void derivatives(double, int, double) override {}
   void dummy_steps(double, int, double) override {}
@@ -74,9 +66,39 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
     ++record_;
   }
   void eigenanalysis(const EigenReport& report) override;
+  Status status() const override { return file_.status(); }
   Status finish() override { return file_.finish(); }
 
+  // What a later eigenanalysis left stays defined, until it is done again.
+  void resume(const Model& model) override {
+    file_.reopen(prefix_ + ".nc", budget_);
+    define_all(model);
+  }
+  void positions(std::vector<std::int64_t>& out) const override {
+    out.push_back(static_cast<std::int64_t>(record_));
+    out.push_back(file_.bytes());
+  }
+  Status go_back(std::span<const std::int64_t>& positions, const EvalContext&) override {
+    record_ = static_cast<std::size_t>(positions[0]);
+    file_.cut(record_, positions[1]);
+    positions = positions.subspan(2);
+    return status();
+  }
+  Status flush(bool to_disk) override { return file_.flush(to_disk); }
+
  private:
+  void define_all(const Model& model) {
+    model_ = &model;
+    time_dimension_ = file_.dimension("time", NetcdfFile::kUnlimited);
+    dimensions_ = {{3, file_.dimension("Vec3", 3)}};
+    step_ = define("run.step", NetcdfFile::Type::integer, {time_dimension_}, "", "integer",
+                   "time step index");
+    time_ =
+        define("time", NetcdfFile::Type::real, {time_dimension_}, "s", "real", "simulation time");
+    h_ =
+        define("run.timestep", NetcdfFile::Type::real, {time_dimension_}, "s", "real", "time step");
+    define_labels();
+  }
   int define(const std::string& name, NetcdfFile::Type type, const std::vector<int>& dimensions,
              const std::string& units, const std::string& kind, const std::string& description) {
     const int id = file_.variable(name, type, dimensions);
@@ -177,7 +199,8 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   }
   void end() override {}
 
-  std::string prefix_;
+  const std::string prefix_;
+  ResultBudget* const budget_;  ///< may be null
   const Model* model_ = nullptr;
   NetcdfFile file_;
   int time_dimension_ = -1, step_ = -1, time_ = -1, h_ = -1;
@@ -265,8 +288,8 @@ void NetcdfWriter::eigenanalysis(const EigenReport& report) {
 
 }  // namespace
 
-std::shared_ptr<ResultWriter> make_netcdf_writer(const std::string& prefix) {
-  return std::make_shared<NetcdfWriter>(prefix);
+std::shared_ptr<ResultWriter> make_netcdf_writer(const std::string& prefix, ResultBudget* budget) {
+  return std::make_shared<NetcdfWriter>(prefix, budget);
 }
 
 }  // namespace mbcosim

@@ -8,10 +8,12 @@
 #include <memory>
 #include <string>
 
+#include "output/result_budget.h"
 #include "output/result_writer.h"
 
 namespace mbcosim {
 
-std::shared_ptr<ResultWriter> make_netcdf_writer(const std::string& prefix);
+std::shared_ptr<ResultWriter> make_netcdf_writer(const std::string& prefix,
+                                                 ResultBudget* budget = nullptr);
 
 }  // namespace mbcosim

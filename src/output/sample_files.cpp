@@ -4,13 +4,13 @@
 
 namespace mbcosim {
 
-void SampleFiles::open(const Model& model, const std::string& prefix) {
+void SampleFiles::open(const Model& model, const std::string& prefix, ResultBudget* budget) {
   for (const auto& set : model.sets) {
     const auto* source = dynamic_cast<const SampledTableSource*>(set.get());
     if (!source) continue;
     for (SampledTable& table : source->sampled_tables()) {
       auto t = std::make_unique<Table>();
-      t->file.open(prefix + "." + table.file);
+      t->file.open(prefix + "." + table.file, budget);
       t->source = std::move(table);
       tables_.push_back(std::move(t));
     }
@@ -32,10 +32,8 @@ void SampleFiles::write(const State& state) {
   }
 }
 
-bool SampleFiles::finish() {
-  bool fine = true;
-  for (const auto& table : tables_) fine = table->file.finish() && fine;
-  return fine;
+void SampleFiles::go_back(const State& state) {
+  for (const auto& table : tables_) table->written = state.memory[table->source.samples];
 }
 
 }  // namespace mbcosim

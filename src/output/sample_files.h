@@ -15,10 +15,16 @@ namespace mbcosim {
 /// columns (MBDyn's format of identified models).
 class SampleFiles {
  public:
-  void open(const Model& model, const std::string& prefix);
+  void open(const Model& model, const std::string& prefix, ResultBudget* budget);
   /// The rows of the elements that took a sample since the last call.
   void write(const State& state);
-  bool finish();
+  /// After the files were cut: what `state` has taken is written.
+  void go_back(const State& state);
+  /// Calls `action` with each file.
+  template <class Action>
+  void each(Action&& action) const {
+    for (const auto& table : tables_) action(table->file);
+  }
 
  private:
   struct Table {

@@ -7,11 +7,15 @@
 namespace mbcosim {
 
 void TextFile::fail() {
-  if (error_.empty()) error_ = "cannot write \"" + path_ + "\": " + std::strerror(errno);
+  if (!problem_) return;
+  problem_ = make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN",
+                        "cannot write \"" + path_ + "\": " + std::strerror(errno));
 }
 
+void TextFile::fail_budget() { problem_ = over_budget(*budget_); }
+
 void TextFile::create() {
-  if (file_ || !error_.empty()) return;
+  if (file_ || !problem_) return;
   file_ = std::fopen(path_.c_str(), "wb");
   if (file_)
     std::setvbuf(file_, nullptr, _IONBF, 0);  // the pieces are large already
@@ -20,31 +24,86 @@ void TextFile::create() {
 }
 
 bool TextFile::flush() {
-  if (used_ == 0) return error_.empty();
+  if (used_ == 0) return bool(problem_);
   create();
-  if (error_.empty()) {
-    const std::size_t written = std::fwrite(text_.data(), 1, used_, file_);
-    size_ += static_cast<long>(written);
-    if (written != used_) {
-      fail();
-      end_at_last_line(written);
-    }
+  if (!problem_) return false;
+  if (budget_ && !budget_->take(static_cast<std::int64_t>(used_)))
+    fail_budget();
+  else
+    write();
+  return bool(problem_);
+}
+
+void TextFile::write() {
+  const std::size_t written = std::fwrite(text_.data(), 1, used_, file_);
+  size_ += static_cast<std::int64_t>(written);
+  if (written == used_) {
+    used_ = 0;
+    return;
   }
-  used_ = 0;
-  return error_.empty();
+  fail();
+  end_at_last_line(written);
 }
 
 void TextFile::end_at_last_line(std::size_t written) {
   const std::size_t line = std::string_view(text_.data(), written).rfind('\n');
   const std::size_t whole = line == std::string_view::npos ? 0 : line + 1;
-  size_ -= static_cast<long>(written - whole);
-  if (ftruncate(fileno(file_), size_) != 0) fail();
+  size_ -= static_cast<std::int64_t>(written - whole);
+  if (budget_) budget_->give_back(static_cast<std::int64_t>(used_ - whole));
+  used_ -= whole;
+  std::memmove(text_.data(), text_.data() + whole, used_);
+  if (ftruncate(fileno(file_), size_) != 0 || std::fseek(file_, size_, SEEK_SET) != 0) fail();
 }
 
 bool TextFile::finish() {
   flush();
   if (file_ && std::fflush(file_) != 0) fail();
-  return error_.empty();
+  return bool(problem_);
+}
+
+bool TextFile::sync() {
+  flush();
+  if (problem_ && file_ && fsync(fileno(file_)) != 0) fail();
+  return bool(problem_);
+}
+
+bool TextFile::cut(std::int64_t size) {
+  if (size > this->size()) return false;
+  problem_ = ok();
+  if (size == kNone) {
+    remove();
+    return true;
+  }
+  if (size >= size_) {
+    used_ = static_cast<std::size_t>(size - size_);
+    return true;
+  }
+  if (budget_) budget_->give_back(size_ - size);
+  size_ = size;
+  used_ = 0;
+  if (ftruncate(fileno(file_), size_) != 0 || std::fseek(file_, size_, SEEK_SET) != 0) fail();
+  return bool(problem_);
+}
+
+void TextFile::remove() {
+  used_ = 0;
+  if (!file_) return;
+  std::fclose(file_);
+  file_ = nullptr;
+  if (budget_) budget_->give_back(size_);
+  size_ = 0;
+  if (unlink(path_.c_str()) != 0) fail();
+}
+
+void TextFile::reopen() {
+  file_ = std::fopen(path_.c_str(), "r+b");
+  if (!file_) {
+    if (errno != ENOENT) fail();
+    return;
+  }
+  std::setvbuf(file_, nullptr, _IONBF, 0);
+  if (std::fseek(file_, 0, SEEK_END) != 0 || (size_ = std::ftell(file_)) < 0) return fail();
+  if (budget_ && !budget_->take(size_)) fail_budget();
 }
 
 }  // namespace mbcosim

@@ -1,24 +1,33 @@
 /// Text files of results.
 #pragma once
 
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <string>
 #include <string_view>
 
+#include "model/diagnostic.h"
+#include "output/result_budget.h"
+
 namespace mbcosim {
 
 /// A file that collects text and writes it in large pieces; created with the first byte. What
-/// cannot be written whole ends after its last whole line.
+/// cannot be written whole ends after its last whole line; the rest is kept and can be tried again.
 class TextFile {
  public:
   static constexpr std::size_t kBuffer = 1 << 16;
+  static constexpr std::int64_t kNone = -1;  ///< size of a file that is not there
 
   TextFile() = default;
   TextFile(const TextFile&) = delete;
   TextFile& operator=(const TextFile&) = delete;
 
-  void open(std::string path) { path_ = std::move(path); }
+  /// `budget`: of which the file's bytes are taken; null: without bound.
+  void open(std::string path, ResultBudget* budget = nullptr) {
+    path_ = std::move(path);
+    budget_ = budget;
+  }
   ~TextFile() {
     if (file_) std::fclose(file_);
   }
@@ -26,7 +35,7 @@ class TextFile {
   char* room(std::size_t count) {
     if (text_.empty()) text_.resize(kBuffer);
     if (used_ + count > text_.size()) flush();
-    if (count > text_.size()) text_.resize(2 * count);
+    if (used_ + count > text_.size()) text_.resize(2 * (used_ + count));
     return text_.data() + used_;
   }
   void commit(char* end) { used_ = static_cast<std::size_t>(end - text_.data()); }
@@ -38,19 +47,41 @@ class TextFile {
   bool flush();
   void create();
   bool finish();
-  /// What went wrong with which path; empty: nothing.
-  const std::string& error() const { return error_; }
+  /// Forgets what went wrong and writes what is left.
+  bool retry() {
+    problem_ = ok();
+    return flush();
+  }
+  /// Everything is on the disk, not in the system's memory.
+  bool sync();
+
+  /// Bytes so far, those that wait included, or kNone.
+  std::int64_t size() const {
+    return file_ || used_ > 0 ? size_ + static_cast<std::int64_t>(used_) : kNone;
+  }
+  std::int64_t waiting() const { return static_cast<std::int64_t>(used_); }
+  /// Ends the file after so many bytes, and goes on there. False: it has not as many.
+  bool cut(std::int64_t size);
+  /// Goes on with a file that another TextFile wrote, if it is there.
+  void reopen();
+
+  /// ErrorKind::io with the path and the reason, ErrorKind::limit when the budget is used up.
+  const Status& status() const { return problem_; }
 
  private:
   void fail();
+  void fail_budget();
+  void write();
   void end_at_last_line(std::size_t written);
+  void remove();
 
   std::string path_;
+  ResultBudget* budget_ = nullptr;
   std::string text_;
   std::size_t used_ = 0;
-  long size_ = 0;  ///< bytes in the file
+  std::int64_t size_ = 0;  ///< bytes in the file
   std::FILE* file_ = nullptr;
-  std::string error_;
+  Status problem_ = ok();
 };
 
 }  // namespace mbcosim

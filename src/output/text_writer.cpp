@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cstring>
+#include <filesystem>
 
 #include "output/eigen_text.h"
 #include "output/model_log.h"
@@ -26,20 +27,18 @@ bool has_joint_output(const Model& model) {
 
 class TextWriter : public ResultWriter, private OutputRow {
  public:
-  explicit TextWriter(const std::string& prefix) : prefix_(prefix) {
+  TextWriter(const std::string& prefix, ResultBudget* budget) : prefix_(prefix), budget_(budget) {
     for (std::size_t k = 0; k < files_.size(); ++k)
-      files_[k].open(prefix + "." + extension(static_cast<OutputFile>(k)));
-    out_.open(prefix + ".out");
-    log_.open(prefix + ".log");
+      files_[k].open(prefix + "." + extension(static_cast<OutputFile>(k)), budget);
+    out_.open(prefix + ".out", budget);
+    log_.open(prefix + ".log", budget);
   }
 
   void begin(const Model& model) override {
-    model_ = &model;
-    precision_ = model.control.output_precision;
+    know(model);
     out_.create();
     log_.create();
     log_.text(model_log(model));
-    samples_.open(model, prefix_);
     if (has_joint_output(model)) files_[static_cast<std::size_t>(OutputFile::jnt)].create();
     if (model.control.output_reference_frames) write_reference_frames(model, *this);
   }
@@ -51,6 +50,10 @@ class TextWriter : public ResultWriter, private OutputRow {
   void dummy_steps(double time, int iterations, double error) override {
     out_.text("# Initial solution after dummy steps at time " + general(time) + " performed in " +
               std::to_string(iterations) + " iterations with " + general(error) + " error\n");
+    header();
+  }
+  void begin_at(std::int64_t step, double time) override {
+    out_.text("# Begins at step " + std::to_string(step) + ", time " + general(time) + "\n");
     header();
   }
   void step(const StepLine& s) override {
@@ -79,9 +82,9 @@ class TextWriter : public ResultWriter, private OutputRow {
   void eigenanalysis(const EigenReport& report) override {
     out_.text(eigen_table(report));
     TextFile file;
-    file.open(prefix_ + eigen_suffix(report) + ".m");
+    file.open(prefix_ + eigen_suffix(report) + ".m", budget_);
     file.text(eigen_file(report, *model_));
-    if (!file.finish() && error_.empty()) error_ = file.error();
+    if (!file.finish() && other_) other_ = file.status();
   }
   void record(const EvalContext& context) override { write_record(context, *this); }
   void samples(const EvalContext& context) override {
@@ -89,28 +92,98 @@ class TextWriter : public ResultWriter, private OutputRow {
     write_traces(context, *this);
   }
   Status status() const override {
-    if (!error_.empty()) return not_written(error_);
-    for (const TextFile* f : {&out_, &log_})
-      if (!f->error().empty()) return not_written(f->error());
-    for (const TextFile& f : files_)
-      if (!f.error().empty()) return not_written(f.error());
-    return ok();
+    Status found = other_;
+    each_of(*this, [&](const TextFile& file) {
+      if (found) found = file.status();
+    });
+    return found;
   }
   Status finish() override {
-    out_.finish();
-    log_.finish();
-    for (TextFile& f : files_) f.finish();
-    if (!samples_.finish() && error_.empty())
-      error_ = "cannot write the samples \"" + prefix_ + ".*\"";
+    each([](TextFile& file) { file.finish(); });
     return status();
+  }
+
+  void resume(const Model& model) override {
+    know(model);
+    each([](TextFile& file) { file.reopen(); });
+    each_eigenanalysis([&](const std::string& path, double) {
+      if (budget_) (void)budget_->take(size_of(path));
+    });
+  }
+  void positions(std::vector<std::int64_t>& out) const override {
+    each_of(*this, [&](const TextFile& file) { out.push_back(file.size()); });
+  }
+  Status go_back(std::span<const std::int64_t>& positions, const EvalContext& context) override {
+    bool whole = true;
+    each([&](TextFile& file) {
+      whole = file.cut(positions.front()) && whole;
+      positions = positions.subspan(1);
+    });
+    samples_.go_back(*context.state);
+    other_ = ok();
+    forget_eigenanalyses_after(context.state->time);
+    if (whole) return status();
+    return make_error(ErrorKind::data_loss, "RESULTS_CUT_SHORT",
+                      "the result files end before step " + std::to_string(context.state->step));
+  }
+  Status flush(bool to_disk) override {
+    each([&](TextFile& file) {
+      file.retry();
+      if (to_disk) file.sync();
+    });
+    return status();
+  }
+  std::int64_t waiting() const override {
+    std::int64_t bytes = 0;
+    each_of(*this, [&](const TextFile& file) { bytes += file.waiting(); });
+    return bytes;
   }
 
  private:
   static constexpr std::size_t kField =
       48;  ///< bytes of one field, with margin for the largest precision used
 
-  static Error not_written(const std::string& what) {
-    return make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN", what);
+  void know(const Model& model) {
+    model_ = &model;
+    precision_ = model.control.output_precision;
+    samples_.open(model, prefix_, budget_);
+  }
+  /// Calls `action` with each file, always in the same order.
+  template <class Self, class Action>
+  static void each_of(Self& self, Action&& action) {
+    for (auto& file : self.files_) action(file);
+    action(self.out_);
+    action(self.log_);
+    self.samples_.each(action);
+  }
+  template <class Action>
+  void each(Action&& action) {
+    each_of(*this, action);
+  }
+  /// Calls `action` with the path and the time of each eigenanalysis of the deck.
+  template <class Action>
+  void each_eigenanalysis(Action&& action) const {
+    int index = 0, count = 0;
+    for (const EigenSettings& s : model_->initial_value.eigenanalyses)
+      count += static_cast<int>(s.times.size());
+    for (const EigenSettings& s : model_->initial_value.eigenanalyses)
+      for (const double time : s.times)
+        action(prefix_ + eigen_suffix(s, index++, count) + ".m", time);
+  }
+  /// Their files are none of this history any more.
+  void forget_eigenanalyses_after(double now) {
+    each_eigenanalysis([&](const std::string& path, double time) {
+      const std::int64_t size = size_of(path);
+      if (size == 0 || time <= now) return;
+      std::error_code none;
+      std::filesystem::remove(path, none);
+      if (budget_) budget_->give_back(size);
+    });
+  }
+  static std::int64_t size_of(const std::string& path) {
+    std::error_code none;
+    const auto size = std::filesystem::file_size(path, none);
+    return none ? 0 : static_cast<std::int64_t>(size);
   }
   void header() {
     out_.text(
@@ -165,10 +238,11 @@ class TextWriter : public ResultWriter, private OutputRow {
     current_->commit(p + 1);
   }
 
-  std::string prefix_;
+  const std::string prefix_;
+  ResultBudget* const budget_;  ///< may be null
   const Model* model_ = nullptr;
   int precision_ = 6;
-  std::string error_;  ///< of files other than the members
+  Status other_ = ok();  ///< of files other than the members
   std::array<TextFile, static_cast<std::size_t>(OutputFile::count)> files_;
   TextFile out_, log_;
   SampleFiles samples_;
@@ -177,8 +251,8 @@ class TextWriter : public ResultWriter, private OutputRow {
 
 }  // namespace
 
-std::shared_ptr<ResultWriter> make_text_writer(const std::string& prefix) {
-  return std::make_shared<TextWriter>(prefix);
+std::shared_ptr<ResultWriter> make_text_writer(const std::string& prefix, ResultBudget* budget) {
+  return std::make_shared<TextWriter>(prefix, budget);
 }
 
 }  // namespace mbcosim

@@ -4,11 +4,13 @@
 #include <memory>
 #include <string>
 
+#include "output/result_budget.h"
 #include "output/result_writer.h"
 
 namespace mbcosim {
 
 /// Files are created when their first line is written, except .out and .log.
-std::shared_ptr<ResultWriter> make_text_writer(const std::string& prefix);
+std::shared_ptr<ResultWriter> make_text_writer(const std::string& prefix,
+                                               ResultBudget* budget = nullptr);
 
 }  // namespace mbcosim

@@ -458,9 +458,29 @@ Status Simulation::restore(const State& state) {
   if (!same_layout(state, impl_->state))
     return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL",
                       "the state belongs to another model: its layout differs");
-  impl_->state = state;
+  State before = std::exchange(impl_->state, state);
   impl_->ended = false;
-  return ok();
+  if (!impl_->writer) return ok();
+  Status cut = impl_->writer->restored(impl_->context());
+  if (!cut) impl_->state = std::move(before);
+  return cut;
+}
+
+Status Simulation::write_to(std::shared_ptr<ResultWriter> writer) try {
+  impl_->writer = std::move(writer);
+  impl_->writer->begin(model());
+  impl_->writer->begin_at(step_number(), time());
+  impl_->writer->samples(impl_->context());
+  impl_->record();
+  return impl_->writer->status();
+} catch (const EvaluationError& e) {
+  return evaluation_failure(state(), e);
+}
+
+Status Simulation::resume_writing(std::shared_ptr<ResultWriter> writer) {
+  impl_->writer = std::move(writer);
+  impl_->writer->resume(model());
+  return impl_->writer->restored(impl_->context());
 }
 
 Linearization Simulation::linearize() const {

@@ -176,8 +176,13 @@ class Simulation {
   Result<Spectrum> eigen(int count = 0, std::complex<double> shift = 0) const;
 
   State snapshot() const { return state(); }
-  /// ErrorKind::precondition when `state` has another model's layout.
+  /// ErrorKind::precondition when `state` has another model's layout. The writer is told; when it
+  /// cannot follow, nothing changes.
   Status restore(const State& state);
+  /// Results go there from now on, beginning with the present state.
+  Status write_to(std::shared_ptr<ResultWriter> writer);
+  /// The same with files that an earlier process wrote, which are cut back to the present step.
+  Status resume_writing(std::shared_ptr<ResultWriter> writer);
   /// Versioned bytes with the model's digest and a checksum.
   std::string export_state() const;
   /// ErrorKind::data_loss for damaged bytes, ErrorKind::precondition for another model's.

@@ -1,0 +1,16 @@
+/// The records of a NetCDF file (classic format with 64-bit offsets), which stand one behind the
+/// other at its end.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "model/diagnostic.h"
+
+namespace mbcosim {
+
+/// Ends the file after so many records; nobody may have it open. ErrorKind::data_loss when it has
+/// fewer or is no such file.
+Status cut_records(const std::string& path, std::int64_t count);
+
+}  // namespace mbcosim
