@@ -185,6 +185,18 @@ struct Simulation::Impl {
     CallContext context(*server);
     v1::StepReply reply;
     require(server->simulations->Step(&context, request, &reply));
+    return to_result(reply);
+  }
+  void put_columns(const std::vector<std::string>& outputs, v1::TableRequest& request,
+                   Table& table) const {
+    for (const std::string& name : outputs) {
+      const v1::Variable& known = variable(name);
+      request.add_handles(known.handle());
+      table.columns.push_back({name, known.unit(), known.size(), table.width});
+      table.width += known.size();
+    }
+  }
+  static StepResult to_result(const v1::StepReply& reply) {
     StepResult result;
     result.outcome = to_outcome(reply.outcome());
     result.steps_done = reply.steps_done();
@@ -265,6 +277,30 @@ StepResult Simulation::run_until(double time, const StepOptions& options) {
   request.set_until_time_s(time);
   impl_->put(options, request);
   return impl_->advance(request);
+}
+
+Table Simulation::simulate(double time, const std::vector<std::string>& outputs,
+                           const SimulateOptions& options) {
+  v1::RunRequest request;
+  request.mutable_step()->set_simulation(name());
+  request.mutable_step()->set_until_time_s(time);
+  impl_->put(options.step, *request.mutable_step());
+  request.mutable_table()->set_every(options.every);
+  request.mutable_table()->set_without_start(!options.start);
+  Table table;
+  impl_->put_columns(outputs, *request.mutable_table(), table);
+  CallContext context(*impl_->server);
+  const auto replies = impl_->server->simulations->Run(&context, request);
+  v1::RunReply reply;
+  while (replies->Read(&reply)) {
+    const v1::TableBlock& rows = reply.rows();
+    table.steps.insert(table.steps.end(), rows.steps().begin(), rows.steps().end());
+    table.times.insert(table.times.end(), rows.times_s().begin(), rows.times_s().end());
+    table.values.insert(table.values.end(), rows.values().begin(), rows.values().end());
+    if (reply.has_done()) table.result = Impl::to_result(reply.done());
+  }
+  require(replies->Finish());
+  return table;
 }
 
 std::vector<double> Simulation::read(const std::string& variable) const {

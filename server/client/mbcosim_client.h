@@ -108,6 +108,30 @@ struct StepOptions {
   std::optional<Condition> until = {};  ///< ends after the first step for which it holds
 };
 
+struct SimulateOptions {
+  std::int64_t every = 1;  ///< a row each so many steps, and one for the last step
+  bool start = true;       ///< a row for the state at the beginning
+  StepOptions step = {};
+};
+
+/// Values over time: a row for each step.
+struct Table {
+  struct Column {
+    std::string name, unit;
+    int size = 1;   ///< numbers in a row
+    int first = 0;  ///< of them, in the row
+  };
+  std::vector<Column> columns;
+  int width = 0;                    ///< numbers in a row
+  std::vector<std::int64_t> steps;  ///< number of the step of each row
+  std::vector<double> times;        ///< [s] of each row
+  std::vector<double> values;       ///< (rows × width), by rows
+  StepResult result;                ///< how the run ended
+  const double* row(std::size_t i) const {
+    return values.data() + i * static_cast<std::size_t>(width);
+  }
+};
+
 /// What a peer gets: n points, global frame unless agreed otherwise, SI units.
 struct Motion {
   std::int64_t step = 0;
@@ -237,6 +261,9 @@ class Simulation {
   const std::string& name() const;  ///< "simulations/4f3a…"
   StepResult step(std::int64_t count = 1, const StepOptions& options = {});
   StepResult run_until(double time, const StepOptions& options = {});
+  /// Steps until `time` [s] and returns the values of variables on the way, in one call.
+  Table simulate(double time, const std::vector<std::string>& outputs,
+                 const SimulateOptions& options = {});
   std::vector<double> read(const std::string& variable) const;
   void write(const std::string& variable, const std::vector<double>& values);
   /// Attaches a peer that asks for exchanges itself: `Peer::next`. It needs a thread other than the

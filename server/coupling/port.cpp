@@ -242,6 +242,7 @@ void Port::lose(const std::string& why) { throw PeerLost{in_port(model_.name(), 
 
 std::optional<Answer> Port::go_on_without(const std::string& why) {
   if (recorder_) recorder_->lost(model_.name(), why);
+  if (on_missed_) on_missed_(why);
   switch (agreement_.policy) {
     case v1::PEER_POLICY_HOLD_LAST:
       return std::nullopt;

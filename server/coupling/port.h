@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -75,6 +76,11 @@ class Port {
   /// dropped.
   void deliver(const v1::PeerExchange& answer);
 
+  /// Calls `missed` with the reason whenever a step gets no answer. Before the first step.
+  void set_on_missed(std::function<void(const std::string& why)> missed) {
+    on_missed_ = std::move(missed);
+  }
+
   // --- the session's thread, in this order within a step
   Agreement agreement() const;
   bool has_peer() const;
@@ -104,6 +110,7 @@ class Port {
   PortModel model_;
   const std::chrono::milliseconds longest_wait_;
   Recorder* const recorder_;
+  std::function<void(const std::string&)> on_missed_;
   mutable std::mutex mutex_;  // protects all below; `model_` too while an answer is decoded
   std::condition_variable changed_;
   Agreement agreement_;

@@ -17,7 +17,9 @@
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "rpc/reflection.h"
 #include "service/coupling_service.h"
+#include "service/events_service.h"
 #include "service/reduction_service.h"
+#include "service/results_service.h"
 #include "service/simulations_service.h"
 #include "service/telemetry_service.h"
 
@@ -120,11 +122,12 @@ Daemon::Daemon(const Config& config)
             log_.refused(method, identity, refusal);
             metrics_.count_failure(refusal.reason());
           }},
-      store_(config_.limits, metrics_),
+      results_(config_.results_root, config_.limits.results_root_bytes),
+      store_(config_.limits, metrics_, log_),
       gate_(runtime_),
       health_({"mbcosim.v1.Simulations", "mbcosim.v1.Coupling", "mbcosim.v1.Telemetry",
-               "mbcosim.v1.Reduction"}),
-      parts_{config_, store_, slots_, metrics_, log_, runtime_, gate_} {
+               "mbcosim.v1.Reduction", "mbcosim.v1.Results", "mbcosim.v1.Events"}),
+      parts_{config_, store_, slots_, metrics_, log_, runtime_, gate_, results_} {
   add_methods();
   listen();
   if (config_.shared_memory) open_shared_memory();
@@ -145,6 +148,8 @@ void Daemon::add_methods() {
   add_telemetry(gate_, parts_);
   add_coupling(gate_, parts_);
   add_reduction(gate_, parts_);
+  add_results(gate_, parts_);
+  add_events(gate_, parts_);
   health_.add_to(gate_, !config_.health_credentials);
   if (config_.reflection) add_reflection(gate_);
 }

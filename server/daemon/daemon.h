@@ -44,6 +44,7 @@ class Daemon {
   Admission admission_;
   MemoryBudget memory_;
   const Runtime runtime_;
+  ResultsRoot results_;
   SessionStore store_;
   Gate gate_;
   Health health_;

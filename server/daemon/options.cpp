@@ -58,6 +58,10 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   add("--limit-http-streams", limits.http_streams, "Streams of one identity over HTTP");
   add("--limit-telemetry-samples", limits.telemetry_samples,
       "Samples buffered for one subscription");
+  add("--limit-results-bytes", limits.results_bytes,
+      "Bytes of the result files of one simulation, default and largest quota");
+  add("--limit-results-root-bytes", limits.results_root_bytes,
+      "Bytes of all result files in the folder of results, quotas of running simulations included");
   add("--lease", lease, "Seconds that a simulation lives without calls, default and longest");
 }
 
@@ -110,6 +114,9 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--listen", config.listen,
                  "Addresses: unix:PATH or HOST:PORT; default: " + default_listener());
   app.add_option("--model-root", config.model_root, "Folder of decks that clients may name")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--results-root", config.results_root,
+                 "Folder in which simulations may have folders for result files")
       ->check(CLI::ExistingDirectory);
   app.add_option("--workers", config.workers, "Simulations that step at once; 0: one per core")
       ->capture_default_str()

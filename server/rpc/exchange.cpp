@@ -57,11 +57,21 @@ void Exchange::start(const Method* method) {
     if (!method)
       throw Refusal(v1::REASON_NOT_SERVED, "no method is named \"" + method_.substr(0, 100) + "\"");
     if (!method->open) caller_ = runtime_.authenticator.check(*context, method->role);
+    label(*context);
     if (method->counted != Counted::no) take_place(*context, method->counted == Counted::stream);
     stream_ = method->counted == Counted::stream;
     handler_ = method->make();
     handler_->start(*this);
   });
+}
+
+void Exchange::label(const grpc::GenericCallbackServerContext& context) {
+  const auto service = method_.rfind('.');  // of "/mbcosim.v1.Simulations/Step"
+  labels_.method = service == std::string::npos ? method_ : method_.substr(service + 1);
+  labels_.identity = caller_.identity;
+  const auto found = context.client_metadata().find("traceparent");
+  if (found != context.client_metadata().end())
+    labels_.trace_id = trace_id_of({found->second.data(), found->second.size()});
 }
 
 void Exchange::take_place(const grpc::GenericCallbackServerContext& context, bool stream) {
@@ -77,6 +87,7 @@ void Exchange::take_place(const grpc::GenericCallbackServerContext& context, boo
 }
 
 void Exchange::guarded(const std::function<void()>& body) noexcept {
+  const CallScope scope(labels_);
   try {
     try {
       body();

@@ -14,6 +14,7 @@
 #include "rpc/admission.h"
 #include "rpc/auth.h"
 #include "rpc/call.h"
+#include "rpc/call_scope.h"
 #include "rpc/lanes.h"
 #include "threads/timer.h"
 #include "wire/memory.h"
@@ -89,6 +90,7 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
   // --- for handlers
   const Caller& caller() const { return caller_; }
   const std::string& method() const { return method_; }
+  const CallLabels& labels() const { return labels_; }
   Call& call() { return call_; }
   const Runtime& runtime() const { return runtime_; }
   /// Asks for the next message; with a bound the call ends when none comes.
@@ -115,6 +117,7 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
   void OnWriteDone(bool ok) override TS_EXCLUDES(mutex_);
   void OnCancel() override TS_EXCLUDES(mutex_);
   void OnDone() override TS_EXCLUDES(mutex_);
+  void label(const grpc::GenericCallbackServerContext& context);
   void take_place(const grpc::GenericCallbackServerContext& context, bool stream)
       TS_EXCLUDES(mutex_);
   void go_on() TS_REQUIRES(mutex_);
@@ -126,6 +129,7 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
   const Runtime& runtime_;
   const std::string method_;
   Caller caller_;
+  CallLabels labels_;  ///< complete before the handler is there
   Call call_;
   bool stream_ = false;
   std::unique_ptr<Handler> handler_;

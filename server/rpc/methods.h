@@ -64,6 +64,9 @@ class OneRequest : public Handler {
     exchange.post(lane_, [this, &exchange, bytes = std::move(message)]() mutable {
       parse(exchange.runtime(), bytes, &request_, &share_);
       bytes.Clear();
+      CallLabels labels = exchange.labels();
+      if constexpr (requires { request_.request_id(); }) labels.request_id = request_.request_id();
+      const CallScope scope(labels);
       serve(exchange, request_);
     });
   }

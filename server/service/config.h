@@ -26,16 +26,19 @@ struct ServiceLimits {
   int identity_streams = 512;   ///< streams at once, of one identity
   int connection_calls = 1024;  ///< calls and streams at once over one connection
   int shared_memory_peers = 64;
-  int http_connections = 64;         ///< served at once through the HTTP door
-  int http_streams = 16;             ///< of one identity through the HTTP door
-  int telemetry_samples = 1 << 16;   ///< buffer of one subscription
-  std::chrono::seconds lease{3600};  ///< default and longest
+  int http_connections = 64;                     ///< served at once through the HTTP door
+  int http_streams = 16;                         ///< of one identity through the HTTP door
+  int telemetry_samples = 1 << 16;               ///< buffer of one subscription
+  std::int64_t results_bytes = 1LL << 30;        ///< of the result files of one simulation
+  std::int64_t results_root_bytes = 64LL << 30;  ///< of all that is in the folder of results
+  std::chrono::seconds lease{3600};              ///< default and longest
   mbcosim::Limits engine;
 };
 
 struct Config {
   std::vector<std::string> listen;  ///< "unix:PATH" or "HOST:PORT"; empty: the default socket
   std::string model_root;           ///< folder of decks that clients may name; empty: none
+  std::string results_root;         ///< folder of result files; empty: none are written
   int workers = 0;                  ///< simulations that step at once; 0: one per core
   std::string tls_certificate, tls_key, tls_client_ca;  ///< PEM files
   std::string tokens_file;                              ///< see Authenticator::from_file

@@ -66,21 +66,28 @@ class Fresh {
 
   /// `make` makes the simulation, counted as the new session's.
   template <class Make>
-  SessionPtr add(const v1::CreateOptions& options, Exchange& exchange, Make make)
-      TS_EXCLUDES(mutex_) {
+  SessionPtr add(const v1::CreateOptions& options, Exchange& exchange, Make make,
+                 const std::string& forked_from = "") TS_EXCLUDES(mutex_) {
     const CallToken token(exchange.call());
     MemoryShare share;
     auto session = within(parts_.runtime.memory, &token, &share, [&] {
+      auto identity = make_identity(options, exchange.caller(), parts_.config.limits);
+      std::unique_ptr<SessionResults> results;
+      if (options.has_results())
+        results = std::make_unique<SessionResults>(parts_.results, identity.id, options.results(),
+                                                   parts_.config.limits.results_bytes);
+      std::unique_ptr<Simulation> simulation = make(token, results.get());
       return std::make_shared<Session>(
-          make_identity(options, exchange.caller(), parts_.config.limits), make(token),
+          std::move(identity), std::move(simulation),
           Session::Shared{parts_.slots, parts_.config.limits, parts_.metrics, parts_.log,
                           parts_.runtime.memory, parts_.runtime.lanes, parts_.runtime.timer},
-          options);
+          options, std::move(results));
     });
     session->set_memory(std::move(share));
     Guard guard(mutex_);
     if (lost_) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
     parts_.store.add(session);
+    parts_.log.created(session->subject(), options.display_name(), forked_from);
     name_ = session->identity().id;
     return session;
   }
@@ -90,7 +97,7 @@ class Fresh {
     lost_ = true;
     if (name_.empty()) return;
     parts_.runtime.lanes.post(Lane::quick, owner,
-                              [&store = parts_.store, name = name_] { store.drop(name); });
+                              [&store = parts_.store, name = name_] { store.discard(name); });
   }
 
  private:
@@ -102,11 +109,13 @@ class Fresh {
 
 /// The model of a deck at its initial solution.
 std::unique_ptr<Simulation> initial_solution(const LoadReport& report, bool summed_time,
-                                             const CancelToken& token) {
+                                             SessionResults* results, const CancelToken& token) {
   if (!report.ok()) refuse_deck(report);
-  auto simulation = Simulation::create(report.model, &token, nullptr,
-                                       summed_time ? TimeKeeping::summed : TimeKeeping::exact);
-  if (!simulation) throw Refusal(simulation.error());
+  auto simulation =
+      Simulation::create(report.model, &token, results ? results->start(*report.model) : nullptr,
+                         summed_time ? TimeKeeping::summed : TimeKeeping::exact);
+  if (!simulation)
+    throw Refusal(results ? results->without_paths(simulation.error()) : simulation.error());
   return std::move(*simulation);
 }
 
@@ -139,9 +148,9 @@ class CreateHandler final : public Upload<v1::UploadRequest> {
     LoadReport report;
     fresh_
         .add(options, exchange,
-             [&](const CancelToken& token) {
+             [&](const CancelToken& token, SessionResults* results) {
                report = load(upload_, parts_.config);
-               return initial_solution(report, options.summed_time(), token);
+               return initial_solution(report, options.summed_time(), results, token);
              })
         ->fill(reply->mutable_simulation());
     to_proto(report.diagnostics, reply->mutable_diagnostics());
@@ -191,6 +200,15 @@ class ValidateHandler final : public Upload<v1::UploadRequest> {
 
 // ------------------------------------------------------------------ ForkSimulation
 
+/// A fork, with result files of its own.
+std::unique_ptr<Simulation> branch(Session& source, int snapshot, SessionResults* results) {
+  std::unique_ptr<Simulation> simulation = source.fork(snapshot);
+  if (!results) return simulation;
+  const Status begun = simulation->write_to(results->start(simulation->model()));
+  if (!begun) throw Refusal(results->without_paths(begun.error()));
+  return simulation;
+}
+
 class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
  public:
   explicit ForkHandler(const Parts& parts) : OneRequest(Lane::work), parts_(parts), fresh_(parts) {}
@@ -210,7 +228,13 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
       const int snapshot =
           request.has_snapshot() ? number_of_snapshot(request.snapshot(), &simulation) : -1;
       const SessionHold source(parts_.store, simulation, exchange.caller());
-      fresh_.add(options, exchange, [&](const CancelToken&) { return source->fork(snapshot); })
+      fresh_
+          .add(
+              options, exchange,
+              [&](const CancelToken&, SessionResults* results) {
+                return branch(*source, snapshot, results);
+              },
+              simulation)
           ->fill(reply.mutable_simulation());
     }
     exchange.end(serialized(reply));

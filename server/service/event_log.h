@@ -1,9 +1,13 @@
-/// What operators see of calls and peers: one line each, and no flood of them.
+/// What happens to simulations, for operators (a line in the log, and no flood of them) and for
+/// those who watch (an event).
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "service/event_journal.h"
 #include "threads/mutex.h"
 #include "wire/refusal.h"
 
@@ -25,19 +29,40 @@ class Rate {
   std::int64_t missed_ TS_GUARDED_BY(mutex_) = 0;
 };
 
+/// What a line of the log is about, by name: "session", "port", "peer".
+using LogFields = std::vector<std::pair<const char*, std::string>>;
+
 /// Thread-safe. Texts of clients lose their control characters.
 class EventLog {
  public:
+  /// The simulation that something happens to.
+  struct Subject {
+    const std::string& name;
+    const std::string& owner;
+  };
   void refused(const std::string& method, const std::string& identity, const Refusal& refusal);
-  void attached(const std::string& simulation, const std::string& port,
-                const std::string& identity);
-  void detached(const std::string& simulation, const std::string& port,
-                const std::string& identity);
-  void step_failed(const std::string& simulation, std::int64_t step, const std::string& why);
+  void created(const Subject& subject, const std::string& display_name,
+               const std::string& forked_from);
+  void deleted(const Subject& subject, v1::DeletionCause cause);
+  void state_changed(const Subject& subject, v1::SimulationState state, std::int64_t step);
+  void step_failed(const Subject& subject, v1::StepOutcome outcome,
+                   const v1::SolverFailure& failure);
+  /// `peer`: its identity; `why`: of being late.
+  void peer(const Subject& subject, v1::PeerChange change, const std::string& port,
+            const std::string& peer, const std::string& why = "");
+  void snapshot(const Subject& subject, v1::SnapshotChange change, const std::string& name,
+                std::int64_t step);
+  void lease_ending(const Subject& subject, double seconds_left);
+
+  EventJournal& journal() { return journal_; }
+  /// Of the line that this thread writes at the moment.
+  static const LogFields& fields();
 
  private:
-  void write(Rate& rate, const std::string& text);
-  Rate refusals_{20}, peers_{50}, failures_{20};
+  void write(Rate& rate, const std::string& text, LogFields fields);
+  void add(const Subject& subject, v1::Event event);
+  Rate refusals_{20}, peers_{50}, failures_{20}, lives_{50};
+  EventJournal journal_;
 };
 
 /// The text with '?' in place of control characters.

@@ -1,8 +1,10 @@
 /// Who uses a session, and how long it lives when nobody does.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <mutex>
+#include <optional>
 
 namespace mbcosim::server {
 
@@ -24,6 +26,7 @@ class Lease {
     std::lock_guard guard(mutex_);
     --uses_;
     last_use_ = Clock::now();
+    warned_ = false;
   }
   /// True: it ends now, because nobody uses it and its time is over.
   bool expire(Clock::time_point now) {
@@ -31,6 +34,15 @@ class Lease {
     if (ended_ || uses_ > 0 || now - last_use_ <= length_) return false;
     ended_ = true;
     return true;
+  }
+  /// Once, shortly before it expires: what is left of it.
+  std::optional<Clock::duration> warn(Clock::time_point now) {
+    const Clock::duration notice = std::min<Clock::duration>(length_ / 4, std::chrono::minutes(1));
+    std::lock_guard guard(mutex_);
+    const Clock::duration left = length_ - (now - last_use_);
+    if (ended_ || uses_ > 0 || warned_ || left > notice) return std::nullopt;
+    warned_ = true;
+    return std::max(left, Clock::duration::zero());
   }
   void end() {
     std::lock_guard guard(mutex_);
@@ -46,7 +58,7 @@ class Lease {
   mutable std::mutex mutex_;  // protects all below
   int uses_ = 0;
   Clock::time_point last_use_ = Clock::now();
-  bool ended_ = false;
+  bool ended_ = false, warned_ = false;
 };
 
 }  // namespace mbcosim::server

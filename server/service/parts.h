@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 
+#include "results/results_root.h"
 #include "rpc/methods.h"
 #include "service/config.h"
 #include "service/event_log.h"
@@ -20,6 +21,7 @@ struct Parts {
   EventLog& log;
   const Runtime& runtime;
   const Gate& gate;
+  ResultsRoot& results;
 };
 
 template <class Request>

@@ -55,12 +55,12 @@ PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& cal
 
 PeerSeat::~PeerSeat() {
   port_.detach();
-  parts_.log.detached(session_->identity().id, port_.model().name(), identity_);
+  parts_.log.peer(session_->subject(), v1::PEER_CHANGE_LEFT, port_.model().name(), identity_);
 }
 
 void PeerSeat::begin() {
   port_.attach(&link_, welcome_.welcome());
-  parts_.log.attached(session_->identity().id, port_.model().name(), identity_);
+  parts_.log.peer(session_->subject(), v1::PEER_CHANGE_ATTACHED, port_.model().name(), identity_);
 }
 
 }  // namespace mbcosim::server

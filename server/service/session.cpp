@@ -12,7 +12,7 @@
 namespace mbcosim::server {
 
 Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
-                 const v1::CreateOptions& options)
+                 const v1::CreateOptions& options, std::unique_ptr<SessionResults> results)
     : identity_(std::move(identity)),
       shared_(shared),
       model_(&simulation->model()),
@@ -20,6 +20,7 @@ Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shar
       lease_(identity_.lease),
       snapshots_(identity_.id, digest_text(model_->digest), shared.limits, shared.memory),
       telemetry_(std::make_shared<TelemetryHub>(shared.memory, shared.lanes, shared.timer)),
+      results_(std::move(results)),
       simulation_(std::move(simulation)),
       recorder_(options.record_ports()
                     ? std::make_unique<Recorder>(shared.limits.record_bytes, shared.memory)
@@ -29,6 +30,11 @@ Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shar
   set_policy(options.non_convergence_policy(), options.minimum_step_s());
   status_.publish(*simulation_);
   if (recorder_) start_record(options);
+  if (results_) results_->keep();
+  for (const auto& port : coupler_.ports())
+    port->set_on_missed([this, name = port->model().name()](const std::string& why) {
+      shared_.log.peer(subject(), v1::PEER_CHANGE_LATE, name, "", why);
+    });
 }
 
 void Session::start_record(const v1::CreateOptions& options) {
@@ -190,6 +196,26 @@ void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariables
   variables_.write(request.values(), *simulation_);
   if (recorder_) recorder_->inputs(request.values());
   reply->set_step(simulation_->step_number());
+}
+
+// ------------------------------------------------------------------ results
+
+SessionResults& Session::results() const {
+  if (!results_)
+    throw Refusal(v1::REASON_NO_RESULTS, "the simulation was created without `results`");
+  return *results_;
+}
+
+void Session::list_results(v1::ListResultsReply* out) {
+  SessionResults& files = results();
+  std::lock_guard lock(lock_);
+  files.list(out);
+}
+
+std::int64_t Session::size_of_result(const std::string& file, std::int64_t* cuts) {
+  SessionResults& files = results();
+  std::lock_guard lock(lock_);
+  return files.size_of(file, cuts);
 }
 
 // ------------------------------------------------------------------ telemetry

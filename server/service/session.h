@@ -8,6 +8,7 @@
 
 #include "coupling/coupler.h"
 #include "mbcosim/v1/simulations.pb.h"
+#include "results/session_results.h"
 #include "rpc/call.h"
 #include "service/config.h"
 #include "service/event_log.h"
@@ -22,6 +23,8 @@
 #include "wire/memory.h"
 
 namespace mbcosim::server {
+
+class RowTable;
 
 /// Thread-safe. One call at a time advances the simulation; others read between its steps. Methods
 /// throw Refusal.
@@ -45,19 +48,21 @@ class Session {
   using Progress = std::function<void()>;  ///< called between slices of a long advance
 
   Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
-          const v1::CreateOptions& options = {});
+          const v1::CreateOptions& options = {}, std::unique_ptr<SessionResults> results = nullptr);
 
   /// What the model and the state take, held until the end.
   void set_memory(MemoryShare share) { memory_ = std::move(share); }
   const Identity& identity() const { return identity_; }
+  EventLog::Subject subject() const { return {identity_.id, identity_.owner}; }
   const Model& model() const { return *model_; }
   const std::vector<Variable>& variables() const { return variables_.variables(); }
+  const VariableAccess& variable_access() const { return variables_; }
   void fill(v1::SimulationInfo* out) const;
   void fill(v1::ModelDescription* out, const std::string& variable_prefix) const;
 
   /// Advances as asked; see `Simulations.Step`.
   void step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
-            const Progress& progress = {});
+            const Progress& progress = {}, RowTable* table = nullptr);
   bool interrupt();  ///< was anything advancing?
   void update(const v1::UpdateSimulationRequest& request);
   /// The record of the ports. Throws NOT_RECORDING.
@@ -71,11 +76,23 @@ class Session {
 
   void save(const std::string& display_name, v1::Snapshot* out);
   void restore(int snapshot);
+  void forget(int snapshot);
   SnapshotShelf& snapshots() { return snapshots_; }
   std::string export_state(int snapshot);  ///< negative: the current state
   void import_state(const std::string& bytes, const std::string& display_name, bool also_restore,
                     v1::Snapshot* out);
   std::unique_ptr<Simulation> fork(int snapshot);  ///< negative: the current state
+
+  /// Waits for the end of a step. Throws NO_RESULTS.
+  void list_results(v1::ListResultsReply* out);
+  /// Bytes of a result file; `*cuts` is for `SessionResults::read`. Throws NO_SUCH_FILE.
+  std::int64_t size_of_result(const std::string& file, std::int64_t* cuts);
+  /// Throws NO_RESULTS.
+  SessionResults& results() const;
+  /// They go with the simulation.
+  void discard_results() {
+    if (results_) results_->discard();
+  }
 
   /// Throws NO_SUCH_VARIABLE.
   void subscribe(const SubscriptionPtr& subscription,
@@ -114,6 +131,7 @@ class Session {
   void wait_for_subscribers();
   bool wants_more(const Advance& advance) const;
   bool choose(Advance& advance);
+  bool may_write(Advance& advance);
   bool begin(Advance& advance);
   bool run_slice(Advance& advance);
   bool run_coupled_step(Advance& advance);
@@ -146,7 +164,8 @@ class Session {
   SnapshotShelf snapshots_;
   const std::shared_ptr<TelemetryHub> telemetry_;
 
-  FairMutex lock_;  // protects the four below
+  FairMutex lock_;                                 // protects the five below
+  const std::unique_ptr<SessionResults> results_;  // null: none are written; outlives its writer
   std::unique_ptr<Simulation> simulation_;
   const std::unique_ptr<Recorder> recorder_;  // thread-safe; null: nothing is recorded
   Coupler coupler_;                           // its ports are thread-safe by themselves

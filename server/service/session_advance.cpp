@@ -53,11 +53,11 @@ class Session::SteppingClaim {
 // ------------------------------------------------------------------ advancing
 
 void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
-                   const Progress& progress) {
+                   const Progress& progress, RowTable* table) {
   const Clock::time_point start = Clock::now();
   require_usable();
   check(request);
-  Advance advance{request, *reply, {}, 1, {}, false, false};
+  Advance advance{request, *reply, {}, 1, {}, table, false, false};
   const SteppingClaim claim(*this, call, advance.token);
   if (request.has_steps()) advance.steps_left = request.steps();
   if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
@@ -94,10 +94,21 @@ bool Session::wants_more(const Advance& advance) const {
 
 // Is there a next step? Its choice is made then.
 bool Session::choose(Advance& advance) {
-  if (!wants_more(advance)) return false;
+  if (!wants_more(advance) || !may_write(advance)) return false;
   advance.choice =
       next_choice(advance.request, advance.reply.steps_done() == 0, variables_, *simulation_);
   return true;
+}
+
+// Can the results of another step be written? Else the advance ends.
+bool Session::may_write(Advance& advance) {
+  if (!results_) return true;
+  const Status ready = results_->ready();
+  if (ready) return true;
+  const bool limit = ready.error().kind == ErrorKind::limit;
+  tell_failure(advance, limit ? v1::STEP_OUTCOME_LIMIT : v1::STEP_OUTCOME_NOT_WRITTEN,
+               reason_of(ready.error().kind), ready.error().message);
+  return false;
 }
 
 // For a client that did not get the reply and asks again.
@@ -120,6 +131,7 @@ bool Session::begin(Advance& advance) {
   advance.reply.set_request_id(request.request_id());
   advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
                                                     : v1::STEP_OUTCOME_ACCEPTED);
+  if (advance.table) advance.table->start(*simulation_);
   return false;
 }
 
@@ -141,7 +153,8 @@ bool Session::run_slice(Advance& advance) {
     }
     account(advance, attempt(advance));
     if (!wants_more(advance)) break;
-    if (must_wait(advance) || lock_.contended() || Clock::now() >= slice_end) return false;
+    const bool send = advance.table && advance.table->full();
+    if (send || must_wait(advance) || lock_.contended() || Clock::now() >= slice_end) return false;
   }
   finish(advance);
   return true;
@@ -153,12 +166,14 @@ StepReport Session::attempt(Advance& advance) {
   try {
     auto report = simulation_->step(advance.choice, &advance.token);
     if (!report) throw Refusal(report.error());
+    if (results_ && report->error) report->error = results_->without_paths(*report->error);
     return std::move(*report);
   } catch (const Refusal&) {
     throw;
   } catch (const std::exception& error) {
     spdlog::error("{}: {}", identity_.id, error.what());
     status_.fail("internal error while stepping");
+    shared_.log.state_changed(subject(), v1::SIMULATION_STATE_FAILED, simulation_->step_number());
     throw Refusal(v1::REASON_INTERNAL,
                   "internal error while stepping; restore a snapshot or delete the simulation");
   }
@@ -183,14 +198,16 @@ void Session::account(Advance& advance, const StepReport& report) {
   if (report.error && report.outcome != StepOutcome::interrupted) {
     to_proto(*report.error, reply.mutable_failure());
     status_.remember_failure(reply.failure().message());
-    shared_.log.step_failed(identity_.id, simulation_->step_number() + 1,
-                            reply.failure().message());
+    shared_.log.step_failed(subject(), reply.outcome(), reply.failure());
   }
+  if (report.outcome == StepOutcome::finished)
+    shared_.log.state_changed(subject(), v1::SIMULATION_STATE_FINISHED, simulation_->step_number());
   if (!is_accepted(report.outcome)) return;
   account_pieces(reply, report);
   if (report.restarted) reply.set_restarted_steps(reply.restarted_steps() + 1);
   --advance.steps_left;
   if (!telemetry_->empty()) telemetry_->publish(*simulation_);
+  if (advance.table) advance.table->add(*simulation_);
   if (advance.request.has_until() && variables_.holds(advance.request.until(), *simulation_)) {
     reply.set_condition_met(true);
     advance.ended = true;
@@ -206,6 +223,7 @@ void Session::account_pieces(v1::StepReply& reply, const StepReport& report) {
 
 void Session::finish(Advance& advance) {
   v1::StepReply& reply = advance.reply;
+  if (advance.table) advance.table->finish(*simulation_);
   reply.set_next_step_size_s(simulation_->next_step_size());
   reply.set_largest_step_size_s(simulation_->largest_step_size());
   reply.set_step(simulation_->step_number());
@@ -365,7 +383,7 @@ void Session::tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason
   failure->set_step(simulation_->step_number() + 1);
   failure->set_time_s(simulation_->time() + length_of(advance.choice, *simulation_));
   status_.remember_failure(failure->message());
-  shared_.log.step_failed(identity_.id, failure->step(), failure->message());
+  shared_.log.step_failed(subject(), outcome, *failure);
 }
 
 }  // namespace mbcosim::server

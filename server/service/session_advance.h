@@ -1,6 +1,7 @@
 /// Internal to Session: one call of `step` in progress.
 #pragma once
 
+#include "service/row_table.h"
 #include "service/session.h"
 
 namespace mbcosim::server {
@@ -11,7 +12,8 @@ struct Session::Advance {
   v1::StepReply& reply;
   CancelToken token;
   std::int64_t steps_left = 1;
-  StepChoice choice;  ///< of the next step
+  StepChoice choice;          ///< of the next step
+  RowTable* table = nullptr;  ///< of rows on the way; null: none are wanted
   bool started = false, ended = false;
 };
 

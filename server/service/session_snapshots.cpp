@@ -6,13 +6,10 @@ namespace mbcosim::server {
 
 void Session::save(const std::string& display_name, v1::Snapshot* out) {
   require_usable();
-  State state;
-  {
-    std::lock_guard lock(lock_);
-    snapshots_.check_room(size_of(simulation_->state()));
-    state = simulation_->snapshot();
-  }
-  snapshots_.add(std::move(state), display_name, out);
+  std::lock_guard lock(lock_);
+  snapshots_.check_room(size_of(simulation_->state()));
+  snapshots_.add(simulation_->snapshot(), display_name, out);
+  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
 }
 
 void Session::restore(int snapshot) {
@@ -26,13 +23,26 @@ void Session::restore(int snapshot) {
     ~Release() { status.release(); }
   } const release{status_};
   std::lock_guard lock(lock_);
+  if (results_) results_->expect(snapshots_.agrees_until(snapshot));
   const auto status = simulation_->restore(saved);
-  if (!status) throw Refusal(status.error());
+  if (results_) results_->restored();
+  if (!status) throw Refusal(results_ ? results_->without_paths(status.error()) : status.error());
+  if (results_) snapshots_.results_end_at(results_->end());
   coupler_.reset();
   if (recorder_) recorder_->restored(simulation_->step_number(), simulation_->time());
   last_reply_.Clear();
+  const SessionStatus::View before = status_.view();
   status_.recover();
   status_.publish(*simulation_);
+  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
+                       simulation_->step_number());
+  if ((before.failed || before.finished) && !simulation_->finished())
+    shared_.log.state_changed(subject(), v1::SIMULATION_STATE_READY, simulation_->step_number());
+}
+
+void Session::forget(int snapshot) {
+  const std::int64_t step = snapshots_.remove(snapshot);
+  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_DELETED, snapshots_.name_of(snapshot), step);
 }
 
 std::unique_ptr<Simulation> Session::fork(int snapshot) {
@@ -56,13 +66,16 @@ std::string Session::export_state(int snapshot) {
 void Session::import_state(const std::string& bytes, const std::string& display_name,
                            bool also_restore, v1::Snapshot* out) {
   std::unique_ptr<Simulation> scratch;
+  std::int64_t results_end = 0;  // an imported state is taken for one of this history so far
   {
     std::lock_guard lock(lock_);
     scratch = simulation_->fork();
+    results_end = results_ ? results_->end() : 0;
   }
   const auto status = scratch->import_state(bytes);
   if (!status) throw Refusal(status.error());
-  const int number = snapshots_.add(scratch->snapshot(), display_name, out);
+  const int number = snapshots_.add(scratch->snapshot(), display_name, out, results_end);
+  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
   if (also_restore) restore(number);
 }
 

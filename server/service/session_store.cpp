@@ -1,7 +1,5 @@
 #include "service/session_store.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <random>
@@ -11,8 +9,8 @@
 
 namespace mbcosim::server {
 
-SessionStore::SessionStore(const ServiceLimits& limits, Metrics& metrics)
-    : limits_(limits), metrics_(metrics), lease_thread_([this] { watch_leases(); }) {}
+SessionStore::SessionStore(const ServiceLimits& limits, Metrics& metrics, EventLog& log)
+    : limits_(limits), metrics_(metrics), log_(log), lease_thread_([this] { watch_leases(); }) {}
 
 SessionStore::~SessionStore() {
   {
@@ -82,7 +80,6 @@ SessionPtr SessionStore::find_request(const Request& request) const {
 void SessionStore::add(SessionPtr session) {
   Guard guard(mutex_);
   const std::string id = session->identity().id;
-  spdlog::info("{} created for {}", id, session->identity().owner);
   order_.push_back(id);
   sessions_.emplace(id, std::move(session));
   metrics_.count_created();
@@ -109,10 +106,24 @@ std::vector<SessionPtr> SessionStore::list(const Caller& caller) const {
 }
 
 void SessionStore::remove(const std::string& id, const Caller& caller) {
-  drop(get(id, caller)->identity().id);
+  const SessionPtr session = get(id, caller);
+  session->discard_results();
+  drop(session->identity().id);
 }
 
-void SessionStore::drop(const std::string& id) {
+void SessionStore::discard(const std::string& id) {
+  SessionPtr session;
+  {
+    Guard guard(mutex_);
+    const auto found = sessions_.find(id);
+    if (found != sessions_.end()) session = found->second;
+  }
+  if (!session) return;
+  session->discard_results();
+  drop(id);
+}
+
+void SessionStore::drop(const std::string& id, v1::DeletionCause cause) {
   SessionPtr session;
   {
     Guard guard(mutex_);
@@ -124,7 +135,7 @@ void SessionStore::drop(const std::string& id) {
     metrics_.set_sessions(static_cast<int>(sessions_.size()));
   }
   session->close();
-  spdlog::info("{} deleted", id);
+  log_.deleted(session->subject(), cause);
 }
 
 void SessionStore::close_all() {
@@ -137,13 +148,13 @@ void SessionStore::close_expired() {
   {
     Guard guard(mutex_);
     const auto now = std::chrono::steady_clock::now();
-    for (const auto& [id, session] : sessions_)
+    for (const auto& [id, session] : sessions_) {
       if (session->lease().expire(now)) expired.push_back(id);
+      if (const auto left = session->lease().warn(now))
+        log_.lease_ending(session->subject(), std::chrono::duration<double>(*left).count());
+    }
   }
-  for (const std::string& id : expired) {
-    spdlog::info("{}: lease over", id);
-    drop(id);
-  }
+  for (const std::string& id : expired) drop(id, v1::DELETION_CAUSE_LEASE_OVER);
 }
 
 void SessionStore::watch_leases() {

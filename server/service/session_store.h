@@ -20,7 +20,7 @@ using SessionPtr = std::shared_ptr<Session>;
 /// Thread-safe. Closes sessions whose lease is over.
 class SessionStore {
  public:
-  SessionStore(const ServiceLimits& limits, Metrics& metrics);
+  SessionStore(const ServiceLimits& limits, Metrics& metrics, EventLog& log);
   ~SessionStore();
 
   /// A place for one more session, taken before the work of creating it starts. A creation with a
@@ -47,8 +47,10 @@ class SessionStore {
   SessionPtr get(const std::string& id, const Caller& caller) const;
   std::vector<SessionPtr> list(const Caller& caller) const;  ///< in the order of creation
   void remove(const std::string& id, const Caller& caller);
+  /// The same for a session that nobody has seen.
+  void discard(const std::string& id);
   /// Ends a session; nothing when it is gone already.
-  void drop(const std::string& id);
+  void drop(const std::string& id, v1::DeletionCause cause = v1::DELETION_CAUSE_ASKED);
   void close_all();
 
   static std::string new_id();
@@ -62,6 +64,7 @@ class SessionStore {
 
   const ServiceLimits& limits_;
   Metrics& metrics_;
+  EventLog& log_;
   mutable Mutex mutex_;
   std::map<std::string, SessionPtr> sessions_ TS_GUARDED_BY(mutex_);
   std::vector<std::string> order_ TS_GUARDED_BY(mutex_);

@@ -26,6 +26,8 @@ void add_limits(const ServiceLimits& limits, v1::ServerInfo* reply) {
   add_limit(reply, "message_bytes", limits.message_bytes);
   add_limit(reply, "bundle_files", limits.bundle_files);
   add_limit(reply, "record_bytes", limits.record_bytes);
+  add_limit(reply, "results_bytes", limits.results_bytes);
+  add_limit(reply, "results_root_bytes", limits.results_root_bytes);
   add_limit(reply, "telemetry_samples", limits.telemetry_samples);
   add_limit(reply, "lease_seconds", limits.lease.count());
   add_limit(reply, "deck_bytes", limits.engine.deck_bytes);

@@ -112,7 +112,7 @@ void add_saved(Gate& gate, const Parts& parts) {
       unary<v1::DeleteSnapshotRequest, v1::DeleteSnapshotReply>(
           Role::control, Lane::quick, [&parts](const CallFrame& frame, const auto& request, auto*) {
             const Named named(parts, request.name(), frame.caller);
-            named.session->snapshots().remove(named.number);
+            named.session->forget(named.number);
           }));
 }
 

@@ -1,5 +1,6 @@
 #include "service/snapshot_shelf.h"
 
+#include <algorithm>
 #include <charconv>
 
 #include "wire/refusal.h"
@@ -47,13 +48,15 @@ void SnapshotShelf::require_room(std::int64_t bytes) const {
                         "the simulation's snapshots would take too much memory");
 }
 
-int SnapshotShelf::add(State state, const std::string& display_name, v1::Snapshot* out) {
-  const std::int64_t bytes = size_of(state);
+int SnapshotShelf::add(State state, const std::string& display_name, v1::Snapshot* out,
+                       std::int64_t results_end) {
+  const std::int64_t bytes = size_of(state), agrees_until = std::min(results_end, state.step);
   std::lock_guard guard(mutex_);
   require_room(bytes);
   MemoryShare share(memory_, bytes);
   const auto added =
-      saved_.emplace(next_, Saved{display_name, std::move(state), std::move(share)}).first;
+      saved_.emplace(next_, Saved{display_name, std::move(state), std::move(share), agrees_until})
+          .first;
   bytes_ += bytes;
   fill(next_, added->second, out);
   return next_++;
@@ -64,10 +67,22 @@ State SnapshotShelf::get(int number) const {
   return find(number).state;
 }
 
-void SnapshotShelf::remove(int number) {
+std::int64_t SnapshotShelf::agrees_until(int number) const {
   std::lock_guard guard(mutex_);
+  return find(number).agrees_until;
+}
+
+void SnapshotShelf::results_end_at(std::int64_t step) {
+  std::lock_guard guard(mutex_);
+  for (auto& [number, saved] : saved_) saved.agrees_until = std::min(saved.agrees_until, step);
+}
+
+std::int64_t SnapshotShelf::remove(int number) {
+  std::lock_guard guard(mutex_);
+  const std::int64_t step = find(number).state.step;
   bytes_ -= find(number).share.bytes();
   saved_.erase(number);
+  return step;
 }
 
 void SnapshotShelf::list(v1::ListSnapshotsReply* out) const {
@@ -84,7 +99,7 @@ const SnapshotShelf::Saved& SnapshotShelf::find(int number) const {
 }
 
 void SnapshotShelf::fill(int number, const Saved& saved, v1::Snapshot* out) const {
-  out->set_name(simulation_ + "/snapshots/" + std::to_string(number));
+  out->set_name(name_of(number));
   out->set_step(saved.state.step);
   out->set_time_s(saved.state.time);
   out->set_display_name(saved.display_name);

@@ -30,11 +30,20 @@ class SnapshotShelf {
 
   /// Throws LIMIT_EXCEEDED when there is no room for a state of so many bytes.
   void check_room(std::int64_t bytes) const;
-  /// Keeps a state. Throws LIMIT_EXCEEDED.
-  int add(State state, const std::string& display_name, v1::Snapshot* out);
+  /// Keeps a state, which shares its history with the result files up to its step, or up to
+  /// `results_end` where that is before it. Throws LIMIT_EXCEEDED.
+  int add(State state, const std::string& display_name, v1::Snapshot* out,
+          std::int64_t results_end = INT64_MAX);
   /// A copy of a saved state. Throws NO_SUCH_SNAPSHOT.
   State get(int number) const;
-  void remove(int number);
+  /// Step up to which a state shares its history with the result files. Throws NO_SUCH_SNAPSHOT.
+  std::int64_t agrees_until(int number) const;
+  /// The result files were cut there: no state shares more with them.
+  void results_end_at(std::int64_t step);
+  std::int64_t remove(int number);  ///< its step
+  std::string name_of(int number) const {
+    return simulation_ + "/snapshots/" + std::to_string(number);
+  }
   void list(v1::ListSnapshotsReply* out) const;
 
  private:
@@ -42,6 +51,7 @@ class SnapshotShelf {
     std::string display_name;
     State state;
     MemoryShare share;
+    std::int64_t agrees_until;
   };
   void require_room(std::int64_t bytes) const;
   const Saved& find(int number) const;

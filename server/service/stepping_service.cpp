@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "service/row_table.h"
 #include "service/simulations_service.h"
 
 namespace mbcosim::server {
@@ -114,6 +115,34 @@ class Progress {
   Clock::time_point started_ = Clock::now(), last_ = started_;
 };
 
+/// Sends rows as they come. The client is waited for: none is left out.
+class Rows {
+ public:
+  Rows(const Session& session, const v1::RunRequest& request, MemoryBudget& memory) {
+    if (request.has_table()) table_.emplace(request.table(), session.variable_access(), memory);
+  }
+  RowTable* table() { return table_ ? &*table_ : nullptr; }
+  /// Sends when there are many, or some for a while. Throws READER_STALLED.
+  void send(Exchange& exchange) {
+    constexpr std::chrono::milliseconds kFresh(50);
+    if (!table_ || table_->empty()) return;
+    if (table_->full() || Clock::now() - last_ >= kFresh) flush(exchange);
+  }
+  void flush(Exchange& exchange) {
+    constexpr std::chrono::seconds kPatience(30);
+    if (!table_ || table_->empty()) return;
+    last_ = Clock::now();
+    table_->take(message_.mutable_rows());
+    if (exchange.write_by(serialized(message_), last_ + kPatience)) return;
+    throw Refusal(v1::REASON_READER_STALLED, "the rows of the table were not read for 30 s");
+  }
+
+ private:
+  std::optional<RowTable> table_;
+  v1::RunReply message_;
+  Clock::time_point last_ = Clock::now();
+};
+
 class RunHandler final : public OneRequest<v1::RunRequest> {
  public:
   explicit RunHandler(const Parts& parts) : OneRequest(Lane::advance), parts_(parts) {}
@@ -122,9 +151,14 @@ class RunHandler final : public OneRequest<v1::RunRequest> {
   void serve(Exchange& exchange, const v1::RunRequest& request) override {
     const SessionHold session(parts_.store, request.step().simulation(), exchange.caller());
     Progress progress(*session, request);
+    Rows rows(*session, request, exchange.runtime().memory);
     v1::RunReply done;
-    session->step(request.step(), exchange.call(), done.mutable_done(),
-                  [&] { progress.send(exchange); });
+    const auto send = [&] {
+      rows.send(exchange);
+      progress.send(exchange);
+    };
+    session->step(request.step(), exchange.call(), done.mutable_done(), send, rows.table());
+    rows.flush(exchange);
     exchange.end(serialized(done));
   }
 

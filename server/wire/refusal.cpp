@@ -26,6 +26,7 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_NO_SUCH_VARIABLE:
     case v1::REASON_NO_SUCH_MODEL:
     case v1::REASON_NO_SUCH_PORT:
+    case v1::REASON_NO_SUCH_FILE:
       return Code::NOT_FOUND;
     case v1::REASON_WRONG_STEP:
     case v1::REASON_SIMULATION_BUSY:
@@ -37,6 +38,7 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_PORT_TAKEN:
     case v1::REASON_PORT_MISMATCH:
     case v1::REASON_NOT_RECORDING:
+    case v1::REASON_NO_RESULTS:
       return Code::FAILED_PRECONDITION;
     case v1::REASON_DAMAGED_STATE:
       return Code::DATA_LOSS;
@@ -46,8 +48,10 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_PEER_LOST:
     case v1::REASON_REJECTED_BY_PEER:
     case v1::REASON_READER_STALLED:
+    case v1::REASON_RESULTS_CHANGED:
       return Code::ABORTED;
     case v1::REASON_LIMIT_EXCEEDED:
+    case v1::REASON_STORAGE_FULL:
       return Code::RESOURCE_EXHAUSTED;
     case v1::REASON_CANCELLED:
       return Code::CANCELLED;
@@ -85,7 +89,7 @@ v1::Reason reason_of(ErrorKind kind) {
     case ErrorKind::cancelled:
       return v1::REASON_CANCELLED;
     case ErrorKind::io:
-      return v1::REASON_BAD_ARGUMENT;
+      return v1::REASON_STORAGE_FULL;
     case ErrorKind::data_loss:
       return v1::REASON_DAMAGED_STATE;
     case ErrorKind::internal:

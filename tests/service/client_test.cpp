@@ -45,6 +45,27 @@ Loads spring(const Motion& motion) {
   return loads;
 }
 
+TEST(Table, HasWhatSingleStepsGive) {
+  Server server = connect();
+  Simulation one = server.load_text(body()), other = server.load_text(body());
+  const std::vector<std::string> names = {"node.structural.1.X", "time"};
+  const Table table = one.simulate(0.1, names, {.every = 4});
+  ASSERT_EQ(table.steps.size(), 26u);
+  ASSERT_EQ(table.width, 4);
+  EXPECT_EQ(table.columns[0].unit, "m");
+  EXPECT_EQ(table.columns[1].first, 3);
+  EXPECT_EQ(table.steps.back(), 100);
+  EXPECT_EQ(table.result.step, 100);
+  EXPECT_TRUE(table.result.ok());
+  for (std::size_t i = 0; i < table.steps.size(); ++i) {
+    if (i > 0) other.step(4);
+    const std::vector<double> x = other.read(names[0]);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(table.row(i)[k], x[static_cast<std::size_t>(k)]);
+    EXPECT_EQ(table.row(i)[3], table.times[i]);
+  }
+  EXPECT_EQ(one.simulate(0.2, {}, {.start = false}).steps.front(), 101);
+}
+
 /// Everything that a peer does holds whatever carries it.
 class Coupled : public testing::TestWithParam<Transport> {
  protected:

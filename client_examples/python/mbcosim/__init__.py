@@ -16,6 +16,7 @@ from .client import Server, connect
 from .coupling import Peer, modal_port, motion_port, signal_port, structural_port
 from .errors import (DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
                      StepFailed, TimedOut, Unavailable)
+from .events import Events
 from .exchange import Loads, Motion, Reject
 from .histories import History
 from .local import LocalServer, connect_or_start, local
@@ -23,7 +24,7 @@ from .simulation import Simulation, Snapshot, Stepper, Subscription
 
 __all__ = [
     "__version__", "connect", "connect_or_start", "local", "default_address", "Server", "LocalServer", "Simulation", "Snapshot", "StepResult",
-    "Stepper", "Subscription", "History", "StateSpace", "Modes", "Motion", "Loads", "Condition", "Reject", "Peer", "modal_port",
+    "Stepper", "Subscription", "Events", "History", "StateSpace", "Modes", "Motion", "Loads", "Condition", "Reject", "Peer", "modal_port",
     "motion_port", "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound",
     "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable",
 ]

@@ -16,20 +16,21 @@ import asyncio
 import contextlib
 import inspect
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
-from typing import Any, Optional, TypeVar
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
+from typing import Any, Optional, TypeVar, Union
 
 import grpc
 import numpy as np
 import numpy.typing as npt
 
-from mbcosim.v1 import common_pb2, coupling_pb2, simulations_pb2 as pb, telemetry_pb2
+from mbcosim.v1 import common_pb2, coupling_pb2, events_pb2, simulations_pb2 as pb, telemetry_pb2
 
-from . import access, exchange
+from . import access, events, exchange
 from .access import Attempts, default_address
 from .calls import ServerCalls, SimulationCalls, SnapshotCalls, StepResult
 from .coupling import Answer, open_stream
-from .errors import PreconditionFailed, TimedOut, Unavailable, from_rpc_error, translated
+from .errors import PreconditionFailed, StepFailed, TimedOut, Unavailable, from_rpc_error, translated
+from .histories import History
 from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Awaiting, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
 from .simulation import subscribe_request
 
@@ -166,6 +167,20 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
         await peer._attach(exchange.hello(self, port, heartbeat_interval=peer._heartbeat_interval, **options), timeout)
         return peer
 
+    async def simulate(self, outputs: Union[str, Iterable[str]], *, until: Optional[float] = None, steps: Optional[int] = None, every: int = 1,
+                       inputs: Optional[Mapping[str, Any]] = None, timeout: Optional[float] = None) -> History:
+        """Advances and returns a History of `outputs` in one call; see mbcosim.Simulation.simulate. Inputs are numbers."""
+        if (until is None) == (steps is None):
+            raise ValueError("say how long with `until` or with `steps`")
+        request = pb.StepRequest(steps=steps) if until is None else pb.StepRequest(until_time_s=until)
+        names, title = [outputs] if isinstance(outputs, str) else list(outputs), str(self.info.display_name)
+        try:
+            rows, _ = await self._connection.run(self._tabulate(names, request, every, inputs, None, timeout))
+        except StepFailed as error:
+            error.history = History.of_rows(error.rows, title)
+            raise
+        return History.of_rows(rows, title)
+
     async def subscribe(self, names: Iterable[str], *, every: int = 1, policy: str = "drop_oldest", buffer: int = 1024,
                         timeout: Optional[float] = USUAL) -> Subscription:
         """Samples of variables every so many steps, whoever advances; see Subscription."""
@@ -189,9 +204,46 @@ class Server(Awaiting, ServerCalls[Simulation]):
         self._connection = Connection(channel, token, reconnect)
         self.metadata = self._connection.metadata
 
+    async def events(self, simulation: str = "", *, after: Optional[int] = None, journal: str = "",
+                     timeout: Optional[float] = USUAL) -> Events:
+        """Events as they happen; see mbcosim.Server.events."""
+        watcher = Events(self._connection, simulation, after, journal)
+        with translated():
+            watcher._begin(await _bounded(timeout, watcher._stream.read(), watcher.close, "the beginning of the events"), after)
+        return watcher
+
     async def close(self) -> None:
         """Closes the connection. Simulations on the server live on for their lease."""
         await self._connection.channel.close()
+
+
+class Events(events.Course):
+    """`async for` over `mbcosim.v1.Event`. Close it, or use it with `async with`."""
+
+    def __init__(self, connection: Connection, simulation: str, after: Optional[int], journal: str) -> None:
+        self._stream: Any = connection.stubs.events.WatchEvents(events.watch_request(simulation, after, journal), metadata=connection.metadata)
+
+    async def __aenter__(self) -> Events:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.close()
+
+    async def __aiter__(self) -> AsyncIterator[events_pb2.Event]:
+        try:
+            while True:
+                with translated():
+                    event = await self._stream.read()
+                if event is grpc.aio.EOF:
+                    return
+                yield self._take(event)
+        except asyncio.CancelledError:
+            if not self._stream.cancelled():
+                raise
+
+    def close(self) -> None:
+        """Ends the watching."""
+        self._stream.cancel()
 
 
 class Stepper:

@@ -7,21 +7,23 @@ from __future__ import annotations
 import dataclasses
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, Generic, Optional, TypeVar
+from typing import Any, Generic, Optional, TypeVar, Union
 
 import numpy as np
 import numpy.typing as npt
 
-from mbcosim.v1 import common_pb2, coupling_types_pb2, reduction_pb2, simulations_pb2 as pb
+from mbcosim.v1 import common_pb2, coupling_types_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb
 
 from . import bundle
 from .errors import StepFailed, enum_name
 from .rpc import USUAL, Call, Calls, call
+from .table import Rows
 from .words import choice, pick, remedy
 
 
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, npt.ArrayLike]  # by name
+Results = Union[bool, str, Iterable[str]]  # which result files
 SimulationKind = TypeVar("SimulationKind", bound="SimulationCalls[Any]")
 SnapshotKind = TypeVar("SnapshotKind", bound="SnapshotCalls")
 list_of = list  # ServerCalls has a method of that name
@@ -38,6 +40,13 @@ def _matrix(message: pb.Matrix) -> Array:
 
 def _policy(name: str) -> Any:
     return choice(pb.NonConvergencePolicy, "NON_CONVERGENCE_POLICY_", name, "policy")
+
+
+def _result_options(formats: Results, quota: Optional[int]) -> results_pb2.ResultOptions:
+    """`mbcosim.v1.ResultOptions`; `formats`: True (what the deck asks for), "text", "netcdf" or several of them."""
+    names: list[str] = [] if isinstance(formats, bool) else [formats] if isinstance(formats, str) else list(formats)
+    return results_pb2.ResultOptions(formats=[choice(results_pb2.ResultFormat, "RESULT_FORMAT_", name, "results") for name in names],
+                                     quota_bytes=quota)
 
 
 _COMPARISONS = {"<": pb.COMPARISON_LESS, "<=": pb.COMPARISON_LESS_OR_EQUAL, ">": pb.COMPARISON_GREATER,
@@ -113,6 +122,8 @@ class ServerCalls(Generic[SimulationKind]):
         minimum_step  shortest piece of "cut_step" [s]; 0: 1/1024 of the step
         record        keeps what crosses the ports; see Simulation.record
         summed_time   time is summed from step to step as MBDyn does, instead of t0 + n h
+        results       writes result files on the server: True (what the deck asks for), "text", "netcdf" or a list of them
+        results_quota most bytes of them; None: the server's limit
         timeout       seconds that the call may take; None: as long as the server lives
         """
         return (yield from self._create(pb.UploadHeader(bundle_main_file=main), files, **options))
@@ -124,7 +135,8 @@ class ServerCalls(Generic[SimulationKind]):
 
     def _create(self, header: pb.UploadHeader, files: Mapping[str, bytes], *, name: str = "", lease: Optional[float] = None,
                 ports: Iterable[coupling_types_pb2.PortDefinition] = (), policy: str = "fail", minimum_step: float = 0.0,
-                record: bool = False, summed_time: bool = False, timeout: Optional[float] = None) -> Calls[SimulationKind]:
+                record: bool = False, summed_time: bool = False, results: Results = False,
+                results_quota: Optional[int] = None, timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = uuid.uuid4().hex
         header.options.display_name = name
         header.options.ports.extend(ports)
@@ -132,6 +144,8 @@ class ServerCalls(Generic[SimulationKind]):
         header.options.minimum_step_s = minimum_step
         header.options.record_ports = record
         header.options.summed_time = summed_time
+        if results:
+            header.options.results.CopyFrom(_result_options(results, results_quota))
         if lease is not None:
             header.options.lease.FromMilliseconds(int(lease * 1000))
         reply = yield Call("Simulations/CreateSimulation", bundle.requests(header, files), timeout)
@@ -310,6 +324,29 @@ class SimulationCalls(Generic[SnapshotKind]):
         yield Call("Simulations/Run", pb.RunRequest(step=request), timeout, each=take)
         return self.result(done[-1], outputs)
 
+    def _tabulate(self, names: list[str], request: pb.StepRequest, every: int, inputs: Optional[Values],
+                  report: Optional[Callable[[pb.RunProgress], object]], timeout: Optional[float]) -> Calls[tuple[Rows, StepResult]]:
+        """Makes `request`'s steps in one call: (Rows of the present state, every `every`-th step and the last one; StepResult). When a step
+        fails, StepFailed has the rows as `rows`. `report(RunProgress)` may be None."""
+        yield from self._fill(request, None, inputs, ())
+        table = pb.TableRequest(handles=(yield from self._handles(names)), every=every)
+        rows, done = Rows([self._variable(name) for name in names]), list[pb.StepReply]()
+
+        def take(message: pb.RunReply) -> None:
+            if message.HasField("rows"):
+                rows.add(message.rows)
+            elif message.HasField("done"):
+                done.append(message.done)
+            elif report is not None:
+                report(message.progress)
+
+        yield Call("Simulations/Run", pb.RunRequest(step=request, table=table), timeout, each=take)
+        try:
+            return rows, self.result(done[-1])
+        except StepFailed as failure:
+            failure.rows = rows
+            raise
+
     @call
     def interrupt(self, *, timeout: Optional[float] = USUAL) -> Calls[bool]:
         """Stops whatever advances this simulation, from any thread or client."""
@@ -409,16 +446,33 @@ class SimulationCalls(Generic[SnapshotKind]):
 
     @call
     def fork(self, snapshot: Optional[SnapshotCalls] = None, *, name: str = "",
-             ports: Iterable[coupling_types_pb2.PortDefinition] = (), timeout: Optional[float] = None) -> Calls[Any]:
-        """A new simulation at a saved state or the current one, sharing the model."""
+             ports: Iterable[coupling_types_pb2.PortDefinition] = (), results: Results = False, results_quota: Optional[int] = None,
+             timeout: Optional[float] = None) -> Calls[Any]:
+        """A new simulation at a saved state or the current one, sharing the model. `results` as in Server.load_bundle: files of its own."""
         request = pb.ForkSimulationRequest(options=pb.CreateOptions(display_name=name, ports=ports,
                                                                     request_id=uuid.uuid4().hex))
+        if results:
+            request.options.results.CopyFrom(_result_options(results, results_quota))
         if snapshot is None:
             request.simulation = self.name
         else:
             request.snapshot = snapshot.name
         reply = yield Call("Simulations/ForkSimulation", request, timeout, repeatable=True)
         return type(self)(self._connection, reply.simulation, [], "", True)
+
+    # ---------------------------------------------------------------- result files
+
+    @call
+    def result_files(self, *, timeout: Optional[float] = USUAL) -> Calls[dict[str, int]]:
+        """Sizes of the result files so far [bytes], by name. The simulation must have been created with `results`."""
+        reply: results_pb2.ListResultsReply = yield Call("Results/ListResults", results_pb2.ListResultsRequest(simulation=self.name), timeout, repeatable=True)
+        return {file.name: file.size_bytes for file in reply.files}
+
+    @call
+    def result_file(self, name: str, *, offset: int = 0, length: Optional[int] = None, timeout: Optional[float] = None) -> Calls[bytes]:
+        """Bytes of a result file: all, or `length` from `offset` on."""
+        request = results_pb2.GetResultsRequest(simulation=self.name, file=name, offset_bytes=offset, length_bytes=length)
+        return (yield from self._collect("Results/GetResults", request, timeout))
 
     # ---------------------------------------------------------------- analysis
 

@@ -13,7 +13,8 @@ from . import access
 from .access import default_address
 from .calls import ServerCalls
 from .errors import Unavailable, translated
-from .rpc import CHANNEL_OPTIONS, PARTING, Blocking, Connection, blocking, runs_calls
+from .events import Events
+from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Blocking, Connection, blocking, runs_calls
 from .simulation import Simulation
 
 Self = TypeVar("Self", bound="Server")
@@ -77,6 +78,11 @@ class Server(Blocking, ServerCalls[Simulation]):
 
     def __repr__(self) -> str:
         return f"<mbcosim.Server at {self.address}>"
+
+    def events(self, simulation: str = "", *, after: Optional[int] = None, journal: str = "", timeout: Optional[float] = USUAL) -> Events:
+        """Events as they happen, of one simulation (by name) or all that may be seen; see Events. With `after`, a sequence number of `journal`,
+        those that came since then, too."""
+        return Events(self._connection, simulation, after, journal, timeout)
 
     def __enter__(self: Self) -> Self:
         return self

@@ -12,6 +12,7 @@ from mbcosim.v1 import common_pb2
 if TYPE_CHECKING:
     from .calls import StepResult
     from .histories import History
+    from .table import Rows
 
 
 class Error(Exception):
@@ -73,6 +74,7 @@ class StepFailed(Error):
 
     result: Optional[StepResult] = None
     history: Optional[History] = None
+    rows: Rows  # of which `history` is made
 
 
 _CLASSES = {

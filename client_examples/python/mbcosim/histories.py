@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
+from mbcosim.v1 import simulations_pb2 as pb
+
 from .calls import StepResult
 from .errors import StepFailed
+from .table import Rows
 from .words import remedy
 
 if TYPE_CHECKING:
@@ -35,8 +38,15 @@ class History(Mapping[str, Array]):
     `history["node.structural.2.X"]` is an array (instants x 3); units are in `units`. See also plot, animate, to_pandas, to_xarray.
     """
 
-    def __init__(self, time: Array, values: dict[str, Array], units: dict[str, str], title: str = "") -> None:
+    def __init__(self, time: Array, values: dict[str, Array], units: dict[str, str], title: str = "",
+                 steps: Optional[npt.NDArray[np.int64]] = None) -> None:
         self.time, self._values, self.units, self.title = time, values, units, title
+        self.steps = steps  # numbers of the steps
+
+    @classmethod
+    def of_rows(cls, rows: Rows, title: str) -> History:
+        """What one call brought."""
+        return cls(rows.times, rows.values(), rows.units(), title, rows.steps)
 
     def __getitem__(self, name: str) -> Array:
         try:
@@ -63,6 +73,17 @@ class History(Mapping[str, Array]):
             for k in range(flat.shape[1]):
                 found[name if values.ndim == 1 else f"{name}[{k + 1}]"] = flat[:, k]
         return found
+
+    def to_numpy(self) -> Any:
+        """A structured array: fields "step" and "time", and one for each variable, with its shape. Units in `dtype.metadata["units"]`."""
+        own = {"step": self.steps, "time": self.time}
+        fields = {name: values for name, values in {**own, **{k: v for k, v in self.items() if k not in own}}.items() if values is not None}
+        kinds = np.dtype([(name, values.dtype, values.shape[1:]) for name, values in fields.items()],
+                         metadata={"units": {"step": "", "time": "s", **self.units}})
+        table = np.empty(len(self.time), kinds)
+        for name, values in fields.items():
+            table[name] = values
+        return table
 
     def to_pandas(self) -> Any:
         """A pandas.DataFrame with one column for each number, indexed by time [s]; units in `attrs["units"]`."""
@@ -99,17 +120,18 @@ class History(Mapping[str, Array]):
         return plots.animate_history(self, lines=lines, view=view, seconds=seconds, frames_per_second=frames_per_second, save=save)
 
 
-class _Rows:
-    """Collects results on the way."""
+class _Collector:
+    """Collects results of single steps on the way."""
 
     def __init__(self, simulation: Simulation, names: list[str]) -> None:
         self._simulation, self._names = simulation, names
         first = simulation.read(names) if names else {}
-        self._times = [simulation.time]
+        self._times, self._steps = [simulation.time], [simulation.step_number]
         self._values = {name: [first[name]] for name in names}
 
     def add(self, result: StepResult) -> None:
         self._times.append(result.time)
+        self._steps.append(result.step)
         for name in self._names:
             self._values[name].append(result.values[name])
 
@@ -117,7 +139,8 @@ class _Rows:
         known = self._simulation.variables
         values = {name: np.array(rows, dtype=float) for name, rows in self._values.items()}
         title: str = self._simulation.info.display_name
-        return History(np.array(self._times, dtype=float), values, {name: known[name].unit for name in self._names}, title)
+        units = {name: known[name].unit for name in self._names}
+        return History(np.array(self._times, dtype=float), values, units, title, np.array(self._steps, dtype=np.int64))
 
 
 def bar(total: float, show: bool, unit: str = "s") -> Any:
@@ -149,7 +172,7 @@ def _numbers(inputs: Mapping[str, Input], time: float) -> list[float]:
 
 def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Optional[float], steps: Optional[int], every: int,
          progress: bool, timeout: Optional[float]) -> History:
-    rows, done, start = _Rows(simulation, names), 0, simulation.time
+    rows, done, start = _Collector(simulation, names), 0, simulation.time
     total = float(steps) if end is None and steps is not None else float(end or 0.0) - start
     size = simulation.info.next_step_s
     with simulation.stepper(names, list(inputs)) as stepper, bar(total, progress, "s" if end is not None else "step") as shown:
@@ -172,13 +195,33 @@ def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Op
     return rows.history()
 
 
+def _run_in_one_call(simulation: Any, names: list[str], request: pb.StepRequest, every: int, inputs: Mapping[str, Any], progress: bool,
+                     timeout: Optional[float]) -> History:
+    title: str = simulation.info.display_name
+    with bar(1.0, progress, "of the run") as shown:
+        last = 0.0
+
+        def report(told: pb.RunProgress) -> None:
+            nonlocal last
+            shown.update(max(told.fraction, last) - last)
+            last = max(told.fraction, last)
+
+        try:
+            rows, _ = simulation._connection.run(simulation._tabulate(names, request, every, inputs, report, timeout))
+        except StepFailed as error:
+            error.history = History.of_rows(error.rows, title)
+            raise
+        shown.update(1.0 - last)
+    return History.of_rows(rows, title)
+
+
 class Histories:
     """What a simulation can do beyond single steps."""
 
     def simulate(self: Any, outputs: Union[None, str, Iterable[str]] = None, *, until: Optional[float] = None, steps: Optional[int] = None,
                  every: int = 1, inputs: Optional[Mapping[str, Input]] = None, progress: bool = False,
                  timeout: Optional[float] = None) -> History:
-        """Advances and keeps what the outputs are on the way, the present state included.
+        """Advances and keeps what the outputs are on the way, the present state included. Without functions among the inputs all is one call.
 
         outputs   names of variables; default: the positions of all structural nodes
         until     time [s]; default: the deck's end
@@ -186,7 +229,7 @@ class Histories:
         every     steps from one kept instant to the next
         inputs    by name: numbers that hold, or functions of time [s] that are asked at every kept instant and hold until the next
         progress  shows a bar (needs tqdm)
-        timeout   seconds that one advance may take
+        timeout   seconds that it may take; with functions among the inputs: one advance
 
         When a step fails, StepFailed.history has what there was until then.
         """
@@ -196,7 +239,11 @@ class Histories:
             raise ValueError(f"`every` must be at least 1, got {every}")
         names = self._positions() if outputs is None else [outputs] if isinstance(outputs, str) else list(outputs)
         end = until if until is not None or steps is not None else self.info.final_time_s
-        return _run(self, names, {self.inputs.name(k): v for k, v in (inputs or {}).items()}, end, steps, every, progress, timeout)
+        named = {self.inputs.name(k): v for k, v in (inputs or {}).items()}
+        if any(callable(v) for v in named.values()):
+            return _run(self, names, named, end, steps, every, progress, timeout)
+        request = pb.StepRequest(steps=steps) if end is None else pb.StepRequest(until_time_s=end)
+        return _run_in_one_call(self, names, request, every, named, progress, timeout)
 
     def _positions(self: Any) -> list[str]:
         return [name for name in self.variables if name.startswith("node.structural.") and name.endswith(".X")]

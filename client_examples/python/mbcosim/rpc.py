@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, cast, overloa
 
 import grpc
 
-from mbcosim.v1 import coupling_pb2_grpc, reduction_pb2_grpc, simulations_pb2_grpc, telemetry_pb2_grpc
+from mbcosim.v1 import (coupling_pb2_grpc, events_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
+                        telemetry_pb2_grpc)
 
 from .errors import TimedOut, Unavailable, translated
 
@@ -106,6 +107,8 @@ class Stubs:
         self.reduction: Any = reduction_pb2_grpc.ReductionStub(channel)  # type: ignore[no-untyped-call]
         self.coupling: Any = coupling_pb2_grpc.CouplingStub(channel)  # type: ignore[no-untyped-call]
         self.telemetry: Any = telemetry_pb2_grpc.TelemetryStub(channel)  # type: ignore[no-untyped-call]
+        self.results: Any = results_pb2_grpc.ResultsStub(channel)  # type: ignore[no-untyped-call]
+        self.events: Any = events_pb2_grpc.EventsStub(channel)  # type: ignore[no-untyped-call]
 
     def method(self, name: str) -> Any:
         service, method = name.split("/")

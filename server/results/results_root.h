@@ -1,0 +1,57 @@
+/// The folder on the server's disk in which simulations have folders for their result files.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "output/result_budget.h"
+#include "threads/mutex.h"
+
+namespace mbcosim::server {
+
+class ResultsFolder;
+
+/// Thread-safe. What is in the folder and what simulations may still write there is bounded.
+class ResultsRoot {
+ public:
+  /// `path` empty: there is none. `most`: bytes of all that is in it. Throws std::runtime_error
+  /// when it cannot be used.
+  ResultsRoot(const std::string& path, std::int64_t most);
+
+  /// A new folder for "simulations/ID". Throws NO_RESULTS, LIMIT_EXCEEDED, STORAGE_FULL.
+  std::unique_ptr<ResultsFolder> make(const std::string& simulation, std::int64_t quota);
+
+ private:
+  friend class ResultsFolder;
+  void take(std::int64_t bytes) TS_EXCLUDES(mutex_);
+  void give_back(std::int64_t bytes) TS_EXCLUDES(mutex_);
+
+  const std::string path_;
+  const std::int64_t most_;
+  Mutex mutex_;
+  std::int64_t used_ TS_GUARDED_BY(mutex_) = 0;  ///< of folders that are left, and quotas of others
+};
+
+/// The folder of one simulation. At its end it is removed, unless it is to be kept.
+class ResultsFolder {
+ public:
+  ResultsFolder(ResultsRoot& root, std::string path, std::int64_t quota)
+      : root_(root), path_(std::move(path)), budget_(quota) {}
+  ~ResultsFolder();
+  ResultsFolder(const ResultsFolder&) = delete;
+  ResultsFolder& operator=(const ResultsFolder&) = delete;
+
+  const std::string& path() const { return path_; }
+  ResultBudget& budget() { return budget_; }
+  const ResultBudget& budget() const { return budget_; }
+  void keep(bool keeps) { kept_ = keeps; }
+
+ private:
+  ResultsRoot& root_;
+  const std::string path_;
+  ResultBudget budget_;
+  bool kept_ = false;
+};
+
+}  // namespace mbcosim::server

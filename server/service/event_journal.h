@@ -1,0 +1,57 @@
+/// The latest events of a daemon, for those who watch.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+
+#include "mbcosim/v1/events.pb.h"
+#include "threads/mutex.h"
+
+namespace mbcosim::server {
+
+/// Thread-safe. Keeps so many events and bytes; the oldest make room.
+class EventJournal {
+ public:
+  EventJournal();
+
+  /// Name of this series of sequence numbers.
+  const std::string& name() const { return name_; }
+  std::int64_t last() const TS_EXCLUDES(mutex_);
+  /// Gives it its number and wakes who waits. `owner`: of the simulation.
+  void add(v1::Event event, const std::string& owner) TS_EXCLUDES(mutex_);
+
+  /// Somebody who reads the journal.
+  struct Reader {
+    std::function<bool(const v1::Event&, const std::string& owner)> wants;
+    std::function<void()> wake;  ///< there is something new; called once after `next` said no
+    std::int64_t next = 1;       ///< sequence number
+    bool waits = false;          ///< belongs to the journal
+  };
+  using ReaderPtr = std::shared_ptr<Reader>;
+  void enter(const ReaderPtr& reader) TS_EXCLUDES(mutex_);
+  void leave(const ReaderPtr& reader) TS_EXCLUDES(mutex_);
+  /// The next event that the reader wants, or `missed`. False: none for now.
+  bool next(Reader& reader, v1::Event* out) TS_EXCLUDES(mutex_);
+
+ private:
+  static constexpr std::size_t kMostEvents = 8192;
+  static constexpr std::size_t kMostBytes = 8 << 20;
+  struct Kept {
+    v1::Event event;
+    std::string owner;
+    std::size_t bytes;
+  };
+
+  const std::string name_;
+  mutable Mutex mutex_;
+  std::deque<Kept> kept_ TS_GUARDED_BY(mutex_);  ///< numbered without a gap up to `last_`
+  std::size_t bytes_ TS_GUARDED_BY(mutex_) = 0;
+  std::int64_t last_ TS_GUARDED_BY(mutex_) = 0;
+  std::list<ReaderPtr> readers_ TS_GUARDED_BY(mutex_);
+};
+
+}  // namespace mbcosim::server

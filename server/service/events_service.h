@@ -1,0 +1,11 @@
+/// Methods of `mbcosim.v1.Events`.
+#pragma once
+
+#include "service/parts.h"
+
+namespace mbcosim::server {
+
+/// Adds all of them to the gate. `parts` outlives it.
+void add_events(Gate& gate, const Parts& parts);
+
+}  // namespace mbcosim::server
