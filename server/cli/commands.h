@@ -85,6 +85,8 @@ int init(const std::string& kind, const std::string& output);
 int plot(const PlotCommand& command);
 /// Compares two sets of result files; kDiffer when they differ beyond the tolerance.
 int diff(const DiffCommand& command);
+/// Serves an editor on the standard input and output; see lsp/server.h.
+int language_server();
 /// Prints eigenvalues of a deck as frequencies and damping.
 int eig(const EigCommand& command);
 /// The words of the input language, served or refused by name.

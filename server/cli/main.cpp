@@ -157,6 +157,12 @@ void add_starts(CLI::App& app, std::string& word, std::string& output, int& exit
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));
   completion->callback(
       [&] { std::fputs(mbcosim::cli::completion_script(app, word).c_str(), stdout); });
+  CLI::App* lsp = app.add_subcommand(
+      "lsp",
+      "Serve an editor: diagnostics, completion, hover, definitions (Language Server Protocol)");
+  lsp->add_flag_callback(
+      "--stdio", [] {}, "On the standard input and output, as always");
+  lsp->callback([&] { exit_code = mbcosim::cli::language_server(); });
   CLI::App* man = app.add_subcommand("man", "Print the manual page: mbcosim man | man -l -");
   man->callback([&] { std::fputs(mbcosim::cli::manual_page(app).c_str(), stdout); });
 }
