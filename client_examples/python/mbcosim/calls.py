@@ -45,8 +45,8 @@ def _policy(name: str) -> Any:
 def _result_options(formats: Results, quota: Optional[int]) -> results_pb2.ResultOptions:
     """`mbcosim.v1.ResultOptions`; `formats`: True (what the deck asks for), "text", "netcdf" or several of them."""
     names: list[str] = [] if isinstance(formats, bool) else [formats] if isinstance(formats, str) else list(formats)
-    return results_pb2.ResultOptions(formats=[choice(results_pb2.ResultFormat, "RESULT_FORMAT_", name, "results") for name in names],
-                                     quota_bytes=quota)
+    chosen: list[Any] = [choice(results_pb2.ResultFormat, "RESULT_FORMAT_", name, "results") for name in names]
+    return results_pb2.ResultOptions(formats=chosen, quota_bytes=quota)
 
 
 _COMPARISONS = {"<": pb.COMPARISON_LESS, "<=": pb.COMPARISON_LESS_OR_EQUAL, ">": pb.COMPARISON_GREATER,

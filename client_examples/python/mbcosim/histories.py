@@ -78,9 +78,10 @@ class History(Mapping[str, Array]):
         """A structured array: fields "step" and "time", and one for each variable, with its shape. Units in `dtype.metadata["units"]`."""
         own = {"step": self.steps, "time": self.time}
         fields = {name: values for name, values in {**own, **{k: v for k, v in self.items() if k not in own}}.items() if values is not None}
-        kinds = np.dtype([(name, values.dtype, values.shape[1:]) for name, values in fields.items()],
-                         metadata={"units": {"step": "", "time": "s", **self.units}})
-        table = np.empty(len(self.time), kinds)
+        columns: Any = [(name, values.dtype, values.shape[1:]) for name, values in fields.items()]
+        dtype: Any = np.dtype
+        kinds = dtype(columns, metadata={"units": {"step": "", "time": "s", **self.units}})
+        table: Any = np.empty(len(self.time), kinds)
         for name, values in fields.items():
             table[name] = values
         return table
