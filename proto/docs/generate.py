@@ -13,7 +13,7 @@ from google.protobuf import descriptor_pb2 as pb
 
 HERE = pathlib.Path(__file__).resolve().parent
 PROTO = HERE.parent
-FILES = ["simulations", "coupling", "coupling_types", "telemetry", "reduction", "record", "common"]
+FILES = ["simulations", "coupling", "coupling_types", "telemetry", "geometry", "results", "events", "reduction", "record", "common"]
 NOTE = "<!-- Written by proto/docs/generate.py from the comments of the .proto files; change those. -->\n"
 TYPES = {value: name[5:].lower() for name, value in pb.FieldDescriptorProto.Type.items()}
 

@@ -18,6 +18,7 @@
 #include "rpc/reflection.h"
 #include "service/coupling_service.h"
 #include "service/events_service.h"
+#include "service/geometry_service.h"
 #include "service/reduction_service.h"
 #include "service/results_service.h"
 #include "service/simulations_service.h"
@@ -126,7 +127,7 @@ Daemon::Daemon(const Config& config)
       store_(config_.limits, metrics_, log_),
       gate_(runtime_),
       health_({"mbcosim.v1.Simulations", "mbcosim.v1.Coupling", "mbcosim.v1.Telemetry",
-               "mbcosim.v1.Reduction", "mbcosim.v1.Results", "mbcosim.v1.Events"}),
+               "mbcosim.v1.Geometry", "mbcosim.v1.Reduction", "mbcosim.v1.Results", "mbcosim.v1.Events"}),
       parts_{config_, store_, slots_, metrics_, log_, runtime_, gate_, results_} {
   add_methods();
   listen();
@@ -146,6 +147,7 @@ void Daemon::expose_metrics() {
 void Daemon::add_methods() {
   add_simulations(gate_, parts_);
   add_telemetry(gate_, parts_);
+  add_geometry(gate_, parts_);
   add_coupling(gate_, parts_);
   add_reduction(gate_, parts_);
   add_results(gate_, parts_);

@@ -64,10 +64,11 @@ class Fresh {
  public:
   explicit Fresh(const Parts& parts) : parts_(parts) {}
 
-  /// `make` makes the simulation, counted as the new session's.
+  /// `make` makes the simulation, counted as the new session's, and fills `symbols`.
   template <class Make>
-  SessionPtr add(const v1::CreateOptions& options, Exchange& exchange, Make make,
-                 const std::string& forked_from = "") TS_EXCLUDES(mutex_) {
+  SessionPtr add(const v1::CreateOptions& options, Exchange& exchange,
+                 std::vector<DeckSymbol>* symbols, Make make, const std::string& forked_from = "")
+      TS_EXCLUDES(mutex_) {
     const CallToken token(exchange.call());
     MemoryShare share;
     auto session = within(parts_.runtime.memory, &token, &share, [&] {
@@ -84,6 +85,7 @@ class Fresh {
           options, std::move(results));
     });
     session->set_memory(std::move(share));
+    session->set_symbols(std::move(*symbols));
     Guard guard(mutex_);
     if (lost_) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
     parts_.store.add(session);
@@ -121,43 +123,40 @@ std::unique_ptr<Simulation> initial_solution(const LoadReport& report, bool summ
 
 // ------------------------------------------------------------------ CreateSimulation
 
-class CreateHandler final : public Upload<v1::UploadRequest> {
+/// What CreateSimulation and its form in one message share.
+class Creation {
  public:
-  explicit CreateHandler(const Parts& parts)
+  explicit Creation(const Parts& parts)
       : parts_(parts), upload_(parts.config.limits, parts.runtime.memory), fresh_(parts) {}
 
- private:
-  void add(Exchange&, v1::UploadRequest& request, MemoryShare share) override {
-    upload_.add(request, std::move(share));
-    check_protocol(upload_.header().options().protocol());
-  }
-  void complete(Exchange& exchange) override {
+  DeckUpload& upload() { return upload_; }
+  v1::CreateSimulationReply run(Exchange& exchange) {
     const v1::CreateOptions& options = upload_.header().options();
     v1::CreateSimulationReply reply;
     reply.set_protocol_version(kProtocolVersion);
     const SessionStore::Place place(parts_.store, options.request_id(), exchange.caller(),
                                     exchange.call());
     if (place.known())
-      place.known()->fill(reply.mutable_simulation());
+      place.known()->fill(reply.mutable_simulation(), exchange.caller());
     else
       create(exchange, options, &reply);
-    exchange.end(serialized(reply));
+    return reply;
   }
+  void lose(const std::string& owner) { fresh_.lose(owner); }
+
+ private:
   void create(Exchange& exchange, const v1::CreateOptions& options,
               v1::CreateSimulationReply* reply) {
-    LoadReport report;
+    DeckReport report;
     fresh_
-        .add(options, exchange,
+        .add(options, exchange, &report.symbols,
              [&](const CancelToken& token, SessionResults* results) {
                report = load(upload_, parts_.config);
                return initial_solution(report, options.summed_time(), results, token);
              })
-        ->fill(reply->mutable_simulation());
+        ->fill(reply->mutable_simulation(), exchange.caller());
     to_proto(report.diagnostics, reply->mutable_diagnostics());
     reply->set_printed(utf8(report.printed));
-  }
-  void on_done(Exchange& exchange, bool delivered) override {
-    if (!delivered) fresh_.lose(exchange.caller().identity);
   }
 
   const Parts& parts_;
@@ -165,7 +164,63 @@ class CreateHandler final : public Upload<v1::UploadRequest> {
   Fresh fresh_;
 };
 
+class CreateHandler final : public Upload<v1::UploadRequest> {
+ public:
+  explicit CreateHandler(const Parts& parts) : creation_(parts) {}
+
+ private:
+  void add(Exchange&, v1::UploadRequest& request, MemoryShare share) override {
+    creation_.upload().add(request, std::move(share));
+    check_protocol(creation_.upload().header().options().protocol());
+  }
+  void complete(Exchange& exchange) override { exchange.end(serialized(creation_.run(exchange))); }
+  void on_done(Exchange& exchange, bool delivered) override {
+    if (!delivered) creation_.lose(exchange.caller().identity);
+  }
+
+  Creation creation_;
+};
+
+class CreateInlineHandler final : public OneRequest<v1::InlineUpload> {
+ public:
+  explicit CreateInlineHandler(const Parts& parts) : OneRequest(Lane::heavy), creation_(parts) {}
+
+ private:
+  void serve(Exchange& exchange, const v1::InlineUpload& request) override {
+    check_protocol(request.header().options().protocol());
+    creation_.upload().add(request);
+    exchange.end(serialized(creation_.run(exchange)));
+  }
+  void on_done(Exchange& exchange, bool delivered) override {
+    if (!delivered) creation_.lose(exchange.caller().identity);
+  }
+
+  Creation creation_;
+};
+
 // ------------------------------------------------------------------ ValidateModel
+
+v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config) {
+  const DeckReport report = load(upload, config);
+  v1::ValidateModelReply reply;
+  reply.set_ok(report.ok());
+  to_proto(report.diagnostics, reply.mutable_diagnostics());
+  reply.set_printed(utf8(report.printed));
+  if (!report.ok()) return reply;
+  v1::ModelDescription* out = reply.mutable_description();
+  const Model& model = *report.model;
+  to_proto(model, out);
+  for (int k = 0; k < node_count(model); ++k) to_proto(model, k, out->add_nodes());
+  for (const ElementRef& e : model.elements) to_proto(model, e, out->add_elements());
+  for (const DeckSymbol& symbol : report.symbols) to_proto(symbol, out->add_symbols());
+  return reply;
+}
+
+v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config, Exchange& exchange) {
+  const CallToken token(exchange.call());
+  MemoryShare share;
+  return within(exchange.runtime().memory, &token, &share, [&] { return look_at(upload, config); });
+}
 
 class ValidateHandler final : public Upload<v1::UploadRequest> {
  public:
@@ -177,25 +232,25 @@ class ValidateHandler final : public Upload<v1::UploadRequest> {
     upload_.add(request, std::move(share));
   }
   void complete(Exchange& exchange) override {
-    const CallToken token(exchange.call());
-    MemoryShare share;
-    const v1::ValidateModelReply reply =
-        within(exchange.runtime().memory, &token, &share, [&] { return look(); });
-    exchange.end(serialized(reply));
-  }
-
-  v1::ValidateModelReply look() {
-    const LoadReport report = load(upload_, parts_.config);
-    v1::ValidateModelReply reply;
-    reply.set_ok(report.ok());
-    to_proto(report.diagnostics, reply.mutable_diagnostics());
-    reply.set_printed(utf8(report.printed));
-    if (report.ok()) to_proto(*report.model, reply.mutable_description());
-    return reply;
+    exchange.end(serialized(look_at(upload_, parts_.config, exchange)));
   }
 
   const Parts& parts_;
   DeckUpload upload_;
+};
+
+class ValidateInlineHandler final : public OneRequest<v1::InlineUpload> {
+ public:
+  explicit ValidateInlineHandler(const Parts& parts) : OneRequest(Lane::heavy), parts_(parts) {}
+
+ private:
+  void serve(Exchange& exchange, const v1::InlineUpload& request) override {
+    DeckUpload upload(parts_.config.limits, parts_.runtime.memory);
+    upload.add(request);
+    exchange.end(serialized(look_at(upload, parts_.config, exchange)));
+  }
+
+  const Parts& parts_;
 };
 
 // ------------------------------------------------------------------ ForkSimulation
@@ -222,20 +277,23 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
     const SessionStore::Place place(parts_.store, options.request_id(), exchange.caller(),
                                     exchange.call());
     if (place.known()) {
-      place.known()->fill(reply.mutable_simulation());
+      place.known()->fill(reply.mutable_simulation(), exchange.caller());
     } else {
       std::string simulation = request.simulation();
       const int snapshot =
           request.has_snapshot() ? number_of_snapshot(request.snapshot(), &simulation) : -1;
-      const SessionHold source(parts_.store, simulation, exchange.caller());
+      const SessionHold source(parts_.store, simulation, exchange.caller(), Access::control);
+      if (options.symbols_size() > 0)
+        throw Refusal(v1::REASON_BAD_ARGUMENT, "`symbols` cannot change the model of a fork");
+      std::vector<DeckSymbol> symbols = source->symbols();
       fresh_
           .add(
-              options, exchange,
+              options, exchange, &symbols,
               [&](const CancelToken&, SessionResults* results) {
                 return branch(*source, snapshot, results);
               },
               simulation)
-          ->fill(reply.mutable_simulation());
+          ->fill(reply.mutable_simulation(), exchange.caller());
     }
     exchange.end(serialized(reply));
   }
@@ -254,6 +312,12 @@ void add_creation(Gate& gate, const Parts& parts) {
            stream(Role::control, [&parts] { return std::make_unique<CreateHandler>(parts); }));
   gate.add(simulations_path("ValidateModel"),
            stream(Role::observe, [&parts] { return std::make_unique<ValidateHandler>(parts); }));
+  gate.add(simulations_path("CreateSimulationInline"),
+           {Role::control, false, Counted::call,
+            [&parts] { return std::make_unique<CreateInlineHandler>(parts); }});
+  gate.add(simulations_path("ValidateModelInline"),
+           {Role::observe, false, Counted::call,
+            [&parts] { return std::make_unique<ValidateInlineHandler>(parts); }});
   gate.add(simulations_path("ForkSimulation"), {Role::control, false, Counted::call, [&parts] {
                                                   return std::make_unique<ForkHandler>(parts);
                                                 }});

@@ -19,11 +19,12 @@ class WatchHandler final : public OneRequest<v1::WatchEventsRequest> {
  private:
   void serve(Exchange& exchange, const v1::WatchEventsRequest& request) override {
     simulation_ = request.simulation();
-    if (!simulation_.empty()) (void)parts_.store.get(simulation_, exchange.caller());
+    if (!simulation_.empty())
+      (void)parts_.store.get(simulation_, exchange.caller(), Access::observe);
     ReaderPtr reader = std::make_shared<Reader>();
     reader->wants = [caller = exchange.caller(), name = simulation_](const v1::Event& event,
                                                                      const std::string& owner) {
-      return caller.may_touch(owner) && (name.empty() || event.simulation() == name);
+      return name.empty() ? caller.may_touch(owner) : event.simulation() == name;
     };
     reader->wake = [weak = exchange.weak_from_this(), this] {
       if (const auto self = weak.lock())

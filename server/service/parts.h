@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "results/results_root.h"
@@ -32,15 +33,21 @@ const std::string& simulation_in(const Request& request) {
     return request.name();
 }
 
-/// A method that works on one simulation, which is found and kept alive meanwhile.
+/// A method that works on one simulation, which is found and kept alive meanwhile. The role tells
+/// what the caller must be allowed to do with it, unless `other_access` does.
 template <class Request, class Reply, class Body>
-Method on_session(const Parts& parts, Role role, Lane lane, Body body) {
+Method on_session(const Parts& parts, Role role, Lane lane, Body body,
+                  std::optional<Access> other_access = {}) {
+  const Access access =
+      other_access.value_or(role == Role::observe ? Access::observe : Access::control);
   return unary<Request, Reply>(
       role, lane,
-      [&parts, body = std::move(body)](const CallFrame& frame, const Request& request,
-                                       Reply* reply) {
-        const SessionHold session(parts.store, simulation_in(request), frame.caller);
-        if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*, Call&>)
+      [&parts, access, body = std::move(body)](const CallFrame& frame, const Request& request,
+                                               Reply* reply) {
+        const SessionHold session(parts.store, simulation_in(request), frame.caller, access);
+        if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*, const CallFrame&>)
+          body(*session, request, reply, frame);
+        else if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*, Call&>)
           body(*session, request, reply, frame.call);
         else
           body(*session, request, reply);

@@ -35,7 +35,7 @@ bool Heart::beat() {
 PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& caller, PeerLink& link)
     : parts_(parts),
       identity_(caller.identity),
-      session_(parts.store, hello.simulation(), caller),
+      session_(parts.store, hello.simulation(), caller, Access::couple, hello.port()),
       link_(link),
       port_(session_->port(hello.port())) {
   v1::SimulationInfo info;

@@ -2,7 +2,10 @@
 
 #include <google/protobuf/util/time_util.h>
 
+#include <charconv>
 #include <cmath>
+#include <string_view>
+#include <unordered_map>
 
 #include "service/session_advance.h"
 #include "wire/convert.h"
@@ -11,12 +14,46 @@
 
 namespace mbcosim::server {
 
+namespace {
+
+/// Which entries of a list belong to a page: those after the number that its token tells.
+class Page {
+ public:
+  explicit Page(const v1::DescribeSimulationRequest& request)
+      : size_(request.page_size() > 0 ? request.page_size() : kUsual) {
+    if (request.page_size() < 0)
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`page_size` must not be negative");
+    const std::string& token = request.page_token();
+    const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), first_);
+    if (!token.empty() &&
+        (error != std::errc() || end != token.data() + token.size() || first_ <= 0))
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`page_token` is not one of the server's");
+  }
+  /// Whether the next entry belongs to the page.
+  bool takes() {
+    const bool inside = at_ >= first_ && at_ - first_ < size_;
+    ++at_;
+    return inside;
+  }
+  void close(v1::ModelDescription* out) const {
+    if (at_ - first_ > size_) out->set_next_page_token(std::to_string(first_ + size_));
+  }
+
+ private:
+  static constexpr std::int64_t kUsual = 5000;
+  const std::int64_t size_;
+  std::int64_t first_ = 0, at_ = 0;
+};
+
+}  // namespace
+
 Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
                  const v1::CreateOptions& options, std::unique_ptr<SessionResults> results)
     : identity_(std::move(identity)),
       shared_(shared),
       model_(&simulation->model()),
       variables_(simulation->variables()),
+      grants_(identity_.owner, options.grants()),
       lease_(identity_.lease),
       snapshots_(identity_.id, digest_text(model_->digest), shared.limits, shared.memory),
       telemetry_(std::make_shared<TelemetryHub>(shared.memory, shared.lanes, shared.timer)),
@@ -69,7 +106,13 @@ void Session::set_policy(v1::NonConvergencePolicy kind, double minimum) {
   status_.set_policy(policy);
 }
 
-void Session::update(const v1::UpdateSimulationRequest& request) {
+void Session::update(const v1::UpdateSimulationRequest& request, const Caller& caller) {
+  if (request.has_grants()) {
+    if (!grants_.allow(caller, Access::own))
+      throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
+                    {{"wanted", "own"}});
+    grants_.replace(request.grants().grants());
+  }
   std::lock_guard lock(lock_);
   const StepPolicy now = simulation_->policy();
   if (request.has_non_convergence_policy() || request.has_minimum_step_s())
@@ -86,6 +129,11 @@ const Recorder& Session::record() const {
 }
 
 // ------------------------------------------------------------------ telling
+
+void Session::fill(v1::SimulationInfo* out, const Caller& caller) const {
+  fill(out);
+  if (grants_.allow(caller, Access::own)) *out->mutable_grants() = grants_.list();
+}
 
 void Session::fill(v1::SimulationInfo* out) const {
   const SessionStatus::View p = status_.view();
@@ -118,14 +166,41 @@ void Session::fill(v1::SimulationInfo* out) const {
   out->set_waiting_for(text);
 }
 
-void Session::fill(v1::ModelDescription* out, const std::string& variable_prefix) const {
+void Session::describe(const v1::DescribeSimulationRequest& request,
+                       v1::ModelDescription* out) const {
   to_proto(*model_, out);
-  for (std::size_t i = 0; i < variables().size(); ++i) {
-    const Variable& variable = variables()[i];
-    if (variable.name.compare(0, variable_prefix.size(), variable_prefix) == 0)
-      to_proto(variable, static_cast<int>(i), out->add_variables());
-  }
+  if (request.variable_names_size() > 0) return describe_variables(request, out);
+  const bool first = request.page_token().empty();
+  Page page(request);
+  for (int k = 0; k < node_count(*model_); ++k)
+    if (page.takes()) to_proto(*model_, k, out->add_nodes());
+  for (const ElementRef& e : model_->elements)
+    if (page.takes()) to_proto(*model_, e, out->add_elements());
+  const std::string& prefix = request.variable_prefix();
+  for (std::size_t i = 0; i < variables().size(); ++i)
+    if (variables()[i].name.compare(0, prefix.size(), prefix) == 0 && page.takes())
+      to_proto(variables()[i], static_cast<int>(i), out->add_variables());
+  page.close(out);
+  if (!first) return;
+  for (const DeckSymbol& symbol : symbols_) to_proto(symbol, out->add_symbols());
   for (const auto& port : coupler_.ports()) port->fill(out->add_ports());
+}
+
+void Session::describe_variables(const v1::DescribeSimulationRequest& request,
+                                 v1::ModelDescription* out) const {
+  std::unordered_map<std::string_view, int> handles;
+  for (const std::string& name : request.variable_names()) handles.emplace(name, -1);
+  for (std::size_t i = 0; i < variables().size(); ++i)
+    if (const auto wanted = handles.find(variables()[i].name); wanted != handles.end())
+      wanted->second = static_cast<int>(i);
+  for (const std::string& name : request.variable_names()) {
+    const int handle = handles.at(name);
+    const std::string shown = utf8(name.substr(0, 100));
+    if (handle < 0)
+      throw Refusal(v1::REASON_NO_SUCH_VARIABLE, "no variable is named \"" + shown + "\"",
+                    {{"name", shown}});
+    to_proto(variables()[handle], handle, out->add_variables());
+  }
 }
 
 Port& Session::port(const std::string& name) const {

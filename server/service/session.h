@@ -13,13 +13,14 @@
 #include "service/config.h"
 #include "service/event_log.h"
 #include "service/fair_mutex.h"
+#include "service/grants.h"
 #include "service/lease.h"
 #include "service/metrics.h"
 #include "service/session_status.h"
 #include "service/snapshot_shelf.h"
 #include "service/telemetry_hub.h"
 #include "service/variable_access.h"
-#include "simulation/simulation.h"
+#include "simulation/load.h"
 #include "wire/memory.h"
 
 namespace mbcosim::server {
@@ -58,13 +59,21 @@ class Session {
   const std::vector<Variable>& variables() const { return variables_.variables(); }
   const VariableAccess& variable_access() const { return variables_; }
   void fill(v1::SimulationInfo* out) const;
-  void fill(v1::ModelDescription* out, const std::string& variable_prefix) const;
+  /// With the grants, when the caller may change them.
+  void fill(v1::SimulationInfo* out, const Caller& caller) const;
+  /// A page of the description. Throws BAD_ARGUMENT, NO_SUCH_VARIABLE.
+  void describe(const v1::DescribeSimulationRequest& request, v1::ModelDescription* out) const;
+  /// Before others know the session: what the deck declares.
+  void set_symbols(std::vector<DeckSymbol> symbols) { symbols_ = std::move(symbols); }
+  const std::vector<DeckSymbol>& symbols() const { return symbols_; }
+  const Grants& grants() const { return grants_; }
 
   /// Advances as asked; see `Simulations.Step`.
   void step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
             const Progress& progress = {}, RowTable* table = nullptr);
   bool interrupt();  ///< was anything advancing?
-  void update(const v1::UpdateSimulationRequest& request);
+  /// Throws NOT_GRANTED when the caller must not change grants.
+  void update(const v1::UpdateSimulationRequest& request, const Caller& caller);
   /// The record of the ports. Throws NOT_RECORDING.
   const Recorder& record() const;
   void read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply);
@@ -148,6 +157,8 @@ class Session {
   void account(Advance& advance, const StepReport& report);
   void account_pieces(v1::StepReply& reply, const StepReport& report);
   void finish(Advance& advance);
+  void describe_variables(const v1::DescribeSimulationRequest& request,
+                          v1::ModelDescription* out) const;
   void require_usable() const;
   void require_rest() const;  ///< usable and not advancing
 
@@ -157,8 +168,10 @@ class Session {
   const VariableAccess variables_;
 
   MemoryShare memory_;
+  std::vector<DeckSymbol> symbols_;
 
   // Thread-safe by themselves.
+  Grants grants_;
   Lease lease_;
   SessionStatus status_;
   SnapshotShelf snapshots_;

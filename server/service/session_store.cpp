@@ -86,12 +86,29 @@ void SessionStore::add(SessionPtr session) {
   metrics_.set_sessions(static_cast<int>(sessions_.size()));
 }
 
-SessionPtr SessionStore::get(const std::string& id, const Caller& caller) const {
+namespace {
+
+constexpr const char* kAccessNames[] = {"see", "observe", "couple", "control", "own"};
+
+[[noreturn]] void refuse_access(const std::string& id, Access access, const std::string& port) {
+  const std::string name = kAccessNames[static_cast<int>(access)];
+  throw Refusal(v1::REASON_NOT_GRANTED,
+                "no grant of " + id + " lets the caller " + name +
+                    (port.empty() ? "" : " at port \"" + port.substr(0, 100) + "\"") +
+                    "; its owner gives them (`grants`)",
+                {{"wanted", name}});
+}
+
+}  // namespace
+
+SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Access access,
+                             const std::string& port) const {
   Guard guard(mutex_);
   const auto found = sessions_.find(id);
-  if (found == sessions_.end() || !caller.may_touch(found->second->identity().owner))
+  if (found == sessions_.end() || !found->second->grants().allow(caller, Access::see))
     throw Refusal(v1::REASON_NO_SUCH_SIMULATION,
                   "no simulation is named \"" + id.substr(0, 100) + "\"");
+  if (!found->second->grants().allow(caller, access, port)) refuse_access(id, access, port);
   return found->second;
 }
 
@@ -100,13 +117,13 @@ std::vector<SessionPtr> SessionStore::list(const Caller& caller) const {
   std::vector<SessionPtr> result;
   for (const std::string& id : order_) {
     const SessionPtr& session = sessions_.at(id);
-    if (caller.may_touch(session->identity().owner)) result.push_back(session);
+    if (session->grants().allow(caller, Access::see)) result.push_back(session);
   }
   return result;
 }
 
 void SessionStore::remove(const std::string& id, const Caller& caller) {
-  const SessionPtr session = get(id, caller);
+  const SessionPtr session = get(id, caller, Access::own);
   session->discard_results();
   drop(session->identity().id);
 }

@@ -43,9 +43,11 @@ class SessionStore {
   };
 
   void add(SessionPtr session);
-  /// Throws NOT_FOUND; other people's sessions are not found either.
-  SessionPtr get(const std::string& id, const Caller& caller) const;
-  std::vector<SessionPtr> list(const Caller& caller) const;  ///< in the order of creation
+  /// Throws NO_SUCH_SIMULATION, also for one that the caller may not see, and NOT_GRANTED.
+  SessionPtr get(const std::string& id, const Caller& caller, Access access,
+                 const std::string& port = "") const;
+  /// What the caller may see, in the order of creation.
+  std::vector<SessionPtr> list(const Caller& caller) const;
   void remove(const std::string& id, const Caller& caller);
   /// The same for a session that nobody has seen.
   void discard(const std::string& id);
@@ -75,11 +77,12 @@ class SessionStore {
   std::thread lease_thread_;
 };
 
-/// A session found and kept alive. Throws NO_SUCH_SIMULATION.
+/// A session found and kept alive. Throws as SessionStore::get.
 class SessionHold {
  public:
-  SessionHold(const SessionStore& store, const std::string& id, const Caller& caller)
-      : session_(store.get(id, caller)), use_(*session_) {}
+  SessionHold(const SessionStore& store, const std::string& id, const Caller& caller, Access access,
+              const std::string& port = "")
+      : session_(store.get(id, caller, access, port)), use_(*session_) {}
   Session& operator*() const { return *session_; }
   Session* operator->() const { return session_.get(); }
 

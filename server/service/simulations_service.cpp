@@ -68,7 +68,7 @@ void list(const SessionStore& store, const Caller& caller,
       reply->set_next_page_token((*next)->identity().id);
       return;
     }
-    (*next)->fill(reply->add_simulations());
+    (*next)->fill(reply->add_simulations(), caller);
   }
 }
 
@@ -94,19 +94,22 @@ void add_life(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("GetSimulation"),
            on_session<v1::GetSimulationRequest, v1::SimulationInfo>(
                parts, Role::observe, Lane::quick,
-               [](Session& session, const auto&, auto* reply) { session.fill(reply); }));
-  gate.add(
-      simulations_path("UpdateSimulation"),
-      on_session<v1::UpdateSimulationRequest, v1::SimulationInfo>(
-          parts, Role::control, Lane::work, [](Session& session, const auto& request, auto* reply) {
-            session.update(request);
-            session.fill(reply);
-          }));
+               [](Session& session, const auto&, auto* reply, const CallFrame& frame) {
+                 session.fill(reply, frame.caller);
+               },
+               Access::see));
+  gate.add(simulations_path("UpdateSimulation"),
+           on_session<v1::UpdateSimulationRequest, v1::SimulationInfo>(
+               parts, Role::control, Lane::work,
+               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+                 session.update(request, frame.caller);
+                 session.fill(reply, frame.caller);
+               }));
   gate.add(
       simulations_path("DescribeSimulation"),
       on_session<v1::DescribeSimulationRequest, v1::ModelDescription>(
           parts, Role::observe, Lane::work, [](Session& session, const auto& request, auto* reply) {
-            session.fill(reply, request.variable_prefix());
+            session.describe(request, reply);
           }));
 }
 

@@ -10,7 +10,8 @@ namespace {
 /// A snapshot named by the client: its simulation, kept alive, and its number.
 struct Named {
   Named(const Parts& parts, const std::string& name, const Caller& caller)
-      : number(number_of_snapshot(name, &simulation)), session(parts.store, simulation, caller) {}
+      : number(number_of_snapshot(name, &simulation)),
+        session(parts.store, simulation, caller, Access::control) {}
   std::string simulation;
   int number;
   SessionHold session;
@@ -26,7 +27,7 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
       if (!request.has_header())
         throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
       header_ = request.header();
-      session_.emplace(parts_.store, header_.simulation(), exchange.caller());
+      session_.emplace(parts_.store, header_.simulation(), exchange.caller(), Access::control);
       return;
     }
     if (request.has_header())
@@ -59,7 +60,7 @@ ExportReplies::Source exported(const Parts& parts, const Caller& caller,
   std::string simulation = request.simulation();
   const int number =
       request.has_snapshot() ? number_of_snapshot(request.snapshot(), &simulation) : -1;
-  const SessionHold session(parts.store, simulation, caller);
+  const SessionHold session(parts.store, simulation, caller, Access::observe);
   auto bytes = std::make_shared<std::string>();
   auto share = std::make_shared<MemoryShare>();
   *bytes = within(parts.runtime.memory, nullptr, share.get(),
@@ -76,7 +77,8 @@ using RecordReplies = Series<v1::GetRecordRequest, v1::GetRecordReply>;
 
 RecordReplies::Source recorded(const Parts& parts, const Caller& caller,
                                const v1::GetRecordRequest& request) {
-  auto session = std::make_shared<SessionHold>(parts.store, request.name(), caller);
+  auto session =
+      std::make_shared<SessionHold>(parts.store, request.name(), caller, Access::observe);
   const Recorder& record = (*session)->record();
   return [session, &record, at = std::size_t{0}](auto* reply) mutable {
     std::string piece = record.read(at, kChunkBytes);
@@ -105,7 +107,7 @@ void add_saved(Gate& gate, const Parts& parts) {
                [&parts](const CallFrame& frame, const auto& request, auto* reply) {
                  const Named named(parts, request.name(), frame.caller);
                  named.session->restore(named.number);
-                 named.session->fill(reply);
+                 named.session->fill(reply, frame.caller);
                }));
   gate.add(
       simulations_path("DeleteSnapshot"),

@@ -34,7 +34,7 @@ class StepStreamHandler final : public Handler {
   void step(Exchange& exchange) {
     if (!session_) {
       name_ = request_.simulation();
-      session_.emplace(parts_.store, name_, exchange.caller());
+      session_.emplace(parts_.store, name_, exchange.caller(), Access::control);
     }
     if (!request_.simulation().empty() && request_.simulation() != name_)
       throw Refusal(v1::REASON_BAD_ARGUMENT,
@@ -149,7 +149,8 @@ class RunHandler final : public OneRequest<v1::RunRequest> {
 
  private:
   void serve(Exchange& exchange, const v1::RunRequest& request) override {
-    const SessionHold session(parts_.store, request.step().simulation(), exchange.caller());
+    const SessionHold session(parts_.store, request.step().simulation(), exchange.caller(),
+                              Access::control);
     Progress progress(*session, request);
     Rows rows(*session, request, exchange.runtime().memory);
     v1::RunReply done;
@@ -177,13 +178,13 @@ void add_stepping(Gate& gate, const Parts& parts) {
            stream(Role::control, [&parts] { return std::make_unique<StepStreamHandler>(parts); }));
   gate.add(simulations_path("Run"),
            stream(Role::control, [&parts] { return std::make_unique<RunHandler>(parts); }));
-  gate.add(
-      simulations_path("Interrupt"),
-      unary<v1::InterruptRequest, v1::InterruptReply>(
-          Role::control, Lane::quick,
-          [&parts](const CallFrame& frame, const auto& request, auto* reply) {
-            reply->set_was_stepping(parts.store.get(request.name(), frame.caller)->interrupt());
-          }));
+  gate.add(simulations_path("Interrupt"),
+           unary<v1::InterruptRequest, v1::InterruptReply>(
+               Role::control, Lane::quick,
+               [&parts](const CallFrame& frame, const auto& request, auto* reply) {
+                 reply->set_was_stepping(
+                     parts.store.get(request.name(), frame.caller, Access::control)->interrupt());
+               }));
 }
 
 }  // namespace mbcosim::server

@@ -48,7 +48,7 @@ class SubscribeHandler final : public OneRequest<v1::SubscribeRequest> {
 
  private:
   void serve(Exchange& exchange, const v1::SubscribeRequest& request) override {
-    session_.emplace(parts_.store, request.simulation(), exchange.caller());
+    session_.emplace(parts_.store, request.simulation(), exchange.caller(), Access::observe);
     Subscription::Options options =
         make_options(request, **session_, exchange.caller(), parts_.config.limits);
     v1::TelemetryBatch first;

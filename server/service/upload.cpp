@@ -24,7 +24,34 @@ void check_name(const std::string& name) {
   }
 }
 
-LoadReport load_from_root(const std::string& name, const v1::CreateOptions& options,
+SymbolValues symbols_of(const v1::CreateOptions& options) {
+  SymbolValues values;
+  for (const auto& [name, value] : options.symbols()) {
+    switch (value.value_case()) {
+      case v1::SymbolValue::kNumber:
+        values.emplace(name, value.number());
+        break;
+      case v1::SymbolValue::kText:
+        values.emplace(name, value.text());
+        break;
+      case v1::SymbolValue::kFlag:
+        values.emplace(name, value.flag());
+        break;
+      default:
+        throw Refusal(v1::REASON_BAD_ARGUMENT,
+                      "`symbols` has no value for \"" + name.substr(0, 100) + "\"");
+    }
+  }
+  return values;
+}
+
+DeckReport read(const FileSource& files, const std::string& main_file,
+                const v1::CreateOptions& options, const Config& config) {
+  return read_deck(files, main_file,
+                   {config.limits.engine, attachments(options), symbols_of(options)});
+}
+
+DeckReport load_from_root(const std::string& name, const v1::CreateOptions& options,
                           const Config& config) {
   if (config.model_root.empty())
     throw Refusal(v1::REASON_NO_SUCH_MODEL, "the server has no model root; upload a bundle");
@@ -38,8 +65,7 @@ LoadReport load_from_root(const std::string& name, const v1::CreateOptions& opti
   if (!inside || !fs::is_regular_file(file, error))
     throw Refusal(v1::REASON_NO_SUCH_MODEL,
                   "no deck is named \"" + name + "\" under the model root");
-  return load_deck(FolderSource(file.parent_path().string()), file.filename().string(),
-                   config.limits.engine, attachments(options));
+  return read(FolderSource(file.parent_path().string()), file.filename().string(), options, config);
 }
 
 }  // namespace
@@ -89,13 +115,23 @@ void DeckUpload::add(v1::UploadRequest& message, MemoryShare share) {
   bundle_.add(message.chunk());
 }
 
+void DeckUpload::add(const v1::InlineUpload& whole) {
+  v1::UploadRequest message;
+  *message.mutable_header() = whole.header();
+  add(message, {});
+  for (const v1::FileChunk& file : whole.files()) {
+    *message.mutable_chunk() = file;
+    add(message, {});
+  }
+}
+
 const v1::UploadHeader& DeckUpload::header() const {
   if (!header_)
     throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an upload must be `header`");
   return *header_;
 }
 
-LoadReport load(DeckUpload& upload, const Config& config) {
+DeckReport load(DeckUpload& upload, const Config& config) {
   const v1::UploadHeader& header = upload.header();
   if (header.has_model_root_file())
     return load_from_root(header.model_root_file(), header.options(), config);
@@ -105,8 +141,7 @@ LoadReport load(DeckUpload& upload, const Config& config) {
   if (files.count(main_file) == 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
-  return load_deck(BundleSource(std::move(files)), main_file, config.limits.engine,
-                   attachments(header.options()));
+  return read(BundleSource(std::move(files)), main_file, header.options(), config);
 }
 
 }  // namespace mbcosim::server

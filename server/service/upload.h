@@ -7,6 +7,7 @@
 
 #include "mbcosim/v1/simulations.pb.h"
 #include "service/config.h"
+#include "simulation/load.h"
 #include "wire/memory.h"
 
 namespace mbcosim::server {
@@ -32,6 +33,8 @@ class DeckUpload {
   DeckUpload(const ServiceLimits& limits, MemoryBudget& memory) : bundle_(limits, memory) {}
   /// `share`: of the message.
   void add(v1::UploadRequest& message, MemoryShare share);
+  /// All of it at once.
+  void add(const v1::InlineUpload& whole);
   /// Throws OUT_OF_TURN when none has come.
   const v1::UploadHeader& header() const;
   std::map<std::string, std::string> take_files() { return bundle_.take(); }
@@ -44,7 +47,7 @@ class DeckUpload {
 
 /// Reads the deck. Throws Refusal when the model root or the file in it is not to be had; a wrong
 /// deck is in the report.
-LoadReport load(DeckUpload& upload, const Config& config);
+DeckReport load(DeckUpload& upload, const Config& config);
 /// Ports that need equations of their own in the model.
 std::vector<PortAttachment> attachments(const v1::CreateOptions& options);
 

@@ -121,27 +121,62 @@ void to_proto(const Model& model, v1::ModelDescription* out) {
   out->set_initial_time_s(model.initial_value.initial_time);
   out->set_final_time_s(model.initial_value.final_time);
   out->set_step_s(model.initial_value.time_step);
-  for (const StructuralNode& n : model.structural) {
-    v1::NodeDescription* p = out->add_nodes();
-    p->set_family("structural");
-    p->set_kind(kind_name(n.kind));
-    p->set_label(n.label);
-    p->set_name(utf8(n.name));
+}
+
+int node_count(const Model& model) {
+  return static_cast<int>(model.structural.size() + model.scalars.size());
+}
+
+void to_proto(const Model& model, int node, v1::NodeDescription* out) {
+  const int structural = static_cast<int>(model.structural.size());
+  if (node < structural) {
+    const StructuralNode& n = model.structural[node];
+    out->set_family("structural");
+    out->set_kind(kind_name(n.kind));
+    out->set_label(n.label);
+    out->set_name(utf8(n.name));
+    return;
   }
-  for (const ScalarNode& n : model.scalars) {
-    v1::NodeDescription* p = out->add_nodes();
-    p->set_family(kind_name(n.kind));
-    p->set_label(n.label);
-    p->set_name(utf8(n.name));
-  }
-  for (const ElementRef& e : model.elements) {
-    const ElementInfo& info = e.set->info(e.index);
-    v1::ElementDescription* p = out->add_elements();
-    p->set_family(family_name(info.family));
-    p->set_type(utf8(info.type));
-    p->set_label(info.label);
-    p->set_name(utf8(info.name));
-  }
+  const ScalarNode& n = model.scalars[node - structural];
+  out->set_family(kind_name(n.kind));
+  out->set_label(n.label);
+  out->set_name(utf8(n.name));
+}
+
+void to_proto(const Model& model, const ElementRef& element, v1::ElementDescription* out) {
+  const ElementInfo& info = element.set->info(element.index);
+  out->set_family(family_name(info.family));
+  out->set_type(utf8(info.type));
+  out->set_label(info.label);
+  out->set_name(utf8(info.name));
+  for (const int node : element.set->nodes(element.index))
+    out->add_nodes(model.structural[node].label);
+}
+
+namespace {
+
+void to_proto(const DeckSymbol::Value& value, v1::SymbolValue* out) {
+  if (const auto* flag = std::get_if<bool>(&value))
+    out->set_flag(*flag);
+  else if (const auto* integer = std::get_if<std::int32_t>(&value))
+    out->set_number(*integer);
+  else if (const auto* number = std::get_if<double>(&value))
+    out->set_number(*number);
+  else
+    out->set_text(utf8(std::get<std::string>(value)));
+}
+
+constexpr const char* kSymbolTypes[] = {"bool", "integer", "real", "string"};
+
+}  // namespace
+
+void to_proto(const DeckSymbol& symbol, v1::DeckSymbol* out) {
+  out->set_name(symbol.name);
+  out->set_constant(symbol.constant);
+  out->set_given(symbol.overridden);
+  out->set_type(kSymbolTypes[symbol.declared.index()]);
+  to_proto(symbol.declared, out->mutable_declared());
+  to_proto(symbol.value, out->mutable_value());
 }
 
 v1::NonConvergencePolicy to_proto(const StepPolicy& policy) {

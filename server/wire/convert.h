@@ -3,7 +3,7 @@
 
 #include "math/hash.h"
 #include "mbcosim/v1/simulations.pb.h"
-#include "simulation/simulation.h"
+#include "simulation/load.h"
 
 namespace mbcosim::server {
 
@@ -12,8 +12,12 @@ using DiagnosticList = google::protobuf::RepeatedPtrField<v1::Diagnostic>;
 void to_proto(const std::vector<Diagnostic>& diagnostics, DiagnosticList* out);
 void to_proto(const Error& error, v1::SolverFailure* out);
 void to_proto(const Variable& variable, int handle, v1::Variable* out);
-/// Nodes and elements; variables and ports are added by the caller.
+/// What is told of the model as a whole.
 void to_proto(const Model& model, v1::ModelDescription* out);
+int node_count(const Model& model);
+void to_proto(const Model& model, int node, v1::NodeDescription* out);  ///< structural ones first
+void to_proto(const Model& model, const ElementRef& element, v1::ElementDescription* out);
+void to_proto(const DeckSymbol& symbol, v1::DeckSymbol* out);
 v1::StepOutcome to_proto(StepOutcome outcome);
 v1::NonConvergencePolicy to_proto(const StepPolicy& policy);
 std::string utf8(const std::string& text);  ///< bytes that are not UTF-8 replaced by '?'

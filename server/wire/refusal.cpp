@@ -1,5 +1,9 @@
 #include "wire/refusal.h"
 
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <google/protobuf/util/time_util.h>
+
 #include "wire/convert.h"
 
 namespace mbcosim::server {
@@ -7,6 +11,44 @@ namespace {
 
 // Wire-compatible with google.rpc.ErrorInfo, so clients may read it under that name.
 constexpr const char* kErrorInfoUrl = "type.googleapis.com/google.rpc.ErrorInfo";
+
+/// A field of length-delimited bytes.
+void put(int number, const std::string& bytes, google::protobuf::io::CodedOutputStream* out) {
+  out->WriteTag(static_cast<std::uint32_t>(number << 3 | 2));
+  out->WriteVarint32(static_cast<std::uint32_t>(bytes.size()));
+  out->WriteString(bytes);
+}
+
+/// The bytes of a message with up to two fields of bytes, numbers 1 and 2.
+std::string message_of(const std::string& first, const std::string& second = "") {
+  std::string bytes;
+  google::protobuf::io::StringOutputStream stream(&bytes);
+  google::protobuf::io::CodedOutputStream out(&stream);
+  put(1, first, &out);
+  if (!second.empty()) put(2, second, &out);
+  out.Trim();
+  return bytes;
+}
+
+/// google.rpc.BadRequest: `field_violations` {field, description}. Messages name the field at fault
+/// first, in backquotes.
+void add_bad_request(const std::string& message, v1::ErrorStatus* details) {
+  const std::size_t open = message.find('`');
+  const std::size_t close = open == std::string::npos ? open : message.find('`', open + 1);
+  if (close == std::string::npos) return;
+  google::protobuf::Any* any = details->add_details();
+  any->set_type_url("type.googleapis.com/google.rpc.BadRequest");
+  any->set_value(message_of(message_of(message.substr(open + 1, close - open - 1), message)));
+}
+
+/// google.rpc.RetryInfo: `retry_delay`.
+void add_retry_info(v1::ErrorStatus* details) {
+  constexpr int kMilliseconds = 100;  // an advance looks whether it is to end this often, at least
+  google::protobuf::Any* any = details->add_details();
+  any->set_type_url("type.googleapis.com/google.rpc.RetryInfo");
+  any->set_value(message_of(
+      google::protobuf::util::TimeUtil::MillisecondsToDuration(kMilliseconds).SerializeAsString()));
+}
 
 }  // namespace
 
@@ -29,7 +71,6 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_NO_SUCH_FILE:
       return Code::NOT_FOUND;
     case v1::REASON_WRONG_STEP:
-    case v1::REASON_SIMULATION_BUSY:
     case v1::REASON_SIMULATION_FAILED:
     case v1::REASON_NOT_WRITABLE:
     case v1::REASON_OTHER_MODEL:
@@ -39,12 +80,13 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_PORT_MISMATCH:
     case v1::REASON_NOT_RECORDING:
     case v1::REASON_NO_RESULTS:
-      return Code::FAILED_PRECONDITION;
-    case v1::REASON_DAMAGED_STATE:
-      return Code::DATA_LOSS;
     case v1::REASON_NOT_CONVERGED:
     case v1::REASON_SINGULAR:
     case v1::REASON_EVALUATION:
+      return Code::FAILED_PRECONDITION;
+    case v1::REASON_DAMAGED_STATE:
+      return Code::DATA_LOSS;
+    case v1::REASON_SIMULATION_BUSY:
     case v1::REASON_PEER_LOST:
     case v1::REASON_REJECTED_BY_PEER:
     case v1::REASON_READER_STALLED:
@@ -58,6 +100,7 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_UNAUTHENTICATED:
       return Code::UNAUTHENTICATED;
     case v1::REASON_ROLE_TOO_LOW:
+    case v1::REASON_NOT_GRANTED:
       return Code::PERMISSION_DENIED;
     case v1::REASON_NOT_SERVED:
       return Code::UNIMPLEMENTED;
@@ -124,11 +167,13 @@ grpc::Status Refusal::status() const {
   details.set_message(message_);
   v1::ErrorInfo info;
   info.set_reason(reason_name(reason_));
-  info.set_domain("mbcosim");
+  info.set_domain("mbcosim.dev");
   info.mutable_metadata()->insert(metadata_.begin(), metadata_.end());
   google::protobuf::Any* any = details.add_details();
   any->set_type_url(kErrorInfoUrl);
   info.SerializeToString(any->mutable_value());
+  if (reason_ == v1::REASON_BAD_ARGUMENT) add_bad_request(message_, &details);
+  if (reason_ == v1::REASON_SIMULATION_BUSY) add_retry_info(&details);
   if (failure_) details.add_details()->PackFrom(*failure_);
   if (diagnostics_) details.add_details()->PackFrom(*diagnostics_);
   return {code_of(reason_), message_, details.SerializeAsString()};

@@ -31,7 +31,7 @@ TEST(Refusal, CarriesItsParticulars) {
   v1::ErrorInfo info;
   ASSERT_TRUE(info.ParseFromString(details.details(0).value()));
   EXPECT_EQ(info.reason(), "WRONG_STEP");
-  EXPECT_EQ(info.domain(), "mbcosim");
+  EXPECT_EQ(info.domain(), "mbcosim.dev");
   EXPECT_EQ(info.metadata().at("step"), "5");
 }
 

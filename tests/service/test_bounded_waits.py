@@ -64,6 +64,7 @@ CALLS = {
     "eigenvalues": lambda s: s.eigenvalues(timeout=0.3),
     "linearize": lambda s: s.linearize(timeout=0.3),
     "linearize_descriptor": lambda s: s.linearize_descriptor(timeout=0.3),
+    "geometry": lambda s: s.geometry(timeout=0.3),
     "refresh": lambda s: s.refresh(timeout=0.3),
     "update": lambda s: s.update(name="x", timeout=0.3),
     "record": lambda s: s.record(timeout=0.3),

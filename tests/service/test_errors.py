@@ -50,7 +50,7 @@ def test_a_loaded_node_without_inertia_is_singular(server):
         "body: 1, 1, 1., null, diag, 1., 2., 3.;", "force: 1, absolute, 1, position, null, 0., 0., 1., const, 1.;")
     with pytest.raises(mbcosim.Error, match="the matrix is singular") as caught:
         server.load_text(deck)
-    assert (caught.value.code, caught.value.reason) == (grpc.StatusCode.ABORTED, "SINGULAR")
+    assert (caught.value.code, caught.value.reason) == (grpc.StatusCode.FAILED_PRECONDITION, "SINGULAR")
     assert caught.value.failure.worst_equations[0].owner == "structural node 1"
 
 

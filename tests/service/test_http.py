@@ -175,7 +175,7 @@ def test_errors_tell_code_reason_and_particulars(door, server, pendulum):
         status, error = door.call("Simulations/Step", {"simulation": simulation.name, "expectedStep": 7})
         assert status == 400 and error["code"] == "failed_precondition"
         assert error["details"][0]["type"] == "google.rpc.ErrorInfo"
-        assert error["details"][0]["debug"] == {"reason": "WRONG_STEP", "domain": "mbcosim", "metadata": {"step": "0"}}
+        assert error["details"][0]["debug"] == {"reason": "WRONG_STEP", "domain": "mbcosim.dev", "metadata": {"step": "0"}}
 
 
 @pytest.mark.parametrize("service", SERVICES, ids=lambda service: service.name)

@@ -11,10 +11,10 @@
 from ._version import __version__
 from .access import default_address
 from .analysis import Modes, StateSpace
-from .calls import Condition, StepResult
+from .calls import Condition, Geometry, StepResult, grant
 from .client import Server, connect
 from .coupling import Peer, modal_port, motion_port, signal_port, structural_port
-from .errors import (DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
+from .errors import (Busy, DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
                      StepFailed, TimedOut, Unavailable)
 from .events import Events
 from .exchange import Loads, Motion, Reject
@@ -26,5 +26,5 @@ __all__ = [
     "__version__", "connect", "connect_or_start", "local", "default_address", "Server", "LocalServer", "Simulation", "Snapshot", "StepResult",
     "Stepper", "Subscription", "Events", "History", "StateSpace", "Modes", "Motion", "Loads", "Condition", "Reject", "Peer", "modal_port",
     "motion_port", "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound",
-    "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable",
+    "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable", "Geometry", "Busy", "grant",
 ]

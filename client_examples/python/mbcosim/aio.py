@@ -29,7 +29,7 @@ from . import access, events, exchange
 from .access import Attempts, default_address
 from .calls import ServerCalls, SimulationCalls, SnapshotCalls, StepResult
 from .coupling import Answer, open_stream
-from .errors import PreconditionFailed, StepFailed, TimedOut, Unavailable, from_rpc_error, translated
+from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, from_rpc_error, translated
 from .histories import History
 from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Awaiting, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
 from .simulation import subscribe_request
@@ -70,10 +70,15 @@ class Connection:
 
     async def run(self, calls: Calls[T]) -> T:
         """Makes the calls of a generator one after the other; its result."""
-        reply: Any = None
         try:
+            call = next(calls)
             while True:
-                reply = await self.perform(calls.send(reply))
+                try:
+                    reply = await self.perform(call)
+                except Error as error:
+                    call = calls.throw(error)
+                else:
+                    call = calls.send(reply)
         except StopIteration as end:
             result: T = end.value
             return result

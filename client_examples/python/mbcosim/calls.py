@@ -12,10 +12,10 @@ from typing import Any, Generic, Optional, TypeVar, Union
 import numpy as np
 import numpy.typing as npt
 
-from mbcosim.v1 import common_pb2, coupling_types_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb
+from mbcosim.v1 import common_pb2, coupling_types_pb2, geometry_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb
 
 from . import bundle
-from .errors import StepFailed, enum_name
+from .errors import NotFound, StepFailed, enum_name
 from .rpc import USUAL, Call, Calls, call
 from .table import Rows
 from .words import choice, pick, remedy
@@ -24,6 +24,7 @@ from .words import choice, pick, remedy
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, npt.ArrayLike]  # by name
 Results = Union[bool, str, Iterable[str]]  # which result files
+Symbol = Union[bool, float, str]
 SimulationKind = TypeVar("SimulationKind", bound="SimulationCalls[Any]")
 SnapshotKind = TypeVar("SnapshotKind", bound="SnapshotCalls")
 list_of = list  # ServerCalls has a method of that name
@@ -36,6 +37,19 @@ def _matrix(message: pb.Matrix) -> Array:
     full = np.zeros((message.rows, message.columns))
     full[list(message.row_indices), list(message.column_indices)] = message.values
     return full
+
+
+def grant(identity: str, right: str, ports: Iterable[str] = ()) -> pb.Grant:
+    """Lets `identity` ("token:NAME", "cert:…" or "*") use a simulation: "observe", "couple" (to `ports`, or all) or "control"."""
+    value: Any = choice(pb.Right, "RIGHT_", right, "right")
+    return pb.Grant(identity=identity, right=value, ports=ports)
+
+
+def _symbol(value: Symbol) -> pb.SymbolValue:
+    """`mbcosim.v1.SymbolValue`."""
+    if isinstance(value, (bool, np.bool_)):
+        return pb.SymbolValue(flag=bool(value))
+    return pb.SymbolValue(text=value) if isinstance(value, str) else pb.SymbolValue(number=float(value))
 
 
 def _policy(name: str) -> Any:
@@ -84,6 +98,15 @@ class StepResult:
     reply: pb.StepReply     # all the server said
 
 
+@dataclasses.dataclass
+class Geometry:
+    """What a viewer needs: messages of `mbcosim.v1`, in the order of the deck."""
+    header: Optional[geometry_pb2.GeometryHeader] = None
+    nodes: list[geometry_pb2.NodeGeometry] = dataclasses.field(default_factory=list)
+    elements: list[geometry_pb2.ElementGeometry] = dataclasses.field(default_factory=list)
+    modal_points: list[geometry_pb2.ModalPoints] = dataclasses.field(default_factory=list)
+
+
 class ServerCalls(Generic[SimulationKind]):
     """Calls that name no simulation, or make one."""
 
@@ -124,6 +147,8 @@ class ServerCalls(Generic[SimulationKind]):
         summed_time   time is summed from step to step as MBDyn does, instead of t0 + n h
         results       writes result files on the server: True (what the deck asks for), "text", "netcdf" or a list of them
         results_quota most bytes of them; None: the server's limit
+        symbols       values by name in place of those that the deck declares: numbers, strings, bools
+        grants        who else may use the simulation: a list of mbcosim.grant(...)
         timeout       seconds that the call may take; None: as long as the server lives
         """
         return (yield from self._create(pb.UploadHeader(bundle_main_file=main), files, **options))
@@ -135,7 +160,8 @@ class ServerCalls(Generic[SimulationKind]):
 
     def _create(self, header: pb.UploadHeader, files: Mapping[str, bytes], *, name: str = "", lease: Optional[float] = None,
                 ports: Iterable[coupling_types_pb2.PortDefinition] = (), policy: str = "fail", minimum_step: float = 0.0,
-                record: bool = False, summed_time: bool = False, results: Results = False,
+                record: bool = False, summed_time: bool = False, symbols: Optional[Mapping[str, Symbol]] = None,
+                grants: Iterable[pb.Grant] = (), results: Results = False,
                 results_quota: Optional[int] = None, timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = uuid.uuid4().hex
         header.options.display_name = name
@@ -146,6 +172,9 @@ class ServerCalls(Generic[SimulationKind]):
         header.options.summed_time = summed_time
         if results:
             header.options.results.CopyFrom(_result_options(results, results_quota))
+        header.options.grants.extend(grants)
+        for symbol, value in (symbols or {}).items():
+            header.options.symbols[symbol].CopyFrom(_symbol(value))
         if lease is not None:
             header.options.lease.FromMilliseconds(int(lease * 1000))
         reply = yield Call("Simulations/CreateSimulation", bundle.requests(header, files), timeout)
@@ -231,11 +260,17 @@ class SimulationCalls(Generic[SnapshotKind]):
         return (yield from self._describe(timeout))
 
     def _describe(self, timeout: Optional[float]) -> Calls[pb.ModelDescription]:
-        description: pb.ModelDescription = yield Call(
-            "Simulations/DescribeSimulation", pb.DescribeSimulationRequest(name=self.name), timeout, repeatable=True)
-        self._description = description
-        self._known.update((v.name, v) for v in description.variables)
-        return description
+        request, whole = pb.DescribeSimulationRequest(name=self.name), pb.ModelDescription()
+        while True:
+            page: pb.ModelDescription = yield Call("Simulations/DescribeSimulation", request, timeout, repeatable=True)
+            request.page_token = page.next_page_token
+            page.next_page_token = ""
+            whole.MergeFrom(page)
+            if not request.page_token:
+                break
+        self._known.update((v.name, v) for v in whole.variables)
+        self._description = whole
+        return whole
 
     @call
     def handles(self, names: Iterable[str], *, timeout: Optional[float] = USUAL) -> Calls[list_of[int]]:
@@ -244,8 +279,17 @@ class SimulationCalls(Generic[SnapshotKind]):
 
     def _handles(self, names: Iterable[str], timeout: Optional[float] = USUAL) -> Calls[list_of[int]]:
         names = list(names)
-        if any(name not in self._known for name in names) and self._description is None:
-            yield from self._describe(timeout)
+        missing = [name for name in names if name not in self._known]
+        if missing and self._description is None:
+            request = pb.DescribeSimulationRequest(name=self.name, variable_names=missing)
+            try:
+                found: pb.ModelDescription = yield Call("Simulations/DescribeSimulation", request, timeout, repeatable=True)
+            except NotFound as error:
+                if error.reason != "NO_SUCH_VARIABLE":
+                    raise
+                yield from self._describe(timeout)  # its names help to find the one that was meant
+            else:
+                self._known.update((v.name, v) for v in found.variables)
         return [self._variable(name).handle for name in names]
 
     def _variable(self, name: str) -> common_pb2.Variable:
@@ -503,6 +547,28 @@ class SimulationCalls(Generic[SnapshotKind]):
         reply: pb.LinearizeReply = yield Call("Simulations/Linearize", request, timeout, repeatable=True)
         return reply
 
+    @call
+    def geometry(self, *, line_samples: Optional[int] = None, modal_points: bool = True,
+                 timeout: Optional[float] = None) -> Calls[Geometry]:
+        """What a viewer needs; see Geometry. `line_samples`: points along each curved line, 2 to 1000."""
+        request = geometry_pb2.DescribeGeometryRequest(simulation=self.name, line_samples=line_samples,
+                                                       without_modal_points=not modal_points)
+        found = Geometry()
+
+        def take(message: geometry_pb2.DescribeGeometryReply) -> None:
+            kind = message.WhichOneof("content")
+            if kind == "header":
+                found.header = message.header
+            elif kind == "nodes":
+                found.nodes += message.nodes.nodes
+            elif kind == "elements":
+                found.elements += message.elements.elements
+            elif kind == "modal_points":
+                found.modal_points.append(message.modal_points)
+
+        yield Call("Geometry/DescribeGeometry", request, timeout, each=take)
+        return found
+
     # ---------------------------------------------------------------- the simulation itself
 
     @call
@@ -513,7 +579,7 @@ class SimulationCalls(Generic[SnapshotKind]):
 
     @call
     def update(self, *, name: Optional[str] = None, policy: Optional[str] = None, minimum_step: Optional[float] = None,
-               timeout: Optional[float] = USUAL) -> Calls[pb.SimulationInfo]:
+               grants: Optional[Iterable[pb.Grant]] = None, timeout: Optional[float] = USUAL) -> Calls[pb.SimulationInfo]:
         """Changes choices made at creation; see Server.load_bundle."""
         request = pb.UpdateSimulationRequest(name=self.name)
         if name is not None:
@@ -522,6 +588,9 @@ class SimulationCalls(Generic[SnapshotKind]):
             request.non_convergence_policy = _policy(policy)
         if minimum_step is not None:
             request.minimum_step_s = minimum_step
+        if grants is not None:
+            request.grants.SetInParent()
+            request.grants.grants.extend(grants)
         self.info = yield Call("Simulations/UpdateSimulation", request, timeout, repeatable=True)
         return self.info
 

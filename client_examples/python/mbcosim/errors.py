@@ -21,6 +21,7 @@ class Error(Exception):
     code      grpc.StatusCode
     reason    name of a `mbcosim.v1.Reason`: "WRONG_STEP", ...; empty when the server gave none
     metadata  particulars by name, as text
+    field     of the request that is at fault; empty: none, or not known
     """
 
     def __init__(self, message: Optional[str], code: Any = None, reason: str = "", metadata: Optional[Mapping[str, str]] = None) -> None:
@@ -28,6 +29,7 @@ class Error(Exception):
         self.code = code
         self.reason = reason
         self.metadata = dict(metadata or {})
+        self.field = ""
         self.diagnostics: list[common_pb2.Diagnostic] = []
         self.failure: Optional[common_pb2.SolverFailure] = None
 
@@ -47,6 +49,10 @@ class NotFound(Error):
 
 class PreconditionFailed(Error):
     """The call does not fit the simulation's state."""
+
+
+class Busy(PreconditionFailed):
+    """Another call advances the simulation at the moment; try again."""
 
 
 class LimitExceeded(Error):
@@ -77,7 +83,7 @@ class StepFailed(Error):
     rows: Rows  # of which `history` is made
 
 
-_CLASSES = {
+_CLASSES: dict[Any, type[Error]] = {
     grpc.StatusCode.NOT_FOUND: NotFound,
     grpc.StatusCode.FAILED_PRECONDITION: PreconditionFailed,
     grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceeded,
@@ -85,7 +91,14 @@ _CLASSES = {
     grpc.StatusCode.PERMISSION_DENIED: NotAllowed,
     grpc.StatusCode.UNAVAILABLE: Unavailable,
     grpc.StatusCode.DEADLINE_EXCEEDED: TimedOut,
-    grpc.StatusCode.ABORTED: StepFailed,
+}
+_REASONS: dict[str, type[Error]] = {
+    "DECK_ERROR": DeckError,
+    "SIMULATION_BUSY": Busy,
+    "NOT_CONVERGED": StepFailed,
+    "SINGULAR": StepFailed,
+    "EVALUATION": StepFailed,
+    "PEER_LOST": StepFailed,
 }
 
 
@@ -105,6 +118,17 @@ def diagnostic_text(diagnostic: common_pb2.Diagnostic) -> str:
     return text + (f"\n  {diagnostic.hint}" if diagnostic.hint else "")
 
 
+def _first_text(data: bytes) -> bytes:
+    """The bytes of a message's first field, which is of bytes: `google.rpc` messages without their package."""
+    size = shift = 0
+    for at in range(1, len(data)):
+        size |= (data[at] & 127) << shift
+        shift += 7
+        if data[at] < 128:
+            return data[at + 1:at + 1 + size]
+    return b""
+
+
 def from_rpc_error(rpc_error: Any) -> Error:
     """The exception that tells what a grpc.RpcError carries."""
     code = rpc_error.code()
@@ -112,18 +136,20 @@ def from_rpc_error(rpc_error: Any) -> Error:
     for key, value in rpc_error.trailing_metadata() or ():
         if key == "grpc-status-details-bin":
             status.ParseFromString(value)
-    info, failure = common_pb2.ErrorInfo(), None
+    info, failure, field = common_pb2.ErrorInfo(), None, ""
     diagnostics: list[common_pb2.Diagnostic] = []
     for detail in status.details:
         if detail.type_url.endswith("google.rpc.ErrorInfo"):
             info.ParseFromString(detail.value)
+        elif detail.type_url.endswith("google.rpc.BadRequest"):
+            field = _first_text(_first_text(detail.value)).decode()
         elif detail.Is(common_pb2.SolverFailure.DESCRIPTOR):
             failure = common_pb2.SolverFailure.FromString(detail.value)
         elif detail.Is(common_pb2.DeckDiagnostics.DESCRIPTOR):
             diagnostics = list(common_pb2.DeckDiagnostics.FromString(detail.value).diagnostics)
-    kind = DeckError if info.reason == "DECK_ERROR" else _CLASSES.get(code, Error)
+    kind = _REASONS[info.reason] if info.reason in _REASONS else _CLASSES.get(code, Error)
     error = kind(rpc_error.details(), code, info.reason, info.metadata)
-    error.failure = failure
+    error.failure, error.field = failure, field
     error.diagnostics = diagnostics
     return error
 

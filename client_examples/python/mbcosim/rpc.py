@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, cast, overloa
 
 import grpc
 
-from mbcosim.v1 import (coupling_pb2_grpc, events_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
+from mbcosim.v1 import (coupling_pb2_grpc, events_pb2_grpc, geometry_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
                         telemetry_pb2_grpc)
 
-from .errors import TimedOut, Unavailable, translated
+from .errors import Error, TimedOut, Unavailable, translated
 
 if TYPE_CHECKING:
     from typing_extensions import Concatenate, ParamSpec
@@ -109,6 +109,7 @@ class Stubs:
         self.telemetry: Any = telemetry_pb2_grpc.TelemetryStub(channel)  # type: ignore[no-untyped-call]
         self.results: Any = results_pb2_grpc.ResultsStub(channel)  # type: ignore[no-untyped-call]
         self.events: Any = events_pb2_grpc.EventsStub(channel)  # type: ignore[no-untyped-call]
+        self.geometry: Any = geometry_pb2_grpc.GeometryStub(channel)  # type: ignore[no-untyped-call]
 
     def method(self, name: str) -> Any:
         service, method = name.split("/")
@@ -143,10 +144,15 @@ class Connection:
 
     def run(self, calls: Calls[T]) -> T:
         """Makes the calls of a generator one after the other; its result."""
-        reply: Any = None
         try:
+            call = next(calls)
             while True:
-                reply = self.perform(calls.send(reply))
+                try:
+                    reply = self.perform(call)
+                except Error as error:
+                    call = calls.throw(error)
+                else:
+                    call = calls.send(reply)
         except StopIteration as end:
             return cast(T, end.value)
 

@@ -1,0 +1,49 @@
+/// The geometry of a simulation as messages of bounded size.
+#pragma once
+
+#include <memory>
+
+#include "mbcosim/v1/geometry.pb.h"
+#include "simulation/geometry_view.h"
+#include "simulation/simulation.h"
+
+namespace mbcosim::server {
+
+/// Tells all that can be drawn of a simulation as it stands, message by message.
+class GeometryMessages {
+ public:
+  /// Throws Refusal when the request is wrong.
+  GeometryMessages(std::unique_ptr<Simulation> simulation,
+                   const v1::DescribeGeometryRequest& request);
+
+  /// Fills the next message; false: there is none.
+  bool next(v1::DescribeGeometryReply* reply);
+
+ private:
+  enum class Part { header, nodes, elements, modal_points, end };
+
+  void fill_header(v1::GeometryHeader* out) const;
+  void fill_nodes(v1::NodeGeometryList* out);
+  void fill_elements(v1::ElementGeometryList* out);
+  bool find_modes();
+  void fill_modal_points(v1::ModalPoints* out);
+  void begin_modal_points(const ElementGeometry::Modes& modes, v1::ModalPoints* out) const;
+  void fill(int k, v1::NodeGeometry* out) const;
+  void fill(int k, v1::ElementGeometry* out) const;
+  void fill(const ElementGeometry::Point& p, v1::GeometryPoint* out) const;
+  void fill(const ElementGeometry& g, const ElementGeometry::Line& line,
+            v1::GeometryLine* out) const;
+  void fill(const ElementGeometry::Arrow& a, const std::string& variable,
+            v1::GeometryArrow* out) const;
+
+  const std::unique_ptr<Simulation> simulation_;
+  const Model& model_;
+  const GeometryView view_;
+  const v1::DescribeGeometryRequest request_;
+  Part part_ = Part::header;
+  int index_ = 0;  ///< next node or element of the part
+  int body_ = 0;   ///< next flexible body of the element
+  int point_ = 0;  ///< its next point
+};
+
+}  // namespace mbcosim::server

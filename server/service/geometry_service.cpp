@@ -1,0 +1,22 @@
+#include "service/geometry_service.h"
+
+#include "service/geometry_messages.h"
+
+namespace mbcosim::server {
+
+void add_geometry(Gate& gate, const Parts& parts) {
+  gate.add("/mbcosim.v1.Geometry/DescribeGeometry",
+           series<v1::DescribeGeometryRequest, v1::DescribeGeometryReply>(
+               Role::observe, Lane::work,
+               [&parts](const CallFrame& frame, const v1::DescribeGeometryRequest& request) {
+                 auto session = std::make_shared<SessionHold>(parts.store, request.simulation(),
+                                                              frame.caller, Access::observe);
+                 auto messages =
+                     std::make_shared<GeometryMessages>((*session)->fork(/*snapshot=*/-1), request);
+                 return [session, messages](v1::DescribeGeometryReply* reply) {
+                   return messages->next(reply);
+                 };
+               }));
+}
+
+}  // namespace mbcosim::server

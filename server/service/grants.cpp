@@ -1,0 +1,78 @@
+#include "service/grants.h"
+
+#include <algorithm>
+
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+constexpr int kMostGrants = 1000;
+constexpr std::size_t kLongestIdentity = 1000;
+
+void check(const Grants::List& grants) {
+  if (grants.size() > kMostGrants)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`grants` must not have more than " + std::to_string(kMostGrants) + " entries");
+  for (const v1::Grant& grant : grants) {
+    if (grant.identity().empty() || grant.identity().size() > kLongestIdentity)
+      throw Refusal(
+          v1::REASON_BAD_ARGUMENT,
+          "`grants.identity` must be \"*\" or an identity such as \"token:NAME\", got \"" +
+              grant.identity().substr(0, 100) + "\"");
+    if (!v1::Right_IsValid(grant.right()) || grant.right() == v1::RIGHT_UNSPECIFIED)
+      throw Refusal(
+          v1::REASON_BAD_ARGUMENT,
+          "`grants.right` must be OBSERVE, COUPLE or CONTROL for \"" + grant.identity() + "\"");
+    if (grant.ports_size() > 0 && grant.right() != v1::RIGHT_COUPLE)
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`grants.ports` goes with the right COUPLE only");
+  }
+}
+
+bool gives(const v1::Grant& grant, Access access, const std::string& port) {
+  const bool control = grant.right() == v1::RIGHT_CONTROL;
+  switch (access) {
+    case Access::see:
+      return true;
+    case Access::observe:
+      return control || grant.right() == v1::RIGHT_OBSERVE;
+    case Access::couple:
+      return control ||
+             (grant.right() == v1::RIGHT_COUPLE &&
+              (grant.ports().empty() ||
+               std::find(grant.ports().begin(), grant.ports().end(), port) != grant.ports().end()));
+    case Access::control:
+      return control;
+    case Access::own:
+      return false;
+  }
+  return false;
+}
+
+}  // namespace
+
+Grants::Grants(std::string owner, const List& grants) : owner_(std::move(owner)), grants_(grants) {
+  check(grants);
+}
+
+void Grants::replace(const List& grants) {
+  check(grants);
+  Guard guard(mutex_);
+  grants_ = grants;
+}
+
+bool Grants::allow(const Caller& caller, Access access, const std::string& port) const {
+  if (caller.may_touch(owner_)) return true;
+  Guard guard(mutex_);
+  return std::any_of(grants_.begin(), grants_.end(), [&](const v1::Grant& grant) {
+    return (grant.identity() == "*" || grant.identity() == caller.identity) &&
+           gives(grant, access, port);
+  });
+}
+
+Grants::List Grants::list() const {
+  Guard guard(mutex_);
+  return grants_;
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,166 @@
+"""Sharing a simulation: method x right x role, and what a second identity may do with a grant."""
+import grpc
+import pytest
+
+import decks
+import mbcosim
+from mbcosim.v1 import coupling_pb2, coupling_types_pb2 as types, geometry_pb2, geometry_pb2_grpc, simulations_pb2 as pb, telemetry_pb2
+from test_coupling import PORT, spring
+from test_geometry import CHAIN
+
+TOKENS = "ann-t control ann\nbob-t control bob\neve-t observe eve\nroot-t admin root\n"
+X = "node.structural.1.X"
+
+# What each right allows: see (get, list), observe, couple, control, own (delete, change grants).
+ALLOWED = {None: "", "observe": "see observe", "couple": "see couple", "control": "see observe couple control"}
+
+
+@pytest.fixture
+def shared(start_daemon, tmp_path):
+    """A daemon with tokens; function: a connection for a token."""
+    tokens = tmp_path / "tokens"
+    tokens.write_text(TOKENS)
+    tokens.chmod(0o600)
+    daemon = start_daemon("--tokens", str(tokens))
+    connections = []
+
+    def connect(name):
+        connections.append(daemon.connect(token=f"{name}-t"))
+        return connections[-1]
+
+    yield connect
+    for connection in connections:
+        connection.close()
+
+
+def calls(server, name, port="spring"):
+    """Calls on a simulation by name, and which access each needs; those that change nothing come first."""
+    stub, metadata = server.simulations, server.metadata
+    geometry = geometry_pb2_grpc.GeometryStub(server._channel)
+
+    def unary(method, request):
+        return lambda: method(request, metadata=metadata, timeout=30)
+
+    def stream(method, request):
+        return lambda: next(method(request, metadata=metadata, timeout=30))
+
+    def attach():
+        with server.attach(name).couple(port, spring):
+            pass
+
+    return [
+        ("GetSimulation", "see", unary(stub.GetSimulation, pb.GetSimulationRequest(name=name))),
+        ("DescribeSimulation", "observe", unary(stub.DescribeSimulation, pb.DescribeSimulationRequest(name=name))),
+        ("ReadVariables", "observe", unary(stub.ReadVariables, pb.ReadVariablesRequest(simulation=name))),
+        ("ListSnapshots", "observe", unary(stub.ListSnapshots, pb.ListSnapshotsRequest(simulation=name))),
+        ("ExportSnapshot", "observe", stream(stub.ExportSnapshot, pb.ExportSnapshotRequest(simulation=name))),
+        ("GetRecord", "observe", stream(stub.GetRecord, pb.GetRecordRequest(name=name))),
+        ("Subscribe", "observe", stream(server.telemetry.Subscribe, telemetry_pb2.SubscribeRequest(simulation=name))),
+        ("DescribeGeometry", "observe", stream(geometry.DescribeGeometry, geometry_pb2.DescribeGeometryRequest(simulation=name))),
+        ("Attach", "couple", attach),
+        ("WriteVariables", "control", unary(stub.WriteVariables, pb.WriteVariablesRequest(simulation=name))),
+        ("Step", "control", unary(stub.Step, pb.StepRequest(simulation=name, steps=0))),
+        ("StepStream", "control", stream(stub.StepStream, iter([pb.StepRequest(simulation=name, steps=0)]))),
+        ("Run", "control", stream(stub.Run, pb.RunRequest(step=pb.StepRequest(simulation=name, steps=0)))),
+        ("Interrupt", "control", unary(stub.Interrupt, pb.InterruptRequest(name=name))),
+        ("CreateSnapshot", "control", unary(stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))),
+        ("RestoreSnapshot", "control", unary(stub.RestoreSnapshot, pb.RestoreSnapshotRequest(name=name + "/snapshots/1"))),
+        ("Linearize", "control", unary(stub.Linearize, pb.LinearizeRequest(simulation=name))),
+        ("ComputeEigenvalues", "control", unary(stub.ComputeEigenvalues, pb.ComputeEigenvaluesRequest(simulation=name))),
+        ("ForkSimulation", "control", unary(stub.ForkSimulation, pb.ForkSimulationRequest(simulation=name))),
+        ("UpdateSimulation", "control", unary(stub.UpdateSimulation, pb.UpdateSimulationRequest(name=name, display_name="x"))),
+        ("UpdateSimulation grants", "own", unary(stub.UpdateSimulation, pb.UpdateSimulationRequest(name=name, grants=pb.Grants()))),
+        ("DeleteSimulation", "own", unary(stub.DeleteSimulation, pb.DeleteSimulationRequest(name=name))),
+    ]
+
+
+def outcome(call):
+    """Code and reason of a call; "OK" when it passes or fails for reasons that have nothing to do with rights."""
+    try:
+        call()
+    except (grpc.RpcError, mbcosim.Error) as error:
+        error = mbcosim.errors.from_rpc_error(error) if isinstance(error, grpc.RpcError) else error
+        if error.code in (grpc.StatusCode.PERMISSION_DENIED, grpc.StatusCode.NOT_FOUND) and error.reason != "NO_SUCH_SNAPSHOT":
+            return error.code.name, error.reason
+    except StopIteration:
+        pass
+    return "OK", ""
+
+
+def expected(access, right, role):
+    needs_control = access in ("couple", "control", "own")
+    if role == "observe" and needs_control:
+        return "PERMISSION_DENIED", "ROLE_TOO_LOW"
+    if right is None:
+        return "NOT_FOUND", "NO_SUCH_SIMULATION"
+    return ("OK", "") if access in ALLOWED[right].split() else ("PERMISSION_DENIED", "NOT_GRANTED")
+
+
+@pytest.mark.parametrize("right", list(ALLOWED))
+@pytest.mark.parametrize("guest, role", [("bob", "control"), ("eve", "observe")])
+def test_every_method_asks_for_its_right(shared, guest, role, right):
+    grants = [] if right is None else [mbcosim.grant(f"token:{guest}", right)]
+    with shared("ann").load_text(decks.body(), ports=PORT, record=True, grants=grants) as simulation:
+        simulation.snapshot()
+        server = shared(guest)
+        for method, access, call in calls(server, simulation.name):
+            wanted = expected(access, right, role)
+            if method == "Attach" and wanted[0] == "PERMISSION_DENIED" and role == "observe" and right is None:
+                wanted = ("NOT_FOUND", "NO_SUCH_SIMULATION")  # the client asks for the simulation first
+            assert outcome(call) == wanted, method
+        seen = [s.name for s in server.list()]
+        assert (simulation.name in seen) == (right is not None)
+
+
+def test_owners_and_admins_may_do_all(shared):
+    for name in ("ann", "root"):
+        simulation = shared("ann").load_text(decks.body(), ports=PORT, record=True)
+        for method, _, call in calls(shared(name), simulation.name):
+            assert outcome(call) == ("OK", ""), (name, method)
+
+
+def test_a_second_token_couples_to_a_granted_port_and_reads_nothing_else(shared):
+    ports = [mbcosim.structural_port("wing", nodes=[1]), mbcosim.structural_port("tail", nodes=[2])]
+    grants = [mbcosim.grant("token:bob", "couple", ["wing"])]
+    with shared("ann").load_text(CHAIN.format(n=2).replace("end: initial value", "max iterations: 20; end: initial value"), ports=ports, grants=grants) as simulation:
+        guest = shared("bob").attach(simulation.name)
+        with pytest.raises(mbcosim.NotAllowed) as caught:
+            guest.couple("tail", spring)
+        assert (caught.value.reason, caught.value.metadata["wanted"]) == ("NOT_GRANTED", "couple")
+        with pytest.raises(mbcosim.NotAllowed):
+            guest.read([X])
+        assert not guest.info.grants, "grants are told to the owner only"
+        with guest.couple("wing", spring), simulation.couple("tail", spring):
+            assert simulation.step(5).step == 5
+
+
+def test_grants_change_while_the_simulation_lives(shared):
+    with shared("ann").load_text(decks.body()) as simulation:
+        guest = shared("bob")
+        with pytest.raises(mbcosim.NotFound):
+            guest.attach(simulation.name)
+        info = simulation.update(grants=[mbcosim.grant("*", "observe")])
+        assert [g.identity for g in info.grants] == ["*"]
+        assert guest.attach(simulation.name).read([X])[X].shape == (3,)
+        simulation.update(name="renamed")
+        assert guest.attach(simulation.name).info.display_name == "renamed", "what is absent stays"
+        simulation.update(grants=[])
+        with pytest.raises(mbcosim.NotFound):
+            guest.attach(simulation.name)
+
+
+@pytest.mark.parametrize("wrong, field", [
+    (pb.Grant(identity="", right=pb.RIGHT_OBSERVE), "grants.identity"),
+    (pb.Grant(identity="token:bob"), "grants.right"),
+    (pb.Grant(identity="token:bob", right=17), "grants.right"),
+    (pb.Grant(identity="token:bob", right=pb.RIGHT_OBSERVE, ports=["wing"]), "grants.ports")])
+def test_wrong_grants_are_refused_by_field_and_change_nothing(shared, wrong, field):
+    server = shared("ann")
+    with pytest.raises(mbcosim.Error) as caught:
+        server.load_text(decks.body(), grants=[wrong])
+    assert caught.value.reason == "BAD_ARGUMENT" and caught.value.field == field
+    assert server.list() == []
+    with server.load_text(decks.body(), grants=[mbcosim.grant("token:bob", "observe")]) as simulation:
+        with pytest.raises(mbcosim.Error):
+            simulation.update(grants=[wrong])
+        assert [g.identity for g in simulation.refresh().grants] == ["token:bob"]
