@@ -62,8 +62,10 @@ Outcome to_outcome(v1::StepOutcome outcome) {
       return Outcome::not_written;
     case v1::STEP_OUTCOME_REJECTED_BY_PEER:
       return Outcome::rejected_by_peer;
-    default:
+    case v1::STEP_OUTCOME_ACCEPTED:
       return Outcome::accepted;
+    default:
+      return Outcome::unknown;
   }
 }
 
@@ -84,6 +86,17 @@ v1::Comparison to_proto(Condition::Kind kind) {
 std::shared_ptr<grpc::ChannelCredentials> channel_credentials(const Credentials& credentials) {
   if (credentials.server_ca.empty()) return grpc::InsecureChannelCredentials();
   return grpc::SslCredentials({credentials.server_ca, credentials.key, credentials.certificate});
+}
+
+/// A server that is stopped or behind a black hole is noticed within 20 s.
+grpc::ChannelArguments channel_arguments() {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  arguments.SetMaxReceiveMessageSize(-1);
+  return arguments;
 }
 
 }  // namespace
@@ -117,7 +130,8 @@ Server Server::connect(const std::string& address, double timeout, const Credent
   auto impl = std::make_shared<Impl>();
   impl->address = address;
   if (!credentials.token.empty()) impl->authorization = "Bearer " + credentials.token;
-  impl->channel = grpc::CreateChannel(address, channel_credentials(credentials));
+  impl->channel =
+      grpc::CreateCustomChannel(address, channel_credentials(credentials), channel_arguments());
   impl->simulations = v1::Simulations::NewStub(impl->channel);
   impl->coupling = v1::Coupling::NewStub(impl->channel);
   const auto deadline = std::chrono::system_clock::now() +
@@ -128,8 +142,8 @@ Server Server::connect(const std::string& address, double timeout, const Credent
   return Server(std::move(impl));
 }
 
-std::string Server::version() const {
-  CallContext context(*impl_);
+std::string Server::version(double timeout) const {
+  CallContext context(*impl_, timeout);
   v1::ServerInfo info;
   require(impl_->simulations->GetServerInfo(&context, {}, &info));
   return info.version();
@@ -149,48 +163,47 @@ Simulation Server::load_text(const std::string& deck, const LoadOptions& options
 
 struct Simulation::Impl {
   Impl(std::shared_ptr<Server::Impl> connection, const v1::SimulationInfo& simulation, bool is_ours)
-      : server(std::move(connection)), info(simulation), owned(is_ours) {
-    CallContext context(*server);
-    v1::DescribeSimulationRequest request;
-    request.set_name(info.name());
-    v1::ModelDescription description;
-    require(server->simulations->DescribeSimulation(&context, request, &description));
-    for (const v1::Variable& variable : description.variables())
-      variables[variable.name()] = variable;
-  }
+      : server(std::move(connection)), info(simulation), owned(is_ours) {}
 
   std::shared_ptr<Server::Impl> server;
   v1::SimulationInfo info;
   bool owned;
-  std::map<std::string, v1::Variable> variables;
+  std::map<std::string, v1::Variable> variables;  ///< those that were asked for
 
-  const v1::Variable& variable(const std::string& name) const {
+  /// Asks the server for the first time.
+  const v1::Variable& variable(const std::string& name, double timeout) {
     const auto found = variables.find(name);
     if (found != variables.end()) return found->second;
-    throw Error("the model has no variable \"" + name + "\"", 5, "NO_SUCH_VARIABLE", {});
+    CallContext context(*server, timeout);
+    v1::DescribeSimulationRequest request;
+    request.set_name(info.name());
+    request.add_variable_names(name);
+    v1::ModelDescription reply;
+    require(server->simulations->DescribeSimulation(&context, request, &reply));
+    return variables[name] = reply.variables(0);
   }
-  void put(const StepOptions& options, v1::StepRequest& request) const {
+  void put(const StepOptions& options, v1::StepRequest& request) {
     if (options.step_size) request.set_step_size_s(*options.step_size);
     request.set_exact(options.exact);
     if (!options.until) return;
     const Condition& until = *options.until;
     v1::Condition& out = *request.mutable_until();
-    out.set_handle(variable(until.variable).handle());
+    out.set_handle(variable(until.variable, options.timeout).handle());
     out.set_element(until.element);
     out.set_comparison(to_proto(until.kind));
     out.set_threshold(until.threshold);
     if (until.locate_within != 0) out.set_locate_within_s(until.locate_within);
   }
-  StepResult advance(const v1::StepRequest& request) {
-    CallContext context(*server);
+  StepResult advance(const v1::StepRequest& request, double timeout) {
+    CallContext context(*server, timeout);
     v1::StepReply reply;
     require(server->simulations->Step(&context, request, &reply));
     return to_result(reply);
   }
-  void put_columns(const std::vector<std::string>& outputs, v1::TableRequest& request,
-                   Table& table) const {
+  void put_columns(const std::vector<std::string>& outputs, v1::TableRequest& request, Table& table,
+                   double timeout) {
     for (const std::string& name : outputs) {
-      const v1::Variable& known = variable(name);
+      const v1::Variable& known = variable(name, timeout);
       request.add_handles(known.handle());
       table.columns.push_back({name, known.unit(), known.size(), table.width});
       table.width += known.size();
@@ -217,7 +230,7 @@ struct Simulation::Impl {
 
 Simulation Server::create(const std::string& main, const std::map<std::string, std::string>& files,
                           const LoadOptions& options) {
-  CallContext context(*impl_);
+  CallContext context(*impl_, options.timeout);
   v1::CreateSimulationReply reply;
   const auto upload = impl_->simulations->CreateSimulation(&context, &reply);
   v1::UploadRequest message;
@@ -239,8 +252,8 @@ Simulation Server::create(const std::string& main, const std::map<std::string, s
   return Simulation(std::make_unique<Simulation::Impl>(impl_, reply.simulation(), true));
 }
 
-Simulation Server::find(const std::string& name) {
-  CallContext context(*impl_);
+Simulation Server::find(const std::string& name, double timeout) {
+  CallContext context(*impl_, timeout);
   v1::GetSimulationRequest request;
   request.set_name(name);
   v1::SimulationInfo info;
@@ -254,7 +267,7 @@ Simulation& Simulation::operator=(Simulation&&) noexcept = default;
 
 Simulation::~Simulation() {
   if (!impl_ || !impl_->owned) return;
-  CallContext context(*impl_->server);
+  CallContext context(*impl_->server, kParting);
   v1::DeleteSimulationRequest request;
   request.set_name(impl_->info.name());
   v1::DeleteSimulationReply reply;
@@ -268,7 +281,7 @@ StepResult Simulation::step(std::int64_t count, const StepOptions& options) {
   request.set_simulation(name());
   request.set_steps(count);
   impl_->put(options, request);
-  return impl_->advance(request);
+  return impl_->advance(request, options.timeout);
 }
 
 StepResult Simulation::run_until(double time, const StepOptions& options) {
@@ -276,7 +289,7 @@ StepResult Simulation::run_until(double time, const StepOptions& options) {
   request.set_simulation(name());
   request.set_until_time_s(time);
   impl_->put(options, request);
-  return impl_->advance(request);
+  return impl_->advance(request, options.timeout);
 }
 
 Table Simulation::simulate(double time, const std::vector<std::string>& outputs,
@@ -288,8 +301,8 @@ Table Simulation::simulate(double time, const std::vector<std::string>& outputs,
   request.mutable_table()->set_every(options.every);
   request.mutable_table()->set_without_start(!options.start);
   Table table;
-  impl_->put_columns(outputs, *request.mutable_table(), table);
-  CallContext context(*impl_->server);
+  impl_->put_columns(outputs, *request.mutable_table(), table, options.step.timeout);
+  CallContext context(*impl_->server, options.step.timeout);
   const auto replies = impl_->server->simulations->Run(&context, request);
   v1::RunReply reply;
   while (replies->Read(&reply)) {
@@ -303,27 +316,40 @@ Table Simulation::simulate(double time, const std::vector<std::string>& outputs,
   return table;
 }
 
-std::vector<double> Simulation::read(const std::string& variable) const {
-  CallContext context(*impl_->server);
+std::vector<double> Simulation::read(const std::string& variable, double timeout) const {
   v1::ReadVariablesRequest request;
   request.set_simulation(name());
-  request.add_handles(impl_->variable(variable).handle());
+  request.add_handles(impl_->variable(variable, timeout).handle());
+  CallContext context(*impl_->server, timeout);
   v1::ReadVariablesReply reply;
   require(impl_->server->simulations->ReadVariables(&context, request, &reply));
   return {reply.values().begin(), reply.values().end()};
 }
 
-void Simulation::write(const std::string& variable, const std::vector<double>& values) {
-  CallContext context(*impl_->server);
+bool Simulation::interrupt(double timeout) {
+  CallContext context(*impl_->server, timeout);
+  v1::InterruptRequest request;
+  request.set_name(name());
+  v1::InterruptReply reply;
+  require(impl_->server->simulations->Interrupt(&context, request, &reply));
+  return reply.was_stepping();
+}
+
+void Simulation::write(const std::string& variable, const std::vector<double>& values,
+                       double timeout) {
   v1::WriteVariablesRequest request;
   request.set_simulation(name());
-  request.mutable_values()->add_handles(impl_->variable(variable).handle());
+  request.mutable_values()->add_handles(impl_->variable(variable, timeout).handle());
+  CallContext context(*impl_->server, timeout);
   request.mutable_values()->mutable_values()->Add(values.begin(), values.end());
   v1::WriteVariablesReply reply;
   require(impl_->server->simulations->WriteVariables(&context, request, &reply));
 }
 
-Peer Simulation::attach(const std::string& port, const PeerOptions& options) {
+Peer Simulation::attach(const std::string& port, const PeerOptions& wanted) {
+  PeerOptions options = wanted;
+  if (options.transport == Transport::shared_memory && options.server_timeout <= 0)
+    options.server_timeout = 20;
   return Peer(attach_peer(impl_->server, make_hello(impl_->info, port, options), options));
 }
 

@@ -5,6 +5,7 @@
 #include <grpcpp/client_context.h>
 #include <grpcpp/support/status.h>
 
+#include <chrono>
 #include <memory>
 
 #include "client/mbcosim_client.h"
@@ -23,10 +24,15 @@ struct Server::Impl {
   std::unique_ptr<v1::Coupling::Stub> coupling;
 };
 
-/// Context of one call: says who calls.
+constexpr double kParting = 2;  ///< longest wait of a destructor [s]
+
+/// Context of one call: says who calls, and how long it may take [s].
 struct CallContext : grpc::ClientContext {
-  explicit CallContext(const Server::Impl& server) {
+  explicit CallContext(const Server::Impl& server, double timeout = kEndless) {
     if (!server.authorization.empty()) AddMetadata("authorization", server.authorization);
+    if (timeout > 0)
+      set_deadline(std::chrono::system_clock::now() +
+                   std::chrono::microseconds(static_cast<std::int64_t>(timeout * 1e6)));
   }
 };
 

@@ -20,6 +20,12 @@
 
 namespace mbcosim::client {
 
+/// Bounds on the time that a call may take [s]. A call that takes longer throws Error with code 4;
+/// one whose server is stopped or cannot be reached any more throws Error with code 14 within 25 s,
+/// whatever its bound.
+constexpr double kUsual = 30;   ///< default of calls that advance nothing
+constexpr double kEndless = 0;  ///< as long as the server lives
+
 /// A call was refused or failed.
 class Error : public std::runtime_error {
  public:
@@ -60,8 +66,10 @@ struct Port {
 struct LoadOptions {
   std::string display_name = {};
   std::vector<Port> ports = {};
+  double timeout = kEndless;  ///< of the call [s]
 };
 
+/// `unknown`: the server tells one that this library does not know; never a success.
 enum class Outcome {
   accepted,
   finished,
@@ -70,7 +78,8 @@ enum class Outcome {
   peer_lost,
   limit,
   not_written,  ///< accepted, but its results could not be written
-  rejected_by_peer
+  rejected_by_peer,
+  unknown
 };
 
 /// What an advance did. A failure is no exception: the simulation stands at its last accepted step.
@@ -106,6 +115,7 @@ struct StepOptions {
   std::optional<double> step_size = {};  ///< of each step [s]; none: the deck's
   bool exact = false;  ///< of `run_until`: the last step is shortened, so that it ends there
   std::optional<Condition> until = {};  ///< ends after the first step for which it holds
+  double timeout = kEndless;            ///< of the call [s]
 };
 
 struct SimulateOptions {
@@ -188,8 +198,9 @@ using StepEnded = std::function<void(bool accepted, std::int64_t step, double ti
 
 struct PeerOptions {
   Mode mode = Mode::port_default;
-  int every = 1;        ///< steps between exchanges; tight: iterations
-  double timeout = 10;  ///< longest wait for an answer [s]
+  int every = 1;             ///< steps between exchanges; tight: iterations
+  double peer_timeout = 10;  ///< longest wait of the server for an answer [s]
+  double timeout = kUsual;   ///< of the call that attaches [s]
   Policy policy = Policy::fail_step;
   Acceleration acceleration = Acceleration::none;
   double relaxation = 0.5;
@@ -204,7 +215,8 @@ struct PeerOptions {
   /// when none comes the server takes the peer for dead. 0: no such promise.
   double heartbeat_timeout = 0;
   /// The same promise of the server: when it is silent for so long [s] while the peer waits for it,
-  /// the peer ends. 0: the peer waits for as long as the connection stands.
+  /// the peer ends. 0: the peer waits for as long as the connection stands; over shared memory,
+  /// which has no other sign of it, 20 s.
   double server_timeout = 0;
   Transport transport = Transport::stream;
   StepEnded step_ended = {};  ///< called by the thread that reads: `next`, or the peer's own
@@ -249,8 +261,8 @@ class Peer {
 
 using Answer = std::function<Loads(const Motion&)>;
 
-/// A simulation on the server. Deletes it when destroyed, if it was loaded here. Calls throw Error;
-/// one thread at a time.
+/// A simulation on the server. Deletes it when destroyed, if it was loaded here and the server can
+/// be reached within 2 s; its lease ends it otherwise. Calls throw Error; one thread at a time.
 class Simulation {
  public:
   struct Impl;  // of the library
@@ -264,8 +276,11 @@ class Simulation {
   /// Steps until `time` [s] and returns the values of variables on the way, in one call.
   Table simulate(double time, const std::vector<std::string>& outputs,
                  const SimulateOptions& options = {});
-  std::vector<double> read(const std::string& variable) const;
-  void write(const std::string& variable, const std::vector<double>& values);
+  std::vector<double> read(const std::string& variable, double timeout = kUsual) const;
+  void write(const std::string& variable, const std::vector<double>& values,
+             double timeout = kUsual);
+  /// Stops whatever advances the simulation, from any client; was anything?
+  bool interrupt(double timeout = kUsual);
   /// Attaches a peer that asks for exchanges itself: `Peer::next`. It needs a thread other than the
   /// one that steps.
   Peer attach(const std::string& port, const PeerOptions& options = {});
@@ -297,12 +312,12 @@ class Server {
   Server(Server&&) noexcept;
   Server& operator=(Server&&) noexcept;
   ~Server();
-  std::string version() const;
+  std::string version(double timeout = kUsual) const;
   /// A deck of this machine, with the files that it names in quotes.
   Simulation load(const std::string& path, const LoadOptions& options = {});
   Simulation load_text(const std::string& deck, const LoadOptions& options = {});
   /// A simulation that another client loaded, by its name; it lives on afterwards.
-  Simulation find(const std::string& name);
+  Simulation find(const std::string& name, double timeout = kUsual);
 
  private:
   explicit Server(std::shared_ptr<Impl> impl);

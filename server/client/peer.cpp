@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 
 namespace mbcosim::client {
 namespace {
@@ -166,6 +167,37 @@ PortLayout to_layout(const v1::PortLayout& from) {
   return layout;
 }
 
+/// Calls `cancel` when it lives longer than `seconds`; 0: never.
+class Deadline {
+ public:
+  Deadline(double seconds, std::function<void()> cancel) {
+    if (seconds <= 0) return;
+    watch_ = std::thread([this, seconds, cancel = std::move(cancel)] {
+      std::unique_lock guard(mutex_);
+      const std::chrono::duration<double> bound(seconds);
+      if (left_.wait_for(guard, bound, [&] { return has_left_; })) return;
+      over_ = true;
+      cancel();
+    });
+  }
+  ~Deadline() {
+    {
+      const std::lock_guard guard(mutex_);
+      has_left_ = true;
+    }
+    left_.notify_one();
+    if (watch_.joinable()) watch_.join();
+  }
+  bool is_over() const { return over_; }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable left_;
+  bool has_left_ = false;
+  std::atomic<bool> over_{false};
+  std::thread watch_;
+};
+
 }  // namespace
 
 v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& port,
@@ -182,12 +214,15 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   hello.set_mode(to_proto(options.mode));
   hello.set_every(options.every);
   hello.set_input_hold(to_proto(options.hold));
-  *hello.mutable_peer_timeout() = to_duration(options.timeout);
+  *hello.mutable_peer_timeout() = to_duration(options.peer_timeout);
   hello.set_tangent(to_proto(options.tangent));
   if (options.heartbeat_timeout > 0)
     *hello.mutable_heartbeat_timeout() = to_duration(options.heartbeat_timeout);
-  if (options.server_timeout > 0)
-    *hello.mutable_heartbeat_interval() = to_duration(options.server_timeout / 3);
+  if (options.server_timeout > 0) {
+    double interval = options.server_timeout / 3;
+    if (options.heartbeat_timeout > 0) interval = std::min(interval, options.heartbeat_timeout);
+    *hello.mutable_heartbeat_interval() = to_duration(interval);
+  }
   hello.set_policy(to_proto(options.policy));
   hello.set_acceleration(to_proto(options.acceleration));
   hello.set_relaxation(options.relaxation);
@@ -201,12 +236,13 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
                                         const v1::Hello& hello, const PeerOptions& options) {
   auto impl = std::make_unique<Peer::Impl>();
   impl->wire = options.transport == Transport::shared_memory
-                   ? open_shared_memory(*server, options.timeout)
+                   ? open_shared_memory(*server, options.peer_timeout)
                    : open_stream(*server);
   impl->server = std::move(server);
   impl->step_ended = options.step_ended;
   v1::PeerMessage first;
   *first.mutable_hello() = hello;
+  const Deadline deadline(options.timeout, [&wire = *impl->wire] { wire.cancel(); });
   if (impl->wire->write(first) && impl->wire->read(&impl->in)) {
     impl->tangent = options.tangent;
     impl->layout = to_layout(impl->in.welcome().layout());
@@ -214,6 +250,9 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
     return impl;
   }
   impl->open = false;
+  if (deadline.is_over())
+    throw Error("attaching the peer took longer than " + std::to_string(options.timeout) + " s",
+                static_cast<int>(grpc::StatusCode::DEADLINE_EXCEEDED), "", {});
   require(impl->wire->finish());
   throw Error("the server ended the handshake", static_cast<int>(grpc::StatusCode::UNAVAILABLE), "",
               {});

@@ -2,10 +2,13 @@
 #include "client/mbcosim_client.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <thread>
 
 #include "../time_factor.h"
@@ -260,7 +263,7 @@ TEST_P(Coupled, ALateOrDeadPeerIsGivenUpInItsTime) {
   Server server = connect();
   Simulation simulation = server.load_text(body(), with_port());
   PeerOptions options = this->options();
-  options.timeout = 0.3;
+  options.peer_timeout = 0.3;
   const auto start = std::chrono::steady_clock::now();
   {
     Peer silent = simulation.attach("spring", options);
@@ -449,6 +452,67 @@ TEST(Client, UploadsIncludedFiles) {
   std::ofstream(folder + "rest.mbd") << body();
   Server server = connect();
   EXPECT_TRUE(server.load(folder + "main.mbd").step().ok());
+}
+
+/// Stops the daemon while it lives.
+class Stopped {
+ public:
+  Stopped() { ::kill(pid(), SIGSTOP); }
+  ~Stopped() { ::kill(pid(), SIGCONT); }
+  static pid_t pid() { return static_cast<pid_t>(std::atoi(std::getenv("MBCOSIM_PID"))); }
+};
+
+double seconds_of(const std::function<void()>& work) {
+  const auto begin = std::chrono::steady_clock::now();
+  work();
+  const auto end = std::chrono::steady_clock::now();
+  return std::chrono::duration<double>(end - begin).count();
+}
+
+/// The code with which `call` fails; 0: it does not.
+int code_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.code();
+  }
+  return 0;
+}
+
+TEST(AStoppedServer, EndsEveryCallAtItsTimeout) {
+  if (!std::getenv("MBCOSIM_PID")) GTEST_SKIP() << "only with a daemon of its own";
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  const std::string x = "node.structural.1.X", load = "node.structural.1.load";
+  const std::vector<std::pair<const char*, std::function<void()>>> calls = {
+      {"version", [&] { server.version(0.3); }},
+      {"load", [&] { server.load_text(body(), {.timeout = 0.3}); }},
+      {"find", [&] { server.find(simulation.name(), 0.3); }},
+      {"step", [&] { simulation.step(1, {.timeout = 0.3}); }},
+      {"run_until", [&] { simulation.run_until(1, {.timeout = 0.3}); }},
+      {"read", [&] { simulation.read(x, 0.3); }},
+      {"write", [&] { simulation.write(load, std::vector<double>(6), 0.3); }},
+      {"interrupt", [&] { simulation.interrupt(0.3); }},
+      {"attach", [&] { simulation.attach("spring", {.timeout = 0.3}); }},
+  };
+  const Stopped stopped;
+  for (const auto& [name, call] : calls) {
+    int code = 0;
+    EXPECT_LT(seconds_of([&, &c = call] { code = code_of(c); }), 0.3 + 2 * time_factor()) << name;
+    EXPECT_EQ(code, 4) << name;
+  }
+  EXPECT_LT(seconds_of([&] { Simulation(std::move(simulation)); }), 2 + 2 * time_factor());
+}
+
+TEST(AStoppedServer, IsNoticedInAStepWithoutATimeout) {
+  if (!std::getenv("MBCOSIM_PID")) GTEST_SKIP() << "only with a daemon of its own";
+  Server server = connect();
+  Simulation simulation = server.load_text(body());
+  const Stopped stopped;
+  int code = 0;
+  EXPECT_LT(seconds_of([&] { code = code_of([&] { simulation.step(); }); }),
+            25 + 2 * time_factor());
+  EXPECT_EQ(code, 14);
 }
 
 }  // namespace

@@ -11,6 +11,14 @@ def test_the_library(daemon):
     assert run.returncode == 0, run.stdout
 
 
+def test_a_stopped_server_ends_every_call(start_daemon):
+    daemon = start_daemon()
+    run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1", "--gtest_filter=AStoppedServer.*"], timeout=200,
+                         text=True, env={**os.environ, "MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_PID": str(daemon.process.pid)},
+                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert run.returncode == 0, run.stdout
+
+
 def test_tokens(start_daemon, tmp_path):
     """Over both transports: with the token all goes well, without it nothing does."""
     tokens = tmp_path / "tokens"
