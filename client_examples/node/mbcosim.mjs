@@ -1,0 +1,172 @@
+/**
+ * A small client for mbcosim: the proto files of this repository are loaded at run time, nothing is generated.
+ *
+ *     const server = connect("unix:/run/user/1000/mbcosim.sock");
+ *     const pendulum = await load(server, "pendulum.mbd");
+ */
+import { readFile } from "node:fs/promises";
+import { basename } from "node:path";
+import { fileURLToPath } from "node:url";
+
+import grpc from "@grpc/grpc-js";
+import { loadSync } from "@grpc/proto-loader";
+
+const PROTOS = process.env.MBCOSIM_PROTOS ?? fileURLToPath(new URL("../../proto", import.meta.url));
+const FILES = ["simulations", "telemetry", "geometry", "coupling"].map((name) => `mbcosim/v1/${name}.proto`);
+const USUAL = 30; // seconds that a call may take which advances nothing
+
+// Ping after 10 s of silence, dead after 10 more: a server that is stopped is noticed.
+const CHANNEL = {
+  "grpc.keepalive_time_ms": 10_000,
+  "grpc.keepalive_timeout_ms": 10_000,
+  "grpc.keepalive_permit_without_calls": 1,
+};
+
+const { v1 } = grpc.loadPackageDefinition(
+  loadSync(FILES, { includeDirs: [PROTOS], keepCase: true, longs: Number, enums: String, defaults: true, oneofs: true }),
+).mbcosim;
+
+/** A connection: stubs of the services. `token`: bearer token; `credentials`: grpc.credentials for TLS. */
+export function connect(address, { token, credentials = grpc.credentials.createInsecure() } = {}) {
+  const metadata = new grpc.Metadata();
+  if (token) metadata.set("authorization", `Bearer ${token}`);
+  const stub = (Service) => new Service(address, credentials, CHANNEL);
+  const stubs = {
+    simulations: stub(v1.Simulations),
+    telemetry: stub(v1.Telemetry),
+    geometry: stub(v1.Geometry),
+    coupling: stub(v1.Coupling),
+  };
+  const close = () => Object.values(stubs).forEach((client) => client.close());
+  return { ...stubs, metadata, close };
+}
+
+const options = (timeout) => (timeout === undefined ? {} : { deadline: Date.now() + 1000 * timeout });
+
+/** One message each way: the reply. `timeout`: seconds; undefined: as long as the server lives. */
+export function call(server, client, method, request, timeout) {
+  return new Promise((resolve, reject) =>
+    client[method](request, server.metadata, options(timeout), (error, reply) => (error ? reject(error) : resolve(reply))),
+  );
+}
+
+/** A series of messages, for `for await`. */
+export function series(server, client, method, request, timeout) {
+  return client[method](request, server.metadata, options(timeout));
+}
+
+/** Creates a simulation from a deck without includes. `choices`: CreateOptions. */
+export async function load(server, deck, choices = {}) {
+  const name = basename(deck);
+  return create(server, { header: { bundle_main_file: name, options: choices }, files: [{ path: name, data: await readFile(deck) }] });
+}
+
+/** Creates a simulation from a deck given as text. */
+export async function loadText(server, text, choices = {}) {
+  return create(server, { header: { bundle_main_file: "deck", options: choices }, files: [{ path: "deck", data: Buffer.from(text) }] });
+}
+
+async function create(server, upload) {
+  const reply = await call(server, server.simulations, "CreateSimulationInline", upload);
+  return new Simulation(server, reply.simulation);
+}
+
+/** A simulation on the server. */
+export class Simulation {
+  #handles = new Map();
+
+  constructor(server, info) {
+    this.server = server;
+    this.info = info;
+    this.name = info.name;
+  }
+
+  #call(method, request, timeout = USUAL) {
+    return call(this.server, this.server.simulations, method, request, timeout);
+  }
+  /** The same for calls that may take as long as they take. */
+  #work(method, request) {
+    return call(this.server, this.server.simulations, method, request);
+  }
+
+  /** Handles of variables by name; asks for those that are not known. */
+  async handles(names) {
+    const missing = names.filter((name) => !this.#handles.has(name));
+    if (missing.length > 0) {
+      const { variables } = await this.#call("DescribeSimulation", { name: this.name, variable_names: missing });
+      for (const variable of variables) this.#handles.set(variable.name, variable.handle);
+    }
+    return names.map((name) => this.#handles.get(name));
+  }
+
+  /** Nodes, elements and variables, page by page. */
+  async *describe() {
+    let token = "";
+    do {
+      const page = await this.#call("DescribeSimulation", { name: this.name, page_token: token });
+      yield page;
+      token = page.next_page_token;
+    } while (token);
+  }
+
+  /** Numbers of a variable at the last accepted step. */
+  async read(name) {
+    return (await this.#call("ReadVariables", { simulation: this.name, handles: await this.handles([name]) })).values;
+  }
+
+  /** Takes steps; StepReply. */
+  async step(steps = 1, outputs = []) {
+    return this.#work("Step", { simulation: this.name, steps, outputs: await this.handles(outputs) });
+  }
+
+  /** An open stream for stepping with the least delay: `await stepper.step()`, at last `stepper.close()`. */
+  async stepper(outputs = []) {
+    return new Stepper(this.server, this.name, await this.handles(outputs));
+  }
+
+  /** What a viewer needs, message by message. */
+  geometry(request = {}) {
+    return series(this.server, this.server.geometry, "DescribeGeometry", { simulation: this.name, ...request });
+  }
+
+  /** The descriptor form E ẏ = A y about the current state. */
+  linearize() {
+    return this.#work("Linearize", { simulation: this.name, descriptor_form: true });
+  }
+
+  /** Ends the simulation. */
+  delete() {
+    return this.#call("DeleteSimulation", { name: this.name });
+  }
+}
+
+/** Steps on one open stream: one message each way per step. */
+class Stepper {
+  #waiting = [];
+  #failure;
+
+  constructor(server, simulation, outputs) {
+    this.request = { simulation, outputs };
+    this.stream = server.simulations.StepStream(server.metadata);
+    this.stream.on("data", (reply) => this.#waiting.shift()?.resolve(reply));
+    this.stream.on("error", (error) => this.#end(error));
+    this.stream.on("end", () => this.#end(new Error("the server has ended the stream")));
+  }
+
+  #end(error) {
+    this.#failure ??= error;
+    for (const { reject } of this.#waiting.splice(0)) reject(this.#failure);
+  }
+
+  step(steps = 1, inputs) {
+    if (this.#failure) return Promise.reject(this.#failure);
+    return new Promise((resolve, reject) => {
+      this.#waiting.push({ resolve, reject });
+      this.stream.write({ ...this.request, steps, inputs });
+    });
+  }
+
+  close() {
+    this.stream.end();
+  }
+}

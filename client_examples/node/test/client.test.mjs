@@ -1,0 +1,72 @@
+/** Against the daemon at $MBCOSIM_ADDRESS. */
+import assert from "node:assert/strict";
+import { after, test } from "node:test";
+
+import { call, connect, loadText } from "../mbcosim.mjs";
+
+const server = connect(process.env.MBCOSIM_ADDRESS);
+after(() => server.close());
+
+const chain = (n) => `
+begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: 1.e-3; end: initial value;
+begin: control data; structural nodes: ${n}; rigid bodies: ${n}; joints: ${n}; end: control data;
+begin: nodes;
+  for: integer k = 1, ${n}; structural: k, dynamic, real(k), 0., 0., eye, null, null; end for;
+end: nodes;
+begin: elements;
+  for: integer k = 1, ${n}; body: k, k, 1., null, eye; end for;
+  for: integer k = 1, ${n} - 1; joint: k, rod, k, k + 1, 1., linear elastic, 1.; end for;
+  joint: ${n}, clamp, 1, node, node;
+end: elements;
+`;
+
+const body = `set: real v = 1.;
+begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: 0.25; end: initial value;
+begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;
+begin: nodes; structural: 1, dynamic, null, eye, v, 0., 0., null; end: nodes;
+begin: elements; body: 1, 1, 1., null, eye; end: elements;
+`;
+
+test("one call and one stream give the same steps", async () => {
+  const simulation = await loadText(server, body, { symbols: { v: { number: 2 } } });
+  const stepper = await simulation.stepper(["node.structural.1.X"]);
+  const first = await stepper.step();
+  assert.equal(first.outcome, "STEP_OUTCOME_ACCEPTED");
+  assert.ok(Math.abs(first.outputs[0] - 0.5) < 1e-12);
+  const second = await simulation.step(1, ["node.structural.1.X"]);
+  assert.equal(second.step, 2);
+  assert.ok(Math.abs(second.outputs[0] - 1) < 1e-12);
+  assert.deepEqual(await simulation.read("node.structural.1.X"), second.outputs);
+  stepper.close();
+  await simulation.delete();
+});
+
+test("errors carry their code, reason and field", async () => {
+  const refused = await loadText(server, "begin: nothing;").catch((error) => error);
+  assert.equal(refused.code, 3);
+  const details = refused.metadata.get("grpc-status-details-bin")[0].toString("latin1");
+  assert.match(details, /DECK_ERROR/);
+  assert.match(details, /mbcosim\.dev/);
+  const gone = await call(server, server.simulations, "GetSimulation", { name: "simulations/none" }, 5).catch((error) => error);
+  assert.equal(gone.code, 5);
+});
+
+test("a model of 10 000 bodies passes the client's default limits", async () => {
+  const n = 10_000;
+  const simulation = await loadText(server, chain(n));
+  let nodes = 0, elements = 0, drawn = 0, masses = 0;
+  for await (const page of simulation.describe()) {
+    nodes += page.nodes.length;
+    elements += page.elements.length;
+  }
+  assert.deepEqual([nodes, elements], [n, 2 * n]);
+  for await (const reply of simulation.geometry()) {
+    if (reply.content === "nodes") drawn += reply.nodes.nodes.length;
+    if (reply.content === "elements") for (const e of reply.elements.elements) masses += e.masses.length;
+  }
+  assert.deepEqual([drawn, masses], [n, n]);
+  assert.equal((await simulation.step()).step, 1);
+  await simulation.delete();
+});

@@ -1,0 +1,46 @@
+"""The client for Node: its own tests, against a real daemon, with the packages of its lock file."""
+import os
+import shutil
+import subprocess
+
+import pytest
+
+from conftest import MODELS, TIME_FACTOR
+
+ROOT = os.path.join(MODELS, "..", "..")
+
+
+@pytest.fixture(scope="module")
+def node_client(tmp_path_factory):
+    """Folder of the client with its packages."""
+    if shutil.which("npm") is None:
+        pytest.skip("there is no npm")
+    source, folder = os.path.join(ROOT, "client_examples", "node"), str(tmp_path_factory.mktemp("node") / "client")
+    shutil.copytree(source, folder, ignore=shutil.ignore_patterns("node_modules"))
+    subprocess.run(["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=folder, check=True, timeout=120 * TIME_FACTOR,
+                   stdout=subprocess.DEVNULL)
+    return folder
+
+
+def run(command, folder, daemon):
+    environment = {**os.environ, "MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_PROTOS": os.path.realpath(os.path.join(ROOT, "proto"))}
+    done = subprocess.run(command, cwd=folder, env=environment, timeout=60 * TIME_FACTOR, text=True, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT)
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def test_its_own_tests(node_client, daemon):
+    output = run(["node", "--test", "test/"], node_client, daemon)
+    assert "# pass 3" in output or "pass 3" in output
+
+
+def test_the_example_follows_the_pendulum(node_client, daemon):
+    shutil.copytree(MODELS, os.path.join(node_client, "..", "models"))
+    lines = run(["node", "pendulum.mjs"], node_client, daemon).splitlines()
+    assert len(lines) == 5 and lines[-1].startswith("2.500 s: ")
+
+
+def test_the_lock_file_names_no_host():
+    with open(os.path.join(ROOT, "client_examples", "node", "package-lock.json"), encoding="utf-8") as file:
+        assert "http" not in "".join(line for line in file if "resolved" in line or "registry" in line)
