@@ -124,12 +124,15 @@ Daemon::Daemon(const Config& config)
             metrics_.count_failure(refusal.reason());
           }},
       results_(config_.results_root, config_.limits.results_root_bytes),
+      durability_(config_, log_, metrics_),
       store_(config_.limits, metrics_, log_),
       gate_(runtime_),
       health_({"mbcosim.v1.Simulations", "mbcosim.v1.Coupling", "mbcosim.v1.Telemetry",
-               "mbcosim.v1.Geometry", "mbcosim.v1.Reduction", "mbcosim.v1.Results", "mbcosim.v1.Events"}),
-      parts_{config_, store_, slots_, metrics_, log_, runtime_, gate_, results_} {
+               "mbcosim.v1.Geometry", "mbcosim.v1.Reduction", "mbcosim.v1.Results",
+               "mbcosim.v1.Events"}),
+      parts_{config_, store_, slots_, metrics_, log_, runtime_, gate_, results_, durability_} {
   add_methods();
+  durability_.start(parts_);
   listen();
   if (config_.shared_memory) open_shared_memory();
   if (!config_.http.empty()) open_http();
@@ -259,6 +262,7 @@ bool Daemon::shut_down() {
   server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace);
   server_.reset();
   const bool ended = lanes_.stop(kLastJobs);
+  durability_.stop(!ended);
   spdlog::info(ended ? "stopped" : "stopped; work that went on is dropped");
   return ended;
 }

@@ -10,6 +10,7 @@
 #include "http/door.h"
 #include "rpc/health.h"
 #include "service/config.h"
+#include "service/durability.h"
 #include "service/parts.h"
 #include "service/shared_memory_service.h"
 
@@ -45,6 +46,7 @@ class Daemon {
   MemoryBudget memory_;
   const Runtime runtime_;
   ResultsRoot results_;
+  Durability durability_;  ///< outlives the store, which calls it
   SessionStore store_;
   Gate gate_;
   Health health_;

@@ -58,6 +58,7 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   add("--limit-http-streams", limits.http_streams, "Streams of one identity over HTTP");
   add("--limit-telemetry-samples", limits.telemetry_samples,
       "Samples buffered for one subscription");
+  add("--limit-state-bytes", limits.state_bytes, "Bytes of all that is in the state folder");
   add("--limit-results-bytes", limits.results_bytes,
       "Bytes of the result files of one simulation, default and largest quota");
   add("--limit-results-root-bytes", limits.results_root_bytes,
@@ -109,12 +110,25 @@ Invocation read_options(int argc, char** argv) {
   app.set_config("--config", "", "File of options, one `name=value` a line");
   app.allow_config_extras(CLI::config_extras_mode::error);
   bool print_config = false, hash_token = false;
-  std::int64_t lease = config.limits.lease.count(), grace = config.shutdown_grace.count();
+  std::int64_t lease = config.limits.lease.count(), grace = config.shutdown_grace.count(),
+               suspended_expiry = config.suspended_expiry.count();
+  double checkpoint_interval = std::chrono::duration<double>(config.checkpoint_interval).count();
 
   app.add_option("--listen", config.listen,
                  "Addresses: unix:PATH or HOST:PORT; default: " + default_listener());
   app.add_option("--model-root", config.model_root, "Folder of decks that clients may name")
       ->check(CLI::ExistingDirectory);
+  app.add_option("--state-dir", config.state_dir,
+                 "Folder of this daemon alone in which simulations outlive it")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--checkpoint-interval", checkpoint_interval,
+                 "Seconds between two checkpoints of a simulation that changes")
+      ->capture_default_str()
+      ->check(CLI::Range(0.001, 1e6));
+  app.add_option("--suspended-expiry", suspended_expiry,
+                 "Seconds after which a suspended simulation is removed")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
   app.add_option("--results-root", config.results_root,
                  "Folder in which simulations may have folders for result files")
       ->check(CLI::ExistingDirectory);
@@ -185,6 +199,9 @@ Invocation read_options(int argc, char** argv) {
   }
   config.limits.lease = std::chrono::seconds(lease);
   config.shutdown_grace = std::chrono::seconds(grace);
+  config.suspended_expiry = std::chrono::seconds(suspended_expiry);
+  config.checkpoint_interval =
+      std::chrono::milliseconds(static_cast<std::int64_t>(checkpoint_interval * 1000));
   if (config.listen.empty()) config.listen.push_back(default_listener());
   if (print_config) {
     std::printf("%s", app.config_to_str(true, true).c_str());

@@ -49,11 +49,28 @@ std::unique_ptr<ResultsFolder> ResultsRoot::make(const std::string& simulation,
     throw Refusal(v1::REASON_NO_RESULTS,
                   "the server writes no result files: it was started without --results-root");
   take(quota);
-  const std::string path = path_ + "/" + simulation.substr(simulation.find('/') + 1);
+  const std::string path = path_of(simulation);
   if (::mkdir(path.c_str(), 0700) == 0) return std::make_unique<ResultsFolder>(*this, path, quota);
   const std::string why = std::strerror(errno);
   give_back(quota);
   throw Refusal(v1::REASON_STORAGE_FULL, "the folder for the results cannot be made: " + why);
+}
+
+std::unique_ptr<ResultsFolder> ResultsRoot::reopen(const std::string& simulation,
+                                                   std::int64_t quota, bool* found) {
+  std::error_code none;
+  *found = !path_.empty() && fs::is_directory(path_of(simulation), none);
+  if (!*found) return make(simulation, quota);
+  take(quota - bytes_in(path_of(simulation)));
+  return std::make_unique<ResultsFolder>(*this, path_of(simulation), quota);
+}
+
+void ResultsRoot::remove(const std::string& simulation) {
+  if (path_.empty()) return;
+  const std::int64_t bytes = bytes_in(path_of(simulation));
+  std::error_code none;
+  fs::remove_all(path_of(simulation), none);
+  give_back(bytes);
 }
 
 void ResultsRoot::take(std::int64_t bytes) {

@@ -21,9 +21,18 @@ class ResultsRoot {
 
   /// A new folder for "simulations/ID". Throws NO_RESULTS, LIMIT_EXCEEDED, STORAGE_FULL.
   std::unique_ptr<ResultsFolder> make(const std::string& simulation, std::int64_t quota);
+  /// The folder that a simulation had in an earlier process; a new one when it is not there any
+  /// more: `*found`.
+  std::unique_ptr<ResultsFolder> reopen(const std::string& simulation, std::int64_t quota,
+                                        bool* found);
+  /// Of a simulation that has no ResultsFolder at the moment. Nothing when it is not there.
+  void remove(const std::string& simulation);
 
  private:
   friend class ResultsFolder;
+  std::string path_of(const std::string& simulation) const {
+    return path_ + "/" + simulation.substr(simulation.find('/') + 1);
+  }
   void take(std::int64_t bytes) TS_EXCLUDES(mutex_);
   void give_back(std::int64_t bytes) TS_EXCLUDES(mutex_);
 

@@ -43,6 +43,24 @@ SessionResults::SessionResults(ResultsRoot& root, const std::string& simulation,
                                const v1::ResultOptions& options, std::int64_t most)
     : formats_(formats_of(options)), folder_(root.make(simulation, quota_of(options, most))) {}
 
+SessionResults::SessionResults(ResultsRoot& root, const std::string& simulation,
+                               const v1::ResultOptions& options, std::int64_t most, bool* found)
+    : formats_(formats_of(options)),
+      folder_(root.reopen(simulation, quota_of(options, most), found)) {
+  folder_->keep(*found);
+}
+
+void SessionResults::sync() const {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_->path(), error), end; !error && entry != end;
+       entry.increment(error)) {
+    const int file = ::open(entry->path().c_str(), O_RDONLY | O_CLOEXEC);
+    if (file < 0) continue;
+    (void)::fsync(file);
+    ::close(file);
+  }
+}
+
 SessionResults::~SessionResults() {
   if (writer_) (void)writer_->finish();
   if (discarded_.load()) folder_->keep(false);

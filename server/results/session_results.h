@@ -19,10 +19,17 @@ class SessionResults {
   /// Throws BAD_ARGUMENT, and what ResultsRoot::make throws. `most`: the largest quota.
   SessionResults(ResultsRoot& root, const std::string& simulation, const v1::ResultOptions& options,
                  std::int64_t most);
+  /// Of a simulation that an earlier process had.
+  SessionResults(ResultsRoot& root, const std::string& simulation, const v1::ResultOptions& options,
+                 std::int64_t most, bool* found);
   ~SessionResults();
 
   /// The writer for the simulation; once.
   std::shared_ptr<ResultHistory> start(const Model& model);
+  /// All so far is in the files, as far as it can be written.
+  void prepare() { (void)writer_->flush(false); }
+  /// What is in the files is on the disk. Without the session's lock.
+  void sync() const;
   /// From now on the files outlive the simulation, unless they are discarded.
   void keep() { folder_->keep(true); }
   void discard() { discarded_.store(true); }

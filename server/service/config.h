@@ -29,6 +29,7 @@ struct ServiceLimits {
   int http_connections = 64;                     ///< served at once through the HTTP door
   int http_streams = 16;                         ///< of one identity through the HTTP door
   int telemetry_samples = 1 << 16;               ///< buffer of one subscription
+  std::int64_t state_bytes = 64LL << 30;         ///< of all that is in the state folder
   std::int64_t results_bytes = 1LL << 30;        ///< of the result files of one simulation
   std::int64_t results_root_bytes = 64LL << 30;  ///< of all that is in the folder of results
   std::chrono::seconds lease{3600};              ///< default and longest
@@ -38,8 +39,11 @@ struct ServiceLimits {
 struct Config {
   std::vector<std::string> listen;  ///< "unix:PATH" or "HOST:PORT"; empty: the default socket
   std::string model_root;           ///< folder of decks that clients may name; empty: none
-  std::string results_root;         ///< folder of result files; empty: none are written
-  int workers = 0;                  ///< simulations that step at once; 0: one per core
+  std::string state_dir;            ///< folder of simulations that outlive the daemon; empty: none
+  std::chrono::milliseconds checkpoint_interval{10000};
+  std::chrono::seconds suspended_expiry{30 * 24 * 3600};
+  std::string results_root;  ///< folder of result files; empty: none are written
+  int workers = 0;           ///< simulations that step at once; 0: one per core
   std::string tls_certificate, tls_key, tls_client_ca;  ///< PEM files
   std::string tokens_file;                              ///< see Authenticator::from_file
   bool insecure = false;  ///< allows TCP without credentials, other than loopback without TLS

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "service/durability.h"
 #include "service/protocol.h"
 #include "service/simulations_service.h"
 #include "service/upload.h"
@@ -64,11 +65,12 @@ class Fresh {
  public:
   explicit Fresh(const Parts& parts) : parts_(parts) {}
 
-  /// `make` makes the simulation, counted as the new session's, and fills `symbols`.
+  /// `make` makes the simulation, counted as the new session's, and fills `symbols`, and `deck` for
+  /// one that is durable; else that is null.
   template <class Make>
   SessionPtr add(const v1::CreateOptions& options, Exchange& exchange,
-                 std::vector<DeckSymbol>* symbols, Make make, const std::string& forked_from = "")
-      TS_EXCLUDES(mutex_) {
+                 std::vector<DeckSymbol>* symbols, const KeptDeck* deck, Make make,
+                 const std::string& forked_from = "") TS_EXCLUDES(mutex_) {
     const CallToken token(exchange.call());
     MemoryShare share;
     auto session = within(parts_.runtime.memory, &token, &share, [&] {
@@ -78,16 +80,18 @@ class Fresh {
         results = std::make_unique<SessionResults>(parts_.results, identity.id, options.results(),
                                                    parts_.config.limits.results_bytes);
       std::unique_ptr<Simulation> simulation = make(token, results.get());
-      return std::make_shared<Session>(
-          std::move(identity), std::move(simulation),
-          Session::Shared{parts_.slots, parts_.config.limits, parts_.metrics, parts_.log,
-                          parts_.runtime.memory, parts_.runtime.lanes, parts_.runtime.timer},
-          options, std::move(results));
+      return std::make_shared<Session>(std::move(identity), std::move(simulation), parts_.shared(),
+                                       options, std::move(results));
     });
     session->set_memory(std::move(share));
     session->set_symbols(std::move(*symbols));
+    if (deck) keep(*session, *deck, options);
     Guard guard(mutex_);
-    if (lost_) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+    if (lost_) {
+      if (deck) parts_.durability.drop(*session);
+      session->discard_results();
+      throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+    }
     parts_.store.add(session);
     parts_.log.created(session->subject(), options.display_name(), forked_from);
     name_ = session->identity().id;
@@ -103,6 +107,15 @@ class Fresh {
   }
 
  private:
+  void keep(Session& session, const KeptDeck& deck, const v1::CreateOptions& options) {
+    try {
+      parts_.durability.begin(session, deck, options);
+    } catch (...) {
+      session.discard_results();
+      throw;
+    }
+  }
+
   const Parts& parts_;
   Mutex mutex_;
   std::string name_ TS_GUARDED_BY(mutex_);
@@ -121,6 +134,12 @@ std::unique_ptr<Simulation> initial_solution(const LoadReport& report, bool summ
   return std::move(*simulation);
 }
 
+/// What an earlier process made for this request id is brought back, so that it is found.
+void wake_known(const Parts& parts, const v1::CreateOptions& options, const Caller& caller) {
+  const std::string name = parts.durability.find_request(caller.identity, options.request_id());
+  if (!name.empty()) (void)parts.store.get(name, caller, Access::own);
+}
+
 // ------------------------------------------------------------------ CreateSimulation
 
 /// What CreateSimulation and its form in one message share.
@@ -134,6 +153,7 @@ class Creation {
     const v1::CreateOptions& options = upload_.header().options();
     v1::CreateSimulationReply reply;
     reply.set_protocol_version(kProtocolVersion);
+    wake_known(parts_, options, exchange.caller());
     const SessionStore::Place place(parts_.store, options.request_id(), exchange.caller(),
                                     exchange.call());
     if (place.known())
@@ -148,10 +168,12 @@ class Creation {
   void create(Exchange& exchange, const v1::CreateOptions& options,
               v1::CreateSimulationReply* reply) {
     DeckReport report;
+    KeptDeck deck;
+    KeptDeck* const kept = parts_.durability.wanted(options, nullptr) ? &deck : nullptr;
     fresh_
-        .add(options, exchange, &report.symbols,
+        .add(options, exchange, &report.symbols, kept,
              [&](const CancelToken& token, SessionResults* results) {
-               report = load(upload_, parts_.config);
+               report = load(upload_, parts_.config, kept);
                return initial_solution(report, options.summed_time(), results, token);
              })
         ->fill(reply->mutable_simulation(), exchange.caller());
@@ -274,6 +296,7 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
     check_protocol(options.protocol());
     v1::CreateSimulationReply reply;
     reply.set_protocol_version(kProtocolVersion);
+    wake_known(parts_, options, exchange.caller());
     const SessionStore::Place place(parts_.store, options.request_id(), exchange.caller(),
                                     exchange.call());
     if (place.known()) {
@@ -286,9 +309,12 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
       if (options.symbols_size() > 0)
         throw Refusal(v1::REASON_BAD_ARGUMENT, "`symbols` cannot change the model of a fork");
       std::vector<DeckSymbol> symbols = source->symbols();
+      KeptDeck deck;
+      const bool durable = parts_.durability.wanted(options, &*source);
+      if (durable) deck = parts_.durability.deck_of(*source);
       fresh_
           .add(
-              options, exchange, &symbols,
+              options, exchange, &symbols, durable ? &deck : nullptr,
               [&](const CancelToken&, SessionResults* results) {
                 return branch(*source, snapshot, results);
               },

@@ -142,6 +142,13 @@ void EventLog::snapshot(const Subject& subject, v1::SnapshotChange change, const
   add(subject, std::move(event));
 }
 
+void EventLog::checkpoint_failed(const Subject& subject, const std::string& why) {
+  write(failures_, subject.name + ": no checkpoint: " + why, {{"session", subject.name}});
+  v1::Event event;
+  event.mutable_checkpoint_failed()->set_message(why);
+  add(subject, std::move(event));
+}
+
 void EventLog::lease_ending(const Subject& subject, double seconds_left) {
   write(lives_,
         subject.name + ": its lease ends in " +

@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "service/durability.h"
+
 namespace mbcosim::server {
 namespace {
 
@@ -19,7 +21,9 @@ class WatchHandler final : public OneRequest<v1::WatchEventsRequest> {
  private:
   void serve(Exchange& exchange, const v1::WatchEventsRequest& request) override {
     simulation_ = request.simulation();
-    if (!simulation_.empty())
+    v1::SimulationInfo suspended;
+    if (!simulation_.empty() &&
+        !parts_.durability.describe(simulation_, exchange.caller(), &suspended))
       (void)parts_.store.get(simulation_, exchange.caller(), Access::observe);
     ReaderPtr reader = std::make_shared<Reader>();
     reader->wants = [caller = exchange.caller(), name = simulation_](const v1::Event& event,

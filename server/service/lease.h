@@ -28,6 +28,15 @@ class Lease {
     last_use_ = Clock::now();
     warned_ = false;
   }
+  /// Has nobody used it for its length?
+  bool is_over(Clock::time_point now) const {
+    std::lock_guard guard(mutex_);
+    return !ended_ && uses_ == 0 && now - last_use_ > length_;
+  }
+  void renew() {
+    std::lock_guard guard(mutex_);
+    last_use_ = Clock::now();
+  }
   /// True: it ends now, because nobody uses it and its time is over.
   bool expire(Clock::time_point now) {
     std::lock_guard guard(mutex_);

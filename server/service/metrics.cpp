@@ -32,7 +32,13 @@ Metrics::Metrics()
                             .Help("Mean solver time of a step in one call")
                             .Register(*registry_)
                             .Add({}, prometheus::Histogram::BucketBoundaries{1e-6, 1e-5, 1e-4, 1e-3,
-                                                                             1e-2, 0.1, 1})) {}
+                                                                             1e-2, 0.1, 1})),
+      checkpoint_seconds_(
+          &prometheus::BuildHistogram()
+               .Name("mbcosim_checkpoint_seconds")
+               .Help("Time that a checkpoint takes, beside the steps")
+               .Register(*registry_)
+               .Add({}, prometheus::Histogram::BucketBoundaries{1e-3, 1e-2, 0.1, 1, 10, 60})) {}
 
 void Metrics::expose(const std::string& address) {
   exposer_ = std::make_unique<prometheus::Exposer>(address);

@@ -26,6 +26,7 @@ class Metrics {
   void count_advance(std::int64_t steps, std::int64_t iterations, double solver_seconds);
   void count_failure(v1::Reason reason);
   void set_sessions(int count) { sessions_->Set(count); }
+  void count_checkpoint(double seconds) { checkpoint_seconds_->Observe(seconds); }
   void count_created() { created_->Increment(); }
 
  private:
@@ -34,7 +35,7 @@ class Metrics {
   prometheus::Family<prometheus::Counter>& failures_;
   prometheus::Gauge* sessions_;
   prometheus::Counter *created_, *steps_, *iterations_;
-  prometheus::Histogram* advance_seconds_;
+  prometheus::Histogram *advance_seconds_, *checkpoint_seconds_;
 };
 
 }  // namespace mbcosim::server

@@ -13,6 +13,8 @@
 
 namespace mbcosim::server {
 
+class Durability;
+
 /// The parts of a daemon that handlers use. All of it outlives the services.
 struct Parts {
   const Config& config;
@@ -23,6 +25,12 @@ struct Parts {
   const Runtime& runtime;
   const Gate& gate;
   ResultsRoot& results;
+  Durability& durability;
+
+  /// What every session gets.
+  Session::Shared shared() const {
+    return {slots, config.limits, metrics, log, runtime.memory, runtime.lanes, runtime.timer};
+  }
 };
 
 template <class Request>

@@ -114,6 +114,7 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
     grants_.replace(request.grants().grants());
   }
   std::lock_guard lock(lock_);
+  ++changes_;
   const StepPolicy now = simulation_->policy();
   if (request.has_non_convergence_policy() || request.has_minimum_step_s())
     set_policy(
@@ -142,6 +143,7 @@ void Session::fill(v1::SimulationInfo* out) const {
   out->set_non_convergence_policy(to_proto(p.policy));
   out->set_minimum_step_s(p.policy.minimum);
   out->set_owner(identity_.owner);
+  out->set_durability(keeping_ ? v1::DURABILITY_CHECKPOINT : v1::DURABILITY_NONE);
   out->set_state(p.failed     ? v1::SIMULATION_STATE_FAILED
                  : p.stepping ? v1::SIMULATION_STATE_STEPPING
                  : p.finished ? v1::SIMULATION_STATE_FINISHED
@@ -269,6 +271,7 @@ void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariables
   std::lock_guard lock(lock_);
   if (request.has_expected_step()) check_step(request.expected_step());
   variables_.write(request.values(), *simulation_);
+  ++changes_;
   if (recorder_) recorder_->inputs(request.values());
   reply->set_step(simulation_->step_number());
 }

@@ -1,12 +1,15 @@
 /// One simulation on the server: who owns it, who advances it, what is saved of it.
 #pragma once
 
+#include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "coupling/coupler.h"
+#include "mbcosim/v1/checkpoints.pb.h"
 #include "mbcosim/v1/simulations.pb.h"
 #include "results/session_results.h"
 #include "rpc/call.h"
@@ -14,6 +17,7 @@
 #include "service/event_log.h"
 #include "service/fair_mutex.h"
 #include "service/grants.h"
+#include "service/keeping.h"
 #include "service/lease.h"
 #include "service/metrics.h"
 #include "service/session_status.h"
@@ -26,6 +30,13 @@
 namespace mbcosim::server {
 
 class RowTable;
+
+/// What a checkpoint holds, the states of snapshots apart.
+struct CapturedPoint {
+  v1::CheckpointPoint point;
+  State state;
+  std::int64_t changes = 0;  ///< of the session, at that moment
+};
 
 /// Thread-safe. One call at a time advances the simulation; others read between its steps. Methods
 /// throw Refusal.
@@ -111,6 +122,29 @@ class Session {
   /// Throws NO_SUCH_PORT. The port lives as long as the session.
   Port& port(const std::string& name) const;
 
+  // --- outliving the daemon
+  /// Before others know the session.
+  void set_keeping(std::unique_ptr<Keeping> keeping) { keeping_ = std::move(keeping); }
+  Keeping* keeping() const { return keeping_.get(); }  ///< null: it does not outlive the daemon
+  /// Grows with everything that a checkpoint holds.
+  std::int64_t changes() const { return changes_.load(); }
+  std::int64_t step_number() const { return status_.view().step; }
+  bool has_failed() const { return status_.failed(); }
+  /// Nobody works on it.
+  bool is_free() {
+    const std::unique_lock lock(lock_, std::try_to_lock);
+    return lock.owns_lock();
+  }
+  /// Waits for the end of a step.
+  CapturedPoint capture();
+  std::string bytes_of(const State& state) const;
+  /// The result files are on the disk.
+  void sync_results() const {
+    if (results_) results_->sync();
+  }
+  /// Before others know the session, which stands at the point's state: all else that it holds.
+  void take_over(const v1::CheckpointPoint& point, const std::map<int, std::string>& snapshots);
+
   /// Interrupts, ends subscriptions; later calls find the session gone.
   void close();
 
@@ -169,6 +203,8 @@ class Session {
 
   MemoryShare memory_;
   std::vector<DeckSymbol> symbols_;
+  std::unique_ptr<Keeping> keeping_;
+  std::atomic<std::int64_t> changes_{0};
 
   // Thread-safe by themselves.
   Grants grants_;

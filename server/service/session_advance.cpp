@@ -116,6 +116,7 @@ void Session::remember(const v1::StepReply& reply) {
   if (reply.request_id().empty()) return;
   std::lock_guard lock(lock_);
   last_reply_ = reply;
+  ++changes_;
 }
 
 // Does once what comes before the first step. True: nothing is to be done, the reply is complete.
@@ -126,6 +127,7 @@ bool Session::begin(Advance& advance) {
   if (request.has_expected_step()) check_step(request.expected_step());
   check_choice(request, *simulation_);
   variables_.write(request.inputs(), *simulation_);
+  ++changes_;
   if (recorder_ && request.inputs().handles_size() > 0) recorder_->inputs(request.inputs());
   advance.started = true;
   advance.reply.set_request_id(request.request_id());
@@ -203,6 +205,7 @@ void Session::account(Advance& advance, const StepReport& report) {
   if (report.outcome == StepOutcome::finished)
     shared_.log.state_changed(subject(), v1::SIMULATION_STATE_FINISHED, simulation_->step_number());
   if (!is_accepted(report.outcome)) return;
+  ++changes_;
   account_pieces(reply, report);
   if (report.restarted) reply.set_restarted_steps(reply.restarted_steps() + 1);
   --advance.steps_left;

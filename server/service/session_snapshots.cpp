@@ -9,6 +9,7 @@ void Session::save(const std::string& display_name, v1::Snapshot* out) {
   std::lock_guard lock(lock_);
   snapshots_.check_room(size_of(simulation_->state()));
   snapshots_.add(simulation_->snapshot(), display_name, out);
+  ++changes_;
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
 }
 
@@ -31,6 +32,7 @@ void Session::restore(int snapshot) {
   coupler_.reset();
   if (recorder_) recorder_->restored(simulation_->step_number(), simulation_->time());
   last_reply_.Clear();
+  ++changes_;
   const SessionStatus::View before = status_.view();
   status_.recover();
   status_.publish(*simulation_);
@@ -42,6 +44,7 @@ void Session::restore(int snapshot) {
 
 void Session::forget(int snapshot) {
   const std::int64_t step = snapshots_.remove(snapshot);
+  ++changes_;
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_DELETED, snapshots_.name_of(snapshot), step);
 }
 
@@ -75,6 +78,7 @@ void Session::import_state(const std::string& bytes, const std::string& display_
   const auto status = scratch->import_state(bytes);
   if (!status) throw Refusal(status.error());
   const int number = snapshots_.add(scratch->snapshot(), display_name, out, results_end);
+  ++changes_;
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
   if (also_restore) restore(number);
 }

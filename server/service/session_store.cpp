@@ -103,6 +103,7 @@ constexpr const char* kAccessNames[] = {"see", "observe", "couple", "control", "
 
 SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Access access,
                              const std::string& port) const {
+  if (!has(id) && keeper_.wake) (void)keeper_.wake(id, caller);
   Guard guard(mutex_);
   const auto found = sessions_.find(id);
   if (found == sessions_.end() || !found->second->grants().allow(caller, Access::see))
@@ -110,6 +111,18 @@ SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Access
                   "no simulation is named \"" + id.substr(0, 100) + "\"");
   if (!found->second->grants().allow(caller, access, port)) refuse_access(id, access, port);
   return found->second;
+}
+
+bool SessionStore::has(const std::string& id) const {
+  Guard guard(mutex_);
+  return sessions_.count(id) > 0;
+}
+
+std::vector<SessionPtr> SessionStore::all() const {
+  Guard guard(mutex_);
+  std::vector<SessionPtr> result;
+  for (const std::string& id : order_) result.push_back(sessions_.at(id));
+  return result;
 }
 
 std::vector<SessionPtr> SessionStore::list(const Caller& caller) const {
@@ -140,19 +153,34 @@ void SessionStore::discard(const std::string& id) {
   drop(id);
 }
 
+SessionPtr SessionStore::take_out(const std::string& id) {
+  Guard guard(mutex_);
+  const auto found = sessions_.find(id);
+  if (found == sessions_.end()) return nullptr;
+  SessionPtr session = std::move(found->second);
+  sessions_.erase(found);
+  std::erase(order_, id);
+  metrics_.set_sessions(static_cast<int>(sessions_.size()));
+  return session;
+}
+
 void SessionStore::drop(const std::string& id, v1::DeletionCause cause) {
-  SessionPtr session;
-  {
-    Guard guard(mutex_);
-    const auto found = sessions_.find(id);
-    if (found == sessions_.end()) return;
-    session = std::move(found->second);
-    sessions_.erase(found);
-    std::erase(order_, id);
-    metrics_.set_sessions(static_cast<int>(sessions_.size()));
-  }
+  const SessionPtr session = take_out(id);
+  if (!session) return;
   session->close();
+  if (session->keeping() && keeper_.forget) keeper_.forget(*session);
   log_.deleted(session->subject(), cause);
+}
+
+// From memory to the disk, unless somebody uses it after all.
+void SessionStore::park(const SessionPtr& session) {
+  const std::string& id = session->identity().id;
+  if (!keeper_.suspend(*session)) return session->lease().renew();
+  if (!session->lease().expire(std::chrono::steady_clock::now())) return keeper_.unsuspend(id);
+  session->keeping()->end();
+  take_out(id);
+  session->close();
+  log_.state_changed(session->subject(), v1::SIMULATION_STATE_SUSPENDED, session->step_number());
 }
 
 void SessionStore::close_all() {
@@ -162,15 +190,18 @@ void SessionStore::close_all() {
 
 void SessionStore::close_expired() {
   std::vector<std::string> expired;
+  std::vector<SessionPtr> parked;
   {
     Guard guard(mutex_);
     const auto now = std::chrono::steady_clock::now();
     for (const auto& [id, session] : sessions_) {
-      if (session->lease().expire(now)) expired.push_back(id);
+      if (session->keeping() && session->lease().is_over(now)) parked.push_back(session);
+      if (!session->keeping() && session->lease().expire(now)) expired.push_back(id);
       if (const auto left = session->lease().warn(now))
         log_.lease_ending(session->subject(), std::chrono::duration<double>(*left).count());
     }
   }
+  for (const SessionPtr& session : parked) park(session);
   for (const std::string& id : expired) drop(id, v1::DELETION_CAUSE_LEASE_OVER);
 }
 

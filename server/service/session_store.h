@@ -1,6 +1,7 @@
 /// All simulations of a daemon.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -42,8 +43,21 @@ class SessionStore {
     SessionPtr known_;
   };
 
+  /// Who keeps sessions on the disk. Called without any lock.
+  struct Keeper {
+    std::function<bool(const std::string& id, const Caller&)> wake;  ///< true: it is back
+    std::function<bool(Session&)> suspend;                           ///< false: it must live on
+    std::function<void(const std::string& id)> unsuspend;            ///< it lives on after all
+    std::function<void(Session&)> forget;
+  };
+  /// Before anybody uses the store.
+  void set_keeper(Keeper keeper) { keeper_ = std::move(keeper); }
+
   void add(SessionPtr session);
+  std::vector<SessionPtr> all() const;
+  bool has(const std::string& id) const;
   /// Throws NO_SUCH_SIMULATION, also for one that the caller may not see, and NOT_GRANTED.
+  /// One that is on the disk is brought back.
   SessionPtr get(const std::string& id, const Caller& caller, Access access,
                  const std::string& port = "") const;
   /// What the caller may see, in the order of creation.
@@ -61,12 +75,15 @@ class SessionStore {
   using Request = std::pair<std::string, std::string>;
   SessionPtr find_request(const Request& request) const TS_REQUIRES(mutex_);
   void check_room(const std::string& owner) const TS_REQUIRES(mutex_);
+  SessionPtr take_out(const std::string& id);
+  void park(const SessionPtr& session);
   void watch_leases();
   void close_expired();
 
   const ServiceLimits& limits_;
   Metrics& metrics_;
   EventLog& log_;
+  Keeper keeper_;
   mutable Mutex mutex_;
   std::map<std::string, SessionPtr> sessions_ TS_GUARDED_BY(mutex_);
   std::vector<std::string> order_ TS_GUARDED_BY(mutex_);
@@ -82,11 +99,21 @@ class SessionHold {
  public:
   SessionHold(const SessionStore& store, const std::string& id, const Caller& caller, Access access,
               const std::string& port = "")
-      : session_(store.get(id, caller, access, port)), use_(*session_) {}
+      : session_(find(store, id, caller, access, port)), use_(*session_) {}
   Session& operator*() const { return *session_; }
   Session* operator->() const { return session_.get(); }
 
  private:
+  // A session that is going to the disk at the moment can be taken when it is there.
+  static SessionPtr find(const SessionStore& store, const std::string& id, const Caller& caller,
+                         Access access, const std::string& port) {
+    SessionPtr session = store.get(id, caller, access, port);
+    for (int tries = 0; tries < 20 && session->lease().ended() && session->keeping(); ++tries) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      session = store.get(id, caller, access, port);
+    }
+    return session;
+  }
   const SessionPtr session_;
   const Session::Use use_;
 };

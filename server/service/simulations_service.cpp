@@ -1,7 +1,9 @@
 #include "service/simulations_service.h"
 
 #include <algorithm>
+#include <set>
 
+#include "service/durability.h"
 #include "service/protocol.h"
 
 namespace mbcosim::server {
@@ -26,6 +28,7 @@ void add_limits(const ServiceLimits& limits, v1::ServerInfo* reply) {
   add_limit(reply, "message_bytes", limits.message_bytes);
   add_limit(reply, "bundle_files", limits.bundle_files);
   add_limit(reply, "record_bytes", limits.record_bytes);
+  add_limit(reply, "state_bytes", limits.state_bytes);
   add_limit(reply, "results_bytes", limits.results_bytes);
   add_limit(reply, "results_root_bytes", limits.results_root_bytes);
   add_limit(reply, "telemetry_samples", limits.telemetry_samples);
@@ -49,26 +52,47 @@ void fill_info(const Config& config, const Caller& caller, v1::ServerInfo* reply
   reply->set_role(role_name(caller.role));
 }
 
-void list(const SessionStore& store, const Caller& caller,
-          const v1::ListSimulationsRequest& request, v1::ListSimulationsReply* reply) {
-  const std::vector<SessionPtr> sessions = store.list(caller);
+/// One line of the list: alive, or on the disk.
+struct Entry {
+  std::string name;
+  SessionPtr session;
+  v1::SimulationInfo suspended;
+};
+
+std::vector<Entry> entries_for(const Parts& parts, const Caller& caller) {
+  std::vector<Entry> entries;
+  std::set<std::string> names;
+  for (SessionPtr& session : parts.store.list(caller)) {
+    names.insert(session->identity().id);
+    entries.push_back({session->identity().id, std::move(session), {}});
+  }
+  for (v1::SimulationInfo& info : parts.durability.list(caller))
+    if (names.count(info.name()) == 0) entries.push_back({info.name(), nullptr, std::move(info)});
+  return entries;
+}
+
+void list(const Parts& parts, const Caller& caller, const v1::ListSimulationsRequest& request,
+          v1::ListSimulationsReply* reply) {
+  std::vector<Entry> entries = entries_for(parts, caller);
   const std::size_t page =
       request.page_size() > 0 ? static_cast<std::size_t>(request.page_size()) : 100;
-  auto next = sessions.begin();
+  auto next = entries.begin();
   if (!request.page_token().empty()) {
-    next = std::find_if(sessions.begin(), sessions.end(), [&](const SessionPtr& s) {
-      return s->identity().id == request.page_token();
-    });
-    if (next == sessions.end())
+    next = std::find_if(entries.begin(), entries.end(),
+                        [&](const Entry& entry) { return entry.name == request.page_token(); });
+    if (next == entries.end())
       throw Refusal(v1::REASON_BAD_ARGUMENT,
                     "`page_token` is not one of the server's, or has expired");
   }
-  for (; next != sessions.end(); ++next) {
+  for (; next != entries.end(); ++next) {
     if (static_cast<std::size_t>(reply->simulations_size()) == page) {
-      reply->set_next_page_token((*next)->identity().id);
+      reply->set_next_page_token(next->name);
       return;
     }
-    (*next)->fill(reply->add_simulations(), caller);
+    if (next->session)
+      next->session->fill(reply->add_simulations(), caller);
+    else
+      *reply->add_simulations() = std::move(next->suspended);
   }
 }
 
@@ -83,21 +107,25 @@ void add_life(Gate& gate, const Parts& parts) {
            unary<v1::ListSimulationsRequest, v1::ListSimulationsReply>(
                Role::observe, Lane::quick,
                [&parts](const CallFrame& frame, const auto& request, auto* reply) {
-                 list(parts.store, frame.caller, request, reply);
+                 list(parts, frame.caller, request, reply);
                }));
   gate.add(
       simulations_path("DeleteSimulation"),
       unary<v1::DeleteSimulationRequest, v1::DeleteSimulationReply>(
           Role::control, Lane::quick, [&parts](const CallFrame& frame, const auto& request, auto*) {
-            parts.store.remove(request.name(), frame.caller);
+            if (!parts.durability.remove(request.name(), frame.caller))
+              parts.store.remove(request.name(), frame.caller);
           }));
   gate.add(simulations_path("GetSimulation"),
-           on_session<v1::GetSimulationRequest, v1::SimulationInfo>(
-               parts, Role::observe, Lane::quick,
-               [](Session& session, const auto&, auto* reply, const CallFrame& frame) {
-                 session.fill(reply, frame.caller);
-               },
-               Access::see));
+           unary<v1::GetSimulationRequest, v1::SimulationInfo>(
+               Role::observe, Lane::quick,
+               [&parts](const CallFrame& frame, const auto& request, auto* reply) {
+                 if (!parts.store.has(request.name()) &&
+                     parts.durability.describe(request.name(), frame.caller, reply))
+                   return;
+                 const SessionHold session(parts.store, request.name(), frame.caller, Access::see);
+                 session->fill(reply, frame.caller);
+               }));
   gate.add(simulations_path("UpdateSimulation"),
            on_session<v1::UpdateSimulationRequest, v1::SimulationInfo>(
                parts, Role::control, Lane::work,

@@ -98,7 +98,7 @@ void add_saved(Gate& gate, const Parts& parts) {
           }));
   gate.add(simulations_path("ListSnapshots"),
            on_session<v1::ListSnapshotsRequest, v1::ListSnapshotsReply>(
-               parts, Role::observe, Lane::quick, [](Session& session, const auto&, auto* reply) {
+               parts, Role::observe, Lane::work, [](Session& session, const auto&, auto* reply) {
                  session.snapshots().list(reply);
                }));
   gate.add(simulations_path("RestoreSnapshot"),
@@ -112,7 +112,7 @@ void add_saved(Gate& gate, const Parts& parts) {
   gate.add(
       simulations_path("DeleteSnapshot"),
       unary<v1::DeleteSnapshotRequest, v1::DeleteSnapshotReply>(
-          Role::control, Lane::quick, [&parts](const CallFrame& frame, const auto& request, auto*) {
+          Role::control, Lane::work, [&parts](const CallFrame& frame, const auto& request, auto*) {
             const Named named(parts, request.name(), frame.caller);
             named.session->forget(named.number);
           }));

@@ -90,6 +90,38 @@ void SnapshotShelf::list(v1::ListSnapshotsReply* out) const {
   for (const auto& [number, saved] : saved_) fill(number, saved, out->add_snapshots());
 }
 
+void SnapshotShelf::describe(v1::CheckpointPoint* out) const {
+  std::lock_guard guard(mutex_);
+  out->set_next_snapshot(next_);
+  for (const auto& [number, saved] : saved_) {
+    v1::CheckpointSnapshot* snapshot = out->add_snapshots();
+    snapshot->set_number(number);
+    snapshot->set_display_name(saved.display_name);
+    snapshot->set_agrees_until_step(saved.agrees_until);
+  }
+}
+
+std::optional<State> SnapshotShelf::find_state(int number) const {
+  std::lock_guard guard(mutex_);
+  const auto found = saved_.find(number);
+  return found == saved_.end() ? std::nullopt : std::optional(found->second.state);
+}
+
+void SnapshotShelf::put(const v1::CheckpointSnapshot& snapshot, State state) {
+  const std::int64_t bytes = size_of(state);
+  std::lock_guard guard(mutex_);
+  require_room(bytes);
+  MemoryShare share(memory_, bytes);
+  saved_.emplace(snapshot.number(), Saved{snapshot.display_name(), std::move(state),
+                                          std::move(share), snapshot.agrees_until_step()});
+  bytes_ += bytes;
+}
+
+void SnapshotShelf::go_on_from(int number) {
+  std::lock_guard guard(mutex_);
+  next_ = std::max(next_, number);
+}
+
 const SnapshotShelf::Saved& SnapshotShelf::find(int number) const {
   const auto found = saved_.find(number);
   if (found != saved_.end()) return found->second;

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 
+#include "mbcosim/v1/checkpoints.pb.h"
 #include "mbcosim/v1/simulations.pb.h"
 #include "model/state.h"
 #include "service/config.h"
@@ -45,6 +47,14 @@ class SnapshotShelf {
     return simulation_ + "/snapshots/" + std::to_string(number);
   }
   void list(v1::ListSnapshotsReply* out) const;
+
+  // --- for checkpoints
+  void describe(v1::CheckpointPoint* out) const;
+  std::optional<State> find_state(int number) const;
+  /// Keeps a state under the number that it had. Throws LIMIT_EXCEEDED.
+  void put(const v1::CheckpointSnapshot& snapshot, State state);
+  /// The number of the next snapshot.
+  void go_on_from(int number);
 
  private:
   struct Saved {

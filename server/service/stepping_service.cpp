@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "service/durability.h"
 #include "service/row_table.h"
 #include "service/simulations_service.h"
 
@@ -182,6 +183,7 @@ void add_stepping(Gate& gate, const Parts& parts) {
            unary<v1::InterruptRequest, v1::InterruptReply>(
                Role::control, Lane::quick,
                [&parts](const CallFrame& frame, const auto& request, auto* reply) {
+                 if (parts.durability.knows(request.name(), frame.caller)) return;  // it rests
                  reply->set_was_stepping(
                      parts.store.get(request.name(), frame.caller, Access::control)->interrupt());
                }));

@@ -44,7 +44,7 @@ grpc::ByteBuffer buffer_of(const std::string& bytes) {
 
 class SubscribeHandler final : public OneRequest<v1::SubscribeRequest> {
  public:
-  explicit SubscribeHandler(const Parts& parts) : OneRequest(Lane::quick), parts_(parts) {}
+  explicit SubscribeHandler(const Parts& parts) : OneRequest(Lane::work), parts_(parts) {}
 
  private:
   void serve(Exchange& exchange, const v1::SubscribeRequest& request) override {

@@ -45,14 +45,32 @@ SymbolValues symbols_of(const v1::CreateOptions& options) {
   return values;
 }
 
+/// Keeps what is read.
+class KeepingSource final : public FileSource {
+ public:
+  KeepingSource(const FileSource& files, KeptDeck& kept) : files_(files), kept_(kept) {}
+  Result<std::string> read(const std::string& name) const override {
+    auto text = files_.read(name);
+    if (text) kept_.files[name] = *text;
+    return text;
+  }
+
+ private:
+  const FileSource& files_;
+  KeptDeck& kept_;
+};
+
 DeckReport read(const FileSource& files, const std::string& main_file,
-                const v1::CreateOptions& options, const Config& config) {
-  return read_deck(files, main_file,
-                   {config.limits.engine, attachments(options), symbols_of(options)});
+                const v1::CreateOptions& options, const Config& config, KeptDeck* kept) {
+  const LoadRequest request{config.limits.engine, attachments(options), symbols_of(options)};
+  if (!kept) return read_deck(files, main_file, request);
+  kept->main_file = main_file;
+  kept->options = options;
+  return read_deck(KeepingSource(files, *kept), main_file, request);
 }
 
 DeckReport load_from_root(const std::string& name, const v1::CreateOptions& options,
-                          const Config& config) {
+                          const Config& config, KeptDeck* kept) {
   if (config.model_root.empty())
     throw Refusal(v1::REASON_NO_SUCH_MODEL, "the server has no model root; upload a bundle");
   check_name(name);
@@ -65,7 +83,8 @@ DeckReport load_from_root(const std::string& name, const v1::CreateOptions& opti
   if (!inside || !fs::is_regular_file(file, error))
     throw Refusal(v1::REASON_NO_SUCH_MODEL,
                   "no deck is named \"" + name + "\" under the model root");
-  return read(FolderSource(file.parent_path().string()), file.filename().string(), options, config);
+  return read(FolderSource(file.parent_path().string()), file.filename().string(), options, config,
+              kept);
 }
 
 }  // namespace
@@ -131,17 +150,21 @@ const v1::UploadHeader& DeckUpload::header() const {
   return *header_;
 }
 
-DeckReport load(DeckUpload& upload, const Config& config) {
+DeckReport load(KeptDeck deck, const Config& config) {
+  return read(BundleSource(std::move(deck.files)), deck.main_file, deck.options, config, nullptr);
+}
+
+DeckReport load(DeckUpload& upload, const Config& config, KeptDeck* kept) {
   const v1::UploadHeader& header = upload.header();
   if (header.has_model_root_file())
-    return load_from_root(header.model_root_file(), header.options(), config);
+    return load_from_root(header.model_root_file(), header.options(), config, kept);
   const std::string& main_file = header.bundle_main_file();
   check_name(main_file);
   std::map<std::string, std::string> files = upload.take_files();
   if (files.count(main_file) == 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
-  return read(BundleSource(std::move(files)), main_file, header.options(), config);
+  return read(BundleSource(std::move(files)), main_file, header.options(), config, kept);
 }
 
 }  // namespace mbcosim::server

@@ -45,9 +45,18 @@ class DeckUpload {
   Bundle bundle_;
 };
 
+/// A deck as it can be kept: its main file, and the files that reading it asked for.
+struct KeptDeck {
+  std::string main_file;
+  std::map<std::string, std::string> files;
+  v1::CreateOptions options;  ///< with which it was read
+};
+
 /// Reads the deck. Throws Refusal when the model root or the file in it is not to be had; a wrong
-/// deck is in the report.
-DeckReport load(DeckUpload& upload, const Config& config);
+/// deck is in the report. `kept` is filled; null: nothing is kept.
+DeckReport load(DeckUpload& upload, const Config& config, KeptDeck* kept = nullptr);
+/// The same deck again.
+DeckReport load(KeptDeck deck, const Config& config);
 /// Ports that need equations of their own in the model.
 std::vector<PortAttachment> attachments(const v1::CreateOptions& options);
 

@@ -152,7 +152,7 @@ Status ResultHistory::finish() {
 }
 
 Status ResultHistory::flush(bool to_disk) {
-  if (to_disk) complete();
+  complete();
   Status written = writer_->flush(to_disk);
   index_.retry();
   if (to_disk) index_.sync();

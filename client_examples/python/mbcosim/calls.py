@@ -149,6 +149,9 @@ class ServerCalls(Generic[SimulationKind]):
         results_quota most bytes of them; None: the server's limit
         symbols       values by name in place of those that the deck declares: numbers, strings, bools
         grants        who else may use the simulation: a list of mbcosim.grant(...)
+        durability    whether it outlives the server: "none" or "checkpoint"; None: "checkpoint" where the server has a state folder
+        checkpoint_interval, checkpoint_steps
+                      longest time [s], and steps, between two checkpoints; None: the server's, and any
         timeout       seconds that the call may take; None: as long as the server lives
         """
         return (yield from self._create(pb.UploadHeader(bundle_main_file=main), files, **options))
@@ -161,8 +164,9 @@ class ServerCalls(Generic[SimulationKind]):
     def _create(self, header: pb.UploadHeader, files: Mapping[str, bytes], *, name: str = "", lease: Optional[float] = None,
                 ports: Iterable[coupling_types_pb2.PortDefinition] = (), policy: str = "fail", minimum_step: float = 0.0,
                 record: bool = False, summed_time: bool = False, symbols: Optional[Mapping[str, Symbol]] = None,
-                grants: Iterable[pb.Grant] = (), results: Results = False,
-                results_quota: Optional[int] = None, timeout: Optional[float] = None) -> Calls[SimulationKind]:
+                grants: Iterable[pb.Grant] = (), results: Results = False, results_quota: Optional[int] = None,
+                durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None,
+                timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = uuid.uuid4().hex
         header.options.display_name = name
         header.options.ports.extend(ports)
@@ -175,6 +179,11 @@ class ServerCalls(Generic[SimulationKind]):
         header.options.grants.extend(grants)
         for symbol, value in (symbols or {}).items():
             header.options.symbols[symbol].CopyFrom(_symbol(value))
+        header.options.durability = choice(pb.Durability, "DURABILITY_", durability, "durability")
+        if checkpoint_interval is not None:
+            header.options.checkpoint_interval.FromMilliseconds(round(checkpoint_interval * 1000))
+        if checkpoint_steps is not None:
+            header.options.checkpoint_steps = checkpoint_steps
         if lease is not None:
             header.options.lease.FromMilliseconds(int(lease * 1000))
         reply = yield Call("Simulations/CreateSimulation", bundle.requests(header, files), timeout)

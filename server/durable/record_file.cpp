@@ -1,0 +1,146 @@
+#include "durable/record_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace mbcosim::server {
+namespace {
+
+constexpr std::size_t kHeader = 16;
+constexpr std::string_view kMagic = "mbcosim 1 ";
+
+void put(std::string& out, std::uint64_t value, int bytes) {
+  for (int k = 0; k < bytes; ++k) out += static_cast<char>(value >> (8 * k));
+}
+
+std::uint64_t get(std::string_view bytes, std::size_t at, int count) {
+  std::uint64_t value = 0;
+  for (int k = count - 1; k >= 0; --k)
+    value = value << 8 | static_cast<unsigned char>(bytes[at + static_cast<std::size_t>(k)]);
+  return value;
+}
+
+std::uint32_t checksum(std::string_view first, std::string_view second) {
+  const auto add = [](uLong crc, std::string_view bytes) {
+    return crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  };
+  return static_cast<std::uint32_t>(add(add(0, first), second));
+}
+
+[[noreturn]] void fail(const std::string& what) {
+  throw StorageError(what + ": " + std::strerror(errno));
+}
+
+std::string folder_of(const std::string& path) { return path.substr(0, path.rfind('/')); }
+
+}  // namespace
+
+// ------------------------------------------------------------------ writing
+
+void RecordWriter::begin(const std::string& file) {
+  add(RecordKind::begin, std::string(kMagic) + file);
+}
+
+void RecordWriter::add(RecordKind kind, std::string_view content) {
+  std::string header;
+  put(header, static_cast<std::uint32_t>(kind), 4);
+  put(header, content.size(), 8);
+  put(header, checksum(header, content), 4);
+  sink_(header);
+  sink_(content);
+}
+
+// ------------------------------------------------------------------ reading
+
+void RecordReader::damaged(const std::string& what) const {
+  throw StorageError("record " + std::to_string(number_ + 1) + " at byte " + std::to_string(at_) +
+                     ": " + what);
+}
+
+void RecordReader::take(std::string_view bytes) {
+  bytes_ += bytes;
+  while (next()) {
+  }
+  bytes_.erase(0, std::exchange(taken_, 0));
+}
+
+bool RecordReader::next() {
+  const std::string_view all = std::string_view(bytes_).substr(taken_);
+  if (all.size() < kHeader) return false;
+  const std::uint64_t length = get(all, 4, 8);
+  if (length > static_cast<std::uint64_t>(most_)) damaged("its length makes no sense");
+  const std::size_t whole = kHeader + static_cast<std::size_t>(length);
+  if (all.size() < whole) return false;
+  if (get(all, 12, 4) != checksum(all.substr(0, 12), all.substr(kHeader, length)))
+    damaged("its checksum differs");
+  const auto kind = static_cast<RecordKind>(get(all, 0, 4));
+  std::string content(all.substr(kHeader, length));
+  check_order(kind, content);
+  taken_ += whole;
+  handler_(kind, std::move(content));
+  at_ += static_cast<std::int64_t>(whole);
+  ++number_;
+  return true;
+}
+
+void RecordReader::check_order(RecordKind kind, const std::string& content) {
+  if (open_ == (kind == RecordKind::begin)) damaged("it is out of turn");
+  open_ = kind != RecordKind::end;
+  if (kind != RecordKind::begin) return;
+  if (content.compare(0, kMagic.size(), kMagic) != 0)
+    damaged("the file is of another kind or version");
+  file_ = content.substr(kMagic.size());
+}
+
+void RecordReader::finish() const {
+  if (!bytes_.empty()) damaged("the file ends within it");
+  if (open_ || number_ == 0) damaged("the file ends before it");
+}
+
+// ------------------------------------------------------------------ files
+
+AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
+  file_ = ::open((path_ + ".new").c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (file_ < 0) fail("a file cannot be made");
+}
+
+AtomicFile::~AtomicFile() {
+  if (file_ < 0) return;
+  ::close(file_);
+  ::unlink((path_ + ".new").c_str());
+}
+
+void AtomicFile::write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(file_, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail("a file cannot be written");
+    bytes.remove_prefix(static_cast<std::size_t>(count));
+    size_ += count;
+  }
+}
+
+void AtomicFile::commit() {
+  if (::fsync(file_) != 0) fail("a file cannot be written");
+  if (::rename((path_ + ".new").c_str(), path_.c_str()) != 0) fail("a file cannot get its name");
+  ::close(file_);
+  file_ = -1;
+  sync_path(folder_of(path_));
+}
+
+void sync_path(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) fail("what was written cannot be opened");
+  const bool done = ::fsync(file) == 0;
+  const int error = errno;
+  ::close(file);
+  errno = error;
+  if (!done) fail("what was written does not get to the disk");
+}
+
+}  // namespace mbcosim::server

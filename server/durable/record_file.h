@@ -1,0 +1,93 @@
+/// Files of records that tell when they are torn or damaged.
+///
+/// A record: kind (4 bytes), length of its content (8 bytes), CRC-32 of kind, length and content
+/// (4 bytes), all with the lowest byte first, then the content. A file begins with a record of kind
+/// `begin`, whose content is "mbcosim 1 " and the file's name, and ends with one of kind `end`.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace mbcosim::server {
+
+enum class RecordKind : std::uint32_t {
+  begin = 1,
+  end = 2,
+  head = 3,
+  file = 4,
+  point = 5,
+  state = 6
+};
+
+/// What cannot be written, as the system says. The message has no path.
+class StorageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Where bytes of records go.
+using ByteSink = std::function<void(std::string_view)>;
+
+/// Writes one file of records to `sink`, or several one after the other.
+class RecordWriter {
+ public:
+  explicit RecordWriter(ByteSink sink) : sink_(std::move(sink)) {}
+  void begin(const std::string& file);
+  void add(RecordKind kind, std::string_view content);
+  void end() { add(RecordKind::end, ""); }
+
+ private:
+  const ByteSink sink_;
+};
+
+/// Takes bytes as they come and hands over whole records. Throws StorageError that names the record
+/// and its place when bytes are damaged, or a record is longer than `most`.
+class RecordReader {
+ public:
+  using Handler = std::function<void(RecordKind, std::string content)>;
+  RecordReader(std::int64_t most, Handler handler) : most_(most), handler_(std::move(handler)) {}
+  void take(std::string_view bytes);
+  /// Nothing follows. Throws StorageError when the last file has no end.
+  void finish() const;
+  /// Of the file that `begin` named last.
+  const std::string& file() const { return file_; }
+
+ private:
+  bool next();
+  void check_order(RecordKind kind, const std::string& content);
+  [[noreturn]] void damaged(const std::string& what) const;
+
+  const std::int64_t most_;
+  const Handler handler_;
+  std::string bytes_, file_;
+  std::size_t taken_ = 0;             ///< of `bytes_`
+  std::int64_t at_ = 0, number_ = 0;  ///< of the next record
+  bool open_ = false;
+};
+
+/// A file that is there whole or not at all: under another name until `commit`.
+class AtomicFile {
+ public:
+  /// Throws StorageError.
+  explicit AtomicFile(std::string path);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+  void write(std::string_view bytes);
+  std::int64_t size() const { return size_; }
+  /// On the disk, under its name, with its folder's entry. Throws StorageError.
+  void commit();
+
+ private:
+  const std::string path_;
+  int file_ = -1;
+  std::int64_t size_ = 0;
+};
+
+/// Entries of a folder, or of a file, are on the disk. Throws StorageError.
+void sync_path(const std::string& path);
+
+}  // namespace mbcosim::server

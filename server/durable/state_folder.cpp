@@ -1,0 +1,262 @@
+#include "durable/state_folder.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+
+namespace mbcosim::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kLongestRecord = 1LL << 40;
+constexpr std::size_t kPiece = 1 << 20;
+const std::string kSnapshot = "snapshot-";
+const std::string kDamaged = ".damaged";
+
+std::int64_t size_of(const std::string& path) {
+  std::error_code none;
+  const auto size = fs::file_size(path, none);
+  return none ? 0 : static_cast<std::int64_t>(size);
+}
+
+std::int64_t bytes_in(const std::string& folder) {
+  std::int64_t bytes = 0;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code none;
+    if (entry->is_regular_file(none)) bytes += size_of(entry->path());
+  }
+  return bytes;
+}
+
+int take_lock(const std::string& path) {
+  const std::string name = path + "/lock";
+  const int file = ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (file < 0)
+    throw std::runtime_error("the state folder " + path +
+                             " cannot be used: " + std::strerror(errno));
+  if (::flock(file, LOCK_EX | LOCK_NB) == 0) return file;
+  ::close(file);
+  throw std::runtime_error("another daemon uses the state folder " + path);
+}
+
+template <class Message>
+void parse(const std::string& content, Message* message) {
+  if (!message->ParseFromString(content)) throw StorageError("a record cannot be understood");
+}
+
+std::optional<int> snapshot_number(const std::string& name) {
+  if (name.compare(0, kSnapshot.size(), kSnapshot) != 0) return std::nullopt;
+  int number = 0;
+  const char* end = name.data() + name.size();
+  const auto [at, error] = std::from_chars(name.data() + kSnapshot.size(), end, number);
+  if (error != std::errc() || at != end || number < 1) return std::nullopt;
+  return number;
+}
+
+}  // namespace
+
+StateFolder::StateFolder(const std::string& path, std::int64_t most) : path_(path), most_(most) {
+  std::error_code error;
+  if (!fs::is_directory(path_, error))
+    throw std::runtime_error("the state folder " + path_ + " is no folder that can be read");
+  lock_ = take_lock(path_);
+  fs::create_directory(path_ + "/simulations", error);
+  if (error)
+    throw std::runtime_error("the state folder " + path_ +
+                             " cannot be written: " + error.message());
+  used_ = bytes_in(path_ + "/simulations");
+}
+
+StateFolder::~StateFolder() { ::close(lock_); }
+
+std::int64_t StateFolder::used() const {
+  Guard guard(mutex_);
+  return used_;
+}
+
+void StateFolder::take(std::int64_t bytes) {
+  Guard guard(mutex_);
+  if (bytes > most_ - used_)
+    throw StorageError("the state folder may take " + std::to_string(most_) +
+                       " bytes (limit state_bytes)");
+  used_ += bytes;
+}
+
+void StateFolder::give_back(std::int64_t bytes) {
+  Guard guard(mutex_);
+  used_ -= bytes;
+}
+
+std::vector<std::string> StateFolder::list() const {
+  std::vector<std::string> ids;
+  std::error_code error;
+  for (fs::directory_iterator entry(path_ + "/simulations", error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename();
+    if (name.find('.') == std::string::npos) ids.push_back(name);
+  }
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+// ------------------------------------------------------------------ writing
+
+template <class Write>
+void StateFolder::write_file(const std::string& id, const std::string& name, Write&& write) {
+  const std::string path = folder(id) + "/" + name;
+  const std::int64_t before = size_of(path);
+  AtomicFile file(path);
+  std::int64_t taken = 0;
+  try {
+    RecordWriter records([&](std::string_view bytes) {
+      take(static_cast<std::int64_t>(bytes.size()));
+      taken += static_cast<std::int64_t>(bytes.size());
+      file.write(bytes);
+    });
+    records.begin(name);
+    write(records);
+    records.end();
+    file.commit();
+  } catch (...) {
+    give_back(taken);
+    throw;
+  }
+  give_back(before);
+}
+
+void StateFolder::write_model(const std::string& id, const StoredModel& model) {
+  if (::mkdir(folder(id).c_str(), 0700) != 0 && errno != EEXIST)
+    throw StorageError(std::string("a folder cannot be made: ") + std::strerror(errno));
+  sync_path(path_ + "/simulations");
+  write_file(id, "model", [&](RecordWriter& records) {
+    records.add(RecordKind::head, model.head.SerializeAsString());
+    v1::FileChunk chunk;
+    for (const auto& [name, bytes] : model.files) {
+      chunk.set_path(name);
+      for (std::size_t at = 0; at == 0 || at < bytes.size(); at += kPiece) {
+        chunk.set_data(bytes.substr(at, kPiece));
+        records.add(RecordKind::file, chunk.SerializeAsString());
+      }
+    }
+  });
+}
+
+void StateFolder::write_point(const std::string& id, const StoredPoint& point) {
+  write_file(id, "point", [&](RecordWriter& records) {
+    records.add(RecordKind::point, point.point.SerializeAsString());
+    records.add(RecordKind::state, point.state);
+  });
+}
+
+void StateFolder::write_snapshot(const std::string& id, int number, const std::string& state) {
+  write_file(id, kSnapshot + std::to_string(number),
+             [&](RecordWriter& records) { records.add(RecordKind::state, state); });
+}
+
+void StateFolder::remove_snapshot(const std::string& id, int number) {
+  const std::string path = folder(id) + "/" + kSnapshot + std::to_string(number);
+  const std::int64_t size = size_of(path);
+  if (::unlink(path.c_str()) == 0) give_back(size);
+}
+
+void StateFolder::remove(const std::string& id) {
+  const std::int64_t size = bytes_in(folder(id));
+  std::error_code none;
+  // Without its model it is no simulation, whatever else is left when the daemon is killed now.
+  fs::remove(folder(id) + "/model", none);
+  fs::remove_all(folder(id), none);
+  give_back(size);
+}
+
+std::string StateFolder::put_aside(const std::string& id) {
+  std::error_code none;
+  fs::rename(folder(id), folder(id) + kDamaged, none);
+  return folder(id) + kDamaged;
+}
+
+// ------------------------------------------------------------------ reading
+
+void StateFolder::read_file(const std::string& id, const std::string& name,
+                            const RecordReader::Handler& handler) const try {
+  std::ifstream file(folder(id) + "/" + name, std::ios::binary);
+  if (!file) throw StorageError("there is no such file, or it cannot be read");
+  RecordReader reader(kLongestRecord, handler);
+  std::string piece(kPiece, '\0');
+  while (file) {
+    file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    reader.take(std::string_view(piece).substr(0, static_cast<std::size_t>(file.gcount())));
+  }
+  reader.finish();
+  if (reader.file() != name) throw StorageError("it is the file \"" + reader.file() + "\"");
+} catch (const StorageError& error) {
+  throw StorageError(id + "/" + name + ": " + error.what());
+}
+
+v1::CheckpointHead StateFolder::read_head(const std::string& id) const {
+  return read_model(id).head;
+}
+
+StoredModel StateFolder::read_model(const std::string& id) const {
+  StoredModel model;
+  read_file(id, "model", [&](RecordKind kind, const std::string& content) {
+    if (kind == RecordKind::head) parse(content, &model.head);
+    if (kind != RecordKind::file) return;
+    v1::FileChunk chunk;
+    parse(content, &chunk);
+    model.files[chunk.path()] += chunk.data();
+  });
+  return model;
+}
+
+StoredPoint StateFolder::read_point(const std::string& id) const {
+  StoredPoint point;
+  read_file(id, "point", [&](RecordKind kind, std::string content) {
+    if (kind == RecordKind::point) parse(content, &point.point);
+    if (kind == RecordKind::state) point.state = std::move(content);
+  });
+  return point;
+}
+
+std::string StateFolder::read_snapshot(const std::string& id, int number) const {
+  std::string state;
+  read_file(id, kSnapshot + std::to_string(number), [&](RecordKind kind, std::string content) {
+    if (kind == RecordKind::state) state = std::move(content);
+  });
+  return state;
+}
+
+std::vector<std::string> StateFolder::files_of(const std::string& id) const {
+  std::vector<std::string> paths = {folder(id) + "/model", folder(id) + "/point"};
+  for (const int number : snapshots(id))
+    paths.push_back(folder(id) + "/" + kSnapshot + std::to_string(number));
+  return paths;
+}
+
+std::vector<int> StateFolder::snapshots(const std::string& id) const {
+  std::vector<int> numbers;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder(id), error), end; !error && entry != end;
+       entry.increment(error))
+    if (const auto number = snapshot_number(entry->path().filename())) numbers.push_back(*number);
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+std::int64_t StateFolder::written_at(const std::string& id) const {
+  struct stat info {};
+  return ::stat((folder(id) + "/point").c_str(), &info) == 0 ? info.st_mtime : 0;
+}
+
+}  // namespace mbcosim::server

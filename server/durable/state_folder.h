@@ -1,0 +1,77 @@
+/// The folder in which simulations outlive the daemon.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "durable/record_file.h"
+#include "mbcosim/v1/checkpoints.pb.h"
+#include "threads/mutex.h"
+
+namespace mbcosim::server {
+
+/// What a stored simulation is made of.
+struct StoredModel {
+  v1::CheckpointHead head;
+  std::map<std::string, std::string> files;  ///< of the deck
+};
+struct StoredPoint {
+  v1::CheckpointPoint point;
+  std::string state;  ///< of Simulation::export_state
+};
+
+/// DIR/lock, which one daemon holds; DIR/simulations/ID with the files "model" (written once),
+/// "point" (replaced by each checkpoint) and "snapshot-N". Thread-safe, as long as each simulation
+/// is written by one thread at a time.
+class StateFolder {
+ public:
+  /// `most`: bytes of all that is in it. Throws std::runtime_error when the folder cannot be used
+  /// or another daemon uses it.
+  StateFolder(const std::string& path, std::int64_t most);
+  ~StateFolder();
+  StateFolder(const StateFolder&) = delete;
+  StateFolder& operator=(const StateFolder&) = delete;
+
+  /// IDs of the simulations that are stored.
+  std::vector<std::string> list() const;
+
+  // --- of one simulation. All throw StorageError; what is written is on the disk then.
+  void write_model(const std::string& id, const StoredModel& model);
+  void write_point(const std::string& id, const StoredPoint& point);
+  void write_snapshot(const std::string& id, int number, const std::string& state);
+  v1::CheckpointHead read_head(const std::string& id) const;
+  StoredModel read_model(const std::string& id) const;
+  StoredPoint read_point(const std::string& id) const;
+  std::string read_snapshot(const std::string& id, int number) const;
+  std::vector<int> snapshots(const std::string& id) const;
+  void remove_snapshot(const std::string& id, int number);
+  /// When its last checkpoint was written [s since 1970].
+  std::int64_t written_at(const std::string& id) const;
+  /// Nothing when there is none.
+  void remove(const std::string& id);
+  /// Keeps what is damaged where nobody takes it for a simulation; its new name.
+  std::string put_aside(const std::string& id);
+
+  /// All of a simulation as one stream of bytes.
+  std::vector<std::string> files_of(const std::string& id) const;
+  std::int64_t used() const TS_EXCLUDES(mutex_);
+
+ private:
+  std::string folder(const std::string& id) const { return path_ + "/simulations/" + id; }
+  template <class Write>
+  void write_file(const std::string& id, const std::string& name, Write&& write);
+  void read_file(const std::string& id, const std::string& name,
+                 const RecordReader::Handler& handler) const;
+  void take(std::int64_t bytes) TS_EXCLUDES(mutex_);
+  void give_back(std::int64_t bytes) TS_EXCLUDES(mutex_);
+
+  const std::string path_;
+  const std::int64_t most_;
+  int lock_ = -1;
+  mutable Mutex mutex_;
+  std::int64_t used_ TS_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace mbcosim::server

@@ -1,0 +1,92 @@
+/// Simulations that outlive the daemon: checkpoints, and sessions made of them again.
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "durable/state_folder.h"
+#include "service/parts.h"
+#include "service/upload.h"
+#include "threads/mutex.h"
+
+namespace mbcosim::server {
+
+/// A simulation that is in the state folder only.
+struct Suspended {
+  v1::CheckpointHead head;
+  v1::SimulationInfo info;  ///< of its last checkpoint
+  std::int64_t since = 0;   ///< [s since 1970]
+};
+
+/// Thread-safe. Without a state folder nothing is durable.
+class Durability {
+ public:
+  /// Takes the folder and reads what is in it: what is damaged is put aside, and said so. Throws
+  /// std::runtime_error when the folder cannot be used.
+  Durability(const Config& config, EventLog& log, Metrics& metrics);
+  ~Durability();
+
+  bool available() const { return folder_ != nullptr; }
+  /// Checkpoints begin. `parts` outlives `stop`.
+  void start(const Parts& parts);
+  /// The last checkpoints: of all sessions; when `busy` tells that some work goes on, of those that
+  /// it does not hold.
+  void stop(bool busy);
+
+  // --- sessions that live
+  /// Shall a new one be durable? `original`: of which it is a fork, or null. Throws NOT_DURABLE,
+  /// BAD_ARGUMENT.
+  bool wanted(const v1::CreateOptions& options, const Session* original) const;
+  /// Stores a new one, of this deck. Throws STORAGE_FULL, and nothing is left.
+  void begin(Session& session, const KeptDeck& deck, const v1::CreateOptions& options);
+  /// One that nobody has seen is not stored any more.
+  void drop(Session& session) { forget(session); }
+  /// The deck of a durable session. Throws STORAGE_FULL when it cannot be read.
+  KeptDeck deck_of(const Session& session) const;
+
+  // --- suspended ones. None of them throws for one that is not known.
+  bool knows(const std::string& simulation, const Caller& caller) const;
+  bool describe(const std::string& simulation, const Caller& caller, v1::SimulationInfo* out) const;
+  std::vector<v1::SimulationInfo> list(const Caller& caller) const;
+  /// False: none of that name, or not the caller's.
+  bool remove(const std::string& simulation, const Caller& caller);
+  /// The simulation that the caller created with this request id; empty: none.
+  std::string find_request(const std::string& owner, const std::string& request_id) const;
+
+ private:
+  bool wake(const std::string& simulation, const Caller& caller) TS_EXCLUDES(mutex_);
+  bool suspend(Session& session);
+  void unsuspend(const std::string& simulation) TS_EXCLUDES(mutex_);
+  void forget(Session& session);
+  SessionPtr revive(const std::string& simulation, const Suspended& suspended);
+  std::unique_ptr<Simulation> simulation_at(const ModelPtr& model, const Suspended& suspended,
+                                            const std::string& state, SessionResults* results,
+                                            bool has_files);
+  void write_snapshots(Session& session, const std::string& id, v1::CheckpointPoint& point);
+  bool may_see(const Suspended& suspended, const Caller& caller, Access access) const;
+  void read_folder();
+  void read_one(const std::string& id);
+  void write(Session& session);
+  void loop();
+  void look();
+  void expire();
+
+  const Config& config_;
+  EventLog& log_;
+  Metrics& metrics_;
+  const std::unique_ptr<StateFolder> folder_;
+  const Parts* parts_ = nullptr;
+  mutable Mutex mutex_;
+  Condition changed_;
+  std::map<std::string, Suspended> suspended_ TS_GUARDED_BY(mutex_);  ///< by name
+  std::set<std::string> waking_ TS_GUARDED_BY(mutex_);
+  bool stop_ TS_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace mbcosim::server

@@ -1,0 +1,133 @@
+#include "durable/record_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+namespace mbcosim::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string two_files() {
+  std::string bytes;
+  RecordWriter writer([&](std::string_view piece) { bytes += piece; });
+  for (const char* name : {"model", "point"}) {
+    writer.begin(name);
+    writer.add(RecordKind::head, "some content of " + std::string(name));
+    writer.add(RecordKind::state, std::string(300, '\0'));
+    writer.end();
+  }
+  return bytes;
+}
+
+using Found = std::vector<std::pair<RecordKind, std::string>>;
+
+/// Reads in pieces of `piece` bytes. Throws StorageError.
+Found read(const std::string& bytes, std::size_t piece = 1 << 20) {
+  Found found;
+  RecordReader reader(1 << 20, [&](RecordKind kind, std::string content) {
+    found.emplace_back(kind, std::move(content));
+  });
+  for (std::size_t at = 0; at < bytes.size(); at += piece)
+    reader.take(std::string_view(bytes).substr(at, piece));
+  reader.finish();
+  return found;
+}
+
+TEST(Records, ComeBackWhateverTheirPieces) {
+  const std::string bytes = two_files();
+  const Found whole = read(bytes);
+  ASSERT_EQ(whole.size(), 8u);
+  EXPECT_EQ(whole[1], std::make_pair(RecordKind::head, std::string("some content of model")));
+  EXPECT_EQ(whole[6], std::make_pair(RecordKind::state, std::string(300, '\0')));
+  for (const std::size_t piece : {1, 7, 16, 1000}) EXPECT_EQ(read(bytes, piece), whole);
+}
+
+TEST(Records, TellEveryFlippedBit) {
+  const std::string bytes = two_files();
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    std::string damaged = bytes;
+    damaged[at] ^= static_cast<char>(1 << (at % 8));
+    EXPECT_THROW(read(damaged), StorageError) << "byte " << at;
+  }
+}
+
+TEST(Records, TellEveryCut) {
+  const std::string bytes = two_files(), first = bytes.substr(0, bytes.size() / 2);
+  EXPECT_EQ(read(first).size(), 4u) << "the first file is whole";
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    if (size == first.size()) continue;
+    EXPECT_THROW(read(bytes.substr(0, size)), StorageError) << size;
+  }
+}
+
+TEST(Records, TellWhereTheDamageIs) {
+  std::string bytes = two_files();
+  bytes[60] ^= 1;
+  try {
+    read(bytes);
+    FAIL();
+  } catch (const StorageError& error) {
+    EXPECT_STREQ(error.what(), "record 2 at byte 31: its checksum differs");
+  }
+}
+
+TEST(Records, OfAbsurdLengthAreNotWaitedFor) {
+  std::string bytes = two_files();
+  bytes[31 + 9] = 1;  // 2^40 bytes and more
+  try {
+    read(bytes);
+    FAIL();
+  } catch (const StorageError& error) {
+    EXPECT_STREQ(error.what(), "record 2 at byte 31: its length makes no sense");
+  }
+}
+
+class Atomic : public testing::Test {
+ protected:
+  Atomic() {
+    std::string path = testing::TempDir() + "mbcosim_atomic_XXXXXX";
+    folder_ = mkdtemp(path.data());
+  }
+  ~Atomic() override { fs::remove_all(folder_); }
+  std::string text() const {
+    std::ostringstream out;
+    out << std::ifstream(folder_ + "/file").rdbuf();
+    return out.str();
+  }
+  std::string folder_;
+};
+
+TEST_F(Atomic, AFileIsThereWholeOrNotAtAll) {
+  {
+    AtomicFile file(folder_ + "/file");
+    file.write("first");
+    EXPECT_FALSE(fs::exists(folder_ + "/file"));
+    file.commit();
+  }
+  EXPECT_EQ(text(), "first");
+  { AtomicFile(folder_ + "/file").write("given up"); }
+  EXPECT_EQ(text(), "first");
+  EXPECT_FALSE(fs::exists(folder_ + "/file.new"));
+}
+
+TEST_F(Atomic, AFullDiskIsTold) {
+  fs::create_symlink("/dev/full", folder_ + "/file.new");
+  try {
+    AtomicFile file(folder_ + "/file");
+    file.write("too much");
+    FAIL();
+  } catch (const StorageError& error) {
+    EXPECT_STREQ(error.what(), "a file cannot be written: No space left on device");
+  }
+  EXPECT_FALSE(fs::exists(folder_ + "/file"));
+}
+
+}  // namespace
+}  // namespace mbcosim::server

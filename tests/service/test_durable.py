@@ -1,0 +1,332 @@
+"""Simulations that outlive the daemon: bit for bit from their last checkpoint, whatever happens in between."""
+import os
+import random
+import signal
+import subprocess
+import threading
+import time
+
+import grpc
+import pytest
+
+import decks
+import mbcosim
+from conftest import BIN, TIME_FACTOR, wait_for
+from mbcosim.v1 import events_pb2, simulations_pb2 as pb
+
+KILLS = int(os.environ.get("MBCOSIM_KILLS", "6"))  # 1000 for the long form
+X, R = "node.structural.1.X", "node.structural.1.R"
+LOAD = "node.structural.1.load"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    path = tmp_path / "state"
+    path.mkdir()
+    return path
+
+
+@pytest.fixture
+def start(start_daemon, folder):
+    """Function that starts a daemon on the folder."""
+    return lambda *options: start_daemon("--state-dir", str(folder), *options)
+
+
+def kill(daemon):
+    """Ends it as a power failure would."""
+    daemon.process.send_signal(signal.SIGKILL)
+    daemon.process.wait(30)
+    daemon.stop = lambda: None  # it cannot end well any more
+
+
+def deck(steps=4000):
+    return decks.body(final_time=str(steps * 1e-3))
+
+
+def bits(simulation):
+    values = simulation.read([X, R, "time"])
+    return values[X].tobytes(), values[R].tobytes(), values["time"]
+
+
+def at_the_end(server, text):
+    """Bits of the uninterrupted run."""
+    with server.load_text(text, durability="none") as simulation:
+        simulation.run_until(1e9)
+        return bits(simulation)
+
+
+def state_of(server, name):
+    return next(info.state for info in server.list() if info.name == name)
+
+
+def test_goes_on_after_an_orderly_end(start):
+    daemon = start()
+    with daemon.connect() as server:
+        expected = at_the_end(server, deck())
+        simulation = server.load_text(deck(), name="body", policy="cut_step", minimum_step=1e-5)
+        simulation.step(100)
+        saved = simulation.snapshot("here")
+        simulation.step(900)
+        last = simulation.info.name
+    daemon.stop()
+    with start().connect() as server:
+        assert state_of(server, last) == pb.SIMULATION_STATE_SUSPENDED
+        again = server.attach(last)
+        assert (again.info.display_name, again.info.step, again.info.minimum_step_s) == ("body", 1000, 1e-5)
+        assert state_of(server, last) == pb.SIMULATION_STATE_SUSPENDED  # asking does not wake it
+        assert again.read(["step"])["step"] == 1000
+        assert state_of(server, last) == pb.SIMULATION_STATE_READY
+        assert [(s.name, s.display_name, s.step) for s in again.snapshots()] == [(saved.name, "here", 100)]
+        again.run_until(1e9)
+        assert bits(again) == expected
+        again.snapshots()[0].restore()
+        assert again.snapshot().name.endswith("/snapshots/2")
+        again.run_until(1e9)
+        assert bits(again) == expected
+
+
+def test_kills_at_random_moments_lose_nothing_of_a_checkpoint(start, folder, tmp_path):
+    """The short form; MBCOSIM_KILLS=1000 for the long one."""
+    rolls, text, root = random.Random(19), deck(200_000), tmp_path / "results"
+    root.mkdir()
+    options = ("--results-root", str(root), "--checkpoint-interval", "0.02")
+    daemon = start(*options)
+    with daemon.connect() as server:
+        name = server.load_text(text, results="text", summed_time=True).name
+    reached = 0
+    for _ in range(KILLS):
+        with daemon.connect() as server:
+            simulation = server.attach(name)
+            step = int(simulation.read(["step"])["step"])
+            assert step >= reached, "a checkpoint is lost"
+            stream = server.simulations.Run(pb.RunRequest(step=pb.StepRequest(simulation=name, until_time_s=1e9)))
+            time.sleep(rolls.uniform(0, 0.3))
+            reached = on_disk(folder, name)
+            kill(daemon)
+            stream.cancel()
+        daemon = start(*options)
+    with daemon.connect() as server:
+        simulation = server.attach(name)
+        stopped = int(simulation.read(["step"])["step"])
+        assert stopped >= reached > 0
+        simulation.step(50)
+        found = bits(simulation), {n: simulation.result_file(n) for n in simulation.result_files()}
+        with server.load_text(text, results="text", summed_time=True, durability="none") as straight:
+            straight.step(stopped + 50)
+            assert bits(straight) == found[0]
+            files = {n: straight.result_file(n) for n in straight.result_files()}
+        assert files.keys() == found[1].keys() and [n for n in files if files[n] != found[1][n]] == []
+
+
+def on_disk(folder, name):
+    """Number of the step of the last checkpoint, read without the daemon."""
+    from mbcosim.v1 import checkpoints_pb2
+    data = (folder / name / "point").read_bytes()
+    at = 0
+    while at < len(data):
+        kind, length = int.from_bytes(data[at:at + 4], "little"), int.from_bytes(data[at + 4:at + 12], "little")
+        if kind == 5:
+            return checkpoints_pb2.CheckpointPoint.FromString(data[at + 16:at + 16 + length]).info.step
+        at += 16 + length
+    raise AssertionError("the file has no point")
+
+
+def test_the_last_reply_is_kept_for_who_asks_again(start):
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(deck()).name
+        request = pb.StepRequest(simulation=name, steps=7, request_id="once", outputs=[0])
+        first = server.simulations.Step(request)
+    daemon.stop()
+    with start().connect() as server:
+        assert server.simulations.Step(request) == first
+        assert server.attach(name).info.step == 7
+
+
+def test_a_creation_is_done_once_across_restarts(start):
+    def create(server):
+        header = pb.UploadHeader(bundle_main_file="deck", options=pb.CreateOptions(request_id="same"))
+        from mbcosim import bundle
+        return server.simulations.CreateSimulation(bundle.requests(header, {"deck": deck().encode()})).simulation.name
+
+    daemon = start()
+    with daemon.connect() as server:
+        name = create(server)
+    kill(daemon)
+    with start().connect() as server:
+        assert create(server) == name and len(server.list()) == 1
+
+
+def test_the_end_of_a_lease_suspends(start):
+    with start().connect() as server, server.events() as watcher:
+        simulation = server.load_text(deck(), lease=0.5)
+        simulation.step(10)
+        wait_for(lambda: state_of(server, simulation.name) == pb.SIMULATION_STATE_SUSPENDED, 20)
+        assert simulation.step(5).step == 15
+        changes = []
+        for event in watcher:
+            if event.WhichOneof("content") == "state_changed":
+                changes.append(event.state_changed.state)
+            if len(changes) == 2:
+                break
+        assert changes == [pb.SIMULATION_STATE_SUSPENDED, pb.SIMULATION_STATE_READY]
+
+
+def test_many_callers_wake_one_simulation_once(start):
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(deck()).name
+    daemon.stop()
+    with start().connect() as server:
+        steps = []
+
+        def look():
+            steps.append(server.attach(name).read(["step"])["step"])
+
+        threads = [threading.Thread(target=look) for _ in range(16)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(60)
+        assert steps == [0.0] * 16 and len(server.list()) == 1
+
+
+def test_deleted_ones_are_gone(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        with server.load_text(deck()) as first:
+            assert (folder / first.name / "point").exists()
+        assert not (folder / first.name).exists()
+        name = server.load_text(deck()).name
+    daemon.stop()
+    with start().connect() as server:
+        server.attach(name).delete()
+        assert server.list() == [] and not (folder / name).exists()
+        with pytest.raises(mbcosim.NotFound):
+            server.attach(name)
+
+
+def test_forks_outlive_too(start):
+    daemon = start()
+    with daemon.connect() as server:
+        original = server.load_text(deck())
+        original.step(20)
+        fork = original.fork(name="twig")
+        fork.step(5)
+        ported = server.load_text(decks.body(), ports=[mbcosim.motion_port("hand", nodes=[1])])
+        ported_fork = ported.fork()  # of a model with equations of the port, without the port
+        names = original.name, fork.name, ported.name, ported_fork.name
+        fleeting = server.load_text(deck(), durability="none")
+        assert fleeting.fork().info.durability == pb.DURABILITY_NONE
+    daemon.stop()
+    with start().connect() as server:
+        assert {info.name for info in server.list()} == set(names)
+        assert [server.attach(n).read(["step"])["step"] for n in names] == [20, 25, 0, 0]
+
+
+@pytest.mark.parametrize("damage", ["flip", "cut", "tail"])
+@pytest.mark.parametrize("file", ["model", "point"])
+def test_what_is_damaged_is_named_and_stops_nobody_else(start, folder, file, damage):
+    daemon = start()
+    with daemon.connect() as server:
+        bad, good = server.load_text(deck()).name, server.load_text(deck()).name
+    kill(daemon)
+    path = folder / bad / file
+    data = bytearray(path.read_bytes())
+    if damage == "flip":
+        data[len(data) // 2] ^= 4
+    path.write_bytes(data[:-7] if damage == "cut" else data + b"torn" if damage == "tail" else data)
+    daemon = start()
+    with daemon.connect() as server:
+        assert [info.name for info in server.list()] == [good]
+        assert server.attach(good).step(3).step == 3
+        with pytest.raises(mbcosim.NotFound):
+            server.attach(bad)
+    line, = [line for line in daemon.log().splitlines() if "put aside" in line]
+    assert f"{bad.split('/')[1]}/{file}: record " in line
+    assert (folder / (bad + ".damaged") / file).exists()
+
+
+def test_a_damaged_snapshot_is_named_when_it_is_needed(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        simulation = server.load_text(deck())
+        simulation.snapshot()
+        name = simulation.name
+    daemon.stop()
+    path = folder / name / "snapshot-1"
+    data = bytearray(path.read_bytes())
+    data[-40] ^= 1
+    path.write_bytes(data)
+    with start().connect() as server:
+        with pytest.raises(mbcosim.Error) as caught:
+            server.attach(name).step()
+        assert caught.value.reason == "DAMAGED_STATE" and "snapshot-1: record 2 at byte" in str(caught.value)
+        assert state_of(server, name) == pb.SIMULATION_STATE_SUSPENDED  # nothing is lost
+
+
+def test_one_folder_has_one_daemon(start, folder, tmp_path):
+    start().connect().close()
+    second = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/second", "--state-dir", str(folder)],
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60 * TIME_FACTOR)
+    assert second.returncode == 4
+    assert second.stdout.splitlines()[-1] == f"mbcosimd: error: another daemon uses the state folder {folder}"
+
+
+def test_a_full_folder_refuses_and_loses_nothing(start, folder):
+    with start("--limit-state-bytes", "60000", "--checkpoint-interval", "0.05").connect() as server, server.events() as watcher:
+        simulation = server.load_text(deck())
+        kept = 1
+        with pytest.raises(mbcosim.LimitExceeded) as caught:
+            for _ in range(100):
+                server.load_text(deck())
+                kept += 1
+        assert caught.value.reason == "STORAGE_FULL" and "may take 60000 bytes (limit state_bytes)" in str(caught.value)
+        assert len(server.list()) == kept == len(os.listdir(folder / "simulations"))
+        for _ in range(20):
+            simulation.snapshot()  # in memory there is room
+        assert simulation.step(10).step == 10
+        failed = next(event for event in watcher if event.WhichOneof("content") == "checkpoint_failed")
+        assert "limit state_bytes" in failed.checkpoint_failed.message and failed.simulation
+        assert simulation.step(10).step == 20
+
+
+def test_refusals(start, start_daemon):
+    with start().connect() as server:
+        for options, message in [({"checkpoint_steps": 0}, "`checkpoint_steps` must be positive, got 0"),
+                                 ({"checkpoint_interval": 0.0}, "`checkpoint_interval` must be at least 1 ms")]:
+            with pytest.raises(mbcosim.Error) as caught:
+                server.load_text(deck(), **options)
+            assert message in str(caught.value)
+        assert server.list() == []
+        fleeting = server.load_text(deck(), durability="none")
+        with pytest.raises(grpc.RpcError) as refused:
+            server.simulations.ForkSimulation(pb.ForkSimulationRequest(
+                simulation=fleeting.name, options=pb.CreateOptions(durability=pb.DURABILITY_CHECKPOINT)))
+        assert "the original of the fork has durability NONE" in refused.value.details()
+    with start_daemon().connect() as server:
+        with pytest.raises(mbcosim.PreconditionFailed) as caught:
+            server.load_text(deck(), durability="checkpoint")
+        assert caught.value.reason == "NOT_DURABLE" and "--state-dir" in str(caught.value)
+        assert server.load_text(deck()).info.durability == pb.DURABILITY_NONE
+
+
+def test_steps_between_checkpoints(start, folder):
+    with start("--checkpoint-interval", "3600").connect() as server:
+        simulation = server.load_text(deck(), checkpoint_steps=100)
+        simulation.step(99)
+        time.sleep(0.2)
+        assert on_disk(folder, simulation.name) == 0
+        simulation.step(1)
+        wait_for(lambda: on_disk(folder, simulation.name) == 100)
+
+
+def test_long_suspended_ones_are_removed(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(deck()).name
+    daemon.stop()
+    os.utime(folder / name / "point", (time.time() - 100,) * 2)
+    with start("--suspended-expiry", "50").connect() as server:
+        wait_for(lambda: server.list() == [])
+        assert not (folder / name).exists()
