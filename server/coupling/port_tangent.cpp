@@ -32,7 +32,8 @@ MatX unpack(const Numbers& numbers, int rows, int columns) {
 }  // namespace
 
 bool PortModel::takes_tangents() const {
-  if (layout_.kind() == v1::PORT_KIND_MODAL) return points_.empty() && layout_.input_size() > 0;
+  if (layout_.kind() == v1::PORT_KIND_MODAL)
+    return points_.empty() && layout_.input_size() > 0 && element_->element->first_mode_row() >= 0;
   return layout_.kind() == v1::PORT_KIND_STRUCTURAL && !layout_.reference_loads() && !is_mapped();
 }
 

@@ -201,8 +201,14 @@ void keep_channel(Card& card, DeckChannel channel) {
     card.builder().on_step(std::make_shared<DeckChannel>(std::move(channel)));
 }
 
+void warn_of_modal_accelerations(Card& card) {
+  if (card.keyword("accelerations"))
+    card.warn("`accelerations` has no effect: they do not travel in modal messages");
+}
+
 void register_external_forces(Registry& registry) {
   registry.typed("force", Family::force, {"external structural"}, read_external_structural);
+  register_modal_mapping(registry);
 }
 
 }  // namespace mbcosim

@@ -18,6 +18,9 @@ PortCoupling read_port_timing(Card& card, DeckChannel& channel);
 void read_port_options(Card& card, StructuralPort& port, DeckChannel& channel);
 /// `[echo, "file"]`: only a channel has it.
 void read_port_echo(Card& card, DeckChannel& channel);
+/// `[accelerations]` of modal forces: no message has them.
+void warn_of_modal_accelerations(Card& card);
+void register_modal_mapping(Registry& registry);
 /// Keeps the channel with the model, unless it is a port of the daemon.
 void keep_channel(Card& card, DeckChannel channel);
 

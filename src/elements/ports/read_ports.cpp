@@ -1,10 +1,8 @@
-/// Cards of ports besides `external structural`: its mapping, `external modal`, `stream output`,
-/// `stream motion output`.
-#include <sstream>
-
+/// Cards of ports besides `external structural` and `external modal mapping`.
 #include "elements/families.h"
 #include "elements/ports/external_modal.h"
 #include "elements/ports/mapped_structural.h"
+#include "elements/ports/mapping_file.h"
 #include "elements/ports/read_external.h"
 #include "elements/ports/stream_output.h"
 #include "model/card.h"
@@ -37,60 +35,6 @@ void read_mapped_points(Card& card, StructuralPort& port) {
   }
 }
 
-/// Numbers of a text; lines that start with # are comments.
-std::vector<double> read_numbers(Card& card, const std::string& text, std::size_t* lines) {
-  std::vector<double> numbers;
-  std::istringstream in(text);
-  *lines = 0;
-  for (std::string line; std::getline(in, line);) {
-    if (line.empty() || line[0] == '#') continue;
-    std::istringstream words(line);
-    const std::size_t before = numbers.size();
-    for (std::string word; words >> word;) {
-      char* end = nullptr;
-      numbers.push_back(std::strtod(word.c_str(), &end));
-      if (*end != 0 || !std::isfinite(numbers.back()))
-        card.fail("mapping file: \"" + word.substr(0, 40) + "\" is no number");
-    }
-    *lines += numbers.size() > before ? 1 : 0;
-  }
-  return numbers;
-}
-
-/// A full matrix by rows, one row a line, or lines `row column value` counted from 1.
-MatX read_matrix(Card& card, bool sparse, int rows, int columns, double threshold) {
-  std::string name;
-  std::size_t lines = 0;
-  const std::vector<double> numbers =
-      read_numbers(card, card.file_contents("mapping file", &name), &lines);
-  const auto refuse = [&](const std::string& what) {
-    card.fail("mapping file \"" + name + "\": " + what);
-  };
-  if (!sparse && rows < 0) rows = static_cast<int>(lines);
-  if (sparse && numbers.size() != 3 * lines) refuse("each line must have row, column and value");
-  if (sparse && rows < 0)
-    for (std::size_t k = 0; k < numbers.size(); k += 3)
-      rows = std::max(rows, (static_cast<int>(numbers[k]) + 2) / 3 * 3);
-  if (rows < 3 || rows % 3 != 0 || rows > 3 * kMostPoints)
-    refuse("the matrix must have three rows for each mapped point");
-  MatX H = MatX::Zero(rows, columns);
-  if (!sparse) {
-    if (numbers.size() != static_cast<std::size_t>(rows) * columns)
-      refuse("the matrix must be " + std::to_string(rows) + " by " + std::to_string(columns) +
-             ", found " + std::to_string(numbers.size()) + " numbers");
-    for (std::size_t k = 0; k < numbers.size(); ++k) H(k / columns, k % columns) = numbers[k];
-  }
-  for (std::size_t k = 0; sparse && k < numbers.size(); k += 3) {
-    const double i = numbers[k], j = numbers[k + 1];
-    if (!(i >= 1 && i <= rows && j >= 1 && j <= columns && i == std::floor(i) &&
-          j == std::floor(j)))
-      refuse("entry " + std::to_string(k / 3 + 1) + " lies outside of " + std::to_string(rows) +
-             " by " + std::to_string(columns));
-    H(static_cast<int>(i) - 1, static_cast<int>(j) - 1) = numbers[k + 2];
-  }
-  return H.unaryExpr([&](double x) { return std::abs(x) < threshold ? 0.0 : x; });
-}
-
 /// `mapped points number, {from file | n}, {full | sparse} mapping file, [threshold, t,] "file" [,
 /// labels]`
 MatX read_mapping(Card& card, StructuralPort& port) {
@@ -104,16 +48,14 @@ MatX read_mapping(Card& card, StructuralPort& port) {
                 ", got " + std::to_string(count));
     rows = 3 * count;
   }
-  const bool sparse = card.required("mapping", {"full mapping file", "sparse mapping file"}) == 1;
-  const double threshold = card.keyword("threshold") ? card.real("threshold") : 0;
-  const MatX H = read_matrix(card, sparse, rows, columns, threshold);
+  const MatX H = read_mapping_file(card, rows, columns, 3);
   const int mapped = static_cast<int>(H.rows()) / 3;
   port.point_labels.clear();
   if (card.keyword("mapped labels file")) {
     std::string name;
     std::size_t lines = 0;
     for (const double label :
-         read_numbers(card, card.file_contents("labels of mapped points", &name), &lines))
+         read_mapping_numbers(card, card.file_contents("labels of mapped points", &name), &lines))
       port.point_labels.push_back(static_cast<int>(label));
     if (static_cast<int>(port.point_labels.size()) != mapped)
       card.fail("\"" + name + "\" has " + std::to_string(port.point_labels.size()) +
@@ -178,8 +120,7 @@ void read_external_modal(Card& card, ElementInfo& info) {
     joint = ref.index;
     node = joints->joint(joint).node;
   }
-  if (card.keyword("accelerations"))
-    card.fail("external modal: accelerations do not travel", "leave `accelerations` out");
+  warn_of_modal_accelerations(card);
   int type = joints ? (node >= 0 ? 2 : 1) : 0;
   if (card.keyword("type")) {
     type = card.required("type", {"rigid", "modal", "all"});
@@ -220,13 +161,14 @@ void read_stream_flags(Card& card, DeckChannel& channel) {
 }
 
 /// What stands before the content: name, address and flags.
-ElementPort read_stream_head(Card& card, DeckChannel& channel) {
+/// `named`: what `name` gave when it followed the label, as it may for every element.
+ElementPort read_stream_head(Card& card, const std::string& named, DeckChannel& channel) {
   constexpr int kDefaultPort = 9011;
   ElementPort port;
-  if (card.one_of({"stream name", "name"}) < 0)
-    card.fail_expected("stream output: `stream name` expected");
-  const SourceSpan where = card.next();
-  port.name = card.quoted("stream name");
+  const bool has_name = card.one_of({"stream name", "name"}) >= 0;
+  if (!has_name && named.empty()) card.fail_expected("stream output: `stream name` expected");
+  const SourceSpan where = has_name ? card.next() : card.last();
+  port.name = has_name ? card.quoted("stream name") : named;
   if (port.name.empty()) card.fail_at(where, "the name of the stream is empty");
   if (has_port(card.model(), port.name))
     card.fail_at(where, "there is a port named \"" + port.name + "\" already");
@@ -308,14 +250,15 @@ void name_motion(const Model& model, const std::vector<StreamOutput::Motion>& mo
     }
 }
 
-void read_stream_output(Card& card, ElementInfo& info, bool only_motion) {
+/// All its words mean the same; old decks leave `values` or `motion` out, which the head then says.
+void read_stream_output(Card& card, ElementInfo& info, bool motion_by_default) {
   DeckChannel channel;
-  ElementPort port = read_stream_head(card, channel);
+  ElementPort port = read_stream_head(card, info.name, channel);
   std::vector<StreamOutput::Value> values;
   std::vector<StreamOutput::Motion> motion;
   std::vector<int> nodes;
-  const bool values_word = !only_motion && card.keyword("values");
-  if (only_motion || (!values_word && card.keyword("motion"))) {
+  const int content = card.one_of({"values", "motion"});
+  if (content == 1 || (content < 0 && motion_by_default)) {
     motion = read_motion_flags(card);
     nodes = read_motion_nodes(card);
     name_motion(card.model(), motion, nodes, port);
@@ -339,8 +282,9 @@ void register_ports(Registry& registry) {
   const auto stream_motion = [](Card& card, ElementInfo& info) {
     read_stream_output(card, info, true);
   };
-  registry.typed("output element", Family::output_element, {"stream"}, stream);
+  registry.typed("output element", Family::output_element, {"stream", "socket stream"}, stream);
   registry.element("stream output", Family::output_element, stream);
+  registry.element("RTAI output", Family::output_element, stream);
   registry.element("stream motion output", Family::output_element, stream_motion);
 }
 

@@ -1,1 +1,1 @@
-set(SOURCES attach.cpp external_modal.cpp external_structural.cpp imposed_motion.cpp port_element.cpp read_external.cpp read_ports.cpp stream_output.cpp)
+set(SOURCES attach.cpp external_modal.cpp external_structural.cpp imposed_motion.cpp mapped_modal.cpp mapping_file.cpp port_element.cpp read_external.cpp read_mapped_modal.cpp read_ports.cpp stream_output.cpp)

@@ -201,7 +201,7 @@ FileDriverPtr read_socket(Card& card) {
 void register_file_drivers(Registry& registry) {
   registry.file_driver({"fixed step"}, read_fixed_step);
   registry.file_driver({"variable step"}, read_variable_step);
-  registry.file_driver({"stream"}, read_stream);
+  registry.file_driver({"stream", "socket stream", "RTAI input"}, read_stream);
   registry.file_driver({"socket"}, read_socket);
 }
 

@@ -338,6 +338,13 @@ const ElementCard kCards[] = {
     {"force: external modal",
      "joint: 89, modal, 7, 3, 4, no damping, \"generic.fem\", 1, 3, 2, null; force: 90, "
      "external modal, grpc, port, \"modes\", 89;"},
+    {"force: external modal mapping",
+     "force: 90, external modal mapping, grpc, port, \"modes\", reference node, 3, nodes number, "
+     "2, "
+     "1, 2, modes number, 1, sparse mapping file, \"modes\";"},
+    {"output element: socket stream",
+     "output element: 90, socket stream, stream name, \"out\", grpc, values, 1, drive, const, 1.;"},
+    {"RTAI output", "RTAI output: 90, stream name, \"out\", grpc, values, 1, drive, const, 1.;"},
 };
 
 /// Nothing that they add to the equations depends on the state; of peers there is none here, their
@@ -353,7 +360,10 @@ const std::set<std::string> kConstant = {"automatic structural",
                                          "force: abstract",
                                          "force: abstract internal",
                                          "force: external structural",
+                                         "RTAI output",
+                                         "force: external modal mapping",
                                          "force: external structural mapping",
+                                         "output element: socket stream",
                                          "output element: stream",
                                          "stream motion output",
                                          "stream output",
@@ -394,6 +404,7 @@ ModelPtr read(const std::string& elements) {
       load_deck(BundleSource(std::map<std::string, std::string>{
                     {"deck.mbd", deck},
                     {"gains", "1. 2.\n"},
+                    {"modes", "1 2 1.\n"},
                     {"generic.fem", write_fem_text(testing::generic_body(), {})}}),
                 "deck.mbd");
   for (const Diagnostic& d : report.diagnostics) EXPECT_NE(d.severity, Severity::error) << d.text();
