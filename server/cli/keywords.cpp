@@ -2,6 +2,7 @@
 
 #include "cli/commands.h"
 #include "elements/families.h"
+#include "input/grammar/grammar.h"
 #include "input/vocabulary.h"
 
 namespace mbcosim::cli {
@@ -9,21 +10,36 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// [{"name": "joint", "title": "Joints", "words": [{"word": "clamp", "served": true}, {"word":
-/// "rotation", "served": false, "dead": true, "reason": "…"}]}]
+Json to_json(const VocabularyWord& word) {
+  Json json = {{"word", word.word}, {"served", word.served}, {"support", word.support}};
+  if (!word.note.empty()) json["note"] = word.note;
+  if (!word.reason.empty()) {
+    json["dead"] = word.dead;
+    json["reason"] = word.reason;
+  }
+  if (!word.sizes.empty()) json["sizes"] = word.sizes;
+  if (!word.grammar.empty()) json["grammar"] = word.grammar;
+  Json units = Json::object();
+  for (const GrammarArgument& argument : grammar_arguments(word.grammar))
+    units[argument.name] = argument.unit;
+  if (!units.empty()) json["units"] = units;
+  if (!word.output.empty()) json["output"] = word.output;
+  return json;
+}
+
+/// [{"name": "joint", "title": "Joints", "form": "joint : <label> , <word> , …", "words": [{"word":
+/// "clamp", "served": true, "support": "yes", "grammar": "<length [m]> , …", "units": {"length":
+/// "m"}, "output": ".jnt: …"},
+/// {"word": "rotation", "served": false, "support": "dead", "dead": true, "reason": "…"}]}]
 Json to_json(const std::vector<VocabularyGroup>& groups) {
   Json list = Json::array();
   for (const VocabularyGroup& group : groups) {
     Json words = Json::array();
-    for (const VocabularyWord& word : group.words) {
-      words.push_back({{"word", word.word}, {"served", word.served}});
-      if (!word.reason.empty()) {
-        words.back()["dead"] = word.dead;
-        words.back()["reason"] = word.reason;
-      }
-      if (!word.sizes.empty()) words.back()["sizes"] = word.sizes;
-    }
-    list.push_back({{"name", group.name}, {"title", group.title}, {"words", words}});
+    for (const VocabularyWord& word : group.words) words.push_back(to_json(word));
+    Json json = {{"name", group.name}, {"title", group.title}};
+    if (!group.form.empty()) json["form"] = group.form;
+    json["words"] = words;
+    list.push_back(json);
   }
   return list;
 }

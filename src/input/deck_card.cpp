@@ -231,10 +231,12 @@ int DeckCard::integer_at_least(std::string_view what, int least) {
 }
 
 bool DeckCard::yes_no(std::string_view what) {
-  switch (one_of({"yes", "no"})) {
+  switch (one_of({"yes", "no", "true", "false"})) {
     case 0:
+    case 2:
       return true;
     case 1:
+    case 3:
       return false;
     default:
       return real(std::string(what) + " (yes, no or a number)") != 0;

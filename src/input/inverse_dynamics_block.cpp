@@ -53,11 +53,11 @@ void refuse_strategy(DeckCard& card) {
 
 /// Cards of `initial value` that mean the same here.
 constexpr std::string_view kShared[] = {
-    "initial time",     "final time",     "time step",
-    "tolerance",        "max iterations", "modify residual test",
-    "nonlinear solver", "newton raphson", "linear solver",
-    "solver",           "threads",        "output",
-    "output meter",     "abort after",    "real time"};
+    "initial time",     "final time",     "time step",      "min time step",
+    "max time step",    "tolerance",      "max iterations", "modify residual test",
+    "nonlinear solver", "newton raphson", "linear solver",  "solver",
+    "threads",          "output",         "output meter",   "abort after",
+    "real time"};
 
 /// What a type of elements does; null: it cannot take part.
 const InverseRole* role_of(const ElementInfo& info) {

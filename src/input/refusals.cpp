@@ -50,10 +50,10 @@ void refuse_dead_elements(Refusals& r) {
       "use `jacobian`", false);
   add(r, "elements", "loadable", "decks load no code",
       "what is built in is written `user defined: <label>, <word>`", false);
-  add(r, "elements", "RTAI output", "it needs a real-time operating system", "use `stream output`",
-      false);
-  add(r, "file driver", "RTAI input", "it needs a real-time operating system", "use `stream`",
-      false);
+  add(r, "outputelement", "buffer stream", "it exchanges through the memory of another program",
+      "use `stream`", false);
+  add(r, "file driver", "buffer stream", "it exchanges through the memory of another program",
+      "use `stream`", false);
 }
 
 void refuse_dead_objects(Refusals& r) {
@@ -74,6 +74,45 @@ void refuse_dead_objects(Refusals& r) {
       false);
 }
 
+/// Words of run-time modules of the reference solver.
+void refuse_modules(Refusals& r) {
+  const char* const module = "it comes from a run-time module of the reference solver";
+  const std::string none = "a deck loads no code";
+  for (const char* word : {"switch", "min", "max", "multi step", "node distance", "smooth step"})
+    add(r, "drive", word, module, none + "; use `string`", false);
+  for (const char* word :
+       {"hunt crossley", "continuous contact", "nonlinear rheologic damper", "hydraulic damper",
+        "GRAALL damper", "damper gandhi", "muscle pennestri", "rolling bearing"})
+    add(r, "law", word, module, none + "; use `symbolic viscoelastic`", false);
+  for (const char* word : {"imu",
+                           "imu constraint",
+                           "load increment force",
+                           "load increment normalization",
+                           "gear joint",
+                           "linear transmission joint",
+                           "motion transmission joint",
+                           "unilateral in plane",
+                           "ball bearing contact",
+                           "journal bearing",
+                           "hydrodynamic_plain_bearing_with_offset",
+                           "hydrodynamic bearing",
+                           "resistor",
+                           "capacitor",
+                           "inductor",
+                           "diode",
+                           "switch",
+                           "electrical source",
+                           "ideal transformer",
+                           "operational amplifier",
+                           "bjt",
+                           "proximity sensor",
+                           "rigid ring tire",
+                           "octave",
+                           "FMU"})
+    add(r, "userdefined", word, module,
+        none + "; built in are `wheel2`, `inline friction` and `asynchronous_machine`", false);
+}
+
 }  // namespace
 
 const Refusals& refusals() {
@@ -82,6 +121,7 @@ const Refusals& refusals() {
     refuse_dead_joints(r);
     refuse_dead_elements(r);
     refuse_dead_objects(r);
+    refuse_modules(r);
     return r;
   }();
   return all;

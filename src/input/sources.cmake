@@ -16,6 +16,11 @@ set(SOURCES
   frames.cpp
   function_values.cpp
   functions.cpp
+  grammar/cards_grammar.cpp
+  grammar/elements_grammar.cpp
+  grammar/grammar.cpp
+  grammar/joints_grammar.cpp
+  grammar/objects_grammar.cpp
   hints.cpp
   initial_value_block.cpp
   inverse_dynamics_block.cpp

@@ -4,6 +4,7 @@
 
 #include "input/cards.h"
 #include "input/functions.h"
+#include "input/grammar/grammar.h"
 #include "input/refusals.h"
 #include "input/symbols.h"
 
@@ -39,14 +40,19 @@ class Collector {
     if (refused != registry_.not_supported.end())
       for (const auto& entry : refused->second)
         if (!words.count(entry.first))
-          words[entry.first] = {shown(entry.first), false, "", false, {}};
+          words[entry.first] = refused_word(shown(entry.first), "", false);
     const auto never = refusals().find(context);
     if (never != refusals().end())
       for (const auto& [word, refusal] : never->second)
         if (!words.count(word))
-          words[word] = {refusal.word, false, sentence(refusal), refusal.dead, {}};
-    VocabularyGroup g{std::move(name), std::move(title), {}};
-    for (const auto& entry : words) g.words.push_back(entry.second);
+          words[word] = refused_word(refusal.word, sentence(refusal), refusal.dead);
+    VocabularyGroup g{std::move(name), std::move(title), "", {}};
+    if (const auto found = grammars().find(g.name); found != grammars().end())
+      g.form = found->second.form;
+    for (auto& entry : words) {
+      complete(g.name, entry.second);
+      g.words.push_back(std::move(entry.second));
+    }
     std::sort(g.words.begin(), g.words.end(),
               [](const auto& a, const auto& b) { return a.word < b.word; });
     groups.push_back(std::move(g));
@@ -61,6 +67,31 @@ class Collector {
   std::vector<VocabularyGroup> groups;
 
  private:
+  static VocabularyWord refused_word(std::string word, std::string reason, bool dead) {
+    VocabularyWord refused;
+    refused.word = std::move(word);
+    refused.served = false;
+    refused.reason = std::move(reason);
+    refused.dead = dead;
+    return refused;
+  }
+  /// What the grammar says of the word.
+  static void complete(const std::string& group, VocabularyWord& word) {
+    word.support = word.served           ? "yes"
+                   : word.dead           ? "dead"
+                   : word.reason.empty() ? "not yet"
+                                         : "no";
+    word.note = word.reason;
+    if (!word.served) return;
+    const WordGrammar* g = find_grammar(group, word.word);
+    if (!g) return;
+    word.grammar = g->text;
+    word.output = g->output;
+    word.note = g->note;
+    if (!g->support.empty()) word.support = g->support;
+    if (word.support == "no") word.reason = word.note;
+    word.served = word.support != "no" && word.support != "not yet";
+  }
   static std::string sentence(const Refusal& r) {
     return r.remedy.empty() ? r.reason : r.reason + "; " + r.remedy;
   }
@@ -78,6 +109,8 @@ class Collector {
 
   const Registry& registry_;
 };
+
+std::vector<std::string> notation_words() { return grammars().at("notation").written; }
 
 std::vector<std::string> constant_names() {
   const SymbolTable predefined;
@@ -156,6 +189,7 @@ std::vector<VocabularyGroup> vocabulary(const Registry& registry) {
   c.group("function", "Scalar functions", c.of(registry.functions), "function");
   c.group("fluid", "Hydraulic fluids", c.of(registry.fluids), "fluid");
   c.group("file driver", "File drivers", c.of(registry.file_drivers), "file driver");
+  c.plain("notation", "What cards are made of", notation_words());
   c.plain("expression function", "Functions of expressions", expression_function_names());
   c.plain("constant", "Constants of expressions", constant_names());
   return std::move(c.groups);

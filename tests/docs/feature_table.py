@@ -3,8 +3,7 @@
 
 usage: feature_table.py MBCOSIM PAGE [--write]
 
-MBCOSIM is the executable; its `keywords --json` is the truth. --write brings the tables up to date: new words are added, words
-that are gone are dropped, notes and the status `partly` stay as they are.
+MBCOSIM is the executable; its `keywords --json` is the truth. --write brings the tables up to date.
 """
 import argparse
 import json
@@ -13,11 +12,8 @@ import subprocess
 import sys
 
 BEGIN, END = "<!-- feature tables -->", "<!-- end of the feature tables -->"
-SERVED, REFUSED = {"yes", "partly", "ignored"}, {"not yet", "no", "dead"}
-# Expressions have their own short lists in the text; their words are not features one by one.
-PLAIN = {"expression function", "constant"}
-# Cards of the language proper: a word of these groups is known to the reader even where it is refused.
-ANY_STATUS = {"block", "statement", "initial value card", "control card", "node"}
+# Expressions have their own short lists in the text; their words are not features one by one. Notation is what cards are made of.
+PLAIN = {"expression function", "constant", "notation"}
 
 
 def vocabulary(executable):
@@ -38,13 +34,12 @@ def parse(text):
     return tables
 
 
-def allowed(group, word):
-    """Statuses that a row may have."""
-    if group["name"] in ANY_STATUS:
-        return SERVED | REFUSED
-    if word["served"]:
-        return SERVED
-    return {"dead"} if word.get("dead") else {"no"} if "reason" in word else {"not yet"}
+def row(word):
+    """Status and note as the program has them."""
+    note = word.get("note", "")
+    if not note and "sizes" in word and word["sizes"] != [1, 3, 6]:
+        note = "for " + " and ".join(f"{n} component{'s' * (n > 1)}" for n in word["sizes"])
+    return word["support"], note
 
 
 def complaints(groups, tables):
@@ -55,26 +50,19 @@ def complaints(groups, tables):
         words = {word["word"]: word for word in group["words"]}
         found += [f"{group['title']}: no row for `{word}`" for word in words if word not in rows]
         found += [f"{group['title']}: `{word}` is no word of the language" for word in rows if word not in words]
-        for word, (status, _) in rows.items():
-            if word in words and status not in allowed(group, words[word]):
-                found.append(f"{group['title']}: `{word}` is marked `{status}`; "
-                             f"the program says: {'served' if words[word]['served'] else 'refused by name'}")
+        found += [f"{group['title']}: `{word}` has {written}; the program says {row(words[word])}"
+                  for word, written in rows.items() if word in words and written != row(words[word])]
     titles = {group["title"] for group in groups}
     return found + [f"a table of unknown title: {title}" for title in tables if title not in titles]
 
 
-def written(groups, tables):
+def written(groups):
     """The tables as they should be."""
     lines = []
     for group in groups:
         lines += [f"## {group['title']}", "", "| Word | Served | Notes |", "|---|---|---|"]
         for word in group["words"]:
-            status, note = tables.get(group["title"], {}).get(word["word"], ("", ""))
-            if status not in allowed(group, word):
-                status, note = "yes" if word["served"] else min(allowed(group, word)), ""
-            note = word.get("reason", note)
-            if not note and "sizes" in word and word["sizes"] != [1, 3, 6]:
-                note = "for " + " and ".join(f"{n} component{'s' * (n > 1)}" for n in word["sizes"])
+            status, note = row(word)
             lines.append(f"| `{word['word']}` | {status} | {note} |")
         lines.append("")
     return "\n".join(lines)
@@ -96,7 +84,7 @@ def main():
     groups, tables = vocabulary(options.executable), parse(inside)
     if options.write:
         with open(options.page, "w", encoding="utf-8") as file:
-            file.write(f"{before}{begin}\n\n{written(groups, tables)}\n{end}{after}")
+            file.write(f"{before}{begin}\n\n{written(groups)}\n{end}{after}")
         return
     found = complaints(groups, tables)
     for sentence in found:

@@ -1,0 +1,91 @@
+#include "input/grammar/grammar.h"
+
+#include <set>
+#include <sstream>
+
+#include "input/grammar/texts.h"
+#include "model/registry.h"
+
+namespace mbcosim {
+
+namespace {
+
+constexpr const char* kPreloads = " [ , prestress , <stress> ] [ , prestrain , <strain drive> ]";
+
+/// What follows the mark and a blank.
+std::string content(const std::string& line) {
+  return line.size() > 4 ? line.substr(4) : std::string();
+}
+
+void read_group(const std::string& line, std::map<std::string, GroupGrammar>& all,
+                GroupGrammar*& group) {
+  const std::size_t bar = line.find(" | ");
+  group = &all[line.substr(2, bar - 2)];
+  group->form = line.substr(bar + 3);
+}
+
+/// `! partly: why`
+void read_support(const std::string& text, WordGrammar& word) {
+  const std::size_t colon = text.find(": ");
+  word.support = text.substr(0, colon);
+  if (colon != text.npos) word.note = text.substr(colon + 2);
+}
+
+void read_texts(const char* texts, std::map<std::string, GroupGrammar>& all) {
+  std::istringstream in(texts);
+  GroupGrammar* group = nullptr;
+  WordGrammar* word = nullptr;
+  for (std::string line; std::getline(in, line);) {
+    if (line.empty()) continue;
+    if (line[0] == '@') {
+      read_group(line, all, group);
+    } else if (line[0] != ' ') {
+      word = &group->words[normalized(line)];
+      group->written.push_back(line);
+    } else if (line[2] == '=') {
+      word->text = content(line);
+    } else if (line[2] == '>') {
+      word->output = content(line);
+    } else if (line[2] == '+') {
+      word->text += kPreloads;
+    } else if (line[2] == '!') {
+      read_support(content(line), *word);
+    }
+  }
+}
+
+}  // namespace
+
+const std::map<std::string, GroupGrammar>& grammars() {
+  static const std::map<std::string, GroupGrammar> all = [] {
+    std::map<std::string, GroupGrammar> m;
+    using namespace grammar;
+    for (const char* texts : {kBlocks, kControl, kNodes, kElements, kJoints, kObjects, kNotation})
+      read_texts(texts, m);
+    return m;
+  }();
+  return all;
+}
+
+const WordGrammar* find_grammar(std::string_view group, std::string_view word) {
+  const auto g = grammars().find(std::string(group));
+  if (g == grammars().end()) return nullptr;
+  const auto w = g->second.words.find(normalized(word));
+  return w == g->second.words.end() ? nullptr : &w->second;
+}
+
+std::vector<GrammarArgument> grammar_arguments(const std::string& text) {
+  std::vector<GrammarArgument> arguments;
+  std::set<std::string> seen;
+  for (std::size_t at = text.find('<'); at != text.npos; at = text.find('<', at + 1)) {
+    const std::size_t end = text.find('>', at);
+    const std::string inside = text.substr(at + 1, end - at - 1);
+    const std::size_t unit = inside.find(" [");
+    if (unit == inside.npos || !seen.insert(inside).second) continue;
+    arguments.push_back(
+        {inside.substr(0, unit), inside.substr(unit + 2, inside.size() - unit - 3)});
+  }
+  return arguments;
+}
+
+}  // namespace mbcosim
