@@ -208,6 +208,7 @@ void PortModel::decode_mapped(const v1::PeerExchange& in, const Agreement& agree
     answer->values.insert(answer->values.end(), force.data(), force.data() + 3);
     answer->values.insert(answer->values.end(), 3, 0.0);
   }
+  decode_reference(in, agreement, &answer->values);
 }
 
 // The moment about the node when the node takes the load; about the point when the deck's element
@@ -223,6 +224,11 @@ void PortModel::decode_loads(const v1::PeerExchange& in, const Agreement& agreem
     answer->insert(answer->end(), force.data(), force.data() + 3);
     answer->insert(answer->end(), moment.data(), moment.data() + 3);
   }
+  decode_reference(in, agreement, answer);
+}
+
+void PortModel::decode_reference(const v1::PeerExchange& in, const Agreement& agreement,
+                                 std::vector<double>* answer) const {
   if (!layout_.reference_loads()) return;
   Mat3 turn = Mat3::Identity();
   if (agreement.frame != v1::PORT_FRAME_GLOBAL) turn = sent_reference_.R;

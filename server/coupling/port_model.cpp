@@ -287,6 +287,7 @@ void PortModel::make_modal(const Simulation& simulation) {
 void PortModel::make_mapped(const Simulation& simulation) {
   const StructuralPort& points = *element_->element->points();
   layout_.set_kind(v1::PORT_KIND_STRUCTURAL);
+  layout_.set_reference_loads(points.use_reference_loads);
   make_points(simulation, points);
   needs_accelerations_ = points.accelerations;
 }

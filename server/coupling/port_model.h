@@ -77,6 +77,8 @@ class PortModel {
   void put_expressions(const Simulation& simulation, v1::ServerExchange* out) const;
   Motion motion(const Simulation& simulation, const Point& point) const;
   void make_relative(Motion& motion) const;
+  void decode_reference(const v1::PeerExchange& in, const Agreement& agreement,
+                        std::vector<double>* answer) const;
   void decode_loads(const v1::PeerExchange& in, const Agreement& agreement,
                     std::vector<double>* answer) const;
   Mat3 to_global(const Agreement& agreement, std::size_t point) const;

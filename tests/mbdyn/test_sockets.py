@@ -340,6 +340,19 @@ def test_tcp_with_a_peer_that_splits_its_messages(run):
     assert done.finish() == 0
 
 
+@pytest.mark.parametrize("options, text", [("", "1. 0. .5 0. .1 0. 99. 98."), ("labels, yes,", "2 1. 0. .5 0. .1 0."),
+                                           ("send after predict, no,", "1. 0. .5 0. .1 0.")])
+def test_a_file_that_stays_is_a_constant_load(run, tmp_path, options, text):
+    """Numbers beyond those expected are ignored; labels stand in it with `labels, yes` only."""
+    (tmp_path / "in.dat").write_text(text + "\n")
+    done = run(deck(f'force: 5, external structural, "in.dat", "out.dat", sleep time, .01, {options} 1, 2, offset, .2,0.,0.;'))
+    assert done.finish() == 0, done.errors
+    assert done.last(2)[2] == pytest.approx([0.02, 0, 0.01], abs=1e-6)
+    with open(tmp_path / "out.frc") as file:
+        lines = [[float(word) for word in line.replace("@", " ").split()] for line in file]
+    assert len(lines) == 3 and all(line == pytest.approx([5, 2, 1, 0, 0.5, 0, 0.1, 0]) for line in lines)
+
+
 # ------------------------------------------------------------------ mapping
 
 def test_mapping(run, tmp_path):
@@ -359,7 +372,31 @@ def test_mapping(run, tmp_path):
     assert done.last(2)[2] == pytest.approx([0.02, 0, 0], abs=1e-6)
 
 
+def test_mapping_with_loads_on_the_reference_node(run):
+    done = run(deck('force: 5, external structural mapping, socket, create, yes, path, "s", reference node, 2, points number, 1, 1, offset, null;'))
+    peer = done.connect()
+    shake(peer, 0x2006, 1)
+    messages = talk(peer, 144 + 48, lambda _: b"\6" + np.array([0, 0, 4.0, 0, 0, 0, 0, 0, 0]).tobytes())
+    assert done.finish() == 0, done.errors
+    numbers = np.frombuffer(messages[0][1])
+    R, v = numbers[3:12].reshape(3, 3).T, numbers[12:15]
+    assert done.last(2)[2] == pytest.approx(v + 0.02 * R @ [0, 0, 4.0], abs=2e-3)
+
+
 # ------------------------------------------------------------------ modal
+
+def test_modal_mapping(run, tmp_path):
+    """One mode, twice the path of node 1 along axis 1."""
+    (tmp_path / "H.dat").write_text("1 1 2.\n")
+    done = run(deck('force: 5, external modal mapping, socket, create, yes, path, "s", nodes number, 1, 1, modes number, 1, '
+                    'sparse mapping file, "H.dat";'))
+    peer = done.connect()
+    shake(peer, 0x1, 1)
+    messages = talk(peer, 16, lambda _: b"\6" + np.array([3.0]).tobytes())
+    assert done.finish() == 0, done.errors
+    assert np.frombuffer(messages[0][1]) == pytest.approx([0, 0.2])
+    assert done.last(1)[2][0] == pytest.approx(0.1 + 0.02 * 6, abs=1e-6)
+
 
 def test_rigid_motion_of_a_modal_element(run):
     done = run(deck('force: 5, external modal, socket, create, yes, path, "s", reference node, 1;'))

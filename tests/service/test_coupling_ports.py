@@ -303,6 +303,38 @@ def test_mapping_keeps_the_power(server):
             found.append(simulation.export_state())
 
 
+def test_a_mapping_takes_the_load_of_its_reference_node(server):
+    card = 'force: 5, external structural mapping, grpc, port, "map", reference node, 2, points number, 1, 1, offset, null;'
+    with server.load_text(cards(card, "forces: 1;")) as simulation:
+        layout = simulation.describe().ports[0]
+        assert layout.reference_loads and layout.reference_node_label == 2
+        before = simulation["node.structural.2.XP"]
+        loads = mbcosim.Loads(forces=[[0.0, 0, 0]], reference_force=[0, 0, 4.0], reference_moment=[0.0, 0, 0])
+        with simulation.couple("map", lambda m: loads) as peer:
+            simulation.step(3)
+            assert peer.error is None
+        assert simulation["port.map.loads"] == pytest.approx([0] * 6 + [0, 0, 4.0, 0, 0, 0])
+        assert simulation["node.structural.2.XP"][2] > before[2]
+
+
+def test_external_modal_mapping_of_the_deck(server):
+    """One mode, twice the path of node 1 along axis 1."""
+    card = 'force: 5, external modal mapping, grpc, port, "modes", nodes number, 1, 1, modes number, 1, sparse mapping file, "H.dat";'
+    files = {"deck": cards(card, "forces: 1;").encode(), "H.dat": b"1 1 2.\n"}
+    with server.load_bundle("deck", files) as simulation:
+        layout = simulation.describe().ports[0]
+        assert (layout.input_size, layout.output_size) == (1, 2) and not layout.point_labels
+        x, v = simulation["node.structural.1.X"], simulation["node.structural.1.XP"]
+        seen = []
+        with simulation.couple("modes", lambda m: seen.append(m.signals) or [3.0]) as peer:
+            simulation.step(3)
+            assert peer.error is None
+        assert seen[0] == pytest.approx([0, 2 * v[0]])
+        moved = simulation["node.structural.1.X"] - x
+        assert simulation["port.modes.modes"] == pytest.approx([2 * moved[0], 2 * simulation["node.structural.1.XP"][0]])
+        assert simulation["port.modes.loads"] == pytest.approx(3.0)
+
+
 def test_external_modal_of_the_deck(server):
     card = 'force: 99, external modal, grpc, port, "modes", DYNAMIC, type, modal;'
     with server.load_bundle("deck", modal_deck(card)) as simulation, server.load_bundle(
@@ -345,8 +377,8 @@ def test_tangent_of_a_modal_port(server):
     ('force: 1, external modal, grpc, port, "a", reference node, 1, type, all;', "forces: 1;", "needs a modal joint"),
     ('force: 1, external structural mapping, grpc, port, "a", points number, 0;', "forces: 1;", "number of points"),
     ('force: 1, external structural mapping, grpc, port, "a", points number, 1, 1, null;', "forces: 1;", "`offset` expected"),
-    ('force: 1, external structural mapping, grpc, port, "a", reference node, 2, points number, 1, 1, offset, null;', "forces: 1;",
-     "use reference node forces, no"),
+    ('force: 1, external structural mapping, grpc, port, "a", points number, 1, 1, offset, null, membrane, 1, 2, 1, 2, .1, -.1;', "forces: 1;",
+     "`membrane` is not supported"),
     ('force: 1, external structural, grpc, port, "a", 1, 1; force: 2, external modal, grpc, port, "a", reference node, 1;', "forces: 2;",
      "port named \"a\" already")])
 def test_bad_cards_are_refused(server, card, counts, match):

@@ -77,9 +77,6 @@ void read_external_mapping(Card& card, ElementInfo& info) {
   read_port_options(card, points, channel);
   if (channel.labels && channel.address.kind != ChannelAddress::Kind::port)
     card.fail("the messages of a mapping have no labels", "write `labels, no`");
-  if (points.use_reference_loads)
-    card.fail("the peer of a mapping gives forces on its points, none on the reference node",
-              "write `use reference node forces, no`");
   read_mapped_points(card, points);
   if (card.keyword("membrane"))
     card.fail("`membrane` is not supported", "give the matrix in a mapping file");
@@ -93,7 +90,7 @@ void read_external_mapping(Card& card, ElementInfo& info) {
   port.name = points.name;
   port.coupling = points.coupling;
   port.nodes = points.nodes;
-  port.input_size = 6 * points.points();
+  port.input_size = points.load_size();
   port.memory = points.memory = card.builder().allocate_memory(port.input_size);
   add_general_element(
       card.builder(), info,

@@ -134,7 +134,7 @@ external structural
 external structural mapping
   = <communicator> , [ orientation , orientation matrix , ] points number , 1 , <node> , offset , <offset> [ , mapped points number , { from file | 1 } , { full | sparse } mapping file , "<mapping>" ]
   > .frc: label@node F (3) M (3)
-  ! partly: no loads on the reference node (`use reference node forces, no`), no `membrane`, no `echo`
+  ! partly: no `membrane`, no `echo`
 external modal
   = <communicator> , { <modal joint> [ , accelerations ] [ , type , { rigid | modal | all } ] | reference node , <node> [ , accelerations ] [ , type , rigid ] }
   > .frc: label#node F (3) M (3), label.mode force
