@@ -45,6 +45,15 @@ class Page {
   std::int64_t first_ = 0, at_ = 0;
 };
 
+double rate_of(const v1::CreateOptions& options) {
+  if (!options.has_pace()) return 0;
+  const double rate = options.pace().rate();
+  if (!(rate > 0) || std::isinf(rate))
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`pace.rate` must be a finite number above 0, got " + std::to_string(rate));
+  return rate;
+}
+
 }  // namespace
 
 Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
@@ -53,6 +62,7 @@ Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shar
       shared_(shared),
       model_(&simulation->model()),
       variables_(simulation->variables()),
+      pace_(rate_of(options)),
       grants_(identity_.owner, options.grants()),
       lease_(identity_.lease),
       snapshots_(identity_.id, digest_text(model_->digest), shared.limits, shared.memory),
@@ -142,6 +152,9 @@ void Session::fill(v1::SimulationInfo* out) const {
   out->set_display_name(p.display_name);
   out->set_non_convergence_policy(to_proto(p.policy));
   out->set_minimum_step_s(p.policy.minimum);
+  if (pace_ > 0) out->mutable_pace()->set_rate(pace_);
+  out->set_late_steps(p.late_steps);
+  out->set_worst_delay_seconds(p.worst_delay);
   out->set_owner(identity_.owner);
   out->set_durability(keeping_ ? v1::DURABILITY_CHECKPOINT : v1::DURABILITY_NONE);
   out->set_state(p.failed     ? v1::SIMULATION_STATE_FAILED

@@ -190,6 +190,7 @@ class Session {
   void start_record(const v1::CreateOptions& options);
   void account(Advance& advance, const StepReport& report);
   void account_pieces(v1::StepReply& reply, const StepReport& report);
+  void account_delay(Advance& advance);
   void finish(Advance& advance);
   void describe_variables(const v1::DescribeSimulationRequest& request,
                           v1::ModelDescription* out) const;
@@ -200,6 +201,7 @@ class Session {
   const Shared shared_;
   const Model* const model_;
   const VariableAccess variables_;
+  const double pace_;  ///< seconds of the model in a second of the wall clock; 0: not held back
 
   MemoryShare memory_;
   std::vector<DeckSymbol> symbols_;

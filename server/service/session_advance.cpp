@@ -3,6 +3,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -57,7 +58,7 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
   const Clock::time_point start = Clock::now();
   require_usable();
   check(request);
-  Advance advance{request, *reply, {}, 1, {}, table, false, false};
+  Advance advance{request, *reply, {}, 1, {}, StepPace(pace_), table, false, false};
   const SteppingClaim claim(*this, call, advance.token);
   if (request.has_steps()) advance.steps_left = request.steps();
   if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
@@ -65,8 +66,10 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
   const bool coupled = !coupler_.ports().empty();
   while (!(coupled ? run_coupled_step(advance) : run_slice(advance))) {
     wait_for_subscribers();
+    advance.pace.wait(advance.token, progress);
     if (progress) progress();
   }
+  advance.pace.wait(advance.token, progress);
   while (must_wait(advance)) wait_for_subscribers();
   if (!advance.started) return;  // a repeated request: the stored reply, as it was
   reply->set_total_seconds(seconds_since(start));
@@ -130,6 +133,7 @@ bool Session::begin(Advance& advance) {
   ++changes_;
   if (recorder_ && request.inputs().handles_size() > 0) recorder_->inputs(request.inputs());
   advance.started = true;
+  advance.pace.start(simulation_->time());
   advance.reply.set_request_id(request.request_id());
   advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
                                                     : v1::STEP_OUTCOME_ACCEPTED);
@@ -156,7 +160,9 @@ bool Session::run_slice(Advance& advance) {
     account(advance, attempt(advance));
     if (!wants_more(advance)) break;
     const bool send = advance.table && advance.table->full();
-    if (send || must_wait(advance) || lock_.contended() || Clock::now() >= slice_end) return false;
+    if (send || must_wait(advance) || advance.pace.holds() || lock_.contended() ||
+        Clock::now() >= slice_end)
+      return false;
   }
   finish(advance);
   return true;
@@ -207,6 +213,7 @@ void Session::account(Advance& advance, const StepReport& report) {
   if (!is_accepted(report.outcome)) return;
   ++changes_;
   account_pieces(reply, report);
+  account_delay(advance);
   if (report.restarted) reply.set_restarted_steps(reply.restarted_steps() + 1);
   --advance.steps_left;
   if (!telemetry_->empty()) telemetry_->publish(*simulation_);
@@ -222,6 +229,15 @@ void Session::account_pieces(v1::StepReply& reply, const StepReport& report) {
   reply.set_pieces(report.pieces);
   if (report.flagged) reply.set_flagged_steps(reply.flagged_steps() + 1);
   if (report.pieces > 1) reply.set_cut_steps(reply.cut_steps() + 1);
+}
+
+void Session::account_delay(Advance& advance) {
+  const double delay = advance.pace.ended(simulation_->time());
+  if (!(delay > 0)) return;
+  v1::StepReply& reply = advance.reply;
+  reply.set_late_steps(reply.late_steps() + 1);
+  reply.set_worst_delay_seconds(std::max(reply.worst_delay_seconds(), delay));
+  status_.count_late_step(delay);
 }
 
 void Session::finish(Advance& advance) {

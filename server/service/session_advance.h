@@ -3,6 +3,7 @@
 
 #include "service/row_table.h"
 #include "service/session.h"
+#include "service/step_pace.h"
 
 namespace mbcosim::server {
 
@@ -12,7 +13,8 @@ struct Session::Advance {
   v1::StepReply& reply;
   CancelToken token;
   std::int64_t steps_left = 1;
-  StepChoice choice;          ///< of the next step
+  StepChoice choice;  ///< of the next step
+  StepPace pace;
   RowTable* table = nullptr;  ///< of rows on the way; null: none are wanted
   bool started = false, ended = false;
 };

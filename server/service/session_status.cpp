@@ -1,5 +1,7 @@
 #include "service/session_status.h"
 
+#include <algorithm>
+
 namespace mbcosim::server {
 
 void SessionStatus::publish(const Simulation& simulation) {
@@ -19,6 +21,12 @@ void SessionStatus::set_display_name(const std::string& name) {
 void SessionStatus::set_policy(const StepPolicy& policy) {
   std::lock_guard guard(mutex_);
   view_.policy = policy;
+}
+
+void SessionStatus::count_late_step(double delay) {
+  std::lock_guard guard(mutex_);
+  ++view_.late_steps;
+  view_.worst_delay = std::max(view_.worst_delay, delay);
 }
 
 void SessionStatus::remember_failure(const std::string& why) {

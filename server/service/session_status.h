@@ -18,6 +18,8 @@ class SessionStatus {
     bool finished = false, failed = false, stepping = false;
     std::string last_failure, display_name;
     StepPolicy policy;
+    std::int64_t late_steps = 0;  ///< of a paced simulation
+    double worst_delay = 0;       ///< [s]
   };
   View view() const {
     std::lock_guard guard(mutex_);
@@ -26,6 +28,7 @@ class SessionStatus {
   void publish(const Simulation& simulation);
   void set_display_name(const std::string& name);
   void set_policy(const StepPolicy& policy);
+  void count_late_step(double delay);
   void remember_failure(const std::string& why);
   void fail(const std::string& why);  ///< the server failed in it
   void recover();                     ///< it was restored

@@ -152,6 +152,7 @@ class ServerCalls(Generic[SimulationKind]):
         durability    whether it outlives the server: "none" or "checkpoint"; None: "checkpoint" where the server has a state folder
         checkpoint_interval, checkpoint_steps
                       longest time [s], and steps, between two checkpoints; None: the server's, and any
+        pace          seconds of the model in a second of the wall clock, 1: real time; None: as fast as it can. Late steps are counted in the replies
         timeout       seconds that the call may take; None: as long as the server lives
         """
         return (yield from self._create(pb.UploadHeader(bundle_main_file=main), files, **options))
@@ -165,7 +166,7 @@ class ServerCalls(Generic[SimulationKind]):
                 ports: Iterable[coupling_types_pb2.PortDefinition] = (), policy: str = "fail", minimum_step: float = 0.0,
                 record: bool = False, summed_time: bool = False, symbols: Optional[Mapping[str, Symbol]] = None,
                 grants: Iterable[pb.Grant] = (), results: Results = False, results_quota: Optional[int] = None,
-                durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None,
+                durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None, pace: Optional[float] = None,
                 timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = uuid.uuid4().hex
         header.options.display_name = name
@@ -184,6 +185,8 @@ class ServerCalls(Generic[SimulationKind]):
             header.options.checkpoint_interval.FromMilliseconds(round(checkpoint_interval * 1000))
         if checkpoint_steps is not None:
             header.options.checkpoint_steps = checkpoint_steps
+        if pace is not None:
+            header.options.pace.rate = pace
         if lease is not None:
             header.options.lease.FromMilliseconds(int(lease * 1000))
         reply = yield Call("Simulations/CreateSimulation", bundle.requests(header, files), timeout)
