@@ -186,6 +186,8 @@ class Binder : CallBinder {
     if (!reading_.model_available() && (item.name == "Time" || item.name == "TimeStep" ||
                                         item.name == "Step" || item.name == "Var"))
       hint = in_quotes(item.name) + " exists from the end of the \"initial value\" block on";
+    else if (best.empty())
+      hint = "declare it before it is used: `set: real " + std::string(item.name) + " = <value>;`";
     fail(message, hint, "unknown-variable");
   }
 

@@ -108,7 +108,8 @@ void Cursor::fail_after(std::size_t begin, std::size_t end, std::string_view wha
     const int line = span(0, 1).line;
     const std::size_t at = begins_card(text, end) ? end : begin;
     fail(span(at, skip_words(text, at)),
-         "\";\" expected at the end of the card begun at line " + std::to_string(line));
+         "\";\" expected at the end of the card begun at line " + std::to_string(line),
+         "end that card with \";\"");
   }
   const std::size_t stop = skip_argument(text, begin);
   const std::string_view whole = text.substr(begin, stop - begin);

@@ -23,7 +23,7 @@ bool Deck::was_refused(const std::string& kind, int label) const {
 void Deck::redefined(DeckCard& card, std::string_view kind, int label, SourceSpan before) {
   card.fail(std::string(kind) + " " + std::to_string(label) + " already defined at " +
                 reading.place(before),
-            "", "redefinition");
+            "give one of the two another label, or remove it", "redefinition");
 }
 
 void Deck::count_entity(DeckCard& card, Kind kind, int label) {

@@ -151,7 +151,9 @@ void DeckCard::need_numbers(std::string_view what, std::int64_t count) {
 }
 
 void DeckCard::need_argument(std::string_view what) {
-  if (!cursor_.more()) fail(std::string(what) + " missing", "", "missing-argument");
+  if (!cursor_.more())
+    fail(std::string(what) + " missing", "add the missing argument; the card ends too early",
+         "missing-argument");
 }
 
 void DeckCard::refuse_word(std::string_view what) {
@@ -278,7 +280,9 @@ void DeckCard::fail_at(SourceSpan where, const std::string& message, const std::
 void DeckCard::fail_undefined(SourceSpan where, const std::string& kind, int label,
                               const std::string& hint) {
   if (deck_.was_refused(kind, label)) deck_.reading.set_damaged(true);
-  fail_at(where, undefined_text(kind, label), hint, "undefined");
+  fail_at(where, undefined_text(kind, label),
+          hint.empty() ? "correct the label, or define the " + kind + " before this card" : hint,
+          "undefined");
 }
 
 void DeckCard::fail_unsupported(SourceSpan where, const std::string& word,

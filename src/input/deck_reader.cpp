@@ -279,7 +279,8 @@ void DeckReader::finish() {
   if (block_ != Block::none) {
     reading.report(reading.diagnostic(
         Severity::error, "end-of-file", begun_,
-        "end of file in block \"" + name_ + "\" begun at line " + std::to_string(begun_.line)));
+        "end of file in block \"" + name_ + "\" begun at line " + std::to_string(begun_.line),
+        "close the block: `end: " + name_ + ";`"));
     return;
   }
   if (latest_ == Block::none) return;  // a deck without blocks: a calculator
@@ -298,7 +299,8 @@ void DeckReader::finish() {
   const InitialValueSettings& iv = model.initial_value;
   if (iv.final_time < iv.initial_time && deck_.final_time_where.file >= 0)
     reading.warn(deck_.final_time_where,
-                 "final time is before the initial time: there is nothing to integrate");
+                 "final time is before the initial time: there is nothing to integrate",
+                 "give a final time after the initial one, or `forever`");
   if (model.control.output_drives)
     for (const int d : deck_.drives_without_output) model.drives[d].output_value = true;
 }

@@ -70,7 +70,7 @@ void declare_damaged(Reading& reading, const Syntax& syntax) {
   if (e.code != "missing-semicolon") reading.fail(where, e.what(), e.hint, e.code);
   const int line = reading.span(statement.file, statement.offset, 1).line;
   reading.fail(where, "\";\" expected at the end of the card begun at line " + std::to_string(line),
-               "", e.code);
+               "end that card with \";\"", e.code);
 }
 
 }  // namespace

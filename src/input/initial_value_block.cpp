@@ -27,7 +27,7 @@ void read_time_step(DeckCard& card) {
   double h = card.real("time step");
   if (h == 0) card.fail("time step must not be zero");
   if (h < 0) {
-    card.warn("time step is negative, its modulus is used");
+    card.warn("time step is negative, its modulus is used", "write a positive length");
     h = -h;
   }
   settings(card).time_step = h;

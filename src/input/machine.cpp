@@ -88,7 +88,10 @@ class Machine {
       } catch (const ExpressionError&) {
         throw;
       } catch (const EvaluationError& e) {
-        throw ExpressionError(in.where, in.length, e.what(), "", "evaluation");
+        throw ExpressionError(
+            in.where, in.length, e.what(),
+            "check the values that enter here: `remark: \"value\", <variable>;` prints them",
+            "evaluation");
       }
     }
     return *top_;

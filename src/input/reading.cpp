@@ -263,7 +263,11 @@ void Reading::fail_read(SourceSpan where, const Error& error, int from) const {
     message += slash == std::string::npos ? " (searched in the deck's folder)"
                                           : " (searched in \"" + base.substr(0, slash) + "\")";
   }
-  fail(where, std::move(message), "", "file");
+  fail(where, std::move(message),
+       error.kind == ErrorKind::io
+           ? "check the name; it counts from the folder of the file that names it"
+           : "",
+       "file");
 }
 
 int Reading::add_trail(Trail t) {

@@ -26,13 +26,14 @@ class Differences {
     for (const int handle : outputs_) count += variables_.list()[handle].size;
     return count;
   }
-  /// Derivatives along a change of the state: change(state, ±step).
+  /// Derivatives along a change of the state: change(state, ±step). `residual`: null when it is not
+  /// wanted.
   template <class Change>
-  void compute(double step, Change&& change, VecX& residual, VecX& outputs) {
+  void compute(double step, Change&& change, VecX* residual, VecX& outputs) {
     State plus = state_, minus = state_;
     change(plus, step);
     change(minus, -step);
-    residual = (residual_of(plus) - residual_of(minus)) / (2 * step);
+    if (residual) *residual = (residual_of(plus) - residual_of(minus)) / (2 * step);
     outputs = (outputs_of(plus) - outputs_of(minus)) / (2 * step);
   }
 
@@ -57,6 +58,8 @@ class Differences {
   Phase phase_;
 };
 
+Error stopped() { return make_error(ErrorKind::cancelled, "CANCELLED", "linearization: stopped"); }
+
 double step_at(double value) { return 1e-6 * std::max(1.0, std::abs(value)); }
 
 }  // namespace
@@ -64,7 +67,8 @@ double step_at(double value) { return 1e-6 * std::max(1.0, std::abs(value)); }
 Result<InputsOutputs> linearize_inputs_outputs(const Model& model, const State& state,
                                                const Variables& variables,
                                                std::span<const int> inputs,
-                                               std::span<const int> outputs) {
+                                               std::span<const int> outputs,
+                                               const CancelToken* cancel) {
   Differences differences(model, state, variables, outputs);
   int input_count = 0;
   for (const int handle : inputs) input_count += variables.list()[handle].size;
@@ -84,22 +88,24 @@ Result<InputsOutputs> linearize_inputs_outputs(const Model& model, const State& 
         moved[k] += step;
         (void)variables.set(model, changed, handle, moved);
       };
-      differences.compute(step_at(values[k]), change, residual, output);
+      if (cancel && cancel->cancelled()) return stopped();
+      differences.compute(step_at(values[k]), change, &residual, output);
       io.b.col(column) = residual;
       io.d0.col(column) = output;
     }
   }
   for (int i = 0; i < n && output_count > 0; ++i) {
+    if (cancel && cancel->cancelled()) return stopped();
     const auto change = [&](std::vector<double> State::*unknowns) {
       return [&model, unknowns, i](State& changed, double step) {
         (changed.*unknowns)[i] += step;
         update_rotations(model, changed);
       };
     };
-    differences.compute(step_at(state.y[i]), change(&State::y), residual, output);
+    differences.compute(step_at(state.y[i]), change(&State::y), nullptr, output);
     io.c0.col(i) = output;
     if (model.kinds[i] != UnknownKind::differential) continue;
-    differences.compute(step_at(state.yp[i]), change(&State::yp), residual, output);
+    differences.compute(step_at(state.yp[i]), change(&State::yp), nullptr, output);
     io.c1.col(i) = output;
   }
   return io;

@@ -4,13 +4,16 @@
 #include <span>
 
 #include "simulation/variables.h"
-#include "solver/state_space.h"
+#include "solver/cancel.h"
+#include "solver/stoppable.h"
 
 namespace mbcosim {
 
+/// ErrorKind::cancelled between two unknowns.
 Result<InputsOutputs> linearize_inputs_outputs(const Model& model, const State& state,
                                                const Variables& variables,
                                                std::span<const int> inputs,
-                                               std::span<const int> outputs);
+                                               std::span<const int> outputs,
+                                               const CancelToken* cancel = nullptr);
 
 }  // namespace mbcosim

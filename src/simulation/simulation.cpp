@@ -50,7 +50,8 @@ struct Simulation::Impl {
   double final_time;  ///< [s]
   std::shared_ptr<ResultWriter> writer;
   TimeKeeping time_keeping = TimeKeeping::summed;
-  bool ended = false;  ///< a drive ended the run before its final time
+  const CancelToken* cancel = nullptr;  ///< of the call that is under way
+  bool ended = false;                   ///< a drive ended the run before its final time
   std::function<void(StartEvent)> start_observer;
   mutable std::once_flag variables_once;
   mutable std::unique_ptr<Variables> variables;
@@ -180,7 +181,7 @@ Status Simulation::Impl::analyse_modes(double after, double until) {
     for (const double time : s.times) {
       const int position = index++;
       if (!(time > after && time <= until)) continue;
-      auto report = mbcosim::analyse_modes(*model, state, s);
+      auto report = mbcosim::analyse_modes(*model, state, s, cancel);
       if (!report) return report.error();
       report->index = position;
       report->count = count;
@@ -244,6 +245,7 @@ StepReport Simulation::Impl::step(const CancelToken* cancel, const StepChoice& c
   StepReport report;
   const double previous_time = state.time;
   const auto begin = std::chrono::steady_clock::now();
+  this->cancel = cancel;
   stepper.set_cancelled(cancel);
   if (inverse) inverse->set_cancelled(cancel);
   PhaseReport phase = controller.advance(state, choice);
@@ -304,6 +306,7 @@ std::unique_ptr<Simulation> Simulation::prepare(ModelPtr model,
 }
 
 Status Simulation::start(const CancelToken* cancel) {
+  impl_->cancel = cancel;
   impl_->stepper.set_cancelled(cancel);
   if (impl_->inverse) impl_->inverse->set_cancelled(cancel);
   Status status = ok();

@@ -1,13 +1,14 @@
 #include "solver/eigen_spectrum.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <numeric>
 #include <random>
 
 #include "solver/doubled_pattern.h"
+#include "solver/in_pieces.h"
 #include "solver/linear_solver.h"
 #include "solver/shifted_pencil.h"
+#include "solver/stoppable.h"
 
 namespace mbcosim {
 
@@ -90,12 +91,13 @@ class Krylov {
     basis_.col(0) = fresh_vector();
   }
 
-  /// Grows to m columns of H; breakdowns are continued with new random directions.
-  void grow(int m) {
+  /// Grows to m columns of H; breakdowns are continued with new random directions. Throws Stopped.
+  void grow(int m, const Watch& watch) {
     int k = static_cast<int>(hessenberg_.cols());
     basis_.conservativeResize(n_, m + 1);
     hessenberg_.conservativeResizeLike(MatrixXcd::Zero(m + 1, m));
     for (; k < m; ++k) {
+      watch.look();
       VectorXcd w = t_.apply(basis_.col(k));
       const double before = w.norm();
       hessenberg_.col(k).head(k + 1) = orthogonalize(w, k + 1);
@@ -154,9 +156,10 @@ std::vector<int> by_size(const VectorXcd& mu) {
 
 /// Similarity scaling that evens out row and column norms; returns the scales d with D⁻¹ T D
 /// balanced.
-VecX balance(MatX& t) {
+VecX balance(MatX& t, const Watch& watch) {
   VecX d = VecX::Ones(t.rows());
-  for (int pass = 0; pass < 8; ++pass)
+  for (int pass = 0; pass < 8; ++pass) {
+    watch.look();
     for (Eigen::Index i = 0; i < t.rows(); ++i) {
       const double row = t.row(i).norm(), column = t.col(i).norm();
       if (!(row > 0) || !(column > 0)) continue;
@@ -165,6 +168,7 @@ VecX balance(MatX& t) {
       t.col(i) *= f;
       d(i) *= f;
     }
+  }
   return d;
 }
 
@@ -173,35 +177,43 @@ void normalize_columns(MatrixXcd& v) {
     if (const double size = v.col(j).norm(); size > 0) v.col(j) /= size;
 }
 
-}  // namespace
+Error not_converged() {
+  return eigen_error(ErrorKind::not_converged, "the QR iteration did not converge");
+}
 
-Result<Spectrum> finite_spectrum(const Linearization& system) {
-  const int n = system.model->unknowns;
-  if (n == 0) return Spectrum{};
-  ShiftedPencil pencil(system);
+Result<Spectrum> dense_spectrum(const Linearization& system, bool vectors, const Watch& watch) {
+  ShiftedPencil pencil(system, watch);
   if (!pencil.is_regular())
     return eigen_error(ErrorKind::singular,
                        "the linearized system is singular: constraints are redundant or something "
                        "is undetermined");
   MatX& t = pencil.t;
-  const VecX scale = balance(t);
-  const MatX basis = scale.asDiagonal() * restrict_to_final_range(t);
+  const VecX scale = balance(t, watch);
+  const MatX basis = scale.asDiagonal() * restrict_to_final_range(t, watch);
   if (t.rows() == 0) return Spectrum{};
-  const Eigen::EigenSolver<MatX> solver(t);
-  if (solver.info() != Eigen::Success)
-    return eigen_error(ErrorKind::not_converged, "the QR iteration did not converge");
+  const auto schur = real_schur_form(t, vectors, watch);
+  if (!schur) return not_converged();
   Spectrum result;
-  result.values = (solver.eigenvalues().cwiseInverse().array() + ShiftedPencil::kShift).matrix();
-  result.vectors = basis * solver.eigenvectors();
-  normalize_columns(result.vectors);
+  VectorXcd mu;
+  if (vectors) {
+    EigenPairs pairs = schur_pairs(*schur, watch);
+    mu = std::move(pairs.values);
+    result.vectors.resize(basis.rows(), mu.size());
+    watch.columns(mu.size(), [&](Eigen::Index first, Eigen::Index count) {
+      result.vectors.middleCols(first, count).noalias() =
+          basis * pairs.vectors.middleCols(first, count);
+    });
+    normalize_columns(result.vectors);
+  } else {
+    mu = schur_values(schur->t);
+  }
+  result.values = (mu.cwiseInverse().array() + ShiftedPencil::kShift).matrix();
   return result;
 }
 
-Result<Spectrum> spectrum_near(const Linearization& system, std::complex<double> shift, int count,
-                               double tolerance, int basis) {
+Result<Spectrum> arnoldi(const Linearization& system, Complex shift, int count, double tolerance,
+                         int basis, const Watch& watch) {
   const int n = system.model->unknowns;
-  count = std::min(count, n);
-  if (count == 0) return Spectrum{};
   ShiftInvert t(system, shift);
   if (!t.regular())
     return eigen_error(ErrorKind::singular,
@@ -210,16 +222,14 @@ Result<Spectrum> spectrum_near(const Linearization& system, std::complex<double>
   Krylov krylov(t, n);
   const int largest = std::min(n, kLargestBasis);
   for (int m = std::min(std::max(basis, 2 * count + 20), largest);; m = std::min(2 * m, largest)) {
-    krylov.grow(m);
-    const Eigen::ComplexEigenSolver<MatrixXcd> solver(krylov.square());
-    if (solver.info() != Eigen::Success)
-      return eigen_error(ErrorKind::not_converged, "the QR iteration did not converge");
-    const VectorXcd& mu = solver.eigenvalues();
+    krylov.grow(m, watch);
+    const auto ritz = hessenberg_pairs(krylov.square(), watch);
+    if (!ritz) return not_converged();
+    const auto& [mu, inner] = *ritz;
     const std::vector<int> order = by_size(mu);
     int converged = 0;
-    while (converged < count &&
-           krylov.last() * std::abs(solver.eigenvectors()(m - 1, order[converged])) <=
-               tolerance * std::abs(mu(order[converged])))
+    while (converged < count && krylov.last() * std::abs(inner(m - 1, order[converged])) <=
+                                    tolerance * std::abs(mu(order[converged])))
       ++converged;
     if (converged < count && m < largest) continue;
     if (converged < count && m < n)
@@ -233,15 +243,41 @@ Result<Spectrum> spectrum_near(const Linearization& system, std::complex<double>
     result.values.resize(static_cast<Eigen::Index>(kept.size()));
     result.vectors.resize(n, static_cast<Eigen::Index>(kept.size()));
     for (std::size_t k = 0; k < kept.size(); ++k) {
+      watch.look();
       result.values(k) = shift + 1.0 / mu(kept[k]);
-      result.vectors.col(k) = krylov.basis() * solver.eigenvectors().col(kept[k]);
+      result.vectors.col(k) = krylov.basis() * inner.col(kept[k]);
     }
     normalize_columns(result.vectors);
     return result;
   }
 }
 
-Result<Spectrum> eigen(const Linearization& system, int count, std::complex<double> shift) {
+Error stopped() { return eigen_error(ErrorKind::cancelled, "stopped"); }
+
+}  // namespace
+
+Result<Spectrum> finite_spectrum(const Linearization& system, const SpectrumOptions& options) {
+  if (system.model->unknowns == 0) return Spectrum{};
+  try {
+    return dense_spectrum(system, options.vectors, Watch(options.cancel));
+  } catch (const Stopped&) {
+    return stopped();
+  }
+}
+
+Result<Spectrum> spectrum_near(const Linearization& system, std::complex<double> shift, int count,
+                               double tolerance, int basis, const SpectrumOptions& options) {
+  count = std::min(count, system.model->unknowns);
+  if (count == 0) return Spectrum{};
+  try {
+    return arnoldi(system, shift, count, tolerance, basis, Watch(options.cancel));
+  } catch (const Stopped&) {
+    return stopped();
+  }
+}
+
+Result<Spectrum> eigen(const Linearization& system, int count, std::complex<double> shift,
+                       const SpectrumOptions& options) {
   const int n = system.model->unknowns;
   const bool all = count <= 0;
   if (all && n > kLargestDense) {
@@ -252,8 +288,9 @@ Result<Spectrum> eigen(const Linearization& system, int count, std::complex<doub
     e.reason = "EIGENANALYSIS_SIZE";
     return e;
   }
-  auto found = all || n <= kSmall ? finite_spectrum(system)
-                                  : spectrum_near(system, shift + kShiftOffset, count);
+  auto found = all || n <= kSmall
+                   ? finite_spectrum(system, options)
+                   : spectrum_near(system, shift + kShiftOffset, count, 1e-10, 0, options);
   if (!found) return found;
   std::vector<int> order(found->values.size());
   std::iota(order.begin(), order.end(), 0);
@@ -263,8 +300,21 @@ Result<Spectrum> eigen(const Linearization& system, int count, std::complex<doub
   if (!all && count < static_cast<int>(order.size())) order.resize(count);
   Spectrum sorted;
   sorted.values = found->values(order);
-  sorted.vectors = found->vectors(Eigen::all, order);
+  if (options.vectors) sorted.vectors = found->vectors(Eigen::all, order);
   return sorted;
+}
+
+Result<Spectrum> finite_spectrum(const Linearization& system) {
+  return finite_spectrum(system, SpectrumOptions{});
+}
+
+Result<Spectrum> spectrum_near(const Linearization& system, std::complex<double> shift, int count,
+                               double tolerance, int basis) {
+  return spectrum_near(system, shift, count, tolerance, basis, {});
+}
+
+Result<Spectrum> eigen(const Linearization& system, int count, std::complex<double> shift) {
+  return eigen(system, count, shift, {});
 }
 
 }  // namespace mbcosim

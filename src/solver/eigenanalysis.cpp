@@ -6,6 +6,7 @@
 #include "solver/eigen_lapack.h"
 #include "solver/eigen_spectrum.h"
 #include "solver/linearization.h"
+#include "solver/stoppable.h"
 
 namespace mbcosim {
 
@@ -15,9 +16,10 @@ constexpr int kLargestDense = 4000;  ///< unknowns; beyond, the matrices alone t
 
 /// α, β = 1 and right vectors of the eigenvalues nearest to 1/κ: those with the largest |Λ + 1|.
 Result<GeneralizedEigen> iterative(const Model& model, const State& state,
-                                   const EigenSettings& settings, double kappa) {
+                                   const EigenSettings& settings, double kappa,
+                                   const CancelToken* cancel) {
   auto spectrum = spectrum_near(linearize(model, state), 1 / kappa, settings.nev,
-                                std::max(settings.tolerance, 1e-12), settings.ncv);
+                                std::max(settings.tolerance, 1e-12), settings.ncv, {true, cancel});
   if (!spectrum) return spectrum.error();
   const Eigen::ArrayXcd ks = kappa * spectrum->values.array(), lambda = (1.0 + ks) / (1.0 - ks);
   GeneralizedEigen result;
@@ -51,7 +53,7 @@ std::vector<EigenReport::NodePose> poses(const Model& model, const State& state)
 }  // namespace
 
 Result<EigenReport> analyse_modes(const Model& model, const State& state,
-                                  const EigenSettings& settings) {
+                                  const EigenSettings& settings, const CancelToken* cancel) {
   EigenReport report;
   report.settings = settings;
   report.time = state.time;
@@ -67,7 +69,7 @@ Result<EigenReport> analyse_modes(const Model& model, const State& state,
   auto solution =
       lapack ? generalized_eigen(model.dense(report.pencil.minus), model.dense(report.pencil.plus),
                                  settings.balance, settings.eigenvectors)
-             : iterative(model, state, settings, report.pencil.kappa);
+             : iterative(model, state, settings, report.pencil.kappa, cancel);
   if (!solution) return solution.error();
   report.solution = std::move(*solution);
   for (int k = report.solution.first; k <= report.solution.last; ++k)

@@ -16,8 +16,13 @@ namespace {
 
 class Assembly {
  public:
-  Assembly(const Model& model, State& state)
-      : model_(model), state_(state), start_(state), n_(model.unknowns), to_local_(2 * n_, -1) {
+  Assembly(const Model& model, State& state, const CancelToken* cancel)
+      : model_(model),
+        state_(state),
+        start_(state),
+        cancel_(cancel),
+        n_(model.unknowns),
+        to_local_(2 * n_, -1) {
     for (const ElementRef& e : model.elements)
       if (is_assembled(e)) elements_.push_back(e);
     number();
@@ -33,6 +38,7 @@ class Assembly {
       if (report.iterations >= model_.control.assembly_max_iterations ||
           !std::isfinite(report.error))
         return failure(ErrorKind::not_converged, report);
+      if (is_cancelled()) return stopped(report);
       if (!correct()) return failure(ErrorKind::singular, report);
       report.moved = true;
     }
@@ -44,6 +50,15 @@ class Assembly {
   Result<AssemblyReport> polish(AssemblyReport& report) {
     if (report.moved && !correct()) return failure(ErrorKind::singular, report);
     return report;
+  }
+
+  bool is_cancelled() const { return cancel_ && cancel_->cancelled(); }
+  Error stopped(const AssemblyReport& report) const {
+    Error e = make_error(ErrorKind::cancelled, "CANCELLED",
+                         "initial assembly: interrupted between iterations");
+    e.failure.time = state_.time;
+    e.failure.iteration = report.iterations;
+    return e;
   }
 
   bool is_assembled(const ElementRef& e) const {
@@ -241,7 +256,7 @@ class Assembly {
     compute_residual();
     for (int k = 0; k < iterations && change > 1e-9; ++k) {
       const std::vector<double> before = state_.y;
-      if (!correct(kCompliance)) return {};
+      if (is_cancelled() || !correct(kCompliance)) return {};
       compute_residual();
       change = 0;
       for (int a = 0; a < node_rows_; ++a)
@@ -295,6 +310,7 @@ class Assembly {
   const Model& model_;
   State& state_;
   const State start_;
+  const CancelToken* const cancel_;
   int n_;
   int size_ = 0, node_rows_ = 0;  ///< local rows of one level, those of nodes among them
   std::vector<ElementRef> elements_;
@@ -305,10 +321,11 @@ class Assembly {
 
 }  // namespace
 
-Result<AssemblyReport> assemble_initially(const Model& model, State& state) {
+Result<AssemblyReport> assemble_initially(const Model& model, State& state,
+                                          const CancelToken* cancel) {
   if (model.control.skip_assembly) return AssemblyReport{};
   const State input = state;
-  Assembly assembly(model, state);
+  Assembly assembly(model, state, cancel);
   if (!assembly.needed()) return AssemblyReport{};
   auto report = assembly.run();
   if (!report || !report->moved) {

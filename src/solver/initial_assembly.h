@@ -9,6 +9,7 @@
 #pragma once
 
 #include "model/model.h"
+#include "solver/cancel.h"
 
 namespace mbcosim {
 
@@ -20,6 +21,8 @@ struct AssemblyReport {
 
 /// Changes positions, orientations and velocities of nodes in `state`; ErrorKind::not_converged or
 /// ::singular otherwise, naming the constraints that fight.
-Result<AssemblyReport> assemble_initially(const Model& model, State& state);
+/// ErrorKind::cancelled between iterations.
+Result<AssemblyReport> assemble_initially(const Model& model, State& state,
+                                          const CancelToken* cancel = nullptr);
 
 }  // namespace mbcosim

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "solver/shifted_pencil.h"
+#include "solver/stoppable.h"
 
 namespace mbcosim {
 
@@ -15,7 +16,7 @@ Error state_space_error(ErrorKind kind, const std::string& message) {
   return make_error(kind, "LINEARIZATION_FAILED", "linearization: " + message);
 }
 
-MatX final_range(MatX t) { return restrict_to_final_range(t); }
+MatX final_range(MatX t, const Watch& watch) { return restrict_to_final_range(t, watch); }
 
 /// T ẋ = (1 + σT) x + b u with the ranges of Tᵏ and (Tᵀ)ᵏ.
 struct Split {
@@ -27,13 +28,14 @@ struct Split {
 
 /// Powers of two that make rows and columns of S⁻¹ T S alike in size (Parlett and Reinsch,
 /// Numerische Mathematik 13, 1969).
-VecX balancing_scale(MatX t) {
+VecX balancing_scale(MatX t, const Watch& watch) {
   constexpr int kSweeps = 20;
   constexpr double kGain = 0.95;
   VecX scale = VecX::Ones(t.rows());
   bool changed = true;
   for (int sweep = 0; sweep < kSweeps && changed; ++sweep) {
     changed = false;
+    watch.look();
     for (Eigen::Index i = 0; i < t.rows(); ++i) {
       const double own = std::abs(t(i, i));
       const double column = t.col(i).lpNorm<1>() - own, row = t.row(i).lpNorm<1>() - own;
@@ -52,28 +54,27 @@ VecX balancing_scale(MatX t) {
 /// Decisions about the rank depend on the units of the unknowns. Where they contradict each other
 /// (the ranges of Tᵏ and its transpose have the same dimension) they are taken again in balanced
 /// units.
-Split split(const MatX& t, const MatX& b) {
-  Split plain{t, b, final_range(t), final_range(t.transpose()), VecX::Ones(t.rows())};
+Split split(const MatX& t, const MatX& b, const Watch& watch) {
+  Split plain{t, b, final_range(t, watch), final_range(t.transpose(), watch), VecX::Ones(t.rows())};
   if (plain.is_consistent()) return plain;
-  const VecX s = balancing_scale(t), inverse = s.cwiseInverse();
+  const VecX s = balancing_scale(t, watch), inverse = s.cwiseInverse();
   const MatX balanced = inverse.asDiagonal() * t * s.asDiagonal();
-  return {balanced, inverse.asDiagonal() * b, final_range(balanced),
-          final_range(balanced.transpose()), s};
+  return {balanced, inverse.asDiagonal() * b, final_range(balanced, watch),
+          final_range(balanced.transpose(), watch), s};
 }
 
-}  // namespace
-
-Result<StateSpace> state_space(const Linearization& system, const InputsOutputs& io) {
-  // With T = (A − σE)⁻¹ E and b = (A − σE)⁻¹ B: T ẋ = (1 + σT) x + b u. The space splits into the
-  // range of Tᵏ, on which T is regular, and its kernel, on which T is nilpotent: there x = −(1 +
-  // σT)⁻¹ b u but for rates of u.
+// With T = (A − σE)⁻¹ E and b = (A − σE)⁻¹ B: T ẋ = (1 + σT) x + b u. The space splits into the
+// range of Tᵏ, on which T is regular, and its kernel, on which T is nilpotent: there x = −(1 +
+// σT)⁻¹ b u but for rates of u.
+Result<StateSpace> eliminate(const Linearization& system, const InputsOutputs& io,
+                             const Watch& watch) {
   constexpr double kShift = ShiftedPencil::kShift;
-  const ShiftedPencil pencil(system);
+  ShiftedPencil pencil(system, watch);
   if (!pencil.is_regular())
     return state_space_error(ErrorKind::singular,
                              "the linearized system is singular: constraints are redundant or "
                              "something is undetermined");
-  const Split parts = split(pencil.t, pencil.lu.solve(io.b));
+  const Split parts = split(pencil.t, pencil.solve(io.b, watch), watch);
   if (!parts.is_consistent())
     return state_space_error(
         ErrorKind::singular,
@@ -82,17 +83,20 @@ Result<StateSpace> state_space(const Linearization& system, const InputsOutputs&
             "): the unknowns differ too much in size; the descriptor form needs no such decision");
   const MatX &t = parts.t, &b = parts.b, &right = parts.right, &left = parts.left;
   const MatX c0 = io.c0 * parts.scale.asDiagonal(), c1 = io.c1 * parts.scale.asDiagonal();
-  const Eigen::PartialPivLU<MatX> cross_basis(left.transpose() * right);
-  const MatX regular = cross_basis.solve(left.transpose() * t * right),
-             b_regular = cross_basis.solve(left.transpose() * b);
+  const Eigen::PartialPivLU<MatX> cross_basis(transposed_product(left, right, watch));
+  const MatX projected =
+      solve(cross_basis, left.transpose(), watch);  // on the range, along the kernel
+  const MatX regular = product(projected, product(t, right, watch), watch),
+             b_regular = projected * b;
   const Eigen::PartialPivLU<MatX> regular_lu(regular);
   const Eigen::Index states = right.cols();
 
   StateSpace result;
-  result.a = regular_lu.inverse() + kShift * MatX::Identity(states, states);
+  result.a = solve(regular_lu, MatX::Identity(states, states), watch) +
+             kShift * MatX::Identity(states, states);
   result.b = regular_lu.solve(b_regular);
   const MatX b_nilpotent = b - right * b_regular;
-  const MatX nilpotent = t - right * regular * cross_basis.solve(left.transpose());
+  const MatX nilpotent = t - product(product(right, regular, watch), projected, watch);
   const MatX direct =
       -(MatX::Identity(t.rows(), t.cols()) + kShift * nilpotent).partialPivLu().solve(b_nilpotent);
   result.c = c0 * right + c1 * right * result.a;
@@ -104,6 +108,21 @@ Result<StateSpace> state_space(const Linearization& system, const InputsOutputs&
         ErrorKind::argument,
         "an output depends on the rate of an input: constraints pass it on directly");
   return result;
+}
+
+}  // namespace
+
+Result<StateSpace> state_space(const Linearization& system, const InputsOutputs& io,
+                               const CancelToken* cancel) {
+  try {
+    return eliminate(system, io, Watch(cancel));
+  } catch (const Stopped&) {
+    return state_space_error(ErrorKind::cancelled, "stopped");
+  }
+}
+
+Result<StateSpace> state_space(const Linearization& system, const InputsOutputs& io) {
+  return state_space(system, io, nullptr);
 }
 
 }  // namespace mbcosim

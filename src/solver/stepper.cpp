@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "solver/advance_time.h"
+#include "solver/divergence.h"
 #include "solver/initial_assembly.h"
 #include "solver/instant.h"
 #include "solver/singularity.h"
@@ -149,7 +150,7 @@ Status Stepper::assemble(State& state) {
   for (const auto& listener : model_.step_listeners)
     listener->advance(model_.context(state, Phase::assembly), state, true);
   update_activity(model_.context(state, Phase::assembly), state, false);
-  auto report = assemble_initially(model_, state);
+  auto report = assemble_initially(model_, state, cancel_);
   if (!report) return report.error();
   const EvalContext context = model_.context(state, Phase::derivatives);
   for (const ElementRef& e : model_.elements)
@@ -555,14 +556,26 @@ void Stepper::explain(PhaseReport& report, const State& state) {
     e.message += cause.details();
     return;
   }
-  cause = find_near_singularity(model_, workspace_.values);
-  if (cause.rank_loss > 0)
+  const bool in_step = e.failure.time > state.time;
+  std::string remedy =
+      in_step ? remedy_by_cause(model_, state, e.failure.time - state.time) : std::string();
+  if (remedy.empty()) cause = find_near_singularity(model_, workspace_.values);
+  if (cause.rank_loss > 0) {
     e.message += "\n  " + cause.text();
-  else if (far)
-    e.message +=
-        "\n  hint: the iteration diverged from a sound state: shorten the time step (`strategy: "
-        "factor` does it when needed), apply loads more slowly, or search along lines "
-        "(`nonlinear solver: line search`)";
+    return;
+  }
+  if (remedy.empty() && !far)
+    remedy = remedy_by_course(e.failure.residual_history, e.failure.worst);
+  if (remedy.empty() && far)
+    remedy =
+        "the iteration diverged from a sound state: shorten the time step (`strategy: factor` does "
+        "it when needed), apply loads more slowly, or search along lines (`nonlinear solver: line "
+        "search`)";
+  if (remedy.empty() && in_step)
+    remedy =
+        "shorten the time step (`strategy: factor` does it when needed), or allow more `max "
+        "iterations`";
+  if (!remedy.empty()) e.message += "\n  hint: " + remedy;
 }
 
 /// The matrix at an accepted state; false when it has no value there.

@@ -205,13 +205,15 @@ TEST(MalformedDeck, TextShowsLineCaretHintAndTrail) {
       "set: integer n = 2;\nfor: integer k = 1, n;\n  include: \"sub/a.inc\";\nend for;\n",
       {{"sub/a.inc", "\n\tinclude: \"b.inc\";"}, {"sub/b.inc", "remark: 1, 10/(k - 1);"}});
   ASSERT_EQ(c.full.size(), 1u);
-  EXPECT_EQ(c.full[0],
-            "sub/b.inc:1:14: error: division by zero\n"
-            "  remark: 1, 10/(k - 1);\n"
-            "               ^\n"
-            "  included from sub/a.inc:2\n"
-            "  included from deck.mbd:3\n"
-            "  in iteration k = 1 of the loop at deck.mbd:2\n");
+  EXPECT_EQ(
+      c.full[0],
+      "sub/b.inc:1:14: error: division by zero\n"
+      "  remark: 1, 10/(k - 1);\n"
+      "               ^\n"
+      "  hint: check the values that enter here: `remark: \"value\", <variable>;` prints them\n"
+      "  included from sub/a.inc:2\n"
+      "  included from deck.mbd:3\n"
+      "  in iteration k = 1 of the loop at deck.mbd:2\n");
 }
 
 TEST(MalformedDeck, HintFollowsTheSourceLine) {
