@@ -392,13 +392,18 @@ class Peer(exchange.Course):
     async def __aexit__(self, *_: object) -> None:
         await self.close()
 
+    async def _leave(self) -> None:
+        """Until the server has ended the stream: the port is free then."""
+        await self._stream.done_writing()
+        await self._stream.code()
+
     async def close(self) -> None:
         """Leaves the port."""
         if self._heart is not None:
             self._heart.cancel()
         if not self._stream.done():
             with contextlib.suppress(asyncio.TimeoutError, asyncio.InvalidStateError):
-                await asyncio.wait_for(self._stream.done_writing(), PARTING / 2)
+                await asyncio.wait_for(self._leave(), PARTING / 2)
             self._stream.cancel()
         if self._task is not None:
             await asyncio.wait([self._task], timeout=PARTING / 2)
