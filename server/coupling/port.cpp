@@ -70,8 +70,15 @@ void Port::attach(PeerLink* link, const v1::Welcome& welcome) {
     answer_.reset();
     peer_failure_.clear();
     rejection_.reset();
+    if (ended_) link_->refuse(*ended_);
   }
   changed_.notify_all();
+}
+
+void Port::end(const Refusal& why) {
+  std::lock_guard guard(mutex_);
+  ended_ = why;
+  if (link_) link_->refuse(why);
 }
 
 void Port::detach() {

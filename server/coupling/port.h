@@ -33,7 +33,8 @@ class PeerLink {
   virtual Pulled pull(v1::PeerMessage*, std::chrono::steady_clock::time_point) {
     return Pulled::closed;
   }
-  /// A pulled message broke the protocol: ends the link with that status.
+  /// A pulled message broke the protocol, or the simulation has ended: ends the link with that
+  /// status. Does not wait.
   virtual void refuse(const Refusal&) {}
 };
 
@@ -68,6 +69,8 @@ class Port {
   /// After `reserve`; exchanges may start. `welcome`: for the record.
   void attach(PeerLink* link, const v1::Welcome& welcome);
   void detach();
+  /// The simulation has ended: so do the link of the peer and those of later ones.
+  void end(const Refusal& why);
   /// How long the peer has sent nothing.
   std::chrono::steady_clock::duration silence() const;
   /// Any message after `hello`. Throws OUT_OF_TURN or what `deliver` throws.
@@ -122,6 +125,7 @@ class Port {
   std::optional<Answer> answer_;
   std::string peer_failure_;  ///< the peer could not compute
   std::optional<PeerRejected> rejection_;
+  std::optional<Refusal> ended_;
   std::optional<Clock::time_point> waiting_since_;
   std::atomic<Clock::rep> heard_{0};  ///< when the peer last sent something
   v1::PeerMessage pulled_;            ///< of the session's thread

@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <grpcpp/grpcpp.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -64,6 +65,14 @@ void check_socket(const std::string& path) {
   if (alive) throw std::runtime_error("another server listens on " + path);
 }
 
+/// As many descriptors as the system grants.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 void add_channel_arguments(grpc::ServerBuilder& builder, const ServiceLimits& limits) {
   builder.SetMaxReceiveMessageSize(limits.message_bytes);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
@@ -99,6 +108,8 @@ Config checked(Config config) {
   int& own = config.limits.identity_sessions;
   if (config.limits.memory_bytes == 0) config.limits.memory_bytes = MemoryBudget::default_bytes();
   const bool several = !config.tokens_file.empty() || !config.tls_client_ca.empty();
+  std::int64_t& part = config.limits.identity_memory_bytes;
+  if (part == 0) part = several ? config.limits.memory_bytes / 2 : config.limits.memory_bytes;
   if (own == 0) own = several ? std::max(1, config.limits.sessions / 2) : config.limits.sessions;
   return config;
 }
@@ -112,12 +123,12 @@ Daemon::Daemon(const Config& config)
       lanes_(config.limits.sessions, worker_count(config.workers)),
       admission_({config.limits.open_calls, config.limits.identity_calls,
                   config.limits.identity_streams, config.limits.connection_calls}),
-      memory_(config_.limits.memory_bytes),
+      budgets_(config_.limits.memory_bytes, config_.limits.identity_memory_bytes),
       runtime_{
           lanes_,
           timer_,
           admission_,
-          memory_,
+          budgets_,
           authenticator_,
           [this](const std::string& method, const std::string& identity, const Refusal& refusal) {
             log_.refused(method, identity, refusal);
@@ -160,26 +171,25 @@ void Daemon::add_methods() {
 }
 
 void Daemon::listen() {
+  raise_descriptor_limit();
   grpc::EnableDefaultHealthCheckService(false);
   grpc::ServerBuilder builder;
   add_channel_arguments(builder, config_.limits);
-  std::vector<int> ports(config_.listen.size(), 0);
-  for (std::size_t i = 0; i < config_.listen.size(); ++i) {
-    check_listener(config_.listen[i]);
-    builder.AddListeningPort(config_.listen[i], credentials_for(config_.listen[i]), &ports[i]);
+  for (const std::string& address : config_.listen) check_listener(address);
+  std::vector<std::unique_ptr<Listener::Acceptor>> acceptors;
+  for (const std::string& address : config_.listen) {
+    listeners_.push_back(std::make_unique<Listener>(address));
+    acceptors.push_back(builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+        credentials_for(address)));
   }
   builder.RegisterCallbackGenericService(&gate_);
   expose_metrics();
-  const mode_t old_mask = ::umask(0177);  // sockets get mode 0600
   server_ = builder.BuildAndStart();
-  ::umask(old_mask);
-  if (!server_) throw std::runtime_error("cannot listen on the address; is it in use?");
-  for (std::size_t i = 0; i < ports.size(); ++i) {
-    const std::string& address = config_.listen[i];
-    const std::string bound =
-        is_unix(address) ? address
-                         : address.substr(0, address.rfind(':') + 1) + std::to_string(ports[i]);
-    spdlog::info("listening on {}", bound);
+  if (!server_) throw std::runtime_error("the server cannot start");
+  for (std::size_t i = 0; i < listeners_.size(); ++i) {
+    listeners_[i]->start(std::move(acceptors[i]));
+    spdlog::info("listening on {}", listeners_[i]->bound());
   }
 }
 
@@ -256,6 +266,7 @@ bool Daemon::shut_down() {
   spdlog::info("shutting down");
   health_.stop();
   gate_.close();
+  listeners_.clear();
   store_.close_all();
   shared_memory_.clear();
   door_.reset();

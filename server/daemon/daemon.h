@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/listener.h"
 #include "http/door.h"
 #include "rpc/health.h"
 #include "service/config.h"
@@ -43,7 +44,7 @@ class Daemon {
   Lanes lanes_;
   Timer timer_;
   Admission admission_;
-  MemoryBudget memory_;
+  MemoryBudgets budgets_;
   const Runtime runtime_;
   ResultsRoot results_;
   Durability durability_;  ///< outlives the store, which calls it
@@ -52,6 +53,7 @@ class Daemon {
   Health health_;
   const Parts parts_;
   std::unique_ptr<grpc::Server> server_;
+  std::vector<std::unique_ptr<Listener>> listeners_;
   std::vector<std::unique_ptr<SharedMemoryService>> shared_memory_;  ///< one for each Unix socket
   std::unique_ptr<http::Door> door_;
 };

@@ -35,9 +35,17 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
       "Nested `for` and `if`, nested brackets of a statement");
   add("--limit-unknowns", limits.engine.unknowns, "Unknowns of one model");
   add("--limit-message-bytes", limits.message_bytes, "Bytes of one message");
-  app.add_option("--limit-memory", limits.memory_bytes,
-                 "Bytes of models, states, snapshots, records, buffers and uploads; 0: 60 % of the "
-                 "machine's or the container's")
+  app.add_option(
+         "--limit-memory", limits.memory_bytes,
+         "Bytes of models, states, matrices, snapshots, records, buffers and uploads; 0: 60 % "
+         "of the machine's or the container's")
+      ->group("Limits")
+      ->capture_default_str()
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::NonNegativeNumber);
+  app.add_option(
+         "--limit-identity-memory", limits.identity_memory_bytes,
+         "The same, of what one identity has; 0: half of all where callers show credentials")
       ->group("Limits")
       ->capture_default_str()
       ->transform(CLI::AsSizeValue(false))

@@ -13,6 +13,7 @@
 
 #include "rpc/admission.h"
 #include "rpc/auth.h"
+#include "rpc/budgets.h"
 #include "rpc/call.h"
 #include "rpc/call_scope.h"
 #include "rpc/lanes.h"
@@ -57,7 +58,7 @@ struct Runtime {
   Lanes& lanes;
   Timer& timer;
   Admission& admission;
-  MemoryBudget& memory;
+  MemoryBudgets& budgets;
   const Authenticator& authenticator;
   std::function<void(const std::string& method, const std::string& identity, const Refusal&)>
       on_refusal;
@@ -93,6 +94,8 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
   const CallLabels& labels() const { return labels_; }
   Call& call() { return call_; }
   const Runtime& runtime() const { return runtime_; }
+  /// Of the caller.
+  MemoryBudget& memory() const { return runtime_.budgets.of(caller_.identity); }
   /// Asks for the next message; with a bound the call ends when none comes.
   void read(std::optional<Clock::duration> longest = std::nullopt) TS_EXCLUDES(mutex_);
   /// Sends, after what is on its way. Nobody waits; ask `all_written` first where it may be much.

@@ -26,7 +26,7 @@ class Health::Check final : public Handler {
  private:
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
     HealthCheckRequest request;
-    parse(exchange.runtime(), message, &request, nullptr);
+    parse(exchange.memory(), message, &request, nullptr);
     if (!health_.knows(request.service()))
       return exchange.finish({grpc::StatusCode::NOT_FOUND, "no such service"});
     Guard guard(health_.mutex_);
@@ -48,7 +48,7 @@ class Health::Watch final : public Handler {
  private:
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
     HealthCheckRequest request;
-    parse(exchange.runtime(), message, &request, nullptr);
+    parse(exchange.memory(), message, &request, nullptr);
     Guard guard(health_.mutex_);
     if (health_.watchers_.size() >= kWatchers)
       throw limit_refusal("health_watchers", kWatchers, "the server's health is watched by many");

@@ -19,16 +19,16 @@ std::string joined(const grpc::ByteBuffer& bytes);
 /// Throws BAD_ARGUMENT when the bytes are no such message. Large ones are counted: a message may
 /// take hundreds of times its bytes. `share` holds what it takes.
 template <class Message>
-void parse(const Runtime& runtime, grpc::ByteBuffer& bytes, Message* message, MemoryShare* share) {
+void parse(MemoryBudget& memory, grpc::ByteBuffer& bytes, Message* message, MemoryShare* share) {
   constexpr std::size_t kSmall = 4096;
   bool good = false;
   if (bytes.Length() <= kSmall) {
     good = grpc::SerializationTraits<Message>::Deserialize(&bytes, message).ok();
   } else {
-    const MemoryShare whole(runtime.memory, static_cast<std::int64_t>(bytes.Length()));
+    const MemoryShare whole(memory, static_cast<std::int64_t>(bytes.Length()));
     const std::string text = joined(bytes);
     bytes.Clear();
-    good = within(runtime.memory, nullptr, share, [&] { return message->ParseFromString(text); });
+    good = within(memory, nullptr, share, [&] { return message->ParseFromString(text); });
   }
   if (!good)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
@@ -52,7 +52,7 @@ struct CallFrame {
 };
 
 inline CallFrame frame_of(Exchange& exchange) {
-  return {exchange.caller(), exchange.call(), exchange.runtime().memory};
+  return {exchange.caller(), exchange.call(), exchange.memory()};
 }
 
 /// One message in.
@@ -62,7 +62,7 @@ class OneRequest : public Handler {
   explicit OneRequest(Lane lane) : lane_(lane) {}
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
     exchange.post(lane_, [this, &exchange, bytes = std::move(message)]() mutable {
-      parse(exchange.runtime(), bytes, &request_, &share_);
+      parse(exchange.memory(), bytes, &request_, &share_);
       bytes.Clear();
       CallLabels labels = exchange.labels();
       if constexpr (requires { request_.request_id(); }) labels.request_id = request_.request_id();
@@ -136,7 +136,7 @@ class Upload : public Handler {
     exchange.post(Lane::work, [this, &exchange, bytes = std::move(message)]() mutable {
       MemoryShare share;
       Request request;
-      parse(exchange.runtime(), bytes, &request, &share);
+      parse(exchange.memory(), bytes, &request, &share);
       add(exchange, request, std::move(share));
       exchange.read(Exchange::kMessageWait);
     });

@@ -83,7 +83,7 @@ class ReflectionHandler final : public Handler {
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
     reflection::ServerReflectionRequest request;
     reflection::ServerReflectionResponse response;
-    parse(exchange.runtime(), message, &request, nullptr);
+    parse(exchange.memory(), message, &request, nullptr);
     answer(gate_, request, &response);
     exchange.write(serialized(response));
   }

@@ -20,6 +20,7 @@ struct ServiceLimits {
   int bundle_files = 10000;
   int message_bytes = 16 << 20;
   std::int64_t memory_bytes = 0;  ///< of all work; 0: a share of the machine's or container's
+  std::int64_t identity_memory_bytes = 0;  ///< 0: half of `memory_bytes` where there are several
   int identity_sessions = 0;    ///< of one identity; 0: half of `sessions` where there are several
   int open_calls = 4096;        ///< calls and streams at once
   int identity_calls = 256;     ///< calls with one answer at once, of one identity

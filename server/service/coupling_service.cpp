@@ -19,7 +19,7 @@ class AttachHandler final : public Handler, public PeerLink {
     Handler::start(exchange);
   }
   void on_message(Exchange& exchange, grpc::ByteBuffer bytes) override {
-    parse(exchange.runtime(), bytes, &message_, &share_);
+    parse(exchange.memory(), bytes, &message_, &share_);
     if (!greeted_) return exchange.post(Lane::work, [this, &exchange] { greet(exchange); });
     try {
       seat_->receive(message_);
@@ -92,6 +92,7 @@ class AttachHandler final : public Handler, public PeerLink {
     exchange_->hang_up();
     return false;
   }
+  void refuse(const Refusal& refusal) override { leave(*exchange_, refusal.status()); }
   void beat(const v1::ServerMessage& message) override {
     if (exchange_->all_written()) exchange_->write(serialized(message));
   }

@@ -73,15 +73,16 @@ class Fresh {
                  const std::string& forked_from = "") TS_EXCLUDES(mutex_) {
     const CallToken token(exchange.call());
     MemoryShare share;
-    auto session = within(parts_.runtime.memory, &token, &share, [&] {
+    auto session = within(exchange.memory(), &token, &share, [&] {
       auto identity = make_identity(options, exchange.caller(), parts_.config.limits);
       std::unique_ptr<SessionResults> results;
       if (options.has_results())
         results = std::make_unique<SessionResults>(parts_.results, identity.id, options.results(),
                                                    parts_.config.limits.results_bytes);
       std::unique_ptr<Simulation> simulation = make(token, results.get());
-      return std::make_shared<Session>(std::move(identity), std::move(simulation), parts_.shared(),
-                                       options, std::move(results));
+      return std::make_shared<Session>(std::move(identity), std::move(simulation),
+                                       parts_.shared(exchange.memory()), options,
+                                       std::move(results));
     });
     session->set_memory(std::move(share));
     session->set_symbols(std::move(*symbols));
@@ -122,10 +123,21 @@ class Fresh {
   bool lost_ TS_GUARDED_BY(mutex_) = false;
 };
 
+/// LAPACK cannot be stopped: the deck's own eigenanalyses are written only of what it does quickly.
+void check_eigenanalyses(const Model& model) {
+  constexpr int kMost = 300;
+  for (const EigenSettings& settings : model.initial_value.eigenanalyses)
+    if (settings.solver == EigenSettings::Solver::lapack && model.unknowns > kMost)
+      throw limit_refusal("eigenanalysis_unknowns", kMost,
+                          "an `eigenanalysis` of the deck is too large for a dense solver: write "
+                          "`use arpack, <number>, <basis>, <tolerance>`");
+}
+
 /// The model of a deck at its initial solution.
 std::unique_ptr<Simulation> initial_solution(const LoadReport& report, bool summed_time,
                                              SessionResults* results, const CancelToken& token) {
   if (!report.ok()) refuse_deck(report);
+  if (results) check_eigenanalyses(*report.model);
   auto simulation =
       Simulation::create(report.model, &token, results ? results->start(*report.model) : nullptr,
                          summed_time ? TimeKeeping::summed : TimeKeeping::exact);
@@ -140,17 +152,25 @@ void wake_known(const Parts& parts, const v1::CreateOptions& options, const Call
   if (!name.empty()) (void)parts.store.get(name, caller, Access::own);
 }
 
+[[noreturn]] void refuse_empty_upload() {
+  throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an upload must be `header`");
+}
+
 // ------------------------------------------------------------------ CreateSimulation
 
 /// What CreateSimulation and its form in one message share.
 class Creation {
  public:
-  explicit Creation(const Parts& parts)
-      : parts_(parts), upload_(parts.config.limits, parts.runtime.memory), fresh_(parts) {}
+  explicit Creation(const Parts& parts) : parts_(parts), fresh_(parts) {}
 
-  DeckUpload& upload() { return upload_; }
+  /// Where the caller's deck arrives.
+  DeckUpload& upload(Exchange& exchange) {
+    if (!upload_) upload_.emplace(parts_.config.limits, exchange.memory());
+    return *upload_;
+  }
   v1::CreateSimulationReply run(Exchange& exchange) {
-    const v1::CreateOptions& options = upload_.header().options();
+    if (!upload_) refuse_empty_upload();
+    const v1::CreateOptions& options = upload_->header().options();
     v1::CreateSimulationReply reply;
     reply.set_protocol_version(kProtocolVersion);
     wake_known(parts_, options, exchange.caller());
@@ -173,7 +193,7 @@ class Creation {
     fresh_
         .add(options, exchange, &report.symbols, kept,
              [&](const CancelToken& token, SessionResults* results) {
-               report = load(upload_, parts_.config, kept);
+               report = load(*upload_, parts_.config, parts_.config.limits.engine, kept);
                return initial_solution(report, options.summed_time(), results, token);
              })
         ->fill(reply->mutable_simulation(), exchange.caller());
@@ -182,7 +202,7 @@ class Creation {
   }
 
   const Parts& parts_;
-  DeckUpload upload_;
+  std::optional<DeckUpload> upload_;
   Fresh fresh_;
 };
 
@@ -191,9 +211,10 @@ class CreateHandler final : public Upload<v1::UploadRequest> {
   explicit CreateHandler(const Parts& parts) : creation_(parts) {}
 
  private:
-  void add(Exchange&, v1::UploadRequest& request, MemoryShare share) override {
-    creation_.upload().add(request, std::move(share));
-    check_protocol(creation_.upload().header().options().protocol());
+  void add(Exchange& exchange, v1::UploadRequest& request, MemoryShare share) override {
+    DeckUpload& upload = creation_.upload(exchange);
+    upload.add(request, std::move(share));
+    check_protocol(upload.header().options().protocol());
   }
   void complete(Exchange& exchange) override { exchange.end(serialized(creation_.run(exchange))); }
   void on_done(Exchange& exchange, bool delivered) override {
@@ -210,7 +231,7 @@ class CreateInlineHandler final : public OneRequest<v1::InlineUpload> {
  private:
   void serve(Exchange& exchange, const v1::InlineUpload& request) override {
     check_protocol(request.header().options().protocol());
-    creation_.upload().add(request);
+    creation_.upload(exchange).add(request);
     exchange.end(serialized(creation_.run(exchange)));
   }
   void on_done(Exchange& exchange, bool delivered) override {
@@ -222,8 +243,18 @@ class CreateInlineHandler final : public OneRequest<v1::InlineUpload> {
 
 // ------------------------------------------------------------------ ValidateModel
 
-v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config) {
-  const DeckReport report = load(upload, config);
+/// What an observer may have read: enough to check a deck of its own, too little to keep the
+/// daemon busy.
+ServiceLimits limits_for(Role role, ServiceLimits limits) {
+  constexpr std::int64_t kBytes = 256 << 10, kStatements = 100'000;
+  if (role != Role::observe) return limits;
+  limits.engine.deck_bytes = std::min(limits.engine.deck_bytes, kBytes);
+  limits.engine.statements = std::min(limits.engine.statements, kStatements);
+  return limits;
+}
+
+v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config, const Limits& limits) {
+  const DeckReport report = load(upload, config, limits);
   v1::ValidateModelReply reply;
   reply.set_ok(report.ok());
   to_proto(report.diagnostics, reply.mutable_diagnostics());
@@ -238,27 +269,33 @@ v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config) {
   return reply;
 }
 
-v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config, Exchange& exchange) {
+v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config, const Limits& limits,
+                               Exchange& exchange) {
   const CallToken token(exchange.call());
   MemoryShare share;
-  return within(exchange.runtime().memory, &token, &share, [&] { return look_at(upload, config); });
+  return within(exchange.memory(), &token, &share, [&] { return look_at(upload, config, limits); });
 }
 
 class ValidateHandler final : public Upload<v1::UploadRequest> {
  public:
-  explicit ValidateHandler(const Parts& parts)
-      : parts_(parts), upload_(parts.config.limits, parts.runtime.memory) {}
+  explicit ValidateHandler(const Parts& parts) : parts_(parts) {}
 
  private:
-  void add(Exchange&, v1::UploadRequest& request, MemoryShare share) override {
-    upload_.add(request, std::move(share));
+  void add(Exchange& exchange, v1::UploadRequest& request, MemoryShare share) override {
+    if (!upload_) {
+      limits_ = limits_for(exchange.caller().role, parts_.config.limits);
+      upload_.emplace(limits_, exchange.memory());
+    }
+    upload_->add(request, std::move(share));
   }
   void complete(Exchange& exchange) override {
-    exchange.end(serialized(look_at(upload_, parts_.config, exchange)));
+    if (!upload_) refuse_empty_upload();
+    exchange.end(serialized(look_at(*upload_, parts_.config, limits_.engine, exchange)));
   }
 
   const Parts& parts_;
-  DeckUpload upload_;
+  ServiceLimits limits_;
+  std::optional<DeckUpload> upload_;
 };
 
 class ValidateInlineHandler final : public OneRequest<v1::InlineUpload> {
@@ -267,9 +304,10 @@ class ValidateInlineHandler final : public OneRequest<v1::InlineUpload> {
 
  private:
   void serve(Exchange& exchange, const v1::InlineUpload& request) override {
-    DeckUpload upload(parts_.config.limits, parts_.runtime.memory);
+    const ServiceLimits limits = limits_for(exchange.caller().role, parts_.config.limits);
+    DeckUpload upload(limits, exchange.memory());
     upload.add(request);
-    exchange.end(serialized(look_at(upload, parts_.config, exchange)));
+    exchange.end(serialized(look_at(upload, parts_.config, limits.engine, exchange)));
   }
 
   const Parts& parts_;

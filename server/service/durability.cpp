@@ -149,6 +149,10 @@ KeptDeck Durability::deck_of(const Session& session) const {
   }
 }
 
+MemoryBudget& Durability::memory_of(const Session& session) const {
+  return parts_->runtime.budgets.of(session.identity().owner);
+}
+
 void Durability::write(Session& session) {
   const auto begin = std::chrono::steady_clock::now();
   const std::string id = id_of(session.identity().id);
@@ -156,7 +160,7 @@ void Durability::write(Session& session) {
   Guard guard(keeping.mutex);
   if (keeping.over || session.has_failed()) return;
   CapturedPoint captured = session.capture();
-  const MemoryShare share(parts_->runtime.memory, 2 * size_of(captured.state));
+  const MemoryShare share(memory_of(session), 2 * size_of(captured.state));
   write_snapshots(session, id, captured.point);
   session.sync_results();
   std::set<int> kept;
@@ -179,7 +183,7 @@ void Durability::write_snapshots(Session& session, const std::string& id,
     if (session.keeping()->snapshots.count(number) == 0) {
       const std::optional<State> state = session.snapshots().find_state(number);
       if (!state) continue;
-      const MemoryShare share(parts_->runtime.memory, 2 * size_of(*state));
+      const MemoryShare share(memory_of(session), 2 * size_of(*state));
       folder_->write_snapshot(id, number, session.bytes_of(*state));
       session.keeping()->snapshots.insert(number);
     }
@@ -361,7 +365,8 @@ SessionPtr Durability::revive(const std::string& simulation, const Suspended& su
 
   const v1::CreateOptions& options = model.head.options();
   MemoryShare share;
-  auto session = within(parts_->runtime.memory, nullptr, &share, [&] {
+  MemoryBudget& memory = parts_->runtime.budgets.of(suspended.head.owner());
+  auto session = within(memory, nullptr, &share, [&] {
     DeckReport report =
         load({model.head.main_file(), std::move(model.files), model.head.model_options()}, config_);
     if (!report.ok() || digest_text(report.model->digest) != model.head.model_digest())
@@ -378,8 +383,8 @@ SessionPtr Durability::revive(const std::string& simulation, const Suspended& su
         simulation, point.point.info().display_name(), suspended.head.owner(), options.request_id(),
         std::chrono::milliseconds(
             google::protobuf::util::TimeUtil::DurationToMilliseconds(point.point.info().lease()))};
-    auto live = std::make_shared<Session>(std::move(identity), std::move(made), parts_->shared(),
-                                          options, std::move(results));
+    auto live = std::make_shared<Session>(std::move(identity), std::move(made),
+                                          parts_->shared(memory), options, std::move(results));
     live->set_symbols(std::move(report.symbols));
     return live;
   });

@@ -71,6 +71,7 @@ class Durability {
   bool may_see(const Suspended& suspended, const Caller& caller, Access access) const;
   void read_folder();
   void read_one(const std::string& id);
+  MemoryBudget& memory_of(const Session& session) const;  ///< its owner's
   void write(Session& session);
   void loop();
   void look();

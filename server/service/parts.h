@@ -27,9 +27,9 @@ struct Parts {
   ResultsRoot& results;
   Durability& durability;
 
-  /// What every session gets.
-  Session::Shared shared() const {
-    return {slots, config.limits, metrics, log, runtime.memory, runtime.lanes, runtime.timer};
+  /// What every session gets; `memory`: its owner's.
+  Session::Shared shared(MemoryBudget& memory) const {
+    return {slots, config.limits, metrics, log, memory, runtime.lanes, runtime.timer};
   }
 };
 

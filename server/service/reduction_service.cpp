@@ -86,20 +86,20 @@ class ProgressSender {
 
 class ReduceHandler final : public Upload<v1::ReduceRequest> {
  public:
-  explicit ReduceHandler(const Parts& parts)
-      : parts_(parts), bundle_(parts.config.limits, parts.runtime.memory) {}
+  explicit ReduceHandler(const Parts& parts) : parts_(parts) {}
 
  private:
-  void add(Exchange&, v1::ReduceRequest& message, MemoryShare) override {
+  void add(Exchange& exchange, v1::ReduceRequest& message, MemoryShare) override {
     if (!header_) {
       if (!message.has_header())
         throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `header`");
       header_ = message.header();
+      bundle_.emplace(parts_.config.limits, exchange.memory());
       return;
     }
     if (!message.has_chunk())
       throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` there are only `chunk` messages");
-    bundle_.add(message.chunk());
+    bundle_->add(message.chunk());
   }
   void complete(Exchange& exchange) override {
     if (!header_) throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `header`");
@@ -112,9 +112,9 @@ class ReduceHandler final : public Upload<v1::ReduceRequest> {
   void answer(Exchange& exchange) {
     ProgressSender sender(exchange);
     const CallToken token(exchange.call());
-    const BundleSource files(bundle_.take());
+    const BundleSource files(bundle_->take());
     const ReductionJob job = read_request(*header_, files);
-    const FeModel model = within(exchange.runtime().memory, &token, &model_share_,
+    const FeModel model = within(exchange.memory(), &token, &model_share_,
                                  [&] { return load(job, files, parts_.config.limits.engine); });
     const auto reduction =
         reduce(model, job.options, [&](const std::string& phase, double fraction) {
@@ -144,7 +144,7 @@ class ReduceHandler final : public Upload<v1::ReduceRequest> {
 
   const Parts& parts_;
   std::optional<v1::ReduceHeader> header_;
-  Bundle bundle_;
+  std::optional<Bundle> bundle_;
   MemoryShare model_share_;
   Mutex mutex_;
   std::optional<std::string> text_ TS_GUARDED_BY(mutex_);  ///< when the report has been sent

@@ -314,9 +314,9 @@ std::int64_t Session::size_of_result(const std::string& file, std::int64_t* cuts
 void Session::subscribe(const SubscriptionPtr& subscription,
                         const google::protobuf::RepeatedField<int>& handles) {
   variables_.check(handles);
-  std::int64_t values = 0;
-  for (const int handle : handles) values += variables()[handle].size;
-  telemetry_->add(subscription, values);
+  std::vector<int> sizes;
+  for (const int handle : handles) sizes.push_back(variables()[handle].size);
+  telemetry_->add(subscription, sizes);
 }
 
 // ------------------------------------------------------------------ end of life
@@ -325,6 +325,8 @@ void Session::close() {
   lease_.end();
   status_.interrupt();
   telemetry_->close();
+  const Refusal gone(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
+  for (const auto& port : coupler_.ports()) port->end(gone);
 }
 
 Session::Use::Use(Session& session) : lease_(session.lease_) {

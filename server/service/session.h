@@ -90,8 +90,8 @@ class Session {
   void read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply);
   void write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply);
 
-  void linearize(const v1::LinearizeRequest& request, v1::LinearizeReply* reply);
-  void eigenvalues(const v1::ComputeEigenvaluesRequest& request,
+  void linearize(const v1::LinearizeRequest& request, Call& call, v1::LinearizeReply* reply);
+  void eigenvalues(const v1::ComputeEigenvaluesRequest& request, Call& call,
                    v1::ComputeEigenvaluesReply* reply);
 
   void save(const std::string& display_name, v1::Snapshot* out);
@@ -145,7 +145,7 @@ class Session {
   /// Before others know the session, which stands at the point's state: all else that it holds.
   void take_over(const v1::CheckpointPoint& point, const std::map<int, std::string>& snapshots);
 
-  /// Interrupts, ends subscriptions; later calls find the session gone.
+  /// Interrupts, ends subscriptions and the streams of peers; later calls find the session gone.
   void close();
 
   /// Keeps the lease from running out while it lives. Throws NO_SUCH_SIMULATION when it has.
@@ -195,7 +195,7 @@ class Session {
   void describe_variables(const v1::DescribeSimulationRequest& request,
                           v1::ModelDescription* out) const;
   void require_usable() const;
-  void require_rest() const;  ///< usable and not advancing
+  State state_at_rest(std::int64_t* step);
 
   const Identity identity_;
   const Shared shared_;

@@ -2,7 +2,9 @@
 /// lane of heavy work bounds them, at a lower priority, so that a few of them starve no step.
 #include <complex>
 
+#include "model/inverse_problem.h"
 #include "service/session.h"
+#include "simulation/linearize.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -51,12 +53,12 @@ void fill_descriptor(const Linearization& system, const InputsOutputs& io,
 }
 
 void fill_state_space(const Linearization& system, const InputsOutputs& io,
-                      v1::LinearizeReply* reply) {
+                      const CancelToken& cancel, v1::LinearizeReply* reply) {
   if (system.model->unknowns > kLargestStateSpace)
     throw limit_refusal("state_space_unknowns", kLargestStateSpace,
                         "the model is too large for the state space form: ask for the descriptor "
                         "form");
-  auto reduced = state_space(system, io);
+  auto reduced = state_space(system, io, &cancel);
   if (!reduced) throw Refusal(reduced.error());
   put(reduced->a, reply->mutable_a());
   put(reduced->b, reply->mutable_b());
@@ -68,50 +70,61 @@ void fill_state_space(const Linearization& system, const InputsOutputs& io,
 
 }  // namespace
 
-void Session::require_rest() const {
+// A copy: the analysis of a large model takes long, and the simulation is free meanwhile.
+State Session::state_at_rest(std::int64_t* step) {
   require_usable();
+  if (inverse_problem(*model_))
+    throw Refusal(
+        v1::REASON_BAD_ARGUMENT,
+        "an inverse dynamics problem prescribes the motion: there is nothing to linearize");
   if (status_.stepping())
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; it is analysed between advances");
+  std::lock_guard lock(lock_);
+  *step = simulation_->step_number();
+  return simulation_->snapshot();
 }
 
-void Session::linearize(const v1::LinearizeRequest& request, v1::LinearizeReply* reply) {
+void Session::linearize(const v1::LinearizeRequest& request, Call& call,
+                        v1::LinearizeReply* reply) {
   variables_.check(request.inputs());
   variables_.check(request.outputs());
-  require_rest();
-  Linearization system;
-  InputsOutputs io;
-  {
-    std::lock_guard lock(lock_);
-    system = simulation_->linearize();
-    auto found = simulation_->linearize(
+  std::int64_t step = 0;
+  const State state = state_at_rest(&step);
+  const CallToken token(call);
+  MemoryShare share;
+  within(shared_.memory, &token, &share, [&] {
+    const Linearization system = mbcosim::linearize(*model_, state);
+    const auto io = linearize_inputs_outputs(
+        *model_, state, Variables(*model_),
         std::vector<int>(request.inputs().begin(), request.inputs().end()),
-        std::vector<int>(request.outputs().begin(), request.outputs().end()));
-    if (!found) throw Refusal(found.error());
-    io = std::move(*found);
-    reply->set_step(simulation_->step_number());
-  }
-  if (request.descriptor_form())
-    fill_descriptor(system, io, reply);
-  else
-    fill_state_space(system, io, reply);
+        std::vector<int>(request.outputs().begin(), request.outputs().end()), &token);
+    if (!io) throw Refusal(io.error());
+    if (request.descriptor_form())
+      fill_descriptor(system, *io, reply);
+    else
+      fill_state_space(system, *io, token, reply);
+    return true;
+  });
+  reply->set_step(step);
 }
 
-void Session::eigenvalues(const v1::ComputeEigenvaluesRequest& request,
+void Session::eigenvalues(const v1::ComputeEigenvaluesRequest& request, Call& call,
                           v1::ComputeEigenvaluesReply* reply) {
   if (request.count() < 0) throw Refusal(v1::REASON_BAD_ARGUMENT, "`count` must not be negative");
   if (!std::isfinite(request.shift_hz()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`shift_hz` must be finite");
-  require_rest();
-  Linearization system;
-  {
-    std::lock_guard lock(lock_);
-    system = simulation_->linearize();
-    reply->set_step(simulation_->step_number());
-  }
-  const auto spectrum =
-      eigen(system, request.count(), std::complex<double>(0, 2 * M_PI * request.shift_hz()));
+  std::int64_t step = 0;
+  const State state = state_at_rest(&step);
+  const CallToken token(call);
+  MemoryShare share;
+  const auto spectrum = within(shared_.memory, &token, &share, [&] {
+    return eigen(mbcosim::linearize(*model_, state), request.count(),
+                 std::complex<double>(0, 2 * M_PI * request.shift_hz()),
+                 {request.eigenvectors(), &token});
+  });
   if (!spectrum) throw Refusal(spectrum.error());
+  reply->set_step(step);
   for (const std::complex<double>& s : spectrum->values) {
     reply->add_real(s.real());
     reply->add_imaginary(s.imag());

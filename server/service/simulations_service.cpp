@@ -19,6 +19,7 @@ void add_limits(const ServiceLimits& limits, v1::ServerInfo* reply) {
   add_limit(reply, "sessions", limits.sessions);
   add_limit(reply, "identity_sessions", limits.identity_sessions);
   add_limit(reply, "memory_bytes", limits.memory_bytes);
+  add_limit(reply, "identity_memory_bytes", limits.identity_memory_bytes);
   add_limit(reply, "open_calls", limits.open_calls);
   add_limit(reply, "identity_calls", limits.identity_calls);
   add_limit(reply, "identity_streams", limits.identity_streams);
@@ -160,14 +161,14 @@ void add_analysis(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("Linearize"),
            on_session<v1::LinearizeRequest, v1::LinearizeReply>(
                parts, Role::control, Lane::heavy,
-               [](Session& session, const auto& request, auto* reply) {
-                 session.linearize(request, reply);
+               [](Session& session, const auto& request, auto* reply, Call& call) {
+                 session.linearize(request, call, reply);
                }));
   gate.add(simulations_path("ComputeEigenvalues"),
            on_session<v1::ComputeEigenvaluesRequest, v1::ComputeEigenvaluesReply>(
                parts, Role::control, Lane::heavy,
-               [](Session& session, const auto& request, auto* reply) {
-                 session.eigenvalues(request, reply);
+               [](Session& session, const auto& request, auto* reply, Call& call) {
+                 session.eigenvalues(request, call, reply);
                }));
 }
 

@@ -19,7 +19,7 @@ struct Named {
 
 class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
  public:
-  explicit ImportHandler(const Parts& parts) : parts_(parts), share_(parts.runtime.memory) {}
+  explicit ImportHandler(const Parts& parts) : parts_(parts) {}
 
  private:
   void add(Exchange& exchange, v1::ImportSnapshotRequest& request, MemoryShare) override {
@@ -27,6 +27,7 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
       if (!request.has_header())
         throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
       header_ = request.header();
+      share_ = MemoryShare(exchange.memory());
       session_.emplace(parts_.store, header_.simulation(), exchange.caller(), Access::control);
       return;
     }
@@ -63,7 +64,7 @@ ExportReplies::Source exported(const Parts& parts, const Caller& caller,
   const SessionHold session(parts.store, simulation, caller, Access::observe);
   auto bytes = std::make_shared<std::string>();
   auto share = std::make_shared<MemoryShare>();
-  *bytes = within(parts.runtime.memory, nullptr, share.get(),
+  *bytes = within(parts.runtime.budgets.of(caller.identity), nullptr, share.get(),
                   [&] { return session->export_state(number); });
   return [bytes, share, at = std::size_t{0}](auto* reply) mutable {
     if (at >= bytes->size()) return false;

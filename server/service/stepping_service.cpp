@@ -28,7 +28,7 @@ class StepStreamHandler final : public Handler {
   void start(Exchange& exchange) override { exchange.read(Exchange::kIdleStream); }
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
     exchange.post(Lane::advance, [this, &exchange, bytes = std::move(message)]() mutable {
-      parse(exchange.runtime(), bytes, &request_, &share_);
+      parse(exchange.memory(), bytes, &request_, &share_);
       step(exchange);
     });
   }
@@ -153,7 +153,7 @@ class RunHandler final : public OneRequest<v1::RunRequest> {
     const SessionHold session(parts_.store, request.step().simulation(), exchange.caller(),
                               Access::control);
     Progress progress(*session, request);
-    Rows rows(*session, request, exchange.runtime().memory);
+    Rows rows(*session, request, exchange.memory());
     v1::RunReply done;
     const auto send = [&] {
       rows.send(exchange);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <numeric>
 
 namespace mbcosim::server {
 namespace {
@@ -13,7 +14,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Wire = google::protobuf::internal::WireFormatLite;
 constexpr std::int64_t kSampleBytes = 96;       ///< of one sample, besides its values
+constexpr std::int64_t kSerialized = 64 << 10;  ///< bytes of samples kept for equal subscriptions
 constexpr std::chrono::milliseconds kRound(5);  // shortest time between two rounds of waking
+constexpr std::chrono::seconds kLastRead(10);   // that long the end waits for readers
 
 /// The sample with its number in the subscription, which alone differs among equal ones.
 void append(const std::string& sample, std::int64_t sequence,
@@ -33,16 +36,19 @@ void append(const std::string& sample, std::int64_t sequence,
 
 }  // namespace
 
-/// Serialized samples of the variables that equal subscriptions ask for, without their numbers.
+/// What equal subscriptions have in common: their samples, serialized when the first of them takes
+/// them, without their numbers.
 struct Feed {
-  std::vector<int> handles;
   std::int64_t every = 1;
-  std::int64_t keep = 0;   ///< samples, the most that one of its subscribers wants kept
-  MemoryShare share;       ///< of so many
-  std::int64_t first = 0;  ///< number of the oldest
-  std::deque<std::shared_ptr<const std::string>> samples = {};
+  std::vector<int> handles;
+  Track* track = nullptr;
+  std::vector<const Track::Column*> columns = {};  ///< (handles)
+  MemoryShare share;                               ///< of handles and serialized samples
+  std::int64_t first = 0;                          ///< number of the oldest that is serialized
+  std::deque<std::string> serialized = {};         ///< at most kSerialized bytes
+  std::size_t bytes = 0;                           ///< of them
   int users = 0;
-  std::int64_t end() const { return first + static_cast<std::int64_t>(samples.size()); }
+  std::int64_t end() const { return first + static_cast<std::int64_t>(serialized.size()); }
 };
 
 TelemetryHub::TelemetryHub(MemoryBudget& memory, Lanes& lanes, Timer& timer)
@@ -52,33 +58,56 @@ TelemetryHub::~TelemetryHub() = default;
 
 // ------------------------------------------------------------------ coming and going
 
-void TelemetryHub::add(const SubscriptionPtr& subscription, std::int64_t values) {
+void TelemetryHub::add(const SubscriptionPtr& subscription, std::span<const int> sizes) {
   Guard guard(mutex_);
   const Subscription::Options& o = subscription->options;
-  const std::int64_t keep = o.capacity + 1;  // one more while the session waits for room
   const std::int64_t sample_bytes =
-      kSampleBytes + values * static_cast<std::int64_t>(sizeof(double));
-  auto feed = std::find_if(feeds_.begin(), feeds_.end(), [&](const Feed& known) {
-    return known.every == o.every && known.handles == o.handles;
-  });
-  MemoryShare share(memory_, static_cast<std::int64_t>(o.handles.size() * sizeof(int)));
-  if (o.policy == v1::OVERFLOW_POLICY_DECIMATE)
-    subscription->share = MemoryShare(memory_, keep * sample_bytes);
-  if (feed == feeds_.end()) {
-    share.grow(keep * sample_bytes);
-    feed = feeds_.insert(feeds_.end(), Feed{o.handles, o.every, keep, std::move(share)});
-  } else if (keep > feed->keep) {
-    feed->share.grow((keep - feed->keep) * sample_bytes);
-    feed->keep = keep;
-  }
-  ++feed->users;
-  subscription->feed = &*feed;
-  subscription->first = subscription->next = feed->end();
+      kSampleBytes + std::accumulate(sizes.begin(), sizes.end(), std::int64_t{0}) *
+                         static_cast<std::int64_t>(sizeof(double));
+  const bool thinned = o.policy == v1::OVERFLOW_POLICY_DECIMATE;
+  MemoryShare share(memory_, o.batch_bytes + (thinned ? o.capacity + 1 : 1) * sample_bytes);
+  Feed& feed = feed_for(o, sizes);
+  subscription->share = std::move(share);
+  ++feed.users;
+  subscription->feed = &feed;
+  subscription->first = subscription->next = feed.track->end();
   subscriptions_.push_back(subscription);
+  ++hungry_;
   if (o.policy == v1::OVERFLOW_POLICY_BLOCK) blockers_.push_back(subscription);
-  if (o.policy == v1::OVERFLOW_POLICY_DECIMATE) decimators_.push_back(subscription);
+  if (thinned) decimators_.push_back(subscription);
   some_.store(true);
   if (closed_) schedule();
+}
+
+Feed& TelemetryHub::feed_for(const Subscription::Options& o, std::span<const int> sizes) {
+  const std::int64_t keep = o.capacity + 1;  // one more while the session waits for room
+  const auto feed = std::find_if(feeds_.begin(), feeds_.end(), [&](const Feed& known) {
+    return known.every == o.every && known.handles == o.handles;
+  });
+  if (feed != feeds_.end()) {
+    feed->track->lengthen_to(keep);
+    return *feed;
+  }
+  MemoryShare share(
+      memory_, kSerialized + static_cast<std::int64_t>(o.handles.size()) *
+                                 static_cast<std::int64_t>(sizeof(int) + sizeof(Track::Column*)));
+  Track& track = tracks_.try_emplace(o.every, memory_).first->second;
+  try {
+    track.want(o.handles, sizes, keep);
+  } catch (...) {
+    if (!track.is_wanted()) tracks_.erase(o.every);
+    throw;
+  }
+  Feed& fresh = feeds_.emplace_back(Feed{o.every, o.handles, &track, {}, std::move(share)});
+  for (const int handle : o.handles) fresh.columns.push_back(&track.column(handle));
+  return fresh;
+}
+
+void TelemetryHub::release(Feed& feed) {
+  if (--feed.users > 0) return;
+  feed.track->release(feed.handles);
+  if (!feed.track->is_wanted()) tracks_.erase(feed.every);
+  feeds_.remove_if([&](const Feed& known) { return &known == &feed; });
 }
 
 void TelemetryHub::remove(const SubscriptionPtr& subscription) {
@@ -86,8 +115,8 @@ void TelemetryHub::remove(const SubscriptionPtr& subscription) {
   if (std::erase(subscriptions_, subscription) == 0) return;
   std::erase(blockers_, subscription);
   std::erase(decimators_, subscription);
-  Feed* feed = std::exchange(subscription->feed, nullptr);
-  if (--feed->users == 0) feeds_.remove_if([&](const Feed& known) { return &known == feed; });
+  if (std::exchange(subscription->hungry, false)) --hungry_;
+  release(*std::exchange(subscription->feed, nullptr));
   some_.store(!subscriptions_.empty());
   look_for_blocks();
   room_.notify_all();
@@ -95,45 +124,52 @@ void TelemetryHub::remove(const SubscriptionPtr& subscription) {
 
 void TelemetryHub::close() {
   Guard guard(mutex_);
-  closed_ = true;
+  if (std::exchange(closed_, true)) return;
   room_.notify_all();
   schedule();
+  timer_.after(kLastRead, [weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->end_late_readers();
+  });
+}
+
+// Who has not read what was kept when the simulation ended holds its stream no longer.
+void TelemetryHub::end_late_readers() {
+  Guard guard(mutex_);
+  for (const SubscriptionPtr& s : subscriptions_) stall(*s);
+  schedule();
+}
+
+void TelemetryHub::stall(Subscription& s) {
+  s.stalled = true;
+  if (!std::exchange(s.hungry, true)) ++hungry_;  // it is woken to be ended
+}
+
+TelemetryHub::Work TelemetryHub::work() const {
+  Guard guard(mutex_);
+  return work_;
 }
 
 // ------------------------------------------------------------------ the session's thread
 
-std::string TelemetryHub::sample(const Simulation& simulation, const Feed& feed) {
-  values_.clear();
-  for (const int handle : feed.handles) simulation.get(handle, values_);
-  scratch_.Clear();
-  scratch_.set_step(simulation.step_number());
-  scratch_.set_time_s(simulation.time());
-  scratch_.mutable_values()->Add(values_.begin(), values_.end());
-  return scratch_.SerializeAsString();
-}
-
 void TelemetryHub::publish(const Simulation& simulation) {
   Guard guard(mutex_);
   if (closed_) return;
-  for (Feed& feed : feeds_) {
-    if (simulation.step_number() % feed.every != 0) continue;
-    feed.samples.push_back(std::make_shared<const std::string>(sample(simulation, feed)));
+  for (auto& [every, track] : tracks_) {
+    if (simulation.step_number() % every != 0) continue;
+    work_.evaluations += track.record(simulation);
     for (const SubscriptionPtr& s : decimators_)
-      if (s->feed == &feed) keep_for(*s, feed);
-    while (static_cast<std::int64_t>(feed.samples.size()) > feed.keep) {
-      feed.samples.pop_front();
-      ++feed.first;
-    }
+      if (s->feed->track == &track) keep_for(*s);
     news_ = true;
   }
   if (!blockers_.empty()) look_for_blocks();
-  if (news_) schedule();
+  if (news_ && hungry_ > 0) schedule();
 }
 
 void TelemetryHub::look_for_blocks() {
   bool blocked = false;
   for (const SubscriptionPtr& s : blockers_) {
-    const bool full = !s->stalled && !closed_ && s->feed->end() - s->next > s->options.capacity;
+    const bool full =
+        !s->stalled && !closed_ && s->feed->track->end() - s->next > s->options.capacity;
     if (!full)
       s->blocks_since = {};
     else if (s->blocks_since == Clock::time_point())
@@ -150,7 +186,7 @@ void TelemetryHub::wait_for_room(std::chrono::milliseconds slice) {
   for (const SubscriptionPtr& s : blockers_) {
     const bool blocks = s->blocks_since != Clock::time_point();
     if (!blocks || Clock::now() - s->blocks_since < s->options.block_timeout) continue;
-    s->stalled = true;
+    stall(*s);
     schedule();
   }
   look_for_blocks();
@@ -174,18 +210,21 @@ std::string TelemetryHub::waiting_for() const {
 void TelemetryHub::schedule() {
   if (std::exchange(scheduled_, true)) return;
   lanes_.post(Lane::quick, "", [weak = weak_from_this()] {
-    if (const auto self = weak.lock()) self->wake_all();
+    if (const auto self = weak.lock()) self->wake_hungry();
   });
 }
 
-void TelemetryHub::wake_all() {
-  std::vector<SubscriptionPtr> all;
+void TelemetryHub::wake_hungry() {
+  std::vector<SubscriptionPtr> hungry;
   {
     Guard guard(mutex_);
     news_ = false;
-    all = subscriptions_;
+    for (const SubscriptionPtr& s : subscriptions_)
+      if (std::exchange(s->hungry, false)) hungry.push_back(s);
+    hungry_ = 0;
+    work_.wakes += static_cast<std::int64_t>(hungry.size());
   }
-  for (const SubscriptionPtr& s : all) s->options.wake();
+  for (const SubscriptionPtr& s : hungry) s->options.wake();
   timer_.after(kRound, [weak = weak_from_this()] {
     if (const auto self = weak.lock()) self->rest();
   });
@@ -195,7 +234,7 @@ void TelemetryHub::wake_all() {
 void TelemetryHub::rest() {
   Guard guard(mutex_);
   scheduled_ = false;
-  if (news_) schedule();
+  if ((news_ || closed_) && hungry_ > 0) schedule();
 }
 
 // ------------------------------------------------------------------ a subscriber
@@ -207,8 +246,11 @@ TelemetryHub::Taken TelemetryHub::take(Subscription& s, std::size_t most_bytes,
   if (s.stalled) return Taken::stalled;
   const bool thinned = s.options.policy == v1::OVERFLOW_POLICY_DECIMATE;
   drop_what_is_late(s);
-  if (thinned ? s.kept.empty() : s.next >= s.feed->end())
-    return closed_ ? Taken::closed : Taken::nothing;
+  if (thinned ? s.kept.empty() : s.next >= s.feed->track->end()) {
+    if (closed_) return Taken::closed;
+    if (!std::exchange(s.hungry, true)) ++hungry_;
+    return Taken::nothing;
+  }
   v1::TelemetryBatch rest;
   s.total_dropped += s.dropped;
   rest.set_dropped(std::exchange(s.dropped, 0));
@@ -220,9 +262,9 @@ TelemetryHub::Taken TelemetryHub::take(Subscription& s, std::size_t most_bytes,
     google::protobuf::io::CodedOutputStream out(&stream);
     const auto room = [&] { return static_cast<std::size_t>(out.ByteCount()) < most_bytes; };
     for (; !s.kept.empty() && room(); s.kept.pop_front())
-      append(*s.kept.front().sample, s.kept.front().sequence, out);
-    for (; !thinned && s.next < s.feed->end() && room(); ++s.next)
-      append(*s.feed->samples[static_cast<std::size_t>(s.next - s.feed->first)], ++s.sequence, out);
+      append(s.kept.front().sample, s.kept.front().sequence, out);
+    for (; !thinned && s.next < s.feed->track->end() && room(); ++s.next)
+      append(sample(*s.feed, s.next), ++s.sequence, out);
     rest.SerializeToCodedStream(&out);
   }
   if (s.blocks_since != Clock::time_point()) {
@@ -232,20 +274,61 @@ TelemetryHub::Taken TelemetryHub::take(Subscription& s, std::size_t most_bytes,
   return Taken::samples;
 }
 
+bool TelemetryHub::is_stalled(const Subscription& subscription) const {
+  Guard guard(mutex_);
+  return subscription.stalled;
+}
+
+// The newest are kept for equal subscriptions, whose readers follow each other closely.
+const std::string& TelemetryHub::sample(Feed& feed, std::int64_t number) {
+  if (number < feed.first) return serialize(feed, number, late_);
+  if (number > feed.end()) {
+    feed.serialized.clear();
+    feed.bytes = 0;
+    feed.first = number;
+  }
+  while (feed.end() <= number) {
+    std::string bytes;
+    serialize(feed, feed.end(), bytes);
+    feed.bytes += bytes.size();
+    feed.serialized.push_back(std::move(bytes));
+    for (; feed.bytes > kSerialized && feed.serialized.size() > 1; ++feed.first) {
+      feed.bytes -= feed.serialized.front().size();
+      feed.serialized.pop_front();
+    }
+  }
+  return feed.serialized[static_cast<std::size_t>(number - feed.first)];
+}
+
+const std::string& TelemetryHub::serialize(const Feed& feed, std::int64_t number,
+                                           std::string& bytes) {
+  scratch_.Clear();
+  scratch_.set_step(feed.track->step(number));
+  scratch_.set_time_s(feed.track->time(number));
+  for (const Track::Column* column : feed.columns) {
+    const std::span<const double> values = feed.track->values(*column, number);
+    scratch_.mutable_values()->Add(values.begin(), values.end());
+  }
+  scratch_.SerializeToString(&bytes);
+  ++work_.serializations;
+  return bytes;
+}
+
 void TelemetryHub::drop_what_is_late(Subscription& s) {
   if (s.options.policy != v1::OVERFLOW_POLICY_DROP_OLDEST) return;
-  const std::int64_t late = s.feed->end() - s.options.capacity - s.next;
+  const std::int64_t late = s.feed->track->end() - s.options.capacity - s.next;
   if (late <= 0) return;
   s.next += late;
   s.sequence += late;
   s.dropped += late;
 }
 
-// The newest sample of the feed, if it is one of those that the subscription still takes.
-void TelemetryHub::keep_for(Subscription& s, const Feed& feed) {
-  if ((feed.end() - 1 - s.first) % s.stride != 0) return;
+// The newest sample, if it is one of those that the subscription still takes.
+void TelemetryHub::keep_for(Subscription& s) {
+  const std::int64_t newest = s.feed->track->end() - 1;
+  if ((newest - s.first) % s.stride != 0) return;
   if (static_cast<std::int64_t>(s.kept.size()) >= s.options.capacity) decimate(s);
-  s.kept.push_back({feed.samples.back(), ++s.sequence});
+  s.kept.push_back({sample(*s.feed, newest), ++s.sequence});
 }
 
 // Every other sample goes; a buffer for one cannot be halved.

@@ -7,12 +7,15 @@
 #include <deque>
 #include <functional>
 #include <list>
+#include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "mbcosim/v1/telemetry.pb.h"
 #include "rpc/lanes.h"
+#include "service/telemetry_track.h"
 #include "simulation/simulation.h"
 #include "threads/mutex.h"
 #include "threads/timer.h"
@@ -29,6 +32,7 @@ struct Subscription {
     std::int64_t every = 1;
     v1::OverflowPolicy policy = v1::OVERFLOW_POLICY_DROP_OLDEST;
     std::int64_t capacity = 1024;  ///< samples kept for it
+    std::int64_t batch_bytes = 0;  ///< that a batch on its way takes, besides its last sample
     std::chrono::milliseconds block_timeout{10000};
     std::string identity;        ///< whose it is
     std::function<void()> wake;  ///< there may be something to take
@@ -40,13 +44,14 @@ struct Subscription {
   const Options options;
   // All below belong to the hub, under its lock.
   Feed* feed = nullptr;
-  std::int64_t first = 0, next = 0;  ///< numbers in the feed: of the first sample, of the next
+  std::int64_t first = 0, next = 0;  ///< numbers in the track: of the first sample, of the next
+  bool hungry = true;                ///< took all there was: it is woken when there is more
   std::int64_t stride = 1;           ///< grows with DECIMATE
   struct Kept {
-    std::shared_ptr<const std::string> sample;
+    std::string sample;
     std::int64_t sequence;
   };
-  std::deque<Kept> kept;  ///< with DECIMATE: thinned out, so they are not the feed's
+  std::deque<Kept> kept;  ///< with DECIMATE: thinned out, so they are not the track's
   MemoryShare share;      ///< of those
   std::int64_t sequence = 0, dropped = 0, total_dropped = 0;
   std::chrono::steady_clock::time_point blocks_since{};  ///< it keeps the session waiting; else 0
@@ -54,21 +59,28 @@ struct Subscription {
 };
 using SubscriptionPtr = std::shared_ptr<Subscription>;
 
-/// The subscribers of one session. Equal subscriptions share one feed: a sample is evaluated and
-/// serialized once however many read it, and one that nobody takes costs nothing more.
-/// Subscribers are woken by threads of a pool, together and at most every few milliseconds.
-/// Thread-safe.
+/// The subscribers of one session. A variable is evaluated once for a step however many want it,
+/// and samples are serialized when they are taken, once for equal subscriptions: one that nobody
+/// takes costs its values' place in a ring. Who reads is woken by threads of a pool, together and
+/// at most every few milliseconds; who does not is not. Thread-safe.
 class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
  public:
   TelemetryHub(MemoryBudget& memory, Lanes& lanes, Timer& timer);
   ~TelemetryHub();
 
-  /// `values`: numbers of one sample. Throws LIMIT_EXCEEDED when the samples that may be kept would
-  /// take too much memory.
-  void add(const SubscriptionPtr& subscription, std::int64_t values) TS_EXCLUDES(mutex_);
+  /// `sizes`: numbers that each of the handles stands for. Throws LIMIT_EXCEEDED when the samples
+  /// that may be kept would take too much memory.
+  void add(const SubscriptionPtr& subscription, std::span<const int> sizes) TS_EXCLUDES(mutex_);
   void remove(const SubscriptionPtr& subscription) TS_EXCLUDES(mutex_);
-  /// Ends all subscriptions, now and from now on: what is kept can still be taken.
+  /// Ends all subscriptions, now and from now on: what is kept can still be taken for a while.
   void close() TS_EXCLUDES(mutex_);
+
+  /// What was done so far: a count of work, for tests.
+  struct Work {
+    std::int64_t evaluations = 0;  ///< of variables
+    std::int64_t serializations = 0, wakes = 0;
+  };
+  Work work() const TS_EXCLUDES(mutex_);
 
   // --- the session's thread
   bool empty() const { return !some_.load(std::memory_order_relaxed); }
@@ -86,15 +98,24 @@ class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
   /// Moves samples of up to about `most_bytes` into `batch`, a serialized TelemetryBatch.
   Taken take(Subscription& subscription, std::size_t most_bytes, std::string* batch)
       TS_EXCLUDES(mutex_);
+  /// Does it stand still for too long? It is to end, whatever is on its way to it.
+  bool is_stalled(const Subscription& subscription) const TS_EXCLUDES(mutex_);
 
  private:
+  Feed& feed_for(const Subscription::Options& options, std::span<const int> sizes)
+      TS_REQUIRES(mutex_);
+  void release(Feed& feed) TS_REQUIRES(mutex_);
+  const std::string& sample(Feed& feed, std::int64_t number) TS_REQUIRES(mutex_);
+  const std::string& serialize(const Feed& feed, std::int64_t number, std::string& bytes)
+      TS_REQUIRES(mutex_);
+  void end_late_readers() TS_EXCLUDES(mutex_);
+  void stall(Subscription& s) TS_REQUIRES(mutex_);
   void drop_what_is_late(Subscription& s) TS_REQUIRES(mutex_);
-  void keep_for(Subscription& s, const Feed& feed) TS_REQUIRES(mutex_);
+  void keep_for(Subscription& s) TS_REQUIRES(mutex_);
   void decimate(Subscription& s) TS_REQUIRES(mutex_);
-  std::string sample(const Simulation& simulation, const Feed& feed) TS_REQUIRES(mutex_);
   void look_for_blocks() TS_REQUIRES(mutex_);
   void schedule() TS_REQUIRES(mutex_);
-  void wake_all() TS_EXCLUDES(mutex_);
+  void wake_hungry() TS_EXCLUDES(mutex_);
   void rest() TS_EXCLUDES(mutex_);
 
   MemoryBudget& memory_;
@@ -102,15 +123,19 @@ class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
   Timer& timer_;
   mutable Mutex mutex_;
   Condition room_;
+  std::map<std::int64_t, Track> tracks_ TS_GUARDED_BY(mutex_);  ///< by interval in steps
   std::list<Feed> feeds_ TS_GUARDED_BY(mutex_);
   std::vector<SubscriptionPtr> subscriptions_ TS_GUARDED_BY(mutex_);
   // Those with policy BLOCK, and with DECIMATE.
   std::vector<SubscriptionPtr> blockers_ TS_GUARDED_BY(mutex_), decimators_ TS_GUARDED_BY(mutex_);
   std::vector<double> values_ TS_GUARDED_BY(mutex_);
   v1::Sample scratch_ TS_GUARDED_BY(mutex_);
+  std::string late_ TS_GUARDED_BY(mutex_);  ///< a sample for one who is behind the others
+  Work work_ TS_GUARDED_BY(mutex_);
   bool closed_ TS_GUARDED_BY(mutex_) = false;
   bool scheduled_ TS_GUARDED_BY(mutex_) = false;  ///< a round of waking comes
   bool news_ TS_GUARDED_BY(mutex_) = false;       ///< since the last round
+  int hungry_ TS_GUARDED_BY(mutex_) = 0;          ///< subscriptions that are
   std::atomic<bool> some_{false}, blocked_{false};
 };
 

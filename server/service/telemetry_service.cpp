@@ -8,12 +8,13 @@
 namespace mbcosim::server {
 namespace {
 
-constexpr std::size_t kBatchBytes = 256 << 10;  // about that much of samples in one message
+constexpr std::size_t kBatchBytes = 64 << 10;  // about that much of samples in one message
 
 Subscription::Options make_options(const v1::SubscribeRequest& request, const Session& session,
                                    const Caller& caller, const ServiceLimits& limits) {
   Subscription::Options options;
   options.identity = caller.identity;
+  options.batch_bytes = kBatchBytes;
   options.handles.assign(request.handles().begin(), request.handles().end());
   if (request.every() < 0) throw Refusal(v1::REASON_BAD_ARGUMENT, "`every` must not be negative");
   if (request.every() > 0) options.every = request.every();
@@ -70,8 +71,10 @@ class SubscribeHandler final : public OneRequest<v1::SubscribeRequest> {
   // Sends what there is, unless the client has not taken the last batch.
   void pump(Exchange& exchange) {
     Guard guard(mutex_);
-    if (!subscription_ || !exchange.all_written()) return;
-    switch ((*session_)->telemetry().take(*subscription_, kBatchBytes, &batch_)) {
+    if (!subscription_) return;
+    TelemetryHub& hub = (*session_)->telemetry();
+    if (!exchange.all_written() && !hub.is_stalled(*subscription_)) return;
+    switch (hub.take(*subscription_, kBatchBytes, &batch_)) {
       case TelemetryHub::Taken::samples:
         return exchange.write(buffer_of(batch_));
       case TelemetryHub::Taken::nothing:
@@ -80,7 +83,8 @@ class SubscribeHandler final : public OneRequest<v1::SubscribeRequest> {
         return exchange.finish(grpc::Status::OK);
       case TelemetryHub::Taken::stalled:
         throw Refusal(v1::REASON_READER_STALLED,
-                      "the reader stood still longer than `block_timeout`");
+                      "the reader stood still longer than `block_timeout`, or for ten seconds "
+                      "after the simulation had ended");
     }
   }
   void on_done(Exchange& exchange, bool) override {

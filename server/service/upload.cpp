@@ -61,8 +61,8 @@ class KeepingSource final : public FileSource {
 };
 
 DeckReport read(const FileSource& files, const std::string& main_file,
-                const v1::CreateOptions& options, const Config& config, KeptDeck* kept) {
-  const LoadRequest request{config.limits.engine, attachments(options), symbols_of(options)};
+                const v1::CreateOptions& options, const Limits& limits, KeptDeck* kept) {
+  const LoadRequest request{limits, attachments(options), symbols_of(options)};
   if (!kept) return read_deck(files, main_file, request);
   kept->main_file = main_file;
   kept->options = options;
@@ -70,12 +70,12 @@ DeckReport read(const FileSource& files, const std::string& main_file,
 }
 
 DeckReport load_from_root(const std::string& name, const v1::CreateOptions& options,
-                          const Config& config, KeptDeck* kept) {
-  if (config.model_root.empty())
+                          const std::string& model_root, const Limits& limits, KeptDeck* kept) {
+  if (model_root.empty())
     throw Refusal(v1::REASON_NO_SUCH_MODEL, "the server has no model root; upload a bundle");
   check_name(name);
   std::error_code error;
-  const fs::path root = fs::canonical(config.model_root, error);
+  const fs::path root = fs::canonical(model_root, error);
   const fs::path file = error ? fs::path() : fs::canonical(root / name, error);
   const bool inside =
       !error &&
@@ -83,7 +83,7 @@ DeckReport load_from_root(const std::string& name, const v1::CreateOptions& opti
   if (!inside || !fs::is_regular_file(file, error))
     throw Refusal(v1::REASON_NO_SUCH_MODEL,
                   "no deck is named \"" + name + "\" under the model root");
-  return read(FolderSource(file.parent_path().string()), file.filename().string(), options, config,
+  return read(FolderSource(file.parent_path().string()), file.filename().string(), options, limits,
               kept);
 }
 
@@ -151,20 +151,22 @@ const v1::UploadHeader& DeckUpload::header() const {
 }
 
 DeckReport load(KeptDeck deck, const Config& config) {
-  return read(BundleSource(std::move(deck.files)), deck.main_file, deck.options, config, nullptr);
+  return read(BundleSource(std::move(deck.files)), deck.main_file, deck.options,
+              config.limits.engine, nullptr);
 }
 
-DeckReport load(DeckUpload& upload, const Config& config, KeptDeck* kept) {
+DeckReport load(DeckUpload& upload, const Config& config, const Limits& limits, KeptDeck* kept) {
   const v1::UploadHeader& header = upload.header();
   if (header.has_model_root_file())
-    return load_from_root(header.model_root_file(), header.options(), config, kept);
+    return load_from_root(header.model_root_file(), header.options(), config.model_root, limits,
+                          kept);
   const std::string& main_file = header.bundle_main_file();
   check_name(main_file);
   std::map<std::string, std::string> files = upload.take_files();
   if (files.count(main_file) == 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
-  return read(BundleSource(std::move(files)), main_file, header.options(), config, kept);
+  return read(BundleSource(std::move(files)), main_file, header.options(), limits, kept);
 }
 
 }  // namespace mbcosim::server

@@ -54,7 +54,8 @@ struct KeptDeck {
 
 /// Reads the deck. Throws Refusal when the model root or the file in it is not to be had; a wrong
 /// deck is in the report. `kept` is filled; null: nothing is kept.
-DeckReport load(DeckUpload& upload, const Config& config, KeptDeck* kept = nullptr);
+DeckReport load(DeckUpload& upload, const Config& config, const Limits& limits,
+                KeptDeck* kept = nullptr);
 /// The same deck again.
 DeckReport load(KeptDeck deck, const Config& config);
 /// Ports that need equations of their own in the model.

@@ -9,26 +9,36 @@
 
 namespace mbcosim::server {
 
-/// Bytes that may still be taken. Thread-safe.
+/// Bytes that may still be taken, of which some may be those of a larger budget. Thread-safe.
 class MemoryBudget {
  public:
-  explicit MemoryBudget(std::int64_t most) : most_(most) {}
+  /// `of`: what is taken here is taken there, too; null: nowhere.
+  explicit MemoryBudget(std::int64_t most, MemoryBudget* of = nullptr) : most_(most), of_(of) {}
   std::int64_t most() const { return most_; }
   std::int64_t used() const { return used_.load(std::memory_order_relaxed); }
-  bool take(std::int64_t bytes) {
-    if (used_.fetch_add(bytes, std::memory_order_relaxed) + bytes <= most_) return true;
-    give_back(bytes);
-    return false;
+  /// Null: taken. Else nothing is, and the budget that has not so much left.
+  const MemoryBudget* take(std::int64_t bytes) {
+    if (used_.fetch_add(bytes, std::memory_order_relaxed) + bytes > most_) {
+      used_.fetch_sub(bytes, std::memory_order_relaxed);
+      return this;
+    }
+    const MemoryBudget* full = of_ ? of_->take(bytes) : nullptr;
+    if (full) used_.fetch_sub(bytes, std::memory_order_relaxed);
+    return full;
   }
-  void give_back(std::int64_t bytes) { used_.fetch_sub(bytes, std::memory_order_relaxed); }
+  void give_back(std::int64_t bytes) {
+    used_.fetch_sub(bytes, std::memory_order_relaxed);
+    if (of_) of_->give_back(bytes);
+  }
 
-  /// Throws LIMIT_EXCEEDED, limit "memory_bytes".
+  /// Throws LIMIT_EXCEEDED, limit "memory_bytes", or "identity_memory_bytes" for a part.
   [[noreturn]] void refuse() const;
   /// A share of what the machine, or its container, has.
   static std::int64_t default_bytes();
 
  private:
   const std::int64_t most_;
+  MemoryBudget* const of_;
   std::atomic<std::int64_t> used_{0};
 };
 
@@ -52,7 +62,7 @@ class MemoryShare {
   /// Takes more. Throws LIMIT_EXCEEDED. Without a budget nothing is counted.
   void grow(std::int64_t bytes) {
     if (!budget_) return;
-    if (!budget_->take(bytes)) budget_->refuse();
+    if (const MemoryBudget* full = budget_->take(bytes)) full->refuse();
     bytes_ += bytes;
   }
   void shrink(std::int64_t bytes) {
@@ -71,10 +81,11 @@ class MemoryShare {
   std::int64_t bytes_ = 0;
 };
 
-/// While it lives, what this thread allocates with `new` is counted: reading a deck or a message
-/// takes many times its bytes, and how many is not known before. At the end of the budget, and
-/// when the work is cancelled, `new` throws std::bad_alloc, again and again until the work gives
-/// up; `check` then tells why. Not to be held while gRPC is called, which does not expect that.
+/// While it lives, what this thread allocates is counted: reading a deck or a message takes many
+/// times its bytes, as factoring a matrix does, and how many is not known before. At the end of the
+/// budget, and when the work is cancelled, `new` throws std::bad_alloc, again and again until the
+/// work gives up, and `malloc` has no large block to give (the C libraries of the solver handle
+/// that); `check` then tells why. Not to be held while gRPC is called, which does not expect that.
 class MemoryScope {
  public:
   explicit MemoryScope(MemoryBudget& budget, const CancelToken* cancel = nullptr);
@@ -89,9 +100,10 @@ class MemoryScope {
   /// Stops counting; what was counted stays taken until the end.
   void leave();
 
-  // --- from `new` and `delete`
+  // --- from the allocator
   static MemoryScope* current();
-  void add(std::int64_t bytes);
+  /// False: refused. `must`: counted all the same, the next one is refused.
+  bool add(std::int64_t bytes, bool must) noexcept;
   void subtract(std::int64_t bytes) noexcept { net_ -= bytes; }
 
  private:
@@ -100,7 +112,8 @@ class MemoryScope {
   MemoryScope* const outer_;
   std::int64_t net_ = 0, taken_ = 0;
   int calls_ = 0;
-  bool exceeded_ = false, cancelled_ = false, left_ = false;
+  const MemoryBudget* exceeded_ = nullptr;  ///< the one that was
+  bool cancelled_ = false, left_ = false;
 };
 
 /// Does work within the budget. What it makes and `kept` is told of stays counted there; else all

@@ -44,7 +44,7 @@ ARROWS = {
     "server/shared_memory": set(),
     "server/http": {"service", "rpc", "wire", "mbcosim"},
     "server/view": {"client"},
-    "server/daemon": {"service", "rpc", "http", "wire", "mbcosim", "grpc"},
+    "server/daemon": {"service", "rpc", "http", "shared_memory", "threads", "wire", "mbcosim", "grpc"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",
              "tests"}

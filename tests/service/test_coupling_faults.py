@@ -273,3 +273,12 @@ def test_an_unreliable_line_gives_the_same_bits(server, daemon, tmp_path):
     relay.close()
     assert relay.lost > 10 and relay.repeated > 5
     assert found[0] == found[1]
+
+
+def test_a_deleted_simulation_ends_the_stream_of_an_idle_peer(server):
+    simulation = oscillator(server)
+    with simulation.couple("spring", spring) as peer:
+        simulation.step(3)
+        simulation.delete()
+        wait_for(lambda: peer.error is not None)
+        assert isinstance(peer.error, mbcosim.NotFound)

@@ -1,5 +1,8 @@
 """Malice that once took the daemon down or locked others out: it goes on, and so do they."""
 import os
+import resource
+import subprocess
+import sys
 import threading
 import time
 
@@ -8,7 +11,7 @@ import pytest
 
 import decks
 import mbcosim
-from conftest import TIME_FACTOR, wait_for
+from conftest import BIN, TIME_FACTOR, wait_for
 from mbcosim.v1 import coupling_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
 
 TOKENS = ("ann-token-0123456789 control ann\nbob-token-0123456789 control bob\n"
@@ -274,6 +277,179 @@ def test_calls_over_one_connection_are_limited(start_daemon):
         stop.set()
         for call in calls:
             call.cancel()
+
+
+CROWD = """
+import socket, sys, time
+held = []
+for _ in range(int(sys.argv[2])):
+    held.append(socket.socket(socket.AF_UNIX))
+    held[-1].connect(sys.argv[1])
+print("there", flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.fixture
+def start_crowd():
+    """Function that starts a process which opens many connections and says nothing."""
+    crowds = []
+
+    def start(daemon, connections):
+        crowds.append(subprocess.Popen([sys.executable, "-c", CROWD, daemon.address[len("unix:"):], str(connections)],
+                                       stdout=subprocess.PIPE, text=True))
+        assert crowds[-1].stdout.readline() == "there\n"
+        return crowds[-1]
+
+    yield start
+    for crowd in crowds:
+        crowd.kill()
+        crowd.wait()
+        crowd.stdout.close()
+
+
+def is_found_healthy(daemon):
+    return subprocess.run([os.path.join(BIN, "mbcosimd"), "--check", daemon.address], timeout=30 * TIME_FACTOR).returncode == 0
+
+
+def test_one_process_cannot_take_all_file_descriptors(start_daemon, start_crowd):
+    daemon = ready(start_daemon())
+    resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (150, 150))
+    with daemon.connect() as server, server.load_text(decks.body()) as simulation:
+        start_crowd(daemon, 300)
+        wait_for(lambda: "connections are dropped" in daemon.log())
+        assert simulation.step().step == 1
+        for _ in range(3):
+            assert is_found_healthy(daemon)
+            with daemon.connect() as other:
+                assert len(other.list()) == 1
+
+
+def test_a_daemon_without_file_descriptors_goes_on_serving_who_is_connected(start_daemon, start_crowd):
+    daemon = ready(start_daemon())
+    resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (150, 150))
+    with daemon.connect() as server, server.load_text(decks.body()) as simulation:
+        crowds = [start_crowd(daemon, 60) for _ in range(4)]
+        wait_for(lambda: "connections are dropped" in daemon.log())
+        assert simulation.step(10).step == 10
+        assert server.load_text(decks.body()).step().step == 1
+        for crowd in crowds:
+            crowd.kill()
+        wait_for(lambda: is_found_healthy(daemon))
+        with daemon.connect() as other:
+            assert len(other.list()) == 2
+
+
+# ---------------------------------------------------------------- everything ends in time
+
+def chain(bodies):
+    """A plane chain of rigid links that hang on spherical hinges; 17 unknowns a link."""
+    nodes = "".join(f"structural: {i}, dynamic, {0.1 * i}, 0., 0., eye, null, null;" for i in range(1, bodies + 1))
+    masses = "".join(f"body: {i}, {i}, 1., null, diag, .01, .02, .03;" for i in range(1, bodies + 1))
+    hinges = "".join(f"joint: {i}, spherical hinge, {i}, position, -.05, 0., 0., {i + 1}, position, .05, 0., 0.;"
+                     for i in range(1, bodies))
+    return f"""
+begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 10.; time step: 1e-3; method: ms, .6; tolerance: 1e-6; max iterations: 30;
+derivatives tolerance: 1e-3; end: initial value;
+begin: control data; structural nodes: {bodies}; rigid bodies: {bodies}; joints: {bodies}; gravity; end: control data;
+begin: nodes; {nodes} end: nodes;
+begin: elements; {masses} {hinges} joint: {bodies}, clamp, 1, node, node; gravity: uniform, 0., 0., -1., const, 9.81; end: elements;
+"""
+
+
+@pytest.fixture(scope="module")
+def long_chain(daemon):
+    """A simulation of 2200 unknowns, the service, and the identity that no other call has."""
+    with grpc.insecure_channel(daemon.address) as channel:
+        stub = simulations_pb2_grpc.SimulationsStub(channel)
+        name = stub.CreateSimulation(iter(upload(chain(145)))).simulation.name
+        yield stub, name
+        stub.DeleteSimulation(pb.DeleteSimulationRequest(name=name))
+
+
+def cpu_of(daemon):
+    """Seconds of processor time that the daemon has used."""
+    with open(f"/proc/{daemon.process.pid}/stat") as file:
+        return sum(map(int, file.read().rsplit(")", 1)[1].split()[11:13])) / os.sysconf("SC_CLK_TCK")
+
+
+def is_at_rest(daemon):
+    before = cpu_of(daemon)
+    time.sleep(0.3)
+    return cpu_of(daemon) - before < 0.03
+
+
+ANALYSES = {
+    "all eigenvalues": lambda stub, name: stub.ComputeEigenvalues.future(
+        pb.ComputeEigenvaluesRequest(simulation=name, eigenvectors=True)),
+    "many eigenvalues": lambda stub, name: stub.ComputeEigenvalues.future(
+        pb.ComputeEigenvaluesRequest(simulation=name, count=700, shift_hz=3.0)),
+    "state space": lambda stub, name: stub.Linearize.future(
+        pb.LinearizeRequest(simulation=name, inputs=[], outputs=list(range(4, 16)))),
+    "many outputs": lambda stub, name: stub.Linearize.future(
+        pb.LinearizeRequest(simulation=name, descriptor_form=True, outputs=list(range(4, 400)))),
+}
+
+
+@pytest.mark.parametrize("what", ANALYSES)
+@pytest.mark.parametrize("after", [0.02, 0.5, 2.0])
+def test_the_work_of_a_cancelled_analysis_ends_within_a_second(daemon, long_chain, what, after):
+    wait_for(lambda: is_at_rest(daemon), 30)
+    call = ANALYSES[what](*long_chain)
+    time.sleep(after)
+    call.cancel()
+    cancelled = time.monotonic()
+    wait_for(lambda: is_at_rest(daemon), 30)
+    assert time.monotonic() - cancelled < (1 + 0.35) * TIME_FACTOR  # the look takes 0.3 s by itself
+
+
+def test_the_daemon_ends_within_its_grace_whatever_runs(start_daemon):
+    daemon = ready(start_daemon())
+    with grpc.insecure_channel(daemon.address) as channel:
+        stub = simulations_pb2_grpc.SimulationsStub(channel)
+        name = stub.CreateSimulation(iter(upload(chain(145)))).simulation.name
+        calls = [start(stub, name) for start in ANALYSES.values()]
+        calls += [stub.CreateSimulation.future(iter(upload(chain(2000)))) for _ in range(3)]
+        time.sleep(0.5)
+        start = time.monotonic()
+        daemon.stop()
+        assert time.monotonic() - start < (1 + 2) * TIME_FACTOR  # the grace, and a second for what computes
+        assert all(call.exception(10) is not None for call in calls)
+
+
+def test_analyses_of_one_client_starve_no_small_simulation(guarded):
+    daemon = guarded()
+    with grpc.insecure_channel(daemon.address) as channel:
+        stub = simulations_pb2_grpc.SimulationsStub(channel)
+        large = stub.CreateSimulation(iter(upload(chain(145))), metadata=bearer("ann")).simulation.name
+        small = stub.CreateSimulation(iter(upload(decks.body())), metadata=bearer("bob")).simulation.name
+        request = pb.ComputeEigenvaluesRequest(simulation=large, eigenvectors=True)
+        calls = [stub.ComputeEigenvalues.future(request, metadata=bearer("ann")) for _ in range(6)]
+        time.sleep(0.3)
+        slowest = 0
+        for _ in range(20):
+            start = time.monotonic()
+            stub.Step(pb.StepRequest(simulation=small, steps=10), metadata=bearer("bob"))
+            slowest = max(slowest, time.monotonic() - start)
+        for call in calls:
+            call.cancel()
+        assert slowest < 1 * TIME_FACTOR
+
+
+def test_an_observer_may_check_small_decks_only(guarded):
+    daemon = guarded()
+    with grpc.insecure_channel(daemon.address) as channel:
+        stub = simulations_pb2_grpc.SimulationsStub(channel)
+        assert stub.ValidateModel(iter(upload(decks.body())), metadata=bearer("eve")).ok
+        large = decks.body() + "# " + 300_000 * "x" + "\n"
+        with pytest.raises(grpc.RpcError) as caught:
+            stub.ValidateModel(iter(upload(large)), metadata=bearer("eve"))
+        assert caught.value.code() == grpc.StatusCode.RESOURCE_EXHAUSTED
+        assert stub.ValidateModel(iter(upload(large)), metadata=bearer("ann")).ok
+        many = "set: real x = 0.; for: integer i = 1, 200000; set: x = i; endfor;" + decks.body()
+        reply = stub.ValidateModel(iter(upload(many)), metadata=bearer("eve"))
+        assert not reply.ok and "limit-statements" in {d.code for d in reply.diagnostics}
 
 
 # ---------------------------------------------------------------- one client does not slow another

@@ -202,3 +202,11 @@ def test_strangers_are_shown_the_door(daemon, server, packet):
         if packet:
             assert stranger.recv(100) == b""
     assert server.info().version
+
+
+def test_a_deleted_simulation_ends_the_link_of_an_idle_peer(server, start_peer):
+    simulation = oscillator(server)
+    peer = start_peer(simulation)
+    simulation.step(2)
+    simulation.delete()
+    peer.wait(5 * TIME_FACTOR)

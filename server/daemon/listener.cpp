@@ -1,0 +1,227 @@
+#include "daemon/listener.h"
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+#include "threads/top_frame.h"
+
+namespace mbcosim::server {
+namespace {
+
+constexpr std::string_view kUnix = "unix:";
+constexpr int kWaiting = 1024;        ///< connections not yet accepted
+constexpr int kLookMs = 100;          ///< how soon the end is noticed
+constexpr int kKeptDescriptors = 32;  ///< for files, while connections come and go
+
+[[noreturn]] void fail(const std::string& address, int error) {
+  throw std::runtime_error("cannot listen on " + address + ": " + std::strerror(error));
+}
+
+shm::Descriptor open_reserve() {
+  return shm::Descriptor(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+}
+
+std::int64_t most_descriptors() {
+  rlimit limit{};
+  return ::getrlimit(RLIMIT_NOFILE, &limit) == 0 ? static_cast<std::int64_t>(limit.rlim_cur) : 1024;
+}
+
+/// The other side: the process of a Unix socket, the address of another.
+std::string source_of(int fd) {
+  sockaddr_storage name{};
+  socklen_t size = sizeof name;
+  char text[NI_MAXHOST] = "";
+  if (::getpeername(fd, reinterpret_cast<sockaddr*>(&name), &size) != 0) return "";
+  if (name.ss_family == AF_UNIX) {
+    ucred process{};
+    socklen_t length = sizeof process;
+    ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &process, &length);
+    return "process " + std::to_string(process.pid);
+  }
+  ::getnameinfo(reinterpret_cast<const sockaddr*>(&name), size, text, sizeof text, nullptr, 0,
+                NI_NUMERICHOST);
+  return text;
+}
+
+ino_t inode_of(int fd) {
+  struct stat info {};
+  return ::fstat(fd, &info) == 0 ? info.st_ino : 0;
+}
+
+int port_of(int socket) {
+  sockaddr_storage name{};
+  socklen_t size = sizeof name;
+  if (::getsockname(socket, reinterpret_cast<sockaddr*>(&name), &size) != 0) return 0;
+  return ntohs(name.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(name).sin6_port
+                                          : reinterpret_cast<sockaddr_in&>(name).sin_port);
+}
+
+void set_port(addrinfo& info, int port) {
+  const auto number = htons(static_cast<std::uint16_t>(port));
+  if (info.ai_family == AF_INET6)
+    reinterpret_cast<sockaddr_in6*>(info.ai_addr)->sin6_port = number;
+  else
+    reinterpret_cast<sockaddr_in*>(info.ai_addr)->sin_port = number;
+}
+
+/// Invalid when the address cannot be had; errno tells why.
+shm::Descriptor listen_on(const addrinfo& info, bool both_families) {
+  shm::Descriptor socket(::socket(info.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!socket) return socket;
+  const int on = 1, only = both_families ? 0 : 1;
+  ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  if (info.ai_family == AF_INET6)
+    ::setsockopt(socket.get(), IPPROTO_IPV6, IPV6_V6ONLY, &only, sizeof only);
+  const bool listens = ::bind(socket.get(), info.ai_addr, info.ai_addrlen) == 0 &&
+                       ::listen(socket.get(), kWaiting) == 0;
+  return listens ? std::move(socket) : shm::Descriptor();
+}
+
+}  // namespace
+
+Listener::Listener(const std::string& address) : bound_(address), reserve_(open_reserve()) {
+  if (address.compare(0, kUnix.size(), kUnix) == 0) {
+    bind_unix(address.substr(kUnix.size()));
+    return;
+  }
+  const std::size_t colon = address.rfind(':');
+  std::string host = address.substr(0, colon);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']')
+    host = host.substr(1, host.size() - 2);
+  bind_tcp(host, address.substr(colon + 1));
+  bound_ = address.substr(0, colon + 1) + std::to_string(port_of(sockets_.front().get()));
+}
+
+Listener::~Listener() { stop(); }
+
+void Listener::bind_unix(const std::string& path) {
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  if (path.size() >= sizeof name.sun_path)
+    throw std::runtime_error("the socket's path is too long: " + path);
+  std::memcpy(name.sun_path, path.c_str(), path.size() + 1);
+  ::unlink(path.c_str());
+  shm::Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const mode_t old_mask = ::umask(0177);
+  const bool listens =
+      socket && ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0 &&
+      ::listen(socket.get(), kWaiting) == 0;
+  const int error = errno;
+  ::umask(old_mask);
+  if (!listens) fail(bound_, error);
+  path_ = path;
+  sockets_.push_back(std::move(socket));
+}
+
+void Listener::bind_tcp(const std::string& host, const std::string& port) {
+  addrinfo hints{};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  if (const int error = ::getaddrinfo(host.c_str(), port.c_str(), &hints, &found); error != 0)
+    throw std::runtime_error("cannot listen on " + bound_ + ": " + ::gai_strerror(error));
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> all(found, ::freeaddrinfo);
+  int error = EADDRNOTAVAIL;
+  for (addrinfo* info = found; info; info = info->ai_next) {
+    if (!sockets_.empty()) set_port(*info, port_of(sockets_.front().get()));
+    shm::Descriptor socket = listen_on(*info, host == "::");
+    if (socket)
+      sockets_.push_back(std::move(socket));
+    else
+      error = errno;
+  }
+  if (sockets_.empty()) fail(bound_, error);
+}
+
+void Listener::start(std::unique_ptr<Acceptor> acceptor) {
+  acceptor_ = std::move(acceptor);
+  thread_ = std::thread([this] { run_caught("listener", [this] { loop(); }); });
+}
+
+void Listener::stop() {
+  stop_.store(true);
+  if (thread_.joinable()) thread_.join();
+  sockets_.clear();
+  if (!path_.empty()) ::unlink(path_.c_str());
+  path_.clear();
+}
+
+void Listener::loop() {
+  std::vector<pollfd> looks;
+  for (const shm::Descriptor& socket : sockets_) looks.push_back({socket.get(), POLLIN, 0});
+  while (!stop_.load()) {
+    if (::poll(looks.data(), looks.size(), kLookMs) <= 0) continue;
+    for (const pollfd& look : looks)
+      if (look.revents != 0) run_caught("listener", [&] { accept_from(look.fd); });
+  }
+}
+
+void Listener::accept_from(int listener) {
+  const int fd = ::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (fd < 0) {
+    if (errno == EMFILE || errno == ENFILE) drop_one(listener);
+    return;  // anything else is the client's: it has gone already, say
+  }
+  if (!may_stay(fd)) {
+    ::close(fd);
+    return tell_dropped();
+  }
+  const int on = 1;
+  ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);  // not for Unix sockets
+  Acceptor::NewConnectionParameters connection;
+  connection.listener_fd = listener;
+  connection.fd = fd;
+  acceptor_->HandleNewConnection(&connection);
+}
+
+bool Listener::may_stay(int fd) {
+  constexpr std::int64_t kShare = 3;  // of one source: one in so many
+  const std::int64_t most = most_descriptors();
+  if (fd + kKeptDescriptors >= most) return false;
+  const Peer fresh{source_of(fd), inode_of(fd)};
+  std::int64_t alike = 0;
+  for (const auto& [known, peer] : peers_) alike += peer.source == fresh.source ? 1 : 0;
+  if (alike >= most / kShare) {  // some of them may have gone
+    std::erase_if(peers_,
+                  [](const auto& entry) { return inode_of(entry.first) != entry.second.inode; });
+    alike = std::count_if(peers_.begin(), peers_.end(),
+                          [&](const auto& entry) { return entry.second.source == fresh.source; });
+  }
+  if (alike >= most / kShare) return false;
+  peers_[fd] = fresh;
+  return true;
+}
+
+// Without this the client would wait, and this thread would spin.
+void Listener::drop_one(int listener) {
+  reserve_ = shm::Descriptor();
+  const int dropped = ::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC);
+  if (dropped >= 0)
+    ::close(dropped);
+  else
+    std::this_thread::sleep_for(std::chrono::milliseconds(kLookMs));
+  reserve_ = open_reserve();
+  tell_dropped();
+}
+
+void Listener::tell_dropped() {
+  std::int64_t missed = 0;
+  if (drops_.pass(Rate::Clock::now(), &missed))
+    spdlog::warn("{}: connections are dropped: too few file descriptors are free", bound_);
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,60 @@
+/// Connections on their way in.
+#pragma once
+
+#include <grpcpp/server_builder.h>
+#include <sys/types.h>
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "service/event_log.h"
+#include "shared_memory/channel.h"
+
+namespace mbcosim::server {
+
+/// Accepts connections on one address and hands them to gRPC, whose own listener ends for good when
+/// the process has no file descriptor left. Here the connection is dropped then, the last few
+/// descriptors are kept for files, and one source (an address, a process of this host) gets a third
+/// of them at most, so that a probe still comes in.
+class Listener {
+ public:
+  using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
+  /// Binds "unix:PATH", mode 0600, or "HOST:PORT"; port 0: any. A socket file is replaced. Throws
+  /// std::runtime_error.
+  explicit Listener(const std::string& address);
+  ~Listener();
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+  const std::string& bound() const { return bound_; }  ///< the address, with the port that it got
+  void start(std::unique_ptr<Acceptor> acceptor);
+  void stop();
+
+ private:
+  void bind_unix(const std::string& path);
+  void bind_tcp(const std::string& host, const std::string& port);
+  void loop();
+  void accept_from(int listener);
+  bool may_stay(int fd);
+  void drop_one(int listener);
+  void tell_dropped();
+
+  std::string bound_, path_;
+  std::vector<shm::Descriptor> sockets_;
+  shm::Descriptor reserve_;  ///< given up for a moment to drop a connection
+  std::unique_ptr<Acceptor> acceptor_;
+  struct Peer {
+    std::string source;
+    ino_t inode = 0;  ///< of its socket: another one means that the connection is gone
+  };
+  std::map<int, Peer> peers_;  ///< of the thread, by descriptor
+  Rate drops_{1};
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace mbcosim::server
