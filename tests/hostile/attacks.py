@@ -27,8 +27,7 @@ begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;
 begin: nodes; structural: 1, dynamic, null, eye, 0., 1., 0., 0.1, 5., 0.1; end: nodes;
 begin: elements; body: 1, 1, 1., null, diag, 1., 2., 3.; end: elements;
 """
-LOOP = 'set: integer i = 0; begin: data; problem: initial value; end: data; for: i = 0; i < 900000; i = i + 1; ' \
-       'set: real x = sin(i) * cos(i); endfor;'
+LOOP = 'set: real x = 0.; for: integer i = 1, 900000; set: x = sin(i) * cos(i); endfor;'
 
 
 class Attacker:
@@ -131,7 +130,8 @@ class Attacker:
         """Uploads, steps, runs and analyses broken off at every point."""
         name = None
         while self.going():
-            name = name or self.create()
+            name = name or self.create(ports=[{"name": "p", "kind": 4, "output_variables": ["time"]}]
+                                       if self.random.random() < 0.3 else [])
             if not name:
                 time.sleep(0.05)
                 continue
@@ -142,7 +142,7 @@ class Attacker:
                 yield pb.UploadRequest(chunk={"path": "deck", "data": BODY.encode()})
                 stop.wait(5)
 
-            what = self.random.randrange(6)
+            what = self.random.randrange(10)
             options = dict(metadata=self.metadata, timeout=5)
             if what == 0:
                 future = self.stub.CreateSimulation.future(half(), **options)
@@ -154,6 +154,17 @@ class Attacker:
                 future = self.stub.Linearize.future(pb.LinearizeRequest(simulation=name), **options)
             elif what == 4:
                 future = self.stub.Run(pb.RunRequest(step=pb.StepRequest(simulation=name, steps=100000)), **options)
+            elif what == 5:
+                future = self.stub.StepStream((pb.StepRequest(simulation=name, steps=50) for _ in range(20)), **options)
+            elif what == 6:
+                future = self.stub.ExportSnapshot(pb.ExportSnapshotRequest(simulation=name), **options)
+            elif what == 7:
+                future = self.stub.ValidateModel.future(half(), **options)
+            elif what == 8:
+                hello = coupling_pb2.PeerMessage(hello=coupling_pb2.Hello(simulation=name, port="p"))
+                future = self.channel.stream_stream(
+                    "/mbcosim.v1.Coupling/Attach", request_serializer=coupling_pb2.PeerMessage.SerializeToString,
+                    response_deserializer=coupling_pb2.ServerMessage.FromString)(iter([hello]), **options)
             else:
                 future = self.stub.ForkSimulation.future(pb.ForkSimulationRequest(
                     simulation=name, options=pb.CreateOptions(lease=Duration(seconds=1))), **options)
@@ -301,8 +312,28 @@ class Attacker:
             else:
                 self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
 
+    def descriptors(self):
+        """More connections than the daemon has file descriptors."""
+        path = self.address[len("unix:"):]
+        while self.going():
+            held = []
+            for _ in range(700):
+                try:
+                    connection = socket.socket(socket.AF_UNIX)
+                    connection.settimeout(0.5)
+                    connection.connect(path)
+                    held.append(connection)
+                except OSError:
+                    self.codes["REFUSED"] += 1
+                    break
+            time.sleep(1)
+            for connection in held:
+                connection.close()
+            time.sleep(1)
 
-KINDS = ["fuzz", "cancel", "race", "slow", "silent", "half_open", "greedy"]
+
+KINDS = ["fuzz", "cancel", "race", "slow", "silent", "half_open", "greedy", "descriptors"]
+REACHING = ["fuzz", "race", "greedy"]  # some of their calls must succeed
 
 
 def main():

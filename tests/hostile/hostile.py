@@ -2,9 +2,11 @@
 """The daemon under attack. usage: hostile.py BIN [--seconds N] [--seed N] [--kinds a,b]
 
 Starts a daemon with tokens, lets hostile clients do their worst from one core at nice 19 (attacks.py), and watches a
-bystander with a token of its own. Fails on: the daemon's death or hang, INTERNAL from its code, a thread or memory that
-stays, a bystander's p99 above 5 times its quiet value (and above 50 ms: below, the scheduler decides), a SIGTERM that
-does not end it in time. The seed is printed; the same one gives the same requests, though not the same interleaving.
+bystander with a token of its own. Every few seconds they are stopped for a moment: the bystander's quiet times are taken then,
+so that what else the machine does counts on both sides. Fails on: the daemon's death or hang, INTERNAL from its code, a thread or
+memory that stays, a probe that finds no healthy daemon, attacks that reach nothing, a bystander's p99 above 5 times its quiet
+value (and above 50 ms: below, the scheduler decides), a SIGTERM that does not end it in time. The seed is printed; the same one
+gives the same requests, though not the same interleaving.
 """
 import argparse
 import json
@@ -79,7 +81,7 @@ class Bystander:
         return took
 
     def watch(self, seconds):
-        """p99 of many rounds."""
+        """Times of many rounds."""
         times, start = [], time.monotonic()
         while time.monotonic() - start - seconds < 0:
             try:
@@ -88,8 +90,11 @@ class Bystander:
                 self.errors.append(repr(error)[:500])
                 break
             time.sleep(0.005)
-        times.sort()
-        return times[int(0.99 * (len(times) - 1))] if times else float("inf")
+        return times
+
+
+def p99(times):
+    return sorted(times)[int(0.99 * (len(times) - 1))] if times else float("inf")
 
 
 def memory_of(pid):
@@ -107,6 +112,34 @@ def watch_memory(pid, peak, stop):
             peak[0] = max(peak[0], memory_of(pid))
         except OSError:
             return
+
+
+def probe(program, address, faults, stop):
+    """What an orchestrator does: a new connection, by a process of its own, every two seconds; two failures in a row count."""
+    failed = 0
+    while not stop.wait(2):
+        command = [os.path.join(program, "mbcosimd"), "--check", address]
+        failed = failed + 1 if subprocess.run(command, timeout=60 * FACTOR).returncode != 0 else 0
+        if failed == 2:
+            faults.append("the probe finds no healthy daemon")
+
+
+def send(attackers, number):
+    for attacker in attackers.values():
+        if attacker.poll() is None:
+            attacker.send_signal(number)
+
+
+def watch_both(bystander, attackers, seconds):
+    """The bystander's times while the attackers stand still, and under attack."""
+    quiet, loud, start = [], [], time.monotonic()
+    while time.monotonic() - start - seconds < 0 and not bystander.errors:
+        loud += bystander.watch(min(8, seconds / 2))
+        send(attackers, signal.SIGSTOP)
+        time.sleep(0.5)
+        quiet += bystander.watch(2)
+        send(attackers, signal.SIGCONT)
+    return quiet, loud
 
 
 def attack(kinds, address, tcp, seed, seconds):
@@ -128,12 +161,14 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         daemon, address, tcp, log = start(options.bin, folder)
         bystander = Bystander(address)
-        quiet = bystander.watch(min(5, options.seconds / 4))
+        bystander.watch(1)
         threads = threads_of(daemon.pid)
         peak, stop = [0], threading.Event()
         threading.Thread(target=watch_memory, args=(daemon.pid, peak, stop), daemon=True).start()
+        prober = threading.Thread(target=probe, args=(options.bin, address, faults, stop), daemon=True)
+        prober.start()
         attackers = attack(options.kinds.split(","), address, tcp, options.seed, options.seconds)
-        loud = bystander.watch(options.seconds)
+        quiet, loud = watch_both(bystander, attackers, options.seconds)
         for kind, attacker in attackers.items():
             try:
                 text, _ = attacker.communicate(timeout=60 * FACTOR)
@@ -143,8 +178,11 @@ def main():
                 result = {"codes": {}, "internal": [f"{kind} hangs"]}
             print(f"  {kind:12} {result['codes']}", flush=True)
             faults += [f"{kind}: {text}" for text in result["internal"]]
+            if kind in attacks.REACHING and not result["codes"].get("OK"):
+                faults.append(f"{kind}: no call reached anything")
         stop.set()
-        faults += judge(daemon, bystander, quiet, loud, threads, peak[0], log)
+        prober.join()
+        faults += judge(daemon, bystander, p99(quiet), p99(loud), threads, peak[0], log)
     for fault in faults:
         print("FAULT", fault)
     sys.exit(1 if faults else 0)
