@@ -122,7 +122,7 @@ interface Inside {
       session?: { playing: { value: string } };
       sample?: { step: number; time: number };
     };
-    scene: { view: { nodeMatrix(index: number): number[]; picture(): Promise<Blob>; drawCalls: number; canvas: HTMLCanvasElement } };
+    scene: { view: { nodeMatrix(index: number): number[]; picture(): Promise<Blob>; drawCalls: number; layers(): string[] } };
   };
 }
 
@@ -153,6 +153,11 @@ export function scene(page: Page): Promise<{ step: number; nodes: Record<string,
         }));
       }),
   );
+}
+
+/** Kinds of things that the scene has. */
+export function drawnLayers(page: Page): Promise<string[]> {
+  return page.evaluate(() => (window as unknown as Inside).mbcosim.scene.view.layers());
 }
 
 /** Steps that the page has recorded. */

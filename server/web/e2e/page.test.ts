@@ -5,7 +5,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { atStep, decks, drawCalls, frameRate, launch, picture, recorded, scene, shown, until, View, visit, type Visit } from './bench';
+import { atStep, decks, drawCalls, drawnLayers, frameRate, launch, MODELS, picture, recorded, scene, shown, until, View, visit, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -90,6 +90,19 @@ describe('a thousand bodies', () => {
       console.log(`1000 bodies: ${(await frameRate(page, 3)).toFixed(1)} pictures a second`);
     });
     rmSync(folder, { recursive: true });
+  });
+});
+
+describe('shapes', () => {
+  test.each([
+    ['pendulum.mbd', ['bodies', 'joints', 'nodes']],
+    ['actuated_beam.mbd', ['bodies', 'joints', 'lines', 'nodes']],
+    ['modal_body.mbd', ['flexible', 'nodes']],
+    ['cantilever_dead_load.mbd', ['beams', 'forces', 'nodes']],
+  ])('%s has %j', async (deck, layers) => {
+    await withPage(deck, async ({ page }) => {
+      expect(await drawnLayers(page)).toEqual(expect.arrayContaining(layers));
+    });
   });
 });
 
@@ -268,6 +281,40 @@ describe('what can be taken away', () => {
     await again.close();
     await visited.close();
     rmSync(dirname(file), { recursive: true });
+  });
+});
+
+describe('a deck from the disk', () => {
+  test('is loaded with the files that it includes', async () => {
+    await withPage('pendulum.mbd', async ({ page }, view) => {
+      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await page.getByLabel('Files of a deck').setInputFiles([`${MODELS}/cantilever_dead_load.mbd`, `${MODELS}/cantilever.inc`]);
+      await until(page, (name) => location.hash.includes('simulation=') && !location.hash.includes(encodeURIComponent(name)), view.simulation);
+      await shown(page);
+      expect(await page.title()).toBe('cantilever_dead_load.mbd – mbcosim');
+      expect(Object.keys((await scene(page)).nodes).length).toBeGreaterThan(2);
+    });
+  });
+
+  test('that is wrong is shown with its line and a mark at the place', async () => {
+    await withPage('pendulum.mbd', async (visited) => {
+      const { page } = visited;
+      const text = readFileSync(`${MODELS}/pendulum.mbd`, 'utf8').replace('spherical hinge', 'sperical hinge');
+      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await page.getByLabel('Files of a deck').setInputFiles({ name: 'bad.mbd', mimeType: 'text/plain', buffer: Buffer.from(text) });
+      await page.getByText('unknown joint type "spericalhinge"').last().waitFor();
+      expect(await page.locator('.diagnostic mark').textContent()).toBe('sperical hinge');
+      await page.getByText('did you mean "spherical hinge"?').waitFor();
+      visited.faults.length = 0;  // the browser reports the refusal, too
+    });
+  });
+
+  test('that is no deck is refused before it is sent', async () => {
+    await withPage('pendulum.mbd', async ({ page }) => {
+      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await page.getByLabel('Files of a deck').setInputFiles({ name: 'notes.txt', mimeType: 'text/plain', buffer: Buffer.from('no deck') });
+      await page.getByText('None of these files is a deck').waitFor();
+    });
   });
 });
 

@@ -3,13 +3,36 @@ import { fromBinary } from '@bufbuild/protobuf';
 import { Code, ConnectError, createClient } from '@connectrpc/connect';
 import { createConnectTransport } from '@connectrpc/connect-web';
 import { DeckDiagnosticsSchema, ErrorInfoSchema, SolverFailureSchema, type Diagnostic, type SolverFailure } from './gen/mbcosim/v1/common_pb';
-import { Simulations } from './gen/mbcosim/v1/simulations_pb';
+import { Geometry } from './gen/mbcosim/v1/geometry_pb';
+import { Simulations, type ModelDescription } from './gen/mbcosim/v1/simulations_pb';
 import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
+import { chunks, type NamedFile } from './upload';
 
 const transport = createConnectTransport({ baseUrl: globalThis.location?.origin ?? '', useBinaryFormat: true });
 
 export const simulations = createClient(Simulations, transport);
 export const telemetry = createClient(Telemetry, transport);
+export const geometry = createClient(Geometry, transport);
+
+/** All pages of a model's description as one. */
+export async function describeModel(name: string): Promise<ModelDescription> {
+  const whole = await simulations.describeSimulation({ name });
+  for (let pageToken = whole.nextPageToken; pageToken; ) {
+    const page = await simulations.describeSimulation({ name, pageToken });
+    whole.nodes.push(...page.nodes);
+    whole.elements.push(...page.elements);
+    for (const variable of page.variables) whole.variables.push(variable);
+    pageToken = page.nextPageToken;
+  }
+  return whole;
+}
+
+/** Loads a deck; the new simulation's name. */
+export async function loadDeck(files: readonly NamedFile[], main: string): Promise<string> {
+  const options = { displayName: main, requestId: crypto.randomUUID() };
+  const reply = await simulations.createSimulationInline({ header: { source: { case: 'bundleMainFile', value: main }, options }, files: chunks(files) });
+  return reply.simulation?.name ?? '';
+}
 
 /** What a failed call says, taken apart. */
 export interface Failure {

@@ -1,25 +1,89 @@
-/** The shape of a model as far as its variables tell it: the nodes. */
-import { simulations } from './api';
-import { mat3, vec3 } from './algebra';
-import { finish, type Geometry, type NodeShape } from './geometry';
-import type { Model } from './model';
+/** Reads `DescribeGeometry` into plain data. */
+import { geometry as client } from './api';
+import { mat3, vec3, type Mat3 } from './algebra';
+import { finish, type ElementShape, type FlexibleBody, type Geometry, type NodeShape } from './geometry';
+import type { ElementGeometry, ModalPoints, NodeGeometry } from './gen/mbcosim/v1/geometry_pb';
 
-export async function loadGeometry(simulation: string, model: Model): Promise<Geometry> {
-  const handles = new Map(model.variables.map((variable) => [variable.name, variable.handle]));
-  const nodes = model.nodes.filter((node) => node.family === 'structural').map((node): NodeShape => ({
+export async function loadGeometry(simulation: string, signal?: AbortSignal): Promise<Geometry> {
+  const nodes: NodeShape[] = [], elements: ElementShape[] = [], bodies: FlexibleBody[] = [];
+  const indexOf = new Map<number, number>();
+  for await (const reply of client.describeGeometry({ simulation }, { signal })) {
+    switch (reply.content.case) {
+      case 'nodes':
+        for (const node of reply.content.value.nodes) {
+          indexOf.set(node.label, nodes.length);
+          nodes.push(nodeShape(node));
+        }
+        break;
+      case 'elements':
+        for (const element of reply.content.value.elements) elements.push(elementShape(element, indexOf));
+        break;
+      case 'modalPoints':
+        addPoints(bodies, reply.content.value, indexOf);
+        break;
+    }
+  }
+  return finish(nodes, elements, bodies);
+}
+
+function nodeShape(node: NodeGeometry): NodeShape {
+  return {
     label: node.label,
-    kind: node.type,
+    kind: node.kind,
     name: node.name,
-    position: [0, 0, 0],
-    positionHandle: handles.get(`node.structural.${node.label}.X`) ?? -1,
-    orientationHandle: handles.get(`node.structural.${node.label}.R`),
-  }));
-  const oriented = nodes.filter((node) => node.orientationHandle !== undefined);
-  const { values } = await simulations.readVariables({
-    simulation,
-    handles: [...nodes.map((node) => node.positionHandle), ...oriented.map((node) => node.orientationHandle as number)],
-  });
-  nodes.forEach((node, i) => (node.position = vec3(values, 3 * i)));
-  oriented.forEach((node, i) => (node.orientation = mat3(values, 3 * nodes.length + 9 * i)));
-  return finish(nodes, [], []);
+    position: vec3(node.position),
+    orientation: node.orientation.length === 9 ? mat3(node.orientation) : undefined,
+    positionHandle: node.positionHandle,
+    orientationHandle: node.orientationHandle,
+  };
+}
+
+function elementShape(element: ElementGeometry, indexOf: Map<number, number>): ElementShape {
+  return {
+    id: `${element.family}:${element.label}`,
+    family: element.family,
+    type: element.type,
+    label: element.label,
+    name: element.name,
+    points: element.points.map((point) => {
+      const node = point.nodeLabel === undefined ? -1 : indexOf.get(point.nodeLabel) ?? -1;
+      return { name: point.name, node, offset: vec3(point.offset) };
+    }),
+    frames: element.frames.map((frame) => ({ name: frame.name, point: frame.point, orientation: mat3(frame.orientation) })),
+    lines: element.lines.map((line) => ({ name: line.name, points: [...line.points], curved: line.curved })),
+    surfaces: element.surfaces.map((surface) => ({ name: surface.name, points: [...surface.points] })),
+    masses: element.masses.map((mass) => ({
+      point: mass.point,
+      mass: mass.mass,
+      moments: vec3(mass.principalMoments),
+      axes: mat3(mass.principalAxes) as Mat3,
+    })),
+    arrows: element.arrows.map((arrow) => ({
+      point: arrow.point,
+      handle: arrow.handle,
+      sign: arrow.reversed ? -1 : 1,
+      moment: arrow.moment,
+    })),
+  };
+}
+
+/** Points of one body come in several messages. */
+function addPoints(bodies: FlexibleBody[], part: ModalPoints, indexOf: Map<number, number>): void {
+  let body = bodies.find((known) => known.joint === part.jointLabel);
+  if (!body) {
+    body = {
+      joint: part.jointLabel,
+      node: part.nodeLabel === undefined ? -1 : indexOf.get(part.nodeLabel) ?? -1,
+      fixedPosition: vec3(part.fixedPosition),
+      fixedOrientation: mat3(part.fixedOrientation),
+      amplitudes: [...part.amplitudeHandles],
+      labels: [],
+      positions: [],
+      shapes: [],
+    };
+    bodies.push(body);
+  }
+  body.labels.push(...part.labels);
+  for (const value of part.positions) body.positions.push(value);
+  for (const value of part.shapes) body.shapes.push(value);
 }

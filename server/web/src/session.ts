@@ -1,5 +1,5 @@
 /** A simulation on the screen: what is known of it, what was seen of it, and what can be done with it. */
-import { failureOf, simulations, telemetry, type Failure } from './api';
+import { describeModel, failureOf, simulations, telemetry, type Failure } from './api';
 import { duration } from './duration';
 import { SimulationState, StepOutcome, type SimulationInfo, type Snapshot, type StepReply } from './gen/mbcosim/v1/simulations_pb';
 import { OverflowPolicy, type TelemetryBatch } from './gen/mbcosim/v1/telemetry_pb';
@@ -82,9 +82,12 @@ export class Session implements Shown {
 
   /** Reads all about the simulation `name` and follows it until `close`. */
   static async open(name: string): Promise<Session> {
-    const [info, description] = await Promise.all([simulations.getSimulation({ name }), simulations.describeSimulation({ name })]);
-    const model = modelOf(description);
-    const session = new Session(info, model, await loadGeometry(name, model));
+    const [info, description, geometry] = await Promise.all([
+      simulations.getSimulation({ name }),
+      describeModel(name),
+      loadGeometry(name),
+    ]);
+    const session = new Session(info, modelOf(description), geometry);
     await session.read();
     void session.follow();
     void session.poll();

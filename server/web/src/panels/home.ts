@@ -1,9 +1,10 @@
 /** The list of simulations, and where a deck is dropped. */
-import { failureOf, simulations, type Failure } from '../api';
+import { failureOf, loadDeck, simulations, type Failure } from '../api';
 import type { Desk } from '../desk';
-import { h, iconButton } from '../dom';
+import { h, icon, iconButton } from '../dom';
 import { number } from '../format';
 import { SimulationState, type SimulationInfo } from '../gen/mbcosim/v1/simulations_pb';
+import { chosenFiles, droppedFiles, mainFiles, type NamedFile } from '../upload';
 import { diagnosticsList } from './diagnostics';
 
 const REFRESH_MILLISECONDS = 3000;
@@ -26,12 +27,54 @@ export class Home {
   constructor(private readonly desk: Desk, private readonly open: (name: string) => void, private readonly compare: (name: string) => void) {
     this.welcome.append(h('div', { class: 'box' },
       h('h1', {}, 'See it move'),
-      h('p', { class: 'soft' }, 'Choose a simulation of this daemon. New ones are made by clients: mbcosim view DECK, Python, C++ or any other.'),
+      h('p', { class: 'soft' }, 'Choose a simulation of this daemon, or bring a deck of your own.'),
+      h('div', { class: 'drop' }, icon('upload'), h('p', {}, 'Drop a deck here, with the files that it includes, or its folder.'), this.chooser()),
       this.message));
+    this.acceptDrops();
     desk.shown.watch((shown) => {
       this.welcome.classList.toggle('hidden', shown !== undefined);
       this.draw();
     });
+  }
+
+  private chooser(): HTMLElement {
+    const input = h('input', { type: 'file', multiple: true, class: 'visually-hidden', tabindex: -1, 'aria-label': 'Files of a deck' });
+    input.addEventListener('change', () => void chosenFiles(input.files as FileList).then((files) => this.load(files)));
+    return h('div', {}, h('button', { type: 'button', class: 'button primary', onclick: () => input.click() }, 'Choose files'), input);
+  }
+
+  private acceptDrops(): void {
+    document.addEventListener('dragover', (event) => {
+      event.preventDefault();
+      document.body.classList.add('dropping');
+    });
+    document.addEventListener('dragleave', (event) => event.relatedTarget === null && document.body.classList.remove('dropping'));
+    document.addEventListener('drop', (event) => {
+      event.preventDefault();
+      document.body.classList.remove('dropping');
+      if (event.dataTransfer) void droppedFiles(event.dataTransfer).then((files) => this.load(files));
+    });
+  }
+
+  /** Loads a deck; where several files can be the main one, the reader says which. */
+  private async load(files: NamedFile[], main?: string): Promise<void> {
+    const mains = main ? [main] : mainFiles(files);
+    if (mains.length !== 1) return this.choose(files, mains);
+    this.message.replaceChildren(h('p', { class: 'soft' }, `Loading ${mains[0]} …`));
+    try {
+      const name = await loadDeck(files, mains[0]);
+      this.message.replaceChildren();
+      this.open(name);
+    } catch (thrown) {
+      this.tell(failureOf(thrown));
+    }
+  }
+
+  private choose(files: NamedFile[], mains: string[]): void {
+    this.welcome.classList.remove('hidden');
+    if (mains.length === 0) return this.message.replaceChildren(h('div', { class: 'diagnostic' }, 'None of these files is a deck: a deck has a card "begin: data;".'));
+    this.message.replaceChildren(h('p', {}, 'Which of them is the main file?'),
+      ...mains.map((path) => h('button', { type: 'button', class: 'button', onclick: () => void this.load(files, path) }, path)));
   }
 
   /** Keeps the list up to date until the page is left. */
@@ -56,7 +99,10 @@ export class Home {
   tell(failure: Failure, kind = ''): void {
     this.message.dataset.kind = kind;
     const hint = failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started: it has the token.' : '';
+    if (kind !== 'connection' || !this.desk.shown.value) this.welcome.classList.remove('hidden');
+    const back = h('button', { type: 'button', class: 'button', onclick: () => this.welcome.classList.add('hidden') }, 'Back to the simulation');
     this.message.replaceChildren(
+      this.desk.shown.value ? back : '',
       h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)),
       diagnosticsList(failure.diagnostics));
   }

@@ -161,6 +161,11 @@ export class View {
     this.select(this.selected);
   }
 
+  /** Layers that have something in them. */
+  layers(): Layer[] {
+    return [...new Set(this.drawn?.batches.map(({ layer }) => layer) ?? [])].sort();
+  }
+
   /** What is drawn for a node: its matrix, 16 numbers by columns, as the graphics card has it. */
   nodeMatrix(index: number): number[] {
     return Array.from(this.drawn?.nodes.matrices.subarray(16 * index, 16 * index + 16) ?? []);

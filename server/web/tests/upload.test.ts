@@ -1,0 +1,23 @@
+import { describe, expect, test } from 'vitest';
+import { chunks, mainFiles, withoutCommonFolder } from '../src/upload';
+
+const file = (path: string, text = '') => ({ path, data: new TextEncoder().encode(text) });
+
+describe('a deck from the disk', () => {
+  test('is sent in pieces of a mebibyte, an empty file in one', () => {
+    const pieces = chunks([{ path: 'big', data: new Uint8Array((1 << 20) + 5) }, file('empty')]);
+    expect(pieces.map(({ path, data }) => [path, data.length])).toEqual([['big', 1 << 20], ['big', 5], ['empty', 0]]);
+  });
+
+  test('has as main file the one with a data card', () => {
+    expect(mainFiles([file('a.inc', 'set: real L = 1.;'), file('b.mbd', '# deck\n Begin : data ;\n'), file('c.fem', 'begin data')])).toEqual(['b.mbd']);
+  });
+
+  test('is named without the folder that all files are in', () => {
+    const paths = (...names: string[]) => withoutCommonFolder(names.map((name) => file(name))).map(({ path }) => path);
+    expect(paths('m/a.mbd', 'm/sub/b.inc')).toEqual(['a.mbd', 'sub/b.inc']);
+    expect(paths('m/sub1/a', 'm/sub2/b')).toEqual(['sub1/a', 'sub2/b']);
+    expect(paths('a', 'm/b')).toEqual(['a', 'm/b']);
+    expect(paths('only/one')).toEqual(['one']);
+  });
+});
