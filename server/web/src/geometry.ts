@@ -1,5 +1,5 @@
 /** A model's shape: points that hang on nodes, and what hangs on points. Plain data, as recordings keep it. */
-import { add, IDENTITY, mat3, rotate, vec3, type Mat3, type Vec3 } from './algebra';
+import { add, IDENTITY, inertiaEllipsoid, mat3, rotate, vec3, type Mat3, type Vec3 } from './algebra';
 import { valueOf, type Layout, type Sample } from './recording';
 
 export interface NodeShape {
@@ -54,9 +54,11 @@ export interface Geometry {
   nodes: NodeShape[];
   elements: ElementShape[];
   bodies: FlexibleBody[];
-  /** Diagonal of the box around all points at the start; 1 when there is no extent. */
+  /** Diagonal of the box around all points at the start; where they are one point, three times the largest ellipsoid; 1 when there is nothing. */
   extent: number;
   centre: Vec3;
+  /** Ellipsoids of inertia are drawn so many times as large as they are, so that they do not hide the rest; at most 1. */
+  bodyScale: number;
 }
 
 /** Where the nodes are, and what else a sample tells. Batches read its arrays; whoever made it may fill it anew. */
@@ -150,6 +152,9 @@ export function deformedPoints(body: FlexibleBody, pose: Pose, amplitudes: reado
   }
 }
 
+/** Semi-axis of the only body, as a part of the extent; of several, by the root of their number less. */
+const LARGEST_BODY = 0.34;
+
 /** Fills in what follows from the rest. */
 export function finish(nodes: NodeShape[], elements: ElementShape[], bodies: FlexibleBody[]): Geometry {
   const pose = initialPose(nodes);
@@ -167,8 +172,20 @@ export function finish(nodes: NodeShape[], elements: ElementShape[], bodies: Fle
     deformedPoints(body, pose, body.amplitudes.map(() => 0), 0, out);
     for (let i = 0; i < out.length; i += 3) include(out.subarray(i, i + 3));
   }
-  if (lower[0] > upper[0]) return { nodes, elements, bodies, extent: 1, centre: [0, 0, 0] };
-  const centre = lower.map((low, k) => (low + upper[k]) / 2) as unknown as Vec3;
-  const extent = Math.hypot(...lower.map((low, k) => upper[k] - low));
-  return { nodes, elements, bodies, extent: extent > 0 ? extent : 1, centre };
+  const { largest, count } = ellipsoids(elements), known = lower[0] <= upper[0];
+  const centre = lower.map((low, k) => (known ? (low + upper[k]) / 2 : 0)) as unknown as Vec3;
+  const extent = (known && Math.hypot(...lower.map((low, k) => upper[k] - low))) || 3 * largest || 1;
+  const room = (LARGEST_BODY * extent) / Math.sqrt(Math.max(count, 1));
+  return { nodes, elements, bodies, extent, centre, bodyScale: largest > room ? room / largest : 1 };
+}
+
+/** The largest semi-axis of an ellipsoid of inertia, and how many there are. */
+function ellipsoids(elements: readonly ElementShape[]): { largest: number; count: number } {
+  let largest = 0, count = 0;
+  for (const { masses } of elements)
+    for (const { mass, moments } of masses) {
+      largest = Math.max(largest, ...inertiaEllipsoid(mass, moments));
+      ++count;
+    }
+  return { largest, count };
 }

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 import { rotationOf, type Mat3 } from '../src/algebra';
-import { deformedPoints, finish, initialPose, orientationOf, pointAt, PoseReader, positionOf, type FlexibleBody, type NodeShape } from '../src/geometry';
+import { deformedPoints, finish, initialPose, orientationOf, pointAt, PoseReader, positionOf, type ElementShape, type FlexibleBody, type NodeShape } from '../src/geometry';
 import { Layout } from '../src/recording';
 
 const R = rotationOf([0, 0, Math.PI / 2]);
@@ -52,4 +52,23 @@ test('the extent is that of all points', () => {
   close(geometry.centre, [2, 2, 0]);
   expect(geometry.extent).toBeCloseTo(Math.hypot(2, 4), 12);
   expect(finish([], [], []).extent).toBe(1);
+});
+
+describe('ellipsoids of inertia', () => {
+  const body = (label: number, J: number): ElementShape => ({
+    id: `body:${label}`, family: 'body', type: '', label, name: '', points: [{ name: '', node: 0, offset: [0, 0, 0] }], frames: [], lines: [], surfaces: [], arrows: [],
+    masses: [{ point: 0, mass: 1, moments: [J, J, J], axes: [1, 0, 0, 0, 1, 0, 0, 0, 1] }],
+  });
+
+  test('are smaller than the model, all by the same factor', () => {
+    const axis = Math.sqrt(5 * 10 / 2), { bodyScale, extent } = finish(nodes, [body(1, 10), body(2, 0.01)], []);
+    expect(bodyScale * axis).toBeCloseTo((0.34 * extent) / Math.SQRT2, 9);
+    expect(finish(nodes, [body(1, 0.001)], []).bodyScale).toBe(1);
+  });
+
+  test('of a single node make the extent', () => {
+    const { bodyScale, extent } = finish(nodes.slice(0, 1), [body(1, 10)], []);
+    expect(extent).toBeCloseTo(3 * Math.sqrt(25), 9);
+    expect(bodyScale).toBe(1);
+  });
 });

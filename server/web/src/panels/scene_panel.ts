@@ -6,14 +6,14 @@ import { number } from '../format';
 
 import { PoseReader } from '../geometry';
 import { amplitude, MovedPose, type Mode } from '../modes';
-import type { Layer } from '../scene/build';
+import { ASKED_FOR, type Layer } from '../scene/build';
 import { DARK, LIGHT } from '../scene/palette';
 import { View, type ViewName } from '../scene/view';
-import type { Session } from '../session';
+import type { Session, Shown } from '../session';
 
 const LAYERS: [Layer, string][] = [
   ['bodies', 'bodies'], ['joints', 'joints'], ['beams', 'beams'], ['lines', 'rods and springs'], ['surfaces', 'shells'], ['flexible', 'flexible bodies'],
-  ['forces', 'forces and moments'], ['links', 'links to nodes'], ['nodes', 'nodes'],
+  ['forces', 'forces and moments'], ['reactions', 'reactions of joints'], ['velocities', 'velocities of nodes'], ['links', 'links to nodes'], ['nodes', 'nodes'], ['axes', 'axes of nodes and joints'],
 ];
 const TRAIL_SAMPLES = 2000;
 /** Modes are shown at this pace, whatever their frequency. */
@@ -24,6 +24,7 @@ export class ScenePanel {
   readonly view: View;
   /** Nodes whose paths are drawn, by index. */
   private readonly trails = new Set<number>();
+  private readonly layers = new Map(LAYERS.map(([layer, name]) => [layer, check(name, !ASKED_FOR.includes(layer), (on) => this.setLayer(layer, on))]));
   private readonly hud = h('div', { class: 'hud', role: 'status', 'aria-live': 'off' });
   private reader = new PoseReader([]);
   private other?: Session;
@@ -34,7 +35,7 @@ export class ScenePanel {
   constructor(private readonly desk: Desk) {
     this.view = new View(this.element, DARK);
     this.view.onPick = (id) => (desk.selected.value = id);
-    this.element.append(this.layerTools(), this.viewTools(), this.hud);
+    this.element.append(h('div', { class: 'tools' }, this.layerTools(), this.viewTools()), this.hud);
     desk.theme.watch((theme) => this.view.setPalette(theme === 'dark' ? DARK : LIGHT));
     desk.shown.watch((shown) => {
       this.trails.clear();
@@ -42,10 +43,29 @@ export class ScenePanel {
       this.view.follow(-1);
       this.mode = undefined;
       this.reader = new PoseReader(shown?.geometry.nodes ?? []);
-      if (shown) this.view.show(shown.geometry);
+      if (shown) this.show(shown);
     });
     desk.selected.watch((id) => this.view.select(id));
     desk.frame.watch(() => this.update());
+  }
+
+  private show(shown: Shown): void {
+    const handles = new Map(shown.model.variables.map((variable) => [variable.name, variable.handle]));
+    this.view.show(shown.geometry, (name) => handles.get(name));
+    const present = new Set(this.view.layers());
+    for (const [layer, entry] of this.layers) entry.classList.toggle('hidden', !present.has(layer));
+    for (const [layer, entry] of this.layers) if (entry.querySelector('input')?.checked) this.wantFor(layer);
+  }
+
+  /** Follows the variables that a layer is drawn from. */
+  private wantFor(layer: Layer): void {
+    const wanted = new Set(this.view.needs(layer));
+    if (wanted.size > 0) this.desk.session?.want(this.desk.session.model.variables.filter((variable) => wanted.has(variable.handle)));
+  }
+
+  private setLayer(layer: Layer, on: boolean): void {
+    if (on) this.wantFor(layer);
+    this.view.setLayer(layer, on);
   }
 
   /** Index of the structural node with the identifier "node.structural:7"; −1: none. */
@@ -105,7 +125,12 @@ export class ScenePanel {
     this.view.setPose(this.mode ? this.mode.pose.move(pose, this.mode.mode, phase, this.mode.factor) : pose);
     this.updateOther(sample.time);
     this.view.setTrails([...this.trails].map((node) => this.path(node)));
-    this.hud.replaceChildren(h('strong', {}, `${number(sample.time, 6)} s`), h('div', { class: 'soft' }, `step ${sample.step}`));
+    this.hud.replaceChildren(h('strong', {}, `${number(sample.time, 6)} s`), h('div', { class: 'soft' }, `step ${sample.step}`), h('div', { class: 'soft' }, `grid ${number(this.view.cell, 3)}${this.unit(shown)}`));
+  }
+
+  private unit({ model, geometry }: Shown): string {
+    const unit = model.variables.find((variable) => variable.handle === geometry.nodes[0]?.positionHandle)?.unit;
+    return unit ? ` ${unit}` : '';
   }
 
   private updateOther(time: number): void {
@@ -136,7 +161,7 @@ export class ScenePanel {
       this.view.setDeformation(factor);
     });
     const menu = h('div', { class: 'menu hidden' },
-      ...LAYERS.map(([layer, name]) => check(name, true, (on) => this.view.setLayer(layer, on))),
+      ...this.layers.values(),
       check('grid', true, (on) => this.view.setGrid(on)),
       h('label', {}, 'deformation', deformation, scale));
     const button = h('button', { type: 'button', class: 'button', 'aria-expanded': 'false', onclick: () => toggle(button, menu) }, icon('layers'), 'Show');

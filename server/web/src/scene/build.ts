@@ -14,7 +14,10 @@ import { Items, nodeItems } from './items';
 import type { Palette } from './palette';
 
 /** What can be shown and hidden by itself. */
-export type Layer = 'nodes' | 'links' | 'bodies' | 'joints' | 'beams' | 'lines' | 'surfaces' | 'forces' | 'flexible';
+export type Layer = 'nodes' | 'links' | 'bodies' | 'joints' | 'beams' | 'lines' | 'surfaces' | 'forces' | 'flexible' | 'reactions' | 'velocities' | 'axes';
+
+/** Layers that are hidden until somebody asks for them. */
+export const ASKED_FOR: readonly Layer[] = ['reactions', 'velocities', 'axes'];
 
 const NODE_SIZE = 0.36;
 /** Length of the longest arrow, as a part of the model's extent. */
@@ -26,21 +29,25 @@ export class Drawn {
   readonly nodes: GlyphBatch;
   private readonly items: Items;
 
-  constructor(geometry: Geometry, private readonly palette: Palette) {
-    const items = (this.items = new Items(geometry));
+  constructor(geometry: Geometry, private readonly palette: Palette, handleOf: (name: string) => number | undefined) {
+    const items = (this.items = new Items(geometry, palette, handleOf));
     this.nodes = new GlyphBatch(glyph('node', geometry.nodes.length), nodeItems(geometry, NODE_SIZE * items.size), items.points, this.colour('node'));
     this.add('nodes', this.nodes);
     this.addLines('links', items.links, 'link', 2);
     this.addBodies();
     for (const [name, list] of items.joints) this.add('joints', new GlyphBatch(glyph(name, list.length), list, items.points, this.colour('joint')));
     if (items.beams.length > 0) this.add('beams', new BeamBatch(items.beams, items.points, this.colour('beam')));
+    this.addLines('beams', items.sections, 'section', 1.2);
     this.addLines('lines', items.springs, 'spring', 2);
     if (items.barrels.length > 0) this.add('lines', new BarBatch(items.barrels, items.points, this.colour('hydraulic'), 0.55));
     if (items.rods.length > 0) this.add('lines', new BarBatch(items.rods, items.points, this.colour('node')));
     this.addLines('lines', items.others, 'other', 2.5);
     if (items.faces.length > 0) this.add('surfaces', new FaceBatch(items.faces, items.points, this.colour('shell')));
-    this.addArrows(items.forces, 'force');
-    this.addArrows(items.moments, 'moment');
+    this.addArrows('forces', items.forces, 'force');
+    this.addArrows('forces', items.moments, 'moment');
+    this.addArrows('reactions', items.reactions, 'reaction');
+    this.addArrows('velocities', items.velocities, 'velocity');
+    this.addLines('axes', items.axes, 'other', 2);
     for (const body of geometry.bodies) this.add('flexible', new FlexibleBatch(body, `joint:${body.joint}`, this.colour('flexible'), this.colour('strained')));
   }
 
@@ -62,8 +69,15 @@ export class Drawn {
     if (bodies.length > 0) this.add('bodies', new GlyphBatch(glyph('sphere', bodies.length), bodies, points, this.colour('body'), bodies.length > MANY ? 1 : 0.62));
   }
 
-  private addArrows(list: ArrowItem[], name: keyof Palette): void {
-    if (list.length > 0) this.add('forces', new ArrowBatch(list, this.items.points, this.colour(name), ARROW * this.items.geometry.extent, true));
+  /** Loads push with their tips; velocities begin at their nodes. */
+  private addArrows(layer: Layer, list: ArrowItem[], name: keyof Palette): void {
+    if (list.length > 0) this.add(layer, new ArrowBatch(list, this.items.points, this.colour(name), ARROW * this.items.geometry.extent, layer === 'forces'));
+  }
+
+  /** Handles of the variables that a layer needs besides the poses of nodes. */
+  needs(layer: Layer): number[] {
+    const arrows = this.batches.filter((entry) => entry.layer === layer).map(({ batch }) => batch).filter((batch) => batch instanceof ArrowBatch);
+    return arrows.flatMap((batch) => batch.items.flatMap((item) => item.handles));
   }
 
   update(pose: Pose): void {

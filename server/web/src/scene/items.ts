@@ -1,19 +1,23 @@
 /** From a model's shape to the things that are drawn, by kind. */
 import { IDENTITY, inertiaEllipsoid, norm, type Mat3, type Vec3 } from '../algebra';
 import { BeamCurve } from '../beam_curve';
-import { initialPose, orientationOf, type ElementShape, type Geometry, type Pose } from '../geometry';
+import { initialPose, orientationOf, type ElementShape, type Geometry, type NodeShape, type Pose } from '../geometry';
 import type { ArrowItem } from './batches/arrows';
 import type { BarItem } from './batches/bars';
 import type { BeamItem } from './batches/beams';
 import type { FaceItem } from './batches/faces';
 import type { GlyphItem } from './batches/glyphs';
 import type { LineItem } from './batches/lines';
+import { reactionOf } from '../reactions';
 import { elementGlyph, type GlyphName } from './glyphs';
-import { coil, straight } from './line_items';
+import { axes, coil, section, straight } from './line_items';
+import type { Palette } from './palette';
 import { Points } from './points';
 
 /** Stations along a beam; fewer where there are many. */
 const BEAM_STATIONS = 13, MANY_BEAMS = 150;
+/** Sections that are drawn between the ends of a beam are one less; so much wider than the beam. */
+const SECTIONS = 4, SECTION_RIM = 1.5;
 
 export class Items {
   readonly points: Points;
@@ -28,18 +32,24 @@ export class Items {
   readonly faces: FaceItem[] = [];
   readonly forces: ArrowItem[] = [];
   readonly moments: ArrowItem[] = [];
+  readonly reactions: ArrowItem[] = [];
+  readonly velocities: ArrowItem[] = [];
+  readonly axes: LineItem[] = [];
+  readonly sections: LineItem[] = [];
   /** Glyphs' size. */
   readonly size: number;
   private readonly pose: Pose;
   private readonly stations: number;
 
-  constructor(readonly geometry: Geometry) {
+  /** `handleOf`: handle of a variable by its name. */
+  constructor(readonly geometry: Geometry, private readonly palette: Palette, private readonly handleOf: (name: string) => number | undefined) {
     this.points = new Points(geometry.nodes.length);
     this.size = glyphSize(geometry);
     this.pose = initialPose(geometry.nodes);
     const beams = geometry.elements.reduce((sum, element) => sum + Number(isBeam(element)), 0);
     this.stations = beams > MANY_BEAMS ? 5 : BEAM_STATIONS;
     for (const element of geometry.elements) this.collect(element);
+    geometry.nodes.forEach((node, i) => this.addNode(node, i));
     this.points.update(this.pose);
   }
 
@@ -51,15 +61,29 @@ export class Items {
     this.addMasses(element, points);
     for (const line of element.lines) this.addLine(element, line.points.map((index) => points[index]));
     for (const surface of element.surfaces) this.faces.push({ id: element.id, points: surface.points.map((index) => points[index]) });
-    for (const arrow of element.arrows) (arrow.moment ? this.moments : this.forces).push(loadArrow(element.id, points[arrow.point], arrow));
+    for (const arrow of element.arrows) (arrow.moment ? this.moments : this.forces).push(vectorArrow(element.id, points[arrow.point], arrow.handle, arrow.sign));
+    for (const frame of element.frames) this.addAxes(element.id, points[frame.point], frame.orientation, 1.1);
+    const reaction = reactionOf(element, points, this.handleOf);
+    if (reaction) this.reactions.push(reaction);
     this.addGlyph(element, points);
+  }
+
+  private addNode(node: NodeShape, index: number): void {
+    const id = `node.structural:${node.label}`, handle = this.handleOf(`node.structural.${node.label}.XP`);
+    if (handle !== undefined) this.velocities.push(vectorArrow(id, index, handle, 1));
+    if (node.orientation) this.addAxes(id, index, IDENTITY, 1.5);
+  }
+
+  private addAxes(id: string, point: number, local: Mat3, length: number): void {
+    const colours = [this.palette.x, this.palette.y, this.palette.z];
+    this.axes.push(...axes(id, point, local, length * this.size, this.points, colours));
   }
 
   private addMasses(element: ElementShape, points: number[]): void {
     const least = 0.3 * this.size;  // a point mass is seen, too
     for (const mass of element.masses) {
       const axes = inertiaEllipsoid(mass.mass, mass.moments);
-      this.bodies.push({ id: element.id, point: points[mass.point], local: mass.axes, size: axes.map((axis) => Math.max(axis, least)) as unknown as Vec3 });
+      this.bodies.push({ id: element.id, point: points[mass.point], local: mass.axes, size: axes.map((axis) => Math.max(this.geometry.bodyScale * axis, least)) as unknown as Vec3 });
     }
   }
 
@@ -75,7 +99,10 @@ export class Items {
     this.points.update(this.pose);
     const nodes = points.map((point) => this.points.node(point));
     const curve = new BeamCurve(points, nodes, this.points.x, (node) => (node < 0 ? IDENTITY : orientationOf(this.pose, node)), this.stations);
-    this.beams.push({ id, curve, width: 0.22 * this.size, height: 0.11 * this.size });
+    const beam = { id, curve, width: 0.22 * this.size, height: 0.11 * this.size };
+    this.beams.push(beam);
+    const between = (this.stations - 1) / SECTIONS;
+    for (let k = 0; k <= SECTIONS; ++k) this.sections.push(section(beam, Math.round(k * between), SECTION_RIM));
   }
 
   /** A barrel that keeps its length, and a rod that comes out of it. */
@@ -108,10 +135,12 @@ function isBeam(element: ElementShape): boolean {
   return element.lines.length > 0 && (/beam/.test(`${element.family} ${element.type}`) || element.lines.some((line) => line.curved));
 }
 
-function loadArrow(id: string, point: number, { handle, sign }: { handle: number; sign: number }): ArrowItem {
+/** The arrow of a variable with three global components. */
+function vectorArrow(id: string, point: number, handle: number, sign: number): ArrowItem {
   return {
     id,
     point,
+    handles: [handle],
     read(pose, out) {
       for (let k = 0; k < 3; ++k) out[k] = sign * pose.value(handle, k);
     },

@@ -1,4 +1,7 @@
 /** Lines of several forms between points. */
+import * as THREE from 'three';
+import type { Mat3 } from '../algebra';
+import type { BeamItem } from './batches/beams';
 import type { LineItem } from './batches/lines';
 import type { Points } from './points';
 
@@ -39,6 +42,39 @@ export function coil(id: string, [from, to]: number[], radius: number, table: Po
         out[at + 1] = x[a + 1] + part * dy + radius * (cos * uy + sin * vy);
         out[at + 2] = x[a + 2] + part * dz + radius * (cos * uz + sin * vz);
       }
+    },
+  };
+}
+
+/** The three axes of a frame at a point, in three colours. */
+export function axes(id: string, point: number, local: Mat3, length: number, table: Points, colours: string[]): LineItem[] {
+  const node = table.node(point);
+  return colours.map((colour, axis): LineItem => ({
+    id,
+    corners: 2,
+    colour: new THREE.Color(colour),
+    fill(out, { R }) {
+      for (let row = 0, r = 9 * node; row < 3; ++row, r += 3) {
+        const d = node < 0 ? local[3 * row + axis] : R[r] * local[axis] + R[r + 1] * local[3 + axis] + R[r + 2] * local[6 + axis];
+        out[row] = table.x[3 * point + row];
+        out[3 + row] = out[row] + length * d;
+      }
+    },
+  }));
+}
+
+/** The rim of a beam's section at a station, `wider` than the beam. The beam itself is moved before. */
+export function section({ id, curve, width, height }: BeamItem, station: number, wider: number): LineItem {
+  const at = 9 * station, a = wider * width, b = wider * height;
+  const corners = [[a, b], [-a, b], [-a, -b], [a, -b], [a, b]];
+  return {
+    id,
+    corners: corners.length,
+    fill(out) {
+      const s = curve.stations;
+      corners.forEach(([u, v], i) => {
+        for (let k = 0; k < 3; ++k) out[3 * i + k] = s[at + k] + u * s[at + 3 + k] + v * s[at + 6 + k];
+      });
     },
   };
 }

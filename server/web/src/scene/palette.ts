@@ -8,6 +8,7 @@ export interface Palette {
   body: string;
   joint: string;
   beam: string;
+  section: string;
   spring: string;
   hydraulic: string;
   shell: string;
@@ -17,6 +18,10 @@ export interface Palette {
   flexible: string;
   strained: string;
   velocity: string;
+  /** Axes. */
+  x: string;
+  y: string;
+  z: string;
   other: string;
   trail: string;
   selected: string;
@@ -24,12 +29,13 @@ export interface Palette {
 
 export const DARK: Palette = {
   background: '#10151c',
-  grid: '#27313d',
+  grid: '#3a4858',
   node: '#e6edf3',
   link: '#7d8b99',
   body: '#6f93b8',
   joint: '#f0a13c',
   beam: '#35c2a8',
+  section: '#b9f0e4',
   spring: '#c9b458',
   hydraulic: '#d86f9a',
   shell: '#4fa8d8',
@@ -39,6 +45,9 @@ export const DARK: Palette = {
   flexible: '#5cb8ff',
   strained: '#ffb347',
   velocity: '#4fd1c5',
+  x: '#ff6b70',
+  y: '#4cc38a',
+  z: '#5aa2ff',
   other: '#9aa7b4',
   trail: '#ffd166',
   selected: '#ffe14d',
@@ -46,12 +55,13 @@ export const DARK: Palette = {
 
 export const LIGHT: Palette = {
   background: '#f3f6f9',
-  grid: '#cdd7e0',
+  grid: '#a9b8c6',
   node: '#1c2733',
   link: '#7c8894',
   body: '#5f86ad',
   joint: '#c96f00',
   beam: '#00836c',
+  section: '#00473b',
   spring: '#8a7400',
   hydraulic: '#b8336a',
   shell: '#1f7fb8',
@@ -61,6 +71,9 @@ export const LIGHT: Palette = {
   flexible: '#1469b8',
   strained: '#c44f00',
   velocity: '#007f86',
+  x: '#c62a2f',
+  y: '#18794e',
+  z: '#0b5cc4',
   other: '#6a7785',
   trail: '#b07a00',
   selected: '#d6006c',

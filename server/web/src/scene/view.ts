@@ -5,7 +5,7 @@ import { LineMaterial } from 'three/examples/jsm/lines/LineMaterial.js';
 import type { Vec3 } from '../algebra';
 import { initialPose, positionOf, type Geometry, type Pose } from '../geometry';
 import { FlexibleBatch } from './batches/flexible';
-import { Drawn, type Layer } from './build';
+import { ASKED_FOR, Drawn, type Layer } from './build';
 import { Grid } from './grid';
 import type { Palette } from './palette';
 import { isSoftware, Quality, rendererName } from './quality';
@@ -22,6 +22,8 @@ export const VIEWS = {
 } as const;
 export type ViewName = keyof typeof VIEWS;
 
+type HandleOf = (name: string) => number | undefined;
+
 const NEAR = 0.01, FAR = 100;  // times the model's extent
 
 export class View {
@@ -36,7 +38,8 @@ export class View {
   private controls: OrbitControls;
   private readonly triad = triad();
   private readonly triadCamera = new THREE.PerspectiveCamera(30, 1, 0.1, 10);
-  private readonly hidden = new Set<Layer>();
+  private readonly hidden = new Set<Layer>(ASKED_FOR);
+  private handleOf: HandleOf = () => undefined;
   private grid?: Grid;
   private drawn?: Drawn;
   private ghost?: Drawn;
@@ -81,10 +84,11 @@ export class View {
 
   // ---- what is shown
 
-  show(geometry: Geometry, keepView = false): void {
+  show(geometry: Geometry, handleOf: HandleOf, keepView = false): void {
     this.clear();
     this.geometry = geometry;
-    this.drawn = new Drawn(geometry, this.palette);
+    this.handleOf = handleOf;
+    this.drawn = new Drawn(geometry, this.palette, handleOf);
     this.addBatches(this.drawn, 1);
     this.trails = new Trails(new THREE.Color(this.palette.trail));
     this.scene.add(this.trails.object);
@@ -98,7 +102,7 @@ export class View {
   /** Another simulation in the same picture, pale. */
   compare(geometry: Geometry | undefined): void {
     if (this.ghost) this.removeBatches(this.ghost);
-    this.ghost = geometry && new Drawn(geometry, this.palette);
+    this.ghost = geometry && new Drawn(geometry, this.palette, () => undefined);
     if (this.ghost) this.addBatches(this.ghost, 0.25);
     if (geometry) this.setGhostPose(initialPose(geometry.nodes));
     this.invalidate();
@@ -153,12 +157,17 @@ export class View {
     this.palette = palette;
     if (!this.geometry) return this.invalidate();
     const pose = this.pose, ghostPose = this.ghostPose, grid = this.grid?.object.visible ?? true;
-    this.show(this.geometry, true);
+    this.show(this.geometry, this.handleOf, true);
     if (pose) this.setPose(pose);
     if (ghostPose) this.setGhostPose(ghostPose);
     this.setGrid(grid);
     this.hidden.forEach((layer) => this.setLayer(layer, false));
     this.select(this.selected);
+  }
+
+  /** Handles of the variables that a layer needs besides the poses of nodes. */
+  needs(layer: Layer): number[] {
+    return this.drawn?.needs(layer) ?? [];
   }
 
   /** Layers that have something in them. */

@@ -9,6 +9,8 @@ import { writeBar } from './matrices';
 export interface ArrowItem {
   id: string;
   point: number;
+  /** Handles of the variables that `read` needs. */
+  handles: number[];
   /** Its global components at a pose. */
   read(pose: Pose, out: number[]): void;
 }
@@ -28,7 +30,7 @@ export class ArrowBatch implements Batch {
   private readonly direction = [0, 0, 1];
   private readonly place = [0, 0, 0];
 
-  constructor(private readonly items: ArrowItem[], private readonly points: Points, private readonly colour: THREE.Color, private readonly reach: number, private readonly tipAtPoint: boolean) {
+  constructor(readonly items: ArrowItem[], private readonly points: Points, private readonly colour: THREE.Color, private readonly reach: number, private readonly tipAtPoint: boolean) {
     this.shafts = solids(SHAFT, items.length);
     this.heads = solids(HEAD, items.length);
     this.vectors = items.map(() => [0, 0, 0]);
