@@ -1,6 +1,6 @@
 /** A daemon with a deck, and a browser before it. */
 import { spawn, type ChildProcess } from 'node:child_process';
-import { readdirSync } from 'node:fs';
+import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { chromium, type Browser, type Page } from 'playwright-core';
 
@@ -9,6 +9,12 @@ const ROOT = fileURLToPath(new URL('../../..', import.meta.url));
 const BIN = process.env.MBCOSIM_BIN ?? `${ROOT}/build/bin`;
 export const MODELS = `${ROOT}/client_examples/models`;
 export const decks = (): string[] => readdirSync(MODELS).filter((name) => name.endsWith('.mbd')).sort();
+
+interface VariableOfJson {
+  name: string;
+  handle: number;
+  size: number;
+}
 
 /** `mbcosim view DECK`. */
 export class View {
@@ -42,21 +48,27 @@ export class View {
   }
 
   /** A unary call in JSON. */
-  async call<T>(method: string, request: object): Promise<T> {
-    const reply = await fetch(`${this.origin}/mbcosim.v1.${method}`, {
-      method: 'POST',
-      headers: { 'Content-Type': 'application/json', Authorization: `Bearer ${this.token}` },
-      body: JSON.stringify(request),
-    });
-    if (!reply.ok) throw new Error(`${method}: ${reply.status} ${await reply.text()}`);
-    return (await reply.json()) as T;
+  call<T>(method: string, request: object): Promise<T> {
+    return call(this.origin, this.token, method, request);
+  }
+
+  /** All pages of a model's variables. */
+  async variables(simulation = this.simulation): Promise<VariableOfJson[]> {
+    const all: VariableOfJson[] = [];
+    let pageToken = '';
+    do {
+      const page = await this.call<{ variables?: VariableOfJson[]; nextPageToken?: string }>('Simulations/DescribeSimulation', { name: simulation, pageToken });
+      all.push(...(page.variables ?? []));
+      pageToken = page.nextPageToken ?? '';
+    } while (pageToken);
+    return all;
   }
 
   /** Values of variables at the last accepted step, by name. */
-  async read(names: string[]): Promise<{ step: number; time: number; values: Record<string, number[]> }> {
-    const { variables } = await this.call<{ variables: { name: string; handle: number; size: number }[] }>('Simulations/DescribeSimulation', { name: this.simulation });
+  async read(names: string[], simulation = this.simulation): Promise<{ step: number; time: number; values: Record<string, number[]> }> {
+    const variables = await this.variables(simulation);
     const chosen = names.map((name) => variables.find((variable) => variable.name === name) ?? fail(`no variable ${name}`));
-    const reply = await this.call<{ step: string; timeS: number; values: number[] }>('Simulations/ReadVariables', { simulation: this.simulation, handles: chosen.map((variable) => variable.handle) });
+    const reply = await this.call<{ step: string; timeS: number; values: number[] }>('Simulations/ReadVariables', { simulation, handles: chosen.map((variable) => variable.handle) });
     const values: Record<string, number[]> = {};
     let at = 0;
     for (const { name, size } of chosen) values[name] = reply.values.slice(at, (at += size));
@@ -69,6 +81,58 @@ export class View {
     this.child.kill('SIGTERM');
     await ended;
   }
+}
+
+/** `mbcosimd` at a port of the caller's, with one token. It can be started again where it was. */
+export class Daemon {
+  readonly token = 'a-token-of-the-tests';
+  private child?: ChildProcess;
+
+  constructor(private readonly folder: string, readonly port: number) {
+    writeFileSync(`${folder}/tokens`, `${this.token} control reader\n`);
+  }
+
+  get origin(): string {
+    return `http://127.0.0.1:${this.port}`;
+  }
+
+  async start(): Promise<void> {
+    const child = spawn(`${BIN}/mbcosimd`, ['--listen', `unix:${this.folder}/socket`, '--http', `127.0.0.1:${this.port}`, '--tokens', `${this.folder}/tokens`], { stdio: 'ignore' });
+    this.child = child;
+    const end = Date.now() + 20_000 * FACTOR;
+    while (!(await fetch(`${this.origin}/healthz`).then((reply) => reply.ok, () => false))) {
+      if (child.exitCode !== null || Date.now() > end) throw new Error(`the daemon does not start: ${child.exitCode}`);
+      await new Promise((resolve) => setTimeout(resolve, 50));
+    }
+  }
+
+  async kill(): Promise<void> {
+    if (!this.child || this.child.exitCode !== null || this.child.signalCode !== null) return;
+    const ended = new Promise((resolve) => this.child?.on('exit', resolve));
+    this.child.kill('SIGKILL');
+    await ended;
+  }
+}
+
+/** A unary call in JSON. */
+async function call<T>(origin: string, token: string, method: string, request: object): Promise<T> {
+  const reply = await fetch(`${origin}/mbcosim.v1.${method}`, {
+    method: 'POST',
+    headers: { 'Content-Type': 'application/json', Authorization: `Bearer ${token}` },
+    body: JSON.stringify(request),
+  });
+  if (!reply.ok) throw new Error(`${method}: ${reply.status} ${await reply.text()}`);
+  return (await reply.json()) as T;
+}
+
+/** Loads an example deck with whatever it includes; the simulation's name. */
+export async function create(server: { origin: string; token: string }, deck: string): Promise<string> {
+  const files = readdirSync(MODELS).filter((name) => name === deck || /\.(inc|fem)$/.test(name));
+  const { simulation } = await call<{ simulation: { name: string } }>(server.origin, server.token, 'Simulations/CreateSimulationInline', {
+    header: { bundleMainFile: deck, options: { displayName: deck } },
+    files: files.map((path) => ({ path, data: readFileSync(`${MODELS}/${path}`).toString('base64') })),
+  });
+  return simulation.name;
 }
 
 function fail(message: string): never {
@@ -119,7 +183,7 @@ interface Inside {
   mbcosim: {
     desk: {
       shown: { value?: { geometry: { nodes: { label: number }[] }; recording: { samples: { step: number; time: number }[] } } };
-      session?: { playing: { value: string } };
+      session?: { name: string; playing: { value: string } };
       sample?: { step: number; time: number };
     };
     scene: { view: { nodeMatrix(index: number): number[]; picture(): Promise<Blob>; drawCalls: number; layers(): string[] } };
@@ -133,6 +197,15 @@ export async function until<T>(page: Page, condition: (argument: T) => boolean, 
     if (Date.now() > end) throw new Error(`waited too long for ${condition}`);
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
+}
+
+/** Opens another simulation of the same daemon and waits until it is on show. */
+export async function turnTo(page: Page, simulation: string): Promise<void> {
+  await page.evaluate((name) => (location.hash = `simulation=${encodeURIComponent(name)}`), simulation);
+  await until(page, (name) => {
+    const { desk } = (window as unknown as Inside).mbcosim;
+    return desk.session?.name === name && desk.sample !== undefined;
+  }, simulation);
 }
 
 /** Waits until a simulation is on show. */

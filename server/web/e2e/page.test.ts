@@ -5,7 +5,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { atStep, decks, drawCalls, drawnLayers, frameRate, launch, MODELS, picture, recorded, scene, shown, until, View, visit, type Visit } from './bench';
+import { atStep, create, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, launch, MODELS, picture, recorded, scene, shown, turnTo, until, View, visit, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -27,15 +27,24 @@ async function withPage(deck: string, work: (visit: Visit, view: View) => Promis
   }
 }
 
+/** A port that nobody listens at. */
+async function freePort(): Promise<number> {
+  const server = createServer();
+  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
+  const { port } = server.address() as { port: number };
+  await new Promise((resolve) => server.close(resolve));
+  return port;
+}
+
 /** Do the scene's node matrices equal what the service reads? */
-async function expectSceneOf(visited: Visit, view: View): Promise<void> {
+async function expectSceneOf(visited: Visit, view: View, simulation = view.simulation): Promise<void> {
   const drawn = await scene(visited.page);
   const labels = Object.keys(drawn.nodes);
   expect(labels.length).toBeGreaterThan(0);
-  const { variables } = await view.call<{ variables: { name: string }[] }>('Simulations/DescribeSimulation', { name: view.simulation });
+  const variables = await view.variables(simulation);
   const names = new Set(variables.map((variable) => variable.name));
   const wanted = labels.flatMap((label) => [`node.structural.${label}.X`, `node.structural.${label}.R`]).filter((name) => names.has(name));
-  const read = await view.read(wanted);
+  const read = await view.read(wanted, simulation);
   expect(drawn.step).toBe(read.step);
   for (const label of labels) {
     const matrix = drawn.nodes[label], X = read.values[`node.structural.${label}.X`], R = read.values[`node.structural.${label}.R`];
@@ -45,14 +54,41 @@ async function expectSceneOf(visited: Visit, view: View): Promise<void> {
   }
 }
 
+/** What the example decks have to be seen by, besides nodes. */
+const LAYERS: Record<string, string[]> = {
+  'pendulum.mbd': ['bodies', 'joints'],
+  'actuated_beam.mbd': ['beams', 'bodies', 'joints', 'lines'],
+  'modal_body.mbd': ['flexible'],
+  'cantilever_dead_load.mbd': ['beams', 'forces'],
+  'slider_crank.mbd': ['bodies', 'joints', 'reactions', 'velocities'],
+};
+
 describe('each example deck', () => {
+  let view: View, visited: Visit;
+  beforeAll(async () => {
+    view = await View.start('pendulum.mbd');
+    visited = await visit(browser, view.address);
+    await shown(visited.page);
+  });
+  afterAll(async () => {
+    await visited?.close();
+    await view?.stop();
+  });
+
   test.each(decks())('%s draws, and its nodes stand where the service says', async (deck) => {
-    await withPage(deck, async (visited, view) => {
-      await expectSceneOf(visited, view);
-      const { colours, covered } = await picture(visited.page);
-      expect(colours).toBeGreaterThan(20);
-      expect(covered).toBeGreaterThan(0.002);
-    });
+    const simulation = await create(view, deck);
+    await turnTo(visited.page, simulation);
+    await expectSceneOf(visited, view, simulation);
+    const { colours, covered } = await picture(visited.page);
+    expect(colours).toBeGreaterThan(20);
+    expect(covered).toBeGreaterThan(0.002);
+    expect(await drawnLayers(visited.page)).toEqual(expect.arrayContaining(['nodes', ...(LAYERS[deck] ?? [])]));
+    await visited.page.getByRole('button', { name: 'One step (S)' }).click();
+    await atStep(visited.page, 1);
+    await expectSceneOf(visited, view, simulation);
+    expect(visited.faults).toEqual([]);
+    await turnTo(visited.page, view.simulation);
+    await view.call('Simulations/DeleteSimulation', { name: simulation });
   });
 });
 
@@ -90,19 +126,6 @@ describe('a thousand bodies', () => {
       console.log(`1000 bodies: ${(await frameRate(page, 3)).toFixed(1)} pictures a second`);
     });
     rmSync(folder, { recursive: true });
-  });
-});
-
-describe('shapes', () => {
-  test.each([
-    ['pendulum.mbd', ['bodies', 'joints', 'nodes']],
-    ['actuated_beam.mbd', ['bodies', 'joints', 'lines', 'nodes']],
-    ['modal_body.mbd', ['flexible', 'nodes']],
-    ['cantilever_dead_load.mbd', ['beams', 'forces', 'nodes']],
-  ])('%s has %j', async (deck, layers) => {
-    await withPage(deck, async ({ page }) => {
-      expect(await drawnLayers(page)).toEqual(expect.arrayContaining(layers));
-    });
   });
 });
 
@@ -378,6 +401,90 @@ describe('a daemon that is gone', () => {
     await page.getByRole('slider', { name: 'Time looked at' }).fill('0');
     await atStep(page, 0);
     await visited.close();
+  });
+});
+
+describe('a daemon that is started again', () => {
+  test('is found again by the page, which says what is gone and opens what is there', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    const daemon = new Daemon(folder, await freePort());
+    try {
+      await daemon.start();
+      const first = await create(daemon, 'pendulum.mbd');
+      const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(first)}`);
+      await shown(page);
+      await daemon.kill();
+      await page.getByText('The daemon does not answer; trying again.').waitFor();
+      await daemon.start();
+      await page.getByText('The daemon does not know this simulation any more.').waitFor();
+      const second = await create(daemon, 'heavy_top.mbd');
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      await page.getByRole('button', { name: 'heavy_top.mbd' }).first().click();
+      await turnTo(page, second);
+      await page.getByRole('button', { name: 'One step (S)' }).click();
+      await atStep(page, 1);
+      await close();
+    } finally {
+      await daemon.kill();
+      rmSync(folder, { recursive: true });
+    }
+  });
+});
+
+describe('a tab that stops reading', () => {
+  /** Wall time of each of `count` steps, in milliseconds, sorted. */
+  async function steps(view: View, count: number): Promise<number[]> {
+    const times: number[] = [];
+    for (let i = 0; i < count; ++i) {
+      const start = performance.now();
+      await view.call('Simulations/Step', { simulation: view.simulation, steps: 1 });
+      times.push(performance.now() - start);
+    }
+    return times.sort((a, b) => a - b);
+  }
+
+  test('does not slow the steps of others', async () => {
+    const view = await View.start('pendulum.mbd');
+    try {
+      const visited = await visit(browser, view.address);
+      await shown(visited.page);
+      await steps(view, 20);
+      const reading = await steps(view, 200);
+      const debug = await visited.page.context().newCDPSession(visited.page);
+      await debug.send('Debugger.enable');
+      await debug.send('Debugger.pause');
+      const evaluated = visited.page.evaluate(() => 1);  // the pause begins with the next statement
+      const stopped = await steps(view, 200);
+      const p99 = (times: number[]) => times[Math.floor(0.99 * times.length)], middle = (times: number[]) => times[times.length >> 1];
+      console.log(`a step beside a tab that reads: median ${middle(reading).toFixed(2)} ms, p99 ${p99(reading).toFixed(2)} ms; that has stopped: ${middle(stopped).toFixed(2)} ms, ${p99(stopped).toFixed(2)} ms`);
+      expect(middle(stopped)).toBeLessThan(2 * middle(reading) + 1);
+      expect(p99(stopped)).toBeLessThan(2 * p99(reading) + 5 * FACTOR);
+      await debug.send('Debugger.resume');
+      await evaluated;
+      await atStep(visited.page, 420);
+      await visited.close();
+    } finally {
+      await view.stop();
+    }
+  });
+});
+
+describe('layers', () => {
+  test('that are asked for show reactions, velocities, axes and names', async () => {
+    await withPage('slider_crank.mbd', async (visited) => {
+      const { page } = visited;
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      const before = await picture(page);
+      await page.getByRole('button', { name: 'Show' }).click();
+      for (const name of ['reactions of joints', 'velocities of nodes', 'axes of nodes and joints', 'names']) await page.getByLabel(name, { exact: true }).check();
+      await until(page, () => document.querySelectorAll('.labels span').length >= 3, undefined);
+      const end = Date.now() + 20_000;
+      let after = before;
+      while (after.covered <= before.covered * 1.02 && Date.now() < end) after = await picture(page);
+      expect(after.covered).toBeGreaterThan(before.covered * 1.02);
+      expect(await page.locator('.labels').textContent()).toContain('spherical hinge 2');
+    });
   });
 });
 

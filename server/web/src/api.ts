@@ -3,6 +3,7 @@ import { fromBinary } from '@bufbuild/protobuf';
 import { Code, ConnectError, createClient } from '@connectrpc/connect';
 import { createConnectTransport } from '@connectrpc/connect-web';
 import { DeckDiagnosticsSchema, ErrorInfoSchema, SolverFailureSchema, type Diagnostic, type SolverFailure } from './gen/mbcosim/v1/common_pb';
+import { Events } from './gen/mbcosim/v1/events_pb';
 import { Geometry } from './gen/mbcosim/v1/geometry_pb';
 import { Simulations, type ModelDescription } from './gen/mbcosim/v1/simulations_pb';
 import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
@@ -13,6 +14,7 @@ const transport = createConnectTransport({ baseUrl: globalThis.location?.origin 
 export const simulations = createClient(Simulations, transport);
 export const telemetry = createClient(Telemetry, transport);
 export const geometry = createClient(Geometry, transport);
+export const events = createClient(Events, transport);
 
 /** All pages of a model's description as one. */
 export async function describeModel(name: string): Promise<ModelDescription> {

@@ -23,6 +23,8 @@ const KEYS: [string, string][] = [
   ['H', 'whole model'], ['1 2 3', 'views along the axes'], ['O', 'parallel projection'], ['D', 'dark and light'], ['?', 'these keys'],
 ];
 
+const GONE = 'The daemon does not know this simulation any more. What was seen of it can still be looked at; others are in the list of simulations.';
+
 export class App {
   readonly desk = new Desk();
   readonly scene = new ScenePanel(this.desk);
@@ -158,7 +160,7 @@ export class App {
     this.name.textContent = shown?.title ?? '';
     document.title = shown ? `${shown.title} – mbcosim` : 'mbcosim';
     this.unwatch = session
-      ? [session.info.watch(() => this.updateState()), session.connected.watch(() => this.updateState()), session.failure.watch(() => this.updateState())]
+      ? [session.info.watch(() => this.updateState()), session.connected.watch(() => this.updateState()), session.gone.watch(() => this.updateState()), session.failure.watch(() => this.updateState())]
       : [];
     this.updateState();
   }
@@ -172,16 +174,16 @@ export class App {
       this.banner.classList.add('hidden');
       return;
     }
-    const state = session.connected.value ? STATES[session.info.value.state] ?? 'unknown' : 'lost';
+    const gone = session.gone.value, state = session.connected.value ? STATES[session.info.value.state] ?? 'unknown' : 'lost';
     this.chip.className = `chip ${state}`;
-    this.chip.textContent = state === 'lost' ? 'no connection' : state;
+    this.chip.textContent = gone ? 'gone' : state === 'lost' ? 'no connection' : state;
     const waits = session.info.value.waits.map((wait) => `waits ${wait.hasPeer ? 'for the peer of' : 'for a peer on'} port ${wait.port} since ${wait.seconds.toFixed(1)} s`);
     const failure = session.failure.value;
     this.banner.classList.toggle('hidden', waits.length === 0 && !failure && state !== 'lost');
     this.banner.classList.toggle('bad', failure !== undefined || state === 'lost');
     if (failure) this.banner.replaceChildren(h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)),
       iconButton('close', 'Close', () => (session.failure.value = undefined), { class: 'icon-button small' }));
-    else this.banner.replaceChildren(h('div', { class: 'text' }, state === 'lost' ? 'The daemon does not answer; trying again.' : waits.join('\n')));
+    else this.banner.replaceChildren(h('div', { class: 'text' }, gone ? GONE : state === 'lost' ? 'The daemon does not answer; trying again.' : waits.join('\n')));
   }
 
   private worst(): HTMLElement | string {

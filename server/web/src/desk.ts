@@ -16,6 +16,8 @@ export interface Plot {
   against?: Curve;
 }
 
+const CALM_MILLISECONDS = 100;
+
 export class Desk {
   readonly shown = new Signal<Shown | undefined>(undefined);
   /** Time looked at; undefined: the newest. */
@@ -25,6 +27,9 @@ export class Desk {
   readonly theme = new Signal<'dark' | 'light'>('dark');
   /** Once for each frame of the screen in which something changed. */
   readonly frame = new Signal(0);
+  /** A few times a second while something changes: for what is read, not watched. */
+  readonly calm = new Signal(0);
+  private calmed = true;
   private stale = false;
   private unwatch = () => {};
   private nextPlot = 1;
@@ -57,6 +62,16 @@ export class Desk {
       this.stale = false;
       this.frame.value += 1;
     });
+    this.invalidateCalm();
+  }
+
+  private invalidateCalm(): void {
+    if (!this.calmed) return;
+    this.calmed = false;
+    setTimeout(() => {
+      this.calmed = true;
+      this.calm.value += 1;
+    }, CALM_MILLISECONDS);
   }
 
   show(shown: Shown | undefined): void {

@@ -1,5 +1,5 @@
 /** A model's shape: points that hang on nodes, and what hangs on points. Plain data, as recordings keep it. */
-import { add, IDENTITY, inertiaEllipsoid, mat3, rotate, vec3, type Mat3, type Vec3 } from './algebra';
+import { add, IDENTITY, inertiaEllipsoid, mat3, multiply, rotate, vec3, type Mat3, type Vec3 } from './algebra';
 import { valueOf, type Layout, type Sample } from './recording';
 
 export interface NodeShape {
@@ -82,6 +82,11 @@ export function orientationOf(pose: Pose, node: number): Mat3 {
 export function pointAt(pose: Pose, point: PointShape): Vec3 {
   if (point.node < 0) return point.offset;
   return add(positionOf(pose, point.node), rotate(orientationOf(pose, point.node), point.offset));
+}
+
+/** Orientation of something that is fixed to a point: `local` to global. */
+export function orientationAt(pose: Pose, point: PointShape, local: Mat3): Mat3 {
+  return point.node < 0 ? local : multiply(orientationOf(pose, point.node), local);
 }
 
 /** The pose in which the model was described. */

@@ -1,5 +1,6 @@
 /** A simulation on the screen: what is known of it, what was seen of it, and what can be done with it. */
-import { describeModel, failureOf, simulations, telemetry, type Failure } from './api';
+import { describeModel, events, failureOf, simulations, telemetry, type Failure } from './api';
+import { tell } from './events';
 import { duration } from './duration';
 import { SimulationState, StepOutcome, type SimulationInfo, type Snapshot, type StepReply } from './gen/mbcosim/v1/simulations_pb';
 import { OverflowPolicy, type TelemetryBatch } from './gen/mbcosim/v1/telemetry_pb';
@@ -56,6 +57,8 @@ export class Session implements Shown {
   readonly failure = new Signal<Failure | undefined>(undefined);
   /** False while the daemon does not answer. */
   readonly connected = new Signal(true);
+  /** The daemon answers and does not know the simulation any more. */
+  readonly gone = new Signal(false);
 
   private layout: Layout;
   private readonly base: VariableInfo[] = [];
@@ -91,6 +94,7 @@ export class Session implements Shown {
     await session.read();
     void session.follow();
     void session.poll();
+    void session.watch();
     void session.refreshSnapshots();
     return session;
   }
@@ -158,6 +162,26 @@ export class Session implements Shown {
     }
   }
 
+  /** Follows what happens to the simulation, whoever makes it happen. */
+  private async watch(): Promise<void> {
+    let journal = '', afterSequence: bigint | undefined;
+    while (!this.ended.signal.aborted) {
+      try {
+        for await (const event of events.watchEvents({ simulation: this.name, journal, afterSequence }, { signal: this.ended.signal })) {
+          if (event.content.case === 'started') journal = event.content.value.journal;
+          else if (event.content.case === 'snapshot') void this.refreshSnapshots();
+          if (event.sequence > 0n) afterSequence = event.sequence;
+          const told = tell(event);
+          if (told) this.note(told.text, told.level);
+        }
+        return;  // the simulation is deleted
+      } catch {
+        if (this.ended.signal.aborted) return;
+        await pause(RETRY_MILLISECONDS);
+      }
+    }
+  }
+
   private every(): number {
     const speed = Number.isFinite(this.speed.value) ? this.speed.value : 1;
     return Math.max(1, Math.floor(speed / RATE / (this.model.step || 1)));
@@ -179,18 +203,25 @@ export class Session implements Shown {
       await pause(this.playing.value === 'no' ? 1000 : 400);
       try {
         this.info.value = await simulations.getSimulation({ name: this.name }, { timeoutMs: 5000, signal: this.ended.signal });
-        if (!this.connected.value) await this.read();
+        if (!this.connected.value || this.behind()) await this.read();
         this.connected.value = true;
       } catch (thrown) {
         const failure = failureOf(thrown);
         if (failure.cancelled) continue;
         this.connected.value = false;
         if (failure.reason === 'NO_SUCH_SIMULATION') {
+          this.gone.value = true;
           this.note('the simulation is gone', 'error');
           this.close();
         }
       }
     }
+  }
+
+  /** Whether the simulation rests at a step that telemetry, which leaves some out, did not bring. */
+  private behind(): boolean {
+    const { state, step } = this.info.value;
+    return state !== SimulationState.STEPPING && this.playing.value === 'no' && Number(step) !== this.recording.last?.step;
   }
 
   // ---- what is done
@@ -273,15 +304,15 @@ export class Session implements Shown {
     if (reply.stepsDone > 0n) this.keep(reply);
     if (reply.outcome === StepOutcome.ACCEPTED || reply.outcome === StepOutcome.INTERRUPTED) return;
     this.pause();
-    if (reply.outcome === StepOutcome.FINISHED) return this.note('the final time of the deck is reached');
-    this.tell({
+    if (reply.outcome === StepOutcome.FINISHED) return;
+    this.failure.value = {
       message: reply.failure?.message ?? 'the step failed',
       reason: StepOutcome[reply.outcome],
       metadata: {},
       diagnostics: [],
       solver: reply.failure,
       cancelled: false,
-    });
+    };
   }
 
   private keep(reply: StepReply): void {
@@ -308,8 +339,7 @@ export class Session implements Shown {
 
   async saveSnapshot(displayName: string): Promise<void> {
     await this.attempt(async () => {
-      const saved = await simulations.createSnapshot({ simulation: this.name, displayName });
-      this.note(`state saved at ${saved.timeS} s`);
+      await simulations.createSnapshot({ simulation: this.name, displayName });
     });
     await this.refreshSnapshots();
   }
@@ -321,7 +351,6 @@ export class Session implements Shown {
       this.failure.value = undefined;
       this.stream.abort();  // what is still on its way is of a time undone
       await this.read(true);
-      this.note(`back at ${snapshot.timeS} s`);
     });
   }
 

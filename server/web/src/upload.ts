@@ -16,10 +16,31 @@ export function chunks(files: readonly NamedFile[]): NamedFile[] {
   });
 }
 
-/** Files that can be a deck's main file: they have a `begin: data;` card. */
+/** Files that can be a deck's main file: they have a `begin: data;` card, or include a file that leads to one, and none of the others includes them. */
 export function mainFiles(files: readonly NamedFile[]): string[] {
   const decoder = new TextDecoder();
-  return files.filter(({ data }) => /^\s*begin\s*:\s*data\s*;/im.test(decoder.decode(data))).map(({ path }) => path);
+  const texts = new Map(files.map(({ path, data }) => [path, decoder.decode(data)]));
+  const includes = new Map([...texts].map(([path, text]) => [path, included(path, text).filter((other) => texts.has(other))]));
+  const leads = (path: string, seen: Set<string>): boolean => {
+    if (seen.has(path)) return false;
+    seen.add(path);
+    return /^\s*begin\s*:\s*data\s*;/im.test(texts.get(path) ?? '') || (includes.get(path) ?? []).some((other) => leads(other, seen));
+  };
+  const inside = new Set([...includes].flatMap(([path, others]) => others.filter((other) => other !== path)));
+  return files.map(({ path }) => path).filter((path) => !inside.has(path) && leads(path, new Set()));
+}
+
+/** Paths of the files that a deck's `include` cards name, which are relative to its own folder. */
+function included(path: string, text: string): string[] {
+  const folder = path.split('/').slice(0, -1);
+  return [...text.matchAll(/^\s*include\s*:\s*"([^"]+)"/gim)].map(([, name]) => {
+    const parts = [...folder];
+    for (const part of name.split('/')) {
+      if (part === '..') parts.pop();
+      else if (part !== '.') parts.push(part);
+    }
+    return parts.join('/');
+  });
 }
 
 /** The folder that all paths share is left out of them. */

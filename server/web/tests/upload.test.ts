@@ -13,6 +13,13 @@ describe('a deck from the disk', () => {
     expect(mainFiles([file('a.inc', 'set: real L = 1.;'), file('b.mbd', '# deck\n Begin : data ;\n'), file('c.fem', 'begin data')])).toEqual(['b.mbd']);
   });
 
+  test('has as main file the one that nobody includes, wherever the data card is', () => {
+    const files = [file('m/beam.inc', 'begin: data;'), file('m/load.mbd', 'set: real F = 1.;\n  include: "./parts/../beam.inc";'), file('m/parts/notes.txt', 'include: "load.mbd"')];
+    expect(mainFiles(files)).toEqual(['m/load.mbd']);
+    expect(mainFiles([...files, file('m/other.mbd', 'include: "beam.inc";')])).toEqual(['m/load.mbd', 'm/other.mbd']);
+    expect(mainFiles([file('a', 'begin: data;\ninclude: "a";')])).toEqual(['a']);
+  });
+
   test('is named without the folder that all files are in', () => {
     const paths = (...names: string[]) => withoutCommonFolder(names.map((name) => file(name))).map(({ path }) => path);
     expect(paths('m/a.mbd', 'm/sub/b.inc')).toEqual(['a.mbd', 'sub/b.inc']);

@@ -103,7 +103,7 @@ export class Home {
     const back = h('button', { type: 'button', class: 'button', onclick: () => this.welcome.classList.add('hidden') }, 'Back to the simulation');
     this.message.replaceChildren(
       this.desk.shown.value ? back : '',
-      h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)),
+      failure.diagnostics.length === 0 ? h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)) : '',
       diagnosticsList(failure.diagnostics));
   }
 

@@ -84,7 +84,7 @@ export function inputsPanel(desk: Desk): HTMLElement {
   panel.addEventListener('toggle', rebuild);
   desk.shown.watch(rebuild);
   desk.selected.watch(rebuild);
-  desk.frame.watch(update);
+  desk.calm.watch(update);
   return panel;
 }
 

@@ -79,8 +79,8 @@ class PlotView {
           { ...axis, size: 56, values: (_, ticks) => ticks.map((tick) => number(tick, 4)) },
         ],
         series: [
-          {},
-          ...this.plot.curves.map((curve, k) => ({ label: label(curve), stroke: colours[k % colours.length], width: 1.6, points: { show: false }, sorted: (this.plot.against ? 0 : 1) as 0 | 1 })),
+          { sorted: (this.plot.against ? 0 : 1) as 0 | 1 },
+          ...this.plot.curves.map((curve, k) => ({ label: label(curve), stroke: colours[k % colours.length], width: 1.6, points: { show: false } })),
         ],
         hooks: { draw: [(chart) => this.drawCursor(chart)] },
       },
@@ -144,6 +144,6 @@ export function plotsPanel(desk: Desk): HTMLElement {
   };
   desk.plots.watch(rebuild);
   desk.theme.watch(() => views.forEach((view) => view.rebuild()));
-  desk.frame.watch(() => views.forEach((view) => view.update()));
+  desk.calm.watch(() => views.forEach((view) => view.update()));
   return element;
 }

@@ -25,6 +25,7 @@ export class ScenePanel {
   /** Nodes whose paths are drawn, by index. */
   private readonly trails = new Set<number>();
   private readonly layers = new Map(LAYERS.map(([layer, name]) => [layer, check(name, !ASKED_FOR.includes(layer), (on) => this.setLayer(layer, on))]));
+  private readonly deformation = h('label');
   private readonly hud = h('div', { class: 'hud', role: 'status', 'aria-live': 'off' });
   private reader = new PoseReader([]);
   private other?: Session;
@@ -54,6 +55,7 @@ export class ScenePanel {
     this.view.show(shown.geometry, (name) => handles.get(name));
     const present = new Set(this.view.layers());
     for (const [layer, entry] of this.layers) entry.classList.toggle('hidden', !present.has(layer));
+    this.deformation.classList.toggle('hidden', !present.has('flexible'));
     for (const [layer, entry] of this.layers) if (entry.querySelector('input')?.checked) this.wantFor(layer);
   }
 
@@ -160,10 +162,12 @@ export class ScenePanel {
       scale.textContent = `× ${number(factor, 2)}`;
       this.view.setDeformation(factor);
     });
+    this.deformation.append('deformation', deformation, scale);
     const menu = h('div', { class: 'menu hidden' },
       ...this.layers.values(),
+      check('names', false, (on) => this.view.setLabels(on)),
       check('grid', true, (on) => this.view.setGrid(on)),
-      h('label', {}, 'deformation', deformation, scale));
+      this.deformation);
     const button = h('button', { type: 'button', class: 'button', 'aria-expanded': 'false', onclick: () => toggle(button, menu) }, icon('layers'), 'Show');
     const trail = h('button', { type: 'button', class: 'button', title: 'Draw the path of the selected node (T)', onclick: () => this.toggleTrail() }, icon('wave'), 'Trail');
     return h('div', { class: 'toolbar layers' }, h('div', { class: 'anchor' }, button, menu), trail);

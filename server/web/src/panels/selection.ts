@@ -53,7 +53,7 @@ export function selectionPanel(desk: Desk, follow: (id: string | undefined) => v
 
   desk.selected.watch(rebuild);
   desk.shown.watch(rebuild);
-  desk.frame.watch(update);
+  desk.calm.watch(update);
   return panel;
 }
 

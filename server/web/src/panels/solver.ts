@@ -24,7 +24,7 @@ export function solverPanel(desk: Desk): HTMLElement {
   const bar = h('div', { class: 'bar', role: 'img' });
   const legend = h('div', { class: 'legend' }, ...PARTS.map((part) => h('span', {}, h('i', { style: `background:${part.colour}` }), part.name)));
   const canvas = h('div', { style: 'height:130px' });
-  const panel = section('Solver', true, h('table', { class: 'values' }, facts), bar, legend, canvas);
+  const panel = section('Solver', true, h('table', { class: 'values' }, facts), bar, legend, h('div', { class: 'legend' }, h('span', { style: 'color:var(--chart-1)' }, 'iterations'), h('span', { class: 'spacer' }), h('span', { style: 'color:var(--chart-2)' }, 'residual')), canvas);
   let chart: uPlot | undefined;
   let unwatch = () => {};
 
@@ -49,8 +49,8 @@ export function solverPanel(desk: Desk): HTMLElement {
       {
         width: Math.max(canvas.clientWidth, 200),
         height: 130,
-        scales: { x: { time: false }, log: {} },
-        axes: [{ ...axis, size: 30 }, { ...axis, size: 28 }, { ...axis, size: 44, side: 1, scale: 'log', grid: { show: false }, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? `1e${number(tick)}` : '')) }],
+        scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(low ?? 0, 0), Math.max(high ?? 1, 1) + 1] }, log: { range: (_, low, high) => [Math.floor(low ?? -12), Math.ceil(high ?? -6)] } },
+        axes: [{ ...axis, size: 30 }, { ...axis, stroke: PARTS[0].colour, size: 28, incrs: [1, 2, 5, 10, 20, 50, 100] }, { ...axis, stroke: PARTS[1].colour, size: 48, side: 1, scale: 'log', grid: { show: false }, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? `1e${tick}` : '')) }],
         series: [{}, { label: 'iterations', stroke: PARTS[0].colour, width: 1.4, points: { show: false } }, { label: 'residual', stroke: PARTS[1].colour, scale: 'log', width: 1.2, points: { show: false } }],
         cursor: { show: false },
       },

@@ -71,7 +71,8 @@ export class Drawn {
 
   /** Loads push with their tips; velocities begin at their nodes. */
   private addArrows(layer: Layer, list: ArrowItem[], name: keyof Palette): void {
-    if (list.length > 0) this.add(layer, new ArrowBatch(list, this.items.points, this.colour(name), ARROW * this.items.geometry.extent, layer === 'forces'));
+    const look = { reach: ARROW * this.items.geometry.extent, tipAtPoint: layer === 'forces', heads: name === 'moment' ? 2 : 1 } as const;
+    if (list.length > 0) this.add(layer, new ArrowBatch(list, this.items.points, this.colour(name), look));
   }
 
   /** Handles of the variables that a layer needs besides the poses of nodes. */

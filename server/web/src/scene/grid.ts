@@ -1,6 +1,7 @@
 /** The ground: lines at round distances that fade out, in one call. */
 import * as THREE from 'three';
-import type { Geometry } from '../geometry';
+import { inertiaEllipsoid } from '../algebra';
+import { initialPose, orientationAt, pointAt, type Geometry } from '../geometry';
 import type { Palette } from './palette';
 
 /** Parts of a cell between its lines. */
@@ -19,7 +20,7 @@ export class Grid {
     const reach = Math.ceil((1.2 * geometry.extent) / this.cell) * this.cell;
     const lines = this.lines(reach, new THREE.Color(palette.grid), new THREE.Color(palette.background));
     this.object = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ vertexColors: true }));
-    const lowest = geometry.nodes.reduce((least, node) => Math.min(least, node.position[2]), 0);
+    const lowest = lowestOf(geometry);
     const [x, y] = geometry.centre.map((value) => Math.round(value / this.cell) * this.cell);
     this.object.position.set(x, y, lowest - 0.02 * geometry.extent);
     this.object.renderOrder = -1;
@@ -46,4 +47,16 @@ export class Grid {
     geometry.setAttribute('color', new THREE.Float32BufferAttribute(colours, 3));
     return geometry;
   }
+}
+
+/** Height of the lowest node or ellipsoid; at most 0. */
+function lowestOf({ nodes, elements, bodyScale }: Geometry): number {
+  const pose = initialPose(nodes);
+  let lowest = nodes.reduce((least, node) => Math.min(least, node.position[2]), 0);
+  for (const { masses, points } of elements)
+    for (const { point, mass, moments, axes } of masses) {
+      const R = orientationAt(pose, points[point], axes), sizes = inertiaEllipsoid(mass, moments);
+      lowest = Math.min(lowest, pointAt(pose, points[point])[2] - bodyScale * Math.hypot(R[6] * sizes[0], R[7] * sizes[1], R[8] * sizes[2]));
+    }
+  return lowest;
 }

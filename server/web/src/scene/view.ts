@@ -7,6 +7,7 @@ import { initialPose, positionOf, type Geometry, type Pose } from '../geometry';
 import { FlexibleBatch } from './batches/flexible';
 import { ASKED_FOR, Drawn, type Layer } from './build';
 import { Grid } from './grid';
+import { Labels } from './labels';
 import type { Palette } from './palette';
 import { isSoftware, Quality, rendererName } from './quality';
 import { drawnBy } from './solids';
@@ -44,6 +45,8 @@ export class View {
   private drawn?: Drawn;
   private ghost?: Drawn;
   private trails?: Trails;
+  private labels?: Labels;
+  private labelled = false;
   private geometry?: Geometry;
   private pose?: Pose;
   private ghostPose?: Pose;
@@ -95,6 +98,7 @@ export class View {
     this.grid = new Grid(geometry, this.palette);
     this.scene.add(this.grid.object);
     this.setPose(initialPose(geometry.nodes));
+    this.setLabels(this.labelled);
     this.setDeformation(this.deformation);
     if (!keepView) this.look('iso');
   }
@@ -111,6 +115,7 @@ export class View {
   setPose(pose: Pose): void {
     this.pose = pose;
     this.drawn?.update(pose);
+    this.labels?.move(pose);
     this.moveWithNode();
     this.invalidate();
   }
@@ -137,6 +142,16 @@ export class View {
 
   setGrid(visible: boolean): void {
     if (this.grid) this.grid.object.visible = visible;
+    this.invalidate();
+  }
+
+  /** Names beside nodes and elements. */
+  setLabels(visible: boolean): void {
+    this.labelled = visible;
+    this.labels?.element.remove();
+    this.labels = visible && this.geometry ? new Labels(this.geometry) : undefined;
+    if (this.labels) this.canvas.after(this.labels.element);
+    if (this.pose) this.labels?.move(this.pose);
     this.invalidate();
   }
 
@@ -367,6 +382,7 @@ export class View {
     this.renderer.clearDepth();
     this.renderer.setViewport(8, 8, corner, corner);
     this.renderer.render(this.triad, this.triadCamera);
+    this.labels?.place(this.camera, width, height);
     this.calls = this.renderer.info.render.calls;
   }
 
