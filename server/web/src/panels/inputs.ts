@@ -46,7 +46,7 @@ export function inputsPanel(desk: Desk): HTMLElement {
       const slider = h('input', { type: 'range', min: -10, max: 10, step: 'any', 'aria-label': name });
       const field = h('input', { type: 'number', step: 'any', 'aria-label': `${name}, value` });
       slider.addEventListener('input', () => {
-        field.value = number(slider.valueAsNumber, 4).replace('−', '-');
+        field.value = number(slider.valueAsNumber, 4).replaceAll('−', '-');
         write(k, slider.valueAsNumber);
       });
       field.addEventListener('change', () => {
@@ -65,7 +65,7 @@ export function inputsPanel(desk: Desk): HTMLElement {
         if (document.activeElement === slider || document.activeElement === field) return;
         widen(slider, value);
         slider.value = String(value);
-        field.value = number(value, 6).replace('−', '-');
+        field.value = number(value, 6).replaceAll('−', '-');
       }),
     });
     return h('div', {}, ...lines);
