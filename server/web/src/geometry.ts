@@ -30,7 +30,8 @@ export interface ElementShape {
   name: string;
   points: PointShape[];
   frames: { name: string; point: number; orientation: Mat3 }[];
-  lines: { name: string; points: number[]; curved: boolean }[];
+  /** `value`: handle of the variable that may colour the line. */
+  lines: { name: string; points: number[]; curved: boolean; value?: number }[];
   surfaces: { name: string; points: number[] }[];
   masses: { point: number; mass: number; moments: Vec3; axes: Mat3 }[];
   arrows: { point: number; handle: number; sign: number; moment: boolean }[];

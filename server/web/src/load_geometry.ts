@@ -50,7 +50,7 @@ function elementShape(element: ElementGeometry, indexOf: Map<number, number>): E
       return { name: point.name, node, offset: vec3(point.offset) };
     }),
     frames: element.frames.map((frame) => ({ name: frame.name, point: frame.point, orientation: mat3(frame.orientation) })),
-    lines: element.lines.map((line) => ({ name: line.name, points: [...line.points], curved: line.curved })),
+    lines: element.lines.map((line) => ({ name: line.name, points: [...line.points], curved: line.curved, value: line.valueHandle })),
     surfaces: element.surfaces.map((surface) => ({ name: surface.name, points: [...surface.points] })),
     masses: element.masses.map((mass) => ({
       point: mass.point,

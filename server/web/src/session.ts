@@ -78,7 +78,10 @@ export class Session implements Shown {
       if (variable) this.base.push(variable);
     };
     for (const node of geometry.nodes) follow(node.positionHandle), follow(node.orientationHandle);
-    for (const element of geometry.elements) for (const arrow of element.arrows) follow(arrow.handle);
+    for (const element of geometry.elements) {
+      for (const arrow of element.arrows) follow(arrow.handle);
+      for (const line of element.lines) follow(line.value);
+    }
     for (const body of geometry.bodies) body.amplitudes.forEach(follow);
     this.layout = new Layout(this.base);
   }
@@ -150,7 +153,7 @@ export class Session implements Shown {
       const layout = this.layout;
       try {
         const batches = telemetry.subscribe(
-          { simulation: this.name, handles: [...layout.handles], every: BigInt(this.every()), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64 },
+          { simulation: this.name, handles: [...layout.handles], every: BigInt(this.every()), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64, minimumInterval: duration(1 / RATE) },
           { signal: this.stream.signal },
         );
         for await (const batch of batches) this.takeBatch(batch, layout);

@@ -7,6 +7,7 @@ import { GlyphBatch } from '../src/scene/batches/glyphs';
 import { coil, straight } from '../src/scene/line_items';
 import { Points } from '../src/scene/points';
 import { drawnBy, solids } from '../src/scene/solids';
+import { ValueScale } from '../src/scene/value_colour';
 
 const nodes: NodeShape[] = [
   { label: 1, kind: 'static', name: '', position: [1, 2, 3], orientation: rotationOf([0.3, -0.7, 1.1]), positionHandle: 0 },
@@ -81,6 +82,22 @@ describe('solids', () => {
       d.forEach((value, k) => expect(end.getComponent(k)).toBeCloseTo([1, 2, 3][k] + 5 * value, 5));
       expect(Math.abs(matrix.determinant())).toBeCloseTo(5 * 0.25, 5);
     }
+  });
+});
+
+describe('colours of values', () => {
+  const low = new THREE.Color(0, 0, 1), high = new THREE.Color(1, 0, 0);
+
+  test('lie between those of the least and the largest seen', () => {
+    const scale = new ValueScale(low, high), out = new THREE.Color();
+    scale.colour(5, out);
+    expect(out.toArray()).toEqual([0.5, 0, 0.5]);
+    scale.colour(15, out);
+    expect(out.toArray()).toEqual([1, 0, 0]);
+    scale.colour(5, out);
+    expect(out.toArray()).toEqual([0, 0, 1]);
+    scale.colour(NaN, out.set(0x00ff00));
+    expect(out.toArray()).toEqual([0, 1, 0]);
   });
 });
 

@@ -39,7 +39,7 @@ export class Drawn {
     if (items.beams.length > 0) this.add('beams', new BeamBatch(items.beams, items.points, this.colour('beam')));
     this.addLines('beams', items.sections, 'section', 1.2);
     this.addLines('lines', items.springs, 'spring', 2);
-    if (items.barrels.length > 0) this.add('lines', new BarBatch(items.barrels, items.points, this.colour('hydraulic'), 0.55));
+    if (items.barrels.length > 0) this.add('lines', new BarBatch(items.barrels, items.points, this.colour('hydraulic'), 0.8));
     if (items.rods.length > 0) this.add('lines', new BarBatch(items.rods, items.points, this.colour('node')));
     this.addLines('lines', items.others, 'other', 2.5);
     if (items.faces.length > 0) this.add('surfaces', new FaceBatch(items.faces, items.points, this.colour('shell')));

@@ -60,14 +60,33 @@ const PLAIN: Partial<Record<GlyphName, (d: Detail) => THREE.BufferGeometry>> = {
   sphere: () => new THREE.SphereGeometry(1, 8, 5),
 };
 
+/** What is drawn in place of all the above where there are very many: some twenty triangles each. */
+const PLAINEST: Partial<Record<GlyphName, () => THREE.BufferGeometry>> = {
+  node: () => new THREE.OctahedronGeometry(0.5),
+  sphere: () => new THREE.IcosahedronGeometry(1),
+  ball: () => new THREE.OctahedronGeometry(0.45),
+  hinge: () => new THREE.CylinderGeometry(0.28, 0.28, 1.1, 5).rotateX(Math.PI / 2),
+  octahedron: () => new THREE.OctahedronGeometry(0.5),
+  plate: () => new THREE.BoxGeometry(1.1, 1.1, 0.06),
+  slider: () => new THREE.BoxGeometry(0.4, 0.4, 1.2),
+  spring: () => new THREE.CylinderGeometry(0.25, 0.25, 0.9, 5).rotateX(Math.PI / 2),
+};
+
 /** Above so many of a kind, each is drawn with fewer corners. */
 export const MANY = 120;
+const VERY_MANY = 400;
 const made = new Map<string, THREE.BufferGeometry>();
 
+function make(name: GlyphName, count: number): THREE.BufferGeometry {
+  if (count > VERY_MANY) return (PLAINEST[name] ?? (() => new THREE.BoxGeometry(0.6, 0.6, 0.6)))();
+  if (count > MANY) return (PLAIN[name] ?? MAKERS[name])(COARSE);
+  return MAKERS[name](FINE);
+}
+
 export function glyph(name: GlyphName, count: number): THREE.BufferGeometry {
-  const detail = count > MANY ? COARSE : FINE, key = `${name} ${count > MANY}`;
+  const key = `${name} ${count > VERY_MANY} ${count > MANY}`;
   let geometry = made.get(key);
-  if (!geometry) made.set(key, (geometry = (count > MANY && PLAIN[name] ? PLAIN[name] : MAKERS[name])(detail)));
+  if (!geometry) made.set(key, (geometry = make(name, count)));
   return geometry;
 }
 

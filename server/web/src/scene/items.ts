@@ -1,4 +1,5 @@
 /** From a model's shape to the things that are drawn, by kind. */
+import * as THREE from 'three';
 import { IDENTITY, inertiaEllipsoid, norm, type Mat3, type Vec3 } from '../algebra';
 import { BeamCurve } from '../beam_curve';
 import { initialPose, orientationOf, type ElementShape, type Geometry, type NodeShape, type Pose } from '../geometry';
@@ -13,6 +14,7 @@ import { elementGlyph, type GlyphName } from './glyphs';
 import { axes, coil, section, straight } from './line_items';
 import type { Palette } from './palette';
 import { Points } from './points';
+import { ValueScale } from './value_colour';
 
 /** Stations along a beam; fewer where there are many. */
 const BEAM_STATIONS = 13, MANY_BEAMS = 150;
@@ -39,12 +41,14 @@ export class Items {
   /** Glyphs' size. */
   readonly size: number;
   private readonly pose: Pose;
+  private readonly pressures: ValueScale;
   private readonly stations: number;
 
   /** `handleOf`: handle of a variable by its name. */
   constructor(readonly geometry: Geometry, private readonly palette: Palette, private readonly handleOf: (name: string) => number | undefined) {
     this.points = new Points(geometry.nodes.length);
     this.size = glyphSize(geometry);
+    this.pressures = new ValueScale(new THREE.Color(palette.low), new THREE.Color(palette.high));
     this.pose = initialPose(geometry.nodes);
     const beams = geometry.elements.reduce((sum, element) => sum + Number(isBeam(element)), 0);
     this.stations = beams > MANY_BEAMS ? 5 : BEAM_STATIONS;
@@ -59,7 +63,8 @@ export class Items {
       if (shape.node >= 0 && norm(shape.offset) > 0) this.links.push(straight(element.id, [shape.node, points[i]], this.points));
     });
     this.addMasses(element, points);
-    for (const line of element.lines) this.addLine(element, line.points.map((index) => points[index]));
+    if (isActuator(element)) this.addActuator(element, points);
+    else for (const line of element.lines) this.addLine(element, line.points.map((index) => points[index]));
     for (const surface of element.surfaces) this.faces.push({ id: element.id, points: surface.points.map((index) => points[index]) });
     for (const arrow of element.arrows) (arrow.moment ? this.moments : this.forces).push(vectorArrow(element.id, points[arrow.point], arrow.handle, arrow.sign));
     for (const frame of element.frames) this.addAxes(element.id, points[frame.point], frame.orientation, 1.1);
@@ -90,7 +95,6 @@ export class Items {
   private addLine(element: ElementShape, points: number[]): void {
     const word = `${element.family} ${element.type}`;
     if (isBeam(element)) this.addBeam(element.id, points);
-    else if (/actuator/.test(word) && points.length === 2) this.addActuator(element.id, points);
     else if (/rod|spring|viscous/.test(word) && points.length === 2) this.springs.push(coil(element.id, points, 0.3 * this.size, this.points));
     else this.others.push(straight(element.id, points, this.points));
   }
@@ -105,13 +109,19 @@ export class Items {
     for (let k = 0; k <= SECTIONS; ++k) this.sections.push(section(beam, Math.round(k * between), SECTION_RIM));
   }
 
-  /** A barrel that keeps its length, and a rod that comes out of it. */
-  private addActuator(id: string, [from, to]: number[]): void {
-    this.points.update(this.pose);
-    const x = this.points.x, length = Math.hypot(...[0, 1, 2].map((k) => x[3 * to + k] - x[3 * from + k]));
-    const barrel = 0.62 * length, rod = 0.7 * length;
-    this.barrels.push({ id, from, to, span: () => [0, barrel], radius: 0.34 * this.size });
-    this.rods.push({ id, from, to, span: (now) => [Math.max(now - rod, 0), now], radius: 0.15 * this.size });
+  /** Two chambers that share the cylinder, coloured by their pressures; the piston between them, and its rod, which comes out at the head. */
+  private addActuator(element: ElementShape, points: number[]): void {
+    const [first, second] = element.lines, [bottom, piston] = first.points.map((index) => points[index]), head = points[second.points[1]];
+    const radius = 0.34 * this.size, x = this.points;
+    for (const { points: [from, to], value } of [first, second])
+      this.barrels.push({ id: element.id, from: points[from], to: points[to], span: (length) => [0, length], radius, colour: this.byValue(value) });
+    const at = () => x.distance(bottom, piston);
+    this.rods.push({ id: element.id, from: bottom, to: head, span: (length) => [at() - 0.03 * length, at() + 0.03 * length], radius: 1.12 * radius });
+    this.rods.push({ id: element.id, from: bottom, to: head, span: (length) => [at(), at() + 1.08 * length], radius: 0.4 * radius });
+  }
+
+  private byValue(handle: number | undefined): BarItem['colour'] {
+    return handle === undefined ? undefined : (pose, out) => this.pressures.colour(pose.value(handle, 0), out);
   }
 
   /** Where nothing else shows the element, or a joint stands at a hinge. */
@@ -129,6 +139,10 @@ export class Items {
     if (list) list.push(item);
     else this.joints.set(name, [item]);
   }
+}
+
+function isActuator({ type, lines }: ElementShape): boolean {
+  return type === 'actuator' && lines.length === 2 && lines.every((line) => line.points.length === 2);
 }
 
 function isBeam(element: ElementShape): boolean {

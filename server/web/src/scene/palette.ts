@@ -11,6 +11,9 @@ export interface Palette {
   section: string;
   spring: string;
   hydraulic: string;
+  /** Lowest and highest pressure. */
+  low: string;
+  high: string;
   shell: string;
   force: string;
   moment: string;
@@ -38,6 +41,8 @@ export const DARK: Palette = {
   section: '#b9f0e4',
   spring: '#c9b458',
   hydraulic: '#d86f9a',
+  low: '#3f6fd8',
+  high: '#ff5a5a',
   shell: '#4fa8d8',
   force: '#ff5c5c',
   moment: '#b980ff',
@@ -64,6 +69,8 @@ export const LIGHT: Palette = {
   section: '#00473b',
   spring: '#8a7400',
   hydraulic: '#b8336a',
+  low: '#2456c4',
+  high: '#cf1d1d',
   shell: '#1f7fb8',
   force: '#cf2222',
   moment: '#7a3fd0',

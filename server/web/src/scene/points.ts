@@ -29,6 +29,11 @@ export class Points {
     return this.nodes[point];
   }
 
+  distance(one: number, other: number): number {
+    const { x } = this;
+    return Math.hypot(x[3 * one] - x[3 * other], x[3 * one + 1] - x[3 * other + 1], x[3 * one + 2] - x[3 * other + 2]);
+  }
+
   update(pose: Pose): void {
     const count = this.nodes.length;
     if (this.x.length !== 3 * count) this.x = new Float64Array(3 * count);

@@ -23,6 +23,10 @@ export function drawnBy(card: boolean): void {
 }
 
 
+export function hasCard(): boolean {
+  return withCard;
+}
+
 export function solids(geometry: THREE.BufferGeometry, count: number, opacity = 1): Solids {
   const made = withCard || count <= INSTANCES_WITHOUT_CARD ? new Instanced(geometry, count, opacity) : new Merged(geometry, count, opacity);
   made.object.frustumCulled = false;

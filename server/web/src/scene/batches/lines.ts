@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import { LineMaterial } from 'three/examples/jsm/lines/LineMaterial.js';
 import type { Pose } from '../../geometry';
+import { hasCard } from '../solids';
 import type { Batch } from './batch';
 
 /** A line: fills the positions of its corners, three numbers each. */
@@ -13,8 +14,8 @@ export interface LineItem {
   colour?: THREE.Color;
 }
 
-/** Above so many pieces, lines are one pixel wide. */
-const MANY_PIECES = 4000;
+/** Above so many pieces, lines are one pixel wide; without a graphics card, wide ones cost much more. */
+const MANY_PIECES = 4000, MANY_WITHOUT_CARD = 600;
 /** Corners of a wide piece as `LineMaterial` wants them: across from −1 to 1, along from −1 to 2 with the round ends. */
 const CORNERS = [[-1, 2], [1, 2], [-1, 1], [1, 1], [-1, 0], [1, 0], [-1, -1], [1, -1]];
 const CORNERS_UV = [[-1, 2], [1, 2], [-1, 1], [1, 1], [-1, -1], [1, -1], [-1, -2], [1, -2]];
@@ -36,7 +37,7 @@ export class LineBatch implements Batch {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(this.segments, 3).setUsage(THREE.DynamicDrawUsage));
     this.skeleton = new THREE.LineSegments(geometry);
-    this.object = this.owners.length > MANY_PIECES ? this.thin() : this.wide(width);
+    this.object = this.owners.length > (hasCard() ? MANY_PIECES : MANY_WITHOUT_CARD) ? this.thin() : this.wide(width);
     this.object.frustumCulled = false;
     this.object.raycast = (ray, hits) => this.skeleton.raycast(ray, hits);
     this.highlight(undefined, colour);
