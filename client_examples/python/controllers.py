@@ -4,6 +4,10 @@ PID controller positions the hydraulic servo.
 
 usage: controllers.py [--address ADDRESS] [--plot FILE.png] [--steps N]
 """
+from __future__ import annotations
+
+import math
+
 import numpy as np
 
 import example
@@ -21,7 +25,7 @@ STROKE, RAMP = 0.1, 1.0           # wanted change of the stroke [m], and its dur
 P, I, D = 40.0, 60.0, 0.8         # gains: valve opening per m, m s, m/s
 
 
-def state_feedback():
+def state_feedback() -> example.Array:
     """Gains (4) that minimize the integral of x' WEIGHTS x + EFFORT u^2 of the upright pendulum; x = (s, s', angle, angle')."""
     full, pole = CART + POLE, POLE * LENGTH
     mass = np.array([[full, pole], [pole, INERTIA + pole * LENGTH]])
@@ -33,15 +37,16 @@ def state_feedback():
     values, vectors = np.linalg.eig(hamiltonian)
     stable = vectors[:, values.real < 0]
     riccati = np.real(stable[4:] @ np.linalg.inv(stable[:4]))
-    return (B.T @ riccati / EFFORT)[0]
+    gains: example.Array = (B.T @ riccati / EFFORT)[0]
+    return gains
 
 
-def balance(server, steps):
+def balance(server: mbcosim.Server, steps: int) -> example.Array:
     """Rows: time, position of the cart, angle, force."""
     gains, rows = state_feedback(), []
     outputs = [f"node.structural.{node}.{name}" for node, name in ((1, "X"), (1, "XP"), (2, "R"), (2, "Omega"))]
 
-    def control(motion):
+    def control(motion: mbcosim.Motion) -> list[float]:
         x, v, R, w = np.split(motion.signals, [3, 6, 15])
         state = np.array([x[0], v[0], np.arctan2(R[2], R[8]), w[1]])
         force = -gains @ state
@@ -55,18 +60,19 @@ def balance(server, steps):
     return np.array(rows).T
 
 
-def wanted(time):
+def wanted(time: float) -> float:
     """Command of the stroke [m]: half a cosine."""
-    return STROKE / 2 * (1 - np.cos(np.pi * min(time / RAMP, 1.0)))
+    return STROKE / 2 * (1 - math.cos(math.pi * min(time / RAMP, 1.0)))
 
 
-def position(server, steps):
+def position(server: mbcosim.Server, steps: int) -> example.Array:
     """Rows: time, command, stroke, valve."""
-    rows, state = [], {}
+    rows: list[tuple[float, ...]] = []
+    state: dict[str, float] = {}
     period = SAMPLE * 1e-3
 
-    def pid(motion):
-        length = np.linalg.norm(motion.signals - PIN)
+    def pid(motion: mbcosim.Motion) -> list[float]:
+        length = float(np.linalg.norm(motion.signals - PIN))
         stroke = length - state.setdefault("start", length)
         error = wanted(motion.target_time) - stroke
         change = (error - state.get("error", error)) / period
@@ -84,7 +90,7 @@ def position(server, steps):
     return np.array(rows).T
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "controllers.png", steps=3000)
     with mbcosim.connect_or_start(options.address) as server:
         times, cart, angle, force = balance(server, options.steps)

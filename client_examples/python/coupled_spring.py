@@ -3,6 +3,10 @@
 
 usage: coupled_spring.py [--address ADDRESS] [--plot FILE.png]
 """
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 
 import example
@@ -13,12 +17,12 @@ STIFFNESS, ANCHOR = 300.0, np.array([1.0, 0.0, 0.0])  # [N/m], where the body st
 STEPS = 400
 
 
-def spring(motion):
+def spring(motion: mbcosim.Motion) -> example.Array:
     """Force on the body, 1 x 3."""
     return STIFFNESS * (ANCHOR - motion.x)
 
 
-def swing(server, **options):
+def swing(server: mbcosim.Server, **options: Any) -> tuple[example.Array, example.Array, float]:
     """Times (n), heights (n) and exchanges a step."""
     ports = [mbcosim.structural_port("spring", nodes=[2])]
     with server.load(example.model("pendulum.mbd"), ports=ports) as simulation:
@@ -28,7 +32,7 @@ def swing(server, **options):
     return np.array([r.time for r in results]), np.array([r.values[POSITION][2] for r in results]), exchanges
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "coupled_spring.png")
     with mbcosim.connect_or_start(options.address) as server:
         runs = {"loose": swing(server), "window, IQN-ILS": swing(server, mode="window", acceleration="iqn_ils")}

@@ -1,8 +1,15 @@
 """What the example scripts share: finding the package, the command line, figures."""
+from __future__ import annotations
+
 import argparse
 import os
 import sys
+from typing import Any, Optional
 
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
 HERE = os.path.dirname(os.path.abspath(__file__))
 # The package with its generated stubs: of PYTHONPATH, of the usual build, or as installed; not the sources beside this file.
 for folder in [*os.environ.get("PYTHONPATH", "").split(os.pathsep), os.path.join(HERE, "..", "..", "build", "python"), *sys.path]:
@@ -11,12 +18,13 @@ for folder in [*os.environ.get("PYTHONPATH", "").split(os.pathsep), os.path.join
         break
 
 
-def model(name):
+def model(name: str) -> str:
     """Path of an example deck."""
     return os.path.join(HERE, "..", "models", name)
 
 
-def options(description, plot, steps=None, second=False, deck=None):
+def options(description: Optional[str], plot: str, steps: Optional[int] = None, second: bool = False,
+            deck: Optional[str] = None) -> argparse.Namespace:
     """--address of the server, --plot file; --steps and --deck if they have a default; --second server if it can be used."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--address", help="of the server; default: the daemon of this user, or one started for the run")
@@ -30,7 +38,7 @@ def options(description, plot, steps=None, second=False, deck=None):
     return parser.parse_args()
 
 
-def figure(rows=1, **arguments):
+def figure(rows: int = 1, **arguments: Any) -> Any:
     """Figure and axes, without a display."""
     import matplotlib
     matplotlib.use("Agg")
@@ -38,6 +46,6 @@ def figure(rows=1, **arguments):
     return plt.subplots(rows, 1, squeeze=False, layout="constrained", **arguments)
 
 
-def save(picture, path):
+def save(picture: Any, path: str) -> None:
     picture.savefig(path, dpi=120)
     print(f"plot: {os.path.abspath(path)}")

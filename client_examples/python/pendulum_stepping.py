@@ -3,6 +3,8 @@
 
 usage: pendulum_stepping.py [--address ADDRESS] [--plot FILE.png]
 """
+from __future__ import annotations
+
 import numpy as np
 
 import example
@@ -12,7 +14,7 @@ POSITION, LOAD = "node.structural.2.X", "node.structural.2.load"
 STEPS, SAVED, PUSH = 600, 200, 3.0  # steps of 5 ms; step of the saved state; push upwards [N]
 
 
-def swing(simulation, steps, push):
+def swing(simulation: mbcosim.Simulation, steps: int, push: float) -> tuple[example.Array, example.Array]:
     """Times (n) and positions (n x 3)."""
     times, positions = [], []
     with simulation.stepper(outputs=[POSITION], inputs=[LOAD]) as stepper:
@@ -23,7 +25,7 @@ def swing(simulation, steps, push):
     return np.array(times), np.array(positions)
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "pendulum.png")
     with mbcosim.connect_or_start(options.address) as server, server.load(example.model("pendulum.mbd")) as pendulum:
         before = swing(pendulum, SAVED, 0.0)

@@ -7,6 +7,10 @@ need and corrects it by the integral of the end's error. Between two samples the
 
 usage: servo_beam.py [--address ADDRESS] [--plot FILE.png]
 """
+from __future__ import annotations
+
+import math
+
 import numpy as np
 
 import example
@@ -21,19 +25,20 @@ HEIGHT, RAMP, END = 0.4, 2.0, 4.0   # wanted height of the end [m], duration of 
 EVERY = 5                           # steps of the model per sample of the controller
 
 
-def command(time):
+def command(time: float) -> float:
     """Wanted height of the beam's end [m]: half a cosine up to HEIGHT."""
-    return HEIGHT / 2 * (1 - np.cos(np.pi * min(time / RAMP, 1.0)))
+    return HEIGHT / 2 * (1 - math.cos(math.pi * min(time / RAMP, 1.0)))
 
 
-def stroke_for(height):
+def stroke_for(height: float) -> float:
     """Length of the cylinder that holds the end of a rigid beam at this height [m]."""
-    return LEVER * np.sqrt(2 + 2 * height / BEAM)
+    return LEVER * math.sqrt(2 + 2 * height / BEAM)
 
 
-def control(simulation):
+def control(simulation: mbcosim.Simulation) -> example.Array:
     """Rows: time, command, height of the end, valve, pressures."""
-    rows, valve, correction, before = [], 0.0, 0.0, 0.0
+    rows: list[tuple[float, ...]] = []
+    valve, correction, before = 0.0, 0.0, 0.0
     with simulation.stepper(outputs=[PISTON, TIP, LOWER, UPPER], inputs=[VALVE]) as stepper:
         while not rows or rows[-1][0] < END:
             result = stepper.step([valve], count=EVERY)
@@ -46,7 +51,7 @@ def control(simulation):
     return np.array(rows).T
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "servo.png")
     with mbcosim.connect_or_start(options.address) as server, server.load(example.model("actuated_beam_servo.mbd")) as simulation:
         times, wanted, tip, valve, lower, upper = control(simulation)

@@ -3,6 +3,8 @@
 
 usage: shunt_damping.py [--address ADDRESS] [--plot FILE.png]
 """
+from __future__ import annotations
+
 import numpy as np
 
 import example
@@ -12,9 +14,9 @@ VELOCITY, VOLTAGE = "node.structural.3.XP", "node.abstract.11.x"
 SHOWN = 0.06  # [s]
 
 
-def vibrate(server, deck):
+def vibrate(server: mbcosim.Server, deck: str) -> example.Array:
     """Times (n), transverse velocities of the free end (n), voltages (n)."""
-    rows = []
+    rows: list[tuple[float, float, float]] = []
     with server.load(example.model(deck)) as simulation, simulation.stepper(outputs=[VELOCITY, VOLTAGE]) as stepper:
         while not rows or rows[-1][0] < SHOWN:
             result = stepper.step()
@@ -22,7 +24,7 @@ def vibrate(server, deck):
     return np.array(rows).T
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "shunt.png")
     with mbcosim.connect_or_start(options.address) as server:
         runs = {"open": vibrate(server, "cantilever_piezo_open.mbd"), "shunted": vibrate(server, "cantilever_piezo_shunt.mbd")}

@@ -6,6 +6,8 @@ The plain exchange of such a peer diverges; quasi-Newton (IQN-ILS) needs a few p
 
 usage: stiff_peer.py [--address ADDRESS] [--plot FILE.png] [--steps N]
 """
+from __future__ import annotations
+
 import time
 
 import numpy as np
@@ -23,15 +25,15 @@ METHODS = {"none": "plain", "aitken": "Aitken", "iqn_ils": "IQN-ILS"}
 class Container:
     """The mass on its spring. Keeps the state at the start of the step until the step is accepted."""
 
-    def __init__(self):
-        self.kept = self.last = None
-        self.step, self.time, self.passes = 0, 0.0, []
+    def __init__(self) -> None:
+        start = np.array([1.0, 0, 0])
+        self.kept = self.last = (0.0, start, np.zeros(3), start)
+        self.step, self.time = 0, 0.0
+        self.passes: list[int] = []
 
-    def answer(self, motion):
+    def answer(self, motion: mbcosim.Motion) -> list[example.Array]:
         """Force of the spring on the body at the end of the step, 1 x 3."""
         time.sleep(DELAY)
-        if self.kept is None:
-            self.kept = self.last = (0.0, np.array([1.0, 0, 0]), np.zeros(3), np.array([1.0, 0, 0]))
         if motion.step > self.step:  # the step before was accepted with the last pass
             self.kept, self.step = self.last, motion.step
             self.passes.append(0)
@@ -49,7 +51,7 @@ class Container:
         return [STIFFNESS * (y - x) + DAMPING * (v - velocity)]
 
 
-def swing(server, steps, acceleration):
+def swing(server: mbcosim.Server, steps: int, acceleration: str) -> tuple[example.Array, list[int]]:
     """Times, heights [m] and passes of the steps that went well."""
     container, rows = Container(), []
     ports = [mbcosim.structural_port("container", nodes=[2])]
@@ -65,7 +67,7 @@ def swing(server, steps, acceleration):
     return np.array(rows).reshape(-1, 2).T, container.passes[:len(rows)]
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "stiff.png", steps=200)
     with mbcosim.connect_or_start(options.address) as server:
         runs = {name: swing(server, options.steps, method) for method, name in METHODS.items()}

@@ -6,6 +6,10 @@ as fast as that of the structure alone.
 
 usage: strip_wing.py [--address ADDRESS] [--plot FILE.png] [--steps N]
 """
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 
 import example
@@ -21,7 +25,7 @@ SPEEDS = [40.0, 60.0, 90.0]            # [m/s]
 EPSILON = 1e-6                         # of the differences that give the tangent
 
 
-def strip_loads(air, R, v, w):
+def strip_loads(air: example.Array, R: example.Array, v: example.Array, w: example.Array) -> tuple[example.Array, example.Array]:
     """Forces and moments about the nodes (n x 3) of strips with velocity v and angular velocity w in air that moves with `air`."""
     span, up = R[:, :, 0], R[:, :, 2]
     to_rear = -R[:, :, 1]
@@ -37,13 +41,13 @@ def strip_loads(air, R, v, w):
     return force + dragged * up, moment - dragged * half * (1.5 - 2 * AXIS) * span
 
 
-def turned(R, axis):
+def turned(R: example.Array, axis: example.Array) -> example.Array:
     """R after a small rotation about a global axis."""
     x, y, z = EPSILON * axis
     return R + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ R
 
 
-def tangent(air, R, v, w):
+def tangent(air: example.Array, R: example.Array, v: example.Array, w: example.Array) -> tuple[example.Array, example.Array]:
     """Blocks d(force, moment)/d(position, rotation) and d/d(velocity, angular velocity): n x 6 x 6, by differences."""
     stiffness, damping = np.zeros((2, len(v), 6, 6))
     base = np.hstack(strip_loads(air, R, v, w))
@@ -54,15 +58,15 @@ def tangent(air, R, v, w):
     return stiffness / EPSILON, damping / EPSILON
 
 
-def wind(speed, time):
+def wind(speed: float, time: float) -> example.Array:
     """Velocity of the air [m/s]."""
     phase = np.clip((time - FROM) / (UNTIL - FROM), 0, 1)
     return np.array([speed, 0.0, GUST / 2 * (1 - np.cos(2 * np.pi * phase))])
 
 
-def fly(server, speed, steps, with_tangent):
+def fly(server: mbcosim.Server, speed: float, steps: int, with_tangent: bool) -> tuple[example.Array, example.Array, float]:
     """Times, heights of the wing's tip [m], exchanges a step."""
-    def aerodynamics(motion):
+    def aerodynamics(motion: mbcosim.Motion) -> Any:
         air = wind(speed, motion.target_time)
         force, moment = strip_loads(air, motion.rotations, motion.v, motion.w)
         if not with_tangent:
@@ -79,7 +83,7 @@ def fly(server, speed, steps, with_tangent):
     return np.array([r.time for r in results]), np.array([r.values[TIP][2] for r in results]), exchanges
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "wing.png", steps=700)
     with mbcosim.connect_or_start(options.address) as server:
         runs = {speed: fly(server, speed, options.steps, True) for speed in SPEEDS}

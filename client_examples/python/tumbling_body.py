@@ -3,7 +3,10 @@
 
 usage: tumbling_body.py [--address ADDRESS] [--deck DECK] [--plot FILE.png]
 """
+from __future__ import annotations
+
 import os
+import sys
 
 import numpy as np
 from tqdm import tqdm
@@ -15,21 +18,21 @@ SPIN, ROTATION = "node.structural.1.Omega", "node.structural.1.R"
 INERTIA = np.diag([1.0, 2.0, 3.0])  # of the deck, node frame [kg m^2]
 
 
-def simulate(simulation):
+def simulate(simulation: mbcosim.Simulation) -> tuple[example.Array, example.Array, example.Array]:
     """Times (n), spins in the node frame (n x 3), kinetic energies (n)."""
     info = simulation.describe()
     steps = round((info.final_time_s - info.initial_time_s) / info.step_s)
-    times, spins = [], []
+    times, found = [], []
     with simulation.stepper(outputs=[SPIN, ROTATION]) as stepper:
-        for _ in tqdm(range(steps), unit="step", disable=None):
+        for _ in tqdm(range(steps), unit="step", disable=not sys.stderr.isatty()):
             result = stepper.step()
             times.append(result.time)
-            spins.append(result.values[ROTATION].T @ result.values[SPIN])
-    spins = np.array(spins)
+            found.append(result.values[ROTATION].T @ result.values[SPIN])
+    spins = np.array(found)
     return np.array(times), spins, 0.5 * np.einsum("ni,ij,nj->n", spins, INERTIA, spins)
 
 
-def plot(times, spins, path):
+def plot(times: example.Array, spins: example.Array, path: str) -> None:
     picture, axes = example.figure(figsize=(8, 4))
     for axis, label in enumerate("xyz"):
         axes[0, 0].plot(times, spins[:, axis], label=f"about {label}")
@@ -38,7 +41,7 @@ def plot(times, spins, path):
     picture.savefig(path, dpi=120)
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "tumbling.png", deck=example.model("tumbling.mbd"))
     with mbcosim.connect_or_start(options.address) as server, server.load(options.deck, name="tumbling body") as simulation:
         times, spins, energy = simulate(simulation)

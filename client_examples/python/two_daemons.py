@@ -6,6 +6,10 @@ usage: two_daemons.py [--address ADDRESS] [--second ADDRESS] [--plot FILE.png] [
 
 Without --second a second daemon is started for the run.
 """
+from __future__ import annotations
+
+from typing import Any, Optional
+
 import numpy as np
 
 import example
@@ -18,14 +22,15 @@ REACTIONS = "port.cut.reactions"
 class Half:
     """The tip half on its daemon. A pass restores the state at the start of the step, imposes the motion, and steps."""
 
-    def __init__(self, simulation):
-        self.simulation, self.heights = simulation, []
-        self._wanted = None
+    def __init__(self, simulation: mbcosim.Simulation) -> None:
+        self.simulation = simulation
+        self.heights: list[float] = []
+        self._wanted: Any = None
         self._start = simulation.snapshot()
         self._height = simulation[TIP][2]
         self._follower = simulation.couple("cut", lambda motion: self._wanted)
 
-    def answer(self, motion):
+    def answer(self, motion: mbcosim.Motion) -> tuple[list[example.Array], list[example.Array]]:
         """Force and moment on the root half's end."""
         if motion.iteration == 1:  # the step before was accepted with the last pass
             self.heights.append(self._height)
@@ -38,12 +43,12 @@ class Half:
         self._height = values[TIP][2]
         return [values[REACTIONS][:3]], [values[REACTIONS][3:]]
 
-    def close(self):
+    def close(self) -> None:
         self.heights.append(self._height)
         self._follower.close()
 
 
-def fall_in_two(first, second, steps):
+def fall_in_two(first: mbcosim.Server, second: mbcosim.Server, steps: int) -> tuple[example.Array, float]:
     """Heights of the tip after each step, and exchanges a step."""
     root_port, tip_port = mbcosim.structural_port("cut", nodes=[CUT]), mbcosim.motion_port("cut", nodes=[CUT])
     with first.load(example.model("cut_beam_root.mbd"), ports=[root_port]) as root, \
@@ -56,19 +61,19 @@ def fall_in_two(first, second, steps):
     return np.array(half.heights[1:]), exchanges
 
 
-def fall_whole(server, steps):
+def fall_whole(server: mbcosim.Server, steps: int) -> tuple[example.Array, example.Array]:
     """Times and heights of the tip of the uncut beam."""
     with server.load(example.model("cut_beam_whole.mbd")) as whole, whole.stepper([TIP]) as stepper:
         results = [stepper.step() for _ in range(steps)]
     return np.array([r.time for r in results]), np.array([r.values[TIP][2] for r in results])
 
 
-def second_server(address):
+def second_server(address: Optional[str]) -> mbcosim.Server:
     """A connection to the second daemon, which is started when no address is given."""
     return mbcosim.connect(address) if address else mbcosim.local()
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "halves.png", steps=200, second=True)
     with mbcosim.connect_or_start(options.address) as first, second_server(options.second) as second:
         heights, exchanges = fall_in_two(first, second, options.steps)

@@ -4,6 +4,10 @@ whose drag is computed here. A second port only watches.
 
 usage: wind_on_chain.py [--address ADDRESS] [--plot FILE.png] [--steps N]
 """
+from __future__ import annotations
+
+from collections.abc import Callable
+
 import numpy as np
 
 import example
@@ -16,28 +20,34 @@ DRAG = 0.5 * 1.225 * 1.2 * 0.2              # density / 2, coefficient, area of 
 MIDDLE = "node.structural.2.X"
 
 
-def drag(motion):
+def drag(motion: mbcosim.Motion) -> example.Array:
     """Forces at the points, 4 x 3 [N]."""
     wind = WIND - motion.v
-    return DRAG * np.linalg.norm(wind, axis=1, keepdims=True) * wind
+    force: example.Array = DRAG * np.linalg.norm(wind, axis=1, keepdims=True) * wind
+    return force
 
 
-def swing(server, force, steps):
+def swing(server: mbcosim.Server, force: Callable[[mbcosim.Motion], example.Array], steps: int) -> tuple[example.Array, example.Array]:
     """Positions of the chain's end (n x 3), and of the second link's middle as the other port saw it."""
-    ends, seen = [], []
+    ends: list[example.Array] = []
+    seen: list[example.Array] = []
 
-    def push(motion):
+    def push(motion: mbcosim.Motion) -> example.Array:
         ends.append(motion.x[-1])
         return force(motion)
 
+    def look(motion: mbcosim.Motion) -> list[float]:
+        seen.append(motion.signals)
+        return []
+
     ports = [mbcosim.structural_port("wind", nodes=LINKS, offsets=ENDS), mbcosim.signal_port("watch", [MIDDLE], [])]
     with server.load(example.model("chain.mbd"), ports=ports) as simulation:
-        with simulation.couple("wind", push), simulation.couple("watch", lambda motion: seen.append(motion.signals) or [], every=10):
+        with simulation.couple("wind", push), simulation.couple("watch", look, every=10):
             simulation.step(steps)
     return np.array(ends), np.array(seen)
 
 
-def main():
+def main() -> None:
     options = example.options(__doc__, "chain.png", steps=3000)
     with mbcosim.connect_or_start(options.address) as server:
         still, _ = swing(server, lambda motion: 0 * motion.x, options.steps)

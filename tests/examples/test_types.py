@@ -29,6 +29,13 @@ def test_the_package_is_clean(mypy):
     assert mypy("-p", "mbcosim").startswith("Success: no issues found")
 
 
+def test_the_examples_are_clean(mypy):
+    folder = os.path.join(ROOT, "client_examples", "python")
+    scripts = sorted(os.path.join(folder, name) for name in os.listdir(folder) if name.endswith(".py") and name != "build_backend.py")
+    assert len(scripts) > 8
+    assert mypy("--exclude", "client_examples/python/mbcosim", *scripts).startswith("Success: no issues found")
+
+
 def test_both_clients_tell_what_their_calls_give(mypy, tmp_path):
     (tmp_path / "user.py").write_text("""
 import mbcosim, mbcosim.aio
