@@ -26,8 +26,12 @@ class Editor:
         self.asked, self.diagnostics = 0, {}
 
     def send(self, **message):
-        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
-        self.process.stdin.write(b"Content-Length: %d\r\n\r\n" % len(body) + body)
+        self.send_all([message])
+
+    def send_all(self, messages):
+        """Several messages in one write: the server has all of them before it answers the first."""
+        bodies = [json.dumps({"jsonrpc": "2.0", **message}).encode() for message in messages]
+        self.process.stdin.write(b"".join(b"Content-Length: %d\r\n\r\n" % len(body) + body for body in bodies))
         self.process.stdin.flush()
 
     def receive(self):
@@ -55,8 +59,9 @@ class Editor:
         return self.next_diagnostics(uri)
 
     def change(self, uri, *texts):
-        for text in texts:
-            self.send(method="textDocument/didChange", params={"textDocument": {"uri": uri, "version": 2}, "contentChanges": [{"text": text}]})
+        self.send_all([{"method": "textDocument/didChange",
+                        "params": {"textDocument": {"uri": uri, "version": version}, "contentChanges": [{"text": text}]}}
+                       for version, text in enumerate(texts, 2)])
         return self.next_diagnostics(uri)
 
     def next_diagnostics(self, uri):
