@@ -46,16 +46,21 @@ def venv(tmp_path):
     return install
 
 
+def files_of(folder):
+    """All but what interpreters of other tests keep of modules."""
+    return sorted(path for path in folder.rglob("*") if "__pycache__" not in path.parts)
+
+
 def use(python, tmp_path):
     environment = {**PLAIN, "MBCOSIM_BIN": os.environ["MBCOSIM_BIN"], "DECK": str(ROOT / "client_examples/models/pendulum.mbd")}
     return run(python, "-c", USE, cwd=tmp_path, env=environment)
 
 
 def test_pip_installs_the_package_from_a_clone(venv, tmp_path):
-    before = sorted(SOURCE.rglob("*"))
+    before = files_of(SOURCE)
     printed = use(venv(SOURCE), tmp_path)
     assert printed.startswith("0.1.0 21 (21, 3) ") and str(tmp_path / "venv") in printed
-    assert sorted(SOURCE.rglob("*")) == before  # nothing is left beside the sources
+    assert files_of(SOURCE) == before  # nothing is left beside the sources
 
 
 def test_a_source_archive_carries_the_stubs(venv, tmp_path):

@@ -105,6 +105,16 @@ def wait_for(condition, seconds=10):
         time.sleep(0.01)
 
 
+def stop(pid):
+    """SIGSTOP, and every thread has obeyed."""
+    def state(task):
+        with open(f"/proc/{pid}/task/{task}/stat") as file:
+            return file.read().rsplit(")", 1)[1].split()[0]
+
+    os.kill(pid, signal.SIGSTOP)
+    wait_for(lambda: all(state(task) == "T" for task in os.listdir(f"/proc/{pid}/task")))
+
+
 def redone_alike(simulation, before, steps, look):
     """Are `steps` steps after a restore those that followed the snapshot? `look()` tells what to compare."""
     simulation.step(before)

@@ -12,7 +12,7 @@ import pytest
 import decks
 import mbcosim
 import mbcosim.aio
-from conftest import TIME_FACTOR, wait_for
+from conftest import TIME_FACTOR, stop, wait_for
 from mbcosim.v1 import simulations_pb2 as pb
 from relay import BlackHole
 from test_coupling import PORT, spring
@@ -30,7 +30,7 @@ def public(cls):
 
 # What the blocking client adds for work at a prompt.
 PARTS = {"nodes", "elements", "joints", "inputs", "outputs"}
-AT_A_PROMPT = {"Simulation": PARTS | {"simulate", "what_if", "state_space", "modes"}}
+AT_A_PROMPT = {"Simulation": PARTS | {"what_if", "state_space", "modes"}}
 
 
 @pytest.mark.parametrize("blocking, awaited", PAIRS, ids=lambda c: c.__module__)
@@ -78,16 +78,6 @@ SERVER_CALLS = {
     "list": lambda s: s.list(timeout=0.3),
     "attach": lambda s: s.attach("simulations/x", timeout=0.3),
 }
-
-
-def stop(pid):
-    """SIGSTOP, and every thread has obeyed."""
-    def state(task):
-        with open(f"/proc/{pid}/task/{task}/stat") as file:
-            return file.read().rsplit(")", 1)[1].split()[0]
-
-    os.kill(pid, signal.SIGSTOP)
-    wait_for(lambda: all(state(task) == "T" for task in os.listdir(f"/proc/{pid}/task")))
 
 
 @pytest.fixture(params=["stopped", "black hole"])

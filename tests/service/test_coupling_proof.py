@@ -12,7 +12,7 @@ import pytest
 
 import decks
 import mbcosim
-from conftest import TIME_FACTOR, Daemon, leaves_no_thread, redone_alike, wait_for
+from conftest import TIME_FACTOR, Daemon, leaves_no_thread, redone_alike, stop, wait_for
 from mbcosim.v1 import simulations_pb2 as pb
 from test_coupling import PORT, oscillator, position, spring
 
@@ -264,7 +264,9 @@ def test_a_peer_that_dies_costs_one_step_within_its_bound(server, start_peer, bl
     with oscillator(server) as simulation:
         peer = start_peer(simulation, stall_at=-1 if when == "idle" else 4)
         assert simulation.step(3).step == 3
-        if when == "idle":
+        if when == "idle" and blow == signal.SIGSTOP:
+            stop(peer.pid)
+        elif when == "idle":
             peer.send_signal(blow)
         else:
             threading.Timer(0.1, lambda: peer.send_signal(blow)).start()
