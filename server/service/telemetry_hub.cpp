@@ -117,6 +117,8 @@ void TelemetryHub::remove(const SubscriptionPtr& subscription) {
   std::erase(decimators_, subscription);
   if (std::exchange(subscription->hungry, false)) --hungry_;
   release(*std::exchange(subscription->feed, nullptr));
+  subscription->kept.clear();
+  subscription->share = MemoryShare();
   some_.store(!subscriptions_.empty());
   look_for_blocks();
   room_.notify_all();

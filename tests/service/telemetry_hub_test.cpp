@@ -14,7 +14,7 @@ using Taken = TelemetryHub::Taken;
 
 constexpr const char* kDeck =
     "begin: data; problem: initial value; end: data;"
-    "begin: initial value; initial time: 0.; final time: 1.; time step: 1.e-3; method: ms, .6;"
+    "begin: initial value; initial time: 0.; final time: 10.; time step: 1.e-3; method: ms, .6;"
     " tolerance: 1.e-9; max iterations: 20; end: initial value;"
     "begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;"
     "begin: nodes; structural: 1, dynamic, null, eye, null, .01, 2., .01; end: nodes;"

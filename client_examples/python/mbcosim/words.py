@@ -20,7 +20,7 @@ def remedy(name: object, known: Iterable[object], most: int = 12) -> str:
     return f"known: {listed(known, most)}" if known else "there are none"
 
 
-def choice(kind: Any, prefix: str, word: Optional[str], what: str) -> int:
+def choice(kind: Any, prefix: str, word: Optional[str], what: str) -> Any:
     """Value of a protobuf enum by its name without prefix, in any case; None leaves the choice to the server (0)."""
     if word is None:
         return 0

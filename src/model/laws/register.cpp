@@ -11,9 +11,6 @@ void register_laws(Registry& registry) {
   register_shock_absorber(registry);
   register_composite_laws(registry);
   register_symbolic_laws(registry);
-  for (const char* word : {"ann elastic", "ann viscoelastic"})
-    registry.unsupported("law", word,
-                         "neural network law; use a scalar function or a symbolic law");
 }
 
 }  // namespace mbcosim

@@ -229,6 +229,7 @@ TEST_F(RunStrings, MessagesNameTheOffsetInTheString) {
             "a.mbd:1:13: error: unknown variable \"foo\"\n"
             "  drive: \"1 + foo\";\n"
             "              ^~~\n"
+            "  hint: declare it before it is used: `set: real foo = <value>;`\n"
             "  at offset 4 of the string at a.mbd:1:8\n");
 }
 

@@ -225,7 +225,9 @@ TEST(ModuleLoad, KnowsTheModulesWhoseElementsAreBuiltIn) {
   EXPECT_EQ(finding("module load: \"libmodule-octave\";"),
             "error: module \"octave\" is not served: decks load no code");
   EXPECT_EQ(finding("user defined: 1, octave, 1;"),
-            "error: user defined element 1: unknown user defined type \"octave\"");
+            "error: user defined element 1: \"octave\" is not served: it comes from a run-time "
+            "module of the "
+            "reference solver");
 }
 
 TEST(C81Data, IsReadWithoutEffect) {
