@@ -147,6 +147,7 @@ void GeometryMessages::fill(const ElementGeometry& g, const ElementGeometry::Lin
   out->set_name(line.name);
   out->mutable_points()->Add(line.points.begin(), line.points.end());
   out->set_curved(line.curved);
+  if (!line.variable.empty()) out->set_value_handle(simulation_->find_variable(line.variable));
   if (!line.curved || !request_.has_line_samples()) return;
   for (const Vec3& x : view_.trace(g, line, request_.line_samples())) put(x, out->mutable_trace());
 }

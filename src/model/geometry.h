@@ -29,6 +29,7 @@ struct ElementGeometry {
     std::string name;
     std::vector<int> points;
     bool curved = false;
+    std::string variable = {};  ///< that may colour it: "node.hydraulic.3.x"; empty: none
   };
   /// A face between its points, in order around it.
   struct Surface {
@@ -77,7 +78,7 @@ struct ElementGeometry {
     return at;
   }
   void line(std::string name, std::vector<int> through, bool curved = false) {
-    lines.push_back({std::move(name), std::move(through), curved});
+    lines.push_back({std::move(name), std::move(through), curved, {}});
   }
 };
 

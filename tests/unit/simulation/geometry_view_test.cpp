@@ -118,5 +118,36 @@ TEST_F(Geometry, OfABeamIsTheParabolaThroughItsPoints) {
   EXPECT_NEAR((trace[4] - Vec3(2, 0, 0)).norm(), 0, 1e-15);
 }
 
+TEST(GeometryOfAnActuator, IsItsTwoChambersWithTheirPressures) {
+  DeckRun run(initial_value_block(0.1, 1) +
+              "begin: control data; structural nodes: 2; hydraulic nodes: 2; joints: 2; genels: "
+              "2; hydraulic elements: 1; skip initial joint assembly; end: control data;\n"
+              "begin: nodes;\n"
+              "structural: 1, static, 0., 0., 0., eye, null, null;\n"
+              "structural: 2, static, 1., 0., 0.3, eye, null, null;\n"
+              "hydraulic: 5, 2.e5; hydraulic: 6, 1.e5;\n"
+              "end: nodes;\n"
+              "begin: elements;\n"
+              "joint: 1, clamp, 1, node, node; joint: 2, clamp, 2, node, node;\n"
+              "hydraulic: 7, actuator, 5, 6, 1, 1., 0., 0., 2, 0., 0., -0.05, direction, 0., 0., "
+              "1., 1.e-3, 1.e-3, 0.4, fluid, incompressible, density, 1000., viscosity, 1.e-3, "
+              "fluid, incompressible, density, 1000., viscosity, 1.e-3;\n"
+              "genel: 5, clamp, 5, hydraulic, const, 2.e5;\n"
+              "genel: 6, clamp, 6, hydraulic, const, 1.e5;\n"
+              "end: elements;\n");
+  ASSERT_TRUE(run.ready());
+  const GeometryView view(run.model(), run.simulation().state());
+  const ElementGeometry g = view.element(2);
+  ASSERT_EQ(g.lines.size(), 2u);
+  EXPECT_EQ(g.lines[0].variable, "node.hydraulic.5.x");
+  EXPECT_EQ(g.lines[1].variable, "node.hydraulic.6.x");
+  const auto x = [&](int line, int k) { return view.position(g.points[g.lines[line].points[k]]); };
+  EXPECT_EQ(x(0, 0), Vec3(1, 0, 0));
+  EXPECT_NEAR((x(0, 1) - Vec3(1, 0, 0.25)).norm(), 0, 1e-15);
+  EXPECT_EQ(x(1, 0), x(0, 1));
+  EXPECT_NEAR((x(1, 1) - Vec3(1, 0, 0.4)).norm(), 0, 1e-15);  // the cylinder's own length
+  EXPECT_GE(run.simulation().find_variable(g.lines[0].variable), 0);
+}
+
 }  // namespace
 }  // namespace mbcosim
