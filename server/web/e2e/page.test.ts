@@ -322,7 +322,7 @@ describe('a deck from the disk', () => {
   test('that is wrong is shown with its line and a mark at the place', async () => {
     await withPage('pendulum.mbd', async (visited) => {
       const { page } = visited;
-      const text = readFileSync(`${MODELS}/pendulum.mbd`, 'utf8').replace('spherical hinge', 'sperical hinge');
+      const text = readFileSync(`${MODELS}/pendulum.mbd`, 'utf8').replaceAll('spherical hinge', 'sperical hinge');
       await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
       await page.getByLabel('Files of a deck').setInputFiles({ name: 'bad.mbd', mimeType: 'text/plain', buffer: Buffer.from(text) });
       await page.getByText('unknown joint type "spericalhinge"').last().waitFor();

@@ -87,7 +87,7 @@ export class App {
       this.menuEntry('camera', 'Picture (PNG)', () => void this.savePicture()),
       this.menuEntry('plot', 'Table of the plots (CSV)', () => this.saveTable()),
       this.menuEntry('download', 'Recording (HTML)', () => void this.saveRecording()));
-    const save = h('button', { type: 'button', class: 'button', 'aria-expanded': 'false', onclick: () => toggle(save, menu) }, icon('download'), h('span', {}, 'Export'));
+    const save = h('button', { type: 'button', class: 'button', 'aria-label': 'Export', 'aria-expanded': 'false', onclick: () => toggle(save, menu) }, icon('download'), h('span', {}, 'Export'));
     const brand = h('div', { class: 'brand' });
     brand.innerHTML = '<svg viewBox="0 0 32 32" aria-hidden="true"><path d="M5 8h9l9 14" fill="none" stroke="#35c2a8" stroke-width="3"/><circle cx="5" cy="8" r="4" fill="#f0a13c"/><circle cx="14" cy="8" r="3" fill="#9aa7b4"/><circle cx="23" cy="23" r="5.4" fill="#4aa8ff"/></svg>';
     brand.append('mbcosim');

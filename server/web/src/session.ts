@@ -153,7 +153,7 @@ export class Session implements Shown {
       const layout = this.layout;
       try {
         const batches = telemetry.subscribe(
-          { simulation: this.name, handles: [...layout.handles], every: BigInt(this.every()), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64, minimumInterval: duration(1 / RATE) },
+          { simulation: this.name, handles: [...layout.handles], every: BigInt(this.every()), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64 },
           { signal: this.stream.signal },
         );
         for await (const batch of batches) this.takeBatch(batch, layout);
