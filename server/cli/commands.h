@@ -35,6 +35,7 @@ struct ReduceCommand {
   std::string job;     ///< file of lines `name = value`; may be empty
   std::string output;  ///< FEM data file
   bool quiet = false;
+  int threads = 0;                                           ///< 0: as many as there are
   std::vector<std::pair<std::string, std::string>> options;  ///< of the command line
 };
 

@@ -31,6 +31,11 @@ void add_reduce(CLI::App& app, mbcosim::cli::ReduceCommand& command, int& exit_c
                    "FEM data file to write; the packed form when its name ends with .bin")
       ->required();
   reduce_app->add_flag("-q,--quiet", command.quiet, "No progress bar and no report");
+  reduce_app
+      ->add_option("--threads", command.threads,
+                   "Threads of the factorizations; results are the same for every number; default: "
+                   "all of the machine")
+      ->check(CLI::Range(1, 1024));
   for (const mbcosim::ReductionOptionHelp& option : mbcosim::reduction_option_help())
     reduce_app->add_option_function<std::string>(
         std::string("--") + option.name,

@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <thread>
 
 #include "cli/commands.h"
 #include "cli/fem_file.h"
@@ -78,7 +79,9 @@ int reduce_model(const ReduceCommand& command) {
   InterruptGuard interrupt;
   Error error;
   try {
-    const ReductionJob job = read_command(command);
+    ReductionJob job = read_command(command);
+    job.options.threads =
+        command.threads > 0 ? command.threads : int(std::thread::hardware_concurrency());
     const std::string folder = fs::path(command.job).parent_path().string();
     const FeModel model = load_model(job, [&](const std::string& name) {
       return read_file(folder.empty() ? "." : folder, name);

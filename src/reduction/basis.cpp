@@ -1,5 +1,6 @@
 #include "reduction/basis.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -12,6 +13,7 @@ constexpr int kShapesAtOnce = 32;
 constexpr double kNearlyFree = 1e-5;
 constexpr double kPoorResidual = 1e4;  ///< times the tolerance
 constexpr double kPoorRounding = 1e3;
+constexpr double kNoStiffness = 1e-12;  ///< relative
 
 double hertz(double square) { return std::sqrt(square) / (2 * std::numbers::pi); }
 
@@ -24,13 +26,25 @@ bool is_static(ReductionBasis basis) {
   return basis != ReductionBasis::free_modes && basis != ReductionBasis::constrained_modes;
 }
 
+[[noreturn]] void refuse_processor(const std::string& name) {
+  std::string accepted = "auto";
+  for (const BlockKernels* kernels : block_kernels())
+    accepted += std::string(", ") + kernels->processor;
+  refuse_reduction("this program and processor cannot do with `" + name + "`",
+                   "accepted: " + accepted);
+}
+
 }  // namespace
 
 BasisBuilder::BasisBuilder(const FeModel& model, const ReductionOptions& options,
                            const ReductionProgress& progress, std::vector<std::string>& warnings)
     : model_(model), options_(options), progress_(progress), warnings_(warnings) {
+  settings_.threads = options.threads;
+  settings_.kernels = find_block_kernels(options.processor);
+  settings_.progress = progress;
+  if (!settings_.kernels) refuse_processor(options.processor);
   report("rigid motions", 0);
-  body_ = std::make_unique<Structure>(model, model.supported);
+  body_ = std::make_unique<Structure>(model, model.supported, settings_);
   if (body_->softest() < kNearlyFree && body_->rigid_count() < 6)
     warnings_.push_back(
         "the stiffness matrix hardly resists a rigid motion: if the body should be free, write the "
@@ -65,7 +79,7 @@ void BasisBuilder::choose_frame() {
   if (options_.basis == ReductionBasis::inertia_decoupling)
     refuse_reduction("inertia decoupling refers to mean axes, not to a node", "use inertia relief");
   attached_ = std::make_unique<Structure>(
-      model_, with_rows_held(model_.supported, model_.rows_of(frame_node_)));
+      model_, with_rows_held(model_.supported, model_.rows_of(frame_node_)), settings_);
 }
 
 void BasisBuilder::find_interface() {
@@ -169,7 +183,7 @@ Structure& BasisBuilder::omitted() {
   if (omitted_) return *omitted_;
   std::vector<char> held = with_rows_held(model_.supported, interface_);
   if (frame_node_ >= 0) held = with_rows_held(held, model_.rows_of(frame_node_));
-  omitted_ = std::make_unique<Structure>(model_, held);
+  omitted_ = std::make_unique<Structure>(model_, held, settings_);
   if (omitted_->rigid_count() > 0)
     refuse_reduction("the body can move while its interface is held",
                      "name more interface nodes or components");
@@ -217,11 +231,38 @@ MatX BasisBuilder::relief_shapes() {
   return s.embedded(s.solve(s.restricted(body_->embedded(loads))));
 }
 
-MatX BasisBuilder::flexibility_columns() {
+/// From the constraint shapes Ψ alone, with balanced loads f and S = Ψᵀ K Ψ:
+///
+///   fᵀ K⁻ f = (Ψᵀ f)ᵀ S⁻ Ψᵀ f + f_oᵀ K_oo⁻¹ f_o
+///
+/// S is singular by the rigid motions of the body only; otherwise empty: the factorization of the
+/// whole body names what is wrong.
+VecX BasisBuilder::condensed_flexibility(Structure& omitted, const MatX& shapes) {
   Structure& s = attached();
-  const MatX loads = unit_loads(s);
-  if (s.rigid_count() == 0) return s.embedded(s.solve(loads));
-  return s.embedded(s.without_rigid(s.solve(s.balanced(loads))));
+  const MatX loads = s.embedded(s.balanced(unit_loads(s))), at_shapes = shapes.transpose() * loads;
+  const MatX stiffness = shapes.transpose() * (model_.stiffness * shapes);
+  const VecX scale = stiffness.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<MatX> solver(scale.asDiagonal() * stiffness *
+                                                   scale.asDiagonal());
+  const auto elastic = stiffness.rows() - s.rigid_count();
+  if (solver.info() != Eigen::Success || elastic < 0) return {};
+  const VecX values = solver.eigenvalues().tail(elastic);
+  if (elastic > 0 && !(values(0) > kNoStiffness * values(elastic - 1))) return {};
+  const MatX amplitudes =
+      solver.eigenvectors().rightCols(elastic).transpose() * (scale.asDiagonal() * at_shapes);
+  VecX sum = (amplitudes.array().square().colwise() / values.array()).colwise().sum();
+  if (s.rigid_count() == 0) return sum;  // nothing acts on the other rows
+  const MatX others = omitted.restricted(loads);
+  return sum +
+         (others.array() * omitted.solve(others).array()).colwise().sum().matrix().transpose();
+}
+
+const VecX& BasisBuilder::interface_flexibility() {
+  if (flexibility_.size() > 0) return flexibility_;
+  Structure& s = attached();
+  const MatX loads = s.balanced(unit_loads(s));
+  flexibility_ = (loads.array() * s.solve(loads).array()).colwise().sum();
+  return flexibility_;
 }
 
 BasisShapes BasisBuilder::build() {
@@ -242,6 +283,7 @@ BasisShapes BasisBuilder::build() {
             "shape of their own");
       basis.shapes = constraint_shapes(omitted());
       basis.static_count = static_cast<int>(interface_.size());
+      flexibility_ = condensed_flexibility(omitted(), basis.shapes);
       add_modes(options_.normal == ReductionNormal::whole ? attached() : omitted(), basis);
       break;
     }

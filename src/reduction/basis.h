@@ -29,8 +29,9 @@ class BasisBuilder {
   Structure& attached() { return attached_ ? *attached_ : *body_; }
   ReductionFrame frame() const { return frame_; }
   const std::vector<int>& interface_rows() const { return interface_; }
-  /// Static solutions to unit loads at the interface, as the chosen frame sees them.
-  MatX flexibility_columns();
+  /// What unit loads at the interface rows, balanced by inertia when the body can move, displace
+  /// there, each row its own.
+  const VecX& interface_flexibility();
 
  private:
   Structure& omitted();  ///< with the interface held
@@ -44,16 +45,19 @@ class BasisBuilder {
   MatX unit_loads(const Structure& structure) const;
   MatX constraint_shapes(Structure& omitted) const;
   MatX relief_shapes();
+  VecX condensed_flexibility(Structure& omitted, const MatX& shapes);
   void report(const std::string& phase, double fraction) const;
 
   const FeModel& model_;
   const ReductionOptions& options_;
   const ReductionProgress& progress_;
   std::vector<std::string>& warnings_;
+  FactorSettings settings_;
   ReductionFrame frame_ = ReductionFrame::point;
   int frame_node_ = -1;
   std::unique_ptr<Structure> body_, attached_, omitted_;
   std::vector<int> interface_;  ///< model rows
+  VecX flexibility_;            ///< at these, when it is known
 };
 
 }  // namespace mbcosim

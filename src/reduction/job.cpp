@@ -138,6 +138,9 @@ const std::vector<ReductionOptionHelp>& reduction_option_help() {
       {"lumping", "hrz: lump the mass by its diagonal; diagonal: refuse a mass that is not lumped"},
       {"tolerance", "Relative tolerance of the normal modes; default: 1e-10"},
       {"shift", "Shift of the eigensolution [1/s^2], below zero; default: none"},
+      {"processor",
+       "Instructions of the factorization, which round differently: plain, x86-64-v3 or x86-64-v4; "
+       "default: the last that this processor has"},
       {"rank-tolerance", "Relative energy below which a combination of shapes is dependent"},
   };
   return kHelp;
@@ -173,6 +176,8 @@ void ReductionJob::set(const std::string& name, const std::string& value) {
     options.eigen_tolerance = share(name, value);
   else if (name == "shift")
     options.shift = shift(value);
+  else if (name == "processor")
+    options.processor = value;
   else if (name == "rank-tolerance")
     options.rank_tolerance = share(name, value);
   else

@@ -22,9 +22,9 @@ class Flexibility {
   Flexibility(Structure& structure, double shift, const ReductionProgress& progress, int expected)
       : structure_(structure), progress_(progress), expected_(expected) {
     if (shift < 0)
-      shifted_ =
-          SparseFactor::positive(structure.stiffness() - shift * structure.mass(),
-                                 structure.places(), [&](int k) { return structure.row_text(k); });
+      shifted_ = SparseFactor::positive(
+          structure.shifted(shift), structure.places(),
+          [&](int k) { return structure.row_text(k); }, structure.factor_settings());
   }
   Eigen::Index rows() const { return structure_.size(); }
   Eigen::Index cols() const { return structure_.size(); }
@@ -49,15 +49,15 @@ class Flexibility {
 class MassProduct {
  public:
   using Scalar = double;
-  explicit MassProduct(const SparseMatrix& mass) : mass_(mass) {}
-  Eigen::Index rows() const { return mass_.rows(); }
-  Eigen::Index cols() const { return mass_.cols(); }
+  explicit MassProduct(const Structure& structure) : structure_(structure) {}
+  Eigen::Index rows() const { return structure_.size(); }
+  Eigen::Index cols() const { return structure_.size(); }
   void perform_op(const double* in, double* out) const {
-    Eigen::Map<VecX>(out, rows()).noalias() = mass_ * Eigen::Map<const VecX>(in, rows());
+    Eigen::Map<VecX>(out, rows()) = structure_.mass_times(Eigen::Map<const VecX>(in, rows()));
   }
 
  private:
-  const SparseMatrix& mass_;
+  const Structure& structure_;
 };
 
 /// A start vector within the range of the operator, so that massless rows do no harm.
@@ -66,7 +66,7 @@ VecX start_vector(const Structure& structure, const Flexibility& flexibility, un
   std::uniform_real_distribution<double> value(-0.5, 0.5);
   VecX x(structure.size()), y(structure.size());
   for (double& v : x) v = value(random);
-  x = structure.mass() * x;
+  x = structure.mass_times(x);
   flexibility.perform_op(x.data(), y.data());
   return y;
 }
@@ -81,7 +81,7 @@ NormalModes Structure::lanczos_modes(int count, const EigenOptions& options,
                      "at most a quarter");
   const int basis = std::min(size(), std::max(2 * count + 1, 20));
   Flexibility flexibility(*this, options.shift, progress, 3 * basis);
-  MassProduct product(mass_);
+  MassProduct product(*this);
   Spectra::SymGEigsShiftSolver<Flexibility, MassProduct, Spectra::GEigsMode::ShiftInvert> solver(
       flexibility, product, count, basis, options.shift);
   const VecX start = start_vector(*this, flexibility, 1u);

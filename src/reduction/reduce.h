@@ -62,6 +62,8 @@ struct ReductionOptions {
   double eigen_tolerance = 1e-10;  ///< relative, of the normal modes
   double shift = 0;  ///< [1/s²] of the Lanczos process, at most 0; 0: a determinate set of rows is
                      ///< held instead
+  std::string processor = "auto";  ///< version of the kernels: auto, plain, x86-64-v3, x86-64-v4
+  int threads = 1;                 ///< of the factorizations; does not change the results
   bool check_completeness = true;  ///< count the eigenvalues below the highest normal mode
 };
 

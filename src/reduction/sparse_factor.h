@@ -6,49 +6,57 @@
 #include <string>
 #include <vector>
 
+#include "reduction/block_kernels.h"
+#include "reduction/error.h"
 #include "reduction/supernodes.h"
 
 namespace mbcosim {
 
+/// How to factor. Results depend on the kernels, not on the number of threads.
+struct FactorSettings {
+  int threads = 1;
+  const BlockKernels* kernels = find_block_kernels("auto");
+  ReductionProgress progress;  ///< called on the caller's thread
+};
+
 /// Kept as dense blocks of columns with the same pattern (supernodes); the numbers are found from
-/// left to right, each block gathering the contributions of those that reach it. One thread, always
-/// the same order: the same matrix gives the same bits.
+/// the leaves of the elimination tree to its roots, each block gathering the contributions of those
+/// that reach it in a fixed order: the same matrix gives the same bits.
 class SparseFactor {
  public:
+  using Pattern = std::shared_ptr<const Supernodes>;
+
   /// Throws ReductionError when `matrix` is not positive definite: `row_text` names a row of it.
+  /// `pattern`: of a matrix with the same entries, instead of `places`.
   static SparseFactor positive(const SparseMatrix& matrix, const RowPlaces& places,
-                               const std::function<std::string(int)>& row_text);
+                               const std::function<std::string(int)>& row_text,
+                               const FactorSettings& settings = {}, Pattern pattern = nullptr);
   /// Number of eigenvalues of the symmetric `matrix` below zero; -1 when the factorization breaks
   /// down.
-  static int count_negative(const SparseMatrix& matrix, const RowPlaces& places);
+  static int count_negative(const SparseMatrix& matrix, const RowPlaces& places,
+                            const FactorSettings& settings = {}, Pattern pattern = nullptr);
 
   /// A⁻¹ f, column by column.
   MatX solve(const MatX& f) const;
-  long nonzeros() const { return static_cast<long>(values_.size()); }
+  long nonzeros() const { return static_cast<long>(size_); }
+  const Pattern& pattern() const { return pattern_; }
 
  private:
-  SparseFactor(const SparseMatrix& matrix, const RowPlaces& places);
-  using Block = Eigen::Map<MatX>;
-  using ConstBlock = Eigen::Map<const MatX>;
-  Block block(int s) { return {values_.data() + from_[s], pattern_.height(s), pattern_.width(s)}; }
-  ConstBlock block(int s) const {
-    return {values_.data() + from_[s], pattern_.height(s), pattern_.width(s)};
-  }
-  void factor(const SparseMatrix& matrix);
-  void load(const SparseMatrix& matrix, int s, const std::vector<int>& local);
-  struct Scratch {
-    MatX scaled, update;
-  };
-  int gather(int d, int top, int s, const std::vector<int>& local, Scratch& scratch);
-  bool eliminate(int s);
+  friend class Factorization;
+  SparseFactor(const SparseMatrix& matrix, const RowPlaces& places, const FactorSettings& settings,
+               Pattern pattern);
+  double* block(int s) { return values_.get() + from_[s]; }
+  const double* block(int s) const { return values_.get() + from_[s]; }
   void solve_lower(MatX& x) const;
   void solve_upper(MatX& x) const;
 
-  Supernodes pattern_;
-  std::vector<std::size_t> from_;  ///< of each block, in `values_`
-  std::vector<double> values_;     ///< L below the diagonal
-  VecX pivots_;                    ///< D, in the order of elimination
-  int broken_ = -1;                ///< row of the matrix whose pivot is zero
+  Pattern pattern_;
+  const BlockKernels* kernels_;
+  std::size_t size_ = 0;
+  std::vector<std::size_t> from_;     ///< of each block, in `values_`
+  std::unique_ptr<double[]> values_;  ///< L below the diagonal
+  VecX pivots_;                       ///< D, in the order of elimination
+  int broken_ = -1;                   ///< row of the matrix whose pivot is zero
 };
 
 }  // namespace mbcosim

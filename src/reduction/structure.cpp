@@ -13,8 +13,8 @@ constexpr double kNoEnergy = 1e-8;  ///< relative strain of a rigid motion
 constexpr int kDenseOrder = 400;    ///< up to here dense eigensolutions
 
 /// √ of the diagonal of K, which makes the strains of different rows comparable.
-VecX row_scales(const SparseMatrix& stiffness) {
-  const VecX diagonal = stiffness.diagonal().cwiseMax(0);
+VecX row_scales(const VecX& stiffness) {
+  const VecX diagonal = stiffness.cwiseMax(0);
   const double mean = std::max(diagonal.mean(), 1e-300);
   return diagonal.unaryExpr([mean](double d) { return std::sqrt(d > 1e-14 * mean ? d : mean); });
 }
@@ -38,16 +38,15 @@ SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<int>& rows,
   return part;
 }
 
-Structure::Structure(const FeModel& model, const std::vector<char>& held)
-    : model_(model), position_(model.rows(), -1) {
+Structure::Structure(const FeModel& model, const std::vector<char>& held,
+                     const FactorSettings& settings)
+    : model_(model), position_(model.rows(), -1), settings_(settings) {
   for (int r = 0; r < model.rows(); ++r) {
     if (held[r]) continue;
     position_[r] = size();
     rows_.push_back(r);
   }
   if (rows_.empty()) refuse_reduction("every degree of freedom is held");
-  stiffness_ = submatrix(model.stiffness, rows_, rows_);
-  mass_ = submatrix(model.mass, rows_, rows_);
   places_.resize(3, size());
   for (int k = 0; k < size(); ++k) places_.col(k) = model.positions.col(model.dofs[rows_[k]].node);
   find_rigid_motions();
@@ -56,15 +55,15 @@ Structure::Structure(const FeModel& model, const std::vector<char>& held)
 
 /// Combinations of the six geometric motions without strain, orthonormal in M.
 void Structure::find_rigid_motions() {
-  const VecX scale = row_scales(stiffness_);
+  const VecX scale = row_scales(restricted(VecX(model_.stiffness.diagonal())));
   const MatX geometric = restricted(model_.rigid_shapes(model_.positions.rowwise().mean()));
   Eigen::ColPivHouseholderQR<MatX> qr((scale.asDiagonal() * geometric).eval());
   qr.setThreshold(1e-10);
   const int independent = static_cast<int>(qr.rank());
   const MatX motions = scale.cwiseInverse().asDiagonal() *
                        MatX(qr.householderQ() * MatX::Identity(size(), independent));
-  const Eigen::JacobiSVD<MatX> svd(MatX(scale.cwiseInverse().asDiagonal() * (stiffness_ * motions)),
-                                   Eigen::ComputeThinV);
+  const Eigen::JacobiSVD<MatX> svd(
+      MatX(scale.cwiseInverse().asDiagonal() * stiffness_times(motions)), Eigen::ComputeThinV);
   int count = 0;
   softest_ = 1;
   for (int k = 0; k < independent; ++k) {
@@ -74,14 +73,14 @@ void Structure::find_rigid_motions() {
       softest_ = std::min(softest_, svd.singularValues()(k));
   }
   rigid_ = motions * svd.matrixV().rightCols(count);
-  const MatX inertia = rigid_.transpose() * (mass_ * rigid_);
+  const MatX inertia = rigid_.transpose() * mass_times(rigid_);
   const Eigen::LLT<MatX> root(inertia);
   if (count > 0 &&
       (root.info() != Eigen::Success ||
        Eigen::SelfAdjointEigenSolver<MatX>(inertia).eigenvalues()(0) <= 1e-12 * inertia.trace()))
     refuse_reduction("a rigid motion of the body has no inertia");
   if (count > 0) rigid_ = root.matrixU().solve<Eigen::OnTheRight>(rigid_);
-  mass_rigid_ = mass_ * rigid_;
+  mass_rigid_ = mass_times(rigid_);
 }
 
 void Structure::hold_determinate_set() {
@@ -96,10 +95,15 @@ void Structure::hold_determinate_set() {
 
 void Structure::factor() {
   if (factor_) return;
-  const SparseMatrix part = submatrix(stiffness_, kept_, kept_);
-  factor_ = std::make_unique<SparseFactor>(
-      SparseFactor::positive(part, places_(Eigen::all, kept_),
-                             [this](int k) { return model_.dof_text(rows_[kept_[k]]); }));
+  std::vector<int> rows;  // of the model
+  for (const int k : kept_) rows.push_back(rows_[k]);
+  const SparseMatrix matrix = submatrix(model_.stiffness, rows, rows);
+  factor_ = std::make_unique<SparseFactor>(SparseFactor::positive(
+      matrix, places_(Eigen::all, kept_), [&](int k) { return model_.dof_text(rows[k]); },
+      settings_));
+  if (rigid_count() > 0) return;
+  pattern_ = factor_->pattern();
+  pattern_entries_ = matrix.nonZeros();
 }
 
 MatX Structure::solve(const MatX& f) {
@@ -121,9 +125,9 @@ NormalModes Structure::modes(int count, const EigenOptions& options,
 
 /// M φ = μ (K + a M X_R X_Rᵀ M) φ with μ = 1/ω²; massless combinations have μ = 0.
 NormalModes Structure::dense_modes(int count) const {
-  const MatX mass = mass_;
-  const double a = MatX(stiffness_).trace() / std::max(mass.trace(), 1e-300);
-  const MatX stiffness = MatX(stiffness_) + a * mass_rigid_ * mass_rigid_.transpose();
+  const MatX mass = this->mass(), elastic = this->stiffness();
+  const double a = elastic.trace() / std::max(mass.trace(), 1e-300);
+  const MatX stiffness = elastic + a * mass_rigid_ * mass_rigid_.transpose();
   const Eigen::GeneralizedSelfAdjointEigenSolver<MatX> solver(mass, stiffness);
   if (solver.info() != Eigen::Success)
     throw ReductionError(ErrorKind::not_converged, "the dense eigensolution failed");
@@ -132,7 +136,7 @@ NormalModes Structure::dense_modes(int count) const {
   int n = 0;
   for (int k = size() - 1; k >= 0 && n < count; --k) {
     const VecX shape = solver.eigenvectors().col(k);
-    const double norm = std::sqrt(std::max(shape.dot(mass_ * shape), 1e-300));
+    const double norm = std::sqrt(std::max(shape.dot(mass_times(shape).col(0)), 1e-300));
     const bool is_rigid = (mass_rigid_.transpose() * shape).norm() > 0.5 * norm;
     if (is_rigid) continue;
     if (solver.eigenvalues()(k) <= 1e-13 * largest) break;
@@ -149,21 +153,39 @@ NormalModes Structure::dense_modes(int count) const {
 void Structure::finish(NormalModes& modes) const {
   for (int j = 0; j < modes.shapes.cols(); ++j) {
     auto shape = modes.shapes.col(j);
-    shape /= std::sqrt(shape.dot(mass_ * shape));
+    shape /= std::sqrt(shape.dot(mass_times(shape).col(0)));
     int largest = 0;
     shape.cwiseAbs().maxCoeff(&largest);
     if (shape(largest) < 0) shape = -shape;
-    const VecX force = stiffness_ * shape;
-    const double error = (force - modes.squares(j) * (mass_ * shape)).norm() / force.norm();
+    const VecX force = stiffness_times(shape);
+    const double error = (force - modes.squares(j) * mass_times(shape)).norm() / force.norm();
     modes.residual = std::max(modes.residual, error);
-    modes.rounding = std::max(modes.rounding,
-                              std::numeric_limits<double>::epsilon() *
-                                  (stiffness_.cwiseAbs() * shape.cwiseAbs()).norm() / force.norm());
+    const VecX whole = embedded(shape).cwiseAbs();
+    VecX largest_force = VecX::Zero(whole.size());
+    for (int c = 0; c < model_.stiffness.outerSize(); ++c)
+      for (SparseMatrix::InnerIterator it(model_.stiffness, c); it; ++it)
+        largest_force(it.row()) += std::abs(it.value()) * whole(c);
+    modes.rounding = std::max(modes.rounding, std::numeric_limits<double>::epsilon() *
+                                                  restricted(largest_force).norm() / force.norm());
   }
 }
 
+SparseMatrix Structure::part(const SparseMatrix& matrix) const {
+  return submatrix(matrix, rows_, rows_);
+}
+
+SparseMatrix Structure::shifted(double sigma) const {
+  return part(model_.stiffness - sigma * model_.mass);
+}
+
+/// The pattern of the last factor if it serves `matrix`, too: K − σ M has no more entries than K.
+SparseFactor::Pattern Structure::pattern_for(const SparseMatrix& matrix) const {
+  return matrix.nonZeros() == pattern_entries_ ? pattern_ : nullptr;
+}
+
 int Structure::count_modes_below(double square) const {
-  const int below = SparseFactor::count_negative(stiffness_ - square * mass_, places_);
+  const SparseMatrix matrix = shifted(square);
+  const int below = SparseFactor::count_negative(matrix, places_, settings_, pattern_for(matrix));
   return below < 0 ? below : below - rigid_count();
 }
 

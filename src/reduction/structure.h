@@ -38,15 +38,21 @@ struct EigenOptions {
 class Structure {
  public:
   /// `held`: flags of the model's rows. The model must outlive the structure.
-  Structure(const FeModel& model, const std::vector<char>& held);
+  Structure(const FeModel& model, const std::vector<char>& held,
+            const FactorSettings& settings = {});
 
   int size() const { return static_cast<int>(rows_.size()); }
   const std::vector<int>& rows() const { return rows_; }              ///< of the model
   int position(int model_row) const { return position_[model_row]; }  ///< −1: held
   std::string row_text(int k) const { return model_.dof_text(rows_[k]); }
-  const SparseMatrix& stiffness() const { return stiffness_; }
-  const SparseMatrix& mass() const { return mass_; }
+  SparseMatrix stiffness() const { return part(model_.stiffness); }
+  SparseMatrix mass() const { return part(model_.mass); }
+  /// K − σ M, with σ in 1/s².
+  SparseMatrix shifted(double sigma) const;
+  MatX stiffness_times(const MatX& shapes) const { return times(model_.stiffness, shapes); }
+  MatX mass_times(const MatX& shapes) const { return times(model_.mass, shapes); }
   const RowPlaces& places() const { return places_; }
+  const FactorSettings& factor_settings() const { return settings_; }
   int rigid_count() const { return static_cast<int>(rigid_.cols()); }
   const MatX& rigid() const { return rigid_; }  ///< X_R
   /// Largest strain of the softest combination that is not rigid, relative; small: nearly free.
@@ -71,6 +77,11 @@ class Structure {
   MatX restricted(const MatX& model_shapes) const;
 
  private:
+  SparseMatrix part(const SparseMatrix& matrix) const;
+  MatX times(const SparseMatrix& matrix, const MatX& shapes) const {
+    return restricted(matrix * embedded(shapes));
+  }
+  SparseFactor::Pattern pattern_for(const SparseMatrix& matrix) const;
   void find_rigid_motions();
   void hold_determinate_set();
   void factor();
@@ -81,12 +92,14 @@ class Structure {
 
   const FeModel& model_;
   std::vector<int> rows_, position_;
-  SparseMatrix stiffness_, mass_;
   RowPlaces places_;
   MatX rigid_, mass_rigid_;
   double softest_ = 1;
   std::vector<int> kept_;  ///< rows outside the determinate set
+  FactorSettings settings_;
   std::unique_ptr<SparseFactor> factor_;
+  SparseFactor::Pattern pattern_;     ///< of the last factor
+  Eigen::Index pattern_entries_ = 0;  ///< of the matrix that it belongs to
 };
 
 /// The rows and columns of `matrix` that are listed.

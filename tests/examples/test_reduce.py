@@ -58,6 +58,14 @@ def reduced(folder, *options):
     return json.loads((folder / "beam.fem.json").read_text()), run.stdout
 
 
+def test_threads_do_not_change_the_file(folder):
+    files = []
+    for threads in 1, 3:
+        reduced(folder, "--basis", "craig-bampton", "--interface", "1,9", "--modes", "4", "--threads", threads, "--processor", "plain")
+        files.append((folder / "beam.fem").read_bytes())
+    assert files[0] == files[1]
+
+
 def clamped_deck(modes, force):
     return f"""begin: data; problem: initial value; end: data;
 begin: initial value; initial time: 0.; final time: 6.; time step: 1.e-2; max iterations: 20; tolerance: 1.e-9; end: initial value;

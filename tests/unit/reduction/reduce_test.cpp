@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "fe_models.h"
+#include "reduction/basis.h"
 #include "reduction/job.h"
 #include "reduction/structure.h"
 
@@ -271,6 +272,27 @@ TEST(ReduceProjections, HoldToRoundOff) {
   EXPECT_LT((body.rigid().transpose() * (body.mass() * modes.shapes)).cwiseAbs().maxCoeff(), 1e-10);
 }
 
+/// From the constraint shapes as from a factorization of the whole body, whether it can move or
+/// not.
+TEST(ReduceFlexibility, OfTheInterfaceNeedsNoFactorOfTheBody) {
+  ReductionOptions o = options_of(ReductionBasis::craig_bampton, 3, {"2", "6", "9"});
+  for (const FeModel& beam : {space_beam(), clamped(space_beam(), "1")}) {
+    const ReductionProgress silent;
+    std::vector<std::string> warnings;
+    BasisBuilder condensed(beam, o, silent, warnings), factored(beam, o, silent, warnings);
+    condensed.build();
+    const VecX expected = factored.interface_flexibility();
+    ASSERT_EQ(expected.size(), 18);
+    ASSERT_GT(expected.minCoeff(), 0);
+    EXPECT_LT((condensed.interface_flexibility().cwiseQuotient(expected).array() - 1)
+                  .cwiseAbs()
+                  .maxCoeff(),
+              1e-9);
+    EXPECT_EQ(condensed.body().factor_nonzeros(), 0);
+    EXPECT_GT(factored.body().factor_nonzeros(), 0);
+  }
+}
+
 /// With whole normal modes the lowest frequencies are those of the model, with those of the held
 /// interface they are above.
 TEST(ReduceModes, OfTheWholeStructureOrWithTheInterfaceHeld) {
@@ -413,6 +435,13 @@ TEST(ReduceOptions, AreChecked) {
       {"fancy", "1", "unknown option"}};
   for (const auto& [name, value, message] : cases)
     EXPECT_THAT(option_refusal(name, value), HasSubstr(message));
+}
+
+TEST(ReduceRefusals, UnknownProcessor) {
+  ReductionOptions o = options_of(ReductionBasis::free_modes, 4);
+  o.processor = "abacus";
+  EXPECT_THAT(refusal(space_beam(), o),
+              HasSubstr("cannot do with `abacus` (accepted: auto, plain"));
 }
 
 TEST(ReduceRefusals, StopsWhenAsked) {

@@ -125,6 +125,88 @@ TEST(SparseFactor, TheSameMatrixGivesTheSameBits) {
   EXPECT_TRUE((first.array() == second.array()).all());
 }
 
+TEST(SparseFactor, AnyNumberOfThreadsGivesTheSameBits) {
+  const Solid s = solid(10, 9, 9, 3);
+  const VecX f = VecX::LinSpaced(s.matrix.rows(), -1, 2);
+  const MatX alone = SparseFactor::positive(s.matrix, s.places, row_text).solve(f);
+  for (const int threads : {2, 3, 8}) {
+    FactorSettings settings;
+    settings.threads = threads;
+    const MatX x = SparseFactor::positive(s.matrix, s.places, row_text, settings).solve(f);
+    EXPECT_TRUE((x.array() == alone.array()).all()) << threads << " threads";
+  }
+}
+
+TEST(SparseFactor, EveryVersionOfTheKernelsSolvesAndCounts) {
+  const Solid s = solid(7, 6, 5, 3);
+  SparseMatrix one(s.matrix.rows(), s.matrix.rows());
+  one.setIdentity();
+  const VecX squares = Eigen::SelfAdjointEigenSolver<MatX>(MatX(s.matrix)).eigenvalues();
+  const SparseMatrix shifted = s.matrix - 0.5 * (squares(9) + squares(10)) * one;
+  const MatX expected = MatX::Random(s.matrix.rows(), 5);
+  ASSERT_FALSE(block_kernels().empty());
+  EXPECT_EQ(find_block_kernels("auto"), block_kernels().back());
+  EXPECT_EQ(find_block_kernels("abacus"), nullptr);
+  for (const BlockKernels* kernels : block_kernels()) {
+    FactorSettings settings;
+    settings.kernels = find_block_kernels(kernels->processor);
+    ASSERT_EQ(settings.kernels, kernels);
+    const SparseFactor factor = SparseFactor::positive(s.matrix, s.places, row_text, settings);
+    EXPECT_LT((factor.solve(s.matrix * expected) - expected).cwiseAbs().maxCoeff(), 1e-11)
+        << kernels->processor;
+    EXPECT_EQ(SparseFactor::count_negative(shifted, s.places, settings), 10) << kernels->processor;
+  }
+}
+
+TEST(SparseFactor, APatternServesASecondMatrix) {
+  const Solid s = solid(6, 5, 4, 3);
+  const SparseFactor first = SparseFactor::positive(s.matrix, s.places, row_text);
+  const SparseMatrix twice = 2 * s.matrix;
+  const VecX f = VecX::LinSpaced(s.matrix.rows(), -1, 2);
+  const MatX x = SparseFactor::positive(twice, s.places, row_text, {}, first.pattern()).solve(f);
+  EXPECT_TRUE((x.array() == 0.5 * first.solve(f).array()).all());  // powers of two round nothing
+}
+
+TEST(SparseFactor, NamesTheSameRowWithAnyNumberOfThreads) {
+  Solid s = solid(9, 9, 9, 3);
+  for (const int row : {400, 1000, 1700}) s.matrix.coeffRef(row, row) = 1e-20;
+  std::vector<std::string> messages;
+  for (const int threads : {1, 2, 5}) {
+    FactorSettings settings;
+    settings.threads = threads;
+    try {
+      SparseFactor::positive(s.matrix, s.places, row_text, settings);
+      FAIL();
+    } catch (const ReductionError& e) {
+      messages.push_back(e.what());
+    }
+  }
+  EXPECT_THAT(messages, ::testing::Each(messages[0]));
+}
+
+/// At once with any number of threads; with one also on the way.
+TEST(SparseFactor, StopsWhenAsked) {
+  const Solid s = solid(9, 9, 9, 3);
+  for (const auto& [threads, share] : {std::pair{1, 0.0}, {2, 0.0}, {5, 0.0}, {1, 0.2}}) {
+    FactorSettings settings;
+    settings.threads = threads;
+    double reached = -1;
+    settings.progress = [&, share = share](const std::string& phase, double fraction) {
+      EXPECT_EQ(phase, "factorization");
+      reached = fraction;
+      return fraction < share;
+    };
+    try {
+      SparseFactor::positive(s.matrix, s.places, row_text, settings);
+      FAIL() << threads << " threads";
+    } catch (const ReductionError& e) {
+      EXPECT_EQ(e.kind, ErrorKind::cancelled);
+      EXPECT_GE(reached, share);
+      EXPECT_LT(reached, 1);
+    }
+  }
+}
+
 TEST(EliminationOrder, DissectionOfASolidCostsLessThanMinimumDegree) {
   for (const bool scattered : {false, true}) {
     const Solid s = solid(14, 14, 14, 1, scattered);

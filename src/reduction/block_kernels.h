@@ -1,0 +1,42 @@
+/// Work of the sparse factorization on dense blocks, compiled for several processors.
+///
+/// A block has `rows` × `columns` numbers, column by column: the columns of L of a supernode, the
+/// square of its own rows on top. The versions do the same operations; those with fused multiply
+/// and add round differently.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace mbcosim {
+
+struct BlockKernels {
+  const char* processor;  ///< "x86-64-v3"
+
+  /// L D Lᵀ of the square on top, in place; the rows below get L. Returns the column whose pivot is
+  /// zero or not finite, or −1.
+  int (*eliminate)(double* block, int rows, int columns, double* pivots);
+  /// update = L D Uᵀ, with U the first `targets` of the `height` rows of `lower`, (height ×
+  /// targets); `scaled`: scratch (columns × targets).
+  void (*contribute)(const double* lower, int rows, int columns, int height, int targets,
+                     const double* pivots, double* scaled, double* update);
+  /// Forward substitution with a block: own = L⁻¹ own, below = L_below own; `own` is part of a
+  /// matrix of `order` rows with `sides` columns, `below` has (rows − columns) × sides numbers.
+  void (*forward)(const double* block, int rows, int columns, double* own, int order, int sides,
+                  double* below);
+  /// Backward substitution: own = L⁻ᵀ (own − L_belowᵀ below).
+  void (*backward)(const double* block, int rows, int columns, double* own, int order, int sides,
+                   const double* below);
+};
+
+/// The versions that this processor can run, the plainest first.
+const std::vector<const BlockKernels*>& block_kernels();
+/// By its name; "auto": the last. Null: unknown, or not for this processor.
+const BlockKernels* find_block_kernels(const std::string& processor);
+
+/// The versions of the build; null where the compiler has none for that processor.
+extern const BlockKernels* const kPlainKernels;
+extern const BlockKernels* const kKernelsV3;
+extern const BlockKernels* const kKernelsV4;
+
+}  // namespace mbcosim
