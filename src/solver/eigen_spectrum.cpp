@@ -6,6 +6,7 @@
 
 #include "solver/doubled_pattern.h"
 #include "solver/in_pieces.h"
+#include "solver/lapack.h"
 #include "solver/linear_solver.h"
 #include "solver/shifted_pencil.h"
 #include "solver/stoppable.h"
@@ -182,6 +183,7 @@ Error not_converged() {
 }
 
 Result<Spectrum> dense_spectrum(const Linearization& system, bool vectors, const Watch& watch) {
+  if (const auto lapack = Lapack::get(); !lapack) return lapack.error();
   ShiftedPencil pencil(system, watch);
   if (!pencil.is_regular())
     return eigen_error(ErrorKind::singular,

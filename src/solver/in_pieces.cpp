@@ -7,13 +7,7 @@
 #include <limits>
 #include <vector>
 
-extern "C" {
-void dlaqps_(const int* m, const int* n, const int* offset, const int* nb, int* kb, double* a,
-             const int* lda, int* jpvt, double* tau, double* vn1, double* vn2, double* auxv,
-             double* f, const int* ldf);
-void dlaqp2_(const int* m, const int* n, const int* offset, double* a, const int* lda, int* jpvt,
-             double* tau, double* vn1, double* vn2, double* work);
-}
+#include "solver/lapack.h"
 
 namespace mbcosim {
 
@@ -156,6 +150,7 @@ MatX solve(const Eigen::PartialPivLU<MatX>& a, const MatX& b, const Watch& watch
 }
 
 MatX range_basis(MatX a, double tolerance, const Watch& watch) {
+  const Lapack& lapack = **Lapack::get();
   constexpr int kPanel = 32, kLast = 128;  // columns by panels, and those at the end without
   const int n = static_cast<int>(a.rows());
   VecX tau = VecX::Zero(n), norms = a.colwise().norm(), partial = norms, work(kPanel);
@@ -167,15 +162,15 @@ MatX range_basis(MatX a, double tolerance, const Watch& watch) {
     watch.look();
     const int left = n - done;
     int factored = 0;
-    dlaqps_(&n, &left, &done, &kPanel, &factored, &a(0, done), &n, &pivots[done], &tau(done),
-            &norms(done), &partial(done), work.data(), scratch.data(), &left);
+    lapack.dlaqps(&n, &left, &done, &kPanel, &factored, &a(0, done), &n, &pivots[done], &tau(done),
+                  &norms(done), &partial(done), work.data(), scratch.data(), &left);
     done += factored;
   }
   if (n - done > 0 && n - done <= kLast) {
     const int left = n - done;
     VecX room(left);
-    dlaqp2_(&n, &left, &done, &a(0, done), &n, &pivots[done], &tau(done), &norms(done),
-            &partial(done), room.data());
+    lapack.dlaqp2(&n, &left, &done, &a(0, done), &n, &pivots[done], &tau(done), &norms(done),
+                  &partial(done), room.data());
     done = n;
   }
   int rank = 0;

@@ -40,7 +40,7 @@ MatX transposed_product(const MatX& a, const MatX& b, const Watch& watch);  ///<
 MatX solve(const Eigen::PartialPivLU<MatX>& a, const MatX& b, const Watch& watch);
 
 /// Orthonormal basis of the range of `a` (n, n), by a QR factorization with column pivoting; pivots
-/// below `tolerance` of the largest count as zero.
+/// below `tolerance` of the largest count as zero. `Lapack::get` must have succeeded.
 MatX range_basis(MatX a, double tolerance, const Watch& watch);
 
 /// A = U T Uᵀ, T quasi-triangular.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "solver/lapack.h"
 #include "solver/shifted_pencil.h"
 #include "solver/stoppable.h"
 
@@ -68,6 +69,7 @@ Split split(const MatX& t, const MatX& b, const Watch& watch) {
 // σT)⁻¹ b u but for rates of u.
 Result<StateSpace> eliminate(const Linearization& system, const InputsOutputs& io,
                              const Watch& watch) {
+  if (const auto lapack = Lapack::get(); !lapack) return lapack.error();
   constexpr double kShift = ShiftedPencil::kShift;
   ShiftedPencil pencil(system, watch);
   if (!pencil.is_regular())

@@ -249,7 +249,7 @@ default aerodynamic output
   ! ignored
 output results
   = { netcdf [ , sync ] [ , no text ] | text }
-  > .nc beside the text files, or instead of them with `no text`
+  > .nc beside the text files; `no text` is ignored
 title
   = "<title>"
 print
