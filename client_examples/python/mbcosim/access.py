@@ -20,7 +20,7 @@ import grpc
 
 from .errors import TimedOut, Unavailable
 
-_PATIENCE = 1.0  # seconds in which a daemon may appear that was started a moment ago
+_PATIENCE = 2.0  # seconds in which a daemon may appear that was started a moment ago
 _ANSWER = 10.0   # seconds that a server may take to answer
 Path = Union[str, "os.PathLike[str]"]
 
