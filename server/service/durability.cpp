@@ -161,7 +161,7 @@ void Durability::write(Session& session) {
   if (keeping.over || session.has_failed()) return;
   CapturedPoint captured = session.capture();
   const MemoryShare share(memory_of(session), 2 * size_of(captured.state));
-  write_snapshots(session, id, captured.point);
+  write_snapshots(session, keeping, id, captured.point);
   session.sync_results();
   std::set<int> kept;
   for (const auto& snapshot : captured.point.snapshots()) kept.insert(snapshot.number());
@@ -175,17 +175,17 @@ void Durability::write(Session& session) {
 }
 
 // States of snapshots that have no file yet. One that was deleted meanwhile leaves the point.
-void Durability::write_snapshots(Session& session, const std::string& id,
+void Durability::write_snapshots(Session& session, Keeping& keeping, const std::string& id,
                                  v1::CheckpointPoint& point) {
   google::protobuf::RepeatedPtrField<v1::CheckpointSnapshot> kept;
   for (const v1::CheckpointSnapshot& snapshot : point.snapshots()) {
     const int number = snapshot.number();
-    if (session.keeping()->snapshots.count(number) == 0) {
+    if (keeping.snapshots.count(number) == 0) {
       const std::optional<State> state = session.snapshots().find_state(number);
       if (!state) continue;
       const MemoryShare share(memory_of(session), 2 * size_of(*state));
       folder_->write_snapshot(id, number, session.bytes_of(*state));
-      session.keeping()->snapshots.insert(number);
+      keeping.snapshots.insert(number);
     }
     *kept.Add() = snapshot;
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "durable/state_folder.h"
+#include "service/keeping.h"
 #include "service/parts.h"
 #include "service/upload.h"
 #include "threads/mutex.h"
@@ -67,7 +68,8 @@ class Durability {
   std::unique_ptr<Simulation> simulation_at(const ModelPtr& model, const Suspended& suspended,
                                             const std::string& state, SessionResults* results,
                                             bool has_files);
-  void write_snapshots(Session& session, const std::string& id, v1::CheckpointPoint& point);
+  void write_snapshots(Session& session, Keeping& keeping, const std::string& id,
+                       v1::CheckpointPoint& point) TS_REQUIRES(keeping.mutex);
   bool may_see(const Suspended& suspended, const Caller& caller, Access access) const;
   void read_folder();
   void read_one(const std::string& id);
