@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import inspect
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
@@ -61,10 +62,22 @@ async def connect(address: Optional[str] = None, *, token: Optional[str] = None,
         await server.close()
 
 
+@functools.cache
+def _keep_grpc() -> None:
+    """Keeps gRPC's runtime for asyncio alive until the process ends.
+
+    Without it the last channel that goes waits, within the garbage collector and without a bound, for calls whose
+    messages are still being written; to a server that has stopped reading they are written for ever
+    (gRPC issues 22365 and 40989).
+    """
+    grpc.aio.init_grpc_aio()
+
+
 class Connection:
     """A channel whose calls are awaited."""
 
     def __init__(self, channel: Any, token: Optional[str], reconnect: float) -> None:
+        _keep_grpc()
         self.channel, self.metadata, self.reconnect = channel, metadata(token), reconnect
         self.stubs = Stubs(channel)
 
