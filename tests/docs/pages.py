@@ -7,8 +7,8 @@ usage: pages.py links ROOT            every link, anchor and cited file of every
 A block of the language `console` is a session: lines that start with `$ ` are commands (with a final `&`, in the background), the
 lines that follow are what they print. Numbers may differ in the last digits, `...` stands for any lines. A comment line above a block says what
 else to do with it: `<!-- file: NAME -->` writes it to a file for the commands of the page that follow, `<!-- not run: REASON -->`
-leaves it alone. Blocks of a page share a folder, in which `build`, `client_examples`, `tests` and `docker` are those of the tree. Blocks without a language
-are for reading only.
+leaves it alone. Blocks of a page share a folder, in which `build`, `client_examples`, `tests` and `docker` are those of the tree. Blocks of the
+language `mermaid` are sequence diagrams, whose form is looked at. Blocks without a language are for reading only.
 """
 import os
 import pathlib
@@ -75,6 +75,30 @@ def links(root):
     return found + [finding for name in tracked(root) if name.suffix in sources for finding in broken_citations(root, name)]
 
 
+def wrong_in_diagram(text):
+    """What GitHub could not draw of a sequence diagram, a sentence each."""
+    known, open_blocks = set(), 0
+    first, *lines = [line.strip() for line in text.strip().split("\n")]
+    if first != "sequenceDiagram":
+        yield f"`{first}` begins no sequence diagram"
+    for line in lines:
+        used = re.fullmatch(r"(\w+)-{1,2}>>(\w+): \S.*|Note over (\w+)(?:,(\w+))?: \S.*", line)
+        if declared := re.fullmatch(r"participant (\w+) as \S.*", line):
+            known.add(declared[1])
+        elif used:
+            yield from (f"`{line}` names {name}, which is no participant" for name in used.groups() if name and name not in known)
+        elif line == "end":
+            open_blocks -= 1
+        elif re.match(r"(loop|alt|opt) \S", line):
+            open_blocks += 1
+        elif not re.match(r"else \S", line):
+            yield f"`{line}` is no line of a sequence diagram"
+        if ";" in line or open_blocks < 0:
+            yield f"`{line}` ends what is not open"
+    if open_blocks > 0:
+        yield "a block of a diagram is not ended"
+
+
 def same(expected, printed):
     """Do two lines agree but for the last digits of their numbers?"""
     if NUMBER.sub("#", expected).split() != NUMBER.sub("#", printed).split():
@@ -131,6 +155,8 @@ class Page:
         elif what is None and language == "console":
             for command, expected in commands(text):
                 yield from self.run_command(command, expected)
+        elif what is None and language == "mermaid":
+            yield from (f"{self.name}: {finding}" for finding in wrong_in_diagram(text))
         elif what is None and language:
             yield f"{self.name}: a block of `{language}` is neither written to a file nor marked as not run:\n{text}"
 
