@@ -1,8 +1,10 @@
 /** A daemon with a deck, and a browser before it. */
 import { spawn, type ChildProcess } from 'node:child_process';
 import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:http';
 import { fileURLToPath } from 'node:url';
 import { chromium, type Browser, type Page } from 'playwright-core';
+import { expect } from 'vitest';
 
 export const FACTOR = Number(process.env.MBCOSIM_TIME_FACTOR ?? 1);
 const ROOT = fileURLToPath(new URL('../../..', import.meta.url));
@@ -88,7 +90,7 @@ export class Daemon {
   readonly token = 'a-token-of-the-tests';
   private child?: ChildProcess;
 
-  constructor(private readonly folder: string, readonly port: number) {
+  constructor(private readonly folder: string, readonly port: number, private readonly options: string[] = []) {
     writeFileSync(`${folder}/tokens`, `${this.token} control reader\n`);
   }
 
@@ -97,7 +99,7 @@ export class Daemon {
   }
 
   async start(): Promise<void> {
-    const child = spawn(`${BIN}/mbcosimd`, ['--listen', `unix:${this.folder}/socket`, '--http', `127.0.0.1:${this.port}`, '--tokens', `${this.folder}/tokens`], { stdio: 'ignore' });
+    const child = spawn(`${BIN}/mbcosimd`, ['--listen', `unix:${this.folder}/socket`, '--http', `127.0.0.1:${this.port}`, '--tokens', `${this.folder}/tokens`, ...this.options], { stdio: 'ignore' });
     this.child = child;
     const end = Date.now() + 20_000 * FACTOR;
     while (!(await fetch(`${this.origin}/healthz`).then((reply) => reply.ok, () => false))) {
@@ -106,12 +108,30 @@ export class Daemon {
     }
   }
 
-  async kill(): Promise<void> {
+  kill(): Promise<void> {
+    return this.signal('SIGKILL');
+  }
+
+  /** In order. */
+  end(): Promise<void> {
+    return this.signal('SIGTERM');
+  }
+
+  private async signal(name: NodeJS.Signals): Promise<void> {
     if (!this.child || this.child.exitCode !== null || this.child.signalCode !== null) return;
     const ended = new Promise((resolve) => this.child?.on('exit', resolve));
-    this.child.kill('SIGKILL');
+    this.child.kill(name);
     await ended;
   }
+}
+
+/** A port that nobody listens at. */
+export async function freePort(): Promise<number> {
+  const server = createServer();
+  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
+  const { port } = server.address() as { port: number };
+  await new Promise((resolve) => server.close(resolve));
+  return port;
 }
 
 /** A unary call in JSON. */
@@ -126,10 +146,10 @@ async function call<T>(origin: string, token: string, method: string, request: o
 }
 
 /** Loads an example deck with whatever it includes; the simulation's name. */
-export async function create(server: { origin: string; token: string }, deck: string): Promise<string> {
+export async function create(server: { origin: string; token: string }, deck: string, options: object = {}): Promise<string> {
   const files = readdirSync(MODELS).filter((name) => name === deck || /\.(inc|fem)$/.test(name));
   const { simulation } = await call<{ simulation: { name: string } }>(server.origin, server.token, 'Simulations/CreateSimulationInline', {
-    header: { bundleMainFile: deck, options: { displayName: deck } },
+    header: { bundleMainFile: deck, options: { displayName: deck, ...options } },
     files: files.map((path) => ({ path, data: readFileSync(`${MODELS}/${path}`).toString('base64') })),
   });
   return simulation.name;
@@ -156,6 +176,16 @@ export interface Visit {
   close(): Promise<void>;
 }
 
+/** With `MBCOSIM_PAGE`, that file is shown in place of the daemon's page: tries a page without a new daemon. */
+async function prepared(page: Page, address: string): Promise<string> {
+  const file = process.env.MBCOSIM_PAGE, { origin, search, hash } = new URL(address);
+  if (!file || !search) return address;
+  await page.goto(address);  // the token becomes a cookie
+  await page.goto('about:blank');
+  await page.route((url) => url.origin === origin && url.pathname === '/', (route) => route.fulfill({ contentType: 'text/html', body: readFileSync(file, 'utf8') }));
+  return `${origin}/${hash}`;
+}
+
 /** Opens an address in a fresh profile. */
 export async function visit(browser: Browser, address: string, options: { width?: number; height?: number; dark?: boolean } = {}): Promise<Visit> {
   const context = await browser.newContext({
@@ -174,8 +204,22 @@ export async function visit(browser: Browser, address: string, options: { width?
     if (!['data:', 'blob:', 'file:'].includes(url.protocol) && url.origin !== origin) faults.push(`request to ${url.origin}`);
   });
   page.setDefaultTimeout(20_000 * FACTOR);
-  await page.goto(address);
+  await page.goto(await prepared(page, address));
   return { page, faults, close: () => context.close() };
+}
+
+/** Runs `work` with a daemon of its own and a page on it; no error may be left in the console. */
+export async function withPage(browser: Browser, deck: string, work: (visit: Visit, view: View) => Promise<void>, options?: Parameters<typeof visit>[2]): Promise<void> {
+  const view = await View.start(deck);
+  try {
+    const visited = await visit(browser, view.address, options);
+    await shown(visited.page);
+    await work(visited, view);
+    expect(visited.faults).toEqual([]);
+    await visited.close();
+  } finally {
+    await view.stop();
+  }
 }
 
 /** What the page has inside, as far as tests look at it. */
@@ -186,7 +230,14 @@ interface Inside {
       session?: { name: string; playing: { value: string } };
       sample?: { step: number; time: number };
     };
-    scene: { view: { nodeMatrix(index: number): number[]; picture(): Promise<Blob>; drawCalls: number; layers(): string[] } };
+    scene: {
+      view: {
+        nodeMatrix(index: number): number[]; picture(): Promise<Blob>; drawCalls: number; layers(): string[];
+        camera: { projectionMatrix: { elements: number[] }; matrixWorldInverse: { elements: number[] } };
+        canvas: HTMLCanvasElement;
+        drawn: { batches: { layer: string; batch: { where: ArrayLike<number> } }[] };
+      };
+    };
   };
 }
 
@@ -226,6 +277,30 @@ export function scene(page: Page): Promise<{ step: number; nodes: Record<string,
         }));
       }),
   );
+}
+
+/** Where the node with a label is seen: pixels of the window; from −1 to 1 across the scene. */
+export function placeOf(page: Page, label: number): Promise<{ x: number; y: number; across: number; up: number }> {
+  return page.evaluate((wanted) => {
+    const { desk, scene: { view } } = (window as unknown as Inside).mbcosim;
+    const index = desk.shown.value?.geometry.nodes.findIndex((node) => node.label === wanted) ?? -1;
+    const times = (m: number[], v: number[]) => [0, 1, 2, 3].map((row) => v.reduce((sum, value, k) => sum + m[4 * k + row] * value, 0));
+    const at = times(view.camera.projectionMatrix.elements, times(view.camera.matrixWorldInverse.elements, [...view.nodeMatrix(index).slice(12, 15), 1]));
+    const across = at[0] / at[3], up = at[1] / at[3], box = view.canvas.getBoundingClientRect();
+    return { x: box.left + ((across + 1) / 2) * box.width, y: box.top + ((1 - up) / 2) * box.height, across, up };
+  }, label);
+}
+
+/** Whether all nodes are seen. */
+export async function inView(page: Page): Promise<boolean> {
+  const { nodes } = await scene(page);
+  const places = await Promise.all(Object.keys(nodes).map((label) => placeOf(page, Number(label))));
+  return places.every(({ across, up }) => Math.abs(across) < 1 && Math.abs(up) < 1);
+}
+
+/** Points of the flexible bodies as they are drawn, three numbers each. */
+export function flexiblePoints(page: Page): Promise<number[]> {
+  return page.evaluate(() => (window as unknown as Inside).mbcosim.scene.view.drawn.batches.filter(({ layer }) => layer === 'flexible').flatMap(({ batch }) => Array.from(batch.where)));
 }
 
 /** Kinds of things that the scene has. */

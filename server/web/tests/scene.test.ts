@@ -1,9 +1,11 @@
 import * as THREE from 'three';
 import { describe, expect, test } from 'vitest';
 import { IDENTITY, rotationOf, type Vec3 } from '../src/algebra';
-import { initialPose, pointAt, type NodeShape, type PointShape } from '../src/geometry';
+import { initialPose, pointAt, type FlexibleBody, type NodeShape, type PointShape, type Pose } from '../src/geometry';
 import { writeBar } from '../src/scene/batches/matrices';
+import { FlexibleBatch } from '../src/scene/batches/flexible';
 import { GlyphBatch } from '../src/scene/batches/glyphs';
+import { roundBelow } from '../src/scene/grid';
 import { coil, straight } from '../src/scene/line_items';
 import { Points } from '../src/scene/points';
 import { drawnBy, solids } from '../src/scene/solids';
@@ -82,6 +84,43 @@ describe('solids', () => {
       d.forEach((value, k) => expect(end.getComponent(k)).toBeCloseTo([1, 2, 3][k] + 5 * value, 5));
       expect(Math.abs(matrix.determinant())).toBeCloseTo(5 * 0.25, 5);
     }
+  });
+});
+
+test('cells of the grid have round lengths', () => {
+  expect([0.004, 0.01, 0.3, 0.75, 1, 4.9, 5, 14, 100].map(roundBelow).map((cell) => Number(cell.toPrecision(6)))).toEqual([0.002, 0.01, 0.2, 0.5, 1, 2, 5, 10, 100]);
+});
+
+describe('a flexible body', () => {
+  const body: FlexibleBody = {
+    joint: 1, node: -1, fixedPosition: [0, 0, 0], fixedOrientation: IDENTITY, amplitudes: [7], labels: ['1', '2', '3'],
+    positions: [0, 0, 0, 1, 0, 0, 2, 0, 0], shapes: [0, 0, 0, 0, 0, 0.5, 0, 0, 1],
+  };
+  const bent: Pose = { ...pose, value: (handle) => (handle === 7 ? 0.1 : NaN) };
+  const blue = new THREE.Color(0, 0, 1), red = new THREE.Color(1, 0, 0);
+
+  test('is drawn deformed, as many times as asked, in the colours of its deformation', () => {
+    drawnBy(true);
+    const scale = new ValueScale(blue, red, 0), batch = new FlexibleBatch(body, 'joint:1', scale, 0.01);
+    batch.factor = 10;
+    batch.update(bent);
+    Array.from(batch.where).forEach((x, i) => expect(x).toBeCloseTo([0, 0, 0, 1, 0, 0.5, 2, 0, 1][i], 6));
+    expect(scale.range?.map((value) => Number(value.toPrecision(6)))).toEqual([0, 0.1]);
+    const points = batch.object.children[0] as THREE.Points, colours = Array.from(points.geometry.attributes.color.array);
+    [0, 0, 1, 0.5, 0, 0.5, 1, 0, 0].forEach((part, i) => expect(colours[i]).toBeCloseTo(part, 5));
+  });
+
+  test('has a bar between each two near points', () => {
+    drawnBy(true);
+    const batch = new FlexibleBatch(body, 'joint:1', new ValueScale(blue, red, 0), 0.01);
+    batch.update(bent);
+    const bars = batch.object.children[1] as THREE.InstancedMesh, matrix = new THREE.Matrix4(), ends: number[] = [];
+    for (let i = 0; i < bars.count; ++i) {
+      bars.getMatrixAt(i, matrix);
+      ends.push(...[0, 1].map((y) => new THREE.Vector3(0, y, 0).applyMatrix4(matrix).x));
+    }
+    expect(bars.count).toBeGreaterThanOrEqual(2);
+    for (const x of [0, 1, 2]) expect(ends.some((end) => Math.abs(end - x) < 1e-6)).toBe(true);
   });
 });
 

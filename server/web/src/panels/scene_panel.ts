@@ -6,7 +6,7 @@ import { number } from '../format';
 
 import { PoseReader } from '../geometry';
 import { amplitude, MovedPose, type Mode } from '../modes';
-import { ASKED_FOR, type Layer } from '../scene/build';
+import { ASKED_FOR, type Layer, type Legend } from '../scene/build';
 import { DARK, LIGHT } from '../scene/palette';
 import { View, type ViewName } from '../scene/view';
 import type { Session, Shown } from '../session';
@@ -32,11 +32,14 @@ export class ScenePanel {
   private otherReader = new PoseReader([]);
   private mode?: { mode: Mode; factor: number; pose: MovedPose };
   private unwatchOther = () => {};
+  private readonly otherName = h('span', { class: 'name' });
+  private readonly comparing = h('div', { class: 'toolbar comparing hidden' }, this.otherName,
+    iconButton('close', 'Compare no more', () => this.compareWith(undefined), { class: 'icon-button small' }));
 
   constructor(private readonly desk: Desk) {
     this.view = new View(this.element, DARK);
     this.view.onPick = (id) => (desk.selected.value = id);
-    this.element.append(h('div', { class: 'tools' }, this.layerTools(), this.viewTools()), this.hud);
+    this.element.append(h('div', { class: 'tools' }, this.layerTools(), this.viewTools(), this.comparing), this.hud);
     desk.theme.watch((theme) => this.view.setPalette(theme === 'dark' ? DARK : LIGHT));
     desk.shown.watch((shown) => {
       this.trails.clear();
@@ -99,6 +102,8 @@ export class ScenePanel {
     this.other = session;
     this.otherReader = new PoseReader(session?.geometry.nodes ?? []);
     this.view.compare(session?.geometry);
+    this.comparing.classList.toggle('hidden', session === undefined);
+    this.otherName.textContent = `pale: ${session?.title ?? ''}`;
     this.unwatchOther = session ? session.changed.watch(() => this.desk.invalidate()) : () => {};
   }
 
@@ -106,6 +111,7 @@ export class ScenePanel {
   animate(mode: Mode | undefined, size: number): void {
     const extent = this.desk.shown.value?.geometry.extent ?? 1;
     const idle = this.mode === undefined;
+    this.view.forgetColours();
     this.mode = mode && { mode, factor: amplitude(mode, size * extent), pose: new MovedPose(this.reader) };
     if (this.mode && idle) this.vibrate();
     else this.desk.invalidate();
@@ -127,11 +133,13 @@ export class ScenePanel {
     this.view.setPose(this.mode ? this.mode.pose.move(pose, this.mode.mode, phase, this.mode.factor) : pose);
     this.updateOther(sample.time);
     this.view.setTrails([...this.trails].map((node) => this.path(node)));
-    this.hud.replaceChildren(h('strong', {}, `${number(sample.time, 6)} s`), h('div', { class: 'soft' }, `step ${sample.step}`), h('div', { class: 'soft' }, `grid ${number(this.view.cell, 3)}${this.unit(shown)}`));
+    this.hud.replaceChildren(h('strong', {}, `${number(sample.time, 6)} s`), h('div', { class: 'soft' }, `step ${sample.step}`), h('div', { class: 'soft' }, `grid ${number(this.view.cell, 3)}${this.unit(shown)}`),
+      ...this.view.legends().map((known) => legend(known, this.unit(shown, known.handle))));
   }
 
-  private unit({ model, geometry }: Shown): string {
-    const unit = model.variables.find((variable) => variable.handle === geometry.nodes[0]?.positionHandle)?.unit;
+  /** Of a variable; of lengths without one. */
+  private unit({ model, geometry }: Shown, handle = geometry.nodes[0]?.positionHandle): string {
+    const unit = model.variables.find((variable) => variable.handle === handle)?.unit;
     return unit ? ` ${unit}` : '';
   }
 
@@ -188,6 +196,12 @@ export class ScenePanel {
     }, { 'aria-pressed': 'false' });
     return h('div', { class: 'toolbar views' }, look('front', 'X–Z'), look('side', 'Y–Z'), look('top', 'X–Y'), iconButton('fit', 'Whole model (H)', () => this.view.look('iso')), orthographic, follow);
   }
+}
+
+/** What the colours between two ends mean. */
+function legend({ name, least, largest, low, high }: Legend, unit: string): HTMLElement {
+  return h('div', { class: 'scale', style: `--low:${low};--high:${high}` }, h('span', {}, name), h('span', { class: 'number' }, number(least, 3)),
+    h('i'), h('span', { class: 'number' }, `${number(largest, 3)}${unit}`));
 }
 
 function check(name: string, on: boolean, change: (on: boolean) => void): HTMLElement {

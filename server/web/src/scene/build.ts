@@ -12,9 +12,26 @@ import { LineBatch, type LineItem } from './batches/lines';
 import { glyph, MANY } from './glyphs';
 import { Items, nodeItems } from './items';
 import type { Palette } from './palette';
+import type { ValueScale } from './value_colour';
 
 /** What can be shown and hidden by itself. */
 export type Layer = 'nodes' | 'links' | 'bodies' | 'joints' | 'beams' | 'lines' | 'surfaces' | 'forces' | 'flexible' | 'reactions' | 'velocities' | 'axes';
+
+/** A range of values and the colours of its ends. */
+export interface Legend {
+  name: string;
+  /** Of a variable that has the values' unit; absent: that of positions. */
+  handle?: number;
+  least: number;
+  largest: number;
+  low: string;
+  high: string;
+}
+
+function legend(name: string, { range, low, high }: ValueScale, handle?: number): Legend | undefined {
+  const hex = (colour: THREE.Color) => `#${colour.getHexString()}`;
+  return range && { name, handle, least: range[0], largest: range[1], low: hex(low), high: hex(high) };
+}
 
 /** Layers that are hidden until somebody asks for them. */
 export const ASKED_FOR: readonly Layer[] = ['reactions', 'velocities', 'axes'];
@@ -22,6 +39,14 @@ export const ASKED_FOR: readonly Layer[] = ['reactions', 'velocities', 'axes'];
 const NODE_SIZE = 0.36;
 /** Length of the longest arrow, as a part of the model's extent. */
 const ARROW = 0.28;
+
+/** A ball around balls: its centre is that of the box around them. */
+function around(balls: readonly THREE.Sphere[]): THREE.Sphere {
+  const box = new THREE.Box3(), one = new THREE.Box3();
+  for (const ball of balls) box.union(ball.getBoundingBox(one));
+  const centre = box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
+  return new THREE.Sphere(centre, balls.reduce((reach, ball) => Math.max(reach, ball.center.distanceTo(centre) + ball.radius), 0));
+}
 
 export class Drawn {
   readonly batches: { layer: Layer; batch: Batch }[] = [];
@@ -48,7 +73,7 @@ export class Drawn {
     this.addArrows('reactions', items.reactions, 'reaction');
     this.addArrows('velocities', items.velocities, 'velocity');
     this.addLines('axes', items.axes, 'other', 2);
-    for (const body of geometry.bodies) this.add('flexible', new FlexibleBatch(body, `joint:${body.joint}`, this.colour('flexible'), this.colour('strained')));
+    for (const body of geometry.bodies) this.add('flexible', new FlexibleBatch(body, `joint:${body.joint}`, items.deformations, 0.12 * items.size));
   }
 
   private colour(name: keyof Palette): THREE.Color {
@@ -75,10 +100,32 @@ export class Drawn {
     if (list.length > 0) this.add(layer, new ArrowBatch(list, this.items.points, this.colour(name), look));
   }
 
+  /** What colours mean, as far as values were seen. */
+  legends(): Legend[] {
+    const { pressures, pressure, deformations } = this.items;
+    return [legend('pressure', pressures, pressure), legend('deformation', deformations)].filter((known) => known !== undefined);
+  }
+
+  /** Colours begin anew with the values that come. */
+  forgetColours(): void {
+    this.items.pressures.forget();
+    this.items.deformations.forget();
+  }
+
   /** Handles of the variables that a layer needs besides the poses of nodes. */
   needs(layer: Layer): number[] {
     const arrows = this.batches.filter((entry) => entry.layer === layer).map(({ batch }) => batch).filter((batch) => batch instanceof ArrowBatch);
     return arrows.flatMap((batch) => batch.items.flatMap((item) => item.handles));
+  }
+
+  /** A ball around all that is drawn as it stands, but for arrows and axes. */
+  bounds(): THREE.Sphere {
+    const balls: THREE.Sphere[] = [], { bodies, points: { x } } = this.items;
+    const add = (from: ArrayLike<number>, at: number, radius: number) => balls.push(new THREE.Sphere(new THREE.Vector3(from[at], from[at + 1], from[at + 2]), radius));
+    for (let i = 0; i < x.length; i += 3) add(x, i, 0);
+    for (const { point, size } of bodies) add(x, 3 * point, Math.max(...size));
+    for (const { batch } of this.batches) if (batch instanceof FlexibleBatch) for (let i = 0; i < batch.where.length; i += 3) add(batch.where, i, 0);
+    return around(balls);
   }
 
   update(pose: Pose): void {

@@ -8,7 +8,16 @@ import type { Palette } from './palette';
 const PARTS = 5;
 /** Pieces of each line: it fades from piece to piece. */
 const PIECES = 12;
-const FAINT = 0.38, STRONG = 0.95;
+const FAINT = 0.45, STRONG = 1;
+
+/** The model is at least so many cells long. */
+const CELLS = 3;
+
+/** The largest of 1, 2, 5, 10, … times a power of ten that is no more than this. */
+export function roundBelow(length: number): number {
+  const power = 10 ** Math.floor(Math.log10(length) + 1e-9);
+  return power * ([5, 2].find((part) => part * power <= length * (1 + 1e-9)) ?? 1);
+}
 
 export class Grid {
   readonly object: THREE.LineSegments;
@@ -16,7 +25,7 @@ export class Grid {
   readonly cell: number;
 
   constructor(geometry: Geometry, palette: Palette) {
-    this.cell = 10 ** Math.floor(Math.log10(geometry.extent / 1.5));
+    this.cell = roundBelow(geometry.extent / CELLS);
     const reach = Math.ceil((1.2 * geometry.extent) / this.cell) * this.cell;
     const lines = this.lines(reach, new THREE.Color(palette.grid), new THREE.Color(palette.background));
     this.object = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ vertexColors: true }));

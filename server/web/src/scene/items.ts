@@ -38,10 +38,14 @@ export class Items {
   readonly velocities: ArrowItem[] = [];
   readonly axes: LineItem[] = [];
   readonly sections: LineItem[] = [];
+  /** Handle of a variable whose values are shown as colours of `pressures`. */
+  pressure?: number;
   /** Glyphs' size. */
   readonly size: number;
   private readonly pose: Pose;
-  private readonly pressures: ValueScale;
+  readonly pressures: ValueScale;
+  /** Of the points of flexible bodies. */
+  readonly deformations: ValueScale;
   private readonly stations: number;
 
   /** `handleOf`: handle of a variable by its name. */
@@ -49,6 +53,7 @@ export class Items {
     this.points = new Points(geometry.nodes.length);
     this.size = glyphSize(geometry);
     this.pressures = new ValueScale(new THREE.Color(palette.low), new THREE.Color(palette.high));
+    this.deformations = new ValueScale(new THREE.Color(palette.flexible), new THREE.Color(palette.strained), 0);
     this.pose = initialPose(geometry.nodes);
     const beams = geometry.elements.reduce((sum, element) => sum + Number(isBeam(element)), 0);
     this.stations = beams > MANY_BEAMS ? 5 : BEAM_STATIONS;
@@ -121,6 +126,7 @@ export class Items {
   }
 
   private byValue(handle: number | undefined): BarItem['colour'] {
+    this.pressure ??= handle;
     return handle === undefined ? undefined : (pose, out) => this.pressures.colour(pose.value(handle, 0), out);
   }
 

@@ -32,7 +32,7 @@ export interface Palette {
 
 export const DARK: Palette = {
   background: '#10151c',
-  grid: '#3a4858',
+  grid: '#52647a',
   node: '#e6edf3',
   link: '#7d8b99',
   body: '#6f93b8',
@@ -60,7 +60,7 @@ export const DARK: Palette = {
 
 export const LIGHT: Palette = {
   background: '#f3f6f9',
-  grid: '#a9b8c6',
+  grid: '#8fa2b4',
   node: '#1c2733',
   link: '#7c8894',
   body: '#5f86ad',

@@ -5,7 +5,7 @@ import { LineMaterial } from 'three/examples/jsm/lines/LineMaterial.js';
 import type { Vec3 } from '../algebra';
 import { initialPose, positionOf, type Geometry, type Pose } from '../geometry';
 import { FlexibleBatch } from './batches/flexible';
-import { ASKED_FOR, Drawn, type Layer } from './build';
+import { ASKED_FOR, Drawn, type Layer, type Legend } from './build';
 import { Grid } from './grid';
 import { Labels } from './labels';
 import type { Palette } from './palette';
@@ -26,6 +26,8 @@ export type ViewName = keyof typeof VIEWS;
 type HandleOf = (name: string) => number | undefined;
 
 const NEAR = 0.01, FAR = 100;  // times the model's extent
+/** Room around what is drawn, when a view is chosen. */
+const ROOM = 1.12;
 
 export class View {
   readonly canvas: HTMLCanvasElement;
@@ -54,6 +56,8 @@ export class View {
   private followed = -1;
   private followedAt?: THREE.Vector3;
   private deformation = 1;
+  /** Of the ball that a view shows whole. */
+  private radius = 0.5;
   private dirty = true;
   /** Drawn with all pixels since it last changed. */
   private fine = false;
@@ -108,6 +112,7 @@ export class View {
     if (this.ghost) this.removeBatches(this.ghost);
     this.ghost = geometry && new Drawn(geometry, this.palette, () => undefined);
     if (this.ghost) this.addBatches(this.ghost, 0.25);
+    this.resize();  // tells wide lines how large the picture is
     if (geometry) this.setGhostPose(initialPose(geometry.nodes));
     this.invalidate();
   }
@@ -185,6 +190,16 @@ export class View {
     return this.drawn?.needs(layer) ?? [];
   }
 
+  /** What colours mean. */
+  legends(): Legend[] {
+    return this.drawn?.legends() ?? [];
+  }
+
+  /** Colours of values begin anew. */
+  forgetColours(): void {
+    this.drawn?.forgetColours();
+  }
+
   /** Layers that have something in them. */
   layers(): Layer[] {
     return [...new Set(this.drawn?.batches.map(({ layer }) => layer) ?? [])].sort();
@@ -199,12 +214,13 @@ export class View {
 
   look(name: ViewName): void {
     const { from, up } = VIEWS[name];
-    const extent = this.geometry?.extent ?? 1, centre = this.middle();
-    const target = this.followed >= 0 && this.pose ? positionOf(this.pose, this.followed) : centre;
+    const extent = this.geometry?.extent ?? 1, bounds = this.drawn?.bounds();
+    this.radius = bounds && bounds.radius > 0 ? ROOM * bounds.radius : extent / 2;
+    const target = this.followed >= 0 && this.pose ? positionOf(this.pose, this.followed) : bounds?.center.toArray() ?? [0, 0, 0];
     this.controls.target.set(...target);
     for (const camera of [this.perspective, this.orthographic]) {
       camera.up.set(up[0], up[1], up[2]);
-      camera.position.set(from[0], from[1], from[2]).normalize().multiplyScalar((extent * 1.9) / Math.min(1, this.perspective.aspect)).add(this.controls.target);
+      camera.position.set(from[0], from[1], from[2]).normalize().multiplyScalar(this.distance()).add(this.controls.target);
       camera.near = extent * NEAR;
       camera.far = extent * FAR;
     }
@@ -223,13 +239,10 @@ export class View {
     return controls;
   }
 
-  /** Of the box around the nodes as they are; the model's own where there are none. */
-  private middle(): Vec3 {
-    const count = this.geometry?.nodes.length ?? 0;
-    if (!this.pose || count === 0) return this.geometry?.centre ?? [0, 0, 0];
-    const box = new THREE.Box3();
-    for (let node = 0; node < count; ++node) box.expandByPoint(new THREE.Vector3(...positionOf(this.pose, node)));
-    return box.getCenter(new THREE.Vector3()).toArray();
+  /** From where all that the view shows fits into the picture, however wide or high that is. */
+  private distance(): number {
+    const half = (this.perspective.fov * Math.PI) / 360;
+    return this.radius / Math.sin(Math.min(half, Math.atan(this.perspective.aspect * Math.tan(half))));
   }
 
   setOrthographic(on: boolean): void {
@@ -340,7 +353,7 @@ export class View {
     this.renderer.setSize(width, height);
     this.perspective.aspect = width / height;
     this.perspective.updateProjectionMatrix();
-    const half = ((this.geometry?.extent ?? 1) * 0.62) / Math.min(1, width / height);
+    const half = this.radius / Math.min(1, width / height);
     Object.assign(this.orthographic, { left: (-half * width) / height, right: (half * width) / height, top: half, bottom: -half });
     this.orthographic.updateProjectionMatrix();
     this.scene.traverse((object) => {

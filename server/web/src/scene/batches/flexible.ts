@@ -1,20 +1,30 @@
-/** A flexible body: its points, deformed, and thin lines between near ones. */
+/** A flexible body: its points, deformed, and bars or thin lines between near ones. */
 import * as THREE from 'three';
 import { deformedPoints, type FlexibleBody, type Pose } from '../../geometry';
 import { joins } from '../../nearest';
+import { solids, type Solids } from '../solids';
+import type { ValueScale } from '../value_colour';
 import type { Batch } from './batch';
+import { writeBar } from './matrices';
+
+/** More joins than this are thin lines. */
+const MOST_BARS = 400;
+const BAR = new THREE.CylinderGeometry(1, 1, 1, 8).translate(0, 0.5, 0);
+const tint = new THREE.Color(), from = [0, 0, 0], along = [0, 0, 0];
 
 export class FlexibleBatch implements Batch {
   readonly object = new THREE.Group();
   factor = 1;
   private readonly points: THREE.Points;
-  private readonly lines: THREE.LineSegments;
+  private readonly joins: [number, number][];
+  private readonly bars?: Solids;
   private readonly amplitudes: number[];
   private readonly straight: Float32Array;
   private readonly shades: Float32Array;
-  private largest = 0;
+  private selected?: THREE.Color;
 
-  constructor(private readonly body: FlexibleBody, private readonly id: string, private readonly colour: THREE.Color, private readonly strained: THREE.Color) {
+  /** `radius`: of the bars. */
+  constructor(private readonly body: FlexibleBody, private readonly id: string, private readonly scale: ValueScale, private readonly radius: number) {
     const count = body.positions.length / 3;
     this.amplitudes = body.amplitudes.map(() => 0);
     this.straight = new Float32Array(3 * count);
@@ -22,16 +32,24 @@ export class FlexibleBatch implements Batch {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * count), 3));
     geometry.setAttribute('color', new THREE.BufferAttribute(this.shades, 3));
-    const lines = geometry.clone();
-    lines.setAttribute('position', geometry.attributes.position);
-    lines.setAttribute('color', geometry.attributes.color);
-    lines.setIndex(joins(body.positions).flat());
     this.points = new THREE.Points(geometry, new THREE.PointsMaterial({ vertexColors: true, size: 7, sizeAttenuation: false }));
-    this.lines = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.7 }));
-    for (const object of [this.points, this.lines]) {
-      object.frustumCulled = false;
-      this.object.add(object);
-    }
+    this.add(this.points);
+    this.joins = joins(body.positions);
+    if (this.joins.length > MOST_BARS) this.add(this.lines(geometry));
+    else if (this.joins.length > 0) this.object.add((this.bars = solids(BAR, this.joins.length)).object);
+  }
+
+  private add(object: THREE.Points | THREE.LineSegments): void {
+    object.frustumCulled = false;
+    this.object.add(object);
+  }
+
+  private lines({ attributes }: THREE.BufferGeometry): THREE.LineSegments {
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', attributes.position);
+    geometry.setAttribute('color', attributes.color);
+    geometry.setIndex(this.joins.flat());
+    return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.7 }));
   }
 
   update(pose: Pose): void {
@@ -41,21 +59,42 @@ export class FlexibleBatch implements Batch {
     deformedPoints(this.body, pose, this.amplitudes, this.factor, out);
     position.needsUpdate = true;
     this.shade(out);
-    for (const object of [this.points, this.lines]) object.geometry.boundingSphere = null;
+    this.stretch(out);
+    for (const object of this.object.children) if (object instanceof THREE.Points || object instanceof THREE.LineSegments) object.geometry.boundingSphere = null;
   }
 
-  /** From the colour of the body at rest to that of the largest displacement seen. */
+  /** From the colour of the body at rest to that of the largest displacement seen in any body. */
   private shade(out: Float32Array): void {
-    const { straight, shades, colour, strained } = this;
+    const { straight, shades, scale } = this;
     const moved = (i: number) => Math.hypot(out[i] - straight[i], out[i + 1] - straight[i + 1], out[i + 2] - straight[i + 2]) / this.factor;
-    for (let i = 0; i < out.length; i += 3) this.largest = Math.max(this.largest, moved(i));
+    scale.colour(0, tint);
+    for (let i = 0; i < out.length; i += 3) scale.colour(moved(i), tint);
     for (let i = 0; i < out.length; i += 3) {
-      const part = this.largest > 0 ? moved(i) / this.largest : 0;
-      shades[i] = colour.r + part * (strained.r - colour.r);
-      shades[i + 1] = colour.g + part * (strained.g - colour.g);
-      shades[i + 2] = colour.b + part * (strained.b - colour.b);
+      if (this.selected) tint.copy(this.selected);
+      else scale.colour(moved(i), tint);
+      tint.toArray(shades, i);
     }
     this.points.geometry.attributes.color.needsUpdate = true;
+  }
+
+  /** Puts the bars between their points, in the colour between theirs. */
+  private stretch(x: Float32Array): void {
+    const { bars, shades } = this;
+    if (!bars) return;
+    this.joins.forEach(([a, b], i) => {
+      for (let k = 0; k < 3; ++k) from[k] = x[3 * a + k], along[k] = x[3 * b + k] - from[k];
+      const length = Math.hypot(along[0], along[1], along[2]);
+      for (let k = 0; k < 3; ++k) along[k] = length > 0 ? along[k] / length : Number(k === 2);
+      writeBar(bars.matrices, 16 * i, from, along, length, this.radius);
+      const shade = (k: number) => (shades[3 * a + k] + shades[3 * b + k]) / 2;
+      bars.paint(i, tint.setRGB(shade(0), shade(1), shade(2)));
+    });
+    bars.moved();
+  }
+
+  /** Where its points are drawn, three numbers each. */
+  get where(): ArrayLike<number> {
+    return this.points.geometry.attributes.position.array;
   }
 
   idOf(): string {
@@ -63,18 +102,17 @@ export class FlexibleBatch implements Batch {
   }
 
   highlight(id: string | undefined, selected: THREE.Color): void {
-    for (const object of [this.points, this.lines]) {
-      const material = object.material as THREE.PointsMaterial | THREE.LineBasicMaterial;
-      material.vertexColors = id !== this.id;
-      material.color.set(id === this.id ? selected : 0xffffff);
-      material.needsUpdate = true;
-    }
+    this.selected = id === this.id ? selected : undefined;
+    this.shade(this.where as Float32Array);
+    this.stretch(this.where as Float32Array);
   }
 
   dispose(): void {
-    for (const object of [this.points, this.lines]) {
-      object.geometry.dispose();
-      (object.material as THREE.Material).dispose();
-    }
+    this.bars?.dispose();
+    for (const object of this.object.children)
+      if (object instanceof THREE.Points || object instanceof THREE.LineSegments) {
+        object.geometry.dispose();
+        (object.material as THREE.Material).dispose();
+      }
   }
 }
