@@ -4,6 +4,7 @@
  *     const server = connect("unix:/run/user/1000/mbcosim.sock");
  *     const pendulum = await load(server, "pendulum.mbd");
  */
+import { randomUUID } from "node:crypto";
 import { readFile } from "node:fs/promises";
 import { basename } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -12,6 +13,7 @@ import grpc from "@grpc/grpc-js";
 import { loadSync } from "@grpc/proto-loader";
 
 const PROTOS = process.env.MBCOSIM_PROTOS ?? fileURLToPath(new URL("../../proto", import.meta.url));
+const PROTOCOL = { lowest: 2, highest: 2 };
 const FILES = ["simulations", "telemetry", "geometry", "coupling"].map((name) => `mbcosim/v1/${name}.proto`);
 const USUAL = 30; // seconds that a call may take which advances nothing
 
@@ -58,12 +60,12 @@ export function series(server, client, method, request, timeout) {
 /** Creates a simulation from a deck without includes. `choices`: CreateOptions. */
 export async function load(server, deck, choices = {}) {
   const name = basename(deck);
-  return create(server, { header: { bundle_main_file: name, options: choices }, files: [{ path: name, data: await readFile(deck) }] });
+  return create(server, { header: { bundle_main_file: name, options: { protocol: PROTOCOL, ...choices } }, files: [{ path: name, data: await readFile(deck) }] });
 }
 
 /** Creates a simulation from a deck given as text. */
 export async function loadText(server, text, choices = {}) {
-  return create(server, { header: { bundle_main_file: "deck", options: choices }, files: [{ path: "deck", data: Buffer.from(text) }] });
+  return create(server, { header: { bundle_main_file: "deck", options: { protocol: PROTOCOL, ...choices } }, files: [{ path: "deck", data: Buffer.from(text) }] });
 }
 
 async function create(server, upload) {
@@ -93,17 +95,21 @@ export class Simulation {
   async handles(names) {
     const missing = names.filter((name) => !this.#handles.has(name));
     if (missing.length > 0) {
-      const { variables } = await this.#call("DescribeSimulation", { name: this.name, variable_names: missing });
-      for (const variable of variables) this.#handles.set(variable.name, variable.handle);
+      const { model } = await this.#call("DescribeSimulation", { simulation: this.name, variable_names: missing });
+      for (const variable of model.variables) this.#handles.set(variable.name, variable.handle);
     }
     return names.map((name) => this.#handles.get(name));
   }
 
   /** Nodes, elements and variables, page by page. */
   async *describe() {
+    for await (const page of this.#pages("DescribeSimulation", {})) yield page.model;
+  }
+
+  async *#pages(method, request) {
     let token = "";
     do {
-      const page = await this.#call("DescribeSimulation", { name: this.name, page_token: token });
+      const page = await this.#work(method, { simulation: this.name, ...request, page_token: token });
       yield page;
       token = page.next_page_token;
     } while (token);
@@ -129,14 +135,14 @@ export class Simulation {
     return series(this.server, this.server.geometry, "DescribeGeometry", { simulation: this.name, ...request });
   }
 
-  /** The descriptor form E ẏ = A y about the current state. */
+  /** The descriptor form E ẏ = A y about the current state, page by page: sparse parts `e` and `a`, and `state_names`. */
   linearize() {
-    return this.#work("Linearize", { simulation: this.name, descriptor_form: true });
+    return this.#pages("Linearize", { descriptor_form: true });
   }
 
   /** Ends the simulation. */
   delete() {
-    return this.#call("DeleteSimulation", { name: this.name });
+    return this.#call("DeleteSimulation", { simulation: this.name, request_id: randomUUID() });
   }
 }
 
@@ -148,7 +154,7 @@ class Stepper {
   constructor(server, simulation, outputs) {
     this.request = { simulation, outputs };
     this.stream = server.simulations.StepStream(server.metadata);
-    this.stream.on("data", (reply) => this.#waiting.shift()?.resolve(reply));
+    this.stream.on("data", (reply) => this.#waiting.shift()?.resolve(reply.step));
     this.stream.on("error", (error) => this.#end(error));
     this.stream.on("end", () => this.#end(new Error("the server has ended the stream")));
   }

@@ -8,8 +8,8 @@ const server = connect(process.argv[2] ?? process.env.MBCOSIM_ADDRESS ?? `unix:$
 const pendulum = await load(server, fileURLToPath(new URL("../models/pendulum.mbd", import.meta.url)));
 const stepper = await pendulum.stepper([X]);
 for (let k = 0; k < 5; ++k) {
-  const { time_s, outputs } = await stepper.step(100);
-  console.log(`${time_s.toFixed(3)} s: ${outputs.map((x) => x.toFixed(6)).join(" ")}`);
+  const { time, outputs } = await stepper.step(100);
+  console.log(`${time.toFixed(3)} s: ${outputs.map((x) => x.toFixed(6)).join(" ")}`);
 }
 stepper.close();
 await pendulum.delete();

@@ -6,7 +6,8 @@
 arguments = argv();
 door = mbcosim_door(arguments{end});
 
-model = mbcosim_call(door, 'Simulations/DescribeSimulation', struct('name', door.simulation, 'variable_prefix', 'node.structural.2.'));
+description = mbcosim_call(door, 'Simulations/DescribeSimulation', struct('simulation', door.simulation, 'variable_prefix', 'node.structural.2.'));
+model = description.model;
 names = {model.variables.name};
 handle = @(name) model.variables(strcmp(names, name)).handle;
 
@@ -17,5 +18,5 @@ mbcosim_call(door, 'Simulations/WriteVariables', struct('simulation', door.simul
 request = struct('simulation', door.simulation, 'steps', '20', 'outputs', {{handle('node.structural.2.X')}});
 for k = 1:5
   reply = mbcosim_call(door, 'Simulations/Step', request);
-  printf('%.1f s  %9.6f %9.6f %9.6f\n', reply.timeS, reply.outputs);
+  printf('%.1f s  %9.6f %9.6f %9.6f\n', reply.time, reply.outputs);
 end

@@ -21,7 +21,7 @@ INERTIA = np.diag([1.0, 2.0, 3.0])  # of the deck, node frame [kg m^2]
 def simulate(simulation: mbcosim.Simulation) -> tuple[example.Array, example.Array, example.Array]:
     """Times (n), spins in the node frame (n x 3), kinetic energies (n)."""
     info = simulation.describe()
-    steps = round((info.final_time_s - info.initial_time_s) / info.step_s)
+    steps = round((info.final_time - info.initial_time) / info.step_size)
     times, found = [], []
     with simulation.stepper(outputs=[SPIN, ROTATION]) as stepper:
         for _ in tqdm(range(steps), unit="step", disable=not sys.stderr.isatty()):

@@ -11,11 +11,28 @@
 #include "client/mbcosim_client.h"
 #include "mbcosim/v1/coupling.grpc.pb.h"
 #include "mbcosim/v1/simulations.grpc.pb.h"
+#include "mbcosim/v1/telemetry.grpc.pb.h"
+#include "wire/protocol.h"
 
 namespace mbcosim::client {
 
+using server::fill_protocol;
+
 /// Throws Error unless the call went well.
 void require(const grpc::Status& status);
+
+/// Throws Error: `what` took longer than so many seconds.
+[[noreturn]] void throw_late(const std::string& what, double seconds);
+
+/// The bytes that a method streams.
+template <class Reply, class Stream>
+std::string collect(Stream stream) {
+  std::string bytes;
+  Reply piece;
+  while (stream->Read(&piece)) bytes += piece.data();
+  require(stream->Finish());
+  return bytes;
+}
 
 struct Server::Impl {
   std::string address, authorization;  ///< "Bearer …", or empty

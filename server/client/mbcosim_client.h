@@ -9,6 +9,7 @@
 ///   beam.run_until(1.0);
 #pragma once
 
+#include <complex>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -16,7 +17,11 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <variant>
 #include <vector>
+
+#include "client/mbcosim_events.h"
+#include "client/mbcosim_geometry.h"
 
 namespace mbcosim::client {
 
@@ -26,25 +31,43 @@ namespace mbcosim::client {
 constexpr double kUsual = 30;   ///< default of calls that advance nothing
 constexpr double kEndless = 0;  ///< as long as the server lives
 
+/// A finding about a deck.
+struct Diagnostic {
+  enum Severity { error, warning, note };
+  Severity severity = error;
+  std::string code, file, message, hint, source_line;
+  int line = 0, column = 0;  ///< from 1; 0: not about a place
+};
+
 /// A call was refused or failed.
 class Error : public std::runtime_error {
  public:
   Error(const std::string& message, int code, std::string reason,
-        std::map<std::string, std::string> metadata)
+        std::map<std::string, std::string> metadata, std::string field = {},
+        std::vector<Diagnostic> diagnostics = {})
       : std::runtime_error(message),
         code_(code),
         reason_(std::move(reason)),
-        metadata_(std::move(metadata)) {}
+        metadata_(std::move(metadata)),
+        field_(std::move(field)),
+        diagnostics_(std::move(diagnostics)) {}
   int code() const { return code_; }  ///< of the call, as in gRPC: 5 is NOT_FOUND
   const std::string& reason() const {
     return reason_;
   }  ///< "WRONG_STEP", …; empty: the server gave none
   const std::map<std::string, std::string>& metadata() const { return metadata_; }
+  const std::string& field() const {
+    return field_;
+  }  ///< of the request that is at fault, or empty
+  /// Of a deck that was refused.
+  const std::vector<Diagnostic>& diagnostics() const { return diagnostics_; }
 
  private:
   int code_;
   std::string reason_;
   std::map<std::string, std::string> metadata_;
+  std::string field_;
+  std::vector<Diagnostic> diagnostics_;
 };
 
 /// What crosses a port: loads on nodes, or signals, when it has no nodes; imposed motion of nodes;
@@ -63,10 +86,44 @@ struct Port {
   bool positions_only = false;  ///< of a motion port: orientations stay free
 };
 
+/// Lets somebody else use a simulation: "token:NAME", "cert:…" or "*" for all.
+struct Grant {
+  enum Right { observe, couple, control };
+  std::string identity;
+  Right right = observe;
+  std::vector<std::string> ports = {};  ///< to which `couple` is allowed; empty: all
+};
+
+enum class NonConvergence { fail, cut_step, accept_flagged };
+using Symbol = std::variant<double, bool, std::string>;
+
+/// Which result files the server writes; of no format: those that the deck asks for.
+struct ResultOptions {
+  enum Format { text, netcdf };
+  std::vector<Format> formats = {};
+  std::optional<std::int64_t> quota = {};  ///< most bytes; none: the server's limit
+};
+
+/// Whether a simulation outlives its server.
+enum class Durability { server_default, none, checkpoint };
+
 struct LoadOptions {
   std::string display_name = {};
   std::vector<Port> ports = {};
-  double timeout = kEndless;  ///< of the call [s]
+  NonConvergence policy = NonConvergence::fail;
+  std::optional<double> minimum_step = {};  ///< of `cut_step` [s]; none: 1/1024 of the deck's
+  std::optional<double> lease =
+      {};                    ///< lives so long without calls [s]; none: the server's default
+  bool record = false;       ///< keeps what crosses the ports; see Simulation::record
+  bool summed_time = false;  ///< time is summed from step to step as MBDyn does
+  std::map<std::string, Symbol> symbols = {};  ///< in place of what the deck declares
+  std::vector<Grant> grants = {};              ///< who else may use it
+  double timeout = kEndless;                   ///< of the call [s]
+  std::optional<ResultOptions> results = {};   ///< none: no files are written
+  Durability durability = Durability::server_default;
+  std::optional<double> checkpoint_interval = {};     ///< wall time [s]; none: the server's
+  std::optional<std::int64_t> checkpoint_steps = {};  ///< none: by time alone
+  std::optional<double> pace = {};  ///< seconds of the model in one of the clock; none: all speed
 };
 
 /// `unknown`: the server tells one that this library does not know; never a success.
@@ -95,7 +152,10 @@ struct StepResult {
   double largest_step_size = 0;    ///< left until the deck's final time [s]
   double preferred_step_size = 0;  ///< of the peer that rejected the step [s]; 0: it did not say
   bool condition_met = false;      ///< `StepOptions::until` holds
-  std::string failure;             ///< empty unless the step failed
+  bool flagged = false;            ///< accepted without convergence
+  int pieces = 1;                  ///< in which the last step was solved
+  std::map<std::string, std::vector<double>> values = {};  ///< of `StepOptions::outputs`
+  std::string failure;                                     ///< empty unless the step failed
   bool ok() const { return outcome == Outcome::accepted || outcome == Outcome::finished; }
 };
 
@@ -115,7 +175,9 @@ struct StepOptions {
   std::optional<double> step_size = {};  ///< of each step [s]; none: the deck's
   bool exact = false;  ///< of `run_until`: the last step is shortened, so that it ends there
   std::optional<Condition> until = {};  ///< ends after the first step for which it holds
-  double timeout = kEndless;            ///< of the call [s]
+  std::map<std::string, std::vector<double>> inputs = {};  ///< set before the first step
+  std::vector<std::string> outputs = {};                   ///< variables that the result holds
+  double timeout = kEndless;                               ///< of the call [s]
 };
 
 struct SimulateOptions {
@@ -198,9 +260,9 @@ using StepEnded = std::function<void(bool accepted, std::int64_t step, double ti
 
 struct PeerOptions {
   Mode mode = Mode::port_default;
-  int every = 1;             ///< steps between exchanges; tight: iterations
-  double peer_timeout = 10;  ///< longest wait of the server for an answer [s]
-  double timeout = kUsual;   ///< of the call that attaches [s]
+  std::optional<int> every = {};  ///< steps between exchanges, tight: iterations; none: the port's
+  double peer_timeout = 10;       ///< longest wait of the server for an answer [s]
+  double timeout = kUsual;        ///< of the call that attaches [s]
   Policy policy = Policy::fail_step;
   Acceleration acceleration = Acceleration::none;
   double relaxation = 0.5;
@@ -261,6 +323,115 @@ class Peer {
 
 using Answer = std::function<Loads(const Motion&)>;
 
+/// A variable of the model.
+struct Variable {
+  enum Causality { input, output, parameter, state };
+  std::string name, unit, frame, description;
+  std::vector<int> shape;  ///< empty: a number
+  int handle = 0, size = 1;
+  Causality causality = output;
+};
+
+/// Where a simulation stands.
+struct SimulationInfo {
+  enum State { unknown, ready, stepping, finished, failed, suspended };
+  std::string name, display_name, owner, model_digest, last_failure, waiting_for;
+  State state = unknown;
+  std::int64_t step = 0;
+  double time = 0, next_step_size = 0, final_time = 0;  ///< [s]
+};
+
+/// A saved state.
+struct Snapshot {
+  std::string name, display_name;
+  std::int64_t step = 0, size_bytes = 0;
+  double time = 0;  ///< [s]
+};
+
+/// A matrix by rows, or what is not zero of it when `sparse`.
+struct Matrix {
+  int rows = 0, columns = 0;
+  bool sparse = false;
+  std::vector<double> values;
+  std::vector<int> row_indices, column_indices;  ///< of the values, when sparse; from 0
+};
+
+/// ẋ = A x + B u, y = C x + D u; of the descriptor form E ẋ on the left, sparse, and E is not
+/// empty.
+struct LinearModel {
+  Matrix A, B, C, D, E;
+  std::vector<std::string> state_names;
+  std::int64_t step = 0;
+};
+
+struct Spectrum {
+  std::vector<std::complex<double>> values;   ///< [1/s]
+  std::vector<std::complex<double>> vectors;  ///< by columns, one for each value; when asked for
+};
+
+enum class Overflow { drop_oldest, block, decimate };
+
+struct SubscriptionOptions {
+  std::int64_t every = 1;                       ///< steps between samples
+  std::optional<double> minimum_interval = {};  ///< wall time between samples, at least [s]
+  Overflow policy = Overflow::drop_oldest;
+  int buffer = 1024;        ///< samples kept for a slow reader
+  double timeout = kUsual;  ///< of the call [s]
+};
+
+struct Sample {
+  std::int64_t step = 0, sequence = 0;
+  double time = 0;             ///< [s]
+  std::vector<double> values;  ///< one variable after the other
+};
+
+/// Samples of variables, whoever advances. Ends when it is destroyed. One thread reads.
+class Subscription {
+ public:
+  struct Impl;  // of the library
+
+  Subscription(Subscription&&) noexcept;
+  Subscription& operator=(Subscription&&) noexcept;
+  ~Subscription();
+  /// Waits for the next sample; false: the simulation is gone or `close` was called. Throws Error.
+  bool next(Sample& sample);
+  std::int64_t dropped() const;  ///< samples that were not read in time
+  void close();                  ///< from any thread
+
+ private:
+  friend class Simulation;
+  explicit Subscription(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Steps on one open stream: one message each way per step. After an Error it is over.
+class Stepper {
+ public:
+  struct Impl;  // of the library
+
+  Stepper(Stepper&&) noexcept;
+  Stepper& operator=(Stepper&&) noexcept;
+  ~Stepper();
+  /// `inputs`: numbers of the stepper's inputs, one variable after the other. `values`, `failure`
+  /// and `condition_met` of the result are told as by Simulation::step. `timeout` [s].
+  StepResult step(const std::vector<double>& inputs = {}, std::int64_t count = 1,
+                  std::optional<double> step_size = {}, double timeout = kEndless);
+  void close();
+
+ private:
+  friend class Simulation;
+  explicit Stepper(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+struct UpdateOptions {
+  std::optional<std::string> display_name = {};
+  std::optional<NonConvergence> policy = {};
+  std::optional<double> minimum_step = {};        ///< [s]
+  std::optional<std::vector<Grant>> grants = {};  ///< in place of those before
+  double timeout = kUsual;                        ///< of the call [s]
+};
+
 /// A simulation on the server. Deletes it when destroyed, if it was loaded here and the server can
 /// be reached within 2 s; its lease ends it otherwise. Calls throw Error; one thread at a time.
 class Simulation {
@@ -281,6 +452,50 @@ class Simulation {
              double timeout = kUsual);
   /// Stops whatever advances the simulation, from any client; was anything?
   bool interrupt(double timeout = kUsual);
+  /// An open stream for stepping with the least delay.
+  Stepper stepper(const std::vector<std::string>& outputs = {},
+                  const std::vector<std::string>& inputs = {}, double timeout = kUsual);
+  Subscription subscribe(const std::vector<std::string>& variables,
+                         const SubscriptionOptions& options = {});
+
+  SimulationInfo refresh(double timeout = kUsual);
+  SimulationInfo update(const UpdateOptions& options);
+  std::vector<Variable> variables(double timeout = kUsual) const;  ///< all of them
+  const std::vector<Diagnostic>& diagnostics() const;              ///< of its deck: warnings, notes
+
+  Snapshot snapshot(const std::string& display_name = {}, double timeout = kUsual);
+  std::vector<Snapshot> snapshots(double timeout = kUsual) const;
+  void restore(const Snapshot& snapshot, double timeout = kUsual);
+  void delete_snapshot(const Snapshot& snapshot, double timeout = kUsual);
+  void reset(double timeout = kEndless);  ///< to the initial solution
+  /// The state as bytes: of a snapshot, or as it is now.
+  std::string export_state(double timeout = kUsual) const;
+  std::string export_state(const Snapshot& snapshot, double timeout = kUsual) const;
+  Snapshot import_state(const std::string& bytes, bool restore = true,
+                        const std::string& display_name = {}, double timeout = kEndless);
+  /// A new simulation at the present state, or at that of a snapshot; only ports, lease, policy and
+  /// names of the options count.
+  Simulation fork(const LoadOptions& options = {}) const;
+  Simulation fork(const Snapshot& snapshot, const LoadOptions& options = {}) const;
+
+  LinearModel linearize(const std::vector<std::string>& inputs = {},
+                        const std::vector<std::string>& outputs = {},
+                        double timeout = kEndless) const;
+  LinearModel linearize_descriptor(const std::vector<std::string>& inputs = {},
+                                   const std::vector<std::string>& outputs = {},
+                                   double timeout = kEndless) const;
+  /// `count` eigenvalues nearest to `shift`; none: all finite ones.
+  Spectrum eigenvalues(std::optional<int> count = {}, double shift = 0, bool vectors = false,
+                       double timeout = kEndless) const;
+  /// What can be drawn.
+  Geometry geometry(const GeometryOptions& options = {}, double timeout = kEndless) const;
+  /// Sizes of the result files so far [bytes], by name; see LoadOptions::results.
+  std::map<std::string, std::int64_t> result_files(double timeout = kUsual) const;
+  /// Bytes of a result file: all from `offset` on, or at most `length`.
+  std::string result_file(const std::string& file, std::int64_t offset = 0,
+                          std::optional<std::int64_t> length = {}, double timeout = kEndless) const;
+  /// All that crossed the ports so far, for `mbcosim replay`.
+  std::string record(double timeout = kEndless) const;
   /// Attaches a peer that asks for exchanges itself: `Peer::next`. It needs a thread other than the
   /// one that steps.
   Peer attach(const std::string& port, const PeerOptions& options = {});
@@ -313,16 +528,26 @@ class Server {
   Server& operator=(Server&&) noexcept;
   ~Server();
   std::string version(double timeout = kUsual) const;
+  std::vector<SimulationInfo> list(double timeout = kUsual) const;  ///< that the caller may see
   /// A deck of this machine, with the files that it names in quotes.
   Simulation load(const std::string& path, const LoadOptions& options = {});
   Simulation load_text(const std::string& deck, const LoadOptions& options = {});
+  /// Files by name, of which `main` is read.
+  Simulation load_bundle(const std::string& main, const std::map<std::string, std::string>& files,
+                         const LoadOptions& options = {});
+  /// A deck under the server's model root.
+  Simulation load_from_root(const std::string& deck, const LoadOptions& options = {});
+  /// What there is to say about a deck of this machine; empty: nothing.
+  std::vector<Diagnostic> validate(const std::string& path, double timeout = kEndless);
   /// A simulation that another client loaded, by its name; it lives on afterwards.
   Simulation find(const std::string& name, double timeout = kUsual);
+  /// Events from now on, of one simulation (by name) or of all that the caller may see; with the
+  /// place where a watcher has ended also what came since.
+  Events events(const std::string& simulation = {}, const EventPlace& after = {},
+                double timeout = kUsual);
 
  private:
   explicit Server(std::shared_ptr<Impl> impl);
-  Simulation create(const std::string& main, const std::map<std::string, std::string>& files,
-                    const LoadOptions& options);
   std::shared_ptr<Impl> impl_;
 };
 

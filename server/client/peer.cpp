@@ -6,6 +6,8 @@
 #include <chrono>
 #include <functional>
 
+#include "client/deadline.h"
+
 namespace mbcosim::client {
 namespace {
 
@@ -115,19 +117,19 @@ void take(const Numbers& numbers, std::vector<double>& out) {
 
 void take(const v1::ServerExchange& in, Motion& motion) {
   motion.step = in.step();
-  motion.time = in.time_s();
-  motion.target_time = in.target_time_s();
+  motion.time = in.time();
+  motion.target_time = in.target_time();
   motion.target_estimated = in.target_estimated();
   motion.iteration = in.iteration();
-  take(in.positions_m(), motion.x);
+  take(in.positions(), motion.x);
   take(in.rotations(), motion.R);
-  take(in.velocities_m_s(), motion.v);
-  take(in.angular_velocities_rad_s(), motion.w);
-  take(in.accelerations_m_s2(), motion.a);
-  take(in.angular_accelerations_rad_s2(), motion.wp);
+  take(in.velocities(), motion.v);
+  take(in.angular_velocities(), motion.w);
+  take(in.accelerations(), motion.a);
+  take(in.angular_accelerations(), motion.wp);
   take(in.signals(), motion.signals);
-  take(in.forces_n(), motion.forces);
-  take(in.moments_nm(), motion.moments);
+  take(in.forces(), motion.forces);
+  take(in.moments(), motion.moments);
 }
 
 void put(const std::vector<double>& values, Numbers* out) {
@@ -135,7 +137,7 @@ void put(const std::vector<double>& values, Numbers* out) {
   out->Add(values.begin(), values.end());
 }
 
-void put_tangent(const Loads& loads, Tangent form, v1::PeerExchange* out) {
+void put_tangent(const Loads& loads, Tangent form, v1::PeerAnswer* out) {
   out->clear_tangent();
   if (loads.stiffness.empty() && loads.damping.empty()) return;
   put(loads.stiffness, out->mutable_tangent()->mutable_stiffness());
@@ -143,15 +145,13 @@ void put_tangent(const Loads& loads, Tangent form, v1::PeerExchange* out) {
   out->mutable_tangent()->set_block_diagonal(form == Tangent::block_diagonal);
 }
 
-void put(const Loads& loads, v1::PeerExchange* out) {
-  out->clear_failure();
-  out->clear_reject();
-  put(loads.forces, out->mutable_forces_n());
-  put(loads.moments, out->mutable_moments_nm());
+void put(const Loads& loads, v1::PeerAnswer* out) {
+  put(loads.forces, out->mutable_forces());
+  put(loads.moments, out->mutable_moments());
   put(loads.signals, out->mutable_signals());
-  put(loads.reference_force, out->mutable_reference_force_n());
-  put(loads.reference_moment, out->mutable_reference_moment_nm());
-  put(loads.positions, out->mutable_positions_m());
+  put(loads.reference_force, out->mutable_reference_force());
+  put(loads.reference_moment, out->mutable_reference_moment());
+  put(loads.positions, out->mutable_positions());
   put(loads.rotations, out->mutable_rotations());
   out->set_unfinished(loads.unfinished);
 }
@@ -167,68 +167,39 @@ PortLayout to_layout(const v1::PortLayout& from) {
   return layout;
 }
 
-/// Calls `cancel` when it lives longer than `seconds`; 0: never.
-class Deadline {
- public:
-  Deadline(double seconds, std::function<void()> cancel) {
-    if (seconds <= 0) return;
-    watch_ = std::thread([this, seconds, cancel = std::move(cancel)] {
-      std::unique_lock guard(mutex_);
-      const std::chrono::duration<double> bound(seconds);
-      if (left_.wait_for(guard, bound, [&] { return has_left_; })) return;
-      over_ = true;
-      cancel();
-    });
-  }
-  ~Deadline() {
-    {
-      const std::lock_guard guard(mutex_);
-      has_left_ = true;
-    }
-    left_.notify_one();
-    if (watch_.joinable()) watch_.join();
-  }
-  bool is_over() const { return over_; }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable left_;
-  bool has_left_ = false;
-  std::atomic<bool> over_{false};
-  std::thread watch_;
-};
-
 }  // namespace
 
 v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& port,
                      const PeerOptions& options) {
   v1::Hello hello;
-  hello.mutable_protocol()->set_lowest(1);
-  hello.mutable_protocol()->set_highest(1);
+  fill_protocol(hello.mutable_protocol());
   hello.set_simulation(simulation.name());
   hello.set_port(port);
-  hello.set_model_digest(simulation.model_digest());
-  hello.set_rotation_form(to_proto(options.rotation));
-  hello.set_frame(to_proto(options.frame));
-  hello.set_accelerations(options.accelerations);
-  hello.set_mode(to_proto(options.mode));
-  hello.set_every(options.every);
-  hello.set_input_hold(to_proto(options.hold));
-  *hello.mutable_peer_timeout() = to_duration(options.peer_timeout);
-  hello.set_tangent(to_proto(options.tangent));
+  hello.mutable_expected()->set_model_digest(simulation.model_digest());
+  v1::ExchangeForm* form = hello.mutable_form();
+  form->set_rotation_form(to_proto(options.rotation));
+  form->set_frame(to_proto(options.frame));
+  form->set_accelerations(options.accelerations);
+  v1::ExchangeSchedule* schedule = hello.mutable_schedule();
+  schedule->set_mode(to_proto(options.mode));
+  if (options.every) schedule->set_every(*options.every);
+  schedule->set_input_hold(to_proto(options.hold));
+  v1::InterfaceIteration* iteration = hello.mutable_iteration();
+  iteration->set_tangent(to_proto(options.tangent));
+  iteration->set_acceleration(to_proto(options.acceleration));
+  iteration->set_relaxation(options.relaxation);
+  iteration->set_tolerance(options.tolerance);
+  iteration->set_maximum_passes(options.maximum_passes);
+  v1::PeerPresence* presence = hello.mutable_presence();
+  *presence->mutable_peer_timeout() = to_duration(options.peer_timeout);
+  presence->set_policy(to_proto(options.policy));
   if (options.heartbeat_timeout > 0)
-    *hello.mutable_heartbeat_timeout() = to_duration(options.heartbeat_timeout);
+    *presence->mutable_heartbeat_timeout() = to_duration(options.heartbeat_timeout);
   if (options.server_timeout > 0) {
     double interval = options.server_timeout / 3;
     if (options.heartbeat_timeout > 0) interval = std::min(interval, options.heartbeat_timeout);
-    *hello.mutable_heartbeat_interval() = to_duration(interval);
+    *presence->mutable_heartbeat_interval() = to_duration(interval);
   }
-  hello.set_policy(to_proto(options.policy));
-  hello.set_acceleration(to_proto(options.acceleration));
-  hello.set_relaxation(options.relaxation);
-  hello.set_interface_tolerance(options.tolerance);
-  hello.set_maximum_passes(options.maximum_passes);
-  hello.set_length_unit("m");
   return hello;
 }
 
@@ -267,15 +238,16 @@ bool Peer::Impl::next(Motion& motion) {
     }
     const bool ended = in.has_accepted() || in.has_rejected();
     const v1::StepNotice& notice = in.has_accepted() ? in.accepted() : in.rejected();
-    if (ended && step_ended) step_ended(in.has_accepted(), notice.step(), notice.time_s());
+    if (ended && step_ended) step_ended(in.has_accepted(), notice.step(), notice.time());
   }
   return false;
 }
 
 void Peer::Impl::answer(const Loads& loads) {
   out.mutable_exchange()->set_index(in.exchange().index());
-  put(loads, out.mutable_exchange());
-  put_tangent(loads, tangent, out.mutable_exchange());
+  v1::PeerAnswer* answer = out.mutable_exchange()->mutable_answer();
+  put(loads, answer);
+  put_tangent(loads, tangent, answer);
   write(out);
 }
 
@@ -331,7 +303,7 @@ void Peer::Impl::reject(const Reject& rejection) {
   message.mutable_exchange()->set_index(in.exchange().index());
   v1::Rejection* reject = message.mutable_exchange()->mutable_reject();
   if (rejection.preferred_step_size != 0)
-    reject->set_preferred_step_size_s(rejection.preferred_step_size);
+    reject->set_preferred_step_size(rejection.preferred_step_size);
   reject->set_text(rejection.text);
   write(message);
 }

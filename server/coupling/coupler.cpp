@@ -93,8 +93,8 @@ void Coupler::fill(Line& line, const Simulation& simulation, double target_time,
   line.message.Clear();
   v1::ServerExchange* out = line.message.mutable_exchange();
   out->set_step(simulation.step_number());
-  out->set_time_s(simulation.time());
-  out->set_target_time_s(target_time);
+  out->set_time(simulation.time());
+  out->set_target_time(target_time);
   line.target_time = target_time;
   out->set_iteration(iteration);
   line.port->model().fill(simulation, line.agreement, out);

@@ -62,77 +62,86 @@ Enum chosen(Enum wanted, Enum fallback) {
   return static_cast<int>(wanted) == 0 ? fallback : wanted;
 }
 
-bool is(const std::string& given, const char* served) { return given.empty() || given == served; }
-
 template <class Wanted, class Have>
 bool agrees(const Wanted& wanted, const Have& have) {
   return wanted.empty() || std::equal(wanted.begin(), wanted.end(), have.begin(), have.end());
 }
 
-void check_layout(const v1::Hello& hello, const PortModel& port, const std::string& digest,
-                  double step_size, Mismatches& mismatches) {
-  const v1::PortLayout& layout = port.layout();
+void check_expected(const v1::PeerExpectation& expected, const v1::PortLayout& layout,
+                    const std::string& digest, double step_size, Mismatches& mismatches) {
   mismatches.expect(
-      is(hello.model_digest(), digest.c_str()), "model_digest",
-      "the model has " + digest + ", the peer expects " + hello.model_digest().substr(0, 32));
-  mismatches.expect(is(hello.length_unit(), "m"), "length_unit", "only \"m\" is served");
-  mismatches.expect(is(hello.force_unit(), "N"), "force_unit", "only \"N\" is served");
-  mismatches.expect(is(hello.angle_unit(), "rad"), "angle_unit", "only \"rad\" is served");
-  mismatches.expect(hello.kind() == v1::PORT_KIND_UNSPECIFIED || hello.kind() == layout.kind(),
-                    "kind", "the port's is " + v1::PortKind_Name(layout.kind()));
-  mismatches.expect(agrees(hello.node_labels(), layout.node_labels()), "node_labels",
+      expected.model_digest().empty() || expected.model_digest() == digest, "model_digest",
+      "the model has " + digest + ", the peer expects " + expected.model_digest().substr(0, 32));
+  mismatches.expect(
+      expected.kind() == v1::PORT_KIND_UNSPECIFIED || expected.kind() == layout.kind(), "kind",
+      "the port's is " + v1::PortKind_Name(layout.kind()));
+  mismatches.expect(agrees(expected.node_labels(), layout.node_labels()), "node_labels",
                     "the port has other nodes, or in another order");
-  mismatches.expect(agrees(hello.output_names(), layout.output_names()), "output_names",
+  mismatches.expect(agrees(expected.output_names(), layout.output_names()), "output_names",
                     "the port has other outputs, or in another order");
-  mismatches.expect(agrees(hello.input_names(), layout.input_names()), "input_names",
+  mismatches.expect(agrees(expected.input_names(), layout.input_names()), "input_names",
                     "the port has other inputs, or in another order");
-  mismatches.expect(!hello.has_output_size() || hello.output_size() == layout.output_size(),
+  mismatches.expect(!expected.has_output_size() || expected.output_size() == layout.output_size(),
                     "output_size",
                     "the port sends " + std::to_string(layout.output_size()) + " signals");
-  mismatches.expect(!hello.has_input_size() || hello.input_size() == layout.input_size(),
+  mismatches.expect(!expected.has_input_size() || expected.input_size() == layout.input_size(),
                     "input_size",
                     "the port takes " + std::to_string(layout.input_size()) + " signals");
   mismatches.expect(
-      !(hello.step_size_s() > 0) || std::abs(hello.step_size_s() - step_size) <= 1e-9 * step_size,
-      "step_size_s", "the next step has " + std::to_string(step_size) + " s");
-  mismatches.expect(!hello.accelerations() || port.offers_accelerations(), "accelerations",
+      !expected.has_step_size() || std::abs(expected.step_size() - step_size) <= 1e-9 * step_size,
+      "step_size", "the next step has " + std::to_string(step_size));
+}
+
+void check_form(const v1::ExchangeForm& form, const PortModel& port, Mismatches& mismatches) {
+  mismatches.expect(
+      v1::RotationForm_IsValid(form.rotation_form()) && v1::PortFrame_IsValid(form.frame()), "form",
+      "a choice is unknown to this server");
+  mismatches.expect(!form.accelerations() || port.offers_accelerations(), "accelerations",
                     "not all nodes of the port have them");
-  mismatches.expect(hello.frame() != v1::PORT_FRAME_REFERENCE || layout.has_reference_node_label(),
-                    "frame", "the port has no reference node");
-  mismatches.expect(!port.is_motion() || hello.frame() <= v1::PORT_FRAME_GLOBAL, "frame",
+  mismatches.expect(
+      form.frame() != v1::PORT_FRAME_REFERENCE || port.layout().has_reference_node_label(), "frame",
+      "the port has no reference node");
+  mismatches.expect(!port.is_motion() || form.frame() <= v1::PORT_FRAME_GLOBAL, "frame",
                     "motion ports count in the global frame");
-  mismatches.expect(!port.is_mapped() || hello.frame() != v1::PORT_FRAME_NODE, "frame",
+  mismatches.expect(!port.is_mapped() || form.frame() != v1::PORT_FRAME_NODE, "frame",
                     "mapped points have no frame of their own");
 }
 
-void check_choices(const v1::Hello& hello, Mismatches& mismatches) {
+void check_schedule(const v1::ExchangeSchedule& schedule, Mismatches& mismatches) {
   mismatches.expect(
-      v1::CouplingMode_IsValid(hello.mode()) && v1::RotationForm_IsValid(hello.rotation_form()) &&
-          v1::PortFrame_IsValid(hello.frame()) && v1::InputHold_IsValid(hello.input_hold()) &&
-          v1::PeerPolicy_IsValid(hello.policy()) &&
-          v1::Acceleration_IsValid(hello.acceleration()) &&
-          v1::TangentForm_IsValid(hello.tangent()),
-      "enum", "a choice is unknown to this server");
-  mismatches.expect(hello.every() >= 0, "every", "must not be negative");
-  mismatches.expect(hello.mode() != v1::COUPLING_MODE_WINDOW || hello.every() <= 1, "every",
+      v1::CouplingMode_IsValid(schedule.mode()) && v1::InputHold_IsValid(schedule.input_hold()),
+      "schedule", "a choice is unknown to this server");
+  mismatches.expect(!schedule.has_every() || schedule.every() >= 1, "every", "must be at least 1");
+  mismatches.expect(schedule.mode() != v1::COUPLING_MODE_WINDOW || schedule.every() <= 1, "every",
                     "must be 1 in mode WINDOW");
-  mismatches.expect(hello.relaxation() >= 0 && hello.relaxation() < 2, "relaxation",
-                    "must be in (0, 2)");
-  mismatches.expect(hello.interface_tolerance() >= 0, "interface_tolerance",
-                    "must not be negative");
-  mismatches.expect(hello.maximum_passes() >= 0, "maximum_passes", "must not be negative");
-  mismatches.expect(!hello.has_peer_timeout() ||
-                        milliseconds(hello.peer_timeout()) > std::chrono::milliseconds(0),
-                    "peer_timeout", "must be positive");
 }
 
-void check_heartbeats(const v1::Hello& hello, Mismatches& mismatches) {
+void check_iteration(const v1::InterfaceIteration& iteration, Mismatches& mismatches) {
+  mismatches.expect(v1::Acceleration_IsValid(iteration.acceleration()) &&
+                        v1::TangentForm_IsValid(iteration.tangent()),
+                    "iteration", "a choice is unknown to this server");
+  mismatches.expect(
+      !iteration.has_relaxation() || (iteration.relaxation() > 0 && iteration.relaxation() < 2),
+      "relaxation", "must be in (0, 2)");
+  mismatches.expect(!iteration.has_tolerance() ||
+                        (iteration.tolerance() > 0 && std::isfinite(iteration.tolerance())),
+                    "tolerance", "must be positive");
+  mismatches.expect(!iteration.has_maximum_passes() || iteration.maximum_passes() >= 1,
+                    "maximum_passes", "must be at least 1");
+}
+
+void check_presence(const v1::PeerPresence& presence, Mismatches& mismatches) {
   constexpr std::chrono::milliseconds kShortest(10);
-  const auto interval = milliseconds(hello.heartbeat_interval()),
-             timeout = milliseconds(hello.heartbeat_timeout());
-  mismatches.expect(!hello.has_heartbeat_interval() || interval >= kShortest, "heartbeat_interval",
-                    "must be at least 10 ms");
-  mismatches.expect(!hello.has_heartbeat_timeout() || timeout >= std::max(interval, kShortest),
+  const auto interval = milliseconds(presence.heartbeat_interval()),
+             timeout = milliseconds(presence.heartbeat_timeout());
+  mismatches.expect(v1::PeerPolicy_IsValid(presence.policy()), "presence",
+                    "a choice is unknown to this server");
+  mismatches.expect(!presence.has_peer_timeout() ||
+                        milliseconds(presence.peer_timeout()) > std::chrono::milliseconds(0),
+                    "peer_timeout", "must be positive");
+  mismatches.expect(!presence.has_heartbeat_interval() || interval >= kShortest,
+                    "heartbeat_interval", "must be at least 10 ms");
+  mismatches.expect(!presence.has_heartbeat_timeout() || timeout >= std::max(interval, kShortest),
                     "heartbeat_timeout",
                     "must be at least 10 ms and not below `heartbeat_interval`");
 }
@@ -152,25 +161,29 @@ void check_agreement(const Agreement& agreement, const PortModel& port, Mismatch
 Agreement choose(const v1::Hello& hello, const PortModel& port) {
   Agreement agreement;
   const v1::PortLayout& layout = port.layout();
-  agreement.rotation_form = chosen(hello.rotation_form(),
-                                   chosen(layout.default_rotation_form(), agreement.rotation_form));
-  agreement.frame = chosen(hello.frame(), chosen(layout.default_frame(), agreement.frame));
-  agreement.accelerations = hello.accelerations() || port.needs_accelerations();
-  agreement.mode = chosen(hello.mode(), chosen(layout.default_mode(), agreement.mode));
+  const v1::ExchangeForm& form = hello.form();
+  agreement.rotation_form =
+      chosen(form.rotation_form(), chosen(layout.default_rotation_form(), agreement.rotation_form));
+  agreement.frame = chosen(form.frame(), chosen(layout.default_frame(), agreement.frame));
+  agreement.accelerations = form.accelerations() || port.needs_accelerations();
+  const v1::ExchangeSchedule& schedule = hello.schedule();
+  agreement.mode = chosen(schedule.mode(), chosen(layout.default_mode(), agreement.mode));
   const bool stepwise =
       agreement.mode == v1::COUPLING_MODE_LOOSE || agreement.mode == v1::COUPLING_MODE_STAGGERED;
-  agreement.every =
-      std::max({hello.every(), hello.every() == 0 && stepwise ? layout.default_every() : 1, 1});
-  agreement.hold = chosen(hello.input_hold(), agreement.hold);
-  agreement.policy = chosen(hello.policy(), agreement.policy);
-  agreement.acceleration = acceleration_of(hello.acceleration());
-  agreement.tangent = chosen(hello.tangent(), agreement.tangent);
-  if (hello.has_peer_timeout()) agreement.timeout = milliseconds(hello.peer_timeout());
-  agreement.heartbeat_interval = milliseconds(hello.heartbeat_interval());
-  agreement.heartbeat_timeout = milliseconds(hello.heartbeat_timeout());
-  if (hello.relaxation() > 0) agreement.relaxation = hello.relaxation();
-  if (hello.interface_tolerance() > 0) agreement.tolerance = hello.interface_tolerance();
-  if (hello.maximum_passes() > 0) agreement.maximum_passes = hello.maximum_passes();
+  const int usual = stepwise && layout.has_default_every() ? layout.default_every() : 1;
+  agreement.every = schedule.has_every() ? schedule.every() : usual;
+  agreement.hold = chosen(schedule.input_hold(), agreement.hold);
+  const v1::InterfaceIteration& iteration = hello.iteration();
+  agreement.acceleration = acceleration_of(iteration.acceleration());
+  agreement.tangent = chosen(iteration.tangent(), agreement.tangent);
+  if (iteration.has_relaxation()) agreement.relaxation = iteration.relaxation();
+  if (iteration.has_tolerance()) agreement.tolerance = iteration.tolerance();
+  if (iteration.has_maximum_passes()) agreement.maximum_passes = iteration.maximum_passes();
+  const v1::PeerPresence& presence = hello.presence();
+  agreement.policy = chosen(presence.policy(), agreement.policy);
+  if (presence.has_peer_timeout()) agreement.timeout = milliseconds(presence.peer_timeout());
+  agreement.heartbeat_interval = milliseconds(presence.heartbeat_interval());
+  agreement.heartbeat_timeout = milliseconds(presence.heartbeat_timeout());
   return agreement;
 }
 
@@ -183,12 +196,12 @@ Agreement agree(const v1::Hello& hello, const PortModel& port, const std::string
   const bool any = range.lowest() == 0 && range.highest() == 0;
   mismatches.expect(
       any || (range.lowest() <= kProtocolVersion && range.highest() >= kProtocolVersion),
-      "protocol",
-      "the server speaks version 1, the peer " + std::to_string(range.lowest()) + " to " +
-          std::to_string(range.highest()));
-  check_layout(hello, port, digest, step_size, mismatches);
-  check_choices(hello, mismatches);
-  check_heartbeats(hello, mismatches);
+      "protocol", version_mismatch(range));
+  check_expected(hello.expected(), port.layout(), digest, step_size, mismatches);
+  check_form(hello.form(), port, mismatches);
+  check_schedule(hello.schedule(), mismatches);
+  check_iteration(hello.iteration(), mismatches);
+  check_presence(hello.presence(), mismatches);
   const Agreement agreement = choose(hello, port);
   check_agreement(agreement, port, mismatches);
   mismatches.refuse_if_any(hello.port());
@@ -198,21 +211,24 @@ Agreement agree(const v1::Hello& hello, const PortModel& port, const std::string
 void fill_agreed(const v1::Hello& hello, const Agreement& agreement, v1::Hello* out) {
   using google::protobuf::util::TimeUtil;
   *out = hello;
-  out->mutable_protocol()->set_lowest(kProtocolVersion);
-  out->mutable_protocol()->set_highest(kProtocolVersion);
-  out->set_rotation_form(agreement.rotation_form);
-  out->set_frame(agreement.frame);
-  out->set_accelerations(agreement.accelerations);
-  out->set_mode(agreement.mode);
-  out->set_every(agreement.every);
-  out->set_input_hold(agreement.hold);
-  *out->mutable_peer_timeout() = TimeUtil::MillisecondsToDuration(agreement.timeout.count());
-  out->set_policy(agreement.policy);
-  out->set_acceleration(to_proto(agreement.acceleration));
-  out->set_relaxation(agreement.relaxation);
-  out->set_interface_tolerance(agreement.tolerance);
-  out->set_maximum_passes(agreement.maximum_passes);
-  out->set_tangent(agreement.tangent);
+  fill_protocol(out->mutable_protocol());
+  v1::ExchangeForm* form = out->mutable_form();
+  form->set_rotation_form(agreement.rotation_form);
+  form->set_frame(agreement.frame);
+  form->set_accelerations(agreement.accelerations);
+  v1::ExchangeSchedule* schedule = out->mutable_schedule();
+  schedule->set_mode(agreement.mode);
+  schedule->set_every(agreement.every);
+  schedule->set_input_hold(agreement.hold);
+  v1::InterfaceIteration* iteration = out->mutable_iteration();
+  iteration->set_acceleration(to_proto(agreement.acceleration));
+  iteration->set_relaxation(agreement.relaxation);
+  iteration->set_tolerance(agreement.tolerance);
+  iteration->set_maximum_passes(agreement.maximum_passes);
+  iteration->set_tangent(agreement.tangent);
+  v1::PeerPresence* presence = out->mutable_presence();
+  *presence->mutable_peer_timeout() = TimeUtil::MillisecondsToDuration(agreement.timeout.count());
+  presence->set_policy(agreement.policy);
 }
 
 }  // namespace mbcosim::server

@@ -23,7 +23,7 @@ PeerRejected to_rejection(const std::string& name, const v1::Rejection& rejectio
   PeerRejected rejected;
   rejected.text = in_port(name, "the peer rejects the step");
   if (!rejection.text().empty()) rejected.text += ": " + rejection.text().substr(0, kLongestText);
-  if (rejection.has_preferred_step_size_s()) rejected.preferred = rejection.preferred_step_size_s();
+  if (rejection.has_preferred_step_size()) rejected.preferred = rejection.preferred_step_size();
   return rejected;
 }
 
@@ -112,28 +112,42 @@ void Port::deliver(const v1::PeerExchange& answer) {
                     in_port(model_.name(), "answer to exchange " + std::to_string(answer.index()) +
                                                "; the last one sent is " + std::to_string(index_)));
     if (answer.index() < index_ || !awaited_) return;
-    peer_failure_ = answer.failure();
+    peer_failure_.clear();
     rejection_.reset();
-    Answer values;
-    if (answer.has_reject()) {
-      check_rejection(answer.reject());
-      rejection_ = to_rejection(model_.name(), answer.reject());
-    } else if (peer_failure_.empty()) {
-      const std::string wrong = model_.decode(answer, agreement_, &values);
-      if (!wrong.empty()) throw Refusal(v1::REASON_BAD_ARGUMENT, in_port(model_.name(), wrong));
-    }
-    answer_ = std::move(values);
+    answer_ = take_content(answer);
     if (recorder_) received_ = answer;
   }
   changed_.notify_all();
 }
 
+Answer Port::take_content(const v1::PeerExchange& exchange) {
+  Answer values;
+  switch (exchange.content_case()) {
+    case v1::PeerExchange::kAnswer: {
+      const std::string wrong = model_.decode(exchange.answer(), agreement_, &values);
+      if (!wrong.empty()) throw Refusal(v1::REASON_BAD_ARGUMENT, in_port(model_.name(), wrong));
+      break;
+    }
+    case v1::PeerExchange::kFailure:
+      peer_failure_ = exchange.failure().empty() ? "it gave no reason" : exchange.failure();
+      break;
+    case v1::PeerExchange::kReject:
+      check_rejection(exchange.reject());
+      rejection_ = to_rejection(model_.name(), exchange.reject());
+      break;
+    default:
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    in_port(model_.name(), "`exchange` must have `answer`, `failure` or `reject`"));
+  }
+  return values;
+}
+
 void Port::check_rejection(const v1::Rejection& rejection) const {
-  if (!rejection.has_preferred_step_size_s()) return;
-  const double preferred = rejection.preferred_step_size_s();
+  if (!rejection.has_preferred_step_size()) return;
+  const double preferred = rejection.preferred_step_size();
   if (preferred > 0 && std::isfinite(preferred)) return;
   throw Refusal(v1::REASON_BAD_ARGUMENT,
-                in_port(model_.name(), "`reject.preferred_step_size_s` must be positive, got " +
+                in_port(model_.name(), "`reject.preferred_step_size` must be positive, got " +
                                            std::to_string(preferred)));
 }
 

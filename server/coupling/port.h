@@ -106,6 +106,7 @@ class Port {
   using Clock = std::chrono::steady_clock;
   void send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message);
   bool pull(std::unique_lock<std::mutex>& guard);
+  Answer take_content(const v1::PeerExchange& exchange);
   void check_rejection(const v1::Rejection& rejection) const;
   [[noreturn]] void lose(const std::string& why);
   std::optional<Answer> go_on_without(const std::string& why);

@@ -67,8 +67,8 @@ void PortModel::fill(const Simulation& simulation, const Agreement& agreement,
   values.clear();
   simulation.get(reactions_, values);
   for (std::size_t i = 0; i < values.size(); i += 6) {
-    out->mutable_forces_n()->Add(values.begin() + i, values.begin() + i + 3);
-    out->mutable_moments_nm()->Add(values.begin() + i + 3, values.begin() + i + 6);
+    out->mutable_forces()->Add(values.begin() + i, values.begin() + i + 3);
+    out->mutable_moments()->Add(values.begin() + i + 3, values.begin() + i + 6);
   }
 }
 
@@ -78,13 +78,13 @@ void PortModel::put_motion(const Motion& global, const Agreement& agreement,
   if (agreement.frame == v1::PORT_FRAME_REFERENCE) make_relative(m);
   Mat3 turn = Mat3::Identity();  // positions and orientations of the node frame stay global
   if (agreement.frame == v1::PORT_FRAME_NODE) turn = m.R.transpose();
-  put(m.x, out->mutable_positions_m());
+  put(m.x, out->mutable_positions());
   put_rotation(m.R, agreement.rotation_form, out->mutable_rotations());
-  put(turn * m.v, out->mutable_velocities_m_s());
-  put(turn * m.w, out->mutable_angular_velocities_rad_s());
+  put(turn * m.v, out->mutable_velocities());
+  put(turn * m.w, out->mutable_angular_velocities());
   if (!agreement.accelerations) return;
-  put(turn * m.a, out->mutable_accelerations_m_s2());
-  put(turn * m.wp, out->mutable_angular_accelerations_rad_s2());
+  put(turn * m.a, out->mutable_accelerations());
+  put(turn * m.wp, out->mutable_angular_accelerations());
 }
 
 // One that cannot be evaluated (a logarithm of zero) is not a number for the peer.
@@ -122,9 +122,9 @@ void PortModel::fill_mapped(const Agreement& agreement, v1::ServerExchange* out)
   const auto put_all = [](const VecX& values, Numbers* numbers) {
     numbers->Add(values.data(), values.data() + values.size());
   };
-  put_all(H * x, out->mutable_positions_m());
-  put_all(H * v, out->mutable_velocities_m_s());
-  if (agreement.accelerations) put_all(H * a, out->mutable_accelerations_m_s2());
+  put_all(H * x, out->mutable_positions());
+  put_all(H * v, out->mutable_velocities());
+  if (agreement.accelerations) put_all(H * a, out->mutable_accelerations());
 }
 
 // ------------------------------------------------------------------ answers
@@ -140,19 +140,19 @@ int PortModel::peer_points() const {
   return static_cast<int>(points_.size());
 }
 
-std::string PortModel::decode(const v1::PeerExchange& in, const Agreement& agreement,
+std::string PortModel::decode(const v1::PeerAnswer& in, const Agreement& agreement,
                               Answer* answer) const {
   answer->unfinished = in.unfinished();
   if (is_motion()) return decode_motion(in, agreement, answer);
   const bool loads = !points_.empty();
   const bool moments = loads && !is_mapped();
   std::string wrong =
-      check_array("forces_n", in.forces_n(), 3 * static_cast<std::size_t>(peer_points()), !loads);
+      check_array("forces", in.forces(), 3 * static_cast<std::size_t>(peer_points()), !loads);
   if (wrong.empty()) wrong = check_loads(in, moments);
   const std::size_t signals = has_signals() ? static_cast<std::size_t>(layout_.input_size()) : 0;
   if (wrong.empty()) wrong = check_array("signals", in.signals(), signals, false);
-  if (wrong.empty() && (in.positions_m_size() > 0 || in.rotations_size() > 0))
-    wrong = "`positions_m` and `rotations` belong to motion ports";
+  if (wrong.empty() && (in.positions_size() > 0 || in.rotations_size() > 0))
+    wrong = "`positions` and `rotations` belong to motion ports";
   if (!wrong.empty()) return wrong;
   if (loads && !moments)
     decode_mapped(in, agreement, answer);
@@ -162,30 +162,28 @@ std::string PortModel::decode(const v1::PeerExchange& in, const Agreement& agree
   return decode_tangent(in, agreement, answer);
 }
 
-std::string PortModel::check_loads(const v1::PeerExchange& in, bool moments) const {
-  std::string wrong =
-      check_array("moments_nm", in.moments_nm(), moments ? 3 * points_.size() : 0, true);
+std::string PortModel::check_loads(const v1::PeerAnswer& in, bool moments) const {
+  std::string wrong = check_array("moments", in.moments(), moments ? 3 * points_.size() : 0, true);
   const std::size_t reference = layout_.reference_loads() ? 3 : 0;
+  if (wrong.empty()) wrong = check_array("reference_force", in.reference_force(), reference, false);
   if (wrong.empty())
-    wrong = check_array("reference_force_n", in.reference_force_n(), reference, false);
-  if (wrong.empty())
-    wrong = check_array("reference_moment_nm", in.reference_moment_nm(), reference, false);
+    wrong = check_array("reference_moment", in.reference_moment(), reference, false);
   return wrong;
 }
 
 // Positions (3) and orientation by rows (9) of each node, as the element keeps them.
-std::string PortModel::decode_motion(const v1::PeerExchange& in, const Agreement& agreement,
+std::string PortModel::decode_motion(const v1::PeerAnswer& in, const Agreement& agreement,
                                      Answer* answer) const {
   const auto n = points_.size();
   const int size = rotation_size(agreement.rotation_form);
-  std::string wrong = check_array("positions_m", in.positions_m(), 3 * n, false);
+  std::string wrong = check_array("positions", in.positions(), 3 * n, false);
   const std::size_t rotations = layout_.positions_only() ? 0 : static_cast<std::size_t>(size) * n;
   if (wrong.empty()) wrong = check_array("rotations", in.rotations(), rotations, false);
-  if (wrong.empty() && in.forces_n_size() + in.moments_nm_size() + in.signals_size() > 0)
-    wrong = "motion ports take `positions_m` and `rotations` only";
+  if (wrong.empty() && in.forces_size() + in.moments_size() + in.signals_size() > 0)
+    wrong = "motion ports take `positions` and `rotations` only";
   if (wrong.empty() && in.has_tangent()) wrong = "motion ports take no `tangent`";
   for (std::size_t k = 0; k < n && wrong.empty(); ++k) {
-    const Vec3 x = triple(in.positions_m(), k);
+    const Vec3 x = triple(in.positions(), k);
     Mat3 R = Mat3::Identity();
     if (rotations > 0 &&
         !take_rotation(in.rotations(), static_cast<int>(k) * size, agreement.rotation_form, &R))
@@ -199,10 +197,10 @@ std::string PortModel::decode_motion(const v1::PeerExchange& in, const Agreement
 }
 
 // F = Hᵀ F̂ on the points.
-void PortModel::decode_mapped(const v1::PeerExchange& in, const Agreement& agreement,
+void PortModel::decode_mapped(const v1::PeerAnswer& in, const Agreement& agreement,
                               Answer* answer) const {
   const MatX& H = *element_->element->mapping();
-  const VecX f = H.transpose() * Eigen::Map<const VecX>(in.forces_n().data(), in.forces_n_size());
+  const VecX f = H.transpose() * Eigen::Map<const VecX>(in.forces().data(), in.forces_size());
   for (std::size_t k = 0; k < points_.size(); ++k) {
     const Vec3 force = to_global(agreement, k) * f.segment<3>(static_cast<Eigen::Index>(3 * k));
     answer->values.insert(answer->values.end(), force.data(), force.data() + 3);
@@ -213,26 +211,26 @@ void PortModel::decode_mapped(const v1::PeerExchange& in, const Agreement& agree
 
 // The moment about the node when the node takes the load; about the point when the deck's element
 // does.
-void PortModel::decode_loads(const v1::PeerExchange& in, const Agreement& agreement,
+void PortModel::decode_loads(const v1::PeerAnswer& in, const Agreement& agreement,
                              std::vector<double>* answer) const {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Mat3 turn = to_global(agreement, i);
-    const Vec3 force = turn * triple(in.forces_n(), i);
+    const Vec3 force = turn * triple(in.forces(), i);
     Vec3 moment = Vec3::Zero();
     if (deck_loads_ < 0) moment = sent_[i].arm.cross(force);
-    if (!in.moments_nm().empty()) moment += turn * triple(in.moments_nm(), i);
+    if (!in.moments().empty()) moment += turn * triple(in.moments(), i);
     answer->insert(answer->end(), force.data(), force.data() + 3);
     answer->insert(answer->end(), moment.data(), moment.data() + 3);
   }
   decode_reference(in, agreement, answer);
 }
 
-void PortModel::decode_reference(const v1::PeerExchange& in, const Agreement& agreement,
+void PortModel::decode_reference(const v1::PeerAnswer& in, const Agreement& agreement,
                                  std::vector<double>* answer) const {
   if (!layout_.reference_loads()) return;
   Mat3 turn = Mat3::Identity();
   if (agreement.frame != v1::PORT_FRAME_GLOBAL) turn = sent_reference_.R;
-  for (const Vec3& v : {triple(in.reference_force_n(), 0), triple(in.reference_moment_nm(), 0)}) {
+  for (const Vec3& v : {triple(in.reference_force(), 0), triple(in.reference_moment(), 0)}) {
     const Vec3 global = turn * v;
     answer->insert(answer->end(), global.data(), global.data() + 3);
   }

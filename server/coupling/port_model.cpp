@@ -93,8 +93,8 @@ void PortModel::make_structural(const v1::PortDefinition& definition,
   const int n = definition.node_labels_size();
   if (n == 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": `node_labels` is empty");
-  if (definition.offsets_m_size() != 0 && definition.offsets_m_size() != 3 * n)
-    throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": `offsets_m` must have " +
+  if (definition.offsets_size() != 0 && definition.offsets_size() != 3 * n)
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": `offsets` must have " +
                                                std::to_string(3 * n) + " numbers");
   for (int i = 0; i < n; ++i) {
     Point point = find_point(simulation, definition.node_labels(i));
@@ -102,8 +102,8 @@ void PortModel::make_structural(const v1::PortDefinition& definition,
       throw Refusal(v1::REASON_NOT_WRITABLE, "port \"" + name() +
                                                  "\": no loads can be applied to structural node " +
                                                  std::to_string(definition.node_labels(i)));
-    if (definition.offsets_m_size() > 0)
-      point.offset = triple(definition.offsets_m(), static_cast<std::size_t>(i));
+    if (definition.offsets_size() > 0)
+      point.offset = triple(definition.offsets(), static_cast<std::size_t>(i));
     points_.push_back(point);
     layout_.add_node_labels(definition.node_labels(i));
   }
@@ -145,7 +145,7 @@ PortModel::PortModel(const StreamInput& stream, const Simulation& simulation)
   layout_.set_kind(v1::PORT_KIND_SIGNAL);
   layout_.set_from_deck(true);
   layout_.set_optional(true);
-  layout_.set_default_every(stream.every);
+  if (stream.every > 0) layout_.set_default_every(stream.every);
   make_signal(definition, simulation);
 }
 
@@ -231,7 +231,7 @@ PortModel::PortModel(const PortElementRef& element, const Simulation& simulation
   layout_.set_name(port.name);
   layout_.set_from_deck(port.from_deck);
   layout_.set_default_mode(to_mode(port.coupling));
-  layout_.set_default_every(port.every);
+  if (port.every > 0) layout_.set_default_every(port.every);
   if (port.input_size > 0) {
     deck_loads_ = handle_of(simulation, port_input_name(port));
     written_.push_back(deck_loads_);

@@ -53,7 +53,7 @@ class PortModel {
   /// Motion or signals at the simulation's state. Keeps what is needed to decode the answer.
   void fill(const Simulation& simulation, const Agreement& agreement, v1::ServerExchange* out);
   /// An answer in global components; empty text, or what is wrong with it.
-  std::string decode(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const;
+  std::string decode(const v1::PeerAnswer& in, const Agreement& agreement, Answer* answer) const;
   /// Where derivatives of the answer enter the equations. Empty: the port has none.
   LoadTangent tangent(const Agreement& agreement) const;
   void apply(const std::vector<double>& answer, Simulation& simulation) const;
@@ -77,12 +77,12 @@ class PortModel {
   void put_expressions(const Simulation& simulation, v1::ServerExchange* out) const;
   Motion motion(const Simulation& simulation, const Point& point) const;
   void make_relative(Motion& motion) const;
-  void decode_reference(const v1::PeerExchange& in, const Agreement& agreement,
+  void decode_reference(const v1::PeerAnswer& in, const Agreement& agreement,
                         std::vector<double>* answer) const;
-  void decode_loads(const v1::PeerExchange& in, const Agreement& agreement,
+  void decode_loads(const v1::PeerAnswer& in, const Agreement& agreement,
                     std::vector<double>* answer) const;
   Mat3 to_global(const Agreement& agreement, std::size_t point) const;
-  std::string check_loads(const v1::PeerExchange& in, bool moments) const;
+  std::string check_loads(const v1::PeerAnswer& in, bool moments) const;
   void make_reference(const Simulation& simulation, int label);
   void make_points(const Simulation& simulation, const StructuralPort& port);
   void make_motion(const Simulation& simulation);
@@ -91,12 +91,12 @@ class PortModel {
   void make_output();
   void put_motion(const Motion& m, const Agreement& agreement, v1::ServerExchange* out) const;
   void fill_mapped(const Agreement& agreement, v1::ServerExchange* out) const;
-  std::string decode_motion(const v1::PeerExchange& in, const Agreement& agreement,
+  std::string decode_motion(const v1::PeerAnswer& in, const Agreement& agreement,
                             Answer* answer) const;
-  void decode_mapped(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const;
-  std::string decode_tangent(const v1::PeerExchange& in, const Agreement& agreement,
+  void decode_mapped(const v1::PeerAnswer& in, const Agreement& agreement, Answer* answer) const;
+  std::string decode_tangent(const v1::PeerAnswer& in, const Agreement& agreement,
                              Answer* answer) const;
-  void move_to_nodes(const v1::PeerExchange& in, const Agreement& agreement, Answer* answer) const;
+  void move_to_nodes(const v1::PeerAnswer& in, const Agreement& agreement, Answer* answer) const;
   bool has_signals() const {
     return layout_.kind() == v1::PORT_KIND_SIGNAL || layout_.kind() == v1::PORT_KIND_MODAL;
   }

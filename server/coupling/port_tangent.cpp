@@ -50,7 +50,7 @@ LoadTangent PortModel::tangent(const Agreement& agreement) const {
   return t;
 }
 
-std::string PortModel::decode_tangent(const v1::PeerExchange& in, const Agreement& agreement,
+std::string PortModel::decode_tangent(const v1::PeerAnswer& in, const Agreement& agreement,
                                       Answer* answer) const {
   if (!in.has_tangent()) return "";
   if (!agreement.has_tangent()) return "`tangent` was not announced in `hello`";
@@ -75,7 +75,7 @@ std::string PortModel::decode_tangent(const v1::PeerExchange& in, const Agreemen
 // K ← Tᵀ (K T + C W), C ← Tᵀ C T for each pair of points. Loads that are held about the nodes turn
 // with the arms: M = m + a × F, so that F× a× δθ joins; the element of a deck's port has that in
 // its own matrix.
-void PortModel::move_to_nodes(const v1::PeerExchange& in, const Agreement& agreement,
+void PortModel::move_to_nodes(const v1::PeerAnswer& in, const Agreement& agreement,
                               Answer* answer) const {
   const bool blocks = agreement.tangent == v1::TANGENT_FORM_BLOCK_DIAGONAL;
   const int n = static_cast<int>(points_.size());
@@ -94,7 +94,7 @@ void PortModel::move_to_nodes(const v1::PeerExchange& in, const Agreement& agree
       K = load * sum;
       if (i == j && deck_loads_ < 0)
         K.bottomRightCorner<3, 3>() +=
-            cross<double>(triple(in.forces_n(), static_cast<std::size_t>(i))) *
+            cross<double>(triple(in.forces(), static_cast<std::size_t>(i))) *
             cross<double>(sent_[i].arm);
     }
   }

@@ -10,7 +10,7 @@ namespace mbcosim::server {
 v1::StepNotice step_notice(std::int64_t step, double time) {
   v1::StepNotice notice;
   notice.set_step(step);
-  notice.set_time_s(time);
+  notice.set_time(time);
   return notice;
 }
 

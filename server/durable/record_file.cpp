@@ -12,7 +12,7 @@ namespace mbcosim::server {
 namespace {
 
 constexpr std::size_t kHeader = 16;
-constexpr std::string_view kMagic = "mbcosim 1 ";
+constexpr std::string_view kMagic = "mbcosim 2 ";
 
 void put(std::string& out, std::uint64_t value, int bytes) {
   for (int k = 0; k < bytes; ++k) out += static_cast<char>(value >> (8 * k));

@@ -77,22 +77,28 @@ class RecordedPeer : public server::PeerLink {
   double tolerance_;
 };
 
-std::unique_ptr<Simulation> load_simulation(const std::string& deck,
-                                            const v1::CreateOptions& options,
-                                            const v1::RecordHeader& header) {
+Session::Origin load_model(const std::string& deck, const v1::CreateOptions& options,
+                           const v1::RecordHeader& header) {
   const std::filesystem::path path(deck);
   const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
-  const LoadReport report = load_deck(FolderSource(folder, /*unrestricted=*/true),
-                                      path.filename().string(), {}, server::attachments(options));
+  const DeckReport report =
+      read_deck(FolderSource(folder, /*unrestricted=*/true), path.filename().string(),
+                {{}, server::attachments(options), server::symbols_of(options)});
   for (const Diagnostic& d : report.diagnostics)
     if (d.severity == Severity::error) throw std::runtime_error(d.text());
   const std::string digest = digest_text(report.model->digest);
   if (digest != header.model_digest())
     throw std::runtime_error("the deck has the digest " + digest + ", the record is of " +
                              header.model_digest());
+  Session::Origin origin;
+  origin.model = report.model;
+  origin.time_keeping = options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact;
+  return origin;
+}
+
+std::unique_ptr<Simulation> start(const Session::Origin& origin, const v1::RecordHeader& header) {
   auto simulation =
-      Simulation::create(report.model, nullptr, nullptr,
-                         options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact);
+      Simulation::create(origin.model, /*cancel=*/nullptr, /*writer=*/nullptr, origin.time_keeping);
   if (!simulation) throw std::runtime_error(simulation.error().message);
   if (!header.state().empty())
     if (const Status status = (*simulation)->import_state(header.state()); !status)
@@ -104,7 +110,8 @@ v1::CreateOptions options_of(const v1::RecordHeader& header) {
   v1::CreateOptions options;
   *options.mutable_ports() = header.ports();
   options.set_non_convergence_policy(header.non_convergence_policy());
-  options.set_minimum_step_s(header.minimum_step_s());
+  if (header.has_minimum_step_size()) options.set_minimum_step_size(header.minimum_step_size());
+  *options.mutable_symbols() = header.symbols();
   options.set_summed_time(header.summed_time());
   return options;
 }
@@ -116,10 +123,10 @@ class ModelReplay {
       : record_(record),
         tolerance_(tolerance),
         slots_(1),
-        session_(
-            {}, load_simulation(deck, options_of(record.front().header()), record.front().header()),
-            {slots_, limits_, metrics_, log_, memory_, lanes_, timer_},
-            options_of(record.front().header())) {
+        origin_(load_model(deck, options_of(record.front().header()), record.front().header())),
+        session_({}, origin_, start(origin_, record.front().header()),
+                 {slots_, limits_, metrics_, log_, memory_, lanes_, timer_},
+                 options_of(record.front().header())) {
     for (const v1::RecordEntry& entry : record)
       if (!entry.port().empty()) ports_[entry.port()].entries.push_back(&entry);
   }
@@ -153,7 +160,7 @@ class ModelReplay {
     leave();
     Port& port = session_.port(entry.port());
     v1::Hello hello = entry.from_peer().hello();
-    hello.clear_step_size_s();
+    hello.mutable_expected()->clear_step_size();
     Agreement agreement =
         server::agree(hello, port.model(), digest_text(session_.model().digest), 0);
     agreement.timeout = std::chrono::milliseconds(20);  // who did not answer then does not now
@@ -183,8 +190,8 @@ class ModelReplay {
     const v1::StepRequest request = std::exchange(chosen_, {});
     v1::StepReply reply;
     server::Call nobody;
-    session_.step(request, nobody, &reply);
-    const v1::StepNotice now = server::step_notice(reply.step(), reply.time_s());
+    session_.step(request, server::Caller{}, nobody, &reply);
+    const v1::StepNotice now = server::step_notice(reply.step(), reply.time());
     const bool accepted_now = reply.steps_done() == 1;
     std::string difference;
     if (accepted != accepted_now)
@@ -206,6 +213,7 @@ class ModelReplay {
   server::ServiceLimits limits_;
   server::Metrics metrics_;
   server::EventLog log_;
+  const Session::Origin origin_;
   Session session_;
   std::map<std::string, PortRecord> ports_;
   std::map<std::string, std::unique_ptr<RecordedPeer>> peers_;

@@ -102,7 +102,7 @@ std::int64_t RecordedCoupling::exchanges() const {
 
 grpc::Status RecordedSimulation::GetServerInfo(grpc::ServerContext*,
                                                const v1::GetServerInfoRequest*,
-                                               v1::ServerInfo* reply) {
+                                               v1::GetServerInfoReply* reply) {
   reply->set_version(MBCOSIM_VERSION);
   reply->mutable_protocol()->set_lowest(header_.protocol_version());
   reply->mutable_protocol()->set_highest(header_.protocol_version());
@@ -113,19 +113,21 @@ grpc::Status RecordedSimulation::GetServerInfo(grpc::ServerContext*,
 
 grpc::Status RecordedSimulation::GetSimulation(grpc::ServerContext*,
                                                const v1::GetSimulationRequest* request,
-                                               v1::SimulationInfo* reply) {
-  reply->set_name(request->name());
+                                               v1::GetSimulationReply* out) {
+  v1::SimulationInfo* reply = out->mutable_simulation();
+  reply->set_name(request->simulation());
   reply->set_display_name("a record");
   reply->set_state(v1::SIMULATION_STATE_READY);
   reply->set_step(header_.step());
-  reply->set_time_s(header_.time_s());
+  reply->set_time(header_.time());
   reply->set_model_digest(header_.model_digest());
   return grpc::Status::OK;
 }
 
 grpc::Status RecordedSimulation::DescribeSimulation(grpc::ServerContext*,
                                                     const v1::DescribeSimulationRequest*,
-                                                    v1::ModelDescription* reply) {
+                                                    v1::DescribeSimulationReply* out) {
+  v1::ModelDescription* reply = out->mutable_model();
   reply->set_title("a record");
   reply->set_model_digest(header_.model_digest());
   *reply->mutable_ports() = header_.layouts();

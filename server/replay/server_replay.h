@@ -53,11 +53,11 @@ class RecordedSimulation final : public v1::Simulations::Service {
  public:
   explicit RecordedSimulation(const v1::RecordHeader& header) : header_(header) {}
   grpc::Status GetServerInfo(grpc::ServerContext*, const v1::GetServerInfoRequest*,
-                             v1::ServerInfo* reply) override;
+                             v1::GetServerInfoReply* reply) override;
   grpc::Status GetSimulation(grpc::ServerContext*, const v1::GetSimulationRequest* request,
-                             v1::SimulationInfo* reply) override;
+                             v1::GetSimulationReply* reply) override;
   grpc::Status DescribeSimulation(grpc::ServerContext*, const v1::DescribeSimulationRequest*,
-                                  v1::ModelDescription* reply) override;
+                                  v1::DescribeSimulationReply* reply) override;
 
  private:
   const v1::RecordHeader& header_;

@@ -39,13 +39,14 @@ using google::protobuf::util::TimeUtil;
   throw Refusal(error);
 }
 
-Session::Identity make_identity(const v1::CreateOptions& options, const Caller& caller,
-                                const ServiceLimits& limits) {
+Session::Identity make_identity(const v1::CreateOptions& options, std::uint64_t digest,
+                                const Caller& caller, const ServiceLimits& limits) {
   Session::Identity identity;
   identity.id = SessionStore::new_id();
   identity.display_name = options.display_name();
   identity.owner = caller.identity;
   identity.request_id = options.request_id();
+  identity.request_digest = digest;
   identity.lease = limits.lease;
   if (options.has_lease()) {
     const std::chrono::milliseconds lease(TimeUtil::DurationToMilliseconds(options.lease()));
@@ -65,27 +66,27 @@ class Fresh {
  public:
   explicit Fresh(const Parts& parts) : parts_(parts) {}
 
-  /// `make` makes the simulation, counted as the new session's, and fills `symbols`, and `deck` for
-  /// one that is durable; else that is null.
+  /// `make` makes the simulation, counted as the new session's, and fills its origin, and `deck`
+  /// for one that is durable; else that is null. `digest`: of the request.
   template <class Make>
-  SessionPtr add(const v1::CreateOptions& options, Exchange& exchange,
-                 std::vector<DeckSymbol>* symbols, const KeptDeck* deck, Make make,
-                 const std::string& forked_from = "") TS_EXCLUDES(mutex_) {
+  SessionPtr add(const v1::CreateOptions& options, std::uint64_t digest, Exchange& exchange,
+                 const KeptDeck* deck, Make make, const std::string& forked_from = "")
+      TS_EXCLUDES(mutex_) {
     const CallToken token(exchange.call());
     MemoryShare share;
     auto session = within(exchange.memory(), &token, &share, [&] {
-      auto identity = make_identity(options, exchange.caller(), parts_.config.limits);
+      auto identity = make_identity(options, digest, exchange.caller(), parts_.config.limits);
       std::unique_ptr<SessionResults> results;
       if (options.has_results())
         results = std::make_unique<SessionResults>(parts_.results, identity.id, options.results(),
                                                    parts_.config.limits.results_bytes);
-      std::unique_ptr<Simulation> simulation = make(token, results.get());
-      return std::make_shared<Session>(std::move(identity), std::move(simulation),
-                                       parts_.shared(exchange.memory()), options,
-                                       std::move(results));
+      Session::Origin origin;
+      std::unique_ptr<Simulation> simulation = make(token, results.get(), &origin);
+      return std::make_shared<Session>(std::move(identity), std::move(origin),
+                                       std::move(simulation), parts_.shared(exchange.memory()),
+                                       options, std::move(results));
     });
     session->set_memory(std::move(share));
-    session->set_symbols(std::move(*symbols));
     if (deck) keep(*session, *deck, options);
     Guard guard(mutex_);
     if (lost_) {
@@ -134,13 +135,11 @@ void check_eigenanalyses(const Model& model) {
 }
 
 /// The model of a deck at its initial solution.
-std::unique_ptr<Simulation> initial_solution(const LoadReport& report, bool summed_time,
-                                             SessionResults* results, const CancelToken& token) {
-  if (!report.ok()) refuse_deck(report);
-  if (results) check_eigenanalyses(*report.model);
-  auto simulation =
-      Simulation::create(report.model, &token, results ? results->start(*report.model) : nullptr,
-                         summed_time ? TimeKeeping::summed : TimeKeeping::exact);
+std::unique_ptr<Simulation> initial_solution(const Session::Origin& origin, SessionResults* results,
+                                             const CancelToken& token) {
+  if (results) check_eigenanalyses(*origin.model);
+  auto simulation = Simulation::create(
+      origin.model, &token, results ? results->start(*origin.model) : nullptr, origin.time_keeping);
   if (!simulation)
     throw Refusal(results ? results->without_paths(simulation.error()) : simulation.error());
   return std::move(*simulation);
@@ -168,34 +167,41 @@ class Creation {
     if (!upload_) upload_.emplace(parts_.config.limits, exchange.memory());
     return *upload_;
   }
-  v1::CreateSimulationReply run(Exchange& exchange) {
+  template <class Reply>
+  Reply run(Exchange& exchange) {
     if (!upload_) refuse_empty_upload();
     const v1::CreateOptions& options = upload_->header().options();
-    v1::CreateSimulationReply reply;
-    reply.set_protocol_version(kProtocolVersion);
+    Reply reply;
+    fill_protocol(reply.mutable_protocol());
     wake_known(parts_, options, exchange.caller());
-    const SessionStore::Place place(parts_.store, options.request_id(), exchange.caller(),
+    const std::uint64_t digest = options.request_id().empty() ? 0 : upload_->digest();
+    const SessionStore::Place place(parts_.store, options.request_id(), digest, exchange.caller(),
                                     exchange.call());
     if (place.known())
       place.known()->fill(reply.mutable_simulation(), exchange.caller());
     else
-      create(exchange, options, &reply);
+      create(exchange, options, digest, &reply);
     return reply;
   }
   void lose(const std::string& owner) { fresh_.lose(owner); }
 
  private:
-  void create(Exchange& exchange, const v1::CreateOptions& options,
-              v1::CreateSimulationReply* reply) {
+  template <class Reply>
+  void create(Exchange& exchange, const v1::CreateOptions& options, std::uint64_t digest,
+              Reply* reply) {
     DeckReport report;
     KeptDeck deck;
     KeptDeck* const kept = parts_.durability.wanted(options, nullptr) ? &deck : nullptr;
-    fresh_
-        .add(options, exchange, &report.symbols, kept,
-             [&](const CancelToken& token, SessionResults* results) {
-               report = load(*upload_, parts_.config, parts_.config.limits.engine, kept);
-               return initial_solution(report, options.summed_time(), results, token);
-             })
+    const auto make = [&](const CancelToken& token, SessionResults* results,
+                          Session::Origin* origin) {
+      report = load(*upload_, parts_.config, parts_.config.limits.engine, kept);
+      if (!report.ok()) refuse_deck(report);
+      *origin = {report.model, std::move(report.symbols),
+                 options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact,
+                 options.symbols()};
+      return initial_solution(*origin, results, token);
+    };
+    fresh_.add(options, digest, exchange, kept, make)
         ->fill(reply->mutable_simulation(), exchange.caller());
     to_proto(report.diagnostics, reply->mutable_diagnostics());
     reply->set_printed(utf8(report.printed));
@@ -216,7 +222,9 @@ class CreateHandler final : public Upload<v1::UploadRequest> {
     upload.add(request, std::move(share));
     check_protocol(upload.header().options().protocol());
   }
-  void complete(Exchange& exchange) override { exchange.end(serialized(creation_.run(exchange))); }
+  void complete(Exchange& exchange) override {
+    exchange.end(serialized(creation_.run<v1::CreateSimulationReply>(exchange)));
+  }
   void on_done(Exchange& exchange, bool delivered) override {
     if (!delivered) creation_.lose(exchange.caller().identity);
   }
@@ -232,7 +240,7 @@ class CreateInlineHandler final : public OneRequest<v1::InlineUpload> {
   void serve(Exchange& exchange, const v1::InlineUpload& request) override {
     check_protocol(request.header().options().protocol());
     creation_.upload(exchange).add(request);
-    exchange.end(serialized(creation_.run(exchange)));
+    exchange.end(serialized(creation_.run<v1::CreateSimulationInlineReply>(exchange)));
   }
   void on_done(Exchange& exchange, bool delivered) override {
     if (!delivered) creation_.lose(exchange.caller().identity);
@@ -253,27 +261,33 @@ ServiceLimits limits_for(Role role, ServiceLimits limits) {
   return limits;
 }
 
-v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config, const Limits& limits) {
-  const DeckReport report = load(upload, config, limits);
-  v1::ValidateModelReply reply;
-  reply.set_ok(report.ok());
-  to_proto(report.diagnostics, reply.mutable_diagnostics());
-  reply.set_printed(utf8(report.printed));
-  if (!report.ok()) return reply;
-  v1::ModelDescription* out = reply.mutable_description();
+constexpr int kDescribed = 20000;  // nodes and elements: what fits into a message
+
+void describe(const DeckReport& report, v1::ModelDescription* out) {
   const Model& model = *report.model;
   to_proto(model, out);
-  for (int k = 0; k < node_count(model); ++k) to_proto(model, k, out->add_nodes());
-  for (const ElementRef& e : model.elements) to_proto(model, e, out->add_elements());
+  const auto room = [&] { return out->nodes_size() + out->elements_size() < kDescribed; };
+  for (int k = 0; k < node_count(model) && room(); ++k) to_proto(model, k, out->add_nodes());
+  for (const ElementRef& e : model.elements) {
+    if (!room()) break;
+    to_proto(model, e, out->add_elements());
+  }
   for (const DeckSymbol& symbol : report.symbols) to_proto(symbol, out->add_symbols());
-  return reply;
 }
 
-v1::ValidateModelReply look_at(DeckUpload& upload, const Config& config, const Limits& limits,
-                               Exchange& exchange) {
+template <class Reply>
+Reply look_at(DeckUpload& upload, const Config& config, const Limits& limits, Exchange& exchange) {
   const CallToken token(exchange.call());
   MemoryShare share;
-  return within(exchange.memory(), &token, &share, [&] { return look_at(upload, config, limits); });
+  return within(exchange.memory(), &token, &share, [&] {
+    const DeckReport report = load(upload, config, limits);
+    Reply reply;
+    reply.set_ok(report.ok());
+    to_proto(report.diagnostics, reply.mutable_diagnostics());
+    reply.set_printed(utf8(report.printed));
+    if (report.ok()) describe(report, reply.mutable_description());
+    return reply;
+  });
 }
 
 class ValidateHandler final : public Upload<v1::UploadRequest> {
@@ -290,7 +304,8 @@ class ValidateHandler final : public Upload<v1::UploadRequest> {
   }
   void complete(Exchange& exchange) override {
     if (!upload_) refuse_empty_upload();
-    exchange.end(serialized(look_at(*upload_, parts_.config, limits_.engine, exchange)));
+    exchange.end(serialized(
+        look_at<v1::ValidateModelReply>(*upload_, parts_.config, limits_.engine, exchange)));
   }
 
   const Parts& parts_;
@@ -307,7 +322,8 @@ class ValidateInlineHandler final : public OneRequest<v1::InlineUpload> {
     const ServiceLimits limits = limits_for(exchange.caller().role, parts_.config.limits);
     DeckUpload upload(limits, exchange.memory());
     upload.add(request);
-    exchange.end(serialized(look_at(upload, parts_.config, limits.engine, exchange)));
+    exchange.end(serialized(
+        look_at<v1::ValidateModelInlineReply>(upload, parts_.config, limits.engine, exchange)));
   }
 
   const Parts& parts_;
@@ -332,37 +348,37 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
   void serve(Exchange& exchange, const v1::ForkSimulationRequest& request) override {
     const v1::CreateOptions& options = request.options();
     check_protocol(options.protocol());
-    v1::CreateSimulationReply reply;
-    reply.set_protocol_version(kProtocolVersion);
+    v1::ForkSimulationReply reply;
+    fill_protocol(reply.mutable_protocol());
     wake_known(parts_, options, exchange.caller());
-    const SessionStore::Place place(parts_.store, options.request_id(), exchange.caller(),
+    const std::uint64_t digest = digest_of("ForkSimulation", request);
+    const SessionStore::Place place(parts_.store, options.request_id(), digest, exchange.caller(),
                                     exchange.call());
-    if (place.known()) {
-      place.known()->fill(reply.mutable_simulation(), exchange.caller());
-    } else {
-      std::string simulation = request.simulation();
-      const int snapshot =
-          request.has_snapshot() ? number_of_snapshot(request.snapshot(), &simulation) : -1;
-      const SessionHold source(parts_.store, simulation, exchange.caller(), Access::control);
-      if (options.symbols_size() > 0)
-        throw Refusal(v1::REASON_BAD_ARGUMENT, "`symbols` cannot change the model of a fork");
-      std::vector<DeckSymbol> symbols = source->symbols();
-      KeptDeck deck;
-      const bool durable = parts_.durability.wanted(options, &*source);
-      if (durable) deck = parts_.durability.deck_of(*source);
-      fresh_
-          .add(
-              options, exchange, &symbols, durable ? &deck : nullptr,
-              [&](const CancelToken&, SessionResults* results) {
-                return branch(*source, snapshot, results);
-              },
-              simulation)
-          ->fill(reply.mutable_simulation(), exchange.caller());
-    }
+    const SessionPtr forked = place.known() ? place.known() : fork(exchange, request, digest);
+    forked->fill(reply.mutable_simulation(), exchange.caller());
     exchange.end(serialized(reply));
   }
   void on_done(Exchange& exchange, bool delivered) override {
     if (!delivered) fresh_.lose(exchange.caller().identity);
+  }
+
+  SessionPtr fork(Exchange& exchange, const v1::ForkSimulationRequest& request,
+                  std::uint64_t digest) {
+    const SessionHold source(parts_.store, request.simulation(), exchange.caller(),
+                             Access::control);
+    if (request.options().symbols_size() > 0)
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`symbols` cannot change the model of a fork");
+    const int number = request.has_snapshot() ? snapshot_in(request) : -1;
+    KeptDeck deck;
+    const bool durable = parts_.durability.wanted(request.options(), &*source);
+    if (durable) deck = parts_.durability.deck_of(*source);
+    const auto make = [&](const CancelToken&, SessionResults* results, Session::Origin* origin) {
+      *origin = source->origin();
+      origin->forked = true;
+      return branch(*source, number, results);
+    };
+    return fresh_.add(request.options(), digest, exchange, durable ? &deck : nullptr, make,
+                      request.simulation());
   }
 
   const Parts& parts_;

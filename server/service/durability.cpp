@@ -49,6 +49,7 @@ void Durability::start(const Parts& parts) {
   if (!folder_) return;
   parts.store.set_keeper(
       {[this](const auto& name, const Caller& caller) { return wake(name, caller); },
+       [this](const auto& name, const Caller& caller) { return remove(name, caller); },
        [this](Session& session) { return suspend(session); },
        [this](const auto& name) { unsuspend(name); },
        [this](Session& session) { forget(session); }});
@@ -124,6 +125,8 @@ void Durability::begin(Session& session, const KeptDeck& deck, const v1::CreateO
   model.head.set_program(MBCOSIM_VERSION);
   model.head.set_model_digest(digest_text(session.model().digest));
   model.head.set_main_file(deck.main_file);
+  model.head.set_request_digest(session.identity().request_digest);
+  model.head.set_forked(session.origin().forked);
   *model.head.mutable_options() = options;
   *model.head.mutable_model_options() = deck.options;
   model.files = deck.files;
@@ -345,7 +348,8 @@ bool Durability::wake(const std::string& simulation, const Caller& caller) {
     }
   } const done{*this, simulation};
   Call call;
-  const SessionStore::Place place(parts_->store, "", {suspended.head.owner(), Role::control}, call);
+  const SessionStore::Place place(parts_->store, "", 0, {suspended.head.owner(), Role::control},
+                                  call);
   const SessionPtr session = revive(simulation, suspended);
   parts_->store.add(session);
   unsuspend(simulation);
@@ -380,13 +384,18 @@ SessionPtr Durability::revive(const std::string& simulation, const Suspended& su
                                                  config_.limits.results_bytes, &has_files);
     auto made = simulation_at(report.model, suspended, point.state, results.get(), has_files);
     Session::Identity identity{
-        simulation, point.point.info().display_name(), suspended.head.owner(), options.request_id(),
+        simulation,
+        point.point.info().display_name(),
+        suspended.head.owner(),
+        options.request_id(),
+        model.head.request_digest(),
         std::chrono::milliseconds(
             google::protobuf::util::TimeUtil::DurationToMilliseconds(point.point.info().lease()))};
-    auto live = std::make_shared<Session>(std::move(identity), std::move(made),
-                                          parts_->shared(memory), options, std::move(results));
-    live->set_symbols(std::move(report.symbols));
-    return live;
+    Session::Origin origin{report.model, std::move(report.symbols),
+                           options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact,
+                           model.head.model_options().symbols(), model.head.forked()};
+    return std::make_shared<Session>(std::move(identity), std::move(origin), std::move(made),
+                                     parts_->shared(memory), options, std::move(results));
   });
   session->set_memory(std::move(share));
   session->take_over(point.point, snapshots);

@@ -76,7 +76,7 @@ bool GeometryMessages::next(v1::DescribeGeometryReply* reply) {
 void GeometryMessages::fill_header(v1::GeometryHeader* h) const {
   h->set_model_digest(digest_text(model_.digest));
   h->set_step(simulation_->step_number());
-  h->set_time_s(simulation_->time());
+  h->set_time(simulation_->time());
   h->set_nodes(static_cast<int>(model_.structural.size()));
   h->set_elements(static_cast<int>(model_.elements.size()));
   if (model_.structural.empty()) return;

@@ -10,25 +10,6 @@ namespace {
 constexpr int kMostGrants = 1000;
 constexpr std::size_t kLongestIdentity = 1000;
 
-void check(const Grants::List& grants) {
-  if (grants.size() > kMostGrants)
-    throw Refusal(v1::REASON_BAD_ARGUMENT,
-                  "`grants` must not have more than " + std::to_string(kMostGrants) + " entries");
-  for (const v1::Grant& grant : grants) {
-    if (grant.identity().empty() || grant.identity().size() > kLongestIdentity)
-      throw Refusal(
-          v1::REASON_BAD_ARGUMENT,
-          "`grants.identity` must be \"*\" or an identity such as \"token:NAME\", got \"" +
-              grant.identity().substr(0, 100) + "\"");
-    if (!v1::Right_IsValid(grant.right()) || grant.right() == v1::RIGHT_UNSPECIFIED)
-      throw Refusal(
-          v1::REASON_BAD_ARGUMENT,
-          "`grants.right` must be OBSERVE, COUPLE or CONTROL for \"" + grant.identity() + "\"");
-    if (grant.ports_size() > 0 && grant.right() != v1::RIGHT_COUPLE)
-      throw Refusal(v1::REASON_BAD_ARGUMENT, "`grants.ports` goes with the right COUPLE only");
-  }
-}
-
 bool gives(const v1::Grant& grant, Access access, const std::string& port) {
   const bool control = grant.right() == v1::RIGHT_CONTROL;
   switch (access) {
@@ -50,6 +31,25 @@ bool gives(const v1::Grant& grant, Access access, const std::string& port) {
 }
 
 }  // namespace
+
+void Grants::check(const List& grants) {
+  if (grants.size() > kMostGrants)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`grants` must not have more than " + std::to_string(kMostGrants) + " entries");
+  for (const v1::Grant& grant : grants) {
+    if (grant.identity().empty() || grant.identity().size() > kLongestIdentity)
+      throw Refusal(
+          v1::REASON_BAD_ARGUMENT,
+          "`grants.identity` must be \"*\" or an identity such as \"token:NAME\", got \"" +
+              grant.identity().substr(0, 100) + "\"");
+    if (!v1::Right_IsValid(grant.right()) || grant.right() == v1::RIGHT_UNSPECIFIED)
+      throw Refusal(
+          v1::REASON_BAD_ARGUMENT,
+          "`grants.right` must be OBSERVE, COUPLE or CONTROL for \"" + grant.identity() + "\"");
+    if (grant.ports_size() > 0 && grant.right() != v1::RIGHT_COUPLE)
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`grants.ports` goes with the right COUPLE only");
+  }
+}
 
 Grants::Grants(std::string owner, const List& grants) : owner_(std::move(owner)), grants_(grants) {
   check(grants);

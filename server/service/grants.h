@@ -20,6 +20,8 @@ class Grants {
   using List = google::protobuf::RepeatedPtrField<v1::Grant>;
 
   /// Throws BAD_ARGUMENT.
+  static void check(const List& grants);
+  /// Throws BAD_ARGUMENT.
   Grants(std::string owner, const List& grants);
   /// Throws BAD_ARGUMENT, and changes nothing then.
   void replace(const List& grants) TS_EXCLUDES(mutex_);

@@ -33,33 +33,60 @@ struct Parts {
   }
 };
 
+/// Number of a snapshot of the simulation that the request names. Throws NO_SUCH_SNAPSHOT,
+/// BAD_ARGUMENT.
 template <class Request>
-const std::string& simulation_in(const Request& request) {
-  if constexpr (requires { request.simulation(); })
-    return request.simulation();
-  else
-    return request.name();
+int snapshot_in(const Request& request) {
+  std::string owner;
+  const int number = number_of_snapshot(request.snapshot(), &owner);
+  if (owner != request.simulation())
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`snapshot` is of another simulation than `simulation` names");
+  return number;
 }
 
-/// A method that works on one simulation, which is found and kept alive meanwhile. The role tells
-/// what the caller must be allowed to do with it, unless `other_access` does.
+/// Does `work`, which fills the reply, unless this very request was done before.
+template <class Request, class Reply, class Work>
+void once(Session& session, const CallFrame& frame, const Request& request, Reply* reply,
+          Work work) {
+  if (request.request_id().empty()) return work();
+  KeptReplies::Turn turn(session.kept(), frame.caller, request.request_id(),
+                         digest_of(Request::descriptor()->name().c_str(), request), frame.call);
+  if (turn.known()) {
+    reply->ParseFromString(*turn.known());
+    return;
+  }
+  work();
+  turn.keep(*reply);
+  session.note_change();
+}
+
+/// A method that works on one simulation, which is found and kept alive meanwhile; a request with
+/// an id is done once. The role tells what the caller must be allowed to do with it, unless
+/// `other_access` does.
 template <class Request, class Reply, class Body>
 Method on_session(const Parts& parts, Role role, Lane lane, Body body,
                   std::optional<Access> other_access = {}) {
   const Access access =
       other_access.value_or(role == Role::observe ? Access::observe : Access::control);
-  return unary<Request, Reply>(
-      role, lane,
-      [&parts, access, body = std::move(body)](const CallFrame& frame, const Request& request,
-                                               Reply* reply) {
-        const SessionHold session(parts.store, simulation_in(request), frame.caller, access);
-        if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*, const CallFrame&>)
-          body(*session, request, reply, frame);
-        else if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*, Call&>)
-          body(*session, request, reply, frame.call);
-        else
-          body(*session, request, reply);
-      });
+  return unary<Request, Reply>(role, lane,
+                               [&parts, access, body = std::move(body)](
+                                   const CallFrame& frame, const Request& request, Reply* reply) {
+                                 const SessionHold session(parts.store, request.simulation(),
+                                                           frame.caller, access);
+                                 const auto work = [&] {
+                                   if constexpr (std::is_invocable_v<Body, Session&, const Request&,
+                                                                     Reply*, const CallFrame&>)
+                                     body(*session, request, reply, frame);
+                                   else
+                                     body(*session, request, reply);
+                                 };
+                                 if constexpr (requires { request.request_id(); } &&
+                                               !std::is_same_v<Request, v1::StepRequest>)
+                                   once(*session, frame, request, reply, work);
+                                 else
+                                   work();
+                               });
 }
 
 }  // namespace mbcosim::server

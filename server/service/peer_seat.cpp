@@ -40,16 +40,17 @@ PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& cal
       port_(session_->port(hello.port())) {
   v1::SimulationInfo info;
   session_->fill(&info);
-  const Agreement agreement = agree(hello, port_.model(), info.model_digest(), info.next_step_s());
+  const Agreement agreement =
+      agree(hello, port_.model(), info.model_digest(), info.next_step_size());
   heart_.emplace(link, port_, agreement);
   port_.reserve(agreement);
   v1::Welcome* welcome = welcome_.mutable_welcome();
-  welcome->set_protocol_version(kProtocolVersion);
+  fill_protocol(welcome->mutable_protocol());
   port_.fill(welcome->mutable_layout());
   welcome->set_model_digest(info.model_digest());
-  welcome->set_step_size_s(info.next_step_s());
+  welcome->set_step_size(info.next_step_size());
   welcome->set_step(info.step());
-  welcome->set_time_s(info.time_s());
+  welcome->set_time(info.time());
   fill_agreed(hello, agreement, welcome->mutable_agreed());
 }
 

@@ -14,9 +14,7 @@ inline void check_protocol(const v1::VersionRange& range) {
   if (range.lowest() == 0 && range.highest() == 0) return;
   if (range.lowest() <= kProtocolVersion && kProtocolVersion <= range.highest()) return;
   const std::string version = std::to_string(kProtocolVersion);
-  throw Refusal(v1::REASON_VERSION_MISMATCH,
-                "the server speaks protocol version " + version + ", the client " +
-                    std::to_string(range.lowest()) + " to " + std::to_string(range.highest()),
+  throw Refusal(v1::REASON_VERSION_MISMATCH, version_mismatch(range),
                 {{"lowest", version}, {"highest", version}});
 }
 

@@ -30,9 +30,13 @@ ReductionJob read_request(const v1::ReduceHeader& header, const BundleSource& fi
     for (const int label : header.interface_nodes())
       job.options.interface_nodes.push_back(std::to_string(label));
   }
-  if (header.fixed_interface_modes() != 0)
+  if (header.has_fixed_interface_modes())
     job.set("modes", std::to_string(header.fixed_interface_modes()));
-  if (header.highest_frequency_hz() != 0) job.options.max_frequency = header.highest_frequency_hz();
+  if (header.has_highest_frequency()) {
+    if (!(header.highest_frequency() > 0))
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`highest_frequency` must be positive");
+    job.options.max_frequency = header.highest_frequency();
+  }
   for (const auto& [name, value] : header.options()) job.set(name, value);
   return job;
 }
@@ -52,8 +56,8 @@ v1::ReduceReply message_of(const ReductionReport& report) {
   v1::ReduceReply reply;
   v1::ReduceReport& r = *reply.mutable_report();
   r.set_modes(static_cast<int>(report.frequencies.size()));
-  r.mutable_frequencies_hz()->Assign(report.frequencies.begin(), report.frequencies.end());
-  r.set_mass_kg(report.inertia.mass);
+  r.mutable_frequencies()->Assign(report.frequencies.begin(), report.frequencies.end());
+  r.set_mass(report.inertia.mass);
   r.set_rigid_motions(report.rigid_motions);
   r.set_removed_shapes(report.removed_shapes);
   if (report.static_error >= 0) r.set_static_error(report.static_error);

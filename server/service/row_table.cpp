@@ -34,7 +34,7 @@ RowTable::RowTable(const v1::TableRequest& request, const VariableAccess& variab
 
 void RowTable::put(const Simulation& simulation) {
   block_.add_steps(simulation.step_number());
-  block_.add_times_s(simulation.time());
+  block_.add_times(simulation.time());
   variables_.read(simulation, handles_, block_.mutable_values());
   since_ = 0;
 }

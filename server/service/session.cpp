@@ -20,9 +20,7 @@ namespace {
 class Page {
  public:
   explicit Page(const v1::DescribeSimulationRequest& request)
-      : size_(request.page_size() > 0 ? request.page_size() : kUsual) {
-    if (request.page_size() < 0)
-      throw Refusal(v1::REASON_BAD_ARGUMENT, "`page_size` must not be negative");
+      : size_(page_size_of(request, kUsual)) {
     const std::string& token = request.page_token();
     const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), first_);
     if (!token.empty() &&
@@ -35,7 +33,7 @@ class Page {
     ++at_;
     return inside;
   }
-  void close(v1::ModelDescription* out) const {
+  void close(v1::DescribeSimulationReply* out) const {
     if (at_ - first_ > size_) out->set_next_page_token(std::to_string(first_ + size_));
   }
 
@@ -54,18 +52,28 @@ double rate_of(const v1::CreateOptions& options) {
   return rate;
 }
 
+/// `minimum_step_size` of options or of a change, when it is there.
+template <class Message>
+std::optional<double> minimum_in(const Message& message) {
+  if (!message.has_minimum_step_size()) return {};
+  return message.minimum_step_size();
+}
+
 }  // namespace
 
-Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
-                 const v1::CreateOptions& options, std::unique_ptr<SessionResults> results)
+Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> simulation,
+                 Shared shared, const v1::CreateOptions& options,
+                 std::unique_ptr<SessionResults> results)
     : identity_(std::move(identity)),
       shared_(shared),
       model_(&simulation->model()),
       variables_(simulation->variables()),
       pace_(rate_of(options)),
+      origin_(std::move(origin)),
       grants_(identity_.owner, options.grants()),
       lease_(identity_.lease),
       snapshots_(identity_.id, digest_text(model_->digest), shared.limits, shared.memory),
+      kept_(shared.memory),
       telemetry_(std::make_shared<TelemetryHub>(shared.memory, shared.lanes, shared.timer)),
       results_(std::move(results)),
       simulation_(std::move(simulation)),
@@ -74,7 +82,7 @@ Session::Session(Identity identity, std::unique_ptr<Simulation> simulation, Shar
                     : nullptr),
       coupler_(options.ports(), *simulation_, identity_.lease, recorder_.get()) {
   status_.set_display_name(identity_.display_name);
-  set_policy(options.non_convergence_policy(), options.minimum_step_s());
+  set_policy(options.non_convergence_policy(), minimum_in(options));
   status_.publish(*simulation_);
   if (recorder_) start_record(options);
   if (results_) results_->keep();
@@ -90,46 +98,51 @@ void Session::start_record(const v1::CreateOptions& options) {
   header->set_protocol_version(kProtocolVersion);
   header->set_model_digest(digest_text(model_->digest));
   header->set_step(simulation_->step_number());
-  header->set_time_s(simulation_->time());
+  header->set_time(simulation_->time());
   *header->mutable_ports() = options.ports();
-  header->set_summed_time(options.summed_time());
+  header->set_summed_time(origin_.time_keeping == TimeKeeping::summed);
+  *header->mutable_symbols() = origin_.given;
   if (simulation_->step_number() > 0) header->set_state(simulation_->export_state());
   for (const auto& port : coupler_.ports()) *header->add_layouts() = port->model().layout();
   header->set_non_convergence_policy(to_proto(simulation_->policy()));
-  header->set_minimum_step_s(simulation_->policy().minimum);
+  if (simulation_->policy().minimum > 0)
+    header->set_minimum_step_size(simulation_->policy().minimum);
   recorder_->add(entry);
 }
 
 // ------------------------------------------------------------------ choices
 
-void Session::set_policy(v1::NonConvergencePolicy kind, double minimum) {
+void Session::set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum) {
   if (!v1::NonConvergencePolicy_IsValid(kind))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`non_convergence_policy` is unknown to this server");
-  if (!(minimum >= 0) || std::isinf(minimum))
-    throw Refusal(v1::REASON_BAD_ARGUMENT, "`minimum_step_s` must be a finite number, at least 0");
+  if (minimum && (!(*minimum > 0) || std::isinf(*minimum)))
+    throw Refusal(
+        v1::REASON_BAD_ARGUMENT,
+        "`minimum_step_size` must be a positive finite number, got " + std::to_string(*minimum));
   StepPolicy policy;
   policy.kind = kind == v1::NON_CONVERGENCE_POLICY_CUT_STEP         ? StepPolicy::cut
                 : kind == v1::NON_CONVERGENCE_POLICY_ACCEPT_FLAGGED ? StepPolicy::accept
                                                                     : StepPolicy::fail;
-  policy.minimum = minimum;
+  policy.minimum = minimum.value_or(0);
   simulation_->set_policy(policy);
   status_.set_policy(policy);
 }
 
 void Session::update(const v1::UpdateSimulationRequest& request, const Caller& caller) {
-  if (request.has_grants()) {
-    if (!grants_.allow(caller, Access::own))
-      throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
-                    {{"wanted", "own"}});
-    grants_.replace(request.grants().grants());
-  }
+  if (request.has_grants() && !grants_.allow(caller, Access::own))
+    throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
+                  {{"wanted", "own"}});
+  if (request.has_grants()) Grants::check(request.grants().grants());  // before anything changes
   std::lock_guard lock(lock_);
   ++changes_;
   const StepPolicy now = simulation_->policy();
-  if (request.has_non_convergence_policy() || request.has_minimum_step_s())
+  std::optional<double> minimum = minimum_in(request);
+  if (!minimum && now.minimum > 0) minimum = now.minimum;
+  if (request.has_non_convergence_policy() || request.has_minimum_step_size())
     set_policy(
         request.has_non_convergence_policy() ? request.non_convergence_policy() : to_proto(now),
-        request.has_minimum_step_s() ? request.minimum_step_s() : now.minimum);
+        minimum);
+  if (request.has_grants()) grants_.replace(request.grants().grants());
   if (request.has_display_name()) status_.set_display_name(request.display_name());
 }
 
@@ -151,7 +164,7 @@ void Session::fill(v1::SimulationInfo* out) const {
   out->set_name(identity_.id);
   out->set_display_name(p.display_name);
   out->set_non_convergence_policy(to_proto(p.policy));
-  out->set_minimum_step_s(p.policy.minimum);
+  if (p.policy.minimum > 0) out->set_minimum_step_size(p.policy.minimum);
   if (pace_ > 0) out->mutable_pace()->set_rate(pace_);
   out->set_late_steps(p.late_steps);
   out->set_worst_delay_seconds(p.worst_delay);
@@ -162,10 +175,10 @@ void Session::fill(v1::SimulationInfo* out) const {
                  : p.finished ? v1::SIMULATION_STATE_FINISHED
                               : v1::SIMULATION_STATE_READY);
   out->set_step(p.step);
-  out->set_time_s(p.time);
-  out->set_next_step_s(p.next_step);
+  out->set_time(p.time);
+  out->set_next_step_size(p.next_step);
   out->set_model_digest(digest_text(model_->digest));
-  out->set_final_time_s(model_->initial_value.final_time);
+  out->set_final_time(model_->initial_value.final_time);
   *out->mutable_lease() =
       google::protobuf::util::TimeUtil::MillisecondsToDuration(identity_.lease.count());
   out->set_last_failure(p.last_failure);
@@ -182,7 +195,8 @@ void Session::fill(v1::SimulationInfo* out) const {
 }
 
 void Session::describe(const v1::DescribeSimulationRequest& request,
-                       v1::ModelDescription* out) const {
+                       v1::DescribeSimulationReply* reply) const {
+  v1::ModelDescription* out = reply->mutable_model();
   to_proto(*model_, out);
   if (request.variable_names_size() > 0) return describe_variables(request, out);
   const bool first = request.page_token().empty();
@@ -195,9 +209,9 @@ void Session::describe(const v1::DescribeSimulationRequest& request,
   for (std::size_t i = 0; i < variables().size(); ++i)
     if (variables()[i].name.compare(0, prefix.size(), prefix) == 0 && page.takes())
       to_proto(variables()[i], static_cast<int>(i), out->add_variables());
-  page.close(out);
+  page.close(reply);
   if (!first) return;
-  for (const DeckSymbol& symbol : symbols_) to_proto(symbol, out->add_symbols());
+  for (const DeckSymbol& symbol : origin_.symbols) to_proto(symbol, out->add_symbols());
   for (const auto& port : coupler_.ports()) port->fill(out->add_ports());
 }
 
@@ -237,10 +251,10 @@ void Session::check(const v1::StepRequest& request) const {
   if (request.has_steps() && request.steps() < 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "`steps` must not be negative, got " + std::to_string(request.steps()));
-  if (request.has_until_time_s() && std::isnan(request.until_time_s()))
-    throw Refusal(v1::REASON_BAD_ARGUMENT, "`until_time_s` is not a number");
-  if (request.exact() && !request.has_until_time_s())
-    throw Refusal(v1::REASON_BAD_ARGUMENT, "`exact` belongs to `until_time_s`, which is missing");
+  if (request.has_until_time() && std::isnan(request.until_time()))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`until_time` is not a number");
+  if (request.exact() && !request.has_until_time())
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`exact` belongs to `until_time`, which is missing");
   if (request.has_until()) variables_.check_condition(request.until());
   variables_.check(request.outputs());
   variables_.check_inputs(request.inputs());
@@ -255,13 +269,6 @@ void Session::check_step(std::int64_t expected) const {
                 {{"step", std::to_string(step)}});
 }
 
-bool Session::replay(const v1::StepRequest& request, v1::StepReply* reply) const {
-  if (request.request_id().empty() || request.request_id() != last_reply_.request_id())
-    return false;
-  *reply = last_reply_;
-  return true;
-}
-
 bool Session::interrupt() { return status_.interrupt(); }
 
 // ------------------------------------------------------------------ reading and writing
@@ -271,7 +278,7 @@ void Session::read(const v1::ReadVariablesRequest& request, v1::ReadVariablesRep
   variables_.check(request.handles());
   std::lock_guard lock(lock_);
   reply->set_step(simulation_->step_number());
-  reply->set_time_s(simulation_->time());
+  reply->set_time(simulation_->time());
   variables_.read(*simulation_, request.handles(), reply->mutable_values());
 }
 

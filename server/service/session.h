@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,10 @@
 #include "service/fair_mutex.h"
 #include "service/grants.h"
 #include "service/keeping.h"
+#include "service/kept_replies.h"
 #include "service/lease.h"
 #include "service/metrics.h"
+#include "service/reply_pages.h"
 #include "service/session_status.h"
 #include "service/snapshot_shelf.h"
 #include "service/telemetry_hub.h"
@@ -45,6 +48,7 @@ class Session {
   struct Identity {
     std::string id;  ///< "simulations/4f3a…"
     std::string display_name, owner, request_id;
+    std::uint64_t request_digest = 0;  ///< of the request that created it
     std::chrono::milliseconds lease{3600 * 1000};
   };
   /// What all sessions of a daemon share; outlives them.
@@ -57,9 +61,17 @@ class Session {
     Lanes& lanes;
     Timer& timer;
   };
+  /// What the simulation was made of.
+  struct Origin {
+    ModelPtr model;
+    std::vector<DeckSymbol> symbols;  ///< that the deck declares
+    TimeKeeping time_keeping = TimeKeeping::exact;
+    google::protobuf::Map<std::string, v1::SymbolValue> given;  ///< `CreateOptions.symbols`
+    bool forked = false;  ///< it did not begin at the initial solution
+  };
   using Progress = std::function<void()>;  ///< called between slices of a long advance
 
-  Session(Identity identity, std::unique_ptr<Simulation> simulation, Shared shared,
+  Session(Identity identity, Origin origin, std::unique_ptr<Simulation> simulation, Shared shared,
           const v1::CreateOptions& options = {}, std::unique_ptr<SessionResults> results = nullptr);
 
   /// What the model and the state take, held until the end.
@@ -73,14 +85,14 @@ class Session {
   /// With the grants, when the caller may change them.
   void fill(v1::SimulationInfo* out, const Caller& caller) const;
   /// A page of the description. Throws BAD_ARGUMENT, NO_SUCH_VARIABLE.
-  void describe(const v1::DescribeSimulationRequest& request, v1::ModelDescription* out) const;
-  /// Before others know the session: what the deck declares.
-  void set_symbols(std::vector<DeckSymbol> symbols) { symbols_ = std::move(symbols); }
-  const std::vector<DeckSymbol>& symbols() const { return symbols_; }
+  void describe(const v1::DescribeSimulationRequest& request,
+                v1::DescribeSimulationReply* out) const;
+  const Origin& origin() const { return origin_; }
   const Grants& grants() const { return grants_; }
+  KeptReplies& kept() { return kept_; }
 
-  /// Advances as asked; see `Simulations.Step`.
-  void step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
+  /// Advances as asked, once for each request id; see `Simulations.Step`.
+  void step(const v1::StepRequest& request, const Caller& caller, Call& call, v1::StepReply* reply,
             const Progress& progress = {}, RowTable* table = nullptr);
   bool interrupt();  ///< was anything advancing?
   /// Throws NOT_GRANTED when the caller must not change grants.
@@ -97,6 +109,7 @@ class Session {
   void save(const std::string& display_name, v1::Snapshot* out);
   void restore(int snapshot);
   void forget(int snapshot);
+  void reset(const CancelToken& cancel);  ///< to the initial solution
   SnapshotShelf& snapshots() { return snapshots_; }
   std::string export_state(int snapshot);  ///< negative: the current state
   void import_state(const std::string& bytes, const std::string& display_name, bool also_restore,
@@ -128,6 +141,7 @@ class Session {
   Keeping* keeping() const { return keeping_.get(); }  ///< null: it does not outlive the daemon
   /// Grows with everything that a checkpoint holds.
   std::int64_t changes() const { return changes_.load(); }
+  void note_change() { ++changes_; }
   std::int64_t step_number() const { return status_.view().step; }
   bool has_failed() const { return status_.failed(); }
   /// Nobody works on it.
@@ -166,8 +180,9 @@ class Session {
   class SteppingClaim;
   class ExchangeInStep;
 
-  bool replay(const v1::StepRequest& request, v1::StepReply* reply) const;
-  void remember(const v1::StepReply& reply);
+  void advance(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
+               const Progress& progress, RowTable* table);
+  void go_to(const State& state, std::int64_t results_until);
   void check(const v1::StepRequest& request) const;
   void check_step(std::int64_t expected) const;
   bool must_wait(const Advance& advance) const;
@@ -175,7 +190,7 @@ class Session {
   bool wants_more(const Advance& advance) const;
   bool choose(Advance& advance);
   bool may_write(Advance& advance);
-  bool begin(Advance& advance);
+  void begin(Advance& advance);
   bool run_slice(Advance& advance);
   bool run_coupled_step(Advance& advance);
   void step_coupled(Advance& advance);
@@ -186,7 +201,7 @@ class Session {
                     const std::string& why);
   StepReport attempt(Advance& advance);
   StepReport attempt_in_slot(Advance& advance);
-  void set_policy(v1::NonConvergencePolicy kind, double minimum);
+  void set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum);
   void start_record(const v1::CreateOptions& options);
   void account(Advance& advance, const StepReport& report);
   void account_pieces(v1::StepReply& reply, const StepReport& report);
@@ -204,7 +219,7 @@ class Session {
   const double pace_;  ///< seconds of the model in a second of the wall clock; 0: not held back
 
   MemoryShare memory_;
-  std::vector<DeckSymbol> symbols_;
+  const Origin origin_;
   std::unique_ptr<Keeping> keeping_;
   std::atomic<std::int64_t> changes_{0};
 
@@ -213,14 +228,16 @@ class Session {
   Lease lease_;
   SessionStatus status_;
   SnapshotShelf snapshots_;
+  KeptReplies kept_;
+  ReplyPages<v1::LinearizeReply> linearization_;
+  ReplyPages<v1::ComputeEigenvaluesReply> spectrum_;
   const std::shared_ptr<TelemetryHub> telemetry_;
 
-  FairMutex lock_;                                 // protects the five below
+  FairMutex lock_;                                 // protects the four below
   const std::unique_ptr<SessionResults> results_;  // null: none are written; outlives its writer
   std::unique_ptr<Simulation> simulation_;
   const std::unique_ptr<Recorder> recorder_;  // thread-safe; null: nothing is recorded
   Coupler coupler_;                           // its ports are thread-safe by themselves
-  v1::StepReply last_reply_;
 };
 
 }  // namespace mbcosim::server

@@ -53,15 +53,28 @@ class Session::SteppingClaim {
 
 // ------------------------------------------------------------------ advancing
 
-void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
-                   const Progress& progress, RowTable* table) {
+void Session::step(const v1::StepRequest& request, const Caller& caller, Call& call,
+                   v1::StepReply* reply, const Progress& progress, RowTable* table) {
+  if (request.request_id().empty()) return advance(request, call, reply, progress, table);
+  KeptReplies::Turn turn(kept_, caller, request.request_id(), digest_of("Step", request), call);
+  if (turn.known()) {
+    reply->ParseFromString(*turn.known());
+    return;
+  }
+  advance(request, call, reply, progress, table);
+  turn.keep(*reply);
+  note_change();
+}
+
+void Session::advance(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
+                      const Progress& progress, RowTable* table) {
   const Clock::time_point start = Clock::now();
   require_usable();
   check(request);
   Advance advance{request, *reply, {}, 1, {}, StepPace(pace_), table, false, false};
   const SteppingClaim claim(*this, call, advance.token);
   if (request.has_steps()) advance.steps_left = request.steps();
-  if (request.has_until_time_s() || (request.has_until() && !request.has_steps()))
+  if (request.has_until_time() || (request.has_until() && !request.has_steps()))
     advance.steps_left = INT64_MAX;
   const bool coupled = !coupler_.ports().empty();
   while (!(coupled ? run_coupled_step(advance) : run_slice(advance))) {
@@ -71,9 +84,7 @@ void Session::step(const v1::StepRequest& request, Call& call, v1::StepReply* re
   }
   advance.pace.wait(advance.token, progress);
   while (must_wait(advance)) wait_for_subscribers();
-  if (!advance.started) return;  // a repeated request: the stored reply, as it was
   reply->set_total_seconds(seconds_since(start));
-  remember(*reply);
   shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
                                 reply->solver_seconds());
   if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
@@ -114,19 +125,10 @@ bool Session::may_write(Advance& advance) {
   return false;
 }
 
-// For a client that did not get the reply and asks again.
-void Session::remember(const v1::StepReply& reply) {
-  if (reply.request_id().empty()) return;
-  std::lock_guard lock(lock_);
-  last_reply_ = reply;
-  ++changes_;
-}
-
-// Does once what comes before the first step. True: nothing is to be done, the reply is complete.
-bool Session::begin(Advance& advance) {
-  if (advance.started) return false;
+// Does once what comes before the first step.
+void Session::begin(Advance& advance) {
+  if (advance.started) return;
   const v1::StepRequest& request = advance.request;
-  if (replay(request, &advance.reply)) return true;
   if (request.has_expected_step()) check_step(request.expected_step());
   check_choice(request, *simulation_);
   variables_.write(request.inputs(), *simulation_);
@@ -138,13 +140,12 @@ bool Session::begin(Advance& advance) {
   advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
                                                     : v1::STEP_OUTCOME_ACCEPTED);
   if (advance.table) advance.table->start(*simulation_);
-  return false;
 }
 
 // Steps for a while with lock and slot held. True: the advance has ended and the reply is complete.
 bool Session::run_slice(Advance& advance) {
   std::lock_guard lock(lock_);
-  if (begin(advance)) return true;
+  begin(advance);
   if (must_wait(advance)) return false;
   if (!wants_more(advance)) {
     finish(advance);
@@ -192,11 +193,11 @@ void Session::account(Advance& advance, const StepReport& report) {
   v1::StepReply& reply = advance.reply;
   reply.set_outcome(to_proto(report.outcome));
   reply.set_steps_done(reply.steps_done() + report.steps_done);
-  reply.set_step_size_s(report.step_size);
+  reply.set_step_size(report.step_size);
   reply.set_iterations(report.iterations);
   reply.set_total_iterations(reply.total_iterations() + report.iterations);
   reply.set_residual_error(report.residual_error);
-  reply.set_solution_error(report.solution_error);
+  if (report.solution_error != 0) reply.set_solution_error(report.solution_error);
   reply.set_solver_seconds(reply.solver_seconds() + report.solver_seconds);
   if (recorder_)
     recorder_->stepped(is_accepted(report.outcome), simulation_->step_number(),
@@ -243,10 +244,10 @@ void Session::account_delay(Advance& advance) {
 void Session::finish(Advance& advance) {
   v1::StepReply& reply = advance.reply;
   if (advance.table) advance.table->finish(*simulation_);
-  reply.set_next_step_size_s(simulation_->next_step_size());
-  reply.set_largest_step_size_s(simulation_->largest_step_size());
+  reply.set_next_step_size(simulation_->next_step_size());
+  reply.set_largest_step_size(simulation_->largest_step_size());
   reply.set_step(simulation_->step_number());
-  reply.set_time_s(simulation_->time());
+  reply.set_time(simulation_->time());
   variables_.read(*simulation_, advance.request.outputs(), reply.mutable_outputs());
 }
 
@@ -257,7 +258,7 @@ void Session::finish(Advance& advance) {
 bool Session::run_coupled_step(Advance& advance) {
   {
     std::lock_guard lock(lock_);
-    if (begin(advance)) return true;
+    begin(advance);
     if (must_wait(advance)) return false;
     if (!choose(advance)) {
       finish(advance);
@@ -383,7 +384,7 @@ void Session::reject_step(Advance& advance, const PeerRejected& rejected) {
   std::lock_guard lock(lock_);
   tell_failure(advance, v1::STEP_OUTCOME_REJECTED_BY_PEER, v1::REASON_REJECTED_BY_PEER,
                rejected.text);
-  if (rejected.preferred) advance.reply.set_preferred_step_size_s(*rejected.preferred);
+  if (rejected.preferred) advance.reply.set_preferred_step_size(*rejected.preferred);
 }
 
 void Session::end_unsolved(Advance& advance, v1::StepOutcome outcome) {
@@ -400,7 +401,7 @@ void Session::tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason
   failure->set_reason(reason);
   failure->set_message(utf8(why));
   failure->set_step(simulation_->step_number() + 1);
-  failure->set_time_s(simulation_->time() + length_of(advance.choice, *simulation_));
+  failure->set_time(simulation_->time() + length_of(advance.choice, *simulation_));
   status_.remember_failure(failure->message());
   shared_.log.step_failed(subject(), outcome, *failure);
 }

@@ -14,7 +14,7 @@ CapturedPoint Session::capture() {
   info->set_state(v1::SIMULATION_STATE_SUSPENDED);
   info->clear_waits();
   info->clear_waiting_for();
-  *captured.point.mutable_last_reply() = last_reply_;
+  kept_.describe(captured.point.mutable_kept_replies());
   snapshots_.describe(&captured.point);
   captured.state = simulation_->snapshot();
   if (results_) results_->prepare();
@@ -29,10 +29,11 @@ void Session::take_over(const v1::CheckpointPoint& point,
                         const std::map<int, std::string>& snapshots) {
   std::lock_guard lock(lock_);
   const v1::SimulationInfo& info = point.info();
-  set_policy(info.non_convergence_policy(), info.minimum_step_s());
+  set_policy(info.non_convergence_policy(),
+             info.has_minimum_step_size() ? std::optional(info.minimum_step_size()) : std::nullopt);
   grants_.replace(info.grants());
   if (!info.last_failure().empty()) status_.remember_failure(info.last_failure());
-  last_reply_ = point.last_reply();
+  kept_.take_over(point.kept_replies());
   for (const v1::CheckpointSnapshot& snapshot : point.snapshots()) {
     auto state = state_from_bytes(snapshots.at(snapshot.number()), model_->digest);
     if (!state) throw Refusal(state.error());

@@ -15,7 +15,24 @@ void Session::save(const std::string& display_name, v1::Snapshot* out) {
 
 void Session::restore(int snapshot) {
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
-  const State saved = snapshots_.get(snapshot);
+  go_to(snapshots_.get(snapshot), results_ ? snapshots_.agrees_until(snapshot) : 0);
+  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
+                       status_.view().step);
+}
+
+void Session::reset(const CancelToken& cancel) {
+  constexpr std::int64_t kNothing = -1, kInitialSolution = 0;
+  if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
+  MemoryShare share;
+  const auto fresh = within(shared_.memory, &cancel, &share, [&] {
+    return Simulation::create(origin_.model, &cancel, /*writer=*/nullptr, origin_.time_keeping);
+  });
+  if (!fresh) throw Refusal(fresh.error());
+  go_to((*fresh)->state(), origin_.forked ? kNothing : kInitialSolution);
+}
+
+// `results_until`: the state shares its history with the result files up to this step.
+void Session::go_to(const State& state, std::int64_t results_until) {
   if (!status_.claim(nullptr))
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; restore when it has ended");
@@ -24,20 +41,17 @@ void Session::restore(int snapshot) {
     ~Release() { status.release(); }
   } const release{status_};
   std::lock_guard lock(lock_);
-  if (results_) results_->expect(snapshots_.agrees_until(snapshot));
-  const auto status = simulation_->restore(saved);
+  if (results_) results_->expect(results_until);
+  const auto status = simulation_->restore(state);
   if (results_) results_->restored();
   if (!status) throw Refusal(results_ ? results_->without_paths(status.error()) : status.error());
   if (results_) snapshots_.results_end_at(results_->end());
   coupler_.reset();
   if (recorder_) recorder_->restored(simulation_->step_number(), simulation_->time());
-  last_reply_.Clear();
   ++changes_;
   const SessionStatus::View before = status_.view();
   status_.recover();
   status_.publish(*simulation_);
-  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
-                       simulation_->step_number());
   if ((before.failed || before.finished) && !simulation_->finished())
     shared_.log.state_changed(subject(), v1::SIMULATION_STATE_READY, simulation_->step_number());
 }

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "threads/top_frame.h"
+#include "wire/convert.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -30,9 +31,10 @@ std::string SessionStore::new_id() {
 
 // ------------------------------------------------------------------ creations
 
-SessionStore::Place::Place(SessionStore& store, const std::string& request_id, const Caller& caller,
-                           const Call& call)
+SessionStore::Place::Place(SessionStore& store, const std::string& request_id, std::uint64_t digest,
+                           const Caller& caller, const Call& call)
     : store_(store), request_(caller.identity, request_id) {
+  check_request_id(request_id);
   constexpr std::chrono::milliseconds kLook(20);  // how soon the end of the call is noticed
   Guard guard(store_.mutex_);
   if (!request_id.empty()) {
@@ -40,6 +42,9 @@ SessionStore::Place::Place(SessionStore& store, const std::string& request_id, c
       store_.changed_.wait_for(store_.mutex_, kLook);
     if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
     known_ = store_.find_request(request_);
+    if (known_ && known_->identity().request_digest != digest)
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    "`request_id` \"" + utf8(request_id) + "\" was another request's");
     if (known_) return;
   }
   store_.check_room(caller.identity);
@@ -135,10 +140,36 @@ std::vector<SessionPtr> SessionStore::list(const Caller& caller) const {
   return result;
 }
 
-void SessionStore::remove(const std::string& id, const Caller& caller) {
+bool SessionStore::was_removed(const std::string& id, const Request& request) const {
+  const auto found = std::find_if(removals_.begin(), removals_.end(),
+                                  [&](const auto& removal) { return removal.first == request; });
+  if (found == removals_.end()) return false;
+  if (found->second == id) return true;
+  throw Refusal(v1::REASON_BAD_ARGUMENT,
+                "`request_id` \"" + utf8(request.second) + "\" was another request's");
+}
+
+void SessionStore::remove(const std::string& id, const Caller& caller,
+                          const std::string& request_id) {
+  check_request_id(request_id);
+  const Request request(caller.identity, request_id);
+  {
+    Guard guard(mutex_);
+    if (!request_id.empty() && was_removed(id, request)) return;
+  }
+  if (keeper_.remove && keeper_.remove(id, caller)) return note_removal(id, request);
   const SessionPtr session = get(id, caller, Access::own);
   session->discard_results();
-  drop(session->identity().id);
+  note_removal(id, request);
+  drop(id);
+}
+
+void SessionStore::note_removal(const std::string& id, const Request& request) {
+  constexpr std::size_t kRemovals = 1024;
+  if (request.second.empty()) return;
+  Guard guard(mutex_);
+  removals_.emplace_back(request, id);
+  if (removals_.size() > kRemovals) removals_.pop_front();
 }
 
 void SessionStore::discard(const std::string& id) {

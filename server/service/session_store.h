@@ -1,6 +1,8 @@
 /// All simulations of a daemon.
 #pragma once
 
+#include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -28,9 +30,10 @@ class SessionStore {
   /// request id is done once: who repeats it waits for the first and gets its session.
   class Place {
    public:
-    /// Throws LIMIT_EXCEEDED when all places are taken, CANCELLED when the call ends first.
-    Place(SessionStore& store, const std::string& request_id, const Caller& caller,
-          const Call& call);
+    /// `digest`: of the request. Throws LIMIT_EXCEEDED when all places are taken, BAD_ARGUMENT when
+    /// the id was another request's, CANCELLED when the call ends first.
+    Place(SessionStore& store, const std::string& request_id, std::uint64_t digest,
+          const Caller& caller, const Call& call);
     ~Place();
     Place(const Place&) = delete;
     Place& operator=(const Place&) = delete;
@@ -45,9 +48,10 @@ class SessionStore {
 
   /// Who keeps sessions on the disk. Called without any lock.
   struct Keeper {
-    std::function<bool(const std::string& id, const Caller&)> wake;  ///< true: it is back
-    std::function<bool(Session&)> suspend;                           ///< false: it must live on
-    std::function<void(const std::string& id)> unsuspend;            ///< it lives on after all
+    std::function<bool(const std::string& id, const Caller&)> wake;    ///< true: it is back
+    std::function<bool(const std::string& id, const Caller&)> remove;  ///< true: it was there
+    std::function<bool(Session&)> suspend;                             ///< false: it must live on
+    std::function<void(const std::string& id)> unsuspend;              ///< it lives on after all
     std::function<void(Session&)> forget;
   };
   /// Before anybody uses the store.
@@ -62,7 +66,9 @@ class SessionStore {
                  const std::string& port = "") const;
   /// What the caller may see, in the order of creation.
   std::vector<SessionPtr> list(const Caller& caller) const;
-  void remove(const std::string& id, const Caller& caller);
+  /// Also one that is on the disk. A repeat with the request's id does nothing more. Throws as
+  /// `get`, and BAD_ARGUMENT.
+  void remove(const std::string& id, const Caller& caller, const std::string& request_id);
   /// The same for a session that nobody has seen.
   void discard(const std::string& id);
   /// Ends a session; nothing when it is gone already.
@@ -74,6 +80,8 @@ class SessionStore {
  private:
   using Request = std::pair<std::string, std::string>;
   SessionPtr find_request(const Request& request) const TS_REQUIRES(mutex_);
+  bool was_removed(const std::string& id, const Request& request) const TS_REQUIRES(mutex_);
+  void note_removal(const std::string& id, const Request& request) TS_EXCLUDES(mutex_);
   void check_room(const std::string& owner) const TS_REQUIRES(mutex_);
   SessionPtr take_out(const std::string& id);
   void park(const SessionPtr& session);
@@ -89,6 +97,8 @@ class SessionStore {
   std::vector<std::string> order_ TS_GUARDED_BY(mutex_);
   std::multiset<std::string> places_ TS_GUARDED_BY(mutex_);  ///< owners of creations under way
   std::set<Request> creations_ TS_GUARDED_BY(mutex_);        ///< under way, with a request id
+  /// The last deletions that had a request id, and what they deleted.
+  std::deque<std::pair<Request, std::string>> removals_ TS_GUARDED_BY(mutex_);
   bool stop_ TS_GUARDED_BY(mutex_) = false;
   Condition changed_;
   std::thread lease_thread_;

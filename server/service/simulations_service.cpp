@@ -9,13 +9,13 @@
 namespace mbcosim::server {
 namespace {
 
-void add_limit(v1::ServerInfo* info, const char* name, std::int64_t maximum) {
+void add_limit(v1::GetServerInfoReply* info, const char* name, std::int64_t maximum) {
   v1::Limit* limit = info->add_limits();
   limit->set_name(name);
-  limit->set_maximum(maximum);
+  if (maximum != 0) limit->set_maximum(maximum);
 }
 
-void add_limits(const ServiceLimits& limits, v1::ServerInfo* reply) {
+void add_limits(const ServiceLimits& limits, v1::GetServerInfoReply* reply) {
   add_limit(reply, "sessions", limits.sessions);
   add_limit(reply, "identity_sessions", limits.identity_sessions);
   add_limit(reply, "memory_bytes", limits.memory_bytes);
@@ -44,10 +44,9 @@ void add_limits(const ServiceLimits& limits, v1::ServerInfo* reply) {
   add_limit(reply, "unknowns", limits.engine.unknowns);
 }
 
-void fill_info(const Config& config, const Caller& caller, v1::ServerInfo* reply) {
+void fill_info(const Config& config, const Caller& caller, v1::GetServerInfoReply* reply) {
   reply->set_version(MBCOSIM_VERSION);
-  reply->mutable_protocol()->set_lowest(kProtocolVersion);
-  reply->mutable_protocol()->set_highest(kProtocolVersion);
+  fill_protocol(reply->mutable_protocol());
   add_limits(config.limits, reply);
   reply->set_identity(caller.identity);
   reply->set_role(role_name(caller.role));
@@ -75,8 +74,7 @@ std::vector<Entry> entries_for(const Parts& parts, const Caller& caller) {
 void list(const Parts& parts, const Caller& caller, const v1::ListSimulationsRequest& request,
           v1::ListSimulationsReply* reply) {
   std::vector<Entry> entries = entries_for(parts, caller);
-  const std::size_t page =
-      request.page_size() > 0 ? static_cast<std::size_t>(request.page_size()) : 100;
+  const auto page = static_cast<std::size_t>(page_size_of(request, /*usual=*/100));
   auto next = entries.begin();
   if (!request.page_token().empty()) {
     next = std::find_if(entries.begin(), entries.end(),
@@ -99,9 +97,9 @@ void list(const Parts& parts, const Caller& caller, const v1::ListSimulationsReq
 
 void add_life(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("GetServerInfo"),
-           unary<v1::GetServerInfoRequest, v1::ServerInfo>(
+           unary<v1::GetServerInfoRequest, v1::GetServerInfoReply>(
                Role::observe, Lane::quick,
-               [&parts](const CallFrame& frame, const auto&, v1::ServerInfo* reply) {
+               [&parts](const CallFrame& frame, const auto&, v1::GetServerInfoReply* reply) {
                  fill_info(parts.config, frame.caller, reply);
                }));
   gate.add(simulations_path("ListSimulations"),
@@ -114,29 +112,29 @@ void add_life(Gate& gate, const Parts& parts) {
       simulations_path("DeleteSimulation"),
       unary<v1::DeleteSimulationRequest, v1::DeleteSimulationReply>(
           Role::control, Lane::quick, [&parts](const CallFrame& frame, const auto& request, auto*) {
-            if (!parts.durability.remove(request.name(), frame.caller))
-              parts.store.remove(request.name(), frame.caller);
+            parts.store.remove(request.simulation(), frame.caller, request.request_id());
           }));
   gate.add(simulations_path("GetSimulation"),
-           unary<v1::GetSimulationRequest, v1::SimulationInfo>(
+           unary<v1::GetSimulationRequest, v1::GetSimulationReply>(
                Role::observe, Lane::quick,
                [&parts](const CallFrame& frame, const auto& request, auto* reply) {
-                 if (!parts.store.has(request.name()) &&
-                     parts.durability.describe(request.name(), frame.caller, reply))
+                 const std::string& name = request.simulation();
+                 if (!parts.store.has(name) &&
+                     parts.durability.describe(name, frame.caller, reply->mutable_simulation()))
                    return;
-                 const SessionHold session(parts.store, request.name(), frame.caller, Access::see);
-                 session->fill(reply, frame.caller);
+                 const SessionHold session(parts.store, name, frame.caller, Access::see);
+                 session->fill(reply->mutable_simulation(), frame.caller);
                }));
   gate.add(simulations_path("UpdateSimulation"),
-           on_session<v1::UpdateSimulationRequest, v1::SimulationInfo>(
+           on_session<v1::UpdateSimulationRequest, v1::UpdateSimulationReply>(
                parts, Role::control, Lane::work,
                [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
                  session.update(request, frame.caller);
-                 session.fill(reply, frame.caller);
+                 session.fill(reply->mutable_simulation(), frame.caller);
                }));
   gate.add(
       simulations_path("DescribeSimulation"),
-      on_session<v1::DescribeSimulationRequest, v1::ModelDescription>(
+      on_session<v1::DescribeSimulationRequest, v1::DescribeSimulationReply>(
           parts, Role::observe, Lane::work, [](Session& session, const auto& request, auto* reply) {
             session.describe(request, reply);
           }));
@@ -161,14 +159,14 @@ void add_analysis(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("Linearize"),
            on_session<v1::LinearizeRequest, v1::LinearizeReply>(
                parts, Role::control, Lane::heavy,
-               [](Session& session, const auto& request, auto* reply, Call& call) {
-                 session.linearize(request, call, reply);
+               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+                 session.linearize(request, frame.call, reply);
                }));
   gate.add(simulations_path("ComputeEigenvalues"),
            on_session<v1::ComputeEigenvaluesRequest, v1::ComputeEigenvaluesReply>(
                parts, Role::control, Lane::heavy,
-               [](Session& session, const auto& request, auto* reply, Call& call) {
-                 session.eigenvalues(request, call, reply);
+               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+                 session.eigenvalues(request, frame.call, reply);
                }));
 }
 

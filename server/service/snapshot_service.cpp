@@ -1,21 +1,13 @@
 /// Methods that save, restore and carry states.
 #include <memory>
 #include <optional>
+#include <string>
 
+#include "math/hash.h"
 #include "service/simulations_service.h"
 
 namespace mbcosim::server {
 namespace {
-
-/// A snapshot named by the client: its simulation, kept alive, and its number.
-struct Named {
-  Named(const Parts& parts, const std::string& name, const Caller& caller)
-      : number(number_of_snapshot(name, &simulation)),
-        session(parts.store, simulation, caller, Access::control) {}
-  std::string simulation;
-  int number;
-  SessionHold session;
-};
 
 class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
  public:
@@ -42,9 +34,20 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
   void complete(Exchange& exchange) override {
     if (!session_)
       throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
-    v1::Snapshot reply;
-    (*session_)->import_state(bytes_, header_.display_name(), header_.restore(), &reply);
+    v1::ImportSnapshotReply reply;
+    Session& session = **session_;
+    once(session, frame_of(exchange), question(), &reply, [&] {
+      session.import_state(bytes_, header_.display_name(), header_.restore(),
+                           reply.mutable_snapshot());
+    });
     exchange.end(serialized(reply));
+  }
+
+  /// The import as one request: header and digest of the bytes.
+  v1::ImportSnapshotHeader question() const {
+    v1::ImportSnapshotHeader all = header_;
+    all.set_display_name(all.display_name() + '\0' + std::to_string(fnv1a(bytes_)));
+    return all;
   }
 
   const Parts& parts_;
@@ -58,10 +61,8 @@ using ExportReplies = Series<v1::ExportSnapshotRequest, v1::ExportSnapshotReply>
 
 ExportReplies::Source exported(const Parts& parts, const Caller& caller,
                                const v1::ExportSnapshotRequest& request) {
-  std::string simulation = request.simulation();
-  const int number =
-      request.has_snapshot() ? number_of_snapshot(request.snapshot(), &simulation) : -1;
-  const SessionHold session(parts.store, simulation, caller, Access::observe);
+  const SessionHold session(parts.store, request.simulation(), caller, Access::observe);
+  const int number = request.has_snapshot() ? snapshot_in(request) : -1;
   auto bytes = std::make_shared<std::string>();
   auto share = std::make_shared<MemoryShare>();
   *bytes = within(parts.runtime.budgets.of(caller.identity), nullptr, share.get(),
@@ -79,7 +80,7 @@ using RecordReplies = Series<v1::GetRecordRequest, v1::GetRecordReply>;
 RecordReplies::Source recorded(const Parts& parts, const Caller& caller,
                                const v1::GetRecordRequest& request) {
   auto session =
-      std::make_shared<SessionHold>(parts.store, request.name(), caller, Access::observe);
+      std::make_shared<SessionHold>(parts.store, request.simulation(), caller, Access::observe);
   const Recorder& record = (*session)->record();
   return [session, &record, at = std::size_t{0}](auto* reply) mutable {
     std::string piece = record.read(at, kChunkBytes);
@@ -93,9 +94,9 @@ RecordReplies::Source recorded(const Parts& parts, const Caller& caller,
 void add_saved(Gate& gate, const Parts& parts) {
   gate.add(
       simulations_path("CreateSnapshot"),
-      on_session<v1::CreateSnapshotRequest, v1::Snapshot>(
+      on_session<v1::CreateSnapshotRequest, v1::CreateSnapshotReply>(
           parts, Role::control, Lane::work, [](Session& session, const auto& request, auto* reply) {
-            session.save(request.display_name(), reply);
+            session.save(request.display_name(), reply->mutable_snapshot());
           }));
   gate.add(simulations_path("ListSnapshots"),
            on_session<v1::ListSnapshotsRequest, v1::ListSnapshotsReply>(
@@ -103,20 +104,25 @@ void add_saved(Gate& gate, const Parts& parts) {
                  session.snapshots().list(reply);
                }));
   gate.add(simulations_path("RestoreSnapshot"),
-           unary<v1::RestoreSnapshotRequest, v1::SimulationInfo>(
-               Role::control, Lane::work,
-               [&parts](const CallFrame& frame, const auto& request, auto* reply) {
-                 const Named named(parts, request.name(), frame.caller);
-                 named.session->restore(named.number);
-                 named.session->fill(reply, frame.caller);
+           on_session<v1::RestoreSnapshotRequest, v1::RestoreSnapshotReply>(
+               parts, Role::control, Lane::work,
+               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+                 session.restore(snapshot_in(request));
+                 session.fill(reply->mutable_simulation(), frame.caller);
                }));
-  gate.add(
-      simulations_path("DeleteSnapshot"),
-      unary<v1::DeleteSnapshotRequest, v1::DeleteSnapshotReply>(
-          Role::control, Lane::work, [&parts](const CallFrame& frame, const auto& request, auto*) {
-            const Named named(parts, request.name(), frame.caller);
-            named.session->forget(named.number);
-          }));
+  gate.add(simulations_path("ResetSimulation"),
+           on_session<v1::ResetSimulationRequest, v1::ResetSimulationReply>(
+               parts, Role::control, Lane::heavy,
+               [](Session& session, const auto&, auto* reply, const CallFrame& frame) {
+                 const CallToken token(frame.call);
+                 session.reset(token);
+                 session.fill(reply->mutable_simulation(), frame.caller);
+               }));
+  gate.add(simulations_path("DeleteSnapshot"),
+           on_session<v1::DeleteSnapshotRequest, v1::DeleteSnapshotReply>(
+               parts, Role::control, Lane::work, [](Session& session, const auto& request, auto*) {
+                 session.forget(snapshot_in(request));
+               }));
 }
 
 }  // namespace

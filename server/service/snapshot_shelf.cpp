@@ -133,7 +133,7 @@ const SnapshotShelf::Saved& SnapshotShelf::find(int number) const {
 void SnapshotShelf::fill(int number, const Saved& saved, v1::Snapshot* out) const {
   out->set_name(name_of(number));
   out->set_step(saved.state.step);
-  out->set_time_s(saved.state.time);
+  out->set_time(saved.state.time);
   out->set_display_name(saved.display_name);
   out->set_model_digest(digest_);
   out->set_size_bytes(saved.share.bytes());

@@ -39,9 +39,11 @@ class StepStreamHandler final : public Handler {
     }
     if (!request_.simulation().empty() && request_.simulation() != name_)
       throw Refusal(v1::REASON_BAD_ARGUMENT,
-                    "all messages of a stream must name the same simulation");
+                    "`simulation`: all messages of a stream must name the same");
+    request_.set_simulation(
+        name_);  // a repeat in another message of the stream is the same request
     reply_.Clear();
-    (*session_)->step(request_, exchange.call(), &reply_);
+    (*session_)->step(request_, exchange.caller(), exchange.call(), reply_.mutable_step());
     const bool taken = exchange.all_written();  // the last reply, by the client
     wants_next_.store(true);
     exchange.write(serialized(reply_));
@@ -58,7 +60,7 @@ class StepStreamHandler final : public Handler {
   std::optional<SessionHold> session_;
   MemoryShare share_;  ///< of the request
   v1::StepRequest request_;
-  v1::StepReply reply_;
+  v1::StepStreamReply reply_;
   std::atomic<bool> wants_next_{false};
 };
 
@@ -70,11 +72,11 @@ class Progress {
   Progress(const Session& session, const v1::RunRequest& request) : session_(session) {
     session_.fill(&info_);
     start_step_ = info_.step();
-    start_time_ = info_.time_s();
+    start_time_ = info_.time();
     steps_ = request.step().has_steps() ? request.step().steps() : -1;
-    end_time_ = info_.final_time_s();
-    if (request.step().has_until_time_s())
-      end_time_ = std::min(end_time_, request.step().until_time_s());
+    end_time_ = info_.final_time();
+    if (request.step().has_until_time())
+      end_time_ = std::min(end_time_, request.step().until_time());
     const auto wanted = request.has_progress_interval()
                             ? TimeUtil::DurationToMilliseconds(request.progress_interval())
                             : 500;
@@ -91,9 +93,9 @@ class Progress {
     const double fraction = done_fraction();
     v1::RunProgress* progress = message_.mutable_progress();
     progress->set_step(info_.step());
-    progress->set_time_s(info_.time_s());
-    progress->set_fraction(fraction);
-    progress->set_remaining_seconds(fraction > 0 ? elapsed * (1 - fraction) / fraction : -1);
+    progress->set_time(info_.time());
+    if (fraction >= 0) progress->set_fraction(fraction);
+    if (fraction > 0) progress->set_remaining_seconds(elapsed * (1 - fraction) / fraction);
     exchange.write(serialized(message_));
   }
 
@@ -103,7 +105,7 @@ class Progress {
     if (steps_ > 0)
       fraction = static_cast<double>(info_.step() - start_step_) / static_cast<double>(steps_);
     if (std::isfinite(end_time_) && end_time_ > start_time_)
-      fraction = std::max(fraction, (info_.time_s() - start_time_) / (end_time_ - start_time_));
+      fraction = std::max(fraction, (info_.time() - start_time_) / (end_time_ - start_time_));
     return std::min(fraction, 1.0);
   }
 
@@ -159,7 +161,8 @@ class RunHandler final : public OneRequest<v1::RunRequest> {
       rows.send(exchange);
       progress.send(exchange);
     };
-    session->step(request.step(), exchange.call(), done.mutable_done(), send, rows.table());
+    session->step(request.step(), exchange.caller(), exchange.call(), done.mutable_done(), send,
+                  rows.table());
     rows.flush(exchange);
     exchange.end(serialized(done));
   }
@@ -170,11 +173,12 @@ class RunHandler final : public OneRequest<v1::RunRequest> {
 }  // namespace
 
 void add_stepping(Gate& gate, const Parts& parts) {
-  gate.add(simulations_path("Step"),
-           on_session<v1::StepRequest, v1::StepReply>(
-               parts, Role::control, Lane::advance,
-               [](Session& session, const v1::StepRequest& request, v1::StepReply* reply,
-                  Call& call) { session.step(request, call, reply); }));
+  gate.add(simulations_path("Step"), on_session<v1::StepRequest, v1::StepReply>(
+                                         parts, Role::control, Lane::advance,
+                                         [](Session& session, const v1::StepRequest& request,
+                                            v1::StepReply* reply, const CallFrame& frame) {
+                                           session.step(request, frame.caller, frame.call, reply);
+                                         }));
   gate.add(simulations_path("StepStream"),
            stream(Role::control, [&parts] { return std::make_unique<StepStreamHandler>(parts); }));
   gate.add(simulations_path("Run"),
@@ -183,9 +187,11 @@ void add_stepping(Gate& gate, const Parts& parts) {
            unary<v1::InterruptRequest, v1::InterruptReply>(
                Role::control, Lane::quick,
                [&parts](const CallFrame& frame, const auto& request, auto* reply) {
-                 if (parts.durability.knows(request.name(), frame.caller)) return;  // it rests
-                 reply->set_was_stepping(
-                     parts.store.get(request.name(), frame.caller, Access::control)->interrupt());
+                 const std::string& name = request.simulation();
+                 if (parts.durability.knows(name, frame.caller)) return;  // it rests
+                 const SessionPtr session = parts.store.get(name, frame.caller, Access::control);
+                 once(*session, frame, request, reply,
+                      [&] { reply->set_was_stepping(session->interrupt()); });
                }));
 }
 

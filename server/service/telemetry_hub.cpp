@@ -23,7 +23,7 @@ void append(const std::string& sample, std::int64_t sequence,
             google::protobuf::io::CodedOutputStream& out) {
   using Coded = google::protobuf::io::CodedOutputStream;
   constexpr auto kSamples =
-      Wire::MakeTag(v1::TelemetryBatch::kSamplesFieldNumber, Wire::WIRETYPE_LENGTH_DELIMITED);
+      Wire::MakeTag(v1::SubscribeReply::kSamplesFieldNumber, Wire::WIRETYPE_LENGTH_DELIMITED);
   constexpr auto kSequence = Wire::MakeTag(v1::Sample::kSequenceFieldNumber, Wire::WIRETYPE_VARINT);
   const auto number = static_cast<std::uint64_t>(sequence);
   out.WriteTag(kSamples);
@@ -39,7 +39,7 @@ void append(const std::string& sample, std::int64_t sequence,
 /// What equal subscriptions have in common: their samples, serialized when the first of them takes
 /// them, without their numbers.
 struct Feed {
-  std::int64_t every = 1;
+  Rhythm rhythm;
   std::vector<int> handles;
   Track* track = nullptr;
   std::vector<const Track::Column*> columns = {};  ///< (handles)
@@ -82,7 +82,7 @@ void TelemetryHub::add(const SubscriptionPtr& subscription, std::span<const int>
 Feed& TelemetryHub::feed_for(const Subscription::Options& o, std::span<const int> sizes) {
   const std::int64_t keep = o.capacity + 1;  // one more while the session waits for room
   const auto feed = std::find_if(feeds_.begin(), feeds_.end(), [&](const Feed& known) {
-    return known.every == o.every && known.handles == o.handles;
+    return known.rhythm == o.rhythm && known.handles == o.handles;
   });
   if (feed != feeds_.end()) {
     feed->track->lengthen_to(keep);
@@ -91,14 +91,14 @@ Feed& TelemetryHub::feed_for(const Subscription::Options& o, std::span<const int
   MemoryShare share(
       memory_, kSerialized + static_cast<std::int64_t>(o.handles.size()) *
                                  static_cast<std::int64_t>(sizeof(int) + sizeof(Track::Column*)));
-  Track& track = tracks_.try_emplace(o.every, memory_).first->second;
+  Track& track = tracks_.try_emplace(o.rhythm, memory_).first->second.track;
   try {
     track.want(o.handles, sizes, keep);
   } catch (...) {
-    if (!track.is_wanted()) tracks_.erase(o.every);
+    if (!track.is_wanted()) tracks_.erase(o.rhythm);
     throw;
   }
-  Feed& fresh = feeds_.emplace_back(Feed{o.every, o.handles, &track, {}, std::move(share)});
+  Feed& fresh = feeds_.emplace_back(Feed{o.rhythm, o.handles, &track, {}, std::move(share)});
   for (const int handle : o.handles) fresh.columns.push_back(&track.column(handle));
   return fresh;
 }
@@ -106,7 +106,7 @@ Feed& TelemetryHub::feed_for(const Subscription::Options& o, std::span<const int
 void TelemetryHub::release(Feed& feed) {
   if (--feed.users > 0) return;
   feed.track->release(feed.handles);
-  if (!feed.track->is_wanted()) tracks_.erase(feed.every);
+  if (!feed.track->is_wanted()) tracks_.erase(feed.rhythm);
   feeds_.remove_if([&](const Feed& known) { return &known == &feed; });
 }
 
@@ -153,11 +153,21 @@ TelemetryHub::Work TelemetryHub::work() const {
 
 // ------------------------------------------------------------------ the session's thread
 
+bool TelemetryHub::is_due(const Rhythm& rhythm, std::int64_t step, Rhythmic& of) {
+  if (step % rhythm.every != 0) return false;
+  if (rhythm.interval == rhythm.interval.zero()) return true;
+  const Clock::time_point now = Clock::now();
+  if (now < of.due) return false;
+  of.due = now + rhythm.interval;
+  return true;
+}
+
 void TelemetryHub::publish(const Simulation& simulation) {
   Guard guard(mutex_);
   if (closed_) return;
-  for (auto& [every, track] : tracks_) {
-    if (simulation.step_number() % every != 0) continue;
+  for (auto& [rhythm, rhythmic] : tracks_) {
+    if (!is_due(rhythm, simulation.step_number(), rhythmic)) continue;
+    Track& track = rhythmic.track;
     work_.evaluations += track.record(simulation);
     for (const SubscriptionPtr& s : decimators_)
       if (s->feed->track == &track) keep_for(*s);
@@ -253,11 +263,11 @@ TelemetryHub::Taken TelemetryHub::take(Subscription& s, std::size_t most_bytes,
     if (!std::exchange(s.hungry, true)) ++hungry_;
     return Taken::nothing;
   }
-  v1::TelemetryBatch rest;
+  v1::SubscribeReply rest;
   s.total_dropped += s.dropped;
   rest.set_dropped(std::exchange(s.dropped, 0));
   rest.set_total_dropped(s.total_dropped);
-  rest.set_every(s.options.every * s.stride);
+  rest.set_every(s.options.rhythm.every * s.stride);
   batch->clear();
   {
     google::protobuf::io::StringOutputStream stream(batch);
@@ -306,7 +316,7 @@ const std::string& TelemetryHub::serialize(const Feed& feed, std::int64_t number
                                            std::string& bytes) {
   scratch_.Clear();
   scratch_.set_step(feed.track->step(number));
-  scratch_.set_time_s(feed.track->time(number));
+  scratch_.set_time(feed.track->time(number));
   for (const Track::Column* column : feed.columns) {
     const std::span<const double> values = feed.track->values(*column, number);
     scratch_.mutable_values()->Add(values.begin(), values.end());

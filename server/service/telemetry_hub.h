@@ -29,7 +29,7 @@ struct Feed;
 struct Subscription {
   struct Options {
     std::vector<int> handles;
-    std::int64_t every = 1;
+    Rhythm rhythm;
     v1::OverflowPolicy policy = v1::OVERFLOW_POLICY_DROP_OLDEST;
     std::int64_t capacity = 1024;  ///< samples kept for it
     std::int64_t batch_bytes = 0;  ///< that a batch on its way takes, besides its last sample
@@ -95,7 +95,7 @@ class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
 
   // --- a subscriber
   enum class Taken { samples, nothing, closed, stalled };
-  /// Moves samples of up to about `most_bytes` into `batch`, a serialized TelemetryBatch.
+  /// Moves samples of up to about `most_bytes` into `batch`, a serialized SubscribeReply.
   Taken take(Subscription& subscription, std::size_t most_bytes, std::string* batch)
       TS_EXCLUDES(mutex_);
   /// Does it stand still for too long? It is to end, whatever is on its way to it.
@@ -123,7 +123,13 @@ class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
   Timer& timer_;
   mutable Mutex mutex_;
   Condition room_;
-  std::map<std::int64_t, Track> tracks_ TS_GUARDED_BY(mutex_);  ///< by interval in steps
+  struct Rhythmic {
+    explicit Rhythmic(MemoryBudget& memory) : track(memory) {}
+    Track track;
+    std::chrono::steady_clock::time_point due{};  ///< the next sample comes not before
+  };
+  static bool is_due(const Rhythm& rhythm, std::int64_t step, Rhythmic& of);
+  std::map<Rhythm, Rhythmic> tracks_ TS_GUARDED_BY(mutex_);
   std::list<Feed> feeds_ TS_GUARDED_BY(mutex_);
   std::vector<SubscriptionPtr> subscriptions_ TS_GUARDED_BY(mutex_);
   // Those with policy BLOCK, and with DECIMATE.

@@ -10,14 +10,31 @@ namespace {
 
 constexpr std::size_t kBatchBytes = 64 << 10;  // about that much of samples in one message
 
+Rhythm rhythm_of(const v1::SubscribeRequest& request) {
+  using google::protobuf::util::TimeUtil;
+  Rhythm rhythm;
+  if (request.has_every()) rhythm.every = request.every();
+  if (rhythm.every < 1)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`every` must be positive, got " + std::to_string(rhythm.every));
+  if (!request.has_minimum_interval()) return rhythm;
+  const auto& wanted = request.minimum_interval();
+  constexpr std::int64_t kLongest = 3600;  // [s]; what is longer may not fit into nanoseconds
+  if (wanted.seconds() >= 0 && wanted.seconds() <= kLongest)
+    rhythm.interval = std::chrono::nanoseconds(TimeUtil::DurationToNanoseconds(wanted));
+  if (rhythm.interval <= rhythm.interval.zero() || rhythm.interval > std::chrono::seconds(kLongest))
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`minimum_interval` must be above 0 s and at most 3600 s");
+  return rhythm;
+}
+
 Subscription::Options make_options(const v1::SubscribeRequest& request, const Session& session,
                                    const Caller& caller, const ServiceLimits& limits) {
   Subscription::Options options;
   options.identity = caller.identity;
   options.batch_bytes = kBatchBytes;
   options.handles.assign(request.handles().begin(), request.handles().end());
-  if (request.every() < 0) throw Refusal(v1::REASON_BAD_ARGUMENT, "`every` must not be negative");
-  if (request.every() > 0) options.every = request.every();
+  options.rhythm = rhythm_of(request);
   if (!v1::OverflowPolicy_IsValid(request.policy()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`policy` is unknown");
   if (request.policy() != v1::OVERFLOW_POLICY_UNSPECIFIED) options.policy = request.policy();
@@ -25,12 +42,13 @@ Subscription::Options make_options(const v1::SubscribeRequest& request, const Se
     throw Refusal(v1::REASON_ROLE_TOO_LOW,
                   "only the owner of a simulation may subscribe with policy BLOCK: it keeps the "
                   "simulation waiting");
-  if (request.buffer_samples() < 0)
-    throw Refusal(v1::REASON_BAD_ARGUMENT, "`buffer_samples` must not be negative");
+  if (request.has_buffer_samples() && request.buffer_samples() < 1)
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`buffer_samples` must be positive, got " +
+                                               std::to_string(request.buffer_samples()));
   if (request.buffer_samples() > limits.telemetry_samples)
     throw limit_refusal("telemetry_samples", limits.telemetry_samples,
                         "the buffer is larger than allowed");
-  if (request.buffer_samples() > 0) options.capacity = request.buffer_samples();
+  if (request.has_buffer_samples()) options.capacity = request.buffer_samples();
   if (request.has_block_timeout()) {
     options.block_timeout = std::chrono::milliseconds(
         google::protobuf::util::TimeUtil::DurationToMilliseconds(request.block_timeout()));
@@ -52,8 +70,8 @@ class SubscribeHandler final : public OneRequest<v1::SubscribeRequest> {
     session_.emplace(parts_.store, request.simulation(), exchange.caller(), Access::observe);
     Subscription::Options options =
         make_options(request, **session_, exchange.caller(), parts_.config.limits);
-    v1::TelemetryBatch first;
-    first.set_every(options.every);
+    v1::SubscribeReply first;
+    first.set_every(options.rhythm.every);
     options.wake = [this, weak = exchange.weak_from_this()] {
       if (const auto self = weak.lock()) self->guarded([&] { pump(*self); });
     };

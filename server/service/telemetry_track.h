@@ -1,6 +1,8 @@
-/// The last samples of variables, as numbers: what subscriptions of one interval have in common.
+/// The last samples of variables, as numbers: what subscriptions of one rhythm have in common.
 #pragma once
 
+#include <chrono>
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <span>
@@ -10,6 +12,14 @@
 #include "wire/memory.h"
 
 namespace mbcosim::server {
+
+/// Which steps are sampled: every so many, of those the ones that come at least so much wall time
+/// after the one before.
+struct Rhythm {
+  std::int64_t every = 1;
+  std::chrono::nanoseconds interval{0};
+  auto operator<=>(const Rhythm&) const = default;
+};
 
 /// Rings of equal length, one for each variable that somebody wants. Samples have numbers; the
 /// newest `keep` are there. Not thread-safe.

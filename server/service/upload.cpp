@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "math/hash.h"
+#include "service/kept_replies.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -22,27 +24,6 @@ void check_name(const std::string& name) {
         "file names must be relative, without \"..\", and at most 1024 bytes long; got \"" +
             name.substr(0, 100) + "\"");
   }
-}
-
-SymbolValues symbols_of(const v1::CreateOptions& options) {
-  SymbolValues values;
-  for (const auto& [name, value] : options.symbols()) {
-    switch (value.value_case()) {
-      case v1::SymbolValue::kNumber:
-        values.emplace(name, value.number());
-        break;
-      case v1::SymbolValue::kText:
-        values.emplace(name, value.text());
-        break;
-      case v1::SymbolValue::kFlag:
-        values.emplace(name, value.flag());
-        break;
-      default:
-        throw Refusal(v1::REASON_BAD_ARGUMENT,
-                      "`symbols` has no value for \"" + name.substr(0, 100) + "\"");
-    }
-  }
-  return values;
 }
 
 /// Keeps what is read.
@@ -88,6 +69,27 @@ DeckReport load_from_root(const std::string& name, const v1::CreateOptions& opti
 }
 
 }  // namespace
+
+SymbolValues symbols_of(const v1::CreateOptions& options) {
+  SymbolValues values;
+  for (const auto& [name, value] : options.symbols()) {
+    switch (value.value_case()) {
+      case v1::SymbolValue::kNumber:
+        values.emplace(name, value.number());
+        break;
+      case v1::SymbolValue::kText:
+        values.emplace(name, value.text());
+        break;
+      case v1::SymbolValue::kFlag:
+        values.emplace(name, value.flag());
+        break;
+      default:
+        throw Refusal(v1::REASON_BAD_ARGUMENT,
+                      "`symbols` has no value for \"" + name.substr(0, 100) + "\"");
+    }
+  }
+  return values;
+}
 
 std::vector<PortAttachment> attachments(const v1::CreateOptions& options) {
   std::vector<PortAttachment> found;
@@ -142,6 +144,18 @@ void DeckUpload::add(const v1::InlineUpload& whole) {
     *message.mutable_chunk() = file;
     add(message, {});
   }
+}
+
+std::uint64_t Bundle::digest() const {
+  std::uint64_t sum = 0;  // of independent terms: pieces may come in any order of files
+  for (const auto& [name, data] : files_) {
+    sum += fnv1a(name + '\0' + std::to_string(fnv1a(data)));
+  }
+  return sum;
+}
+
+std::uint64_t DeckUpload::digest() const {
+  return digest_of("CreateSimulation", header()) + bundle_.digest();
 }
 
 const v1::UploadHeader& DeckUpload::header() const {

@@ -1,6 +1,7 @@
 /// Decks on their way in: bundles in pieces, or names under the model root.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,6 +20,8 @@ class Bundle {
   /// Appends a piece. Throws Refusal for a bad name or an exceeded limit.
   void add(const v1::FileChunk& chunk);
   std::map<std::string, std::string> take() { return std::move(files_); }
+  /// Of names and contents, before they are taken.
+  std::uint64_t digest() const;
 
  private:
   const ServiceLimits& limits_;
@@ -38,6 +41,8 @@ class DeckUpload {
   /// Throws OUT_OF_TURN when none has come.
   const v1::UploadHeader& header() const;
   std::map<std::string, std::string> take_files() { return bundle_.take(); }
+  /// Of header and files, before they are taken.
+  std::uint64_t digest() const;
 
  private:
   MemoryShare header_share_;
@@ -58,6 +63,8 @@ DeckReport load(DeckUpload& upload, const Config& config, const Limits& limits,
                 KeptDeck* kept = nullptr);
 /// The same deck again.
 DeckReport load(KeptDeck deck, const Config& config);
+/// Throws BAD_ARGUMENT for a symbol without a value.
+SymbolValues symbols_of(const v1::CreateOptions& options);
 /// Ports that need equations of their own in the model.
 std::vector<PortAttachment> attachments(const v1::CreateOptions& options);
 

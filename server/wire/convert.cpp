@@ -76,8 +76,8 @@ void to_proto(const std::vector<Diagnostic>& diagnostics, DiagnosticList* out) {
     p->set_severity(to_proto(d.severity));
     p->set_code(d.code);
     p->set_file(utf8(d.file));
-    p->set_line(d.line);
-    p->set_column(d.column);
+    if (d.line > 0) p->set_line(d.line);
+    if (d.column > 0) p->set_column(d.column);
     p->set_length(d.length);
     p->set_message(utf8(d.message));
     p->set_source_line(utf8(d.source_line.substr(0, 2000)));
@@ -89,7 +89,7 @@ void to_proto(const std::vector<Diagnostic>& diagnostics, DiagnosticList* out) {
 void to_proto(const Error& error, v1::SolverFailure* out) {
   out->set_reason(reason_of(error.kind));
   out->set_message(utf8(error.message));
-  out->set_time_s(error.failure.time);
+  out->set_time(error.failure.time);
   out->set_step(error.failure.step);
   out->set_iteration(error.failure.iteration);
   out->mutable_residual_norms()->Assign(error.failure.residual_history.begin(),
@@ -118,9 +118,9 @@ void to_proto(const Model& model, v1::ModelDescription* out) {
   out->set_title(utf8(model.title));
   out->set_model_digest(digest_text(model.digest));
   out->set_unknowns(model.unknowns);
-  out->set_initial_time_s(model.initial_value.initial_time);
-  out->set_final_time_s(model.initial_value.final_time);
-  out->set_step_s(model.initial_value.time_step);
+  out->set_initial_time(model.initial_value.initial_time);
+  out->set_final_time(model.initial_value.final_time);
+  out->set_step_size(model.initial_value.time_step);
 }
 
 int node_count(const Model& model) {

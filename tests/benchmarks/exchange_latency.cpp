@@ -57,7 +57,7 @@ std::string deck(int numbers) {
 // ------------------------------------------------------------------ echoes
 
 void fill_answer(const v1::PeerMessage& in, v1::ServerMessage* out) {
-  *out->mutable_exchange()->mutable_signals() = in.exchange().signals();
+  *out->mutable_exchange()->mutable_signals() = in.exchange().answer().signals();
 }
 
 class Echo final : public v1::Coupling::Service {
@@ -96,7 +96,7 @@ Samples sample(int count, Exchange&& exchange) {
 
 v1::PeerMessage message_of(int numbers) {
   v1::PeerMessage message;
-  message.mutable_exchange()->mutable_signals()->Resize(numbers, 1.0);
+  message.mutable_exchange()->mutable_answer()->mutable_signals()->Resize(numbers, 1.0);
   return message;
 }
 
@@ -224,7 +224,7 @@ Coupled couple_in_process(v1::CouplingMode mode, int numbers, int count) {
   definition->add_output_variables("stream.wide");
   definition->add_input_variables("stream.wide");
   auto simulation = mbcosim::Simulation::create(loaded.model);
-  server::Session session({}, std::move(*simulation),
+  server::Session session({}, {}, std::move(*simulation),
                           {slots, config.limits, metrics, log, memory, lanes, timer},
                           session_options);
   server::Port& port = session.port("loop");
@@ -238,7 +238,7 @@ Coupled couple_in_process(v1::CouplingMode mode, int numbers, int count) {
   request.set_steps(count);
   v1::StepReply reply;
   server::Call call;
-  session.step(request, call, &reply);
+  session.step(request, {"local", server::Role::control}, call, &reply);
   port.detach();
   return {intervals.samples(), 1e6 * reply.solver_seconds() / double(intervals.exchanges())};
 }

@@ -31,9 +31,9 @@ const char* const kDeck =
 class Echo final : public v1::Simulations::Service {
   grpc::Status StepStream(
       grpc::ServerContext*,
-      grpc::ServerReaderWriter<v1::StepReply, v1::StepRequest>* stream) override {
+      grpc::ServerReaderWriter<v1::StepStreamReply, v1::StepRequest>* stream) override {
     v1::StepRequest request;
-    while (stream->Read(&request)) stream->Write(v1::StepReply());
+    while (stream->Read(&request)) stream->Write(v1::StepStreamReply());
     return grpc::Status::OK;
   }
 };
@@ -67,7 +67,7 @@ void exchange(benchmark::State& state, v1::Simulations::Stub& stub, const std::s
   const auto stream = stub.StepStream(&context);
   v1::StepRequest request;
   request.set_simulation(simulation);
-  v1::StepReply reply;
+  v1::StepStreamReply reply;
   for (auto _ : state)
     if (!stream->Write(request) || !stream->Read(&reply)) state.SkipWithError("the stream ended");
   stream->WritesDone();

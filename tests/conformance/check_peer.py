@@ -85,7 +85,7 @@ class Stage(scripted_server.ScriptedServer):
         require(self.heard[0][1].HasField("hello"), "the first message is not `hello`")
         self.hello = self.heard[0][1].hello
         check_hello(self.hello, self.session.name)
-        self.say(pb.ServerMessage(welcome=pb.Welcome(protocol_version=1, layout=self.session.layout(), step_size_s=scripted_server.STEP,
+        self.say(pb.ServerMessage(welcome=pb.Welcome(protocol=scripted_server.PROTOCOL, layout=self.session.layout(), step_size=scripted_server.STEP,
                                                      model_digest=scripted_server.DIGEST)))
         self.quiet("after `welcome`")
 
@@ -97,11 +97,11 @@ class Stage(scripted_server.ScriptedServer):
 
     @property
     def implicit(self):
-        return self.hello.mode in scripted_server.IMPLICIT
+        return self.hello.schedule.mode in scripted_server.IMPLICIT
 
     @property
     def bound(self):
-        timeout = self.hello.peer_timeout.ToMilliseconds() / 1000 if self.hello.HasField("peer_timeout") else 10.0
+        timeout = scripted_server.time_out_of(self.hello)
         return min(timeout, WAIT)
 
     def ask(self, step, iteration, position):
@@ -120,7 +120,7 @@ class Stage(scripted_server.ScriptedServer):
         return answer
 
     def tell(self, kind, step):
-        self.say(pb.ServerMessage(**{kind: pb.StepNotice(step=step, time_s=step * scripted_server.STEP)}))
+        self.say(pb.ServerMessage(**{kind: pb.StepNotice(step=step, time=step * scripted_server.STEP)}))
 
     def finish(self):
         self.say(None)
@@ -130,26 +130,31 @@ def check_hello(hello, simulation):
     require(hello.simulation == simulation, f"`hello` names simulation {hello.simulation!r}")
     require(hello.port == "p", f"`hello` names port {hello.port!r}")
     require(hello.protocol.lowest <= hello.protocol.highest, "the range of versions is empty")
-    require(hello.protocol.lowest <= 1, "the peer does not speak version 1")
-    for field, kind in (("mode", types.CouplingMode), ("rotation_form", types.RotationForm), ("frame", types.PortFrame),
-                        ("input_hold", types.InputHold), ("policy", types.PeerPolicy), ("acceleration", types.Acceleration),
-                        ("tangent", pb.TangentForm)):
-        require(getattr(hello, field) in kind.values(), f"`{field}` has a value that the protocol does not know")
-    require(hello.every >= 0 and 0 <= hello.relaxation < 2 and hello.interface_tolerance >= 0 and hello.maximum_passes >= 0,
-            "a number in `hello` is out of its range")
-    require(hello.length_unit in ("", "m") and hello.force_unit in ("", "N") and hello.angle_unit in ("", "rad"), "other units than SI")
+    version = scripted_server.VERSION
+    require(hello.protocol.lowest <= version <= hello.protocol.highest, f"the peer does not speak version {version}")
+    form, schedule, iteration, presence = hello.form, hello.schedule, hello.iteration, hello.presence
+    for group, field, kind in ((schedule, "mode", types.CouplingMode), (form, "rotation_form", types.RotationForm),
+                               (form, "frame", types.PortFrame), (schedule, "input_hold", types.InputHold),
+                               (presence, "policy", types.PeerPolicy), (iteration, "acceleration", types.Acceleration),
+                               (iteration, "tangent", pb.TangentForm)):
+        require(getattr(group, field) in kind.values(), f"`{field}` has a value that the protocol does not know")
+    for group, field, good in ((schedule, "every", lambda n: n >= 1), (iteration, "relaxation", lambda x: 0 < x < 2),
+                               (iteration, "tolerance", lambda x: x > 0), (iteration, "maximum_passes", lambda n: n >= 1)):
+        require(not group.HasField(field) or good(getattr(group, field)), f"`{field}` is out of its range")
 
 
-def check_answer(answer, hello):
-    if answer.failure:
+def check_answer(exchange, hello):
+    require(exchange.WhichOneof("content"), "an exchange with neither `answer` nor `failure` nor `reject`")
+    if not exchange.HasField("answer"):
         return
-    require(len(answer.forces_n) == 3 * NODES, f"{len(answer.forces_n)} numbers in `forces_n` for {NODES} nodes")
-    require(len(answer.moments_nm) in (0, 3 * NODES), f"{len(answer.moments_nm)} numbers in `moments_nm` for {NODES} nodes")
-    require(not answer.signals and not answer.positions_m, "numbers that belong to other kinds of ports")
-    require(not answer.reference_force_n and not answer.reference_moment_nm, "loads on a reference node that the port does not have")
-    require(all(map(math.isfinite, [*answer.forces_n, *answer.moments_nm])), "a number that is not finite")
+    answer = exchange.answer
+    require(len(answer.forces) == 3 * NODES, f"{len(answer.forces)} numbers in `forces` for {NODES} nodes")
+    require(len(answer.moments) in (0, 3 * NODES), f"{len(answer.moments)} numbers in `moments` for {NODES} nodes")
+    require(not answer.signals and not answer.positions, "numbers that belong to other kinds of ports")
+    require(not answer.reference_force and not answer.reference_moment, "loads on a reference node that the port does not have")
+    require(all(map(math.isfinite, [*answer.forces, *answer.moments])), "a number that is not finite")
     if answer.HasField("tangent"):
-        require(hello.tangent > pb.TANGENT_FORM_NONE, "a tangent that `hello` did not announce")
+        require(hello.iteration.tangent > pb.TANGENT_FORM_NONE, "a tangent that `hello` did not announce")
         size = 36 * NODES if answer.tangent.block_diagonal else 36 * NODES * NODES
         sizes = {len(answer.tangent.stiffness), len(answer.tangent.damping)}
         require(sizes <= {0, size}, f"the tangent has {sorted(sizes)} numbers, expected {size}")
@@ -179,7 +184,7 @@ def play_rejection(stage):
     stage.quiet("after `rejected`")
     again = [stage.ask(2, iteration, 0.2 + 0.1 * iteration) for iteration in (1, 2)]
     for before, after in zip(first, again):
-        require(list(before.forces_n) == list(after.forces_n), "after `rejected` the same motion gets another answer")
+        require(list(before.answer.forces) == list(after.answer.forces), "after `rejected` the same motion gets another answer")
     stage.tell("accepted", 2)
     return None
 

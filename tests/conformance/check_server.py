@@ -18,6 +18,8 @@ from mbcosim.v1 import common_pb2, coupling_pb2 as pb, coupling_types_pb2 as typ
 from wires import END, open_wire
 
 STEP = 1e-3  # [s]
+VERSION = 2
+PROTOCOL = common_pb2.VersionRange(lowest=VERSION, highest=VERSION)
 FORCE = 2.0  # [N] on a unit mass
 DECK = f"""begin: data; problem: initial value; end: data;
 begin: initial value; initial time: 0.; final time: 100.; time step: {STEP}; method: ms, 0.6; tolerance: 1.e-9;
@@ -64,7 +66,7 @@ class Bench:
         for wire in self._wires:
             wire.close()
         try:
-            self.stub.DeleteSimulation(simulations_pb2.DeleteSimulationRequest(name=self.info.name), timeout=WAIT)
+            self.stub.DeleteSimulation(simulations_pb2.DeleteSimulationRequest(simulation=self.info.name), timeout=WAIT)
         except grpc.RpcError:
             pass  # a wrong server may not delete
         self._channel.close()
@@ -74,17 +76,20 @@ class Bench:
         return self._wires[-1]
 
     def hello(self, **fields):
-        message = pb.Hello(simulation=self.info.name, port="p", length_unit="m")
-        message.protocol.lowest = message.protocol.highest = 1
+        message = pb.Hello(protocol=PROTOCOL, simulation=self.info.name, port="p")
         for name, value in fields.items():
             if name == "timeout":
-                message.peer_timeout.FromMilliseconds(int(1000 * value))
+                message.presence.peer_timeout.FromMilliseconds(int(1000 * value))
             elif name == "node_labels":
-                message.node_labels.extend(value)
+                message.expected.node_labels.extend(value)
             elif name == "versions":
                 message.protocol.lowest, message.protocol.highest = value
-            else:
+            elif name in ("simulation", "port"):
                 setattr(message, name, value)
+            else:
+                group = next(g for g in (message.expected, message.form, message.schedule, message.iteration, message.presence)
+                             if name in g.DESCRIPTOR.fields_by_name)
+                setattr(group, name, value)
         return pb.PeerMessage(hello=message)
 
     def attach(self, **fields):
@@ -148,7 +153,7 @@ def exchange(wire, what="exchange"):
 
 def answer(wire, index, forces=None, **fields):
     forces = [0.0] * 3 * NODES if forces is None else forces
-    wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=index, forces_n=forces, **fields)))
+    wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=index, answer=pb.PeerAnswer(forces=forces, **fields))))
 
 
 def silent(wire, seconds=0.1):
@@ -157,10 +162,10 @@ def silent(wire, seconds=0.1):
 
 
 def check_arrays(values, rotation_size=9):
-    sizes = [len(values.positions_m), len(values.rotations), len(values.velocities_m_s), len(values.angular_velocities_rad_s),
-             len(values.accelerations_m_s2), len(values.signals)]
+    sizes = [len(values.positions), len(values.rotations), len(values.velocities), len(values.angular_velocities),
+             len(values.accelerations), len(values.signals)]
     require(sizes == [3 * NODES, rotation_size * NODES, 3 * NODES, 3 * NODES, 0, 0], f"lengths of the arrays: {sizes}")
-    require(all(math.isfinite(x) for field in (values.positions_m, values.rotations, values.velocities_m_s) for x in field),
+    require(all(math.isfinite(x) for field in (values.positions, values.rotations, values.velocities) for x in field),
             "numbers that are not finite")
 
 
@@ -168,12 +173,13 @@ def check_arrays(values, rotation_size=9):
 
 def handshake(bench):
     _, welcome = bench.attach(node_labels=[1, 2])
-    require(welcome.protocol_version == 1, f"version {welcome.protocol_version} was not offered")
+    chosen = welcome.protocol
+    require(chosen.lowest == chosen.highest == VERSION, f"versions {chosen.lowest} to {chosen.highest} are no choice of those offered")
     require(list(welcome.layout.node_labels) == [1, 2], f"labels {list(welcome.layout.node_labels)}, the port has [1, 2]")
     require(welcome.layout.kind == types.PORT_KIND_STRUCTURAL, "the layout has another kind")
     require(len(welcome.model_digest) == 16, f"digest {welcome.model_digest!r}")
-    require(math.isclose(welcome.step_size_s, STEP) and welcome.step == 0 and welcome.time_s == 0,
-            f"step {welcome.step}, time {welcome.time_s}, step size {welcome.step_size_s}")
+    require(math.isclose(welcome.step_size, STEP) and welcome.step == 0 and welcome.time == 0,
+            f"step {welcome.step}, time {welcome.time}, step size {welcome.step_size}")
 
 
 def loose(bench):
@@ -183,15 +189,15 @@ def loose(bench):
         values = exchange(wire)
         require(values.index == k + 1, f"index {values.index} of exchange {k + 1}")
         require(values.step == k and values.iteration == 0, f"step {values.step}, iteration {values.iteration} before step {k + 1}")
-        require(math.isclose(values.time_s, k * STEP, abs_tol=1e-12), f"time {values.time_s} at step {k}")
-        require(math.isclose(values.target_time_s, (k + 1) * STEP, rel_tol=1e-9), f"target time {values.target_time_s} at step {k}")
+        require(math.isclose(values.time, k * STEP, abs_tol=1e-12), f"time {values.time} at step {k}")
+        require(math.isclose(values.target_time, (k + 1) * STEP, rel_tol=1e-9), f"target time {values.target_time} at step {k}")
         check_arrays(values)
         for R in np.reshape(values.rotations, (NODES, 3, 3)):
             require(np.allclose(R @ R.T, np.eye(3), atol=1e-9) and np.linalg.det(R) > 0, "a rotation matrix is none")
         if k > 1:  # the load starts within its first step, and the integrator remembers it for some
-            gained = values.velocities_m_s[3] - velocity
+            gained = values.velocities[3] - velocity
             require(math.isclose(gained, FORCE * STEP, rel_tol=0.05), f"the force changed the velocity by {gained}")
-        velocity = values.velocities_m_s[3]
+        velocity = values.velocities[3]
         answer(wire, values.index, [0, 0, 0, FORCE, 0, 0])
     require(stepping.result("ACCEPTED").step == 5, "five steps were asked for")
     silent(wire)
@@ -207,7 +213,7 @@ def orientation(bench):
     answer(wire, second.index)
     stepping.result("ACCEPTED")
     R, later = (np.reshape(values.rotations, (NODES, 3, 3)) for values in (first, second))
-    w = np.reshape(first.angular_velocities_rad_s, (NODES, 3))
+    w = np.reshape(first.angular_velocities, (NODES, 3))
     for i in range(NODES):
         spin = (later[i] @ R[i].T - np.eye(3)) / STEP
         require(np.allclose([spin[2, 1], spin[0, 2], spin[1, 0]], w[i], atol=0.1), "the angular velocity does not turn the matrix")
@@ -261,7 +267,7 @@ def implicit(mode):
                 require(iteration < 50, "a constant load does not converge")
             require(iteration > 0, f"step {k} was accepted without an exchange")
             notice = message.accepted
-            require(notice.step == k and math.isclose(notice.time_s, k * STEP, rel_tol=1e-9), f"`accepted` of step {k}: {notice}")
+            require(notice.step == k and math.isclose(notice.time, k * STEP, rel_tol=1e-9), f"`accepted` of step {k}: {notice}")
         stepping.result("ACCEPTED")
         silent(wire)
     return check
@@ -270,9 +276,9 @@ def implicit(mode):
 def rejected(bench):
     wire, _ = bench.attach(mode=types.COUPLING_MODE_TIGHT)
     stepping = bench.step()
-    answer(wire, exchange(wire).index, [], failure="no wind")
+    wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=exchange(wire).index, failure="no wind")))
     notice = exchange(wire, "rejected")
-    require(notice.step == 0 and notice.time_s == 0, f"`rejected` names step {notice.step} to go back to")
+    require(notice.step == 0 and notice.time == 0, f"`rejected` names step {notice.step} to go back to")
     reply = stepping.result("PEER_LOST")
     require("no wind" in reply.failure.message and reply.step == 0, f"the failure: {reply.failure.message}, step {reply.step}")
 
@@ -284,15 +290,15 @@ def refused_length(mode):
         explicit = mode == types.COUPLING_MODE_LOOSE
         stepping = bench.step()
         wire.send(pb.PeerMessage(exchange=pb.PeerExchange(
-            index=exchange(wire).index, reject=pb.Rejection(preferred_step_size_s=STEP / 4, text="too long"))))
+            index=exchange(wire).index, reject=pb.Rejection(preferred_step_size=STEP / 4, text="too long"))))
         reply = stepping.result("REJECTED_BY_PEER")
-        require(reply.preferred_step_size_s == STEP / 4 and reply.step == 0, f"preferred {reply.preferred_step_size_s}, step {reply.step}")
+        require(reply.preferred_step_size == STEP / 4 and reply.step == 0, f"preferred {reply.preferred_step_size}, step {reply.step}")
         require("too long" in reply.failure.message, f"the failure: {reply.failure.message}")
         if not explicit:
             require(exchange(wire, "rejected").step == 0, "`rejected` names another step")
-        stepping = bench.step(step_size_s=STEP / 4)
+        stepping = bench.step(step_size=STEP / 4)
         values = exchange(wire)
-        require(math.isclose(values.target_time_s, STEP / 4, rel_tol=1e-9), f"target time {values.target_time_s} of the shorter step")
+        require(math.isclose(values.target_time, STEP / 4, rel_tol=1e-9), f"target time {values.target_time} of the shorter step")
         answer(wire, values.index)
         while not explicit:  # until it is accepted
             message = wire.receive(WAIT)
@@ -300,7 +306,7 @@ def refused_length(mode):
             if message.WhichOneof("content") == "accepted":
                 break
             answer(wire, message.exchange.index)
-        require(math.isclose(stepping.result("ACCEPTED").time_s, STEP / 4, rel_tol=1e-9), "the step has another length")
+        require(math.isclose(stepping.result("ACCEPTED").time, STEP / 4, rel_tol=1e-9), "the step has another length")
     return check
 
 
@@ -340,13 +346,14 @@ def hello_twice(bench):
 
 def versions(bench):
     bench.refused(bench.hello(versions=(7, 9)), ["VERSION_MISMATCH"], grpc.StatusCode.FAILED_PRECONDITION)
+    bench.refused(bench.hello(versions=(1, 1)), ["VERSION_MISMATCH"], grpc.StatusCode.FAILED_PRECONDITION)
     bench.attach(versions=(1, 9))
 
 
 def mismatches(bench):
-    status = bench.refused(bench.hello(model_digest="0" * 16, length_unit="ft", node_labels=[2, 1], frame=types.PORT_FRAME_REFERENCE),
+    status = bench.refused(bench.hello(model_digest="0" * 16, input_size=7, node_labels=[2, 1], frame=types.PORT_FRAME_REFERENCE),
                            ["PORT_MISMATCH"], grpc.StatusCode.FAILED_PRECONDITION)
-    missing = {"model_digest", "length_unit", "node_labels", "frame"} - set(status.metadata)
+    missing = {"model_digest", "input_size", "node_labels", "frame"} - set(status.metadata)
     require(not missing, f"not told in the refusal: {sorted(missing)}")
 
 
@@ -385,7 +392,7 @@ CHECKS = {
     "window peer rejects": refused_length(types.COUPLING_MODE_WINDOW),
     "heartbeats": heartbeats, "too few forces": wrong_answer(*BAD, forces=[1.0, 2.0]),
     "not a number": wrong_answer(*BAD, forces=[math.nan] * 3 * NODES),
-    "moments of another length": wrong_answer(*BAD, moments_nm=[1.0]), "signals on nodes": wrong_answer(*BAD, signals=[1.0]),
+    "moments of another length": wrong_answer(*BAD, moments=[1.0]), "signals on nodes": wrong_answer(*BAD, signals=[1.0]),
     "answer in advance": wrong_answer(*TURN, offset=1), "answer without a number": wrong_answer(*TURN, offset=-1),
     "answer twice": wrong_answer(*TURN, repeat=2), "first message": not_hello_first, "hello twice": hello_twice,
     "versions": versions, "mismatches": mismatches, "unknown names": names, "port taken": port_taken, "late peer": late_peer,

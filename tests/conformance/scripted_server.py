@@ -13,6 +13,8 @@ import numpy as np
 
 from mbcosim.v1 import common_pb2, coupling_pb2 as pb, coupling_pb2_grpc, coupling_types_pb2 as types, simulations_pb2, simulations_pb2_grpc
 
+VERSION = 2
+PROTOCOL = common_pb2.VersionRange(lowest=VERSION, highest=VERSION)
 STEP = 1e-3
 ITERATIONS = 2
 DIGEST = "0123456789abcdef"
@@ -50,6 +52,12 @@ class Rejected(Exception):
     """By the peer: the length that it prefers, and its words."""
 
 
+def time_out_of(hello):
+    """Longest wait for an answer of this peer [s]."""
+    presence = hello.presence
+    return presence.peer_timeout.ToMilliseconds() / 1000 if presence.HasField("peer_timeout") else 10.0
+
+
 class Attached:
     """The server's end of one peer."""
 
@@ -61,11 +69,11 @@ class Attached:
 
     @property
     def mode(self):
-        return self.hello.mode or types.COUPLING_MODE_LOOSE
+        return self.hello.schedule.mode or types.COUPLING_MODE_LOOSE
 
     @property
     def timeout(self):
-        return self.hello.peer_timeout.ToMilliseconds() / 1000 if self.hello.HasField("peer_timeout") else 10.0
+        return time_out_of(self.hello)
 
     def end(self, refusal=None):
         with self.changed:
@@ -94,20 +102,20 @@ class Session:
         peer.index += 2 if fault == "index skips" and peer.index else 1
         peer.answered, peer.answer = False, None
         out = pb.ServerExchange(index=peer.index - (fault == "index from zero"), step=step + (fault == "step of the future"),
-                                time_s=self.t + (self.h if iteration else 0), target_time_s=self.t + self.h, iteration=iteration,
+                                time=self.t + (self.h if iteration else 0), target_time=self.t + self.h, iteration=iteration,
                                 target_estimated=peer.mode == types.COUPLING_MODE_STAGGERED and fault != "estimate untold")
         if fault == "target time of the past":
-            out.target_time_s = out.time_s
+            out.target_time = out.time
         if fault == "iteration stands still":
             out.iteration = min(iteration, 1)
         x, v = (self.x + self.h * self.v, self.v + self.h * self.forces) if iteration else (self.x, self.v)
-        out.positions_m.extend(x.ravel()[:5 if fault == "an array too short" else 6])
-        out.velocities_m_s.extend(v.ravel())
-        out.angular_velocities_rad_s.extend([*SPIN, 0, 0, 0])
+        out.positions.extend(x.ravel()[:5 if fault == "an array too short" else 6])
+        out.velocities.extend(v.ravel())
+        out.angular_velocities.extend([*SPIN, 0, 0, 0])
         if fault == "accelerations unasked":
-            out.accelerations_m_s2.extend([0.0] * 6)
-        angle = SPIN * out.time_s
-        if peer.hello.rotation_form == types.ROTATION_FORM_QUATERNION:
+            out.accelerations.extend([0.0] * 6)
+        angle = SPIN * out.time
+        if peer.hello.form.rotation_form == types.ROTATION_FORM_QUATERNION:
             half = np.linalg.norm(angle) / 2
             quaternion = np.array([math.cos(half), *(angle / 2 * np.sinc(half / math.pi))])
             out.rotations.extend([*(-quaternion if fault == "negative quaternion" else quaternion), 1, 0, 0, 0])
@@ -120,7 +128,7 @@ class Session:
 
     def notice(self, kind):
         if self.fault != f"no notice of {'acceptance' if kind == 'accepted' else 'rejection'}":
-            self.peer.out.put(pb.ServerMessage(**{kind: pb.StepNotice(step=self.k, time_s=self.t)}))
+            self.peer.out.put(pb.ServerMessage(**{kind: pb.StepNotice(step=self.k, time=self.t)}))
 
     def deliver(self, peer, message):
         """A message of the peer after `hello`. Raises Refused."""
@@ -131,15 +139,17 @@ class Session:
             return
         if not message.HasField("exchange"):
             raise Refused(grpc.StatusCode.FAILED_PRECONDITION, "OUT_OF_TURN", "only `exchange` and `heartbeat` after `hello`")
-        answer = message.exchange
+        answer, values = message.exchange, message.exchange.answer
         in_advance = (answer.index < 1 or answer.index > peer.index) and fault not in ("answers in advance are taken", "index from zero")
         twice = answer.index == peer.index and peer.answered and peer.answer is not None and fault != "answers are taken twice"
         if in_advance or twice:
             raise Refused(grpc.StatusCode.FAILED_PRECONDITION, "OUT_OF_TURN", f"answer {answer.index} of {peer.index}")
-        lengths = [len(answer.forces_n) in (6, 6 * bool(not answer.failure and not answer.HasField("reject"))), len(answer.moments_nm) in (0, 6), not answer.signals]
+        if answer.WhichOneof("content") is None:
+            raise Refused(grpc.StatusCode.INVALID_ARGUMENT, "BAD_ARGUMENT", "`answer`, `failure` or `reject` is wanted")
+        lengths = [not answer.HasField("answer") or len(values.forces) == 6, len(values.moments) in (0, 6), not values.signals]
         if not all(lengths) and fault != "wrong lengths are taken":
             raise Refused(grpc.StatusCode.INVALID_ARGUMENT, "BAD_ARGUMENT", "an array of the wrong length")
-        if not all(map(math.isfinite, answer.forces_n)) and fault != "not a number is taken":
+        if not all(map(math.isfinite, values.forces)) and fault != "not a number is taken":
             raise Refused(grpc.StatusCode.INVALID_ARGUMENT, "BAD_ARGUMENT", "a number that is not finite")
         with peer.changed:
             if answer.index < peer.index and fault != "answers in advance are taken":
@@ -156,11 +166,11 @@ class Session:
             if not peer.answered:
                 return "the peer is gone" if peer.gone else "the peer did not answer in time"
             if peer.answer.HasField("reject") and self.fault != "rejections are ignored":
-                raise Rejected(peer.answer.reject.preferred_step_size_s, peer.answer.reject.text)
-            if peer.answer.failure:
+                raise Rejected(peer.answer.reject.preferred_step_size, peer.answer.reject.text)
+            if peer.answer.HasField("failure"):
                 return "the peer failed: " + peer.answer.failure
             forces = np.zeros(6)
-            forces[:len(peer.answer.forces_n)] = peer.answer.forces_n[:6]
+            forces[:len(peer.answer.answer.forces)] = peer.answer.answer.forces[:6]
             if self.fault != "forces are ignored":
                 self.forces = np.nan_to_num(forces).reshape(2, 3)
         return None
@@ -229,7 +239,7 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
     def _abort(self, context, refusal):
         status = common_pb2.ErrorStatus(code=refusal.code.value[0], message=str(refusal))
         if self.fault != "refuses without a reason":
-            info = common_pb2.ErrorInfo(reason=refusal.reason, domain="mbcosim", metadata=refusal.metadata)
+            info = common_pb2.ErrorInfo(reason=refusal.reason, domain="mbcosim.dev", metadata=refusal.metadata)
             status.details.add(type_url="type.googleapis.com/google.rpc.ErrorInfo", value=info.SerializeToString())
         context.set_trailing_metadata((("grpc-status-details-bin", status.SerializeToString()),))
         context.abort(refusal.code, str(refusal))
@@ -243,10 +253,10 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
     # ------------------------------------------------------------ Simulations
 
     def _info(self, session):
-        return simulations_pb2.SimulationInfo(name=session.name, model_digest=DIGEST, step=session.k, time_s=session.t)
+        return simulations_pb2.SimulationInfo(name=session.name, model_digest=DIGEST, step=session.k, time=session.t)
 
     def GetServerInfo(self, request, context):
-        return simulations_pb2.ServerInfo(version="scripted")
+        return simulations_pb2.GetServerInfoReply(version="scripted", protocol=PROTOCOL)
 
     def CreateSimulation(self, requests, context):
         for _ in requests:
@@ -254,13 +264,14 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
         return simulations_pb2.CreateSimulationReply(simulation=self._info(self.new_session()))
 
     def GetSimulation(self, request, context):
-        return self._info(self.sessions[request.name])
+        return simulations_pb2.GetSimulationReply(simulation=self._info(self.sessions[request.simulation]))
 
     def DescribeSimulation(self, request, context):
-        return simulations_pb2.ModelDescription(ports=[self.sessions[request.name].layout()])
+        model = simulations_pb2.ModelDescription(ports=[self.sessions[request.simulation].layout()])
+        return simulations_pb2.DescribeSimulationReply(model=model)
 
     def DeleteSimulation(self, request, context):
-        session = self.sessions.pop(request.name)
+        session = self.sessions.pop(request.simulation)
         if session.peer:
             session.peer.end()
         return simulations_pb2.DeleteSimulationReply()
@@ -270,13 +281,13 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
         reply = simulations_pb2.StepReply(outcome=simulations_pb2.STEP_OUTCOME_ACCEPTED)
         with session.lock:
             for _ in range(request.steps):
-                own = request.HasField("step_size_s") and self.fault != "lengths are ignored"
+                own = request.HasField("step_size") and self.fault != "lengths are ignored"
                 try:
-                    why = session.step(request.step_size_s if own else STEP)
+                    why = session.step(request.step_size if own else STEP)
                 except Rejected as rejected:
                     reply.outcome = simulations_pb2.STEP_OUTCOME_REJECTED_BY_PEER
                     if self.fault != "preference untold":
-                        reply.preferred_step_size_s = rejected.args[0]
+                        reply.preferred_step_size = rejected.args[0]
                     reply.failure.message, reply.failure.reason = rejected.args[1], common_pb2.REASON_REJECTED_BY_PEER
                     break
                 if why:
@@ -284,23 +295,23 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
                     reply.failure.message, reply.failure.reason = why, common_pb2.REASON_PEER_LOST
                     break
                 reply.steps_done += 1
-        reply.step, reply.time_s = session.k, session.t
+        reply.step, reply.time = session.k, session.t
         return reply
 
     # ------------------------------------------------------------ Coupling
 
     def _welcome(self, hello):
         lowest, highest = hello.protocol.lowest, hello.protocol.highest
-        if (lowest, highest) != (0, 0) and not lowest <= 1 <= highest and self.fault != "any version is spoken":
-            raise Refused(grpc.StatusCode.FAILED_PRECONDITION, "VERSION_MISMATCH", "version 1 is spoken")
+        if (lowest, highest) != (0, 0) and not lowest <= VERSION <= highest and self.fault != "any version is spoken":
+            raise Refused(grpc.StatusCode.FAILED_PRECONDITION, "VERSION_MISMATCH", f"version {VERSION} is spoken")
         wrong = {}
-        if hello.model_digest not in ("", DIGEST):
+        if hello.expected.model_digest not in ("", DIGEST):
             wrong["model_digest"] = "another model"
-        if hello.length_unit not in ("", "m"):
-            wrong["length_unit"] = "only m"
-        if list(hello.node_labels) not in ([], [1, 2]):
+        if hello.expected.HasField("input_size") and hello.expected.input_size:
+            wrong["input_size"] = "no signals"
+        if list(hello.expected.node_labels) not in ([], [1, 2]):
             wrong["node_labels"] = "1, 2"
-        if hello.frame == types.PORT_FRAME_REFERENCE:
+        if hello.form.frame == types.PORT_FRAME_REFERENCE:
             wrong["frame"] = "no reference node"
         if wrong:
             told = dict([wrong.popitem()]) if self.fault == "first mismatch only" else wrong
@@ -328,8 +339,8 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
             self._abort(context, refusal)
         peer = session.peer
         threading.Thread(target=self._read, args=(session, peer, requests), daemon=True).start()
-        yield pb.ServerMessage(welcome=pb.Welcome(protocol_version=1, layout=session.layout(), model_digest=DIGEST, step_size_s=STEP,
-                                                  step=session.k, time_s=session.t))
+        yield pb.ServerMessage(welcome=pb.Welcome(protocol=PROTOCOL, layout=session.layout(), model_digest=DIGEST, step_size=STEP,
+                                                  step=session.k, time=session.t))
         while True:
             message = peer.out.get()
             if message is None:

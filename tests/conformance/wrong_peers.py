@@ -20,39 +20,41 @@ FAULTS = [
 
 
 def hello(simulation, port, fault):
-    message = pb.Hello(simulation=simulation, port="wing" if fault == "another port" else port, mode=types.COUPLING_MODE_TIGHT)
-    message.protocol.lowest, message.protocol.highest = (2, 1) if fault == "versions turned round" else (1, 1)
-    message.peer_timeout.FromMilliseconds(1000)
+    message = pb.Hello(simulation=simulation, port="wing" if fault == "another port" else port)
+    message.protocol.lowest, message.protocol.highest = (3, 2) if fault == "versions turned round" else (2, 2)
+    message.schedule.mode = types.COUPLING_MODE_TIGHT
+    message.presence.peer_timeout.FromMilliseconds(1000)
     if fault == "unknown mode":
-        message.mode = 77
+        message.schedule.mode = 77
     if fault == "negative tolerance":
-        message.interface_tolerance = -1.0
+        message.iteration.tolerance = -1.0
     if fault == "tangent of another size":
-        message.tangent = pb.TANGENT_FORM_DENSE
+        message.iteration.tangent = pb.TANGENT_FORM_DENSE
     return pb.PeerMessage(hello=message)
 
 
 def answer(exchange, calls, fault):
     """A spring on each point."""
-    out = pb.PeerExchange(index=exchange.index, forces_n=[-100.0 * x for x in exchange.positions_m])
-    out.moments_nm.extend([0.0] * len(exchange.positions_m))
+    whole = pb.PeerExchange(index=exchange.index, answer=pb.PeerAnswer(forces=[-100.0 * x for x in exchange.positions]))
+    out = whole.answer
+    out.moments.extend([0.0] * len(exchange.positions))
     if fault == "another index":
-        out.index += 1
+        whole.index += 1
     if fault == "too few forces":
-        del out.forces_n[-1]
+        del out.forces[-1]
     if fault == "moments of another length":
-        del out.moments_nm[-1]
+        del out.moments[-1]
     if fault == "signals on nodes":
         out.signals.append(1.0)
     if fault == "not a number":
-        out.forces_n[0] = math.nan
+        out.forces[0] = math.nan
     if fault == "does not go back":
-        out.forces_n[0] += calls
+        out.forces[0] += calls
     if fault == "reference loads unasked":
-        out.reference_force_n.extend([0.0] * 3)
+        out.reference_force.extend([0.0] * 3)
     if fault == "tangent of another size":
         out.tangent.stiffness.extend([0.0] * 7)
-    return pb.PeerMessage(exchange=out)
+    return pb.PeerMessage(exchange=whole)
 
 
 def run(address, simulation, port, fault=None):
@@ -69,9 +71,9 @@ def run(address, simulation, port, fault=None):
             break
         kind = message.WhichOneof("content")
         if kind == "welcome" and fault == "answers in advance":
-            wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=1, forces_n=[0.0] * 6)))
+            wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=1, answer=pb.PeerAnswer(forces=[0.0] * 6))))
         if kind in ("accepted", "rejected") and fault == "answers notices":
-            wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=calls, forces_n=[0.0] * 6)))
+            wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=calls, answer=pb.PeerAnswer(forces=[0.0] * 6))))
         if kind != "exchange" or fault == "does not answer" and calls > 1:
             continue
         calls += 1

@@ -91,8 +91,8 @@ class Attacker:
                         fuzzer.learn(field, name)
                     snapshot = self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
                     if snapshot:
-                        fuzzer.learn("snapshot", snapshot.name)
-                        fuzzer.learn("name", snapshot.name)
+                        fuzzer.learn("snapshot", snapshot.snapshot.name)
+                        fuzzer.learn("name", snapshot.snapshot.name)
                 fuzzer.learn("port", "p")
             service, method = self.random.choice(methods)
             self.send(service, method, fuzzer, get_class)
@@ -173,7 +173,7 @@ class Attacker:
             stop.set()
             self.codes["CANCELLED"] += 1
             if self.random.random() < 0.02:
-                self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(name=name))
+                self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))
                 name = None
 
     def race(self):
@@ -196,14 +196,15 @@ class Attacker:
                     if forked:
                         names.append(forked.simulation.name)
                 elif what == 2:
-                    self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(name=name))
+                    self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))
                 elif what == 3:
                     saved = self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
                     if saved:
-                        snapshots.append(saved.name)
+                        snapshots.append((name, saved.snapshot.name))
                         del snapshots[:-10]
                 elif what == 4 and snapshots:
-                    self.call(self.stub.RestoreSnapshot, pb.RestoreSnapshotRequest(name=rng.choice(snapshots)))
+                    chosen = rng.choice(snapshots)
+                    self.call(self.stub.RestoreSnapshot, pb.RestoreSnapshotRequest(simulation=chosen[0], snapshot=chosen[1]))
                 else:
                     self.call(self.stub.Step, pb.StepRequest(simulation=name, steps=rng.choice([1, 50])))
 

@@ -40,7 +40,7 @@ ARROWS = {
     "server/results": {"output", "threads", "wire", "mbcosim"},
     "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "durable", "results", "rpc", "threads", "wire", "mbcosim",
                        "shared_memory"},
-    "server/client": {"mbcosim", "shared_memory"},
+    "server/client": {"mbcosim", "shared_memory", "wire"},
     "server/shared_memory": set(),
     "server/http": {"service", "rpc", "wire", "mbcosim"},
     "server/view": {"client"},

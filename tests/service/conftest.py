@@ -8,6 +8,7 @@ import time
 import pytest
 
 import mbcosim
+from relay import BlackHole
 
 BIN = os.environ.get("MBCOSIM_BIN", os.path.join(os.path.dirname(__file__), "..", "..", "build", "bin"))
 MODELS = os.path.join(os.path.dirname(__file__), "..", "..", "client_examples", "models")
@@ -20,7 +21,7 @@ class Daemon:
     """A daemon on a socket of its own. Ends with SIGTERM and must then exit with 0."""
 
     def __init__(self, folder, *options):
-        self.address = f"unix:{folder}/mbcosim.sock"
+        self.address, self.killed = f"unix:{folder}/mbcosim.sock", False
         self.log_path = os.path.join(folder, "log")
         self._log = open(self.log_path, "ab")
         self._output_path = os.path.join(folder, "output")
@@ -48,12 +49,18 @@ class Daemon:
         with open(self.log_path, errors="replace") as file:
             return file.read()
 
+    def kill(self):
+        """SIGKILL."""
+        self.process.kill()
+        self.process.wait(30 * TIME_FACTOR)
+        self.killed = True
+
     def stop(self):
         if self.alive():
             self.process.send_signal(signal.SIGTERM)
         code = self.process.wait(30 * TIME_FACTOR)
         self._log.close()
-        assert code == 0, f"the daemon ended with {code}:\n{self.log()[-4000:]}"
+        assert code == 0 or self.killed, f"the daemon ended with {code}:\n{self.log()[-4000:]}"
 
 
 @pytest.fixture
@@ -113,6 +120,22 @@ def stop(pid):
 
     os.kill(pid, signal.SIGSTOP)
     wait_for(lambda: all(state(task) == "T" for task in os.listdir(f"/proc/{pid}/task")))
+
+
+@pytest.fixture(params=["stopped", "black hole", "killed"])
+def falls_silent(request, tmp_path, start_daemon):
+    """(address, function after which the server says nothing any more)"""
+    daemon = start_daemon()
+    if request.param == "stopped":
+        yield daemon.address, lambda: stop(daemon.process.pid)
+        os.kill(daemon.process.pid, signal.SIGCONT)
+        return
+    if request.param == "killed":
+        yield daemon.address, daemon.kill
+        return
+    hole = BlackHole(str(tmp_path), daemon.address)
+    yield hole.address, hole.fall_silent
+    hole.close()
 
 
 def redone_alike(simulation, before, steps, look):

@@ -54,7 +54,7 @@ class TwoSessions : public testing::Test {
     request.set_steps(steps);
     v1::StepReply reply;
     Call call;
-    session.step(request, call, &reply);
+    session.step(request, {"local", Role::control}, call, &reply);
     return reply;
   }
   static v1::Reason refusal_of_step(Session& session) {
@@ -74,8 +74,8 @@ class TwoSessions : public testing::Test {
   Lanes lanes_{1, 1};
   Timer timer_;
   Session::Shared shared_{slots_, limits_, metrics_, log_, memory_, lanes_, timer_};
-  Session mistaken_{named("simulations/a"), simulation_that_fails_at(.25), shared_};
-  Session other_{named("simulations/b"), simulation_that_fails_at(1e9), shared_};
+  Session mistaken_{named("simulations/a"), {}, simulation_that_fails_at(.25), shared_};
+  Session other_{named("simulations/b"), {}, simulation_that_fails_at(1e9), shared_};
 };
 
 TEST_F(TwoSessions, AnInternalErrorFailsOneSessionAndNoOther) {

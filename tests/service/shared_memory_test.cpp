@@ -35,7 +35,8 @@ struct Pair {
 v1::PeerMessage message_of(int numbers, std::int64_t index) {
   v1::PeerMessage message;
   message.mutable_exchange()->set_index(index);
-  for (int i = 0; i < numbers; ++i) message.mutable_exchange()->add_signals(i + double(index));
+  for (int i = 0; i < numbers; ++i)
+    message.mutable_exchange()->mutable_answer()->add_signals(i + double(index));
   return message;
 }
 
@@ -55,9 +56,9 @@ TEST(SharedMemory, MessagesOfAllSizesArriveInOrder) {
     for (std::size_t k = 0; k < sizes.size(); ++k) {
       ASSERT_EQ(pair.server->receive(&message, in(milliseconds(10000))), Received::message);
       ASSERT_EQ(message.exchange().index(), std::int64_t(k));
-      ASSERT_EQ(message.exchange().signals_size(), sizes[k]);
+      ASSERT_EQ(message.exchange().answer().signals_size(), sizes[k]);
       if (sizes[k] > 0) {
-        ASSERT_EQ(message.exchange().signals(sizes[k] - 1), sizes[k] - 1 + double(k));
+        ASSERT_EQ(message.exchange().answer().signals(sizes[k] - 1), sizes[k] - 1 + double(k));
       }
     }
   }

@@ -23,8 +23,10 @@ constexpr const char* kDeck =
 class Telemetry : public testing::Test {
  protected:
   SubscriptionPtr subscribe(v1::OverflowPolicy policy, std::int64_t capacity,
-                            std::vector<int> handles = {0}) {
+                            std::vector<int> handles = {0},
+                            std::chrono::nanoseconds interval = 0ns) {
     Subscription::Options options;
+    options.rhythm.interval = interval;
     const std::vector<int> sizes(handles.size(), 1);
     options.handles = std::move(handles);
     options.policy = policy;
@@ -42,14 +44,14 @@ class Telemetry : public testing::Test {
       hub_->publish(*simulation_);
     }
   }
-  v1::TelemetryBatch take(Subscription& subscription) {
+  v1::SubscribeReply take(Subscription& subscription) {
     std::string bytes;
     EXPECT_EQ(hub_->take(subscription, 1 << 20, &bytes), Taken::samples);
-    v1::TelemetryBatch batch;
+    v1::SubscribeReply batch;
     EXPECT_TRUE(batch.ParseFromString(bytes));
     return batch;
   }
-  static std::vector<std::int64_t> steps(const v1::TelemetryBatch& batch) {
+  static std::vector<std::int64_t> steps(const v1::SubscribeReply& batch) {
     std::vector<std::int64_t> result;
     for (const auto& sample : batch.samples()) result.push_back(sample.step());
     return result;
@@ -69,7 +71,7 @@ class Telemetry : public testing::Test {
 TEST_F(Telemetry, SamplesArriveOnceInOrderWithTheirNumbers) {
   const auto s = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 10);
   step(3);
-  const v1::TelemetryBatch batch = take(*s);
+  const v1::SubscribeReply batch = take(*s);
   EXPECT_EQ(steps(batch), (Steps{1, 2, 3}));
   EXPECT_EQ(batch.samples(2).sequence(), 3);
   EXPECT_EQ(batch.samples(0).values_size(), 1);
@@ -80,7 +82,7 @@ TEST_F(Telemetry, SamplesArriveOnceInOrderWithTheirNumbers) {
 TEST_F(Telemetry, DropOldestKeepsTheNewestAndCounts) {
   const auto s = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 3);
   step(5);
-  v1::TelemetryBatch batch = take(*s);
+  v1::SubscribeReply batch = take(*s);
   EXPECT_EQ(steps(batch), (Steps{3, 4, 5}));
   EXPECT_EQ(batch.dropped(), 2);
   EXPECT_EQ(batch.samples(0).sequence(), 3);
@@ -94,7 +96,7 @@ TEST_F(Telemetry, DropOldestKeepsTheNewestAndCounts) {
 TEST_F(Telemetry, DecimateWidensTheIntervalAndCounts) {
   const auto s = subscribe(v1::OVERFLOW_POLICY_DECIMATE, 4);
   step(5);  // 1 2 3 4 are full: 2 and 4 go
-  v1::TelemetryBatch batch = take(*s);
+  v1::SubscribeReply batch = take(*s);
   EXPECT_EQ(steps(batch), (Steps{1, 3, 5}));
   EXPECT_EQ(batch.every(), 2);
   EXPECT_EQ(batch.dropped(), 2);
@@ -106,7 +108,7 @@ TEST_F(Telemetry, DecimateWidensTheIntervalAndCounts) {
 TEST_F(Telemetry, DecimateKeepsTheWholeTimeForAReaderThatComesLate) {
   const auto s = subscribe(v1::OVERFLOW_POLICY_DECIMATE, 8);
   step(200);
-  const v1::TelemetryBatch batch = take(*s);
+  const v1::SubscribeReply batch = take(*s);
   EXPECT_LE(batch.samples_size(), 8);
   EXPECT_GE(batch.samples_size(), 4);
   EXPECT_EQ(batch.samples(0).step(), 1);
@@ -121,7 +123,7 @@ TEST_F(Telemetry, DecimateOfABufferForOneSampleDeliversAndGoesOn) {
     step(50);
     std::string bytes;
     if (hub_->take(*s, 1 << 20, &bytes) != Taken::samples) continue;
-    v1::TelemetryBatch batch;
+    v1::SubscribeReply batch;
     ASSERT_TRUE(batch.ParseFromString(bytes));
     ASSERT_EQ(batch.samples_size(), 1);
     EXPECT_GT(batch.samples(0).step(), last);
@@ -159,6 +161,24 @@ TEST_F(Telemetry, WhatIsKeptAtTheEndCanStillBeTaken) {
   EXPECT_EQ(steps(take(*s)), (Steps{1, 2}));
   std::string bytes;
   EXPECT_EQ(hub_->take(*s, 1 << 20, &bytes), Taken::closed);
+}
+
+TEST_F(Telemetry, AMinimumIntervalLeavesOutStepsThatComeSooner) {
+  const auto all = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 10);
+  const auto few = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 10, {0}, 1h);
+  const std::int64_t before = hub_->work().evaluations;
+  step(4);
+  EXPECT_EQ(hub_->work().evaluations - before, 5) << "steps left out are not evaluated";
+  EXPECT_EQ(steps(take(*all)), (Steps{1, 2, 3, 4}));
+  const v1::SubscribeReply batch = take(*few);
+  EXPECT_EQ(steps(batch), (Steps{1}));
+  EXPECT_EQ(batch.samples(0).sequence(), 1);
+  EXPECT_EQ(batch.total_dropped(), 0);
+  const auto soon = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 10, {0}, 1ms);
+  step(1);
+  std::this_thread::sleep_for(5ms);
+  step(1);
+  EXPECT_EQ(steps(take(*soon)), (Steps{5, 6}));
 }
 
 TEST_F(Telemetry, EqualSubscriptionsShareTheirMemoryAndAllAreWoken) {

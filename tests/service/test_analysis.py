@@ -51,7 +51,7 @@ def test_state_space_of_an_oscillator(oscillator):
 
 
 def test_few_eigenvalues_near_a_frequency(oscillator):
-    values = oscillator.eigenvalues(1, shift_hz=3.2)
+    values = oscillator.eigenvalues(1, shift=3.2)
     assert values == pytest.approx([S], abs=1e-6)
 
 
@@ -59,6 +59,6 @@ def test_analysis_refuses_nonsense(oscillator):
     with pytest.raises(mbcosim.Error):
         oscillator.eigenvalues(-1)
     with pytest.raises(mbcosim.Error):
-        oscillator.eigenvalues(1, shift_hz=float("nan"))
+        oscillator.eigenvalues(1, shift=float("nan"))
     with pytest.raises(mbcosim.Error):
         oscillator.linearize(["node.structural.1.X"], [])

@@ -2,9 +2,9 @@
 import asyncio
 import inspect
 import os
-import signal
 import threading
 import time
+import types
 
 import grpc
 import pytest
@@ -12,12 +12,12 @@ import pytest
 import decks
 import mbcosim
 import mbcosim.aio
-from conftest import TIME_FACTOR, stop, wait_for
+from conftest import MODELS, TIME_FACTOR
+from mbcosim.calls import ServerCalls, SimulationCalls, SnapshotCalls
 from mbcosim.v1 import simulations_pb2 as pb
-from relay import BlackHole
 from test_coupling import PORT, spring
 
-X = "node.structural.1.X"
+X, PENDULUM = "node.structural.1.X", os.path.join(MODELS, "pendulum.mbd")
 SILENT = 25.0  # seconds after which a silent server must have been noticed
 
 PAIRS = [(getattr(mbcosim, name), getattr(mbcosim.aio, name))
@@ -68,29 +68,45 @@ CALLS = {
     "refresh": lambda s: s.refresh(timeout=0.3),
     "update": lambda s: s.update(name="x", timeout=0.3),
     "record": lambda s: s.record(timeout=0.3),
+    "reset": lambda s: s.reset(timeout=0.3),
     "delete": lambda s: s.delete(timeout=0.3),
     "couple": lambda s: s.couple("spring", spring, timeout=0.3),
     "subscribe": lambda s: s.subscribe([X], timeout=0.3),
+    "stepper": lambda s: s.stepper(["node.structural.1.V"], timeout=0.3),
+    "handles": lambda s: s.handles(["node.structural.1.Omega"], timeout=0.3),
+    "simulate": lambda s: s.simulate([X], until=1.0, timeout=0.3),
+    "restore": lambda s: s.restore(types.SimpleNamespace(name=f"{s.name}/snapshots/1"), timeout=0.3),
+    "result_files": lambda s: s.result_files(timeout=0.3),
+    "result_file": lambda s: s.result_file("results.mov", timeout=0.3),
 }
 SERVER_CALLS = {
     "info": lambda s: s.info(timeout=0.3),
-    "load": lambda s: s.load_text(decks.body(), timeout=0.3),
+    "load": lambda s: s.load(PENDULUM, timeout=0.3),
+    "load_text": lambda s: s.load_text(decks.body(), timeout=0.3),
+    "load_bundle": lambda s: s.load_bundle("deck", {"deck": b"x"}, timeout=0.3),
+    "load_from_root": lambda s: s.load_from_root("deck", timeout=0.3),
+    "validate": lambda s: s.validate(PENDULUM, timeout=0.3),
+    "reduce": lambda s: s.reduce(PENDULUM, timeout=0.3),
+    "events": lambda s: s.events(timeout=0.3),
     "list": lambda s: s.list(timeout=0.3),
     "attach": lambda s: s.attach("simulations/x", timeout=0.3),
 }
 
 
-@pytest.fixture(params=["stopped", "black hole"])
-def falls_silent(request, tmp_path, start_daemon):
-    """(address, function after which the server says nothing any more)"""
-    daemon = start_daemon()
-    if request.param == "stopped":
-        yield daemon.address, lambda: stop(daemon.process.pid)
-        os.kill(daemon.process.pid, signal.SIGCONT)
-        return
-    hole = BlackHole(str(tmp_path), daemon.address)
-    yield hole.address, hole.fall_silent
-    hole.close()
+SNAPSHOT_CALLS = {
+    "restore": lambda s: s.restore(timeout=0.3),
+    "export": lambda s: s.export(timeout=0.3),
+    "delete": lambda s: s.delete(timeout=0.3),
+}
+
+
+def test_the_tables_have_every_call():
+    def calls(kind):
+        return {name for name, function in inspect.getmembers(kind) if getattr(function, "is_call", False)}
+
+    assert calls(SimulationCalls) | {"stepper", "subscribe", "couple", "simulate"} == set(CALLS) - {"run with progress"}
+    assert calls(ServerCalls) | {"events"} == set(SERVER_CALLS)
+    assert calls(SnapshotCalls) == set(SNAPSHOT_CALLS)
 
 
 def took(begin, bound, what="it"):
@@ -102,15 +118,11 @@ def test_a_timeout_ends_every_blocking_call(falls_silent):
     address, silence = falls_silent
     with mbcosim.connect(address) as server:
         simulation = server.load_text(decks.body(), ports=PORT)
-        simulation.describe()
         stepper = server.load_text(decks.body()).stepper()
         stepper.step()
         saved = simulation.snapshot()
         silence()
-        calls = [(CALLS, simulation), (SERVER_CALLS, server),
-                 ({"restore": lambda s: s.restore(timeout=0.3), "export": lambda s: s.export(timeout=0.3),
-                   "delete": lambda s: s.delete(timeout=0.3)}, saved),
-                 ({"stepper": lambda s: s.step(timeout=0.3)}, stepper)]
+        calls = [(CALLS, simulation), (SERVER_CALLS, server), (SNAPSHOT_CALLS, saved), ({"stepper": lambda s: s.step(timeout=0.3)}, stepper)]
         for table, subject in calls:
             for name, call in table.items():
                 begin = time.monotonic()
@@ -129,14 +141,11 @@ def test_a_timeout_ends_every_awaited_call(falls_silent):
     async def main():
         async with mbcosim.aio.connect(address) as server:
             simulation = await server.load_text(decks.body(), ports=PORT)
-            await simulation.describe()
             saved = await simulation.snapshot()
             stepper = await (await server.load_text(decks.body())).stepper()
             await stepper.step()
             silence()
-            calls = [(CALLS, simulation), (SERVER_CALLS, server),
-                     ({"restore": lambda s: s.restore(timeout=0.3), "export": lambda s: s.export(timeout=0.3)}, saved),
-                     ({"stepper": lambda s: s.step(timeout=0.3)}, stepper)]
+            calls = [(CALLS, simulation), (SERVER_CALLS, server), (SNAPSHOT_CALLS, saved), ({"stepper": lambda s: s.step(timeout=0.3)}, stepper)]
             for table, subject in calls:
                 for name, call in table.items():
                     begin = time.monotonic()
@@ -183,7 +192,7 @@ def test_an_awaited_peer_shows_signs_of_life_while_it_computes(daemon):
 def test_an_unknown_outcome_is_never_a_success(server):
     with server.load_text(decks.body()) as simulation:
         for outcome in (0, 17):
-            reply = pb.StepReply(step=3, time_s=0.5)
+            reply = pb.StepReply(step=3, time=0.5)
             reply.outcome = outcome
             with pytest.raises(mbcosim.StepFailed) as caught:
                 simulation.result(reply)

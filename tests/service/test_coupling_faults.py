@@ -176,7 +176,7 @@ def test_daemon(tmp_path_factory, tmp_path, blow, when):
     assert not client.is_alive() and time.monotonic() - start < 8 * TIME_FACTOR  # a deadline bounds what nobody answers
     if when == "idle" and blow in ("stop", "black hole"):
         with pytest.raises(Exception):
-            simulation._stub.GetSimulation(pb.GetSimulationRequest(name=simulation.name), timeout=0.5)
+            simulation._stub.GetSimulation(pb.GetSimulationRequest(simulation=simulation.name), timeout=0.5)
     if blow == "stop":
         daemon.process.send_signal(signal.SIGCONT)
         with daemon.connect() as again:

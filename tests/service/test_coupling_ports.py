@@ -241,7 +241,7 @@ def cards(text, counts):
 
 def watch(simulation, port, steps):
     seen = []
-    with simulation.couple(port, lambda m: seen.append(m) or []) as peer:
+    with simulation.couple(port, lambda m: seen.append(m) or [], every=1) as peer:
         simulation.step(steps)
         assert peer.error is None
     return seen
@@ -253,7 +253,7 @@ def test_stream_output_sends_its_values(server):
     with server.load_text(cards(card, "output elements: 1;")) as simulation:
         layout = simulation.describe().ports[0]
         assert layout.from_deck and layout.optional and layout.default_every == 2 and layout.output_size == 3
-        with simulation.couple("out", lambda m: [], every=0) as peer:
+        with simulation.couple("out", lambda m: []) as peer:
             simulation.step(10)
             assert peer.error is None and peer.exchanges == 5
         seen = watch(simulation, "out", 4)

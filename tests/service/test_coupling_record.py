@@ -61,7 +61,7 @@ def test_the_first_difference_is_named(server, tmp_path):
         entry = record_pb2.RecordEntry.FromString(data[at:at + size])
         at += size
         if entry.from_peer.HasField("exchange") and entry.from_peer.exchange.index == 7:
-            entry.from_peer.exchange.forces_n[1] += 1e-6
+            entry.from_peer.exchange.answer.forces[1] += 1e-6
             changed = True
         text = entry.SerializeToString()
         out += encoder._VarintBytes(len(text)) + text
@@ -69,7 +69,7 @@ def test_the_first_difference_is_named(server, tmp_path):
     (tmp_path / "changed.rec").write_bytes(out)
     result = replay(tmp_path / "changed.rec", deck)
     assert result.returncode == 3
-    assert 'first difference: step 8, port "spring": positions_m[1]' in result.stdout or 'step 7, port' in result.stdout
+    assert 'first difference: step 8, port "spring": positions[1]' in result.stdout or 'step 7, port' in result.stdout
     assert replay(tmp_path / "changed.rec", deck, "--tolerance", "1e-3").returncode == 0
 
 
@@ -105,7 +105,7 @@ def test_a_recorded_server_checks_a_client(server, tmp_path):
             assert process.wait(20) == code
             peer.close()
         text = process.stdout.read()
-        assert ("same: " in text) if code == 0 else ('port "spring": forces_n[1]' in text)
+        assert ("same: " in text) if code == 0 else ('port "spring": forces[1]' in text)
 
 
 def test_a_simulation_without_a_record_says_so(server):

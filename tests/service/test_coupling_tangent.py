@@ -167,17 +167,17 @@ def test_a_wrong_tangent_ends_the_stream(server, tangent, given, match):
         assert simulation.refresh().step == 0
 
 
-def test_every_mismatch_of_units_layout_and_version(server):
+def test_every_mismatch_of_layout_and_version(server):
     from mbcosim import exchange
     from mbcosim.coupling import open_stream
     with server.load_text(cut(), ports=PORTS) as simulation:
         message = exchange.hello(simulation, "rod")
         hello = message.hello
-        hello.force_unit, hello.angle_unit, hello.length_unit = "kN", "deg", "mm"
-        hello.kind, hello.input_size, hello.output_size, hello.step_size_s = 4, 3, 2, 1.0
-        hello.output_names.append("q")
-        hello.node_labels.extend([2, 1])
-        hello.model_digest = "0" * 16
+        expected = hello.expected
+        expected.kind, expected.input_size, expected.output_size, expected.step_size = 4, 3, 2, 1.0
+        expected.output_names.append("q")
+        expected.node_labels.extend([2, 1])
+        expected.model_digest = "0" * 16
         hello.protocol.lowest = hello.protocol.highest = 7
         import grpc
         from mbcosim.errors import from_rpc_error
@@ -186,5 +186,5 @@ def test_every_mismatch_of_units_layout_and_version(server):
         error = from_rpc_error(caught.value)
         assert error.reason == "VERSION_MISMATCH"
         assert set(error.metadata) - {"lowest", "highest"} == {
-            "protocol", "model_digest", "force_unit", "angle_unit", "length_unit", "kind", "input_size", "output_size", "output_names",
-            "node_labels", "step_size_s"}
+            "protocol", "model_digest", "kind", "input_size", "output_size", "output_names",
+            "node_labels", "step_size"}

@@ -2,21 +2,34 @@
 import os
 import subprocess
 
-from conftest import BIN
+import pytest
+
+from conftest import BIN, TIME_FACTOR, wait_for
 
 
-def test_the_library(daemon):
+def test_the_library(start_daemon, tmp_path):
+    (tmp_path / "results").mkdir()
+    daemon = start_daemon("--results-root", str(tmp_path / "results"))
     run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1"], timeout=200, text=True,
                          env={**os.environ, "MBCOSIM_ADDRESS": daemon.address}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     assert run.returncode == 0, run.stdout
 
 
-def test_a_stopped_server_ends_every_call(start_daemon):
-    daemon = start_daemon()
-    run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1", "--gtest_filter=AStoppedServer.*"], timeout=200,
-                         text=True, env={**os.environ, "MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_PID": str(daemon.process.pid)},
-                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    assert run.returncode == 0, run.stdout
+@pytest.mark.parametrize("test", ["EndsEveryCallAtItsTimeout", "IsNoticedInAStepWithoutATimeout"])
+def test_a_silent_server_ends_every_call(falls_silent, tmp_path, test):
+    address, silence = falls_silent
+    wanted = tmp_path / "silence"
+    run = subprocess.Popen([os.path.join(BIN, "client_tests"), "--gtest_brief=1", f"--gtest_filter=ASilentServer.{test}"], text=True,
+                           env={**os.environ, "MBCOSIM_ADDRESS": address, "MBCOSIM_SILENCE": str(wanted)},
+                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    try:
+        wait_for(lambda: wanted.exists() or run.poll() is not None, 30 * TIME_FACTOR)
+        silence()
+        wanted.unlink(missing_ok=True)
+        output, _ = run.communicate(timeout=200)
+    finally:
+        run.kill()
+    assert run.returncode == 0, output
 
 
 def test_tokens(start_daemon, tmp_path):

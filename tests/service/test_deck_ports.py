@@ -102,7 +102,7 @@ def test_missing_reference_loads_are_told(server):
             with pytest.raises(mbcosim.StepFailed):
                 simulation.step()
             wait_for(lambda: peer.error)
-            assert "reference_force_n" in str(peer.error)
+            assert "reference_force" in str(peer.error)
 
 
 def test_without_a_peer_the_step_fails(server):

@@ -72,7 +72,7 @@ def test_goes_on_after_an_orderly_end(start):
     with start().connect() as server:
         assert state_of(server, last) == pb.SIMULATION_STATE_SUSPENDED
         again = server.attach(last)
-        assert (again.info.display_name, again.info.step, again.info.minimum_step_s) == ("body", 1000, 1e-5)
+        assert (again.info.display_name, again.info.step, again.info.minimum_step_size) == ("body", 1000, 1e-5)
         assert state_of(server, last) == pb.SIMULATION_STATE_SUSPENDED  # asking does not wake it
         assert again.read(["step"])["step"] == 1000
         assert state_of(server, last) == pb.SIMULATION_STATE_READY
@@ -99,7 +99,7 @@ def test_kills_at_random_moments_lose_nothing_of_a_checkpoint(start, folder, tmp
             simulation = server.attach(name)
             step = int(simulation.read(["step"])["step"])
             assert step >= reached, "a checkpoint is lost"
-            stream = server.simulations.Run(pb.RunRequest(step=pb.StepRequest(simulation=name, until_time_s=1e9)))
+            stream = server.simulations.Run(pb.RunRequest(step=pb.StepRequest(simulation=name, until_time=1e9)))
             time.sleep(rolls.uniform(0, 0.3))
             reached = on_disk(folder, name)
             kill(daemon)
@@ -131,16 +131,35 @@ def on_disk(folder, name):
     raise AssertionError("the file has no point")
 
 
-def test_the_last_reply_is_kept_for_who_asks_again(start):
+def test_the_last_replies_are_kept_for_who_asks_again(start):
     daemon = start()
     with daemon.connect() as server:
         name = server.load_text(deck()).name
-        request = pb.StepRequest(simulation=name, steps=7, request_id="once", outputs=[0])
-        first = server.simulations.Step(request)
+        requests = {"Step": pb.StepRequest(simulation=name, steps=7, request_id="a", outputs=[0]),
+                    "CreateSnapshot": pb.CreateSnapshotRequest(simulation=name, request_id="b"),
+                    "UpdateSimulation": pb.UpdateSimulationRequest(simulation=name, request_id="c", display_name="renamed")}
+        first = {method: getattr(server.simulations, method)(request) for method, request in requests.items()}
     daemon.stop()
     with start().connect() as server:
-        assert server.simulations.Step(request) == first
-        assert server.attach(name).info.step == 7
+        for method, request in requests.items():
+            assert getattr(server.simulations, method)(request) == first[method]
+        with pytest.raises(grpc.RpcError, match="another request"):
+            server.simulations.Step(pb.StepRequest(simulation=name, steps=8, request_id="a"))
+        simulation = server.attach(name)
+        assert simulation.info.step == 7 and len(simulation.snapshots()) == 1
+
+
+def test_one_on_the_disk_is_deleted_once(start):
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(deck()).name
+    daemon.stop()
+    with start().connect() as server:
+        for _ in range(2):
+            server.simulations.DeleteSimulation(pb.DeleteSimulationRequest(simulation=name, request_id="end"))
+        assert server.list() == []
+        with pytest.raises(mbcosim.NotFound):
+            server.attach(name).delete()
 
 
 def test_a_creation_is_done_once_across_restarts(start):

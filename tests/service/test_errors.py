@@ -102,12 +102,12 @@ def test_bad_arguments(server, tumbling):
         table = [
             (stub.Step, pb.StepRequest(simulation="simulations/no"), "NOT_FOUND", "NO_SUCH_SIMULATION"),
             (stub.Step, pb.StepRequest(simulation=s.name, steps=-1), "INVALID_ARGUMENT", "BAD_ARGUMENT"),
-            (stub.Step, pb.StepRequest(simulation=s.name, until_time_s=float("nan")), "INVALID_ARGUMENT", "BAD_ARGUMENT"),
+            (stub.Step, pb.StepRequest(simulation=s.name, until_time=float("nan")), "INVALID_ARGUMENT", "BAD_ARGUMENT"),
             (stub.Step, pb.StepRequest(simulation=s.name, outputs=[-1]), "NOT_FOUND", "NO_SUCH_VARIABLE"),
             (stub.Step, pb.StepRequest(simulation=s.name, until=pb.Condition(handle=0)), "INVALID_ARGUMENT", "BAD_ARGUMENT"),
             (stub.Step, pb.StepRequest(simulation=s.name, until=pb.Condition(handle=0, element=1, comparison=1)),
              "INVALID_ARGUMENT", "BAD_ARGUMENT"),
-            (stub.Step, pb.StepRequest(simulation=s.name, step_size_s=0.0), "INVALID_ARGUMENT", "BAD_ARGUMENT"),
+            (stub.Step, pb.StepRequest(simulation=s.name, step_size=0.0), "INVALID_ARGUMENT", "BAD_ARGUMENT"),
             (stub.Step, pb.StepRequest(simulation=s.name, exact=True), "INVALID_ARGUMENT", "BAD_ARGUMENT"),
             (stub.Step, pb.StepRequest(simulation=s.name, inputs=values(handles=[load], values=[1.0])),
              "INVALID_ARGUMENT", "BAD_ARGUMENT"),
@@ -116,9 +116,9 @@ def test_bad_arguments(server, tumbling):
             (stub.Step, pb.StepRequest(simulation=s.name, inputs=values(handles=[position], values=[1.0] * 3)),
              "FAILED_PRECONDITION", "NOT_WRITABLE"),
             (stub.ReadVariables, pb.ReadVariablesRequest(simulation=s.name, handles=[10**6]), "NOT_FOUND", "NO_SUCH_VARIABLE"),
-            (stub.GetSimulation, pb.GetSimulationRequest(name=""), "NOT_FOUND", "NO_SUCH_SIMULATION"),
-            (stub.RestoreSnapshot, pb.RestoreSnapshotRequest(name=s.name), "NOT_FOUND", "NO_SUCH_SNAPSHOT"),
-            (stub.RestoreSnapshot, pb.RestoreSnapshotRequest(name=s.name + "/snapshots/1x"), "NOT_FOUND", "NO_SUCH_SNAPSHOT"),
+            (stub.GetSimulation, pb.GetSimulationRequest(simulation=""), "NOT_FOUND", "NO_SUCH_SIMULATION"),
+            (stub.RestoreSnapshot, pb.RestoreSnapshotRequest(simulation=s.name, snapshot=s.name), "NOT_FOUND", "NO_SUCH_SNAPSHOT"),
+            (stub.RestoreSnapshot, pb.RestoreSnapshotRequest(simulation=s.name, snapshot=s.name + "/snapshots/1x"), "NOT_FOUND", "NO_SUCH_SNAPSHOT"),
             (stub.ListSimulations, pb.ListSimulationsRequest(page_token="?"), "INVALID_ARGUMENT", "BAD_ARGUMENT"),
         ]
         for call, request, code, reason in table:

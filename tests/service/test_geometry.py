@@ -41,7 +41,7 @@ def test_points_follow_their_nodes(server, pendulum):
     with server.load(pendulum) as simulation:
         simulation.step(100)
         geometry = simulation.geometry()
-        assert geometry.header.step == 100 and geometry.header.time_s == simulation.time
+        assert geometry.header.step == 100 and geometry.header.time == simulation.time
         assert geometry.header.model_digest == simulation.info.model_digest
         for told, computed in points(geometry):
             assert np.allclose(told, computed, atol=1e-12)

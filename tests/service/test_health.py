@@ -38,7 +38,7 @@ def test_health_and_socket_mode(daemon, server):
 
 def test_server_info(server):
     info = server.info()
-    assert info.protocol.lowest == info.protocol.highest == 1
+    assert info.protocol.lowest == info.protocol.highest == 2
     assert (info.identity, info.role) == ("local", "admin")
     assert {limit.name for limit in info.limits} >= {"sessions", "deck_bytes", "unknowns"}
 

@@ -84,7 +84,7 @@ def endless(pendulum):
 
 
 def state(door, simulation):
-    return door.call("Simulations/GetSimulation", {"name": simulation.name})[1]["state"]
+    return door.call("Simulations/GetSimulation", {"simulation": simulation.name})[1]["simulation"]["state"]
 
 
 @pytest.fixture
@@ -108,24 +108,24 @@ def test_a_step_over_json_is_the_step_over_grpc(door, server, pendulum):
         status, reply = door.call("Simulations/Step", {"simulation": theirs.name, "steps": 10, "outputs": [handle]})
         assert status == 200
         assert reply["outcome"] == "STEP_OUTCOME_ACCEPTED" and reply["step"] == "10"
-        assert reply["timeS"] == expected.time and reply["outputs"] == list(expected.values["node.structural.2.X"])
+        assert reply["time"] == expected.time and reply["outputs"] == list(expected.values["node.structural.2.X"])
 
 
 def test_binary_messages_are_those_of_grpc(door, server, pendulum):
     with server.load(pendulum) as simulation:
-        request = simulations_pb2.GetSimulationRequest(name=simulation.name)
+        request = simulations_pb2.GetSimulationRequest(simulation=simulation.name)
         status, headers, body = door.request("POST", "/mbcosim.v1.Simulations/GetSimulation", request.SerializeToString(),
                                              Content_Type="application/proto")
         assert status == 200 and headers["Content-Type"] == "application/proto"
-        assert simulations_pb2.SimulationInfo.FromString(body).name == simulation.name
+        assert simulations_pb2.GetSimulationReply.FromString(body).simulation.name == simulation.name
 
 
 def test_an_infinite_number_has_a_json_form(door, server, tumbling):
     with server.load(tumbling) as simulation:
-        status, info = door.call("Simulations/GetSimulation", {"name": simulation.name})
-        assert status == 200 and float(info["finalTimeS"]) > 0
-        parsed = json_format.ParseDict(info, simulations_pb2.SimulationInfo())
-        assert parsed.step == 0 and math.isfinite(parsed.time_s)
+        status, info = door.call("Simulations/GetSimulation", {"simulation": simulation.name})
+        assert status == 200 and float(info["simulation"]["finalTime"]) > 0
+        parsed = json_format.ParseDict(info, simulations_pb2.GetSimulationReply()).simulation
+        assert parsed.step == 0 and math.isfinite(parsed.time)
 
 
 def test_a_run_streams_progress_and_ends_with_done(door, server, pendulum):
@@ -402,7 +402,7 @@ def test_slow_senders_disturb_nobody_and_are_cut_off(door, server, pendulum):
     started = time.monotonic()
     with server.load(pendulum) as simulation:
         assert simulation.step(100).reply.step == 100
-        assert door.call("Simulations/GetSimulation", {"name": simulation.name})[0] == 200
+        assert door.call("Simulations/GetSimulation", {"simulation": simulation.name})[0] == 200
     assert time.monotonic() - started < 5 * TIME_FACTOR
 
     def cut_off(link):

@@ -283,7 +283,7 @@ def test_the_state_space_of_an_oscillator_answers_as_its_closed_form(server):
 def test_a_wing_has_twice_as_many_states_as_its_nodes_can_move(server):
     """Beams, whose unknowns differ in size by twelve orders."""
     with server.load(model("wing.mbd")) as simulation:
-        system, values = simulation.state_space("structural.9.load", ["node.structural.9.X"]), simulation.eigenvalues(12, shift_hz=5)
+        system, values = simulation.state_space("structural.9.load", ["node.structural.9.X"]), simulation.eigenvalues(12, shift=5)
     assert len(system.A) == 2 * 6 * 8
     for value in values[values.imag > 0]:
         assert np.abs(system.poles - value).min() < 1e-6 * abs(value)
@@ -291,7 +291,7 @@ def test_a_wing_has_twice_as_many_states_as_its_nodes_can_move(server):
 
 def test_modes_of_a_wing_are_ordered_and_scaled(server):
     with server.load(model("wing.mbd")) as simulation:
-        modes = simulation.modes(8, shift_hz=5)
+        modes = simulation.modes(8, shift=5)
     assert list(modes.frequencies_hz) == sorted(modes.frequencies_hz) and modes.shapes.shape == (len(modes), 9, 3)
     assert np.abs(modes.shapes).reshape(len(modes), -1).max(1) == pytest.approx(1)
     assert np.abs(modes.shape(1)[-1]).max() == pytest.approx(1) and np.abs(modes.shape(1)[0]).max() < 1e-9  # tip and clamped root

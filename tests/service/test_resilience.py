@@ -65,7 +65,7 @@ def test_leases_that_end_while_simulations_are_deleted(start_daemon):
             def delete(mine):
                 for name in mine:
                     try:
-                        stub.DeleteSimulation(pb.DeleteSimulationRequest(name=name))
+                        stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=name))
                     except grpc.RpcError as error:
                         errors.append(error.code())
 
@@ -129,7 +129,7 @@ def test_one_request_id_makes_one_simulation_though_four_ask_at_once(server, dae
             calls = [stub.CreateSimulation.future(iter(upload(decks.body(), request_id=f"id-{turn}"))) for _ in range(4)]
             names = {call.result(30 * TIME_FACTOR).simulation.name for call in calls}
             assert len(names) == 1
-            stub.DeleteSimulation(pb.DeleteSimulationRequest(name=names.pop()))
+            stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=names.pop()))
 
 
 def test_an_upload_without_messages_ends(daemon):
@@ -210,7 +210,7 @@ def test_idle_step_streams_and_subscriptions_cost_no_thread(daemon, server):
         stop.set()
         for call in [*streams, *subscriptions]:
             call.cancel()
-        stub.DeleteSimulation(pb.DeleteSimulationRequest(name=name))
+        stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=name))
 
 
 def test_reflection_asks_for_credentials_when_the_service_does(guarded):
@@ -365,7 +365,7 @@ def long_chain(daemon):
         stub = simulations_pb2_grpc.SimulationsStub(channel)
         name = stub.CreateSimulation(iter(upload(chain(145)))).simulation.name
         yield stub, name
-        stub.DeleteSimulation(pb.DeleteSimulationRequest(name=name))
+        stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=name))
 
 
 def cpu_of(daemon):
@@ -384,7 +384,7 @@ ANALYSES = {
     "all eigenvalues": lambda stub, name: stub.ComputeEigenvalues.future(
         pb.ComputeEigenvaluesRequest(simulation=name, eigenvectors=True)),
     "many eigenvalues": lambda stub, name: stub.ComputeEigenvalues.future(
-        pb.ComputeEigenvaluesRequest(simulation=name, count=700, shift_hz=3.0)),
+        pb.ComputeEigenvaluesRequest(simulation=name, count=700, shift=3.0)),
     "state space": lambda stub, name: stub.Linearize.future(
         pb.LinearizeRequest(simulation=name, inputs=[], outputs=list(range(4, 16)))),
     "many outputs": lambda stub, name: stub.Linearize.future(
@@ -468,8 +468,8 @@ def test_only_the_owner_may_block_and_is_named(guarded):
         stream = subscribe(wanted, metadata=bearer("ann"))
         next(stream)
         running = stub.Step.future(pb.StepRequest(simulation=name, steps=50000), metadata=bearer("ann"))
-        wait_for(lambda: "subscriber" in stub.GetSimulation(pb.GetSimulationRequest(name=name),
-                                                            metadata=bearer("ann")).waiting_for)
+        wait_for(lambda: "subscriber" in stub.GetSimulation(pb.GetSimulationRequest(simulation=name),
+                                                            metadata=bearer("ann")).simulation.waiting_for)
         stream.cancel()
         assert running.result(60 * TIME_FACTOR).step == 50000
 
@@ -487,4 +487,4 @@ def test_450_idle_subscribers_do_not_stop_a_run(daemon):
         assert reply.steps_done == 20000
         for watcher in watchers:
             watcher.cancel()
-        stub.DeleteSimulation(pb.DeleteSimulationRequest(name=name))
+        stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=name))

@@ -26,8 +26,9 @@ import sys, time
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 import wires
 address, simulation, mode, hang_at = sys.argv[1:]
-hello = pb.Hello(simulation=simulation, port="spring", mode=types.CouplingMode.Value("COUPLING_MODE_" + mode))
-hello.peer_timeout.FromMilliseconds(500)
+hello = pb.Hello(simulation=simulation, port="spring")
+hello.schedule.mode = types.CouplingMode.Value("COUPLING_MODE_" + mode)
+hello.presence.peer_timeout.FromMilliseconds(500)
 wire = wires.SharedMemoryWire(address)
 wire.send(pb.PeerMessage(hello=hello))
 while (message := wire.receive(60)) is not wires.END:
@@ -35,7 +36,7 @@ while (message := wire.receive(60)) is not wires.END:
     if kind == "exchange" and message.exchange.index == int(hang_at):
         kind = "hangs"
     if kind == "exchange":
-        wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=message.exchange.index, forces_n=[0.0] * 3)))
+        wire.send(pb.PeerMessage(exchange=pb.PeerExchange(index=message.exchange.index, answer=pb.PeerAnswer(forces=[0.0] * 3))))
     print(kind, flush=True)
 """
 

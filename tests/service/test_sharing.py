@@ -49,12 +49,12 @@ def calls(server, name, port="spring"):
             pass
 
     return [
-        ("GetSimulation", "see", unary(stub.GetSimulation, pb.GetSimulationRequest(name=name))),
-        ("DescribeSimulation", "observe", unary(stub.DescribeSimulation, pb.DescribeSimulationRequest(name=name))),
+        ("GetSimulation", "see", unary(stub.GetSimulation, pb.GetSimulationRequest(simulation=name))),
+        ("DescribeSimulation", "observe", unary(stub.DescribeSimulation, pb.DescribeSimulationRequest(simulation=name))),
         ("ReadVariables", "observe", unary(stub.ReadVariables, pb.ReadVariablesRequest(simulation=name))),
         ("ListSnapshots", "observe", unary(stub.ListSnapshots, pb.ListSnapshotsRequest(simulation=name))),
         ("ExportSnapshot", "observe", stream(stub.ExportSnapshot, pb.ExportSnapshotRequest(simulation=name))),
-        ("GetRecord", "observe", stream(stub.GetRecord, pb.GetRecordRequest(name=name))),
+        ("GetRecord", "observe", stream(stub.GetRecord, pb.GetRecordRequest(simulation=name))),
         ("Subscribe", "observe", stream(server.telemetry.Subscribe, telemetry_pb2.SubscribeRequest(simulation=name))),
         ("DescribeGeometry", "observe", stream(geometry.DescribeGeometry, geometry_pb2.DescribeGeometryRequest(simulation=name))),
         ("Attach", "couple", attach),
@@ -62,15 +62,16 @@ def calls(server, name, port="spring"):
         ("Step", "control", unary(stub.Step, pb.StepRequest(simulation=name, steps=0))),
         ("StepStream", "control", stream(stub.StepStream, iter([pb.StepRequest(simulation=name, steps=0)]))),
         ("Run", "control", stream(stub.Run, pb.RunRequest(step=pb.StepRequest(simulation=name, steps=0)))),
-        ("Interrupt", "control", unary(stub.Interrupt, pb.InterruptRequest(name=name))),
+        ("Interrupt", "control", unary(stub.Interrupt, pb.InterruptRequest(simulation=name))),
         ("CreateSnapshot", "control", unary(stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))),
-        ("RestoreSnapshot", "control", unary(stub.RestoreSnapshot, pb.RestoreSnapshotRequest(name=name + "/snapshots/1"))),
+        ("RestoreSnapshot", "control", unary(stub.RestoreSnapshot, pb.RestoreSnapshotRequest(simulation=name, snapshot=name + "/snapshots/1"))),
+        ("ResetSimulation", "control", unary(stub.ResetSimulation, pb.ResetSimulationRequest(simulation=name))),
         ("Linearize", "control", unary(stub.Linearize, pb.LinearizeRequest(simulation=name))),
         ("ComputeEigenvalues", "control", unary(stub.ComputeEigenvalues, pb.ComputeEigenvaluesRequest(simulation=name))),
         ("ForkSimulation", "control", unary(stub.ForkSimulation, pb.ForkSimulationRequest(simulation=name))),
-        ("UpdateSimulation", "control", unary(stub.UpdateSimulation, pb.UpdateSimulationRequest(name=name, display_name="x"))),
-        ("UpdateSimulation grants", "own", unary(stub.UpdateSimulation, pb.UpdateSimulationRequest(name=name, grants=pb.Grants()))),
-        ("DeleteSimulation", "own", unary(stub.DeleteSimulation, pb.DeleteSimulationRequest(name=name))),
+        ("UpdateSimulation", "control", unary(stub.UpdateSimulation, pb.UpdateSimulationRequest(simulation=name, display_name="x"))),
+        ("UpdateSimulation grants", "own", unary(stub.UpdateSimulation, pb.UpdateSimulationRequest(simulation=name, grants=pb.Grants()))),
+        ("DeleteSimulation", "own", unary(stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))),
     ]
 
 

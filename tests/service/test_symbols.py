@@ -12,7 +12,7 @@ DECK = "set: const real h = 1.e-3; set: integer n = 2; set: string tag = \"a\"; 
 
 def test_a_given_value_takes_the_place_of_the_declared_one(server):
     with server.load_text(DECK) as plain, server.load_text(DECK, symbols={"h": 2e-3, "tag": "b", "on": True, "n": 7}) as given:
-        assert (plain.info.next_step_s, given.info.next_step_s) == (1e-3, 2e-3)
+        assert (plain.info.next_step_size, given.info.next_step_size) == (1e-3, 2e-3)
         assert plain.info.model_digest != given.info.model_digest
         symbols = {s.name: s for s in given.describe().symbols}
         assert symbols["h"].constant and symbols["h"].given and symbols["h"].declared.number == 2e-3
@@ -71,13 +71,13 @@ def test_descriptions_come_in_pages_that_pass_default_limits(daemon, server):
     with server.load_text(CHAIN.format(n=10_000)) as simulation, grpc.insecure_channel(daemon.address) as channel:
         from mbcosim.v1 import simulations_pb2_grpc
         stub = simulations_pb2_grpc.SimulationsStub(channel)  # with a client's default limit of 4 MiB
-        request, pages = pb.DescribeSimulationRequest(name=simulation.name), []
+        request, pages = pb.DescribeSimulationRequest(simulation=simulation.name), []
         while not pages or request.page_token:
             pages.append(stub.DescribeSimulation(request))
             request.page_token = pages[-1].next_page_token
         assert max(p.ByteSize() for p in pages) < 4 << 20 and len(pages) > 2
-        assert sum(len(p.nodes) for p in pages) == 10_000
-        assert list(next(e for p in pages for e in p.elements if e.family == "joint").nodes) == [1, 2]
+        assert sum(len(p.model.nodes) for p in pages) == 10_000
+        assert list(next(e for p in pages for e in p.model.elements if e.family == "joint").nodes) == [1, 2]
         whole = simulation.describe()
         assert [v.handle for v in whole.variables] == list(range(len(whole.variables)))
         assert len(whole.elements) == 20_000
@@ -94,9 +94,9 @@ def test_a_few_names_cost_no_description(server, pendulum):
 
 def test_wrong_pages_are_refused_by_field(server, pendulum):
     with server.load(pendulum) as simulation:
-        for request, field in [(pb.DescribeSimulationRequest(name=simulation.name, page_size=-1), "page_size"),
-                               (pb.DescribeSimulationRequest(name=simulation.name, page_token="x"), "page_token"),
-                               (pb.DescribeSimulationRequest(name=simulation.name, page_token="-5"), "page_token")]:
+        for request, field in [(pb.DescribeSimulationRequest(simulation=simulation.name, page_size=-1), "page_size"),
+                               (pb.DescribeSimulationRequest(simulation=simulation.name, page_token="x"), "page_token"),
+                               (pb.DescribeSimulationRequest(simulation=simulation.name, page_token="-5"), "page_token")]:
             with pytest.raises(mbcosim.Error) as caught:
                 simulation._call(simulation._stub.DescribeSimulation, request)
             assert caught.value.field == field

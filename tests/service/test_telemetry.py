@@ -1,6 +1,8 @@
 """Telemetry: nothing is missed, gaps are counted, a slow reader delays only whom it asked to."""
 import threading
+import time
 
+import grpc
 import pytest
 
 import decks
@@ -56,6 +58,31 @@ def test_decimate_widens_the_interval(server):
         simulation._owned = False
         steps = [sample.step for batch in stream for sample in batch.samples]
         assert steps == sorted(steps)
+
+
+def test_a_minimum_interval_leaves_out_steps_on_the_way(server):
+    with server.load_text(decks.body(final_time="20.")) as simulation:
+        with simulation.subscribe(["time"], minimum_interval=0.05) as few, simulation.subscribe(["time"], minimum_interval=3600.0) as one:
+            begin = time.monotonic()
+            simulation.step(20000)
+            took = time.monotonic() - begin
+            simulation.delete()
+            got = list(few)
+            assert [step for step, _, _ in one] == [1]
+        simulation._owned = False
+        assert 1 <= len(got) <= 2 + took / 0.05 and few.dropped == 0
+        assert all(values["time"] == time_ for _, time_, values in got)
+
+
+@pytest.mark.parametrize("seconds, nanos", [(0, 0), (-1, 0), (0, -1), (3600, 1), (10**12, 0)])
+def test_a_wrong_minimum_interval_is_refused(server, seconds, nanos):
+    with server.load_text(decks.body()) as simulation:
+        request = telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=[0])
+        request.minimum_interval.seconds, request.minimum_interval.nanos = seconds, nanos
+        with pytest.raises(grpc.RpcError) as caught:
+            next(server.telemetry.Subscribe(request, metadata=server.metadata))
+        error = mbcosim.errors.from_rpc_error(caught.value)
+        assert (error.code, error.field) == (grpc.StatusCode.INVALID_ARGUMENT, "minimum_interval")
 
 
 def test_a_stalled_reader_that_blocks_is_dropped(server):

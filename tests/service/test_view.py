@@ -75,7 +75,7 @@ def test_the_address_leads_to_the_page_with_the_deck(view, pendulum):
     assert simulation.startswith("simulations/")
     opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
     assert "<title>mbcosim</title>" in read_page(opener, page)
-    request = urllib.request.Request(page.split("?")[0] + "mbcosim.v1.Simulations/GetSimulation", b'{"name": "%s"}' % simulation.encode(),
+    request = urllib.request.Request(page.split("?")[0] + "mbcosim.v1.Simulations/GetSimulation", b'{"simulation": "%s"}' % simulation.encode(),
                                      {"Content-Type": "application/json"})
     with opener.open(request, timeout=30 * TIME_FACTOR) as answer:  # the cookie lets it in
         assert b'"displayName":"pendulum.mbd"' in answer.read()

@@ -49,7 +49,7 @@ test("errors carry their code, reason and field", async () => {
   const details = refused.metadata.get("grpc-status-details-bin")[0].toString("latin1");
   assert.match(details, /DECK_ERROR/);
   assert.match(details, /mbcosim\.dev/);
-  const gone = await call(server, server.simulations, "GetSimulation", { name: "simulations/none" }, 5).catch((error) => error);
+  const gone = await call(server, server.simulations, "GetSimulation", { simulation: "simulations/none" }, 5).catch((error) => error);
   assert.equal(gone.code, 5);
 });
 
@@ -67,6 +67,13 @@ test("a model of 10 000 bodies passes the client's default limits", async () => 
     if (reply.content === "elements") for (const e of reply.elements.elements) masses += e.masses.length;
   }
   assert.deepEqual([drawn, masses], [n, n]);
+  let unknowns = 0, entries = 0;
+  for await (const page of simulation.linearize()) {
+    unknowns += page.state_names.length;
+    entries += (page.a?.values.length ?? 0) + (page.e?.values.length ?? 0);
+    assert.ok(page.a === null || page.a.sparse);
+  }
+  assert.ok(unknowns >= 12 * n && entries > unknowns);
   assert.equal((await simulation.step()).step, 1);
   await simulation.delete();
 });

@@ -32,7 +32,7 @@ from .calls import ServerCalls, SimulationCalls, SnapshotCalls, StepResult
 from .coupling import Answer, open_stream
 from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, from_rpc_error, translated
 from .histories import History
-from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Awaiting, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
+from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Awaiting, Bound, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
 from .simulation import subscribe_request
 
 T = TypeVar("T")
@@ -83,11 +83,12 @@ class Connection:
 
     async def run(self, calls: Calls[T]) -> T:
         """Makes the calls of a generator one after the other; its result."""
+        bound = Bound()
         try:
             call = next(calls)
             while True:
                 try:
-                    reply = await self.perform(call)
+                    reply = await self.perform(bound.within(call))
                 except Error as error:
                     call = calls.throw(error)
                 else:
@@ -190,7 +191,7 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
         """Advances and returns a History of `outputs` in one call; see mbcosim.Simulation.simulate. Inputs are numbers."""
         if (until is None) == (steps is None):
             raise ValueError("say how long with `until` or with `steps`")
-        request = pb.StepRequest(steps=steps) if until is None else pb.StepRequest(until_time_s=until)
+        request = pb.StepRequest(steps=steps) if until is None else pb.StepRequest(until_time=until)
         names, title = [outputs] if isinstance(outputs, str) else list(outputs), str(self.info.display_name)
         try:
             rows, _ = await self._connection.run(self._tabulate(names, request, every, inputs, None, timeout))
@@ -200,10 +201,10 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
         return History.of_rows(rows, title)
 
     async def subscribe(self, names: Iterable[str], *, every: int = 1, policy: str = "drop_oldest", buffer: int = 1024,
-                        timeout: Optional[float] = USUAL) -> Subscription:
-        """Samples of variables every so many steps, whoever advances; see Subscription."""
+                        minimum_interval: Optional[float] = None, timeout: Optional[float] = USUAL) -> Subscription:
+        """Samples of variables every so many steps, whoever advances, at least `minimum_interval` seconds of wall time apart; see Subscription."""
         names = list(names)
-        request = subscribe_request(self, await self.handles(names, timeout=timeout), every, policy, buffer)
+        request = subscribe_request(self, await self.handles(names, timeout=timeout), every, policy, buffer, minimum_interval)
         subscription = Subscription(self, names, request)
         with translated():
             await _bounded(timeout, subscription._stream.read(), subscription.close, "the subscription")
@@ -292,14 +293,14 @@ class Stepper:
         request.CopyFrom(self._request)
         request.steps = count
         if step_size is not None:
-            request.step_size_s = step_size
+            request.step_size = step_size
         if request.inputs.handles:
             request.inputs.values.extend(np.ravel(np.asarray(values, float)))
         with translated():
             reply = await _bounded(timeout, self._exchange(request), self._stream.cancel, "the step")
-        return self._simulation.result(reply, self._outputs)
+        return self._simulation.result(reply.step, self._outputs)
 
-    async def _exchange(self, request: pb.StepRequest) -> pb.StepReply:
+    async def _exchange(self, request: pb.StepRequest) -> pb.StepStreamReply:
         try:
             await self._stream.write(request)
             reply = await self._stream.read()
@@ -307,7 +308,7 @@ class Stepper:
             reply = grpc.aio.EOF
         if reply is grpc.aio.EOF:
             raise await _status(self._stream)
-        answer: pb.StepReply = reply
+        answer: pb.StepStreamReply = reply
         return answer
 
     async def close(self, *, timeout: Optional[float] = PARTING) -> None:
@@ -345,7 +346,7 @@ class Subscription:
                     return
                 self.dropped = batch.total_dropped
                 for sample in batch.samples:
-                    yield sample.step, sample.time_s, self._simulation.split(self._names, sample.values)
+                    yield sample.step, sample.time, self._simulation.split(self._names, sample.values)
         except asyncio.CancelledError:
             if not self._stream.cancelled():
                 raise

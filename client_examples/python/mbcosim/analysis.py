@@ -8,7 +8,8 @@ from typing import Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
-from .histories import Array, needed
+from .histories import Array
+from .words import needed
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -145,9 +146,9 @@ class Analysis:
         A, B, C, D = self.linearize(sources, results, timeout=timeout)
         return StateSpace(A, B, C, D, _columns(self, sources), _columns(self, results))
 
-    def modes(self: Any, count: int = 0, *, shift_hz: float = 0.0, timeout: Optional[float] = None) -> Modes:
-        """The modes that oscillate about the present state, by frequency: those of `count` eigenvalues nearest to `shift_hz`, or of all (0)."""
-        values, vectors = self.eigenvalues(count, shift_hz=shift_hz, vectors=True, timeout=timeout)
+    def modes(self: Any, count: int = 0, *, shift: float = 0.0, timeout: Optional[float] = None) -> Modes:
+        """The modes that oscillate about the present state, by frequency: those of `count` eigenvalues nearest to `shift`, or of all (0)."""
+        values, vectors = self.eigenvalues(count, shift=shift, vectors=True, timeout=timeout)
         labels = [node.label for node in self.nodes.values() if node.family == "structural"]
         names = [f"node.structural.{label}.X" for label in labels]
         turns = [f"node.structural.{label}.Phi" for label in labels if f"node.structural.{label}.Phi" in self.variables]

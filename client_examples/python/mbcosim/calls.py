@@ -16,9 +16,9 @@ from mbcosim.v1 import common_pb2, coupling_types_pb2, geometry_pb2, reduction_p
 
 from . import bundle
 from .errors import NotFound, StepFailed, enum_name
-from .rpc import USUAL, Call, Calls, call
+from .rpc import USUAL, Call, Calls, call, protocol
 from .table import Rows
-from .words import choice, pick, remedy
+from .words import choice, needed, pick, remedy
 
 
 Array = npt.NDArray[np.float64]
@@ -26,6 +26,7 @@ Values = Mapping[str, npt.ArrayLike]  # by name
 Results = Union[bool, str, Iterable[str]]  # which result files
 Symbol = Union[bool, float, str]
 SimulationKind = TypeVar("SimulationKind", bound="SimulationCalls[Any]")
+Reply = TypeVar("Reply")
 SnapshotKind = TypeVar("SnapshotKind", bound="SnapshotCalls")
 list_of = list  # ServerCalls has a method of that name
 
@@ -37,6 +38,19 @@ def _matrix(message: pb.Matrix) -> Array:
     full = np.zeros((message.rows, message.columns))
     full[list(message.row_indices), list(message.column_indices)] = message.values
     return full
+
+
+def _sparse(message: pb.Matrix) -> Any:
+    """`mbcosim.v1.Matrix` as a matrix of SciPy."""
+    matrices, shape = needed("scipy.sparse", "a sparse matrix", "scipy"), (message.rows, message.columns)
+    if not message.sparse:
+        return matrices.csc_matrix(_matrix(message))
+    return matrices.csc_matrix((message.values, (message.row_indices, message.column_indices)), shape)
+
+
+def _new_id() -> str:
+    """Of a request: sent again it is not done again."""
+    return uuid.uuid4().hex
 
 
 def grant(identity: str, right: str, ports: Iterable[str] = ()) -> pb.Grant:
@@ -118,9 +132,9 @@ class ServerCalls(Generic[SimulationKind]):
         return self._simulation_class(self._connection, info, list(diagnostics), printed, owned)
 
     @call
-    def info(self, *, timeout: Optional[float] = USUAL) -> Calls[pb.ServerInfo]:
-        """`mbcosim.v1.ServerInfo`: version, limits, identity, role."""
-        reply: pb.ServerInfo = yield Call("Simulations/GetServerInfo", pb.GetServerInfoRequest(), timeout, repeatable=True)
+    def info(self, *, timeout: Optional[float] = USUAL) -> Calls[pb.GetServerInfoReply]:
+        """`mbcosim.v1.GetServerInfoReply`: version, limits, identity, role."""
+        reply: pb.GetServerInfoReply = yield Call("Simulations/GetServerInfo", pb.GetServerInfoRequest(), timeout, repeatable=True)
         return reply
 
     @call
@@ -142,7 +156,7 @@ class ServerCalls(Generic[SimulationKind]):
         lease         seconds that the simulation lives without calls; None: the server's default
         ports         places where peers can couple: structural_port, signal_port, motion_port, modal_port
         policy        what to do when a step does not converge: "fail", "cut_step" or "accept_flagged"
-        minimum_step  shortest piece of "cut_step" [s]; 0: 1/1024 of the step
+        minimum_step  shortest piece of "cut_step" [s]; None: 1/1024 of the step
         record        keeps what crosses the ports; see Simulation.record
         summed_time   time is summed from step to step as MBDyn does, instead of t0 + n h
         results       writes result files on the server: True (what the deck asks for), "text", "netcdf" or a list of them
@@ -163,16 +177,18 @@ class ServerCalls(Generic[SimulationKind]):
         return (yield from self._create(pb.UploadHeader(model_root_file=deck), {}, **options))
 
     def _create(self, header: pb.UploadHeader, files: Mapping[str, bytes], *, name: str = "", lease: Optional[float] = None,
-                ports: Iterable[coupling_types_pb2.PortDefinition] = (), policy: str = "fail", minimum_step: float = 0.0,
+                ports: Iterable[coupling_types_pb2.PortDefinition] = (), policy: str = "fail", minimum_step: Optional[float] = None,
                 record: bool = False, summed_time: bool = False, symbols: Optional[Mapping[str, Symbol]] = None,
                 grants: Iterable[pb.Grant] = (), results: Results = False, results_quota: Optional[int] = None,
                 durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None, pace: Optional[float] = None,
                 timeout: Optional[float] = None) -> Calls[SimulationKind]:
-        header.options.request_id = uuid.uuid4().hex
+        header.options.request_id = _new_id()
+        header.options.protocol.CopyFrom(protocol())
         header.options.display_name = name
         header.options.ports.extend(ports)
         header.options.non_convergence_policy = _policy(policy)
-        header.options.minimum_step_s = minimum_step
+        if minimum_step is not None:
+            header.options.minimum_step_size = minimum_step
         header.options.record_ports = record
         header.options.summed_time = summed_time
         if results:
@@ -240,8 +256,8 @@ class ServerCalls(Generic[SimulationKind]):
     @call
     def attach(self, name: str, *, timeout: Optional[float] = USUAL) -> Calls[SimulationKind]:
         """A simulation that exists on the server, by its name."""
-        info = yield Call("Simulations/GetSimulation", pb.GetSimulationRequest(name=name), timeout, repeatable=True)
-        return self._make(info, owned=False)
+        reply = yield Call("Simulations/GetSimulation", pb.GetSimulationRequest(simulation=name), timeout, repeatable=True)
+        return self._make(reply.simulation, owned=False)
 
 
 class SimulationCalls(Generic[SnapshotKind]):
@@ -258,11 +274,11 @@ class SimulationCalls(Generic[SnapshotKind]):
         self.info = info
         self.diagnostics = diagnostics
         self.printed = printed
-        self.step_number, self.time = info.step, info.time_s
+        self.step_number, self.time = info.step, info.time
 
     def __repr__(self) -> str:
         title = f" \"{self.info.display_name}\"" if self.info.display_name else ""
-        return f"<{type(self).__name__} {self.name}{title}, step {self.step_number}, t = {self.time:g} s of {self.info.final_time_s:g} s>"
+        return f"<{type(self).__name__} {self.name}{title}, step {self.step_number}, t = {self.time:g} s of {self.info.final_time:g} s>"
 
     # ---------------------------------------------------------------- variables
 
@@ -272,14 +288,8 @@ class SimulationCalls(Generic[SnapshotKind]):
         return (yield from self._describe(timeout))
 
     def _describe(self, timeout: Optional[float]) -> Calls[pb.ModelDescription]:
-        request, whole = pb.DescribeSimulationRequest(name=self.name), pb.ModelDescription()
-        while True:
-            page: pb.ModelDescription = yield Call("Simulations/DescribeSimulation", request, timeout, repeatable=True)
-            request.page_token = page.next_page_token
-            page.next_page_token = ""
-            whole.MergeFrom(page)
-            if not request.page_token:
-                break
+        request = pb.DescribeSimulationRequest(simulation=self.name)
+        whole = (yield from self._pages("Simulations/DescribeSimulation", request, pb.DescribeSimulationReply(), timeout)).model
         self._known.update((v.name, v) for v in whole.variables)
         self._description = whole
         return whole
@@ -289,19 +299,20 @@ class SimulationCalls(Generic[SnapshotKind]):
         """Integer handles of variables, for calls on the hot path."""
         return (yield from self._handles(names, timeout))
 
-    def _handles(self, names: Iterable[str], timeout: Optional[float] = USUAL) -> Calls[list_of[int]]:
+    def _handles(self, names: Iterable[str], timeout: Optional[float]) -> Calls[list_of[int]]:
+        timeout = USUAL if timeout is None else min(timeout, USUAL)  # of whatever needs them
         names = list(names)
         missing = [name for name in names if name not in self._known]
         if missing and self._description is None:
-            request = pb.DescribeSimulationRequest(name=self.name, variable_names=missing)
+            request = pb.DescribeSimulationRequest(simulation=self.name, variable_names=missing)
             try:
-                found: pb.ModelDescription = yield Call("Simulations/DescribeSimulation", request, timeout, repeatable=True)
+                found: pb.DescribeSimulationReply = yield Call("Simulations/DescribeSimulation", request, timeout, repeatable=True)
             except NotFound as error:
                 if error.reason != "NO_SUCH_VARIABLE":
                     raise
                 yield from self._describe(timeout)  # its names help to find the one that was meant
             else:
-                self._known.update((v.name, v) for v in found.variables)
+                self._known.update((v.name, v) for v in found.model.variables)
         return [self._variable(name).handle for name in names]
 
     def _variable(self, name: str) -> common_pb2.Variable:
@@ -326,7 +337,7 @@ class SimulationCalls(Generic[SnapshotKind]):
 
     def _write(self, values: Values, timeout: Optional[float]) -> Calls[None]:
         yield from self._handles(values, timeout)
-        request = pb.WriteVariablesRequest(simulation=self.name, values=self.pack(values))
+        request = pb.WriteVariablesRequest(simulation=self.name, values=self.pack(values), request_id=_new_id())
         yield Call("Simulations/WriteVariables", request, timeout, repeatable=True)
 
     def split(self, names: Iterable[str], values: Any) -> dict[str, Any]:
@@ -355,7 +366,7 @@ class SimulationCalls(Generic[SnapshotKind]):
              outputs: Iterable[str] = (), timeout: Optional[float] = None) -> Calls[StepResult]:
         """Takes `count` steps, of `step_size` [s] each (default: the deck's), or fewer when `until`, a Condition, holds before. Raises
         StepFailed when one does not converge, or a peer rejects it."""
-        request = pb.StepRequest(steps=count, step_size_s=step_size)
+        request = pb.StepRequest(steps=count, step_size=step_size)
         return (yield from self._advance(request, until, inputs, outputs, timeout))
 
     @call
@@ -364,10 +375,10 @@ class SimulationCalls(Generic[SnapshotKind]):
                   timeout: Optional[float] = None) -> Calls[StepResult]:
         """Steps until `time` [s] or the deck's end; with `exact` the last step is shortened so that it ends there. `step_size` and `until` as in
         `step`. `progress(RunProgress)` is called about twice a second."""
-        request = pb.StepRequest(until_time_s=time, exact=exact, step_size_s=step_size)
+        request = pb.StepRequest(until_time=time, exact=exact, step_size=step_size)
         if progress is None:
             return (yield from self._advance(request, until, inputs, outputs, timeout))
-        yield from self._fill(request, until, inputs, outputs)
+        yield from self._fill(request, until, inputs, outputs, timeout)
         done: list_of[pb.StepReply] = []
         wanted = progress
 
@@ -384,8 +395,8 @@ class SimulationCalls(Generic[SnapshotKind]):
                   report: Optional[Callable[[pb.RunProgress], object]], timeout: Optional[float]) -> Calls[tuple[Rows, StepResult]]:
         """Makes `request`'s steps in one call: (Rows of the present state, every `every`-th step and the last one; StepResult). When a step
         fails, StepFailed has the rows as `rows`. `report(RunProgress)` may be None."""
-        yield from self._fill(request, None, inputs, ())
-        table = pb.TableRequest(handles=(yield from self._handles(names)), every=every)
+        yield from self._fill(request, None, inputs, (), timeout)
+        table = pb.TableRequest(handles=(yield from self._handles(names, timeout)), every=every)
         rows, done = Rows([self._variable(name) for name in names]), list[pb.StepReply]()
 
         def take(message: pb.RunReply) -> None:
@@ -406,35 +417,36 @@ class SimulationCalls(Generic[SnapshotKind]):
     @call
     def interrupt(self, *, timeout: Optional[float] = USUAL) -> Calls[bool]:
         """Stops whatever advances this simulation, from any thread or client."""
-        reply: pb.InterruptReply = yield Call("Simulations/Interrupt", pb.InterruptRequest(name=self.name), timeout, repeatable=True)
+        reply: pb.InterruptReply = yield Call("Simulations/Interrupt", pb.InterruptRequest(simulation=self.name, request_id=_new_id()), timeout, repeatable=True)
         return reply.was_stepping
 
-    def _fill(self, request: pb.StepRequest, until: Optional[Condition], inputs: Optional[Values], outputs: Iterable[str]) -> Calls[None]:
+    def _fill(self, request: pb.StepRequest, until: Optional[Condition], inputs: Optional[Values], outputs: Iterable[str],
+              timeout: Optional[float]) -> Calls[None]:
         request.simulation = self.name
         if until is not None:
-            request.until.handle, = yield from self._handles([until.variable])
+            request.until.handle, = yield from self._handles([until.variable], timeout)
             request.until.element, request.until.threshold = until.element, until.threshold
             request.until.comparison = pick(_COMPARISONS, until.comparison, "comparison")
             if until.locate_within is not None:
-                request.until.locate_within_s = until.locate_within
+                request.until.locate_within = until.locate_within
         if inputs:
-            yield from self._handles(inputs)
+            yield from self._handles(inputs, timeout)
             request.inputs.CopyFrom(self.pack(inputs))
-        request.outputs.extend((yield from self._handles(outputs)))
+        request.outputs.extend((yield from self._handles(outputs, timeout)))
 
     def _advance(self, request: pb.StepRequest, until: Optional[Condition], inputs: Optional[Values], outputs: Iterable[str],
                  timeout: Optional[float]) -> Calls[StepResult]:
-        yield from self._fill(request, until, inputs, outputs)
-        request.request_id = uuid.uuid4().hex
+        yield from self._fill(request, until, inputs, outputs, timeout)
+        request.request_id = _new_id()
         return self.result((yield Call("Simulations/Step", request, timeout, repeatable=True)), outputs)
 
     def result(self, reply: pb.StepReply, outputs: Iterable[str] = ()) -> StepResult:
         """A reply as a StepResult; raises StepFailed when the reply tells a failure."""
-        self.step_number, self.time = reply.step, reply.time_s
+        self.step_number, self.time = reply.step, reply.time
         outcome = enum_name(pb.StepOutcome, reply.outcome, "STEP_OUTCOME_")
-        preferred = reply.preferred_step_size_s if reply.HasField("preferred_step_size_s") else None
-        result = StepResult(outcome, reply.steps_done, reply.step, reply.time_s, reply.step_size_s, reply.next_step_size_s,
-                            reply.largest_step_size_s, preferred, reply.condition_met, reply.iterations, reply.total_iterations,
+        preferred = reply.preferred_step_size if reply.HasField("preferred_step_size") else None
+        result = StepResult(outcome, reply.steps_done, reply.step, reply.time, reply.step_size, reply.next_step_size,
+                            reply.largest_step_size, preferred, reply.condition_met, reply.iterations, reply.total_iterations,
                             reply.residual_error, reply.solver_seconds, self.split(outputs, reply.outputs), reply)
         if reply.HasField("failure"):
             reason = enum_name(common_pb2.Reason, reply.failure.reason, "REASON_")
@@ -452,8 +464,8 @@ class SimulationCalls(Generic[SnapshotKind]):
     @call
     def snapshot(self, name: str = "", *, timeout: Optional[float] = USUAL) -> Calls[SnapshotKind]:
         """Saves the state."""
-        request = pb.CreateSnapshotRequest(simulation=self.name, display_name=name)
-        return self._snapshot_class(self, (yield Call("Simulations/CreateSnapshot", request, timeout)))
+        request = pb.CreateSnapshotRequest(simulation=self.name, display_name=name, request_id=_new_id())
+        return self._snapshot_class(self, (yield Call("Simulations/CreateSnapshot", request, timeout, repeatable=True)).snapshot)
 
     @call
     def snapshots(self, *, timeout: Optional[float] = USUAL) -> Calls[list_of[SnapshotKind]]:
@@ -468,11 +480,18 @@ class SimulationCalls(Generic[SnapshotKind]):
         yield from self._restore(snapshot, timeout)
 
     def _restore(self, snapshot: SnapshotCalls, timeout: Optional[float]) -> Calls[None]:
-        self._stand((yield Call("Simulations/RestoreSnapshot", pb.RestoreSnapshotRequest(name=snapshot.name), timeout)))
+        request = pb.RestoreSnapshotRequest(simulation=self.name, snapshot=snapshot.name, request_id=_new_id())
+        self._stand((yield Call("Simulations/RestoreSnapshot", request, timeout, repeatable=True)).simulation)
+
+    @call
+    def reset(self, *, timeout: Optional[float] = None) -> Calls[None]:
+        """Goes back to the initial solution."""
+        request = pb.ResetSimulationRequest(simulation=self.name, request_id=_new_id())
+        self._stand((yield Call("Simulations/ResetSimulation", request, timeout, repeatable=True)).simulation)
 
     def _stand(self, info: pb.SimulationInfo) -> pb.SimulationInfo:
         self.info = info
-        self.step_number, self.time = info.step, info.time_s
+        self.step_number, self.time = info.step, info.time
         return info
 
     @call
@@ -490,12 +509,12 @@ class SimulationCalls(Generic[SnapshotKind]):
     def import_state(self, data: bytes, *, restore: bool = True, name: str = "", timeout: Optional[float] = None) -> Calls[SnapshotKind]:
         """Adds a saved state from bytes and, with `restore`, goes to it."""
         def messages() -> Iterator[pb.ImportSnapshotRequest]:
-            yield pb.ImportSnapshotRequest(
-                header=pb.ImportSnapshotHeader(simulation=self.name, display_name=name, restore=restore))
+            yield pb.ImportSnapshotRequest(header=pb.ImportSnapshotHeader(
+                simulation=self.name, display_name=name, restore=restore, request_id=_new_id()))
             for start in range(0, len(data), 1 << 20):
                 yield pb.ImportSnapshotRequest(data=data[start:start + (1 << 20)])
 
-        snapshot = self._snapshot_class(self, (yield Call("Simulations/ImportSnapshot", messages(), timeout)))
+        snapshot = self._snapshot_class(self, (yield Call("Simulations/ImportSnapshot", messages(), timeout)).snapshot)
         if restore:
             self.step_number, self.time = snapshot.step, snapshot.time
         return snapshot
@@ -505,14 +524,10 @@ class SimulationCalls(Generic[SnapshotKind]):
              ports: Iterable[coupling_types_pb2.PortDefinition] = (), results: Results = False, results_quota: Optional[int] = None,
              timeout: Optional[float] = None) -> Calls[Any]:
         """A new simulation at a saved state or the current one, sharing the model. `results` as in Server.load_bundle: files of its own."""
-        request = pb.ForkSimulationRequest(options=pb.CreateOptions(display_name=name, ports=ports,
-                                                                    request_id=uuid.uuid4().hex))
+        options = pb.CreateOptions(display_name=name, ports=ports, request_id=_new_id(), protocol=protocol())
         if results:
-            request.options.results.CopyFrom(_result_options(results, results_quota))
-        if snapshot is None:
-            request.simulation = self.name
-        else:
-            request.snapshot = snapshot.name
+            options.results.CopyFrom(_result_options(results, results_quota))
+        request = pb.ForkSimulationRequest(simulation=self.name, snapshot=snapshot.name if snapshot else None, options=options)
         reply = yield Call("Simulations/ForkSimulation", request, timeout, repeatable=True)
         return type(self)(self._connection, reply.simulation, [], "", True)
 
@@ -533,11 +548,11 @@ class SimulationCalls(Generic[SnapshotKind]):
     # ---------------------------------------------------------------- analysis
 
     @call
-    def eigenvalues(self, count: int = 0, *, shift_hz: float = 0.0, vectors: bool = False, timeout: Optional[float] = None) -> Calls[Any]:
-        """Eigenvalues [1/s] about the current state, nearest to `shift_hz` first; 0: all finite ones. With `vectors` also
+    def eigenvalues(self, count: int = 0, *, shift: float = 0.0, vectors: bool = False, timeout: Optional[float] = None) -> Calls[Any]:
+        """Eigenvalues [1/s] about the current state, nearest to `shift` first; 0: all finite ones. With `vectors` also
         the eigenvectors, one a column."""
-        request = pb.ComputeEigenvaluesRequest(simulation=self.name, count=count, shift_hz=shift_hz, eigenvectors=vectors)
-        reply = yield Call("Simulations/ComputeEigenvalues", request, timeout, repeatable=True)
+        request = pb.ComputeEigenvaluesRequest(simulation=self.name, count=count or None, shift=shift, eigenvectors=vectors)
+        reply = yield from self._pages("Simulations/ComputeEigenvalues", request, pb.ComputeEigenvaluesReply(), timeout)
         values = np.array(reply.real) + 1j * np.array(reply.imaginary)
         return (values, _matrix(reply.vectors_real) + 1j * _matrix(reply.vectors_imaginary)) if vectors else values
 
@@ -548,16 +563,28 @@ class SimulationCalls(Generic[SnapshotKind]):
         return tuple(_matrix(m) for m in (reply.a, reply.b, reply.c, reply.d))
 
     @call
-    def linearize_descriptor(self, inputs: Iterable[str] = (), outputs: Iterable[str] = (), *, timeout: Optional[float] = None) -> Calls[tuple[Array, ...]]:
-        """Matrices E, A, B, C, D of E dx/dt = A x + B u, y = C x + D u with all unknowns of the model."""
+    def linearize_descriptor(self, inputs: Iterable[str] = (), outputs: Iterable[str] = (), *, sparse: bool = False,
+                             timeout: Optional[float] = None) -> Calls[tuple[Any, ...]]:
+        """Matrices E, A, B, C, D of E dx/dt = A x + B u, y = C x + D u with all unknowns of the model: numpy arrays, or with `sparse` matrices of
+        SciPy (csc_matrix), without which a large model does not fit into memory."""
         reply = yield from self._linearize(inputs, outputs, True, timeout)
-        return tuple(_matrix(m) for m in (reply.e, reply.a, reply.b, reply.c, reply.d))
+        made = _sparse if sparse else _matrix
+        return tuple(made(m) for m in (reply.e, reply.a, reply.b, reply.c, reply.d))
 
     def _linearize(self, inputs: Iterable[str], outputs: Iterable[str], descriptor: bool, timeout: Optional[float]) -> Calls[pb.LinearizeReply]:
-        request = pb.LinearizeRequest(simulation=self.name, inputs=(yield from self._handles(inputs)),
-                                      outputs=(yield from self._handles(outputs)), descriptor_form=descriptor)
-        reply: pb.LinearizeReply = yield Call("Simulations/Linearize", request, timeout, repeatable=True)
-        return reply
+        request = pb.LinearizeRequest(simulation=self.name, inputs=(yield from self._handles(inputs, timeout)),
+                                      outputs=(yield from self._handles(outputs, timeout)), descriptor_form=descriptor)
+        return (yield from self._pages("Simulations/Linearize", request, pb.LinearizeReply(), timeout))
+
+    def _pages(self, method: str, request: Any, whole: Reply, timeout: Optional[float]) -> Calls[Reply]:
+        """All pages of a reply as one."""
+        merged: Any = whole
+        while True:
+            page = yield Call(method, request, timeout, repeatable=True)
+            merged.MergeFrom(page)
+            request.page_token = page.next_page_token
+            if not request.page_token:
+                return whole
 
     @call
     def geometry(self, *, line_samples: Optional[int] = None, modal_points: bool = True,
@@ -586,35 +613,36 @@ class SimulationCalls(Generic[SnapshotKind]):
     @call
     def refresh(self, *, timeout: Optional[float] = USUAL) -> Calls[pb.SimulationInfo]:
         """Asks the server where the simulation stands."""
-        return self._stand((yield Call("Simulations/GetSimulation", pb.GetSimulationRequest(name=self.name), timeout,
-                                       repeatable=True)))
+        return self._stand((yield Call("Simulations/GetSimulation", pb.GetSimulationRequest(simulation=self.name), timeout,
+                                       repeatable=True)).simulation)
 
     @call
     def update(self, *, name: Optional[str] = None, policy: Optional[str] = None, minimum_step: Optional[float] = None,
                grants: Optional[Iterable[pb.Grant]] = None, timeout: Optional[float] = USUAL) -> Calls[pb.SimulationInfo]:
         """Changes choices made at creation; see Server.load_bundle."""
-        request = pb.UpdateSimulationRequest(name=self.name)
+        request = pb.UpdateSimulationRequest(simulation=self.name, request_id=_new_id())
         if name is not None:
             request.display_name = name
         if policy is not None:
             request.non_convergence_policy = _policy(policy)
         if minimum_step is not None:
-            request.minimum_step_s = minimum_step
+            request.minimum_step_size = minimum_step
         if grants is not None:
             request.grants.SetInParent()
             request.grants.grants.extend(grants)
-        self.info = yield Call("Simulations/UpdateSimulation", request, timeout, repeatable=True)
+        self.info = (yield Call("Simulations/UpdateSimulation", request, timeout, repeatable=True)).simulation
         return self.info
 
     @call
     def record(self, *, timeout: Optional[float] = None) -> Calls[bytes]:
         """All that crossed the ports so far, as bytes for `mbcosim replay`. The simulation must have been created with `record`."""
-        return (yield from self._collect("Simulations/GetRecord", pb.GetRecordRequest(name=self.name), timeout))
+        return (yield from self._collect("Simulations/GetRecord", pb.GetRecordRequest(simulation=self.name), timeout))
 
     @call
     def delete(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Ends the simulation."""
-        yield Call("Simulations/DeleteSimulation", pb.DeleteSimulationRequest(name=self.name), timeout)
+        yield Call("Simulations/DeleteSimulation", pb.DeleteSimulationRequest(simulation=self.name, request_id=_new_id()), timeout,
+                   repeatable=True)
 
 
 class SnapshotCalls:
@@ -622,7 +650,7 @@ class SnapshotCalls:
 
     def __init__(self, simulation: SimulationCalls[Any], info: pb.Snapshot) -> None:
         self._simulation, self._connection = simulation, simulation._connection
-        self.name, self.step, self.time, self.display_name = info.name, info.step, info.time_s, info.display_name
+        self.name, self.step, self.time, self.display_name = info.name, info.step, info.time, info.display_name
         self.size_bytes = info.size_bytes
 
     def __repr__(self) -> str:
@@ -636,9 +664,11 @@ class SnapshotCalls:
     @call
     def export(self, *, timeout: Optional[float] = USUAL) -> Calls[bytes]:
         """The state as bytes."""
-        return (yield from self._simulation._collect("Simulations/ExportSnapshot", pb.ExportSnapshotRequest(snapshot=self.name), timeout))
+        request = pb.ExportSnapshotRequest(simulation=self._simulation.name, snapshot=self.name)
+        return (yield from self._simulation._collect("Simulations/ExportSnapshot", request, timeout))
 
     @call
     def delete(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Forgets the state."""
-        yield Call("Simulations/DeleteSnapshot", pb.DeleteSnapshotRequest(name=self.name), timeout)
+        request = pb.DeleteSnapshotRequest(simulation=self._simulation.name, snapshot=self.name, request_id=_new_id())
+        yield Call("Simulations/DeleteSnapshot", request, timeout, repeatable=True)

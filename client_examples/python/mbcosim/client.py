@@ -43,13 +43,13 @@ def connect(address: Optional[str] = None, *, token: Optional[str] = None, tls: 
     return server
 
 
-def await_answer(server: Server, timeout: Optional[float]) -> simulations_pb2.ServerInfo:
+def await_answer(server: Server, timeout: Optional[float]) -> simulations_pb2.GetServerInfoReply:
     """Waits until a server answers; see access.Attempts."""
     attempts = access.Attempts(server.address, timeout)
     while True:
         try:
             with translated():
-                info: simulations_pb2.ServerInfo = server.simulations.GetServerInfo(
+                info: simulations_pb2.GetServerInfoReply = server.simulations.GetServerInfo(
                     simulations_pb2.GetServerInfoRequest(), metadata=server.metadata, timeout=attempts.left())
                 return info
         except Unavailable as error:

@@ -36,7 +36,7 @@ def structural_port(name: str, nodes: Iterable[int], *, offsets: Optional[npt.Ar
     """A port on structural nodes: motion out, forces and moments in. `offsets`: n x 3 in the nodes' frames [m]."""
     port = types.PortDefinition(name=name, kind=types.PORT_KIND_STRUCTURAL, node_labels=list(nodes))
     if offsets is not None:
-        port.offsets_m.extend(np.ravel(np.asarray(offsets, float)))
+        port.offsets.extend(np.ravel(np.asarray(offsets, float)))
     if reference is not None:
         port.reference_node_label = reference
     return port
@@ -73,7 +73,7 @@ class Peer(exchange.Course):
     Without `answer` the peer is synchronous: iterate over it and answer each motion with `peer.answer(...)`, in another thread than
     the one that steps.
 
-    every      steps between exchanges; "tight": iterations
+    every      steps between exchanges; "tight": iterations; None: the port's own, 1 unless its deck says otherwise
     mode       "loose", "staggered", "tight" or "window"; None: the port's own, "loose" unless its deck says otherwise
     frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
     tangent    "dense" or "block_diagonal" when answers are Loads with derivatives

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
 from .errors import Error
+from .rpc import protocol
 from .words import choice
 
 _ROTATION_SIZE = {"matrix": 9, "vector": 3, "quaternion": 4, "euler_123": 3}
@@ -66,22 +67,25 @@ class Loads:
 
 
 def hello(simulation: Any, port: str, *, mode: Optional[str] = None, rotation: str = "matrix", frame: Optional[str] = None,
-          accelerations: bool = False, every: int = 1, hold: str = "zero_order", peer_timeout: float = 10.0, policy: str = "fail_step",
-          acceleration: str = "none", relaxation: float = 0.5, tolerance: float = 1e-6, maximum_passes: int = 50, check_model: bool = True,
-          tangent: str = "none", heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None) -> pb.PeerMessage:
+          accelerations: bool = False, every: Optional[int] = None, hold: str = "zero_order", peer_timeout: float = 10.0,
+          policy: str = "fail_step", acceleration: str = "none", relaxation: Optional[float] = None, tolerance: Optional[float] = None,
+          maximum_passes: Optional[int] = None, check_model: bool = True, tangent: str = "none",
+          heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None) -> pb.PeerMessage:
     """First message of a peer."""
     message = pb.Hello(
-        simulation=simulation.name, port=port, rotation_form=_enum(types.RotationForm, "ROTATION_FORM_", rotation),
-        frame=_enum(types.PortFrame, "PORT_FRAME_", frame), accelerations=accelerations,
-        mode=_enum(types.CouplingMode, "COUPLING_MODE_", mode), every=every,
-        input_hold=_enum(types.InputHold, "INPUT_HOLD_", hold), policy=_enum(types.PeerPolicy, "PEER_POLICY_", policy),
-        acceleration=_enum(types.Acceleration, "ACCELERATION_", acceleration), relaxation=relaxation,
-        interface_tolerance=tolerance, maximum_passes=maximum_passes, length_unit="m", force_unit="N", angle_unit="rad",
-        model_digest=simulation.info.model_digest if check_model else "",
-        tangent=_enum(pb.TangentForm, "TANGENT_FORM_", tangent))
-    message.protocol.lowest = message.protocol.highest = 1
-    message.peer_timeout.FromMilliseconds(int(peer_timeout * 1000))
-    for field, seconds in ((message.heartbeat_interval, heartbeat_interval), (message.heartbeat_timeout, heartbeat_timeout)):
+        protocol=protocol(), simulation=simulation.name, port=port,
+        expected=pb.PeerExpectation(model_digest=simulation.info.model_digest if check_model else ""),
+        form=pb.ExchangeForm(rotation_form=_enum(types.RotationForm, "ROTATION_FORM_", rotation),
+                             frame=_enum(types.PortFrame, "PORT_FRAME_", frame), accelerations=accelerations),
+        schedule=pb.ExchangeSchedule(mode=_enum(types.CouplingMode, "COUPLING_MODE_", mode), every=every,
+                                     input_hold=_enum(types.InputHold, "INPUT_HOLD_", hold)),
+        iteration=pb.InterfaceIteration(acceleration=_enum(types.Acceleration, "ACCELERATION_", acceleration), relaxation=relaxation,
+                                        tolerance=tolerance, maximum_passes=maximum_passes,
+                                        tangent=_enum(pb.TangentForm, "TANGENT_FORM_", tangent)),
+        presence=pb.PeerPresence(policy=_enum(types.PeerPolicy, "PEER_POLICY_", policy)))
+    presence = message.presence
+    for field, seconds in ((presence.peer_timeout, peer_timeout), (presence.heartbeat_interval, heartbeat_interval),
+                           (presence.heartbeat_timeout, heartbeat_timeout)):
         if seconds is not None:
             field.FromMilliseconds(int(seconds * 1000))
     return pb.PeerMessage(hello=message)
@@ -150,12 +154,12 @@ def motion(fields: dict[int, Any], rotation: str) -> Motion:
     if rotation == "matrix":
         rotations = rotations.reshape(-1, 3, 3)
     return Motion(
-        fields.get(_E.STEP_FIELD_NUMBER, 0), fields.get(_E.TIME_S_FIELD_NUMBER, 0.0),
-        fields.get(_E.TARGET_TIME_S_FIELD_NUMBER, 0.0), fields.get(_E.ITERATION_FIELD_NUMBER, 0),
-        rows(_E.POSITIONS_M_FIELD_NUMBER), rotations, rows(_E.VELOCITIES_M_S_FIELD_NUMBER),
-        rows(_E.ANGULAR_VELOCITIES_RAD_S_FIELD_NUMBER), rows(_E.ACCELERATIONS_M_S2_FIELD_NUMBER),
-        rows(_E.ANGULAR_ACCELERATIONS_RAD_S2_FIELD_NUMBER), rows(_E.SIGNALS_FIELD_NUMBER, 1).ravel(),
-        rows(_E.FORCES_N_FIELD_NUMBER), rows(_E.MOMENTS_NM_FIELD_NUMBER), bool(fields.get(_E.TARGET_ESTIMATED_FIELD_NUMBER, 0)))
+        fields.get(_E.STEP_FIELD_NUMBER, 0), fields.get(_E.TIME_FIELD_NUMBER, 0.0),
+        fields.get(_E.TARGET_TIME_FIELD_NUMBER, 0.0), fields.get(_E.ITERATION_FIELD_NUMBER, 0),
+        rows(_E.POSITIONS_FIELD_NUMBER), rotations, rows(_E.VELOCITIES_FIELD_NUMBER),
+        rows(_E.ANGULAR_VELOCITIES_FIELD_NUMBER), rows(_E.ACCELERATIONS_FIELD_NUMBER),
+        rows(_E.ANGULAR_ACCELERATIONS_FIELD_NUMBER), rows(_E.SIGNALS_FIELD_NUMBER, 1).ravel(),
+        rows(_E.FORCES_FIELD_NUMBER), rows(_E.MOMENTS_FIELD_NUMBER), bool(fields.get(_E.TARGET_ESTIMATED_FIELD_NUMBER, 0)))
 
 
 def index(fields: dict[int, Any]) -> int:
@@ -176,22 +180,18 @@ def answer(number: int, value: Any, kind: Optional[int]) -> pb.PeerMessage:
     if isinstance(value, Reject):
         out.reject.text = value.text
         if value.preferred_step_size is not None:
-            out.reject.preferred_step_size_s = value.preferred_step_size
+            out.reject.preferred_step_size = value.preferred_step_size
         return pb.PeerMessage(exchange=out)
-    loads = _loads(value, kind)
-    _put(out.forces_n, loads.forces)
-    _put(out.moments_nm, loads.moments)
-    _put(out.reference_force_n, loads.reference_force)
-    _put(out.reference_moment_nm, loads.reference_moment)
-    _put(out.signals, loads.signals)
-    _put(out.positions_m, loads.positions)
-    _put(out.rotations, loads.rotations)
-    out.unfinished = loads.unfinished
+    loads, values = _loads(value, kind), out.answer
+    values.SetInParent()
+    for name in ("forces", "moments", "reference_force", "reference_moment", "signals", "positions", "rotations"):
+        _put(getattr(values, name), getattr(loads, name))
+    values.unfinished = loads.unfinished
     for field, block in (("stiffness", loads.stiffness), ("damping", loads.damping)):
         if block is not None:
             numbers = np.asarray(block, float)
-            _put(getattr(out.tangent, field), numbers)
-            out.tangent.block_diagonal = numbers.ndim == 3
+            _put(getattr(values.tangent, field), numbers)
+            values.tangent.block_diagonal = numbers.ndim == 3
     return pb.PeerMessage(exchange=out)
 
 
@@ -238,7 +238,7 @@ class Course:
             self._index = index(content)
             return motion(content, self._rotation)
         if name in ("accepted", "rejected"):
-            getattr(self, name).append((content.step, content.time_s))
+            getattr(self, name).append((content.step, content.time))
         return None
 
     def _answer(self, value: Any) -> pb.PeerMessage:

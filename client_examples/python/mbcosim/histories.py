@@ -12,24 +12,15 @@ from mbcosim.v1 import simulations_pb2 as pb
 
 from .calls import StepResult
 from .errors import StepFailed
+from .rpc import USUAL
 from .table import Rows
-from .words import remedy
+from .words import needed, remedy
 
 if TYPE_CHECKING:
     from .simulation import Simulation
 
 Array = npt.NDArray[np.float64]
 Input = Union[float, Sequence[float], Array, Callable[[float], Any]]
-
-
-def needed(module: str, purpose: str, package: str = "") -> Any:
-    """A module that only some functions need; where it is missing the error says how to get it."""
-    import importlib
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        name = package or module.split(".")[0]
-        raise ImportError(f"{purpose} needs {name}: pip install {name}, or apt-get install python3-{name}") from None
 
 
 class History(Mapping[str, Array]):
@@ -175,7 +166,7 @@ def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Op
          progress: bool, timeout: Optional[float]) -> History:
     rows, done, start = _Collector(simulation, names), 0, simulation.time
     total = float(steps) if end is None and steps is not None else float(end or 0.0) - start
-    size = simulation.info.next_step_s
+    size = simulation.info.next_step_size
     with simulation.stepper(names, list(inputs)) as stepper, bar(total, progress, "s" if end is not None else "step") as shown:
         while True:
             left = steps - done if end is None and steps is not None else round((float(end or 0.0) - simulation.time) / size) if size > 0 else 0
@@ -238,12 +229,14 @@ class Histories:
             raise ValueError("say how long with `until` or with `steps`, not with both")
         if every < 1:
             raise ValueError(f"`every` must be at least 1, got {every}")
+        if self._description is None and (outputs is None or inputs):
+            self.describe(timeout=USUAL if timeout is None else min(timeout, USUAL))
         names = self._positions() if outputs is None else [outputs] if isinstance(outputs, str) else list(outputs)
-        end = until if until is not None or steps is not None else self.info.final_time_s
+        end = until if until is not None or steps is not None else self.info.final_time
         named = {self.inputs.name(k): v for k, v in (inputs or {}).items()}
         if any(callable(v) for v in named.values()):
             return _run(self, names, named, end, steps, every, progress, timeout)
-        request = pb.StepRequest(steps=steps) if end is None else pb.StepRequest(until_time_s=end)
+        request = pb.StepRequest(steps=steps) if end is None else pb.StepRequest(until_time=end)
         return _run_in_one_call(self, names, request, every, named, progress, timeout)
 
     def _positions(self: Any) -> list[str]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
-from .histories import Array, History, needed
+from .histories import Array, History
+from .words import needed
 
 if TYPE_CHECKING:
     from .analysis import Modes, StateSpace

@@ -4,6 +4,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import math
 import threading
 import time
 from collections.abc import Callable, Coroutine, Generator, Iterator
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, cast, overloa
 
 import grpc
 
-from mbcosim.v1 import (coupling_pb2_grpc, events_pb2_grpc, geometry_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
+from mbcosim.v1 import (common_pb2, coupling_pb2_grpc, events_pb2_grpc, geometry_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
                         telemetry_pb2_grpc)
 
 from .errors import Error, TimedOut, Unavailable, translated
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 _Class = TypeVar("_Class", bound=type)
 
+PROTOCOL_VERSION = 2
+FEATURES = ("grants", "geometry", "symbols", "step_sizes", "request_ids", "pages", "reset", "results", "tables", "events", "checkpoints",
+            "pace", "sample_intervals")  # that this library knows
 USUAL = 30.0    # seconds that a call which advances nothing may take
 PARTING = 2.0   # seconds that leaving a `with` block may take
 _AGAIN = 2.0    # seconds in which a repeatable call is asked again after the connection broke
@@ -94,6 +98,11 @@ def runs_calls(drive: Callable[[Any], Any]) -> Callable[[_Class], _Class]:
     return decorate
 
 
+def protocol() -> common_pb2.VersionRange:
+    """The version and the features that this library speaks."""
+    return common_pb2.VersionRange(lowest=PROTOCOL_VERSION, highest=PROTOCOL_VERSION, features=FEATURES)
+
+
 def metadata(token: Optional[str]) -> list[tuple[str, str]]:
     """What says who calls."""
     return [("authorization", f"Bearer {token}")] if token else []
@@ -116,22 +125,38 @@ class Stubs:
         return getattr(getattr(self, service.lower()), method)
 
 
+class Bound:
+    """The calls that one call of the user's makes: their timeouts count from its beginning."""
+
+    def __init__(self) -> None:
+        self._begin = time.monotonic()
+
+    def within(self, call: Call) -> Call:
+        if call.timeout is not None:
+            call.timeout = max(call.timeout - (time.monotonic() - self._begin), 1e-3)
+        return call
+
+
 class Retries:
-    """Whether a call that was lost on the way is asked again: until `reconnect` seconds are over, and at least a few times."""
+    """Whether a call that was lost on the way is asked again: until `reconnect` seconds are over, and at least a few times. The call's timeout, longer
+    by `reconnect`, is the bound of all attempts together."""
 
     def __init__(self, call: Call, reconnect: float) -> None:
-        self._allowed, self._reconnect = call.repeatable, reconnect
+        self._call, self._allowed, self._reconnect = call, call.repeatable, reconnect
+        self._latest = math.inf if call.timeout is None else time.monotonic() + call.timeout + reconnect
         self._end: Optional[float] = None
         self._attempts = 0
 
     def again(self, error: Unavailable) -> tuple[float, float]:
         """Seconds to pause, and seconds to wait for a connection after that; raises `error` when there is no use in it."""
         if self._end is None:
-            self._end = time.monotonic() + max(self._reconnect, _AGAIN)
+            self._end = min(time.monotonic() + max(self._reconnect, _AGAIN), self._latest)
         self._attempts += 1
         left = self._end - time.monotonic()
         if not self._allowed or isinstance(error, TimedOut) or left <= 0 or (not self._reconnect and self._attempts > 4):
             raise error
+        if self._call.timeout is not None:
+            self._call.timeout = max(self._latest - time.monotonic(), 1e-3)
         return min(_PAUSE * 2.0 ** min(self._attempts - 1, 5), left), left
 
 
@@ -144,11 +169,12 @@ class Connection:
 
     def run(self, calls: Calls[T]) -> T:
         """Makes the calls of a generator one after the other; its result."""
+        bound = Bound()
         try:
             call = next(calls)
             while True:
                 try:
-                    reply = self.perform(call)
+                    reply = self.perform(bound.within(call))
                 except Error as error:
                     call = calls.throw(error)
                 else:

@@ -26,10 +26,13 @@ _POLICIES = {"block": telemetry_pb2.OVERFLOW_POLICY_BLOCK, "drop_oldest": teleme
 
 
 def subscribe_request(simulation: SimulationCalls[Any], handles: Iterable[int], every: int, policy: str,
-                      buffer: int) -> telemetry_pb2.SubscribeRequest:
+                      buffer: int, minimum_interval: Optional[float]) -> telemetry_pb2.SubscribeRequest:
     """`mbcosim.v1.SubscribeRequest`."""
-    return telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=handles, every=every, policy=pick(_POLICIES, policy, "policy"),
-                                          buffer_samples=buffer)
+    request = telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=handles, every=every, policy=pick(_POLICIES, policy, "policy"),
+                                             buffer_samples=buffer)
+    if minimum_interval is not None:
+        request.minimum_interval.FromNanoseconds(round(minimum_interval * 1e9))
+    return request
 
 
 @runs_calls(blocking)
@@ -88,9 +91,9 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
         return Peer(self, port, answer, **options)
 
     def subscribe(self, names: Iterable[str], *, every: int = 1, policy: str = "drop_oldest", buffer: int = 1024,
-                  timeout: Optional[float] = USUAL) -> Subscription:
-        """Samples of variables every so many steps, whoever advances; see Subscription."""
-        return Subscription(self, list(names), every, policy, buffer, timeout)
+                  minimum_interval: Optional[float] = None, timeout: Optional[float] = USUAL) -> Subscription:
+        """Samples of variables every so many steps, whoever advances, at least `minimum_interval` seconds of wall time apart; see Subscription."""
+        return Subscription(self, list(names), every, policy, buffer, minimum_interval, timeout)
 
 
 class Stepper:
@@ -123,13 +126,13 @@ class Stepper:
         request.CopyFrom(self._request)
         request.steps = count
         if step_size is not None:
-            request.step_size_s = step_size
+            request.step_size = step_size
         if self._inputs:
             request.inputs.values.extend(np.ravel(np.asarray(values, float)))
         self._requests.put(request)
         with bounded(timeout, self._replies.cancel, "the step"), translated():
             reply = next(self._replies)
-        return self._simulation.result(reply, self._outputs)
+        return self._simulation.result(reply.step, self._outputs)
 
     def close(self, *, timeout: Optional[float] = PARTING) -> None:
         """Ends the stream."""
@@ -148,9 +151,9 @@ class Subscription:
     """
 
     def __init__(self, simulation: Simulation, names: list[str], every: int, policy: str, buffer: int,
-                 timeout: Optional[float] = USUAL) -> None:
+                 minimum_interval: Optional[float] = None, timeout: Optional[float] = USUAL) -> None:
         self._simulation, self._names = simulation, names
-        request = subscribe_request(simulation, simulation.handles(names, timeout=timeout), every, policy, buffer)
+        request = subscribe_request(simulation, simulation.handles(names, timeout=timeout), every, policy, buffer, minimum_interval)
         connection = simulation._connection
         self._stream = connection.stubs.telemetry.Subscribe(request, metadata=connection.metadata)
         self.dropped = 0
@@ -168,7 +171,7 @@ class Subscription:
             for batch in self._stream:
                 self.dropped = batch.total_dropped
                 for sample in batch.samples:
-                    yield sample.step, sample.time_s, self._simulation.split(self._names, sample.values)
+                    yield sample.step, sample.time, self._simulation.split(self._names, sample.values)
         except grpc.RpcError as error:
             if error.code() != grpc.StatusCode.CANCELLED:
                 with translated():

@@ -23,7 +23,7 @@ class Rows:
         """Takes the next block."""
         count = len(block.steps)
         self._steps.append(np.fromiter(block.steps, np.int64, count))
-        self._times.append(np.fromiter(block.times_s, float, count))
+        self._times.append(np.fromiter(block.times, float, count))
         self._values.append(np.fromiter(block.values, float, len(block.values)).reshape(count, self._width))
 
     @property

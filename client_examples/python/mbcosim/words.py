@@ -36,3 +36,13 @@ def pick(choices: dict[str, Any], word: str, what: str) -> Any:
         return choices[word]
     except (KeyError, TypeError):
         raise ValueError(f"{what}: no choice is called {word!r}; choose from {listed(choices)}") from None
+
+
+def needed(module: str, purpose: str, package: str = "") -> Any:
+    """A module that only some functions need; where it is missing the error says how to get it."""
+    import importlib
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        name = package or module.split(".")[0]
+        raise ImportError(f"{purpose} needs {name}: pip install {name}, or apt-get install python3-{name}") from None

@@ -59,8 +59,8 @@ export class View {
     const all: VariableOfJson[] = [];
     let pageToken = '';
     do {
-      const page = await this.call<{ variables?: VariableOfJson[]; nextPageToken?: string }>('Simulations/DescribeSimulation', { name: simulation, pageToken });
-      all.push(...(page.variables ?? []));
+      const page = await this.call<{ model: { variables?: VariableOfJson[] }; nextPageToken?: string }>('Simulations/DescribeSimulation', { simulation, pageToken });
+      all.push(...(page.model.variables ?? []));
       pageToken = page.nextPageToken ?? '';
     } while (pageToken);
     return all;
@@ -70,11 +70,11 @@ export class View {
   async read(names: string[], simulation = this.simulation): Promise<{ step: number; time: number; values: Record<string, number[]> }> {
     const variables = await this.variables(simulation);
     const chosen = names.map((name) => variables.find((variable) => variable.name === name) ?? fail(`no variable ${name}`));
-    const reply = await this.call<{ step: string; timeS: number; values: number[] }>('Simulations/ReadVariables', { simulation, handles: chosen.map((variable) => variable.handle) });
+    const reply = await this.call<{ step: string; time: number; values: number[] }>('Simulations/ReadVariables', { simulation, handles: chosen.map((variable) => variable.handle) });
     const values: Record<string, number[]> = {};
     let at = 0;
     for (const { name, size } of chosen) values[name] = reply.values.slice(at, (at += size));
-    return { step: Number(reply.step), time: reply.timeS, values };
+    return { step: Number(reply.step), time: reply.time, values };
   }
 
   async stop(): Promise<void> {

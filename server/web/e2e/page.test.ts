@@ -88,7 +88,7 @@ describe('each example deck', () => {
     await expectSceneOf(visited, view, simulation);
     expect(visited.faults).toEqual([]);
     await turnTo(visited.page, view.simulation);
-    await view.call('Simulations/DeleteSimulation', { name: simulation });
+    await view.call('Simulations/DeleteSimulation', { simulation });
   });
 });
 
@@ -242,7 +242,7 @@ describe('plots', () => {
 describe('eigenmodes', () => {
   test('are those of the service, and move the scene', async () => {
     await withPage('cantilever_five.mbd', async ({ page }, view) => {
-      const eigen = await view.call<{ real: number[]; imaginary: number[] }>('Simulations/ComputeEigenvalues', { simulation: view.simulation, count: 20, shiftHz: 1 });
+      const eigen = await view.call<{ real: number[]; imaginary: number[] }>('Simulations/ComputeEigenvalues', { simulation: view.simulation, count: 20, shift: 1 });
       const slowest = Math.min(...eigen.imaginary.filter((imaginary) => imaginary > 0)) / (2 * Math.PI);
       await page.locator('summary', { hasText: 'Eigenmodes' }).click();
       await page.getByRole('button', { name: 'Compute' }).click();

@@ -26,7 +26,7 @@ describe('the first view', () => {
         await turnTo(page, simulation);
         expect(await inView(page), deck).toBe(true);
         await turnTo(page, view.simulation);
-        await view.call('Simulations/DeleteSimulation', { name: simulation });
+        await view.call('Simulations/DeleteSimulation', { simulation });
       }
     });
   });

@@ -5,7 +5,7 @@ import { createConnectTransport } from '@connectrpc/connect-web';
 import { DeckDiagnosticsSchema, ErrorInfoSchema, SolverFailureSchema, type Diagnostic, type SolverFailure } from './gen/mbcosim/v1/common_pb';
 import { Events } from './gen/mbcosim/v1/events_pb';
 import { Geometry } from './gen/mbcosim/v1/geometry_pb';
-import { Simulations, type ModelDescription } from './gen/mbcosim/v1/simulations_pb';
+import { Simulations } from './gen/mbcosim/v1/simulations_pb';
 import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
 import { chunks, type NamedFile } from './upload';
 
@@ -15,19 +15,6 @@ export const simulations = createClient(Simulations, transport);
 export const telemetry = createClient(Telemetry, transport);
 export const geometry = createClient(Geometry, transport);
 export const events = createClient(Events, transport);
-
-/** All pages of a model's description as one. */
-export async function describeModel(name: string): Promise<ModelDescription> {
-  const whole = await simulations.describeSimulation({ name });
-  for (let pageToken = whole.nextPageToken; pageToken; ) {
-    const page = await simulations.describeSimulation({ name, pageToken });
-    whole.nodes.push(...page.nodes);
-    whole.elements.push(...page.elements);
-    for (const variable of page.variables) whole.variables.push(variable);
-    pageToken = page.nextPageToken;
-  }
-  return whole;
-}
 
 /** Loads a deck; the new simulation's name. */
 export async function loadDeck(files: readonly NamedFile[], main: string): Promise<string> {

@@ -33,7 +33,7 @@ export function tell(event: Event): Told | undefined {
   const info = (text: string | undefined): Told | undefined => (text ? { text, level: 'info' } : undefined);
   switch (content.case) {
     case 'missed':
-      return info(content.value.count > 0n ? `${content.value.count} events were missed` : 'events were missed: the daemon was started anew');
+      return info(content.value.count !== undefined ? `${content.value.count} events were missed` : 'events were missed: the daemon was started anew');
     case 'created':
       return info(`${who} made the simulation${content.value.forkedFrom ? ` out of ${content.value.forkedFrom}` : ''}`);
     case 'deleted':

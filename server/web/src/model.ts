@@ -47,9 +47,9 @@ export function modelOf(description: ModelDescription): Model {
     title: description.title,
     digest: description.modelDigest,
     unknowns: description.unknowns,
-    initialTime: description.initialTimeS,
-    finalTime: description.finalTimeS,
-    step: description.stepS,
+    initialTime: description.initialTime,
+    finalTime: description.finalTime,
+    step: description.stepSize,
     nodes: description.nodes.map((node) => ({
       id: `node.${node.family}:${node.label}`,
       family: node.family,

@@ -1,9 +1,10 @@
 /** A simulation on the screen: what is known of it, what was seen of it, and what can be done with it. */
-import { describeModel, events, failureOf, simulations, telemetry, type Failure } from './api';
+import { events, failureOf, simulations, telemetry, type Failure } from './api';
+import { describe, eigenvectors, look, stateNames, told } from './questions';
 import { tell } from './events';
 import { duration } from './duration';
 import { SimulationState, StepOutcome, type SimulationInfo, type Snapshot, type StepReply } from './gen/mbcosim/v1/simulations_pb';
-import { OverflowPolicy, type TelemetryBatch } from './gen/mbcosim/v1/telemetry_pb';
+import { OverflowPolicy, type SubscribeReply } from './gen/mbcosim/v1/telemetry_pb';
 import type { Geometry } from './geometry';
 import { loadGeometry } from './load_geometry';
 import { modelOf, type Model, type VariableInfo } from './model';
@@ -88,11 +89,7 @@ export class Session implements Shown {
 
   /** Reads all about the simulation `name` and follows it until `close`. */
   static async open(name: string): Promise<Session> {
-    const [info, description, geometry] = await Promise.all([
-      simulations.getSimulation({ name }),
-      describeModel(name),
-      loadGeometry(name),
-    ]);
+    const [info, description, geometry] = await Promise.all([look(name), describe(name), loadGeometry(name)]);
     const session = new Session(info, modelOf(description), geometry);
     await session.read();
     void session.follow();
@@ -133,7 +130,7 @@ export class Session implements Shown {
     const layout = this.layout;
     try {
       const reply = await simulations.readVariables({ simulation: this.name, handles: [...layout.handles] });
-      this.take({ step: Number(reply.step), time: reply.timeS, layout, values: Float64Array.from(reply.values) }, undone);
+      this.take({ step: Number(reply.step), time: reply.time, layout, values: Float64Array.from(reply.values) }, undone);
     } catch (thrown) {
       this.tell(failureOf(thrown));
     }
@@ -173,7 +170,7 @@ export class Session implements Shown {
         for await (const event of events.watchEvents({ simulation: this.name, journal, afterSequence }, { signal: this.ended.signal })) {
           if (event.content.case === 'started') journal = event.content.value.journal;
           else if (event.content.case === 'snapshot') void this.refreshSnapshots();
-          if (event.sequence > 0n) afterSequence = event.sequence;
+          if (event.sequence !== undefined) afterSequence = event.sequence;
           const told = tell(event);
           if (told) this.note(told.text, told.level);
         }
@@ -190,12 +187,12 @@ export class Session implements Shown {
     return Math.max(1, Math.floor(speed / RATE / (this.model.step || 1)));
   }
 
-  private takeBatch(batch: TelemetryBatch, layout: Layout): void {
+  private takeBatch(batch: SubscribeReply, layout: Layout): void {
     this.connected.value = true;
     for (const sample of batch.samples) {
       const step = Number(sample.step);
       // Samples of a stream come in order, unless somebody restored a state.
-      this.take({ step, time: sample.timeS, layout, values: Float64Array.from(sample.values) }, step <= this.streamed);
+      this.take({ step, time: sample.time, layout, values: Float64Array.from(sample.values) }, step <= this.streamed);
       this.streamed = step;
     }
   }
@@ -205,7 +202,7 @@ export class Session implements Shown {
     while (!this.ended.signal.aborted) {
       await pause(this.playing.value === 'no' ? 1000 : 400);
       try {
-        this.info.value = await simulations.getSimulation({ name: this.name }, { timeoutMs: 5000, signal: this.ended.signal });
+        this.info.value = await look(this.name, { timeoutMs: 5000, signal: this.ended.signal });
         if (!this.connected.value || this.behind()) await this.read();
         this.connected.value = true;
       } catch (thrown) {
@@ -234,10 +231,10 @@ export class Session implements Shown {
   }
 
   runUntil(time: number): Promise<void> {
-    return this.advance({ case: 'untilTimeS', value: time });
+    return this.advance({ case: 'untilTime', value: time });
   }
 
-  private async advance(how: { case: 'steps'; value: bigint } | { case: 'untilTimeS'; value: number }): Promise<void> {
+  private async advance(how: { case: 'steps'; value: bigint } | { case: 'untilTime'; value: number }): Promise<void> {
     if (this.busy) return;
     this.busy = true;
     try {
@@ -273,10 +270,10 @@ export class Session implements Shown {
 
   private async playPaced(): Promise<void> {
     this.playing.value = 'paced';
-    const pace = new Pace(this.speed.value, performance.now() / 1000, this.info.value.timeS);
+    const pace = new Pace(this.speed.value, performance.now() / 1000, this.info.value.time);
     while (this.playing.value === 'paced') {
       const info = this.info.value;
-      const target = pace.next(performance.now() / 1000, info.timeS, info.nextStepS || this.model.step);
+      const target = pace.next(performance.now() / 1000, info.time, info.nextStepSize || this.model.step);
       if (target === undefined) await pause(8);
       else await this.runUntil(target);
       if (this.info.value.state === SimulationState.FINISHED) this.pause();
@@ -289,7 +286,7 @@ export class Session implements Shown {
     const end = Number.isFinite(this.model.finalTime) ? this.model.finalTime : Number.MAX_VALUE;
     try {
       const run = simulations.run(
-        { step: { simulation: this.name, advance: { case: 'untilTimeS', value: end } }, progressInterval: duration(0.2) },
+        { step: { simulation: this.name, advance: { case: 'untilTime', value: end } }, progressInterval: duration(0.2) },
         { signal: this.fast.signal },
       );
       for await (const reply of run) if (reply.content.case === 'done') this.done(reply.content.value);
@@ -303,7 +300,7 @@ export class Session implements Shown {
 
   private done(reply: StepReply): void {
     const state = reply.outcome === StepOutcome.FINISHED ? SimulationState.FINISHED : SimulationState.READY;
-    this.info.value = { ...this.info.value, state, step: reply.step, timeS: reply.timeS };
+    this.info.value = { ...this.info.value, state, step: reply.step, time: reply.time };
     if (reply.stepsDone > 0n) this.keep(reply);
     if (reply.outcome === StepOutcome.ACCEPTED || reply.outcome === StepOutcome.INTERRUPTED) return;
     this.pause();
@@ -322,7 +319,7 @@ export class Session implements Shown {
     const steps = this.steps.value.slice(-499);
     steps.push({
       step: Number(reply.step),
-      time: reply.timeS,
+      time: reply.time,
       iterations: reply.iterations,
       residual: reply.residualError,
       solver: reply.solverSeconds,
@@ -350,7 +347,7 @@ export class Session implements Shown {
   async restore(snapshot: Snapshot): Promise<void> {
     this.pause();
     await this.attempt(async () => {
-      this.info.value = await simulations.restoreSnapshot({ name: snapshot.name });
+      this.info.value = told((await simulations.restoreSnapshot({ simulation: this.name, snapshot: snapshot.name })).simulation);
       this.failure.value = undefined;
       this.stream.abort();  // what is still on its way is of a time undone
       await this.read(true);
@@ -359,19 +356,16 @@ export class Session implements Shown {
 
   /** Name of a new simulation that starts at the snapshot, or at the present state. */
   async branch(snapshot: Snapshot | undefined, displayName: string): Promise<string | undefined> {
-    const source = snapshot
-      ? { case: 'snapshot' as const, value: snapshot.name }
-      : { case: 'simulation' as const, value: this.name };
     let name: string | undefined;
     await this.attempt(async () => {
-      const reply = await simulations.forkSimulation({ source, options: { displayName } });
+      const reply = await simulations.forkSimulation({ simulation: this.name, snapshot: snapshot?.name, options: { displayName } });
       name = reply.simulation?.name;
     });
     return name;
   }
 
   async deleteSnapshot(snapshot: Snapshot): Promise<void> {
-    await this.attempt(async () => void (await simulations.deleteSnapshot({ name: snapshot.name })));
+    await this.attempt(async () => void (await simulations.deleteSnapshot({ simulation: this.name, snapshot: snapshot.name })));
     await this.refreshSnapshots();
   }
 
@@ -382,15 +376,11 @@ export class Session implements Shown {
   }
 
   /** Modes about the present state, nearest to a frequency in hertz. */
-  async eigenmodes(count: number, shiftHz: number): Promise<Mode[]> {
+  async eigenmodes(count: number, shift: number): Promise<Mode[]> {
     let modes: Mode[] = [];
     await this.attempt(async () => {
-      const simulation = this.name;
-      const [eigen, names] = await Promise.all([
-        simulations.computeEigenvalues({ simulation, count: 2 * count, shiftHz, eigenvectors: true }),
-        simulations.linearize({ simulation, descriptorForm: true }),
-      ]);
-      modes = modesOf(eigen, names.stateNames, this.geometry.nodes);
+      const [eigen, names] = await Promise.all([eigenvectors(this.name, 2 * count, shift), stateNames(this.name)]);
+      modes = modesOf(eigen, names, this.geometry.nodes);
     });
     return modes;
   }

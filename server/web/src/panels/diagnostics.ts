@@ -15,8 +15,8 @@ export function marked(line: string, column: number, length: number): [string, s
 export function diagnosticsList(diagnostics: readonly Diagnostic[]): HTMLElement {
   return h('div', { class: 'diagnostics' }, ...diagnostics.map((diagnostic) => {
     const name = NAMES[diagnostic.severity] ?? 'note';
-    const place = diagnostic.line > 0 ? `${diagnostic.file}:${diagnostic.line}:${diagnostic.column}: ` : '';
-    const [before, at, after] = marked(diagnostic.sourceLine, diagnostic.column, diagnostic.length);
+    const place = diagnostic.line ? `${diagnostic.file}:${diagnostic.line}:${diagnostic.column ?? 1}: ` : '';
+    const [before, at, after] = marked(diagnostic.sourceLine, diagnostic.column ?? 1, diagnostic.length);
     return h('article', { class: `diagnostic ${name}` },
       h('div', {}, h('strong', {}, place), `${name}: ${diagnostic.message}`),
       diagnostic.sourceLine ? h('pre', { tabindex: 0 }, before, h('mark', {}, at), after) : null,

@@ -112,7 +112,7 @@ export class Home {
     this.list.replaceChildren(...this.known.map((info) => h('li', { class: `card${info.name === current ? ' current' : ''}` },
       h('button', { type: 'button', class: 'name body', style: 'background:none;border:0;text-align:left;cursor:pointer;padding:0', onclick: () => this.open(info.name) },
         h('div', {}, info.displayName || info.name.replace('simulations/', '')),
-        h('div', { class: 'soft' }, `${STATES[info.state] ?? 'unknown'}, ${number(info.timeS, 5)} s, ${info.owner}`)),
+        h('div', { class: 'soft' }, `${STATES[info.state] ?? 'unknown'}, ${number(info.time, 5)} s, ${info.owner}`)),
       current && info.name !== current ? iconButton('eye', `Compare with ${info.displayName || info.name}`, () => this.compare(info.name), { class: 'icon-button small' }) : null,
       iconButton('trash', `Delete ${info.displayName || info.name}`, () => void this.remove(info), { class: 'icon-button small' }))));
     if (this.known.length === 0) this.list.append(h('li', { class: 'soft' }, 'No simulation yet.'));
@@ -121,7 +121,7 @@ export class Home {
   private async remove(info: SimulationInfo): Promise<void> {
     if (!confirm(`Delete the simulation ${info.displayName || info.name}?`)) return;
     try {
-      await simulations.deleteSimulation({ name: info.name });
+      await simulations.deleteSimulation({ simulation: info.name });
     } catch (thrown) {
       this.tell(failureOf(thrown));
     }

@@ -23,10 +23,10 @@ export function snapshotsPanel(desk: Desk, open: (simulation: string) => void): 
     panel.classList.toggle('hidden', !session);
     unwatch = session
       ? session.snapshots.watch((snapshots) => list.replaceChildren(...snapshots.map((snapshot) => h('li', { class: 'card' },
-          h('div', { class: 'body' }, h('div', {}, `${number(snapshot.timeS, 6)} s`), h('div', { class: 'soft' }, `step ${snapshot.step}, ${bytes(Number(snapshot.sizeBytes))}`)),
-          iconButton('restore', `Restore the state at ${number(snapshot.timeS, 6)} s`, () => void session.restore(snapshot)),
-          iconButton('branch', `Branch off at ${number(snapshot.timeS, 6)} s`, () => void branch(snapshot)),
-          iconButton('trash', `Delete the state at ${number(snapshot.timeS, 6)} s`, () => void session.deleteSnapshot(snapshot))))))
+          h('div', { class: 'body' }, h('div', {}, `${number(snapshot.time, 6)} s`), h('div', { class: 'soft' }, `step ${snapshot.step}, ${bytes(Number(snapshot.sizeBytes))}`)),
+          iconButton('restore', `Restore the state at ${number(snapshot.time, 6)} s`, () => void session.restore(snapshot)),
+          iconButton('branch', `Branch off at ${number(snapshot.time, 6)} s`, () => void branch(snapshot)),
+          iconButton('trash', `Delete the state at ${number(snapshot.time, 6)} s`, () => void session.deleteSnapshot(snapshot))))))
       : () => {};
   });
   return panel;

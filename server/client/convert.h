@@ -1,0 +1,30 @@
+/// Internal to the client library: messages from and to what its users see.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/mbcosim_client.h"
+#include "mbcosim/v1/simulations.pb.h"
+
+namespace mbcosim::client {
+
+v1::PortDefinition to_proto(const Port& port);
+v1::Comparison to_proto(Condition::Kind kind);
+v1::NonConvergencePolicy to_proto(NonConvergence policy);
+v1::Grant to_proto(const Grant& grant);
+/// With a new request id.
+void fill(const LoadOptions& options, v1::CreateOptions* out);
+
+StepResult to_result(const v1::StepReply& reply);
+SimulationInfo to_info(const v1::SimulationInfo& info);
+Snapshot to_snapshot(const v1::Snapshot& snapshot);
+Variable to_variable(const v1::Variable& variable);
+Matrix to_matrix(const v1::Matrix& matrix);
+std::vector<Diagnostic> to_diagnostics(
+    const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics);
+
+/// A text that no other request has.
+std::string new_request_id();
+
+}  // namespace mbcosim::client

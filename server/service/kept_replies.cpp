@@ -1,0 +1,152 @@
+#include "service/kept_replies.h"
+
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <google/protobuf/message_lite.h>
+
+#include <algorithm>
+
+#include "math/hash.h"
+#include "wire/convert.h"
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+
+namespace {
+
+constexpr std::size_t kLongestId = 128;
+
+std::string bytes_of(const google::protobuf::MessageLite& message) {
+  std::string bytes;
+  google::protobuf::io::StringOutputStream stream(&bytes);
+  google::protobuf::io::CodedOutputStream out(&stream);
+  out.SetSerializationDeterministic(true);
+  message.SerializeToCodedStream(&out);
+  out.Trim();
+  return bytes;
+}
+
+}  // namespace
+
+std::uint64_t digest_of(const char* method, const google::protobuf::MessageLite& request) {
+  return fnv1a(method + bytes_of(request));
+}
+
+void check_request_id(const std::string& id) {
+  if (id.size() > kLongestId)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`request_id` must not be longer than " + std::to_string(kLongestId) + " bytes");
+}
+
+// ------------------------------------------------------------------ one request
+
+KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::string& request_id,
+                        std::uint64_t digest, const Call& call)
+    : kept_(kept), identity_(caller.identity), id_(request_id), digest_(digest) {
+  constexpr std::chrono::milliseconds kLook(20);  // how soon the end of the call is noticed
+  if (id_.empty()) return;
+  check_request_id(id_);
+  Guard guard(kept_.mutex_);
+  bool waits = false;
+  for (Entry* entry = kept_.find(identity_, id_); entry; entry = kept_.find(identity_, id_)) {
+    if (entry->digest != digest_)
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    "`request_id` \"" + utf8(id_) + "\" was another request's");
+    if (!entry->at_work) {
+      known_ = entry->reply;
+      return;
+    }
+    if (entry->awaited && !waits)
+      throw Refusal(v1::REASON_SIMULATION_BUSY,
+                    "this request is at work, and another repeat waits for it already");
+    entry->awaited = waits = true;
+    kept_.changed_.wait_for(kept_.mutex_, kLook);
+    if (!call.cancelled()) continue;
+    if (Entry* still = kept_.find(identity_, id_)) still->awaited = false;
+    throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+  }
+  kept_.entries_.push_back({identity_, id_, digest_, true, false, {}});
+}
+
+KeptReplies::Turn::~Turn() {
+  if (id_.empty() || known_) return;
+  Guard guard(kept_.mutex_);
+  Entry* entry = kept_.find(identity_, id_);
+  if (entry && entry->at_work) kept_.forget(identity_, id_);
+  kept_.changed_.notify_all();
+}
+
+void KeptReplies::Turn::keep(const google::protobuf::MessageLite& reply) {
+  if (id_.empty() || known_) return;
+  std::string bytes = reply.SerializeAsString();
+  Guard guard(kept_.mutex_);
+  if (!kept_.make_room(static_cast<std::int64_t>(bytes.size()))) return;
+  Entry* entry = kept_.find(identity_, id_);
+  entry->reply = std::move(bytes);
+  entry->at_work = false;
+}
+
+// ------------------------------------------------------------------ the store
+
+KeptReplies::Entry* KeptReplies::find(const std::string& identity, const std::string& id) {
+  const auto found = std::find_if(entries_.rbegin(), entries_.rend(), [&](const Entry& e) {
+    return e.id == id && e.identity == identity;
+  });
+  return found == entries_.rend() ? nullptr : &*found;
+}
+
+void KeptReplies::forget(const std::string& identity, const std::string& id) {
+  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) {
+    return e.id == id && e.identity == identity;
+  });
+  share_.shrink(static_cast<std::int64_t>(found->reply.size()));
+  entries_.erase(found);
+}
+
+void KeptReplies::describe(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const {
+  Guard guard(mutex_);
+  for (const Entry& entry : entries_) {
+    if (entry.at_work) continue;
+    v1::KeptReply* kept = out->Add();
+    kept->set_identity(entry.identity);
+    kept->set_request_id(entry.id);
+    kept->set_request_digest(entry.digest);
+    kept->set_reply(entry.reply);
+  }
+}
+
+void KeptReplies::take_over(const google::protobuf::RepeatedPtrField<v1::KeptReply>& kept) {
+  Guard guard(mutex_);
+  for (const v1::KeptReply& reply : kept)
+    if (make_room(std::ssize(reply.reply())))
+      entries_.push_back({reply.identity(), reply.request_id(), reply.request_digest(), false,
+                          false, reply.reply()});
+}
+
+bool KeptReplies::drop_oldest() {
+  const auto oldest =
+      std::find_if(entries_.begin(), entries_.end(), [](const Entry& e) { return !e.at_work; });
+  if (oldest == entries_.end()) return false;
+  share_.shrink(static_cast<std::int64_t>(oldest->reply.size()));
+  entries_.erase(oldest);
+  return true;
+}
+
+std::size_t KeptReplies::kept() const {
+  return static_cast<std::size_t>(
+      std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return !e.at_work; }));
+}
+
+bool KeptReplies::make_room(std::int64_t bytes) {
+  if (bytes > kBytes) return false;
+  while (kept() >= kReplies || share_.bytes() + bytes > kBytes)
+    if (!drop_oldest()) return false;
+  try {
+    share_.grow(bytes);
+  } catch (const Refusal&) {  // no memory: as if it had been dropped at once
+    return false;
+  }
+  return true;
+}
+
+}  // namespace mbcosim::server

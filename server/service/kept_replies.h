@@ -1,0 +1,81 @@
+/// Replies of requests that changed something, for clients that did not get them and ask again.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "mbcosim/v1/checkpoints.pb.h"
+#include "rpc/auth.h"
+#include "rpc/call.h"
+#include "threads/mutex.h"
+#include "wire/memory.h"
+
+namespace mbcosim::server {
+
+/// Digest of a request and the method that it is for; map fields count in no order.
+std::uint64_t digest_of(const char* method, const google::protobuf::MessageLite& request);
+
+/// Thread-safe. Keeps the last replies as long as they are small; the oldest goes first.
+class KeptReplies {
+ public:
+  static constexpr std::size_t kReplies = 64;
+  static constexpr std::int64_t kBytes = 8 << 20;  ///< of all replies together
+
+  explicit KeptReplies(MemoryBudget& memory) : share_(memory) {}
+
+  /// All that are kept, oldest first, and back.
+  void describe(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const TS_EXCLUDES(mutex_);
+  void take_over(const google::protobuf::RepeatedPtrField<v1::KeptReply>& kept) TS_EXCLUDES(mutex_);
+
+  /// One request at work. What went well is kept by `keep`; without it the request may be tried
+  /// anew.
+  class Turn {
+   public:
+    /// Waits while the same request is at work. Without an id nothing is kept. Throws BAD_ARGUMENT
+    /// when the id is too long or was another request's, SIMULATION_BUSY when another repeat waits
+    /// already, CANCELLED when the call ends first.
+    Turn(KeptReplies& kept, const Caller& caller, const std::string& request_id,
+         std::uint64_t digest, const Call& call);
+    ~Turn();
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+    /// The reply of the first, serialized; null: this is the first.
+    const std::string* known() const { return known_ ? &*known_ : nullptr; }
+    void keep(const google::protobuf::MessageLite& reply);
+
+   private:
+    KeptReplies& kept_;
+    const std::string identity_, id_;
+    const std::uint64_t digest_;
+    std::optional<std::string> known_;
+  };
+
+ private:
+  struct Entry {
+    std::string identity, id;
+    std::uint64_t digest;
+    bool at_work = true, awaited = false;
+    std::string reply;
+  };
+  using Entries = std::deque<Entry>;
+
+  Entry* find(const std::string& identity, const std::string& id) TS_REQUIRES(mutex_);
+  void forget(const std::string& identity, const std::string& id) TS_REQUIRES(mutex_);
+  std::size_t kept() const TS_REQUIRES(mutex_);
+  bool make_room(std::int64_t bytes) TS_REQUIRES(mutex_);
+  bool drop_oldest() TS_REQUIRES(mutex_);
+
+  mutable Mutex mutex_;
+  Condition changed_;
+  Entries entries_ TS_GUARDED_BY(mutex_);  ///< in the order in which they began
+  MemoryShare share_ TS_GUARDED_BY(mutex_);
+};
+
+/// Throws BAD_ARGUMENT for an id that is too long.
+void check_request_id(const std::string& id);
+
+}  // namespace mbcosim::server
