@@ -15,6 +15,7 @@ import mbcosim.aio
 from conftest import MODELS, TIME_FACTOR
 from mbcosim.calls import ServerCalls, SimulationCalls, SnapshotCalls
 from mbcosim.v1 import simulations_pb2 as pb
+from relay import BlackHole
 from test_coupling import PORT, spring
 
 X, PENDULUM = "node.structural.1.X", os.path.join(MODELS, "pendulum.mbd")

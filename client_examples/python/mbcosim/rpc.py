@@ -197,8 +197,8 @@ class Connection:
         method = self.stubs.method(call.method)
         if call.each is not None:
             return self._stream(method, call)
-        if call.timeout is None and hasattr(call.request, "SerializeToString"):
-            return method(call.request, metadata=self.metadata)
+        if hasattr(call.request, "SerializeToString"):  # one message: this thread does it all, and gRPC ends it at its deadline
+            return method(call.request, metadata=self.metadata, timeout=call.timeout)
         return self._bounded(method, call)
 
     def _bounded(self, method: Any, call: Call) -> Any:
