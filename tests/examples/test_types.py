@@ -54,4 +54,4 @@ with mbcosim.local() as server:
     assert found == [
         'note: Revealed type is "mbcosim.aio.Simulation"', 'note: Revealed type is "mbcosim.calls.StepResult"',
         'note: Revealed type is "mbcosim.simulation.Simulation"', 'note: Revealed type is "mbcosim.calls.StepResult"',
-        'note: Revealed type is "builtins.str"', 'error: Argument 1 has incompatible type "str"; expected "int"  [arg-type]']
+        'note: Revealed type is "builtins.str"', 'error: Argument 1 to "step" of "Simulation" has incompatible type "str"; expected "int"  [arg-type]']

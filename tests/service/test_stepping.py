@@ -129,3 +129,78 @@ def test_a_failed_step_leaves_the_last_accepted_state(server):
         if simulation.info.step == 0:
             assert bits(simulation) == before
         assert simulation.info.last_failure
+
+
+# ---------------------------------------------------------------- steps in a loop
+
+def in_a_loop(simulation, count=5, **options):
+    return [simulation.step(outputs=["node.structural.1.X"], **options) for _ in range(count)]
+
+
+def opens_a_stream(simulation):
+    return simulation._line._replies is not None
+
+
+def test_steps_in_a_loop_share_a_stream_that_ends_when_they_do(server, tumbling):
+    with server.load(tumbling) as simulation, server.load(tumbling) as other:
+        simulation.step()
+        assert not opens_a_stream(simulation)  # one step is a call
+        alike = [[result.values["node.structural.1.X"].tolist() for result in in_a_loop(simulation)]]
+        assert opens_a_stream(simulation)
+        other.step()
+        alike.append([result.values["node.structural.1.X"].tolist() for result in in_a_loop(other, timeout=60.0)])
+        assert not opens_a_stream(other)  # with a timeout each is a call
+        assert alike[0] == alike[1] and simulation.export_state() == other.export_state()
+        wait_for(lambda: not opens_a_stream(simulation), 10 * TIME_FACTOR)
+        assert simulation.step().step == 7
+
+
+def test_an_error_in_a_loop_is_that_of_a_call_and_the_loop_goes_on(server, tumbling):
+    with server.load(tumbling) as simulation:
+        in_a_loop(simulation)
+        for _ in range(3):
+            with pytest.raises(mbcosim.Error) as caught:
+                simulation.step(step_size=-1.0)
+            assert (caught.value.reason, caught.value.field) == ("BAD_ARGUMENT", "step_size")
+        assert in_a_loop(simulation)[-1].step == 10 and opens_a_stream(simulation)
+
+
+def test_two_threads_step_one_simulation_in_a_loop(server):
+    with server.load_text(decks.body()) as simulation:
+        errors = []
+
+        def loop():
+            try:
+                for _ in range(100):
+                    while True:
+                        try:
+                            simulation.step()
+                            break
+                        except mbcosim.Busy:
+                            pass
+            except Exception as error:  # pylint: disable=broad-except
+                errors.append(error)
+
+        threads = [threading.Thread(target=loop) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(60 * TIME_FACTOR)
+        assert errors == [] and simulation.refresh().step == 200
+
+
+def test_where_no_stream_is_to_be_had_a_loop_makes_calls(start_daemon):
+    daemon = start_daemon("--limit-identity-streams", "1")
+    with daemon.connect() as server, server.load_text(decks.body()) as simulation, simulation.subscribe(["time"]):
+        assert in_a_loop(simulation, 20)[-1].step == 20
+        assert not opens_a_stream(simulation)
+
+
+def test_a_daemon_that_dies_in_a_loop_is_noticed(start_daemon):
+    daemon = start_daemon()
+    with daemon.connect() as server:
+        simulation = server.load_text(decks.body())
+        in_a_loop(simulation)
+        daemon.kill()
+        with pytest.raises(mbcosim.Unavailable):
+            in_a_loop(simulation)

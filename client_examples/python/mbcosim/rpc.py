@@ -52,12 +52,14 @@ class Call:
     timeout     seconds; None: as long as the server lives
     repeatable  a second call does no harm when the reply to the first was lost
     each        of a method that streams: called with every message
+    through     of a call without timeout: another way to the reply; it gives None when the call is to be made all the same
     """
     method: str
     request: Any
     timeout: Optional[float] = None
     repeatable: bool = False
     each: Optional[Callable[[Any], Any]] = None
+    through: Optional[Callable[[Any], Any]] = None
 
 
 Calls = Generator[Call, Any, T]  # is sent the replies, one after the other
@@ -92,7 +94,7 @@ def runs_calls(drive: Callable[[Any], Any]) -> Callable[[_Class], _Class]:
     def decorate(cls: _Class) -> _Class:
         for base in reversed(cls.__mro__[1:]):
             for name, function in vars(base).items():
-                if getattr(function, "is_call", False):
+                if getattr(function, "is_call", False) and name not in vars(cls):
                     setattr(cls, name, functools.wraps(function)(drive(function)))
         return cls
     return decorate
@@ -197,6 +199,8 @@ class Connection:
         method = self.stubs.method(call.method)
         if call.each is not None:
             return self._stream(method, call)
+        if call.through is not None and call.timeout is None and (reply := call.through(call.request)) is not None:
+            return reply
         if hasattr(call.request, "SerializeToString"):  # one message: this thread does it all, and gRPC ends it at its deadline
             return method(call.request, metadata=self.metadata, timeout=call.timeout)
         return self._bounded(method, call)

@@ -12,12 +12,13 @@ import numpy.typing as npt
 from mbcosim.v1 import common_pb2, simulations_pb2 as pb, telemetry_pb2
 
 from .analysis import Analysis
-from .calls import SimulationCalls, SnapshotCalls, StepResult
+from .calls import Condition, SimulationCalls, SnapshotCalls, StepResult, Values
 from .coupling import Answer, Peer
 from .errors import translated
 from .histories import Histories
 from .objects import ModelObjects
-from .rpc import PARTING, USUAL, Blocking, blocking, bounded, parting, runs_calls
+from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, parting, runs_calls
+from .stepping import StepLine
 from .words import pick
 
 Self = TypeVar("Self")
@@ -52,6 +53,25 @@ class Snapshot(Blocking, SnapshotCalls):
 class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Snapshot]):
     """A simulation. As a context manager it is deleted from the server at the end (unless it was attached)."""
     _snapshot_class = Snapshot
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._line = StepLine(self._stub, self._connection.metadata)
+        self._through = self._line.step
+
+    def step(self, count: int = 1, *, step_size: Optional[float] = None,  # type: ignore[override]  # of a method made by runs_calls
+             until: Optional[Condition] = None, inputs: Optional[Values] = None, outputs: Iterable[str] = (),
+             timeout: Optional[float] = None) -> StepResult:
+        """Takes `count` steps, of `step_size` [s] each (default: the deck's), or fewer when `until`, a Condition, holds before. Raises
+        StepFailed when one does not converge, or a peer rejects it."""
+        names = list(outputs)
+        if step_size is None and until is None and timeout is None and not inputs and (request := self._quick_step(count, names)) is not None:
+            return self.result(self._connection.perform(Call("Simulations/Step", request, repeatable=True, through=self._through)), names)
+        result: StepResult = self._connection.run(self._steps(count, step_size, until, inputs, names, timeout))
+        return result
+
+    def _leave(self) -> None:
+        self._line.close()
 
     @property
     def _stub(self) -> Any:
