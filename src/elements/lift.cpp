@@ -1,5 +1,7 @@
 #include "elements/lift.h"
 
+#include <algorithm>
+
 namespace mbcosim::detail {
 
 namespace {
@@ -115,13 +117,10 @@ void lift_in_time(const Local<double>& u, Local<TimeDual>& t) {
 
 template <class T>
 void clear(Residual<T>& r, const Connection& c, bool momentum) {
-  for (int k = 0; k < c.node_count; ++k)
-    for (int i = 0; i < 6; ++i) {
-      r.node[k][i] = T(0.0);
-      if (momentum) r.momentum_rows[k][i] = T(0.0);
-    }
-  for (int i = 0; i < c.scalar_count; ++i) r.scalar_rows[i] = T(0.0);
-  for (int i = 0; i < c.own_count; ++i) r.own_rows[i] = T(0.0);
+  std::fill_n(r.node[0], 6 * c.node_count, T(0.0));
+  if (momentum) std::fill_n(r.momentum_rows[0], 6 * c.node_count, T(0.0));
+  std::fill_n(r.scalar_rows, c.scalar_count, T(0.0));
+  std::fill_n(r.own_rows, c.own_count, T(0.0));
 }
 
 void store_rows(const Residual<double>& r, const Connection& c, bool momentum, double* rows) {

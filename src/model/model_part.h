@@ -53,7 +53,8 @@ Data& part(ModelBuilder& builder) {
 template <class Data>
 const Data* find_part(const Model& model) {
   for (const auto& set : model.sets)
-    if (const auto* found = dynamic_cast<const ModelPart<Data>*>(set.get())) return &found->data;
+    if (set->size() == 0)  // a cheap look first: this is asked in every step
+      if (const auto* found = dynamic_cast<const ModelPart<Data>*>(set.get())) return &found->data;
   return nullptr;
 }
 

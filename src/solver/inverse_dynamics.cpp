@@ -254,7 +254,7 @@ void InverseDynamics::solve_forces(State& state) {
 void InverseDynamics::finish(State& state) const {
   for (const Joint& j : joints_)
     if (takes_part(state, j, kPosition)) j.constraint->accept(context(state), state);
-  accumulate(context(state), *scratch_);
+  accumulate(context(state));
   for (const ElementSpan& s : model_.stage_order)
     if (!inverse_constraint({s.set, s.range.first}))
       s.set->after_convergence(context(state), state, s.range);
@@ -475,7 +475,7 @@ VecX InverseDynamics::spring_force(const State& state, const Spring& spring) con
 void InverseDynamics::add_springs(const State& state, bool first, VecX& right) const {
   if (ergonomy_.empty()) return;
   const State at = first ? reference(state) : state;
-  accumulate(context(at), *scratch_);
+  accumulate(context(at));
   for (const Spring& s : ergonomy_)
     if (s.element.set->is_active(state, s.element.index)) right.head(n_) += spring_force(at, s);
 }
@@ -487,7 +487,7 @@ void InverseDynamics::add_spring_matrix(const State& state, bool first, Triplets
   std::vector<double> values(model_.row_index.size(), 0.0);
   const std::vector<NodeSeeds> seeds(model_.structural.size(),
                                      NodeSeeds{Mat3::Identity(), Mat3::Zero()});
-  accumulate(context(base), *scratch_);
+  accumulate(context(base));
   for (const Spring& s : ergonomy_) {
     const int i = s.element.index;
     if (!s.element.set->is_active(state, i)) continue;
@@ -518,7 +518,7 @@ void InverseDynamics::add_spring_matrix(const State& state, bool first, Triplets
 VecX InverseDynamics::loads(const State& state) const {
   std::vector<double> r(model_.unknowns, 0.0), late(model_.unknowns, 0.0);
   bool has_late = false;
-  accumulate(context(state), *scratch_);
+  accumulate(context(state));
   for (const ElementRef& e : loads_) {
     if (!e.set->is_active(state, e.index)) continue;
     // Beams that only load the nodes are one record late, as in the reference solver.
@@ -528,7 +528,7 @@ VecX InverseDynamics::loads(const State& state) const {
   }
   if (has_late) {
     const State base = reference(state);
-    accumulate(context(base), *scratch_);
+    accumulate(context(base));
     for (const ElementRef& e : loads_)
       if (beams_of(e) && !settings_.role(e.set->info(e.index)).ergonomy &&
           e.set->is_active(state, e.index))

@@ -12,16 +12,16 @@ void run_after_prediction(EvalContext context, Scratch& scratch, State& state) {
     s.set->after_predict(context, state, s.range);
 }
 
-void accumulate(EvalContext context, Scratch& scratch) {
+void accumulate(const EvalContext& context) {
   if (context.model->accumulation.empty()) return;
-  std::fill(scratch.sums.begin(), scratch.sums.end(), 0.0);
-  context.scratch = &scratch;
+  std::vector<double>& sums = context.scratch->sums;
+  std::fill(sums.begin(), sums.end(), 0.0);
   for (const ElementSpan& s : context.model->accumulation) s.set->accumulate(context, s.range);
 }
 
 void run_after_convergence(EvalContext context, Scratch& scratch, State& state) {
   context.scratch = &scratch;
-  accumulate(context, scratch);
+  accumulate(context);
   for (const ElementSpan& s : context.model->stage_order)
     s.set->after_convergence(context, state, s.range);
 }

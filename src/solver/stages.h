@@ -17,8 +17,8 @@
 namespace mbcosim {
 
 void run_after_prediction(EvalContext context, Scratch& scratch, State& state);
-/// Fills the sums; nothing to do for a model without.
-void accumulate(EvalContext context, Scratch& scratch);
+/// Fills the sums in the scratch of the context; nothing to do for a model without.
+void accumulate(const EvalContext& context);
 void run_after_convergence(EvalContext context, Scratch& scratch, State& state);
 
 }  // namespace mbcosim

@@ -41,8 +41,8 @@ void each_tile(const Model& model, Action action) {
 }  // namespace
 
 void compute_residual(EvalContext context, Scratch& scratch, std::vector<double>& r) {
-  accumulate(context, scratch);
   context.scratch = &scratch;
+  accumulate(context);
   std::fill(r.begin(), r.end(), 0.0);
   each_tile(*context.model,
             [&](const auto& part, ElementRange range) { part.residual(context, r.data(), range); });
@@ -75,8 +75,8 @@ void compute_seeds(const EvalContext& context, std::vector<NodeSeeds>& seeds) {
 }
 
 void compute_jacobian(EvalContext context, Workspace& workspace) {
-  accumulate(context, workspace.scratch);
   context.scratch = &workspace.scratch;
+  accumulate(context);
   compute_seeds(context, workspace.seeds);
   std::fill(workspace.values.begin(), workspace.values.end(), 0.0);
   each_tile(*context.model, [&](const auto& part, ElementRange range) {
