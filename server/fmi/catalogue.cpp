@@ -186,4 +186,18 @@ std::vector<Entry> as_scalars(const std::vector<Entry>& entries) {
   return scalars;
 }
 
+void add_symbols(const std::vector<DeckSymbol>& symbols, const SymbolValues& given,
+                 std::vector<Entry>& entries) {
+  for (const DeckSymbol& symbol : symbols) {
+    const auto chosen = given.find(symbol.name);
+    const bool is_given = chosen != given.end();
+    Entry e;
+    e.name = "symbol." + symbol.name;
+    e.description = "value of `" + symbol.name + "` in the deck";
+    e.symbol = FmuSymbol{static_cast<std::uint32_t>(entries.size()), symbol.name,
+                         is_given ? chosen->second : symbol.declared, is_given};
+    entries.push_back(std::move(e));
+  }
+}
+
 }  // namespace mbcosim::fmi

@@ -1,11 +1,12 @@
 /// Which variables an FMU has: chosen from those of the model, as its description shows them.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fmi/manifest.h"
-#include "simulation/simulation.h"
+#include "simulation/load.h"
 
 namespace mbcosim::fmi {
 
@@ -15,8 +16,11 @@ struct Entry {
   std::string name;
   std::string unit;  ///< empty: none
   std::string description;
-  std::vector<int> shape;  ///< {}: scalar
-  std::string port;        ///< to which it belongs; may be empty
+  std::vector<int> shape;           ///< {}: scalar
+  std::string port;                 ///< to which it belongs; may be empty
+  std::optional<FmuSymbol> symbol;  ///< a symbol of the deck, instead of `variable`
+
+  std::uint32_t reference() const { return symbol ? symbol->reference : variable.reference; }
 };
 
 /// Patterns with `*` and `?`; empty: the default.
@@ -31,5 +35,9 @@ Result<std::vector<Entry>> make_catalogue(const Simulation& simulation, const Se
 
 /// For FMI 2, which has no arrays: one entry for each number, named "name[i]" or "name[i,j]".
 std::vector<Entry> as_scalars(const std::vector<Entry>& entries);
+
+/// Appends the symbols of the deck, "symbol.NAME"; `given`: at the export.
+void add_symbols(const std::vector<DeckSymbol>& symbols, const SymbolValues& given,
+                 std::vector<Entry>& entries);
 
 }  // namespace mbcosim::fmi

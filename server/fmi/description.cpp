@@ -94,13 +94,26 @@ void add_common(pugi::xml_node root, const DescriptionHead& head) {
   set(experiment, "stepSize", exact(head.step));
 }
 
+/// Names of the types of symbols, in the order of Value.
+constexpr const char* kTypes2[] = {"Boolean", "Integer", "Real", "String"};
+constexpr const char* kTypes3[] = {"Boolean", "Int32", "Float64", "String"};
+
+std::string start_text(const Value& value) {
+  if (const double* real = std::get_if<double>(&value)) return exact(*real);
+  if (const bool* truth = std::get_if<bool>(&value)) return *truth ? "true" : "false";
+  return printed(value);
+}
+
 /// Attributes that a variable has in both standards.
 void name_variable(pugi::xml_node node, const Entry& e) {
   set(node, "name", e.name);
-  set(node, "valueReference", e.variable.reference);
+  set(node, "valueReference", e.reference());
   if (!e.description.empty()) set(node, "description", e.description);
-  set(node, "causality", causality(e.variable.role));
-  if (e.variable.role == Role::tunable) set(node, "variability", "tunable");
+  set(node, "causality", e.symbol ? "parameter" : causality(e.variable.role));
+  if (e.symbol)
+    set(node, "variability", "fixed");
+  else if (e.variable.role == Role::tunable)
+    set(node, "variability", "tunable");
 }
 
 std::string start_text(const Entry& e) {
@@ -145,7 +158,12 @@ std::string describe_fmi2(const DescriptionHead& head, const std::vector<Entry>&
     const Entry& e = scalars[k];
     pugi::xml_node node = variables.append_child("ScalarVariable");
     name_variable(node, e);
-    if (e.variable.role == Role::tunable) set(node, "initial", "exact");
+    if (e.symbol || e.variable.role == Role::tunable) set(node, "initial", "exact");
+    if (e.symbol) {
+      set(node.append_child(kTypes2[e.symbol->start.index()]), "start",
+          start_text(e.symbol->start));
+      continue;
+    }
     pugi::xml_node real = node.append_child("Real");
     if (!e.unit.empty()) set(real, "unit", e.unit);
     if (is_written(e)) set(real, "start", start_text(e));
@@ -171,15 +189,22 @@ std::string describe_fmi3(const DescriptionHead& head, const std::vector<Entry>&
   set(kind, "providesAdjointDerivatives", true);
   set(kind, "canHandleVariableCommunicationStepSize", head.variable_steps);
   for (const Entry& e : entries) {
-    pugi::xml_node node = variables.append_child("Float64");
+    pugi::xml_node node =
+        variables.append_child(e.symbol ? kTypes3[e.symbol->start.index()] : "Float64");
     name_variable(node, e);
+    if (e.symbol) {
+      const bool text = std::holds_alternative<std::string>(e.symbol->start);
+      pugi::xml_node place = text ? node.append_child("Start") : node;
+      set(place, text ? "value" : "start", start_text(e.symbol->start));
+      continue;
+    }
     if (!e.unit.empty()) set(node, "unit", e.unit);
     if (is_written(e)) set(node, "start", start_text(e));
     for (const int size : e.shape) set(node.append_child("Dimension"), "start", size);
   }
   for (const char* element : {"Output", "InitialUnknown"})
     for (const Entry& e : entries)
-      if (e.variable.role == Role::output)
+      if (!e.symbol && e.variable.role == Role::output)
         set(structure.append_child(element), "valueReference", e.variable.reference);
   return text_of(document);
 }

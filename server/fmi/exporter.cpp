@@ -104,6 +104,10 @@ DescriptionHead head_of(const ExportOptions& options, const Model& model,
 
 void count(const std::vector<Entry>& entries, ExportReport& report) {
   for (const Entry& e : entries) {
+    if (e.symbol) {
+      ++report.parameters;
+      continue;
+    }
     report.inputs += e.variable.role == FmuVariable::Role::input ? 1 : 0;
     report.outputs += e.variable.role == FmuVariable::Role::output ? 1 : 0;
     report.parameters += e.variable.role == FmuVariable::Role::tunable ? 1 : 0;
@@ -118,7 +122,7 @@ mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
                             /*unrestricted=*/true);
   const RecordingSource source(folder);
   const std::string main_file = path.filename().string();
-  const LoadReport loaded = load_deck(source, main_file);
+  const DeckReport loaded = read_deck(source, main_file, {.symbols = options.symbols});
   report.diagnostics = loaded.diagnostics;
   if (!loaded.ok()) return refused(ErrorKind::deck, "the deck is refused");
   const Model& model = *loaded.model;
@@ -128,13 +132,18 @@ mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
   if (!entries) return entries.error();
   const bool arrays = options.standard == Standard::fmi3;
   if (!arrays) *entries = as_scalars(*entries);
+  add_symbols(loaded.symbols, options.symbols, *entries);
   count(*entries, report);
 
   Manifest manifest;
   std::map<std::string, std::string> archive;
   manifest.deck = main_file;
   manifest.digest = digest_text(model.digest);
-  for (const Entry& e : *entries) manifest.variables.push_back(e.variable);
+  for (const Entry& e : *entries)
+    if (e.symbol)
+      manifest.symbols.push_back(*e.symbol);
+    else
+      manifest.variables.push_back(e.variable);
   add_files(source.files(), manifest, archive);
   manifest.token = make_token(manifest, to_json(manifest));
   const DescriptionHead head = head_of(options, model, manifest.token);

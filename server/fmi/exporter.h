@@ -15,7 +15,8 @@ struct ExportOptions {
   std::string output;  ///< path of the FMU
   Standard standard = Standard::fmi3;
   Selection selection;
-  std::string library;  ///< path of the shared library with the engine
+  SymbolValues symbols;  ///< instead of what the deck gives them
+  std::string library;   ///< path of the shared library with the engine
 };
 
 struct ExportReport {

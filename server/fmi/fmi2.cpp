@@ -90,23 +90,35 @@ Code fmi2SetReal(Component component, const Reference references[], std::size_t 
   });
 }
 
-Code fmi2GetInteger(Component component, const Reference[], std::size_t count, Integer[]) {
-  return no_such_type(component, Call::get, "fmi2GetInteger", "Integer", count);
+Code fmi2GetInteger(Component component, const Reference references[], std::size_t count,
+                    Integer values[]) {
+  return get_symbols(component, "fmi2GetInteger", mbcosim::ValueType::integer,
+                     array(references, count), array(values, count));
 }
-Code fmi2GetBoolean(Component component, const Reference[], std::size_t count, Boolean[]) {
-  return no_such_type(component, Call::get, "fmi2GetBoolean", "Boolean", count);
+Code fmi2GetBoolean(Component component, const Reference references[], std::size_t count,
+                    Boolean values[]) {
+  return get_symbols(component, "fmi2GetBoolean", mbcosim::ValueType::boolean,
+                     array(references, count), array(values, count));
 }
-Code fmi2GetString(Component component, const Reference[], std::size_t count, String[]) {
-  return no_such_type(component, Call::get, "fmi2GetString", "String", count);
+Code fmi2GetString(Component component, const Reference references[], std::size_t count,
+                   String values[]) {
+  return get_symbols(component, "fmi2GetString", mbcosim::ValueType::string,
+                     array(references, count), array(values, count));
 }
-Code fmi2SetInteger(Component component, const Reference[], std::size_t count, const Integer[]) {
-  return no_such_type(component, Call::set, "fmi2SetInteger", "Integer", count);
+Code fmi2SetInteger(Component component, const Reference references[], std::size_t count,
+                    const Integer values[]) {
+  return set_symbols(component, "fmi2SetInteger", mbcosim::ValueType::integer,
+                     array(references, count), array(values, count));
 }
-Code fmi2SetBoolean(Component component, const Reference[], std::size_t count, const Boolean[]) {
-  return no_such_type(component, Call::set, "fmi2SetBoolean", "Boolean", count);
+Code fmi2SetBoolean(Component component, const Reference references[], std::size_t count,
+                    const Boolean values[]) {
+  return set_symbols(component, "fmi2SetBoolean", mbcosim::ValueType::boolean,
+                     array(references, count), array(values, count));
 }
-Code fmi2SetString(Component component, const Reference[], std::size_t count, const String[]) {
-  return no_such_type(component, Call::set, "fmi2SetString", "String", count);
+Code fmi2SetString(Component component, const Reference references[], std::size_t count,
+                   const String values[]) {
+  return set_symbols(component, "fmi2SetString", mbcosim::ValueType::string,
+                     array(references, count), array(values, count));
 }
 
 Code fmi2GetFMUstate(Component component, StateHandle* state) {

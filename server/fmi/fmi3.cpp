@@ -105,6 +105,42 @@ Code fmi3SetFloat64(Handle instance, const Reference references[], std::size_t c
   });
 }
 
+Code fmi3GetInt32(Handle instance, const Reference references[], std::size_t count,
+                  std::int32_t values[], std::size_t size) {
+  return get_symbols(instance, "fmi3GetInt32", mbcosim::ValueType::integer,
+                     array(references, count), array(values, size));
+}
+
+Code fmi3SetInt32(Handle instance, const Reference references[], std::size_t count,
+                  const std::int32_t values[], std::size_t size) {
+  return set_symbols(instance, "fmi3SetInt32", mbcosim::ValueType::integer,
+                     array(references, count), array(values, size));
+}
+
+Code fmi3GetBoolean(Handle instance, const Reference references[], std::size_t count,
+                    Boolean values[], std::size_t size) {
+  return get_symbols(instance, "fmi3GetBoolean", mbcosim::ValueType::boolean,
+                     array(references, count), array(values, size));
+}
+
+Code fmi3SetBoolean(Handle instance, const Reference references[], std::size_t count,
+                    const Boolean values[], std::size_t size) {
+  return set_symbols(instance, "fmi3SetBoolean", mbcosim::ValueType::boolean,
+                     array(references, count), array(values, size));
+}
+
+Code fmi3GetString(Handle instance, const Reference references[], std::size_t count,
+                   String values[], std::size_t size) {
+  return get_symbols(instance, "fmi3GetString", mbcosim::ValueType::string,
+                     array(references, count), array(values, size));
+}
+
+Code fmi3SetString(Handle instance, const Reference references[], std::size_t count,
+                   const String values[], std::size_t size) {
+  return set_symbols(instance, "fmi3SetString", mbcosim::ValueType::string,
+                     array(references, count), array(values, size));
+}
+
 Code fmi3GetFMUState(Handle instance, StateHandle* state) {
   return guarded(instance, Call::state, "fmi3GetFMUState",
                  [&](Instance& core) { return save_state(core, state); });

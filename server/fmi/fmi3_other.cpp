@@ -58,14 +58,6 @@ Code fmi3SetUInt16(Handle instance, const Reference[], std::size_t count, const 
                    std::size_t) {
   return set_none(instance, "fmi3SetUInt16", "UInt16", count);
 }
-Code fmi3GetInt32(Handle instance, const Reference[], std::size_t count, std::int32_t[],
-                  std::size_t) {
-  return get_none(instance, "fmi3GetInt32", "Int32", count);
-}
-Code fmi3SetInt32(Handle instance, const Reference[], std::size_t count, const std::int32_t[],
-                  std::size_t) {
-  return set_none(instance, "fmi3SetInt32", "Int32", count);
-}
 Code fmi3GetUInt32(Handle instance, const Reference[], std::size_t count, std::uint32_t[],
                    std::size_t) {
   return get_none(instance, "fmi3GetUInt32", "UInt32", count);
@@ -89,20 +81,6 @@ Code fmi3GetUInt64(Handle instance, const Reference[], std::size_t count, std::u
 Code fmi3SetUInt64(Handle instance, const Reference[], std::size_t count, const std::uint64_t[],
                    std::size_t) {
   return set_none(instance, "fmi3SetUInt64", "UInt64", count);
-}
-Code fmi3GetBoolean(Handle instance, const Reference[], std::size_t count, Boolean[], std::size_t) {
-  return get_none(instance, "fmi3GetBoolean", "Boolean", count);
-}
-Code fmi3SetBoolean(Handle instance, const Reference[], std::size_t count, const Boolean[],
-                    std::size_t) {
-  return set_none(instance, "fmi3SetBoolean", "Boolean", count);
-}
-Code fmi3GetString(Handle instance, const Reference[], std::size_t count, String[], std::size_t) {
-  return get_none(instance, "fmi3GetString", "String", count);
-}
-Code fmi3SetString(Handle instance, const Reference[], std::size_t count, const String[],
-                   std::size_t) {
-  return set_none(instance, "fmi3SetString", "String", count);
 }
 Code fmi3GetBinary(Handle instance, const Reference[], std::size_t count, std::size_t[], Binary[],
                    std::size_t) {

@@ -56,6 +56,47 @@ inline int no_such_type(void* handle, Call call, const char* function, const cha
   });
 }
 
+/// Hands symbols of the deck to the C interface; `text` of strings lives until the next such call.
+template <class Out>
+int get_symbols(void* handle, const char* function, ValueType type,
+                std::span<const std::uint32_t> references, std::span<Out> out) {
+  return guarded(handle, Call::get, function, [&](Instance& instance) {
+    const std::vector<Value>* values = nullptr;
+    const Status status = instance.get_symbols(references, type, values);
+    if (status != Status::ok) return status;
+    if (values->size() != out.size())
+      return instance.fail("the variables have " + std::to_string(values->size()) +
+                           " values, not " + std::to_string(out.size()));
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      const Value& value = (*values)[k];
+      if constexpr (std::is_pointer_v<Out>)
+        out[k] = std::get<std::string>(value).c_str();
+      else if (type == ValueType::boolean)
+        out[k] = static_cast<Out>(std::get<bool>(value));
+      else
+        out[k] = static_cast<Out>(std::get<std::int32_t>(value));
+    }
+    return Status::ok;
+  });
+}
+
+template <class In>
+int set_symbols(void* handle, const char* function, ValueType type,
+                std::span<const std::uint32_t> references, std::span<const In> in) {
+  return guarded(handle, Call::set, function, [&](Instance& instance) {
+    std::vector<Value> values;
+    for (const In given : in) {
+      if constexpr (std::is_pointer_v<In>)
+        values.emplace_back(std::string(given ? given : ""));
+      else if (type == ValueType::boolean)
+        values.emplace_back(given != 0);
+      else
+        values.emplace_back(static_cast<std::int32_t>(given));
+    }
+    return instance.set_symbols(references, type, values);
+  });
+}
+
 /// Saves into *state; what *state held before is replaced.
 inline Status save_state(Instance& instance, void** state) {
   if (!state) return instance.fail("no place for the state was given");

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "fmi/saved_state.h"
+#include "input/sources.h"
 #include "solver/state_space.h"
 
 namespace mbcosim::fmi {
@@ -72,26 +73,70 @@ bool Instance::load(const std::string& token, const std::string& resources) {
   if (token != manifest_.token)
     return refuse("the token \"" + token + "\" is not that of these resources, \"" +
                   manifest_.token + "\"");
-  std::map<std::string, std::string> files;
   for (const auto& [name, path] : manifest_.files) {
     auto content = read_file(resources + "/" + path);
     if (!content) return refuse("cannot read \"" + resources + "/" + path + "\"");
-    files[name] = std::move(*content);
+    files_[name] = std::move(*content);
   }
-  const LoadReport report = load_deck(BundleSource(std::move(files)), manifest_.deck);
-  for (const Diagnostic& d : report.diagnostics)
-    log_.write(d.severity == Severity::error ? Status::error : Status::warning, d.text());
+  for (const FmuSymbol& symbol : manifest_.symbols)
+    if (symbol.given) exported_.insert_or_assign(symbol.name, symbol.start);
+  DeckReport report = read_with(exported_);
   if (!report.ok()) return false;
-  model_ = report.model;
+  take(std::move(report), exported_);
   log_.write(Status::ok, "model read: " + std::to_string(model_->unknowns) + " unknowns");
+  initial_time_ = model_->initial_value.initial_time;
   set_start_values();
   return bind();
 }
 
+DeckReport Instance::read_with(const SymbolValues& symbols) {
+  DeckReport report = read_deck(BundleSource(files_), manifest_.deck, {.symbols = symbols});
+  for (const Diagnostic& d : report.diagnostics)
+    log_.write(d.severity == Severity::error ? Status::error : Status::warning, d.text());
+  return report;
+}
+
+void Instance::take(DeckReport report, const SymbolValues& symbols) {
+  model_ = std::move(report.model);
+  read_ = symbols;
+  declared_.clear();
+  for (DeckSymbol& symbol : report.symbols)
+    declared_.insert_or_assign(std::move(symbol.name), std::move(symbol.declared));
+}
+
+mbcosim::Status Instance::ensure_read() {
+  if (chosen_ == read_) return ok();
+  const auto refuse = [](const std::string& message) {
+    return make_error(ErrorKind::argument, "", message);
+  };
+  DeckReport report = read_with(chosen_);
+  if (!report.ok()) return refuse("the deck is refused with these parameters");
+  const auto names = [](const Simulation& simulation) {
+    std::vector<std::pair<std::string, std::vector<int>>> all;
+    for (const mbcosim::Variable& v : simulation.variables()) all.emplace_back(v.name, v.shape);
+    return all;
+  };
+  if (names(*Simulation::prepare(report.model)) != names(*Simulation::prepare(model_)))
+    return refuse("with these parameters the model has other variables: export an FMU with -D");
+  take(std::move(report), chosen_);
+  simulation_ = Simulation::prepare(model_);
+  if (!bind()) return refuse("with these parameters the model has other variables");
+  return ok();
+}
+
+Result<std::uint64_t> Instance::digest_with(const SymbolValues& symbols) {
+  if (symbols == read_) return model_->digest;
+  const DeckReport report = read_with(symbols);
+  if (!report.ok())
+    return make_error(ErrorKind::argument, "", "the deck is refused with the state's parameters");
+  return report.model->digest;
+}
+
 void Instance::set_start_values() {
   mode_ = Mode::instantiated;
-  communication_time_ = last_time_ = model_->initial_value.initial_time;
+  communication_time_ = last_time_ = initial_time_;
   stop_time_.reset();
+  chosen_ = exported_;
   given_.clear();
   for (const FmuVariable& variable : manifest_.variables) given_.push_back(variable.start);
   simulation_ = Simulation::prepare(model_);
@@ -100,6 +145,9 @@ void Instance::set_start_values() {
 }
 
 bool Instance::bind() {
+  motions_.clear();
+  variables_.clear();
+  index_.clear();
   for (const FmuVariable& variable : manifest_.variables) {
     Variable bound{&variable};
     if (variable.source == FmuVariable::Source::variable) {
@@ -137,7 +185,7 @@ Status Instance::discard(const std::string& message) {
 }
 
 Status Instance::setup(double start_time, std::optional<double> stop_time) {
-  const double initial = model_->initial_value.initial_time;
+  const double initial = initial_time_;
   if (!(std::abs(start_time - initial) <= kRounding * std::max(1.0, std::abs(initial))))
     return fail("the deck starts at " + number(initial) + " s, the importer at " +
                 number(start_time) + " s");
@@ -155,6 +203,11 @@ Status Instance::enter_initialization() {
 
 mbcosim::Status Instance::ensure_started() {
   if (started_) return ok();
+  if (auto read = ensure_read(); !read) return read;
+  if (model_->initial_value.initial_time != initial_time_)
+    return make_error(ErrorKind::argument, "",
+                      "with these parameters the deck starts at " +
+                          number(model_->initial_value.initial_time) + " s");
   simulation_ = Simulation::prepare(model_);
   simulation_->set_final_time(std::numeric_limits<double>::infinity());
   for (std::size_t k = 0; k < variables_.size(); ++k)
@@ -206,12 +259,14 @@ Status Instance::get(std::span<const std::uint32_t> references, std::span<double
   std::size_t at = 0;
   for (const std::uint32_t reference : references) {
     const Variable* variable = find(reference);
-    if (!variable) return fail("no real variable has the reference " + std::to_string(reference));
-    const std::vector<double>& given = given_[index_of(*variable)];
-    one = given;
-    if (variable->of->role == FmuVariable::Role::independent)
+    const FmuSymbol* symbol = variable ? nullptr : find_symbol(reference, ValueType::real);
+    if (!variable && !symbol)
+      return fail("no real variable has the reference " + std::to_string(reference));
+    if (symbol)
+      one = {std::get<double>(value_of(*symbol))};
+    else if (variable->of->role == FmuVariable::Role::independent)
       one = {communication_time_};
-    else if (given.empty())
+    else if (one = given_[index_of(*variable)]; one.empty())
       read(*variable, all, one);
     if (one.size() > values.size() - at)
       return fail("the variables have more than " + std::to_string(values.size()) + " values");
@@ -243,9 +298,12 @@ Status Instance::set(std::span<const std::uint32_t> references, std::span<const 
   std::size_t at = 0;
   for (const std::uint32_t reference : references) {
     const Variable* variable = find(reference);
-    if (!variable) return fail("no real variable has the reference " + std::to_string(reference));
-    if (const Status status = may_set(*variable); status != Status::ok) return status;
-    const std::size_t size = variable->of->elements.size();
+    const FmuSymbol* symbol = variable ? nullptr : find_symbol(reference, ValueType::real);
+    if (!variable && !symbol)
+      return fail("no real variable has the reference " + std::to_string(reference));
+    const Status status = symbol ? may_choose(*symbol) : may_set(*variable);
+    if (status != Status::ok) return status;
+    const std::size_t size = symbol ? 1 : variable->of->elements.size();
     if (size > values.size() - at)
       return fail("the variables have more than " + std::to_string(values.size()) + " values");
     at += size;
@@ -256,7 +314,13 @@ Status Instance::set(std::span<const std::uint32_t> references, std::span<const 
   if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
     return discard("a value is not finite; none was set");
   for (const std::uint32_t reference : references) {
-    const Variable& variable = *find(reference);
+    const Variable* found = find(reference);
+    if (!found) {
+      choose(*find_symbol(reference, ValueType::real), values[0]);
+      values = values.subspan(1);
+      continue;
+    }
+    const Variable& variable = *found;
     const auto mine = values.first(variable.of->elements.size());
     values = values.subspan(mine.size());
     given_[index_of(variable)].assign(mine.begin(), mine.end());
@@ -264,6 +328,69 @@ Status Instance::set(std::span<const std::uint32_t> references, std::span<const 
       return fail("\"" + variable.of->name + "\" cannot be set");
   }
   if (mode_ != Mode::step) started_ = false;
+  ++revision_;
+  return Status::ok;
+}
+
+// ------------------------------------------------------------------ symbols of the deck
+
+const FmuSymbol* Instance::find_symbol(std::uint32_t reference, ValueType type) const {
+  for (const FmuSymbol& symbol : manifest_.symbols)
+    if (symbol.reference == reference) return type_of(symbol.start) == type ? &symbol : nullptr;
+  return nullptr;
+}
+
+/// What the deck computes from other symbols follows them once it was read with them.
+Value Instance::value_of(const FmuSymbol& symbol) const {
+  if (const auto chosen = chosen_.find(symbol.name); chosen != chosen_.end()) return chosen->second;
+  const auto declared = declared_.find(symbol.name);
+  return declared == declared_.end() ? symbol.start : declared->second;
+}
+
+Status Instance::may_choose(const FmuSymbol& symbol) {
+  if (mode_ != Mode::step) return Status::ok;
+  return fail("\"symbol." + symbol.name + "\" is fixed: it is set before the first step");
+}
+
+/// The start value leaves the choice to the deck.
+void Instance::choose(const FmuSymbol& symbol, const Value& value) {
+  if (value == symbol.start && !symbol.given)
+    chosen_.erase(symbol.name);
+  else
+    chosen_.insert_or_assign(symbol.name, value);
+}
+
+Status Instance::get_symbols(std::span<const std::uint32_t> references, ValueType type,
+                             const std::vector<Value>*& values) {
+  if (mode_ == Mode::initialization)
+    if (const auto started = ensure_started(); !started) return fail(started.error().message);
+  handed_out_.clear();
+  for (const std::uint32_t reference : references) {
+    const FmuSymbol* symbol = find_symbol(reference, type);
+    if (!symbol)
+      return fail(std::string("no ") + type_name(type) + " variable has the reference " +
+                  std::to_string(reference));
+    handed_out_.push_back(value_of(*symbol));
+  }
+  values = &handed_out_;
+  return Status::ok;
+}
+
+Status Instance::set_symbols(std::span<const std::uint32_t> references, ValueType type,
+                             const std::vector<Value>& values) {
+  if (values.size() != references.size())
+    return fail("the variables have " + std::to_string(references.size()) + " values, not " +
+                std::to_string(values.size()));
+  for (const std::uint32_t reference : references) {
+    const FmuSymbol* symbol = find_symbol(reference, type);
+    if (!symbol)
+      return fail(std::string("no ") + type_name(type) + " variable has the reference " +
+                  std::to_string(reference));
+    if (const Status status = may_choose(*symbol); status != Status::ok) return status;
+  }
+  for (std::size_t k = 0; k < references.size(); ++k)
+    choose(*find_symbol(references[k], type), values[k]);
+  started_ = false;
   ++revision_;
   return Status::ok;
 }
@@ -319,6 +446,7 @@ std::unique_ptr<SavedState> Instance::save() const {
   saved->token = manifest_.token;
   saved->mode = mode_;
   saved->given = given_;
+  saved->symbols = chosen_;
   saved->communication_time = communication_time_;
   saved->last_time = last_time_;
   saved->stop_time = stop_time_;
@@ -329,6 +457,8 @@ std::unique_ptr<SavedState> Instance::save() const {
 Status Instance::restore(const SavedState& saved) {
   if (saved.token != manifest_.token) return fail("the state belongs to another FMU");
   given_ = saved.given;
+  chosen_ = saved.symbols;
+  if (chosen_ != read_) started_ = false;
   if (saved.state) {
     if (!started_)
       if (const auto started = ensure_started(); !started) return fail(started.error().message);
@@ -347,12 +477,14 @@ Status Instance::restore(const SavedState& saved) {
   return Status::ok;
 }
 
-std::string Instance::serialize(const SavedState& saved) const {
-  return to_bytes(saved, model_->digest);
+std::string Instance::serialize(const SavedState& saved) {
+  const auto digest = digest_with(saved.symbols);
+  return to_bytes(saved, digest ? *digest : 0);
 }
 
 std::unique_ptr<SavedState> Instance::deserialize(std::string_view bytes) {
-  auto saved = saved_state_from_bytes(bytes, manifest_.token, model_->digest);
+  auto saved = saved_state_from_bytes(
+      bytes, manifest_.token, [this](const SymbolValues& symbols) { return digest_with(symbols); });
   if (!saved) {
     fail(saved.error().message);
     return nullptr;

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -14,8 +15,8 @@
 #include "fmi/log.h"
 #include "fmi/manifest.h"
 #include "fmi/modes.h"
+#include "simulation/load.h"
 #include "simulation/point_motion.h"
-#include "simulation/simulation.h"
 
 namespace mbcosim::fmi {
 
@@ -24,6 +25,7 @@ struct SavedState {
   std::string token;  ///< of the FMU
   Mode mode = Mode::instantiated;
   std::vector<std::vector<double>> given;  ///< last values of inputs and parameters, by variable
+  SymbolValues symbols;                    ///< values of symbols that are not the deck's
   double communication_time = 0, last_time = 0;
   std::optional<double> stop_time;
   std::optional<State> state;  ///< when the start was computed
@@ -54,12 +56,18 @@ class Instance {
   Status reset();
   Status get(std::span<const std::uint32_t> references, std::span<double> values);
   Status set(std::span<const std::uint32_t> references, std::span<const double> values);
+  /// Symbols of another type than real; the alternative of each value is `type`. `values` is kept
+  /// where it lies until the next call of this function (strings of the C interface).
+  Status get_symbols(std::span<const std::uint32_t> references, ValueType type,
+                     const std::vector<Value>*& values);
+  Status set_symbols(std::span<const std::uint32_t> references, ValueType type,
+                     const std::vector<Value>& values);
   Status do_step(double time, double length);
   double last_time() const { return last_time_; }  ///< that the last step reached [s]
 
   std::unique_ptr<SavedState> save() const;
   Status restore(const SavedState& saved);
-  std::string serialize(const SavedState& saved) const;
+  std::string serialize(const SavedState& saved);
   /// null: the bytes are refused, which is logged.
   std::unique_ptr<SavedState> deserialize(std::string_view bytes);
 
@@ -86,11 +94,22 @@ class Instance {
   Instance(Standard standard, std::string name, Log log)
       : standard_(standard), name_(std::move(name)), log_(std::move(log)) {}
   bool load(const std::string& token, const std::string& resources);
+  /// The deck with these values of symbols; its diagnostics go to the log.
+  DeckReport read_with(const SymbolValues& symbols);
+  void take(DeckReport report, const SymbolValues& symbols);
+  /// Reads the deck again when symbols have got other values.
+  mbcosim::Status ensure_read();
+  /// The digest of the model with these values of symbols.
+  Result<std::uint64_t> digest_with(const SymbolValues& symbols);
   bool bind();
   void set_start_values();
   /// The phases before the first step, with the inputs as given; again when one has changed.
   mbcosim::Status ensure_started();
   const Variable* find(std::uint32_t reference) const;
+  const FmuSymbol* find_symbol(std::uint32_t reference, ValueType type) const;
+  Value value_of(const FmuSymbol& symbol) const;
+  Status may_choose(const FmuSymbol& symbol);
+  void choose(const FmuSymbol& symbol, const Value& value);
   int index_of(const Variable& variable) const {
     return static_cast<int>(&variable - variables_.data());
   }
@@ -108,6 +127,13 @@ class Instance {
   const std::string name_;
   Log log_;
   Manifest manifest_;
+  std::map<std::string, std::string> files_;
+  SymbolValues exported_;  ///< symbols whose values were chosen at the export
+  SymbolValues chosen_;    ///< those, and what the importer chose
+  SymbolValues read_;      ///< with which the deck was read last
+  SymbolValues declared_;  ///< what it gave all symbols then
+  std::vector<Value> handed_out_;
+  double initial_time_ = 0;  ///< of the deck as it was exported [s]
   ModelPtr model_;
   std::unique_ptr<Simulation> simulation_;
   std::vector<std::unique_ptr<PointMotion>> motions_;

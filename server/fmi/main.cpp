@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "fmi/exporter.h"
+#include "input/symbol_values.h"
 
 namespace mbcosim::fmi {
 namespace {
@@ -58,6 +59,17 @@ int main(int argc, char** argv) {
   app.add_option("--outputs", options.selection.outputs,
                  "Variables to read, names or patterns with * and ?; default: all")
       ->delimiter(',');
+  app.add_option_function<std::vector<std::string>>(
+         "-D",
+         [&](const std::vector<std::string>& definitions) {
+           for (const std::string& definition : definitions) {
+             auto symbol = mbcosim::parse_symbol(definition);
+             if (!symbol) throw CLI::ValidationError("-D", symbol.error().message);
+             options.symbols.insert_or_assign(std::move(symbol->first), std::move(symbol->second));
+           }
+         },
+         "Value of a symbol of the deck: NAME=VALUE; repeatable")
+      ->take_all();
   app.footer("Exit codes: 0 done, 2 deck refused, 4 wrong usage, or the file cannot be written.");
   try {
     app.parse(argc, argv);

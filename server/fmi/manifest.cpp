@@ -2,6 +2,24 @@
 
 #include <nlohmann/json.hpp>
 
+/// A number with a point is a real one.
+template <>
+struct nlohmann::adl_serializer<mbcosim::Value> {
+  static void to_json(json& j, const mbcosim::Value& value) {
+    std::visit([&](const auto& held) { j = held; }, value);
+  }
+  static void from_json(const json& j, mbcosim::Value& value) {
+    if (j.is_boolean())
+      value = j.get<bool>();
+    else if (j.is_number_integer())
+      value = j.get<std::int32_t>();
+    else if (j.is_number())
+      value = j.get<double>();
+    else
+      value = j.get<std::string>();
+  }
+};
+
 namespace mbcosim::fmi {
 
 using nlohmann::json;
@@ -17,7 +35,8 @@ NLOHMANN_JSON_SERIALIZE_ENUM(FmuVariable::Source,
                               {FmuVariable::Source::velocities, "velocities"},
                               {FmuVariable::Source::angular_velocities, "angular velocities"}})
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FmuVariable, reference, role, source, name, elements, start)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Manifest, token, deck, digest, files, variables)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FmuSymbol, reference, name, start, given)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Manifest, token, deck, digest, files, variables, symbols)
 
 std::string to_json(const Manifest& manifest) { return json(manifest).dump(1); }
 

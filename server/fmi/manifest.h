@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "input/value.h"
 #include "model/diagnostic.h"
 
 namespace mbcosim::fmi {
@@ -30,12 +31,21 @@ struct FmuVariable {
   int size() const { return static_cast<int>(elements.size()); }
 };
 
+/// A fixed parameter: a symbol of the deck (`set` card), read when initialization ends.
+struct FmuSymbol {
+  std::uint32_t reference = 0;
+  std::string name;    ///< in the deck
+  Value start;         ///< its alternative is the type
+  bool given = false;  ///< `start` was chosen at the export; else the deck gives it
+};
+
 struct Manifest {
   std::string token;                         ///< instantiationToken, guid
   std::string deck;                          ///< name of the main file
   std::string digest;                        ///< of the model, 16 hexadecimal digits
   std::map<std::string, std::string> files;  ///< name that the deck uses -> path below resources
   std::vector<FmuVariable> variables;
+  std::vector<FmuSymbol> symbols;
 };
 
 std::string to_json(const Manifest& manifest);

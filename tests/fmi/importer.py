@@ -52,9 +52,18 @@ class Archive:
         return int(self.variables[name].get("valueReference"))
 
     def start(self, name):
+        """Numbers of a real variable; of another type the text that the description has."""
         variable = self.variables[name]
-        real = variable.find("Real")
-        return [float(x) for x in (variable if real is None else real).get("start").split()]
+        typed = variable if self.version.startswith("3") else variable[0]
+        if typed.tag == "String":
+            return typed.get("start") if typed.find("Start") is None else typed.find("Start").get("value")
+        if typed.tag not in ("Real", "Float64"):
+            return typed.get("start")
+        return [float(x) for x in typed.get("start").split()]
+
+    def type(self, name):
+        """The standard's name: "Real" or "Float64", "Integer" or "Int32", "Boolean", "String"."""
+        return self.variables[name].tag if self.version.startswith("3") else self.variables[name][0].tag
 
     def experiment(self):
         node = self.description.find("DefaultExperiment")
@@ -97,6 +106,32 @@ class Instance:
         status = self.set_reals([self.archive.reference(name)], values)
         if status != OK:
             raise Failed("set", status)
+
+    C_TYPES = {"Integer": c.c_int32, "Int32": c.c_int32, "String": c.c_char_p}
+
+    def _typed(self, function, name, values):
+        archive = self.archive
+        size = (c.c_size_t(len(values)),) if archive.version.startswith("3") else ()
+        return self.call(function + archive.type(name), (c.c_uint32 * 1)(archive.reference(name)), c.c_size_t(1), values, *size)
+
+    def _array(self, name, *values):
+        boolean = c.c_bool if self.archive.version.startswith("3") else c.c_int
+        return (self.C_TYPES.get(self.archive.type(name), boolean) * 1)(*values)
+
+    def set_parameter(self, name, value):
+        """Status of setting one parameter of any type."""
+        if self.archive.type(name) in ("Real", "Float64"):
+            return self.set_reals([self.archive.reference(name)], [value])
+        return self._typed("Set", name, self._array(name, value))
+
+    def parameter(self, name):
+        if self.archive.type(name) in ("Real", "Float64"):
+            return self[name][0]
+        values = self._array(name)
+        status = self._typed("Get", name, values)
+        if status != OK:
+            raise Failed("Get" + self.archive.type(name), status)
+        return values[0]
 
     def initialize(self, stop=None):
         start = self.archive.experiment()[0]

@@ -406,7 +406,7 @@ def test_bad_values(ports, standard):
     with instance_of(fmu) as instance:
         one = (ctypes.c_uint32 * 1)(fmu.reference(scalar))
         assert instance.call(wrong_type, one, ctypes.c_size_t(1), (ctypes.c_int32 * 1)(1), ctypes.c_size_t(1)) == ERROR
-        assert "no variable is of type Int" in instance.log[-1][2]
+        assert "no integer variable has the reference" in instance.log[-1][2]
     if standard == "3":
         with instance_of(fmu) as instance:
             assert instance.set_reals([fmu.reference("port.wing.loads.force")], [1.0] * 5) == ERROR
@@ -535,6 +535,117 @@ def test_variables_can_be_chosen(ports, standard):
     assert default.names("parameter") == ["node.parameter.7.x"] and default.start("node.parameter.7.x") == [2.0]
 
 
+# ------------------------------------------------------------------ symbols of the deck
+
+SYMBOLS = """set: const real L = 1.; set: real M = 2.*L; set: const integer INPUTS = 2; set: const bool HEAVY = TRUE;
+set: const string KIND = "plain";
+begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: 1e-2; tolerance: 1e-9; max iterations: 20; end: initial value;
+begin: control data; structural nodes: 1; rigid bodies: 1; forces: 1; file drivers: 1; gravity; end: control data;
+begin: nodes; structural: 1, dynamic, L,0.,0., eye, null, 0.,0.,1.; end: nodes;
+begin: drivers; file: 1, stream, stream drive name, "push", create, no, path, "nobody", INPUTS; end: drivers;
+begin: elements; body: 1, 1, M, null, diag, 1.,2.,3.; gravity: uniform, 0.,0.,-1., 9.81*(HEAVY == TRUE);
+force: 1, absolute, 1, position, null, 1.,0.,0., const, L*(KIND == "plain"); end: elements;
+"""
+
+
+@pytest.fixture(scope="module")
+def symbols(exported, tmp_path_factory):
+    path = tmp_path_factory.mktemp("deck") / "symbols.mbd"
+    path.write_text(SYMBOLS)
+    return lambda standard, *options: exported(str(path), standard, *options)
+
+
+def positions(instance, steps=20):
+    """Positions after each step from where the instance stands."""
+    names = [name for name in instance.archive.names("output") if re.fullmatch(r"node\.structural\.1\.X(\[\d\])?", name)]
+    step, rows = instance.archive.experiment()[2], []
+    start = instance["time"][0]
+    for k in range(steps):
+        assert instance.do_step(start + k * step, step) == OK
+        rows.append(instance[names])
+    return rows
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_symbols_are_fixed_parameters_with_the_types_of_the_deck(symbols, standard):
+    fmu = symbols(standard)
+    real, integer = ("Real", "Integer") if standard == "2" else ("Float64", "Int32")
+    assert {name: (fmu.type(name), fmu.start(name)) for name in fmu.names("parameter")} == {
+        "symbol.HEAVY": ("Boolean", "true"), "symbol.INPUTS": (integer, "2"), "symbol.KIND": ("String", "plain"),
+        "symbol.L": (real, [1.0]), "symbol.M": (real, [2.0])}
+    assert all(fmu.variables[name].get("variability") == "fixed" for name in fmu.names("parameter"))
+    with instance_of(fmu) as instance:
+        assert [instance.parameter(name) for name in sorted(fmu.names("parameter"))] == [True, 2, b"plain", 1.0, 2.0]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_symbols_that_are_set_give_the_bits_of_an_fmu_exported_with_them(symbols, standard):
+    values = {"L": 0.5, "HEAVY": False, "KIND": b"other"}
+    fmu = symbols(standard)
+    with instance_of(symbols(standard, "-D", "L=0.5", "-D", "HEAVY=FALSE", "-D", "KIND=other")) as with_values:
+        with_values.initialize()
+        expected = positions(with_values)
+        assert with_values.archive.start("symbol.L") == [0.5] and with_values.archive.start("symbol.HEAVY") == "false"
+    with instance_of(fmu) as instance:
+        for name, value in values.items():
+            assert instance.set_parameter("symbol." + name, value) == OK
+        instance.initialize()
+        assert instance.parameter("symbol.M") == 1.0  # the deck computes it from L
+        assert positions(instance) == expected
+        assert instance.call("Reset") == OK
+        assert instance.parameter("symbol.L") == 1.0
+        instance.initialize()
+        assert positions(instance) != expected
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_states_carry_the_symbols(symbols, standard):
+    fmu = symbols(standard)
+    with instance_of(fmu) as one, instance_of(fmu) as other:
+        assert one.set_parameter("symbol.L", 0.25) == OK
+        one.initialize()
+        positions(one)
+        state = one.get_state()
+        data = one.serialize(state)
+        expected = positions(one)
+        other.initialize()
+        taken = other.deserialize(data)
+        other.set_state(taken)
+        assert other.parameter("symbol.L") == 0.25 and other.parameter("symbol.M") == 0.5
+        assert positions(other) == expected
+        other.free_state(taken)
+        one.free_state(state)
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_bad_values_of_symbols(symbols, standard):
+    fmu = symbols(standard)
+    with instance_of(fmu) as instance:
+        assert instance.set_parameter("symbol.L", float("nan")) == DISCARD
+        instance.initialize()
+        assert instance.set_parameter("symbol.L", 2.0) == ERROR
+        assert '"symbol.L" is fixed: it is set before the first step' in instance.log[-1][2]
+    with instance_of(fmu) as instance:  # the number of inputs depends on it
+        assert instance.set_parameter("symbol.INPUTS", 3) == OK
+        with pytest.raises(Failed):
+            instance.initialize()
+        assert "the model has other variables: export an FMU with -D" in instance.log[-1][2]
+    with instance_of(fmu) as instance:  # the body has no mass
+        assert instance.set_parameter("symbol.M", -1.0) == OK
+        with pytest.raises(Failed):
+            instance.initialize()
+        assert any("mass" in text for _, _, text in instance.log), instance.log
+        assert instance.call("Reset") == OK
+        instance.initialize()
+        positions(instance)
+    with instance_of(fmu) as instance:
+        wrong = (ctypes.c_uint32 * 1)(fmu.reference("symbol.L"))
+        function = "SetInteger" if standard == "2" else "SetInt32"
+        assert instance.call(function, wrong, ctypes.c_size_t(1), (ctypes.c_int32 * 1)(1), ctypes.c_size_t(1)) == ERROR
+        assert "no integer variable has the reference" in instance.log[-1][2]
+
+
 def test_wrong_selections_and_decks_are_refused(tmp_path):
     def export(*arguments):
         done = subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", *arguments, "-o", str(tmp_path / "x.fmu")], capture_output=True,
@@ -550,6 +661,9 @@ def test_wrong_selections_and_decks_are_refused(tmp_path):
     bad.write_text("begin: nonsense;")
     assert export(str(bad))[0] == 2
     assert export(pendulum, "--fmi", "1")[0] == 4
+    code, text = export(pendulum, "-D", "NOBODY=1")
+    assert code == 2 and "NOBODY" in text
+    assert export(pendulum, "-D", "L")[0] == 4
 
 
 def test_only_functions_of_fmi_are_visible(ports):
@@ -568,7 +682,7 @@ def test_equal_decks_make_equal_files(tmp_path):
 
 
 @pytest.mark.parametrize("standard", STANDARDS)
-def test_descriptions_meet_the_schema(exported, ports, standard):
+def test_descriptions_meet_the_schema(exported, ports, symbols, standard):
     schema = os.environ.get("MBCOSIM_FMI_SCHEMA", "")  # folder with fmi2/ and fmi3/, the standard's own files
     if not schema or not shutil.which("xmllint"):
         pytest.skip("MBCOSIM_FMI_SCHEMA is not set, or there is no xmllint")
@@ -578,7 +692,7 @@ def test_descriptions_meet_the_schema(exported, ports, standard):
         checked = subprocess.run(command, capture_output=True, text=True, timeout=60)
         assert checked.returncode == 0, checked.stderr
 
-    fmus = [ports(standard)] + [exported(deck, standard) for deck in TUTORIALS]
+    fmus = [ports(standard), symbols(standard)] + [exported(deck, standard) for deck in TUTORIALS]
     validate(f"fmi{standard}ModelDescription.xsd", *[os.path.join(fmu.folder, "modelDescription.xml") for fmu in fmus])
     if standard == "3":
         validate("fmi3TerminalsAndIcons.xsd", os.path.join(ports("3").folder, "terminalsAndIcons", "terminalsAndIcons.xml"))
