@@ -247,14 +247,15 @@ std::string module_name(std::string file) {
 void read_module_load(DeckCard& card) {
   const std::string name = module_name(card.quoted("name of the module"));
   const SourceSpan where = card.last();
-  for (const char* known : {"wheel2", "inline_friction", "asynchronous_machine"}) {
+  for (const char* known : {"wheel2", "inline_friction", "asynchronous_machine", "minmaxdrive"}) {
     if (name != known) continue;
     while (card.more()) card.skip();  // arguments of the module
-    card.note("the elements of \"" + name + "\" are built in; nothing is loaded");
+    card.note("the words of \"" + name + "\" are built in; nothing is loaded");
     return;
   }
   card.fail_at(where, "module \"" + name + "\" is not served: decks load no code",
-               "built in are the elements of wheel2, inline_friction and asynchronous_machine");
+               "built in are the words of wheel2, inline_friction, asynchronous_machine and "
+               "minmaxdrive");
 }
 
 }  // namespace

@@ -195,7 +195,7 @@ void read_output_results(DeckCard& card) {
               "write `output results: netcdf`", "not-supported");
   c.netcdf = true;
   while (card.more())
-    if (card.required("option", {"sync", "no text", "classic", "netcdf4"}) == 1)
+    if (card.required("option", {"sync", "no text", "classic", "netcdf4", "text", "no sync"}) == 1)
       card.warn("`no text` is ignored: the text files are written beside the NetCDF file");
 }
 
@@ -297,6 +297,9 @@ void read_restart(DeckCard& card) {
                "snapshots of the service (`CreateSnapshot`) keep a run, and its checkpoints");
 }
 void ignored(DeckCard& card) { ignore_rest(card, "this card has no effect"); }
+void read_automatic_differentiation(DeckCard& card) {
+  card.note("derivatives are exact with and without this card");
+}
 void read_solution_array(DeckCard& card) {
   card.fail_at(card.head(),
                "\"read solution array\" is not served: the file depends on the machine and "
@@ -343,6 +346,8 @@ const std::vector<std::pair<const char*, Reader>>& control_cards() {
       {"rigid body kinematics", read_frame_motion},
       {"loadable path", ignored},
       {"finite difference jacobian meter", ignored},
+      {"use automatic differentiation", read_automatic_differentiation},
+      {"output units", ignored},
       {"read solution array", read_solution_array},
       {"output file name", read_output_file_name},
       {"gravity", read_gravity_flag},

@@ -160,6 +160,9 @@ double read_tolerance_above_zero(DeckCard& card, const char* what, double fallba
 void read_derivatives_tolerance(DeckCard& card) {
   settings(card).derivatives_tolerance =
       read_tolerance_above_zero(card, "derivatives tolerance", 1e-6);
+  if (!card.more()) return;
+  card.real("tolerance of the solution");
+  card.note("derivatives tolerance: the residual is tested, not the solution");
 }
 void read_derivatives_iterations(DeckCard& card) {
   settings(card).derivatives_max_iterations = read_iterations(card, "derivatives max iterations");
@@ -288,6 +291,9 @@ void read_threads(DeckCard& card) {
   card.integer("number of threads");
 }
 void ignored(DeckCard& card) { ignore_rest(card, "this card has no effect"); }
+void read_real_time(DeckCard& card) {
+  ignore_rest(card, "a deck sets no pace; `mbcosim run --real-time` holds a run to the clock");
+}
 
 using Reader = void (*)(DeckCard&);
 const std::vector<std::pair<const char*, Reader>>& initial_value_cards() {
@@ -326,7 +332,7 @@ const std::vector<std::pair<const char*, Reader>>& initial_value_cards() {
       {"abort after", read_abort_after},
       {"eigenanalysis", read_eigenanalysis},
       {"threads", read_threads},
-      {"real time", ignored},
+      {"real time", read_real_time},
       {"interface linear solver", ignored},
       {"interface solver", ignored},
       {"pod", ignored},

@@ -45,9 +45,6 @@ void refuse_dead_elements(Refusals& r) {
       "use `genel: <label>, clamp` on the hydraulic node");
   add(r, "hydraulic", "imposed flow", "the reference solver has no such element",
       "use `force: <label>, abstract` on the hydraulic node");
-  add(r, "jointregularization", "dynamic",
-      "it depends on the residual evaluated before, thus on how often it is evaluated",
-      "use `jacobian`", false);
   add(r, "elements", "loadable", "decks load no code",
       "what is built in is written `user defined: <label>, <word>`", false);
   add(r, "outputelement", "buffer stream", "it exchanges through the memory of another program",
@@ -78,7 +75,7 @@ void refuse_dead_objects(Refusals& r) {
 void refuse_modules(Refusals& r) {
   const char* const module = "it comes from a run-time module of the reference solver";
   const std::string none = "a deck loads no code";
-  for (const char* word : {"switch", "min", "max", "multi step", "node distance", "smooth step"})
+  for (const char* word : {"switch", "multi step", "node distance", "smooth step"})
     add(r, "drive", word, module, none + "; use `string`", false);
   for (const char* word :
        {"hunt crossley", "continuous contact", "nonlinear rheologic damper", "hydraulic damper",

@@ -194,13 +194,15 @@ MethodSettings read_method(DeckCard& card) {
 void read_linear_solver(DeckCard& card) {
   const SourceSpan where = card.more() ? card.next() : card.last();
   const int solver = card.required(
-      "linear solver", {"umfpack", "umfpack3", "klu", "naive", "lapack", "y12", "superlu", "taucs",
-                        "harwell", "meschach", "watson", "pardiso", "empty"});
-  if (solver == 12) card.fail_at(where, "the linear solver \"empty\" solves nothing");
+      "linear solver",
+      {"umfpack", "umfpack3", "klu", "naive", "lapack", "y12", "superlu", "taucs", "harwell",
+       "meschach", "watson", "pardiso", "pastix", "strumpack", "spqr", "qr", "wsmp", "empty"});
+  if (solver == 17) card.fail_at(where, "the linear solver \"empty\" solves nothing");
   static const std::set<std::string, std::less<>> kFlags = {
       "map",          "cc",     "columncompressed", "dir",
       "directaccess", "colamd", "minimumdegree",    "rcmk",
-      "king",         "sloan",  "nesteddissection", "mmdata"};
+      "king",         "sloan",  "nesteddissection", "mmdata",
+      "grad"};
   while (card.more()) {
     if (kFlags.count(card.peek_word())) {
       card.skip();

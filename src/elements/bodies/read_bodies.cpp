@@ -32,8 +32,8 @@ namespace {
 
 constexpr double kGravitationalConstant = 6.67384e-11;  ///< `G, si` [m³/(kg s²)], MBDyn's value
 
-/// mass, centre of mass, inertia about it [, inertial, orientation]: one part of a (condensed)
-/// body.
+/// mass, centre of mass, inertia about it [, {inertial | orientation}, axes]: one part of a
+/// (condensed) body.
 void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
   const double m = card.real("mass");
   if (m < 0 && !negative_allowed)
@@ -42,7 +42,7 @@ void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
   const Vec3 x = card.relative_position("centre of mass", node);
   Mat3 j = card.relative_tensor("inertia", node);
   if (!negative_allowed) warn_about_inertia(card, j);
-  if (card.keyword("inertial") && !card.keyword("node")) {
+  if (card.one_of({"inertial", "orientation"}) >= 0 && !card.keyword("node")) {
     const Mat3 r = card.relative_orientation("inertial axes", node);
     j = r * j * r.transpose();
   }

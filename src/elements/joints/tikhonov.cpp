@@ -114,6 +114,7 @@ void register_tikhonov(Registry& registry) {
     registry.typed("joint regularization", Family::joint_regularization, {word}, std::move(reader));
   };
   add("tikhonov", [](Card& c, ElementInfo& info) { read_regularization(c, info, false); });
+  add("dynamic", [](Card& c, ElementInfo& info) { read_regularization(c, info, false); });
   add("jacobian", [](Card& c, ElementInfo& info) { read_regularization(c, info, true); });
 }
 

@@ -10,6 +10,9 @@ namespace mbcosim {
 /// the rows of this program, which are those of the reference solver; whether the joint yields or
 /// is driven away depends on it. It adds to rows of another element, hence a set of its own and not
 /// an ElementSetOf.
+///
+/// The word `dynamic` of the reference solver takes λₖ of the residual evaluated before: where the
+/// iteration has converged both are equal, so that it is served by the same equations.
 class TikhonovSet final : public ElementSet {
  public:
   /// `matrix_only`: the constraints stay exact, Newton's matrix is regularized.
@@ -63,7 +66,8 @@ class TikhonovSet final : public ElementSet {
   std::vector<Slot> slots_;
 };
 
-/// `joint regularization : <joint label> , { tikhonov | jacobian } [ , { list , <ε1> , … | <ε> } ]
+/// `joint regularization : <joint label> , { tikhonov | dynamic | jacobian } [ , { list , <ε1> , …
+/// | <ε> } ]
 /// ;`
 void register_tikhonov(Registry& registry);
 

@@ -35,7 +35,7 @@ chdir
   ! no: a deck changes no folder
 module load
   = "<module>" [ , <module arguments> ]
-  ! partly: `wheel2`, `inline_friction`, `asynchronous_machine`: their elements are built in; a deck loads no code
+  ! partly: `wheel2`, `inline_friction`, `asynchronous_machine`, `minmaxdrive`: their words are built in; a deck loads no code
 c81 data
   = <label> , [ name , "<name>" , ] "<file>" [ , tolerance , <tolerance> ] [ , { fc511 | nrel | free format } ] [ , flip ] [ , echo , "<file>" [ , free format ] ]
   ! ignored: checked for its form; only aerodynamic elements would use it
@@ -248,8 +248,9 @@ default aerodynamic output
   = { position | orientation | velocity | all }
   ! ignored
 output results
-  = { netcdf [ , sync ] [ , no text ] | text }
-  > .nc beside the text files; `no text` is ignored
+  = { netcdf [ , { classic | netcdf4 } ] [ , { sync | no sync } ] [ , { text | no text } ] | text }
+  > .nc beside the text files
+  ! partly: `no text` is ignored with a warning; the text files are written beside the `.nc`
 title
   = "<title>"
 print
@@ -274,6 +275,11 @@ loadable path
 finite difference jacobian meter
   = <drive>
   ! ignored
+use automatic differentiation
+  ! ignored: a newer word; derivatives are exact without it
+output units
+  = <word>
+  ! ignored: a newer word; units are those of the deck
 read solution array
   ! no: use snapshots
 output file name
@@ -281,7 +287,7 @@ output file name
   ! no: `mbcosim run -o PREFIX`
 gravity
 air properties
-  ! not yet: the count alone
+  ! not yet: the count alone; aerodynamics
 automatic structural elements
   = <n elements>
   ! ignored

@@ -44,8 +44,8 @@ hbeam
 bind
   = { <joint> , joint , <element parameter node> , { { string | name } , "<private datum>" | [ index , ] <n datum> } }
 body
-  = <node> , { condense , 2 , ( <mass [kg]> , <offset> , <inertia> [ , inertial , { node | <orientation> } ] ) * 2 | [ allow negative mass , ] <mass [kg]> , <offset> , <inertia> [ , inertial , { node | <orientation> } ] | variable mass , <drive> , <vec3 drive> , <mat3 drive> , <mat3 drive> }
-  ! yes: also `condense`, `variable mass`
+  = <node> , { condense , 2 , ( <mass [kg]> , <offset> , <inertia> [ , { inertial | orientation } , { node | <orientation> } ] ) * 2 | [ allow negative mass , ] <mass [kg]> , <offset> , <inertia> [ , { inertial | orientation } , { node | <orientation> } ] | variable mass , <drive> , <vec3 drive> , <mat3 drive> , <mat3 drive> }
+  ! yes: also `condense`, `variable mass`; `orientation` is a newer word for `inertial`
 bulk
   = <type of the bulk group>
 couple
@@ -134,7 +134,7 @@ external structural
 external structural mapping
   = <communicator> , [ orientation , orientation matrix , ] points number , 1 , <node> , offset , <offset> [ , mapped points number , { from file | 1 } , { full | sparse } mapping file , "<mapping>" ]
   > .frc: label@node F (3) M (3)
-  ! partly: no `membrane`, no `echo`
+  ! partly: no `membrane` (nodes of membrane elements, which are not served), no `echo` (the input of a tool that makes the matrix; write the matrix into the mapping file)
 external modal
   = <communicator> , { <modal joint> [ , accelerations ] [ , type , { rigid | modal | all } ] | reference node , <node> [ , accelerations ] [ , type , rigid ] }
   > .frc: label#node F (3) M (3), label.mode force
@@ -232,6 +232,9 @@ asynchronous_machine
 @ jointregularization | joint regularization : <label of the joint> , <word> [ , <grammar> ] ;
 tikhonov
   = [ <coefficient> | list , ( <coefficient> ) * 6 ]
+dynamic
+  = [ <coefficient> | list , ( <coefficient> ) * 6 ]
+  ! yes: as `tikhonov`, to which it converges
 jacobian
   = [ <coefficient> | list , ( <coefficient> ) * 6 ]
   ! yes: in the matrix only

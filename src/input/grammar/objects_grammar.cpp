@@ -41,6 +41,10 @@ linear
   = <c0> , <c1>
 meter
   = <t0 [s]> , { <t1 [s]> | forever } [ , steps , <n steps> ]
+max
+  = <n drives> , ( <drive> ) * n drives
+min
+  = <n drives> , ( <drive> ) * n drives
 mult
   = <drive> , <drive>
 node

@@ -1,5 +1,6 @@
 #include "model/drives/composed_drives.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "model/model.h"
@@ -17,6 +18,15 @@ double ProductDrive::derivative(const EvalContext& context, double t) const {
          f_->value(context, t) * g_->derivative(context, t);
 }
 
+namespace {
+
+bool all_have_derivatives(const std::vector<DrivePtr>& parts) {
+  return std::all_of(parts.begin(), parts.end(),
+                     [](const DrivePtr& f) { return f->has_derivative(); });
+}
+
+}  // namespace
+
 double SumDrive::value(const EvalContext& context, double t) const {
   double sum = 0;
   for (const DrivePtr& f : parts_) sum += f->value(context, t);
@@ -27,15 +37,31 @@ double SumDrive::value(const EvalContext& context) const {
   for (const DrivePtr& f : parts_) sum += f->value(context);
   return sum;
 }
-bool SumDrive::has_derivative() const {
-  for (const DrivePtr& f : parts_)
-    if (!f->has_derivative()) return false;
-  return true;
-}
+bool SumDrive::has_derivative() const { return all_have_derivatives(parts_); }
 double SumDrive::derivative(const EvalContext& context, double t) const {
   double sum = 0;
   for (const DrivePtr& f : parts_) sum += f->derivative(context, t);
   return sum;
+}
+
+double ExtremeDrive::value(const EvalContext& context, double t) const {
+  double extreme = parts_[0]->value(context, t);
+  for (const DrivePtr& f : parts_)
+    if (const double v = f->value(context, t); beats(v, extreme)) extreme = v;
+  return extreme;
+}
+double ExtremeDrive::value(const EvalContext& context) const {
+  double extreme = parts_[0]->value(context);
+  for (const DrivePtr& f : parts_)
+    if (const double v = f->value(context); beats(v, extreme)) extreme = v;
+  return extreme;
+}
+bool ExtremeDrive::has_derivative() const { return all_have_derivatives(parts_); }
+double ExtremeDrive::derivative(const EvalContext& context, double t) const {
+  const Drive* extreme = parts_[0].get();
+  for (const DrivePtr& f : parts_)
+    if (beats(f->value(context, t), extreme->value(context, t))) extreme = f.get();
+  return extreme->derivative(context, t);
 }
 
 double ChainDrive::value(const EvalContext& context, double t) const {

@@ -41,6 +41,23 @@ class SumDrive : public Drive {
   std::vector<DrivePtr> parts_;
 };
 
+/// The smallest or the largest of fₖ; the first of those that are equal.
+class ExtremeDrive : public Drive {
+ public:
+  ExtremeDrive(std::vector<DrivePtr> parts, bool largest)
+      : parts_(std::move(parts)), largest_(largest) {}
+  double value(const EvalContext& context, double t) const override;
+  double value(const EvalContext& context) const override;
+  bool has_derivative() const override;
+  double derivative(const EvalContext& context, double t) const override;
+
+ private:
+  bool beats(double a, double b) const { return largest_ ? a > b : a < b; }
+
+  std::vector<DrivePtr> parts_;
+  bool largest_;
+};
+
 /// f(g(t)).
 class ChainDrive : public Drive {
  public:

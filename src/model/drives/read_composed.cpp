@@ -12,12 +12,24 @@ DrivePtr read_product(Card& card) {
   return std::make_shared<ProductDrive>(std::move(f), std::move(g));
 }
 
-DrivePtr read_array(Card& card) {
+std::vector<DrivePtr> read_drives(Card& card) {
   const int n = read_count(card, "number of drives");
   std::vector<DrivePtr> parts;
   for (int k = 0; k < n; ++k) parts.push_back(card.drive());
-  if (n == 1) return parts[0];
+  return parts;
+}
+
+DrivePtr read_array(Card& card) {
+  std::vector<DrivePtr> parts = read_drives(card);
+  if (parts.size() == 1) return parts[0];
   return std::make_shared<SumDrive>(std::move(parts));
+}
+
+DrivePtr read_smallest(Card& card) {
+  return std::make_shared<ExtremeDrive>(read_drives(card), false);
+}
+DrivePtr read_largest(Card& card) {
+  return std::make_shared<ExtremeDrive>(read_drives(card), true);
 }
 
 DrivePtr read_chain(Card& card) {
@@ -138,6 +150,8 @@ DrivePtr read_element(Card& card) {
 void register_composed_drives(Registry& registry) {
   registry.drive({"mult"}, read_product);
   registry.drive({"array"}, read_array);
+  registry.drive({"min"}, read_smallest);
+  registry.drive({"max"}, read_largest);
   registry.drive({"drive"}, read_chain);
   registry.drive({"periodic"}, read_periodic);
   registry.drive({"postponed"}, [](Card& card) {

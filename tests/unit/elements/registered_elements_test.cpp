@@ -55,6 +55,9 @@ const ElementCard kCards[] = {
     {"joint: deformable displacement hinge",
      "joint: 90, deformable displacement hinge, 1, .1,.2,.3, hinge, euler, .1,.2,.3, 2, "
      ".3,.2,.1, hinge, euler, .3,.2,.1, linear viscoelastic, 3., 2.;"},
+    {"joint regularization: dynamic",
+     "joint: 90, spherical hinge, 1, .1,.2,.3, 2, -.4,.5,.6; joint regularization: 90, "
+     "dynamic, 1e-3;"},
     {"joint regularization: jacobian",
      "joint: 90, spherical hinge, 1, .1,.2,.3, 2, -.4,.5,.6; joint regularization: 90, "
      "jacobian, 0.;"},

@@ -200,6 +200,26 @@ TEST(ControlData, ReadsAssemblyAndOutput) {
   EXPECT_EQ(model->title, "a \"b\"");
 }
 
+/// Of decks for later versions of the reference solver; they change no results.
+TEST(NewerWords, AreReadWithANote) {
+  const LoadReport report = load(
+      "begin: data; problem: initial value; end: data;"
+      "begin: initial value; time step: 1e-2; derivatives tolerance: 1e-3, 1e-6; linear solver: "
+      "pastix, grad, scale, iterative, always, max iterations, 10; end: initial value;"
+      "begin: control data; use automatic differentiation; output units: MKS; output results: "
+      "netcdf, netcdf4, no sync, text; end: control data;"
+      "begin: nodes; structural: 1, dynamic, null, eye, null, null; end: nodes;"
+      "begin: elements; body: 1, 1, 1., null, diag, 1.,2.,2.5, orientation, euler, 0.,0.,pi/2.; "
+      "end: elements;");
+  EXPECT_TRUE(report.ok()) << findings(report.diagnostics);
+  int notes = 0;
+  for (const Diagnostic& d : report.diagnostics) {
+    EXPECT_EQ(d.severity, Severity::note) << d.text();
+    notes += d.severity == Severity::note;
+  }
+  EXPECT_EQ(notes, 3);
+}
+
 TEST(ControlData, ReadsTheMotionOfTheFrame) {
   const ModelPtr model =
       control("rigid body kinematics: const, velocity, 1.,2.,3., angular velocity, 0.,0.,4.;");

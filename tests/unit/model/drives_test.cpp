@@ -327,6 +327,22 @@ TEST_F(DriveTable, DerivativesAtKinksAreMeansOfOneSidedSlopes) {
           << row.deck << " " << k;
 }
 
+TEST_F(DriveTable, ExtremesHaveTheSlopeOfTheDriveThatCounts) {
+  const std::vector<DrivePtr> parts = {linear(1, 2), linear(4, -1), make_constant_drive(2.5)};
+  const ExtremeDrive smallest(parts, false), largest(parts, true);
+  const double t[] = {.5, 1.1, 3}, low[] = {2, 2.5, 1}, low_slope[] = {2, 0, -1},
+               high[] = {3.5, 3.2, 7}, high_slope[] = {-1, 2, 2};
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_DOUBLE_EQ(smallest.value(context(), t[k]), low[k]) << k;
+    EXPECT_DOUBLE_EQ(largest.value(context(), t[k]), high[k]) << k;
+    EXPECT_DOUBLE_EQ(smallest.derivative(context(), t[k]), low_slope[k]) << k;
+    EXPECT_DOUBLE_EQ(largest.derivative(context(), t[k]), high_slope[k]) << k;
+  }
+  EXPECT_TRUE(smallest.has_derivative());
+  EXPECT_FALSE(
+      ExtremeDrive({linear(1, 2), std::make_shared<TimeStepDrive>()}, true).has_derivative());
+}
+
 TEST_F(DriveTable, SmoothDerivativesMatchCentralDifferences) {
   const std::vector<DrivePtr> drives = {
       std::make_shared<ExponentialDrive>(2, .5, 1, .25),

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "deck_run.h"
 #include "output/result_files.h"
 #include "simulation/simulation.h"
 #include "source_dir.h"
@@ -89,6 +90,22 @@ TEST_P(ReferenceRules, GiveTheNumbersOfTheReference) {
             << "line " << k + 1 << ", column " << i + 1;
     }
   }
+}
+
+/// Rule 10: with `dynamic` the multipliers of the residual before, equal to those of the residual
+/// where the iteration has converged.
+TEST(JointRegularization, DynamicConvergesToTikhonov) {
+  std::ifstream file(folder() + "tik2.mbd");
+  const std::string deck{std::istreambuf_iterator<char>(file), {}};
+  std::string other = deck;
+  other.replace(other.find("tikhonov"), 8, "dynamic");
+  DeckRun tikhonov(deck), dynamic(other);
+  ASSERT_TRUE(tikhonov.ready() && dynamic.ready());
+  tikhonov.step(5);
+  dynamic.step(5);
+  EXPECT_GT(tikhonov.node(1).x.norm(), .1);
+  EXPECT_EQ(tikhonov.node(1).x, dynamic.node(1).x);
+  EXPECT_EQ(tikhonov.own(Family::joint, 1, 2), dynamic.own(Family::joint, 1, 2));
 }
 
 INSTANTIATE_TEST_SUITE_P(Decks, ReferenceRules,
