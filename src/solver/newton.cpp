@@ -114,7 +114,7 @@ class Newton {
         (void)search_along(system_, rescue_);
       else
         system_.correct(scratch_.delta);
-    } else if (!search_along(system_, *settings_.line_search)) {
+    } else if (!search()) {
       finish(report, NewtonOutcome::not_converged);
       return false;
     }
@@ -122,6 +122,20 @@ class Newton {
     if (settings_.solution_test != ResidualTest::none)
       report.solution_error = test_value(settings_.solution_test, scratch_.delta);
     return true;
+  }
+
+  /// Searches along the correction. Where that of an earlier matrix leads nowhere (a joint was
+  /// switched, a contact opened since), along the correction of the matrix of this iterate.
+  bool search() {
+    if (search_along(system_, *settings_.line_search)) return true;
+    if (fresh_) return false;
+    system_.go_back();
+    system_.compute_residual();
+    build_matrix();
+    if (!system_.factor()) return false;
+    std::copy(scratch_.residual.begin(), scratch_.residual.end(), scratch_.delta.begin());
+    system_.solve(scratch_.delta.data());
+    return search_along(system_, *settings_.line_search);
   }
 
   /// Has the residual found no new minimum in the last iterations?
@@ -169,17 +183,23 @@ class Newton {
   /// Builds and factors the matrix when it is due; false when it cannot be factored.
   bool factor(int iterations) {
     const bool keep = settings_.keep_jacobian;
-    double* const kept = keep ? system_.state().kept_matrix.data() : nullptr;
     const long count = keep ? kept_iterations() : iterations;
-    if (count % settings_.jacobian_every == 0) {
-      system_.compute_matrix();
-      if (keep) std::copy(scratch_.values.begin(), scratch_.values.end(), kept);
+    fresh_ = count % settings_.jacobian_every == 0;
+    if (fresh_) {
+      build_matrix();
     } else if (keep && iterations == 0) {
+      const double* const kept = system_.state().kept_matrix.data();
       std::copy(kept, kept + scratch_.values.size(), scratch_.values.begin());
     } else {
       return true;
     }
     return system_.factor();
+  }
+
+  void build_matrix() {
+    system_.compute_matrix();
+    if (settings_.keep_jacobian)
+      std::copy(scratch_.values.begin(), scratch_.values.end(), system_.state().kept_matrix.data());
   }
 
   /// Iterations since the integrator's coefficients changed: a matrix is not kept beyond that.
@@ -198,6 +218,7 @@ class Newton {
   const NewtonHooks& hooks_;
   NewtonScratch& scratch_;
   const LineSearchSettings rescue_ = rescue_settings();
+  bool fresh_ = true;  ///< the matrix is that of the iterate
 };
 
 }  // namespace

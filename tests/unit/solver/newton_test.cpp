@@ -299,6 +299,18 @@ TEST(LineSearch, GivesUpAtTheSmallestStep) {
   EXPECT_EQ(report.error->kind, ErrorKind::not_converged);
 }
 
+/// Far from the start the slope is steeper than that of the first matrix: its steps are too long
+/// for the smallest fraction.
+TEST(LineSearch, TakesANewMatrixWhereAnEarlierOneLeadsNowhere) {
+  for (const char* keep : {"", ", keep jacobian matrix"}) {
+    DeckRun run(arc_tangent("nonlinear solver: line search, modified, 30" + std::string(keep) +
+                            ", lambda min, .1, relative, no;"));
+    ASSERT_TRUE(run.ready());
+    run.step();
+    EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 0, 1e-8) << keep;
+  }
+}
+
 std::vector<double> step_sizes(const std::string& initial, int count) {
   DeckRun run(pendulum("max iterations: 30; tolerance: 1e-10; " + initial));
   std::vector<double> h;
