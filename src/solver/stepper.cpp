@@ -53,6 +53,14 @@ NewtonSettings start_settings(const InitialValueSettings& s, double tolerance, i
   return n;
 }
 
+/// The derivatives phase takes full steps: positions and velocities are put back after each, so
+/// that the residual along a step says nothing of it.
+NewtonSettings derivatives_settings(const InitialValueSettings& s) {
+  NewtonSettings n = start_settings(s, s.derivatives_tolerance, s.derivatives_max_iterations);
+  n.line_search = nullptr;
+  return n;
+}
+
 double drive_or(const DrivePtr& drive, const EvalContext& context, double otherwise) {
   return drive ? drive->value(context) : otherwise;
 }
@@ -125,8 +133,7 @@ Stepper::Stepper(const Model& model)
     : model_(model),
       workspace_(model),
       regular_(regular_settings(model.initial_value)),
-      derivatives_(start_settings(model.initial_value, model.initial_value.derivatives_tolerance,
-                                  model.initial_value.derivatives_max_iterations)),
+      derivatives_(derivatives_settings(model.initial_value)),
       dummy_(start_settings(model.initial_value, model.initial_value.dummy_tolerance,
                             model.initial_value.dummy_max_iterations)),
       derivatives_coefficient_(model.initial_value.derivatives_coefficient) {

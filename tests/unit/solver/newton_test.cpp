@@ -299,6 +299,20 @@ TEST(LineSearch, GivesUpAtTheSmallestStep) {
   EXPECT_EQ(report.error->kind, ErrorKind::not_converged);
 }
 
+/// A spring that is not in balance as read: the start needs a rate of 1/c.
+TEST(LineSearch, LeavesTheDerivativesPhaseItsFullStep) {
+  DeckRun run(
+      "begin: data; problem: initial value; end: data; begin: initial value; final time: 1.; time "
+      "step: .1; max iterations: 20; nonlinear solver: line search; end: initial value; begin: "
+      "control data; end: control data; begin: nodes; abstract: 1; end: nodes; begin: elements; "
+      "genel: 1, spring support, 1, abstract, algebraic, linear elastic, 2.; force: 1, abstract, "
+      "1, abstract, const, 3.; end: elements;");
+  ASSERT_TRUE(run.ready());
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 1.5, 1e-6);
+  run.step();
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 1.5, 1e-6);
+}
+
 /// Far from the start the slope is steeper than that of the first matrix: its steps are too long
 /// for the smallest fraction.
 TEST(LineSearch, TakesANewMatrixWhereAnEarlierOneLeadsNowhere) {
