@@ -1,6 +1,7 @@
 """The command line: exit codes, output, and the same numbers as the service."""
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -145,6 +146,14 @@ def test_a_run_in_real_time_lasts_as_long_as_the_model(tmp_path):
     begun = time.monotonic()
     assert mbcosim("run", str(deck), "--real-time").returncode == 0
     assert time.monotonic() - begun > 0.38
+
+
+def test_steps_that_cannot_keep_up_with_the_clock_are_counted(tmp_path):
+    deck = tmp_path / "deck"
+    deck.write_text(decks.body(step="1.e-9", final_time="9.95e-8"))
+    run = mbcosim("run", str(deck), "--real-time")
+    assert run.returncode == 0
+    assert re.search(r"note: 1\d\d of 1\d\d steps ended late, the latest by \S+ s", run.stderr), run.stderr
 
 
 def test_messages_name_files_as_they_were_typed(deck, tmp_path):

@@ -1,4 +1,5 @@
-/// Cards of thermal, bulk and user elements, of contacts, sliders and helicoidal beams, with
+/// Cards of thermal, bulk and user elements, of contacts, sliders, helicoidal beams and
+/// regularizations, with
 /// arguments that are missing, too many, of another kind, not finite or out of range: each is
 /// refused at its place.
 #include <gtest/gtest.h>
@@ -52,6 +53,24 @@ const GoodCard kCards[] = {
      "joint: 90, rod bezier, 1, null, .3,0.,0., 3, -.3,0.,0., null, 1.2, integration order, 2, "
      "integration segments, 3, linear elastic, 10.",
      {}},
+    {"deformable_displacement_hinge",
+     "",
+     "joint: 90, deformable displacement hinge, 1, null, hinge, eye, 3, null, hinge, eye, linear "
+     "viscoelastic, 10., 1.",
+     {}},
+    {"regularization",
+     "joint: 90, spherical hinge, 1, null, 3, null; ",
+     "joint regularization: 90, tikhonov, list, 1e-6, 1e-6, 1e-6",
+     {2}},
+    {"dynamic_regularization",
+     "joint: 90, spherical hinge, 1, null, 3, null; ",
+     "joint regularization: 90, dynamic, 1e-6",
+     {2}},
+    {"total_internal_couple",
+     "",
+     "couple: 90, total internal, 1, position, null, force orientation, eye, moment orientation, "
+     "eye, 3, position, null, force, 1., 2., 3., const, 2., moment, 3., 1., 2., const, 1.",
+     {10, 12, 18}},
     {"point_contact", "", "joint: 90, point contact, 1, 2, 0.,0.,1., 1e4", {}},
     {"beam_slider",
      "beam3: 89, 2, null, 1, 0.,0.,-.5, 3, null, eye, linear elastic generic, eye, same, same; ",
@@ -178,6 +197,11 @@ TEST(OutOfRangeArguments, AreNamedWithWhatIsAccepted) {
       {"user defined: 90, imu, 1",
        "user defined element 90: \"imu\" is not served: it comes from a run-time module of the "
        "reference solver"},
+      {"joint: 91, spherical hinge, 1, null, 3, null; joint regularization: 91, dynamic, -1.",
+       "joint regularization 91 (dynamic): regularization coefficient must not be negative, got "
+       "-1.000000"},
+      {"joint: 91, clamp, 2, node, node; joint regularization: 92, dynamic, 1.",
+       "joint regularization 92 (dynamic): joint 92 is not defined"},
       {"joint: 90, rod bezier, 1, null, .3,0.,0., 3, -.3,0.,0., null, -1.2, linear elastic, 10.",
        "joint 90 (rod bezier): the length must be positive"},
       {"joint: 90, rod bezier, 1, null, .3,0.,0., 3, -.3,0.,0., null, 1.2, integration order, 11, "

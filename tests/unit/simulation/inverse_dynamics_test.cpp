@@ -141,6 +141,71 @@ TEST(InverseDynamics, SharesTheLoadOfRedundantActuators) {
   expect_near(moment(run, 6), {.0584581923916346, .15322866984544, .154701615763463});
 }
 
+const char* const kErgonomicRod =
+    "joint: 7, rod, 1, 2, .8, linear elastic, 30., inverse dynamics, right hand side, no, "
+    "ergonomy, yes;\n";
+
+TEST(InverseDynamics, MinimizesTheEnergyOfErgonomicSprings) {
+  DeckRun run(redundant("joints: 6;", "", kErgonomicRod));
+  ASSERT_TRUE(run.ready());
+  expect_iterations(run, {3, 18, 21, 22});
+}
+
+/// Two beams from the ground to a point that is lifted, with the sections of a slender rod; all
+/// that moves is minimized by the energy of the beams, `max iterations: 100, at most`.
+TEST(InverseDynamics, HasTheNumbersOfTheReferenceForBeams) {
+  DeckRun run(R"deck(begin: data; problem: inverse dynamics; end: data;
+begin: inverse dynamics; problem type: underdetermined fully actuated, weights, 0.,0., 1.,0., 1.,0.; final time: 2.; time step: 1.; max iterations: 100, at most; tolerance: 1e-6; end: inverse dynamics;
+begin: control data; end: control data;
+begin: nodes; structural: 10, static, null, eye, null, null; structural: 1, static, 1.,0.,0., eye, null, null; structural: 2, static, 2.,0.,0., eye, null, null; end: nodes;
+constitutive law: 1, 6, linear elastic generic, diag, 1e9, 1./(1./1e8 + 1./12e4), 1./(1./1e8 + 1./12e4), 1e4, 1e4, 1e4;
+begin: elements;
+joint: 10, clamp, 10, node, node;
+beam2: 1, 10, null, 1, null, eye, reference, 1, inverse dynamics, right hand side, yes, ergonomy, yes;
+beam2: 2, 1, null, 2, null, eye, reference, 1, inverse dynamics, right hand side, yes, ergonomy, yes;
+joint: 1, total joint, 10, position, 1.,0.,0., 1, position constraint, 1,1,1, null, null, null, orientation constraint, 1,1,1, null, null, null, inverse dynamics, torque, yes;
+joint: 2, total joint, 10, position, 2.,0.,0., 2, position constraint, 1,1,1, null, null, null, orientation constraint, 1,1,1, null, null, null, inverse dynamics, torque, yes;
+joint: 12, total joint, 10, position, 2.,0.,0., 2,
+  position constraint, 1,1,1, component, 0., 0., linear, 0., .02, component, 0., 0., .02, null,
+  orientation constraint, 1,1,1, null, null, null, inverse dynamics, prescribed motion, yes;
+end: elements;
+)deck");
+  ASSERT_TRUE(run.ready());
+  struct Record {
+    double turn, w, M1;
+    Vec3 F2;
+    double M2, N, T, bending;
+  };
+  const Record records[] = {{-.014995220362,
+                             -.014995220362,
+                             117.271765588,
+                             {-46865.1496267, 0, -651.285542774},
+                             -241.269929302,
+                             46868.7154613,
+                             299.888967667,
+                             -149.952906048},
+                            {-.0376093100585,
+                             -.0226140896964,
+                             672.315919851,
+                             {-180053.99258, 0, -3980.86216814},
+                             -715.940276452,
+                             180096.407858,
+                             -755.899628771,
+                             -526.049118188}};
+  for (const Record& r : records) {
+    run.step();
+    EXPECT_NEAR(run.rotation_vector(1)(1), r.turn, 2e-12);
+    EXPECT_NEAR(run.node(1).w(1), r.w, 2e-12);
+    EXPECT_NEAR(moment(run, 1)(1), r.M1, 1e-8);
+    expect_near(force(run, 2), r.F2, 1e-6);
+    EXPECT_NEAR(moment(run, 2)(1), r.M2, 1e-8);
+    const std::vector<double> section = printed(run, Family::beam, 1);
+    EXPECT_NEAR(section[0], r.N, 1e-6);
+    EXPECT_NEAR(section[2], r.T, 1e-8);
+    EXPECT_NEAR(section[4], r.bending, 1e-8);
+  }
+}
+
 TEST(InverseDynamics, ContinuesBitForBitFromASnapshot) {
   DeckRun first(redundant()), second(redundant());
   ASSERT_TRUE(first.ready() && second.ready());
@@ -189,6 +254,70 @@ TEST(InverseDynamics, RefusesWhatCannotTakePart) {
       HasSubstr("without a constitutive law"));
   EXPECT_THAT(refusal("begin: inverse dynamics;", "begin: initial value;"),
               HasSubstr("unknown block"));
+}
+
+struct BadCard {
+  const char* card;
+  const char* message;  ///< how it begins
+};
+
+/// Missing, surplus, negative, foreign and undefined arguments of the block's cards.
+TEST(InverseDynamicsCards, AreRefusedAtTheArgument) {
+  const BadCard cases[] = {
+      {"problem type: foreign", "problem type expected (fully actuated collocated, "},
+      {"problem type: fully actuated collocated, 1.", "problem type: unexpected argument \"1.\""},
+      {"problem type: underdetermined fully actuated, weights, 1.",
+       "weight of the inertia missing"},
+      {"problem type: underdetermined fully actuated, weights, -1.,2.,3.,4.,5.,6.",
+       "weight of the change must be at least 0, got -1"},
+      {"problem type: underdetermined fully actuated, weights, 0./0.,2.,3.,4.,5.,6.",
+       "division by zero"},
+      {"initial time", "initial time missing"},
+      {"initial time: 1e400", "real literal overflows"},
+      {"initial time: 0., 1.", "initial time: unexpected argument \"1.\""},
+      {"time step: 0.", "time step must not be zero"},
+      {"time step: foreign", "unknown variable \"foreign\""},
+      {"min time step: -1.", "min time step must be greater than 0, got -1"},
+      {"strategy: factor, .5, 1, 2., 1, 3, 8", "the records of inverse dynamics are one time step"},
+      {"tolerance: 1e-6, test, foreign", "convergence test expected (none, norm, minmax)"},
+      {"tolerance: null", "solution tolerance required when the residual test is off"},
+      {"max iterations: 3, at most, 4", "max iterations: unexpected argument \"4\""},
+      {"full residual test: foreign", "unknown variable \"foreign\""},
+      {"modify residual test: 1.", "modify residual test: unexpected argument \"1.\""},
+      {"nonlinear solver: foreign", "nonlinear solver expected"},
+      {"linear solver: foreign", "linear solver expected"},
+      {"abort after", "phase expected"},
+      {"method: ms, .6", "unknown card \"method\""},
+  };
+  for (const BadCard& c : cases) {
+    SCOPED_TRACE(c.card);
+    std::string deck = kActuated;
+    const std::string card = std::string("\n") + c.card + ";";
+    const std::size_t at = deck.find("begin: inverse dynamics;") + 24;
+    deck.insert(at, card);
+    const LoadReport report = load_deck(BundleSource({{"deck.mbd", deck}}), "deck.mbd");
+    EXPECT_FALSE(report.ok());
+    ASSERT_FALSE(report.diagnostics.empty());
+    const Diagnostic& first = report.diagnostics.front();
+    EXPECT_EQ(first.message.rfind(c.message, 0), 0u) << first.text();
+    EXPECT_EQ(first.line, 3) << first.text();
+    EXPECT_GT(first.column, 0) << first.text();
+  }
+}
+
+/// The clause behind a card of an element.
+TEST(InverseDynamicsClauses, AreRefusedAtTheArgument) {
+  const std::pair<const char*, const char*> cases[] = {
+      {", inverse dynamics, foreign, yes", "unexpected argument \"foreign\""},
+      {", inverse dynamics, torque", "torque (yes, no or a number) missing"},
+      {", inverse dynamics, torque, foreign", "unknown variable \"foreign\""},
+      {", inverse dynamics, prescribed motion, yes, torque, yes", "unexpected argument \"torque\""},
+      {", inverse dynamics, torque, yes, 4.", "unexpected argument \"4.\""},
+  };
+  for (const auto& [clause, message] : cases)
+    EXPECT_THAT(refusal("0.6,0.,0.8, const, 1.", std::string("0.6,0.,0.8, const, 1.") + clause),
+                ::testing::HasSubstr(message))
+        << clause;
 }
 
 }  // namespace
