@@ -225,8 +225,12 @@ void finish_inverse_dynamics(Deck& deck) {
   InverseProblem& problem = part<InverseProblem>(deck.builder);
   check_nodes(deck);
   if (!problem.underdetermined) check_actuation(deck);
-  problem.memory =
-      deck.builder.allocate_memory(6 * static_cast<int>(deck.builder.model().structural.size()));
+  const Model& model = deck.builder.model();
+  problem.memory = deck.builder.allocate_memory(6 * static_cast<int>(model.structural.size()));
+  int constraints = 0;
+  for (const ElementRef& e : model.elements)
+    if (e.set->info(e.index).family == Family::joint) constraints += e.set->unknowns(e.index);
+  problem.multipliers = deck.builder.allocate_memory(constraints);
 }
 
 }  // namespace mbcosim

@@ -24,7 +24,8 @@ struct InverseProblem {
   /// and that of the bodies' inertia.
   double change_weight[3] = {1, 1, 1}, inertia_weight[3] = {0, 0, 0};
   bool full_residual_test = false;
-  int memory = -1;                   ///< accelerations in State::memory (6 × structural nodes)
+  int memory = -1;       ///< accelerations in State::memory (6 × structural nodes)
+  int multipliers = -1;  ///< sums of the multipliers of position stages there (rows of joints)
   std::map<int, InverseRole> roles;  ///< by ElementInfo::order
 
   InverseRole role(const ElementInfo& info) const {

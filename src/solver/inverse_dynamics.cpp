@@ -216,10 +216,8 @@ void InverseDynamics::correct_position(const VecX& delta, State& state) const {
     for (int i = 0; i < 6; ++i) y[i] += delta(first_[k] + i);
     state.rotation[k].R = cgr_rotation(Vec3(y + 3)) * state.rotation_history[k].R_ref;
   }
-  for (const Joint& j : joints_)
-    if (!takes_part(state, j, kPosition))
-      for (int i = 0; i < j.constraint->rows(); ++i)
-        state.y[j.constraint->joint().set->first_own(j.constraint->joint().index) + i] = 0;
+  if (settings_.underdetermined)
+    for (int i = 0; i < m_; ++i) state.memory[settings_.multipliers + i] += delta(n_ + i);
 }
 
 void InverseDynamics::solve_velocity(State& state) {
@@ -278,9 +276,9 @@ VecX InverseDynamics::constraint_values(const State& state, Stage stage) const {
   VecX values = VecX::Zero(m_);
   for (const Joint& j : joints_) {
     auto rows = values.segment(j.row, j.constraint->rows());
-    const ElementRef e = j.constraint->joint();
     if (!takes_part(state, j, stage)) {
-      if (stage == kPosition) rows = -VecX::Map(&state.y[e.set->first_own(e.index)], rows.size());
+      if (stage == kPosition)
+        rows = -VecX::Map(&state.memory[settings_.multipliers + j.row], rows.size());
     } else if (stage == kPosition) {
       rows = j.constraint->position(c);
     } else if (stage == kVelocity) {

@@ -34,8 +34,10 @@ namespace mbcosim {
 ///
 /// In State: y has x and g, which is not reset between records; yp the velocities; R_ref of
 /// NodeRotationHistory is R_previous; y1, yp1, w1 are those of the record before; accelerations lie
-/// in the memory at InverseProblem::memory. Source: MBDyn input manual; P. Masarati et al.,
-/// "Efficient inverse kinematics and dynamics of redundant manipulators", 2011.
+/// in the memory at InverseProblem::memory. There, too, is the sum of each row's multipliers of all
+/// position stages: while a row takes no part in them, its equation takes the sum back to zero (as
+/// in the reference solver, whose count of iterations depends on it). Source: MBDyn input manual;
+/// P. Masarati et al., "Efficient inverse kinematics and dynamics of redundant manipulators", 2011.
 class InverseDynamics final : public StepSystem {
  public:
   explicit InverseDynamics(const Model& model);

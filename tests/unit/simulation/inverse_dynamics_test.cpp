@@ -151,6 +151,21 @@ TEST(InverseDynamics, MinimizesTheEnergyOfErgonomicSprings) {
   expect_iterations(run, {3, 18, 21, 22});
 }
 
+/// An actuator that is handed over from one joint to another while the mechanism moves.
+TEST(InverseDynamics, FollowsDrivenActuators) {
+  std::string deck = redundant(
+      "joints: 6;", "",
+      "driven: 6, string, \"Time>.15\", joint: 6, total joint, 1, position, null, 2, position, "
+      "null, orientation constraint, 1,1,1, null, null, null, inverse dynamics, torque, yes;\n");
+  for (const char* joint : {"joint: 4,", "joint: 5,"}) {
+    const std::size_t at = deck.find(joint);
+    deck.insert(at, std::string("driven: ") + joint[7] + ", string, \"Time<.15\", ");
+  }
+  DeckRun run(deck);
+  ASSERT_TRUE(run.ready());
+  expect_iterations(run, {3, 9, 7, 3});
+}
+
 /// Two beams from the ground to a point that is lifted, with the sections of a slender rod; all
 /// that moves is minimized by the energy of the beams, `max iterations: 100, at most`.
 TEST(InverseDynamics, HasTheNumbersOfTheReferenceForBeams) {
