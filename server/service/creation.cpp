@@ -196,9 +196,12 @@ class Creation {
                           Session::Origin* origin) {
       report = load(*upload_, parts_.config, parts_.config.limits.engine, kept);
       if (!report.ok()) refuse_deck(report);
-      *origin = {report.model, std::move(report.symbols),
+      *origin = {report.model,
+                 std::move(report.symbols),
                  options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact,
-                 options.symbols()};
+                 options.symbols(),
+                 false,
+                 std::move(report.files)};
       return initial_solution(*origin, results, token);
     };
     fresh_.add(options, digest, exchange, kept, make)

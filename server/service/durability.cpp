@@ -391,9 +391,12 @@ SessionPtr Durability::revive(const std::string& simulation, const Suspended& su
         model.head.request_digest(),
         std::chrono::milliseconds(
             google::protobuf::util::TimeUtil::DurationToMilliseconds(point.point.info().lease()))};
-    Session::Origin origin{report.model, std::move(report.symbols),
+    Session::Origin origin{report.model,
+                           std::move(report.symbols),
                            options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact,
-                           model.head.model_options().symbols(), model.head.forked()};
+                           model.head.model_options().symbols(),
+                           model.head.forked(),
+                           std::move(report.files)};
     return std::make_shared<Session>(std::move(identity), std::move(origin), std::move(made),
                                      parts_->shared(memory), options, std::move(results));
   });

@@ -1,5 +1,6 @@
 #include "service/geometry_messages.h"
 
+#include "input/written_card.h"
 #include "wire/convert.h"
 #include "wire/refusal.h"
 
@@ -8,6 +9,7 @@ namespace {
 
 using Numbers = google::protobuf::RepeatedField<double>;
 
+constexpr std::size_t kCardBytes = 4000;
 constexpr std::size_t kMessageBytes = 512 << 10;  // a message goes out when it has grown so far
 
 void put(const Vec3& v, Numbers* out) { out->Add(v.data(), v.data() + 3); }
@@ -34,13 +36,53 @@ void fill(const ElementGeometry::Mass& m, v1::GeometryMass* out) {
   put(m.axes, out->mutable_principal_axes());
 }
 
+/// Whose card it is.
+struct Owner {
+  bool node = false;
+  const char* family = "";
+  int label = 0;
+  SourceSpan where;
+};
+
+int card_count(const Model& model) {
+  return static_cast<int>(model.structural.size() + model.scalars.size() + model.elements.size());
+}
+
+/// Structural nodes first, then the others, then elements.
+Owner card_owner(const Model& model, std::size_t k) {
+  if (k < model.structural.size()) {
+    const StructuralNode& node = model.structural[k];
+    return {true, "structural", node.label, node.where};
+  }
+  k -= model.structural.size();
+  if (k < model.scalars.size()) {
+    const ScalarNode& node = model.scalars[k];
+    return {true, kind_name(node.kind), node.label, node.where};
+  }
+  const ElementRef& element = model.elements[k - model.scalars.size()];
+  const ElementInfo& info = element.set->info(element.index);
+  return {false, family_name(info.family), info.label, info.where};
+}
+
+void fill(const Owner& owner, const WrittenCard& card, v1::DeckCard* out) {
+  out->set_of_node(owner.node);
+  out->set_family(owner.family);
+  out->set_label(owner.label);
+  out->set_file(utf8(card.file));
+  out->set_line(card.line);
+  out->set_column(card.column);
+  out->set_text(utf8(card.text));
+  out->set_cut(card.cut);
+}
+
 }  // namespace
 
-GeometryMessages::GeometryMessages(std::unique_ptr<Simulation> simulation,
+GeometryMessages::GeometryMessages(std::unique_ptr<Simulation> simulation, DeckFiles files,
                                    const v1::DescribeGeometryRequest& request)
     : simulation_(std::move(simulation)),
       model_(simulation_->model()),
       view_(model_, simulation_->state()),
+      files_(std::move(files)),
       request_(request) {
   if (request.has_line_samples() && (request.line_samples() < 2 || request.line_samples() > 1000))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`line_samples` must be from 2 to 1000");
@@ -65,12 +107,20 @@ bool GeometryMessages::next(v1::DescribeGeometryReply* reply) {
       fill_elements(reply->mutable_elements());
       return true;
     }
-    part_ = request_.without_modal_points() ? Part::end : Part::modal_points;
+    part_ = request_.without_modal_points() ? Part::cards : Part::modal_points;
     index_ = 0;
   }
-  if (part_ == Part::end || !find_modes()) return false;
-  fill_modal_points(reply->mutable_modal_points());
-  return true;
+  if (part_ == Part::modal_points) {
+    if (find_modes()) {
+      fill_modal_points(reply->mutable_modal_points());
+      return true;
+    }
+    part_ = Part::cards;
+    index_ = 0;
+  }
+  if (part_ == Part::end || !request_.cards()) return false;
+  fill_cards(reply->mutable_cards());
+  return reply->cards().cards_size() > 0;
 }
 
 void GeometryMessages::fill_header(v1::GeometryHeader* h) const {
@@ -133,6 +183,18 @@ void GeometryMessages::fill(int k, v1::ElementGeometry* out) const {
   for (const ElementGeometry::Mass& m : g.masses) server::fill(m, out->add_masses());
   const std::vector<std::string> variables = view_.arrow_variables(k);
   for (const ElementGeometry::Arrow& a : g.arrows) fill(a, variables[a.arrow], out->add_arrows());
+}
+
+/// Cards of nodes and elements from `index_` on; none: there are no more.
+void GeometryMessages::fill_cards(v1::DeckCardList* out) {
+  const int count = card_count(model_);
+  for (std::size_t bytes = 0; index_ < count && bytes < kMessageBytes; ++index_) {
+    const Owner owner = card_owner(model_, index_);
+    const auto card = written_card(files_, owner.where, kCardBytes);
+    if (!card) continue;
+    server::fill(owner, *card, out->add_cards());
+    bytes += out->cards().rbegin()->ByteSizeLong();
+  }
 }
 
 void GeometryMessages::fill(const ElementGeometry::Point& p, v1::GeometryPoint* out) const {

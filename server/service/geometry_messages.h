@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "mbcosim/v1/geometry.pb.h"
+#include "model/deck_file.h"
 #include "simulation/geometry_view.h"
 #include "simulation/simulation.h"
 
@@ -12,15 +13,15 @@ namespace mbcosim::server {
 /// Tells all that can be drawn of a simulation as it stands, message by message.
 class GeometryMessages {
  public:
-  /// Throws Refusal when the request is wrong.
-  GeometryMessages(std::unique_ptr<Simulation> simulation,
+  /// `files`: of the deck, for its cards. Throws Refusal when the request is wrong.
+  GeometryMessages(std::unique_ptr<Simulation> simulation, DeckFiles files,
                    const v1::DescribeGeometryRequest& request);
 
   /// Fills the next message; false: there is none.
   bool next(v1::DescribeGeometryReply* reply);
 
  private:
-  enum class Part { header, nodes, elements, modal_points, end };
+  enum class Part { header, nodes, elements, modal_points, cards, end };
 
   void fill_header(v1::GeometryHeader* out) const;
   void fill_nodes(v1::NodeGeometryList* out);
@@ -28,6 +29,7 @@ class GeometryMessages {
   bool find_modes();
   void fill_modal_points(v1::ModalPoints* out);
   void begin_modal_points(const ElementGeometry::Modes& modes, v1::ModalPoints* out) const;
+  void fill_cards(v1::DeckCardList* out);
   void fill(int k, v1::NodeGeometry* out) const;
   void fill(int k, v1::ElementGeometry* out) const;
   void fill(const ElementGeometry::Point& p, v1::GeometryPoint* out) const;
@@ -39,9 +41,10 @@ class GeometryMessages {
   const std::unique_ptr<Simulation> simulation_;
   const Model& model_;
   const GeometryView view_;
+  const DeckFiles files_;
   const v1::DescribeGeometryRequest request_;
   Part part_ = Part::header;
-  int index_ = 0;  ///< next node or element of the part
+  int index_ = 0;  ///< next node or element of the part; of the cards, nodes first
   int body_ = 0;   ///< next flexible body of the element
   int point_ = 0;  ///< its next point
 };

@@ -11,8 +11,8 @@ void add_geometry(Gate& gate, const Parts& parts) {
                [&parts](const CallFrame& frame, const v1::DescribeGeometryRequest& request) {
                  auto session = std::make_shared<SessionHold>(parts.store, request.simulation(),
                                                               frame.caller, Access::observe);
-                 auto messages =
-                     std::make_shared<GeometryMessages>((*session)->fork(/*snapshot=*/-1), request);
+                 auto messages = std::make_shared<GeometryMessages>(
+                     (*session)->fork(/*snapshot=*/-1), (*session)->origin().files, request);
                  return [session, messages](v1::DescribeGeometryReply* reply) {
                    return messages->next(reply);
                  };

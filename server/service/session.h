@@ -67,7 +67,8 @@ class Session {
     std::vector<DeckSymbol> symbols;  ///< that the deck declares
     TimeKeeping time_keeping = TimeKeeping::exact;
     google::protobuf::Map<std::string, v1::SymbolValue> given;  ///< `CreateOptions.symbols`
-    bool forked = false;  ///< it did not begin at the initial solution
+    bool forked = false;   ///< it did not begin at the initial solution
+    DeckFiles files = {};  ///< the deck and what it includes
   };
   using Progress = std::function<void()>;  ///< called between slices of a long advance
 

@@ -51,8 +51,23 @@ Result<int> Reading::open_file(const std::string& name) {
   return index;
 }
 
+namespace {
+
+std::vector<std::size_t> line_starts(const std::string& text) {
+  std::vector<std::size_t> starts = {0};
+  const char* const begin = text.data();
+  const char* const end = begin + text.size();
+  for (const char* p = begin; (p = static_cast<const char*>(std::memchr(p, '\n', end - p)));)
+    starts.push_back(++p - begin);
+  return starts;
+}
+
+}  // namespace
+
 int Reading::add_text(std::string name, std::string text) {
-  files_.push_back({std::move(name), std::move(text), {}});
+  std::vector<std::size_t> starts = line_starts(text);
+  files_.push_back(std::make_shared<const DeckFile>(
+      DeckFile{std::move(name), std::move(text), std::move(starts)}));
   return file_count() - 1;
 }
 
@@ -60,7 +75,7 @@ Result<std::string> Reading::resolve(std::string_view name, int from) const {
   Result<std::string> expanded = expand_environment(name);
   if (!expanded) return expanded;
   std::string path = *expanded;
-  const std::string& base = files_[from].name;
+  const std::string& base = file(from).name;
   const std::size_t slash = base.rfind('/');
   if (slash != std::string::npos && (path.empty() || path[0] != '/'))
     path = base.substr(0, slash + 1) + path;
@@ -117,14 +132,7 @@ Result<std::string> Reading::read_data(std::string_view name, int from) {
 SourceSpan Reading::span(int file, std::size_t offset, std::size_t length) const {
   SourceSpan s;
   if (file < 0 || file >= file_count()) return s;
-  DeckFile& f = files_[file];
-  if (f.line_starts.empty()) {
-    f.line_starts.push_back(0);
-    const char* const begin = f.text.data();
-    const char* const end = begin + f.text.size();
-    for (const char* p = begin; (p = static_cast<const char*>(std::memchr(p, '\n', end - p)));)
-      f.line_starts.push_back(++p - begin);
-  }
+  const DeckFile& f = this->file(file);
   const auto line = std::upper_bound(f.line_starts.begin(), f.line_starts.end(), offset) - 1;
   s.file = file;
   s.line = static_cast<int>(line - f.line_starts.begin()) + 1;
@@ -135,12 +143,12 @@ SourceSpan Reading::span(int file, std::size_t offset, std::size_t length) const
 
 std::size_t Reading::offset_of(SourceSpan where) const {
   if (where.file < 0 || where.line < 1) return 0;
-  return files_[where.file].line_starts[where.line - 1] + where.column - 1;
+  return file(where.file).line_starts[where.line - 1] + where.column - 1;
 }
 
 std::string Reading::place(SourceSpan where) const {
   if (where.file < 0) return "the start";
-  return files_[where.file].name + ":" + std::to_string(where.line);
+  return file(where.file).name + ":" + std::to_string(where.line);
 }
 
 // --------------------------------------------------------------------------------------------------------
@@ -170,7 +178,7 @@ Diagnostic Reading::diagnostic(Severity severity, std::string code, SourceSpan w
   d.message = std::move(message);
   d.hint = std::move(hint);
   if (where.file >= 0) {
-    const DeckFile& f = files_[where.file];
+    const DeckFile& f = file(where.file);
     d.file = f.name;
     d.line = where.line;
     d.column = where.column;
@@ -179,7 +187,7 @@ Diagnostic Reading::diagnostic(Severity severity, std::string code, SourceSpan w
   }
   for (int t = trail_; t >= 0; t = trails_[t].parent) {
     const Trail& trail = trails_[t];
-    const std::string place = files_[trail.file].name + ":" + std::to_string(trail.line);
+    const std::string place = file(trail.file).name + ":" + std::to_string(trail.line);
     d.trail.push_back(trail.loop ? "in iteration " + trail.name + " = " +
                                        std::to_string(trail.value) + " of the loop at " + place
                                  : "included from " + place);
@@ -258,7 +266,7 @@ void Reading::fail_read(SourceSpan where, const Error& error, int from) const {
   if (error.kind == ErrorKind::limit) fail_limit(where, error.reason, error.message);
   std::string message = error.message;
   if (error.kind == ErrorKind::io) {
-    const std::string& base = files_[from].name;
+    const std::string& base = file(from).name;
     const std::size_t slash = base.rfind('/');
     message += slash == std::string::npos ? " (searched in the deck's folder)"
                                           : " (searched in \"" + base.substr(0, slash) + "\")";

@@ -14,6 +14,7 @@
 #include "input/sources.h"
 #include "input/symbols.h"
 #include "model/context.h"
+#include "model/deck_file.h"
 #include "model/diagnostic.h"
 #include "model/fwd.h"
 #include "model/limits.h"
@@ -22,13 +23,6 @@ namespace mbcosim {
 
 class PendingString;
 struct ExpressionScratch;
-
-/// A file of the deck, kept until reading ends: statements are views into its text.
-struct DeckFile {
-  std::string name;  ///< as messages show it, relative to the deck's root
-  std::string text;
-  std::vector<std::size_t> line_starts;  ///< offsets; filled at the first use
-};
 
 /// Where a statement comes from, besides its file: an `include` card or a pass of a loop.
 struct Trail {
@@ -58,7 +52,9 @@ class Reading {
   Reading& operator=(const Reading&) = delete;
 
   // ------------------------------------------------------------------ files
-  const DeckFile& file(int index) const { return files_[index]; }
+  const DeckFile& file(int index) const { return *files_[index]; }
+  /// All of them, kept at least until reading ends: statements are views into their texts.
+  const DeckFiles& files() const { return files_; }
   int file_count() const { return static_cast<int>(files_.size()); }
   /// Reads a file of the deck by its name relative to the root; its index. Counts against
   /// `deck_bytes`.
@@ -151,7 +147,7 @@ class Reading {
 
   const FileSource& source_;
   ModelBuilder* builder_;
-  mutable std::deque<DeckFile> files_;
+  DeckFiles files_;
   std::map<std::string, int> file_index_;
   std::int64_t bytes_ = 0;
   const std::chrono::steady_clock::time_point read_until_;

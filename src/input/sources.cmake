@@ -48,4 +48,5 @@ set(SOURCES
   symbols.cpp
   value.cpp
   vocabulary.cpp
+  written_card.cpp
 )

@@ -152,6 +152,7 @@ DeckReport read_deck(const FileSource& files, const std::string& main_file,
     std::vector<Diagnostic> extra;
     report.model = read_model(reading, builder, request.ports, extra);
     if (report.model) report.symbols = declared_symbols(reading);
+    report.files = reading.files();
     report.printed = reading.printed;
     report.diagnostics = reading.release_diagnostics();
     report.diagnostics.insert(report.diagnostics.end(), extra.begin(), extra.end());

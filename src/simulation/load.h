@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "input/symbols.h"
+#include "model/deck_file.h"
 #include "model/symbol.h"
 #include "simulation/simulation.h"
 
@@ -21,6 +22,7 @@ struct LoadRequest {
 
 struct DeckReport : LoadReport {
   std::vector<DeckSymbol> symbols;  ///< that a request can change, by name; empty when refused
+  DeckFiles files;                  ///< the deck and what it includes
 };
 
 /// Reads a deck; see load_deck.

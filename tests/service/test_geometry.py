@@ -87,3 +87,50 @@ def test_wrong_requests_are_refused(server, pendulum):
         gone = simulation.name
     with pytest.raises(mbcosim.NotFound):
         server.attach(gone)
+
+
+def cards_of(daemon, simulation):
+    """The deck's cards by (of a node?, family, label)."""
+    import grpc
+    with grpc.insecure_channel(daemon.address) as channel:
+        request = geometry_pb2.DescribeGeometryRequest(simulation=simulation.name, without_modal_points=True, cards=True)
+        replies = list(geometry_pb2_grpc.GeometryStub(channel).DescribeGeometry(request))
+    assert max(r.ByteSize() for r in replies) < 1 << 20
+    return {(card.of_node, card.family, card.label): card for r in replies for card in r.cards.cards}
+
+
+def test_cards_stand_there_as_they_are_written(daemon, server):
+    deck = os.path.join(MODELS, "cantilever_dead_load.mbd")
+    with server.load(deck) as simulation, simulation.fork() as branch:
+        cards = cards_of(daemon, simulation)
+        model = simulation.describe()
+        assert set(cards) == ({(True, node.family, node.label) for node in model.nodes}
+                              | {(False, element.family, element.label) for element in model.elements})
+        for card in cards.values():
+            with open(os.path.join(MODELS, card.file), encoding="utf-8") as file:
+                text = file.read()
+            begin = sum(len(line) for line in text.splitlines(keepends=True)[:card.line - 1]) + card.column - 1
+            assert not card.cut and card.text.endswith(";") and text[begin:].startswith(card.text)
+        assert {card.file for card in cards.values()} == {"cantilever_dead_load.mbd", "cantilever.inc"}
+        assert cards_of(daemon, branch) == cards
+
+
+def test_cards_of_ten_thousand_bodies_come_in_messages_of_bounded_size(daemon, server):
+    with server.load_text(CHAIN.format(n=10_000)) as simulation:
+        cards = cards_of(daemon, simulation)
+        assert len(cards) == 30_000
+        assert cards[False, "body", 77].text == "body: k, k, 1., 0., 0.5, 0., diag, 1., 2., 3.;"
+
+
+def test_a_card_that_is_very_long_is_told_by_its_beginning(daemon, server):
+    lines = "\n".join(f"    # {k}" for k in range(1000))
+    text = CHAIN.format(n=2).replace("  joint: 2, clamp,", f"  joint: 2,\n{lines}\n clamp,")
+    with server.load_text(text) as simulation:
+        card = cards_of(daemon, simulation)[False, "joint", 2]
+        assert card.cut and card.text.startswith("joint: 2,\n    # 0\n") and 3900 < len(card.text) <= 4000
+
+
+def test_what_a_client_attaches_has_no_card(daemon, server, pendulum):
+    with server.load(pendulum, ports=[mbcosim.motion_port("hand", nodes=[2])]) as simulation:
+        elements = {(False, element.family, element.label) for element in simulation.describe().elements}
+        assert elements - set(cards_of(daemon, simulation))
