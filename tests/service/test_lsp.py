@@ -143,8 +143,24 @@ def test_hover_tells_values_and_words(editor):
     uri = "file:///r.mbd"
     assert editor.open(uri, text) == []
     assert editor.at("hover", uri, text, "kp*goal2", 1)["contents"]["value"] == "**kp** = 400.0 (const)"
-    assert "**revolute hinge** (Joints)" in editor.at("hover", uri, text, "revolute hinge", 10)["contents"]["value"]
+    hinge = editor.at("hover", uri, text, "revolute hinge", 10)["contents"]["value"]
+    assert hinge.startswith("**revolute hinge** (Joints)")
     assert editor.at("hover", uri, text, "# torque kp", 10) is None  # a comment
+
+
+def test_hover_tells_how_a_word_is_written_what_it_writes_and_how_far_it_is_served(editor):
+    vocabulary = json.loads(subprocess.run([os.path.join(BIN, "mbcosim"), "keywords", "--json"], stdout=subprocess.PIPE, check=True).stdout)
+    joints = next(group for group in vocabulary if group["name"] == "joint")
+    clamp = next(word for word in joints["words"] if word["word"] == "clamp")
+    text = pathlib.Path(MODELS, "pendulum.mbd").read_text()
+    editor.open("file:///p.mbd", text)
+    told = editor.at("hover", "file:///p.mbd", text, "clamp", 2)["contents"]["value"]
+    assert f"joint : <label> , clamp , {clamp['grammar']}" in told
+    assert f"Writes {clamp['output']}" in told
+    assert "Genels" not in told  # the genel of this name cannot stand here
+    solver = text.replace("begin: initial value;", "begin: initial value;\n    threads: 2;")
+    editor.open("file:///s.mbd", solver)
+    assert "Served: ignored; a simulation runs on one thread" in editor.at("hover", "file:///s.mbd", solver, "threads", 3)["contents"]["value"]
 
 
 def test_definition_and_references_of_symbols_and_labels(editor):

@@ -104,6 +104,30 @@ std::string bare(const std::string& text) {
   return result;
 }
 
+/// How a statement with the word is written: the form of its group with the word and its grammar.
+std::string statement_of(const VocabularyGroup& words, const VocabularyWord& word) {
+  if (word.grammar.empty()) return "";
+  std::string text = words.form.empty() ? "<word> , <grammar>" : words.form;
+  for (const auto& [name, value] :
+       {std::pair<std::string, std::string>{"<word>", word.word}, {"<grammar>", word.grammar}})
+    if (const std::size_t at = text.find(name); at != std::string::npos)
+      text.replace(at, name.size(), value);
+  return text;
+}
+
+/// A word with its grammar, results and support, in Markdown.
+std::string told(const VocabularyGroup& words, const VocabularyWord& word) {
+  std::string text = "**" + word.word + "** (" + words.title + ")";
+  if (!word.served)
+    return text + (word.reason.empty() ? ": not supported" : ": not supported; " + word.reason);
+  if (const std::string statement = statement_of(words, word); !statement.empty())
+    text += "\n```mbcosim\n" + statement + "\n```";
+  if (!word.output.empty()) text += "\nWrites " + word.output;
+  if (word.support != "yes" || !word.note.empty())
+    text += "\n\nServed: " + word.support + (word.note.empty() ? "" : "; " + word.note);
+  return text;
+}
+
 /// Group of the words that may come next in a statement: `joint: 5, …` wants those of joints.
 std::string wanted_group(const std::string& statement) {
   const std::size_t colon = statement.find(':');
@@ -282,14 +306,14 @@ Json Server::hover(const Entry& entry, std::size_t offset) const {
   for (const DeckSymbol& symbol : entry.symbols)
     if (symbol.name == name)
       text = "**" + name + "** = " + shown(symbol.value) + (symbol.constant ? " (const)" : "");
+  std::string here, elsewhere;  // what may stand at this place, and words that are spelled so
+  const std::string group = wanted_group(document.statement_before(start));
   for (const VocabularyGroup& words : words_)
     for (const VocabularyWord& word : words.words)
       if (bare(word.word) == whole || bare(word.word) == bare(phrase))
-        text += (text.empty() ? "" : "\n\n") + std::string("**") + word.word + "** (" +
-                words.title + ")" +
-                (word.served           ? ""
-                 : word.reason.empty() ? ": not supported"
-                                       : ": not supported; " + word.reason);
+        (words.name == group ? here : elsewhere) += "\n\n" + told(words, word);
+  text += here.empty() ? elsewhere : here;
+  text.erase(0, text.find_first_not_of('\n'));
   if (text.empty()) return nullptr;
   return {{"contents", {{"kind", "markdown"}, {"value", text}}},
           {"range", to_json(document.range(from, name.size()))}};
