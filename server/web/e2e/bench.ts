@@ -85,12 +85,13 @@ export class View {
   }
 }
 
-/** `mbcosimd` at a port of the caller's, with one token. It can be started again where it was. */
+/** `mbcosimd` at a port of the caller's, with one token; `openSocket`: none is asked for at its socket, and the door has one of its own. It can
+ * be started again where it was. */
 export class Daemon {
-  readonly token = 'a-token-of-the-tests';
+  token = 'a-token-of-the-tests';
   private child?: ChildProcess;
 
-  constructor(private readonly folder: string, readonly port: number, private readonly options: string[] = []) {
+  constructor(private readonly folder: string, readonly port: number, private readonly options: string[] = [], private readonly openSocket = false) {
     writeFileSync(`${folder}/tokens`, `${this.token} control reader\n`);
   }
 
@@ -99,13 +100,20 @@ export class Daemon {
   }
 
   async start(): Promise<void> {
-    const child = spawn(`${BIN}/mbcosimd`, ['--listen', `unix:${this.folder}/socket`, '--http', `127.0.0.1:${this.port}`, '--tokens', `${this.folder}/tokens`, ...this.options], { stdio: 'ignore' });
+    const tokens = this.openSocket ? [] : ['--tokens', `${this.folder}/tokens`];
+    const child = spawn(`${BIN}/mbcosimd`, ['--listen', `unix:${this.folder}/socket`, '--http', `127.0.0.1:${this.port}`, ...tokens, ...this.options], { stdio: ['ignore', 'pipe', 'ignore'] });
+    child.stdout?.on('data', (said: Buffer) => (this.token = /token=(\S+)/.exec(String(said))?.[1] ?? this.token));
     this.child = child;
     const end = Date.now() + 20_000 * FACTOR;
     while (!(await fetch(`${this.origin}/healthz`).then((reply) => reply.ok, () => false))) {
       if (child.exitCode !== null || Date.now() > end) throw new Error(`the daemon does not start: ${child.exitCode}`);
       await new Promise((resolve) => setTimeout(resolve, 50));
     }
+  }
+
+  /** Another program of the build. */
+  run(program: string, ...options: string[]): ChildProcess {
+    return spawn(`${BIN}/${program}`, options, { stdio: 'ignore' });
   }
 
   kill(): Promise<void> {

@@ -1,40 +1,18 @@
 import type { Browser } from 'playwright-core';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import type { ChildProcess } from 'node:child_process';
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { atStep, create, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, launch, MODELS, picture, recorded, scene, shown, turnTo, until, View, visit, type Visit } from './bench';
+import { atStep, create, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, freePort, launch, MODELS, picture, recorded, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
   browser = await launch();
 });
 afterAll(() => browser?.close());
-
-/** Runs `work` with a daemon of its own and a page on it; no error may be left in the console. */
-async function withPage(deck: string, work: (visit: Visit, view: View) => Promise<void>, options?: Parameters<typeof visit>[2]): Promise<void> {
-  const view = await View.start(deck);
-  try {
-    const visited = await visit(browser, view.address, options);
-    await shown(visited.page);
-    await work(visited, view);
-    expect(visited.faults).toEqual([]);
-    await visited.close();
-  } finally {
-    await view.stop();
-  }
-}
-
-/** A port that nobody listens at. */
-async function freePort(): Promise<number> {
-  const server = createServer();
-  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
-  const { port } = server.address() as { port: number };
-  await new Promise((resolve) => server.close(resolve));
-  return port;
-}
 
 /** Do the scene's node matrices equal what the service reads? */
 async function expectSceneOf(visited: Visit, view: View, simulation = view.simulation): Promise<void> {
@@ -116,7 +94,7 @@ describe('a thousand bodies', () => {
   test('are drawn in a few calls, where the service says', async () => {
     const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
     writeFileSync(join(folder, 'pendulums.mbd'), pendulums(1000));
-    await withPage(join(folder, 'pendulums.mbd'), async (visited, view) => {
+    await withPage(browser, join(folder, 'pendulums.mbd'), async (visited, view) => {
       const { page } = visited;
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
@@ -131,7 +109,7 @@ describe('a thousand bodies', () => {
 
 describe('time', () => {
   test('a step of the page is a step of the simulation, and the scene follows', async () => {
-    await withPage('pendulum.mbd', async (visited, view) => {
+    await withPage(browser, 'pendulum.mbd', async (visited, view) => {
       await visited.page.getByRole('button', { name: 'One step (S)' }).click();
       await atStep(visited.page, 1);
       await visited.page.keyboard.press('s');
@@ -143,7 +121,7 @@ describe('time', () => {
   });
 
   test('runs by the wall clock until it is paused, and then stands still', async () => {
-    await withPage('pendulum.mbd', async ({ page }, view) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
       await page.getByRole('button', { name: 'Run (space)' }).click();
       await until(page, () => Number(document.querySelector('.time output')?.textContent?.replace(' s', '')) > 0.5, undefined);
       await page.getByRole('button', { name: 'Pause (space)' }).click();
@@ -158,7 +136,7 @@ describe('time', () => {
   });
 
   test('runs until a given time', async () => {
-    await withPage('pendulum.mbd', async ({ page }, view) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
       await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('0.25');
       await page.keyboard.press('Enter');
       await atStep(page, 50);
@@ -167,7 +145,7 @@ describe('time', () => {
   });
 
   test('a restored state is the saved one, and steps from there give what they gave', async () => {
-    await withPage('pendulum.mbd', async (visited, view) => {
+    await withPage(browser, 'pendulum.mbd', async (visited, view) => {
       const { page } = visited;
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
@@ -190,7 +168,7 @@ describe('time', () => {
   });
 
   test('what was recorded can be looked at again while the simulation stays', async () => {
-    await withPage('pendulum.mbd', async ({ page }, view) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
       await page.getByRole('slider', { name: 'Time looked at' }).fill('0');
@@ -202,7 +180,7 @@ describe('time', () => {
   });
 
   test('a branch is another simulation at the same state', async () => {
-    await withPage('pendulum.mbd', async ({ page }, view) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
       await page.getByRole('button', { name: 'Branch off here' }).click();
@@ -217,7 +195,7 @@ describe('time', () => {
 
 describe('plots', () => {
   test('grow with the run', async () => {
-    await withPage('pendulum.mbd', async ({ page }) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
       await page.getByRole('searchbox', { name: 'Search the model' }).fill('2.X');
       await page.getByRole('button', { name: 'Plot node.structural.2.X', exact: true }).click();
       await page.locator('.plot canvas').waitFor();
@@ -241,7 +219,7 @@ describe('plots', () => {
 
 describe('eigenmodes', () => {
   test('are those of the service, and move the scene', async () => {
-    await withPage('cantilever_five.mbd', async ({ page }, view) => {
+    await withPage(browser, 'cantilever_five.mbd', async ({ page }, view) => {
       const eigen = await view.call<{ real: number[]; imaginary: number[] }>('Simulations/ComputeEigenvalues', { simulation: view.simulation, count: 20, shift: 1 });
       const slowest = Math.min(...eigen.imaginary.filter((imaginary) => imaginary > 0)) / (2 * Math.PI);
       await page.locator('summary', { hasText: 'Eigenmodes' }).click();
@@ -266,7 +244,7 @@ describe('eigenmodes', () => {
 
 describe('several readers', () => {
   test('of one simulation see the same, whoever steps', async () => {
-    await withPage('pendulum.mbd', async (visited, view) => {
+    await withPage(browser, 'pendulum.mbd', async (visited, view) => {
       const other = await visit(browser, view.address);
       await shown(other.page);
       await view.call('Simulations/Step', { simulation: view.simulation, steps: 30 });
@@ -307,9 +285,80 @@ describe('what can be taken away', () => {
   });
 });
 
+describe('a picture', () => {
+  test('can be taken away as PNG, as large as the scene', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
+      const download = page.waitForEvent('download');
+      await page.getByRole('button', { name: 'Export' }).click();
+      await page.getByRole('button', { name: 'Picture (PNG)' }).click();
+      const bytes = readFileSync(await (await download).path());
+      expect(bytes.subarray(0, 8)).toEqual(Buffer.from([137, 80, 78, 71, 13, 10, 26, 10]));
+      const box = await page.locator('.scene canvas').boundingBox();
+      const pixels = bytes.readUInt32BE(16) / (box?.width ?? 0);  // more than one where it is drawn finely
+      expect(pixels).toBeGreaterThanOrEqual(1);
+      expect(bytes.readUInt32BE(20)).toBe(pixels * (box?.height ?? 0));
+    });
+  });
+});
+
+describe('inputs', () => {
+  test('are set by their sliders', async () => {
+    await withPage(browser, 'pendulum_cart.mbd', async ({ page }, view) => {
+      await page.locator('summary', { hasText: 'Inputs' }).click();
+      await page.getByRole('slider', { name: 'stream.force' }).fill('2.5');
+      let read = await view.read(['stream.force']);
+      const end = Date.now() + 20_000;
+      while (read.values['stream.force'][0] !== 2.5 && Date.now() < end) read = await view.read(['stream.force']);
+      expect(read.values['stream.force']).toEqual([2.5]);
+    });
+  });
+});
+
+describe('who waits for whom', () => {
+  test('is told while a step waits for a peer that does not answer', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    const daemon = new Daemon(folder, await freePort(), [], true);
+    let peer: ChildProcess | undefined;
+    try {
+      await daemon.start();
+      const simulation = await create(daemon, 'pendulum.mbd', { ports: [{ name: 'tip', kind: 'PORT_KIND_STRUCTURAL', nodeLabels: [2] }] });
+      const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(simulation)}`);
+      await shown(page);
+      peer = daemon.run('spring_peer', `unix:${folder}/socket`, '--join', simulation, 'tip');
+      await page.locator('summary', { hasText: 'Events' }).click();
+      await page.getByRole('log', { name: 'Events' }).getByText(/attached to port tip/).waitFor();
+      peer.kill('SIGSTOP');
+      await page.getByRole('button', { name: 'One step (S)' }).click();
+      await page.getByText(/waits for the peer of port tip since \d/).waitFor();
+      peer.kill('SIGCONT');
+      await atStep(page, 1);
+      await close();
+    } finally {
+      peer?.kill('SIGKILL');
+      await daemon.kill();
+      rmSync(folder, { recursive: true });
+    }
+  });
+});
+
+describe('solver and events', () => {
+  test('tell iterations, residual, times and what happened', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      const solver = page.locator('.section', { hasText: 'iterations in the last step' });
+      expect(await solver.textContent()).toMatch(/iterations in the last step[1-9]\d*residual\d\S*solver time a step\d\S* (µs|ms)/);
+      expect(await solver.locator('.bar').getAttribute('aria-label')).toMatch(/^solver \d+ %, peers \d+ %, rest \d+ %$/);
+      await page.getByRole('button', { name: 'Save state' }).click();
+      await page.locator('summary', { hasText: 'Events' }).click();
+      await page.getByRole('log', { name: 'Events' }).getByText('saved the state at step 10').waitFor();
+    });
+  });
+});
+
 describe('a deck from the disk', () => {
   test('is loaded with the files that it includes', async () => {
-    await withPage('pendulum.mbd', async ({ page }, view) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
       await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
       await page.getByLabel('Files of a deck').setInputFiles([`${MODELS}/cantilever_dead_load.mbd`, `${MODELS}/cantilever.inc`]);
       await until(page, (name) => location.hash.includes('simulation=') && !location.hash.includes(encodeURIComponent(name)), view.simulation);
@@ -320,20 +369,22 @@ describe('a deck from the disk', () => {
   });
 
   test('that is wrong is shown with its line and a mark at the place', async () => {
-    await withPage('pendulum.mbd', async (visited) => {
+    await withPage(browser, 'pendulum.mbd', async (visited) => {
       const { page } = visited;
       const text = readFileSync(`${MODELS}/pendulum.mbd`, 'utf8').replaceAll('spherical hinge', 'sperical hinge');
       await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
       await page.getByLabel('Files of a deck').setInputFiles({ name: 'bad.mbd', mimeType: 'text/plain', buffer: Buffer.from(text) });
       await page.getByText('unknown joint type "spericalhinge"').last().waitFor();
       expect(await page.locator('.diagnostic mark').textContent()).toBe('sperical hinge');
+      const lines = text.split('\n'), at = lines.findIndex((line) => line.includes('joint: 2, sperical hinge'));
+      expect(await page.locator('.diagnostic .line code').allTextContents()).toEqual(lines.slice(at - 3, at + 4));
       await page.getByText('did you mean "spherical hinge"?').waitFor();
       visited.faults.length = 0;  // the browser reports the refusal, too
     });
   });
 
   test('that is no deck is refused before it is sent', async () => {
-    await withPage('pendulum.mbd', async ({ page }) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
       await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
       await page.getByLabel('Files of a deck').setInputFiles({ name: 'notes.txt', mimeType: 'text/plain', buffer: Buffer.from('no deck') });
       await page.getByText('None of these files is a deck').waitFor();
@@ -377,7 +428,7 @@ describe('who comes in', () => {
   });
 
   test('a reload shows the simulation where it stands', async () => {
-    await withPage('pendulum.mbd', async (visited, view) => {
+    await withPage(browser, 'pendulum.mbd', async (visited, view) => {
       await visited.page.getByRole('button', { name: '+10' }).click();
       await atStep(visited.page, 10);
       await visited.page.reload();
@@ -431,6 +482,45 @@ describe('a daemon that is started again', () => {
   });
 });
 
+describe('a daemon that keeps its simulations', () => {
+  /** What a page does before, a daemon that ends so, and what the page has to find. */
+  async function comesBack(end: (daemon: Daemon) => Promise<void>, reload: boolean): Promise<void> {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    mkdirSync(join(folder, 'state'));
+    const daemon = new Daemon(folder, await freePort(), ['--state-dir', join(folder, 'state')]);
+    try {
+      await daemon.start();
+      const simulation = await create(daemon, 'pendulum.mbd', { checkpointSteps: '1' });
+      const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(simulation)}`);
+      await shown(page);
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      const before = await scene(page);
+      await end(daemon);
+      await page.getByText('The daemon does not answer; trying again.').waitFor();
+      await daemon.start();
+      if (reload) await page.reload();
+      else await until(page, () => document.querySelector('.banner')?.classList.contains('hidden') === true, undefined);
+      await shown(page);
+      await atStep(page, 10);
+      expect(await scene(page)).toEqual(before);
+      await page.getByRole('button', { name: 'One step (S)' }).click();
+      await atStep(page, 11);
+      expect((await scene(page)).nodes).not.toEqual(before.nodes);
+      await page.getByRole('button', { name: 'clamp 1', exact: true }).click();
+      await page.locator('.written').getByText(/^pendulum\.mbd:\d+:\d+$/).waitFor();
+      await close();
+    } finally {
+      await daemon.kill();
+      rmSync(folder, { recursive: true });
+    }
+  }
+
+  test('and is shut down in order: the page goes on where it was', () => comesBack((daemon) => daemon.end(), false));
+  test('and is killed: the page goes on where it was', () => comesBack((daemon) => daemon.kill(), false));
+  test('and is killed: the page that is reloaded shows it where it was', () => comesBack((daemon) => daemon.kill(), true));
+});
+
 describe('a tab that stops reading', () => {
   /** Wall time of each of `count` steps, in milliseconds, sorted. */
   async function steps(view: View, count: number): Promise<number[]> {
@@ -471,7 +561,7 @@ describe('a tab that stops reading', () => {
 
 describe('layers', () => {
   test('that are asked for show reactions, velocities, axes and names', async () => {
-    await withPage('slider_crank.mbd', async (visited) => {
+    await withPage(browser, 'slider_crank.mbd', async (visited) => {
       const { page } = visited;
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
@@ -484,23 +574,6 @@ describe('layers', () => {
       while (after.covered <= before.covered * 1.02 && Date.now() < end) after = await picture(page);
       expect(after.covered).toBeGreaterThan(before.covered * 1.02);
       expect(await page.locator('.labels').textContent()).toContain('spherical hinge 2');
-    });
-  });
-});
-
-describe('comparing', () => {
-  test('draws another simulation in the same scene', async () => {
-    await withPage('pendulum.mbd', async ({ page }, view) => {
-      const { simulation } = await view.call<{ simulation: { name: string } }>('Simulations/ForkSimulation', { simulation: view.simulation, options: { displayName: 'other' } });
-      await view.call('Simulations/Step', { simulation: simulation.name, steps: 60 });
-      const alone = await picture(page);
-      await page.getByRole('tab', { name: 'Simulations' }).click();
-      await page.getByRole('button', { name: 'Compare with other' }).click();
-      const until = Date.now() + 20_000;
-      let both = alone;
-      while (both.covered <= alone.covered && Date.now() < until) both = await picture(page);
-      expect(both.covered).toBeGreaterThan(alone.covered);
-      await atStep(page, 0);
     });
   });
 });
@@ -519,7 +592,7 @@ describe('for everybody', () => {
     { name: 'wide and light', options: { dark: false } },
     { name: 'narrow', options: { width: 390, height: 780 } },
   ])('no serious fault, $name', async ({ options }) => {
-    await withPage('actuated_beam.mbd', async (visited) => {
+    await withPage(browser, 'actuated_beam.mbd', async (visited) => {
       expect(await seriousFaults(visited)).toEqual([]);
       for (const tab of options.width ? ['Model', 'Plots', 'Panels'] : []) {
         await visited.page.getByRole('tab', { name: tab, exact: true }).last().click();
@@ -529,7 +602,7 @@ describe('for everybody', () => {
   });
 
   test('the keyboard alone is enough', async () => {
-    await withPage('pendulum.mbd', async ({ page }) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
       await page.keyboard.press('/');
       await page.keyboard.type('body');
       await page.keyboard.press('Tab');

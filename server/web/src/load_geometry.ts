@@ -1,13 +1,14 @@
-/** Reads `DescribeGeometry` into plain data. */
+/** Reads `DescribeGeometry` into plain data: what is drawn, and the cards of the deck. */
 import { geometry as client } from './api';
 import { mat3, vec3, type Mat3 } from './algebra';
 import { finish, type ElementShape, type FlexibleBody, type Geometry, type NodeShape } from './geometry';
+import { cardOf, type Card } from './model';
 import type { ElementGeometry, ModalPoints, NodeGeometry } from './gen/mbcosim/v1/geometry_pb';
 
-export async function loadGeometry(simulation: string, signal?: AbortSignal): Promise<Geometry> {
+export async function loadGeometry(simulation: string, signal?: AbortSignal): Promise<{ geometry: Geometry; cards: Map<string, Card> }> {
   const nodes: NodeShape[] = [], elements: ElementShape[] = [], bodies: FlexibleBody[] = [];
-  const indexOf = new Map<number, number>();
-  for await (const reply of client.describeGeometry({ simulation }, { signal })) {
+  const indexOf = new Map<number, number>(), cards = new Map<string, Card>();
+  for await (const reply of client.describeGeometry({ simulation, cards: true }, { signal })) {
     switch (reply.content.case) {
       case 'nodes':
         for (const node of reply.content.value.nodes) {
@@ -21,9 +22,12 @@ export async function loadGeometry(simulation: string, signal?: AbortSignal): Pr
       case 'modalPoints':
         addPoints(bodies, reply.content.value, indexOf);
         break;
+      case 'cards':
+        for (const card of reply.content.value.cards) cards.set(...cardOf(card));
+        break;
     }
   }
-  return finish(nodes, elements, bodies);
+  return { geometry: finish(nodes, elements, bodies), cards };
 }
 
 function nodeShape(node: NodeGeometry): NodeShape {

@@ -1,6 +1,7 @@
 /** What a model is made of, in plain data that recordings keep too. */
 import { Causality } from './gen/mbcosim/v1/common_pb';
-import type { ModelDescription } from './gen/mbcosim/v1/simulations_pb';
+import type { DeckCard } from './gen/mbcosim/v1/geometry_pb';
+import type { ModelDescription, SymbolValue } from './gen/mbcosim/v1/simulations_pb';
 
 export type Kind = 'input' | 'output' | 'parameter' | 'state';
 
@@ -15,6 +16,15 @@ export interface VariableInfo {
   owner: string;
 }
 
+/** A card of the deck, as its author wrote it. */
+export interface Card {
+  /** "pendulum.mbd:12:3". */
+  place: string;
+  text: string;
+  /** The deck's card is longer than that. */
+  cut: boolean;
+}
+
 export interface Part {
   /** "joint:7", "node.structural:2": unique. */
   id: string;
@@ -22,6 +32,14 @@ export interface Part {
   type: string;
   label: number;
   name: string;
+  card?: Card;
+}
+
+/** A variable of the deck (`set` cards). */
+export interface Parameter {
+  name: string;
+  /** "0.5", "true", "\"text\"". */
+  value: string;
 }
 
 export interface Model {
@@ -34,6 +52,7 @@ export interface Model {
   nodes: Part[];
   elements: Part[];
   variables: VariableInfo[];
+  parameters: Parameter[];
 }
 
 const KINDS: Record<number, Kind> = {
@@ -42,7 +61,8 @@ const KINDS: Record<number, Kind> = {
   [Causality.STATE]: 'state',
 };
 
-export function modelOf(description: ModelDescription): Model {
+/** `cards`: by the identifiers of their parts. */
+export function modelOf(description: ModelDescription, cards: ReadonlyMap<string, Card>): Model {
   return {
     title: description.title,
     digest: description.modelDigest,
@@ -56,6 +76,7 @@ export function modelOf(description: ModelDescription): Model {
       type: node.kind,
       label: node.label,
       name: node.name,
+      card: cards.get(`node.${node.family}:${node.label}`),
     })),
     elements: description.elements.map((element) => ({
       id: `${element.family}:${element.label}`,
@@ -63,6 +84,7 @@ export function modelOf(description: ModelDescription): Model {
       type: element.type,
       label: element.label,
       name: element.name,
+      card: cards.get(`${element.family}:${element.label}`),
     })),
     variables: description.variables.map((variable) => ({
       handle: variable.handle,
@@ -74,7 +96,44 @@ export function modelOf(description: ModelDescription): Model {
       description: variable.description,
       owner: variable.owner,
     })),
+    parameters: description.symbols.map(({ name, value }) => ({ name, value: written(value) })),
   };
+}
+
+/** The part to which a card belongs, and the card as it is shown. */
+export function cardOf(card: DeckCard): [string, Card] {
+  const id = `${card.ofNode ? 'node.' : ''}${card.family}:${card.label}`;
+  return [id, { place: `${card.file}:${card.line}:${card.column}`, text: evenly(card.text, card.column), cut: card.cut }];
+}
+
+function written(value: SymbolValue | undefined): string {
+  if (value?.value.case === 'text') return JSON.stringify(value.value.value);
+  return String(value?.value.value ?? '');
+}
+
+/** A card without the indentation that it has in its file: its first line begins at a column, from 1. */
+export function evenly(text: string, column: number): string {
+  const [first, ...rest] = text.split('\n');
+  const blanks = rest.filter((line) => line.trim() !== '').map((line) => line.search(/\S/));
+  const shift = Math.min(column - 1, ...blanks);
+  return [first, ...rest.map((line) => line.slice(Math.min(shift, line.search(/\S|$/))))].join('\n');
+}
+
+/** The deck's variables that a card names, outside its comments and strings. */
+export function namedIn(card: Card, parameters: readonly Parameter[]): Parameter[] {
+  const code = card.text.replace(/"(?:[^"\\]|\\.)*"|\/\*[\s\S]*?(?:\*\/|$)|#.*/g, ' ');
+  const words = new Set(code.match(/[A-Za-z_]\w*/g));
+  return parameters.filter(({ name }) => words.has(name));
+}
+
+/** What has variables and is neither node nor element: drives. */
+export function otherParts(model: Model): Part[] {
+  const known = new Set([...model.nodes, ...model.elements].map(({ id }) => id));
+  const others = [...variablesByPart(model.variables).keys()].filter((id) => id !== '' && !known.has(id));
+  return others.map((id) => {
+    const [family, label] = id.split(':');
+    return { id, family, type: family === 'drive' ? 'drive caller' : family, label: Number(label), name: '' };
+  });
 }
 
 /** "joint:7" of "joint.7.Fx", "node.structural:2" of "node.structural.2.X"; empty: of the model. */

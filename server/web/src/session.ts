@@ -89,8 +89,8 @@ export class Session implements Shown {
 
   /** Reads all about the simulation `name` and follows it until `close`. */
   static async open(name: string): Promise<Session> {
-    const [info, description, geometry] = await Promise.all([look(name), describe(name), loadGeometry(name)]);
-    const session = new Session(info, modelOf(description), geometry);
+    const [info, description, { geometry, cards }] = await Promise.all([look(name), describe(name), loadGeometry(name)]);
+    const session = new Session(info, modelOf(description, cards), geometry);
     await session.read();
     void session.follow();
     void session.poll();
@@ -380,7 +380,7 @@ export class Session implements Shown {
     let modes: Mode[] = [];
     await this.attempt(async () => {
       const [eigen, names] = await Promise.all([eigenvectors(this.name, 2 * count, shift), stateNames(this.name)]);
-      modes = modesOf(eigen, names, this.geometry.nodes);
+      modes = modesOf(eigen, names, this.geometry);
     });
     return modes;
   }

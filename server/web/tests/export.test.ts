@@ -7,7 +7,7 @@ import { Signal } from '../src/signal';
 
 const X: VariableInfo = { handle: 4, name: 'node.structural.2.X', size: 3, unit: 'm', frame: 'global', kind: 'state', description: '', owner: '' };
 const E: VariableInfo = { handle: 9, name: 'body.2.E', size: 1, unit: 'J', frame: '', kind: 'output', description: '', owner: '' };
-const model: Model = { title: '</script><b>', digest: 'ab', unknowns: 3, initialTime: 0, finalTime: Infinity, step: 0.1, nodes: [], elements: [], variables: [X, E] };
+const model: Model = { title: '</script><b>', digest: 'ab', unknowns: 3, initialTime: 0, finalTime: Infinity, step: 0.1, nodes: [], elements: [], variables: [X, E], parameters: [] };
 
 function shown() {
   const recording = new Recording();

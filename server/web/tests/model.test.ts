@@ -1,9 +1,9 @@
 import { describe, expect, test } from 'vitest';
-import { matches, partOf, shortName } from '../src/model';
+import { evenly, matches, namedIn, otherParts, partOf, shortName, type Model } from '../src/model';
 import { bytes, curveName, number, seconds } from '../src/format';
 import { Pace } from '../src/pace';
 import { jointGlyph } from '../src/scene/glyphs';
-import { marked } from '../src/panels/diagnostics';
+import { linesAround, marked } from '../src/panels/diagnostics';
 import { timeSplit } from '../src/panels/solver';
 
 describe('names of variables', () => {
@@ -22,6 +22,27 @@ describe('names of variables', () => {
     expect(matches('joint.7.Fx revolute hinge', 'HINGE fx')).toBe(true);
     expect(matches('joint.7.Fx revolute hinge', 'hinge fy')).toBe(false);
   });
+});
+
+describe('a card of the deck', () => {
+  test('is shown without the indentation of its file', () => {
+    expect(evenly('body: 3, 1,\n      2., null,\n\n    eye;', 3)).toBe('body: 3, 1,\n    2., null,\n\n  eye;');
+    expect(evenly('body: 3,\n 1;', 5)).toBe('body: 3,\n1;');
+    expect(evenly('body: 3;', 9)).toBe('body: 3;');
+  });
+
+  test('names variables of the deck, not those in comments and strings', () => {
+    const parameters = ['L', 'm', 'EJ', 'x'].map((name) => ({ name, value: '1' }));
+    const card = { place: 'a.mbd:1:1', text: 'body: 3, 1, 2*m, /* EJ */ reference, node, L/2., # x\n "string, x", eye;', cut: false };
+    expect(namedIn(card, parameters).map(({ name }) => name)).toEqual(['L', 'm']);
+  });
+});
+
+test('drives stand in the tree, since variables belong to them', () => {
+  const variable = (name: string) => ({ handle: 0, name, size: 1, unit: '', frame: '', kind: 'output' as const, description: '', owner: '' });
+  const part = { id: 'joint:7', family: 'joint', type: 'clamp', label: 7, name: '' };
+  const model = { nodes: [], elements: [part], variables: ['time', 'joint.7.Fx', 'drive.4.value'].map(variable) } as unknown as Model;
+  expect(otherParts(model)).toEqual([{ id: 'drive:4', family: 'drive', type: 'drive caller', label: 4, name: '' }]);
 });
 
 describe('numbers', () => {
@@ -65,6 +86,11 @@ test('a mark in a line counts bytes, not letters', () => {
   expect(marked('joint: 2, sperical hinge,', 11, 14)).toEqual(['joint: 2, ', 'sperical hinge', ',']);
   expect(marked('# é; bad', 6, 3)).toEqual(['# é;', ' ba', 'd']);
   expect(marked('', 9, 3)).toEqual(['', '', '']);
+});
+
+test('lines around a place are those of the deck, as far as there are any', () => {
+  expect(linesAround('a\r\nb\nc\nd\ne\nf', 2)).toEqual({ before: [[1, 'a']], after: [[3, 'c'], [4, 'd'], [5, 'e']] });
+  expect(linesAround('a\nb', 2)).toEqual({ before: [[1, 'a']], after: [] });
 });
 
 test('the parts of the wall time sum to one', () => {

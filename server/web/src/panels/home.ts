@@ -14,6 +14,7 @@ export const STATES: Record<number, string> = {
   [SimulationState.STEPPING]: 'stepping',
   [SimulationState.FINISHED]: 'finished',
   [SimulationState.FAILED]: 'failed',
+  [SimulationState.SUSPENDED]: 'suspended',
 };
 
 export class Home {
@@ -66,7 +67,7 @@ export class Home {
       this.message.replaceChildren();
       this.open(name);
     } catch (thrown) {
-      this.tell(failureOf(thrown));
+      this.tell(failureOf(thrown), '', files);
     }
   }
 
@@ -96,7 +97,7 @@ export class Home {
     return this.known;
   }
 
-  tell(failure: Failure, kind = ''): void {
+  tell(failure: Failure, kind = '', files: readonly NamedFile[] = []): void {
     this.message.dataset.kind = kind;
     const hint = failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started: it has the token.' : '';
     if (kind !== 'connection' || !this.desk.shown.value) this.welcome.classList.remove('hidden');
@@ -104,7 +105,7 @@ export class Home {
     this.message.replaceChildren(
       this.desk.shown.value ? back : '',
       failure.diagnostics.length === 0 ? h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)) : '',
-      diagnosticsList(failure.diagnostics));
+      diagnosticsList(failure.diagnostics, files));
   }
 
   private draw(): void {

@@ -3,7 +3,7 @@ import type { Desk } from '../desk';
 import { h, iconButton } from '../dom';
 import { componentName, number } from '../format';
 import type { ElementShape } from '../geometry';
-import { partTitle, shortName, variablesByPart, type VariableInfo } from '../model';
+import { namedIn, otherParts, partTitle, shortName, variablesByPart, type Card, type Model, type VariableInfo } from '../model';
 import { valueOf } from '../recording';
 
 /** Variables whose values are followed while something is selected. */
@@ -17,7 +17,7 @@ export function selectionPanel(desk: Desk, follow: (id: string | undefined) => v
   const rebuild = () => {
     cells = [];
     const model = desk.shown.value?.model, id = desk.selected.value;
-    const part = model && [...model.nodes, ...model.elements].find((other) => other.id === id);
+    const part = model && [...model.nodes, ...model.elements, ...otherParts(model)].find((other) => other.id === id);
     if (!part || !model) return body.replaceChildren(h('p', { class: 'soft' }, 'Pick something in the scene or in the tree.'));
     const variables = (variablesByPart(model.variables).get(part.id) ?? []).slice(0, MOST);
     desk.session?.want(variables);
@@ -27,8 +27,9 @@ export function selectionPanel(desk: Desk, follow: (id: string | undefined) => v
       h('div', { class: 'row' }, h('strong', { class: 'name' }, partTitle(part)), h('span', { class: 'spacer' }),
         node ? iconButton('follow', 'Follow this node with the camera', () => follow(part.id)) : '',
         iconButton('close', 'Select nothing', () => (desk.selected.value = undefined), { class: 'icon-button small' })),
+      part.card ? cardText(part.card, model) : '',
       shape ? facts(shape, desk) : '',
-      h('table', { class: 'values' }, h('tbody', {}, ...variables.map(row))),
+      h('table', { class: 'values', 'aria-label': 'Variables' }, h('tbody', {}, ...variables.map(row))),
     );
     update();
   };
@@ -55,6 +56,16 @@ export function selectionPanel(desk: Desk, follow: (id: string | undefined) => v
   desk.shown.watch(rebuild);
   desk.calm.watch(update);
   return panel;
+}
+
+/** The card as the deck has it, and the deck's variables that it names. */
+function cardText(card: Card, model: Model): HTMLElement {
+  const parameters = namedIn(card, model.parameters);
+  return h('figure', { class: 'written' },
+    h('figcaption', { class: 'soft' }, card.place),
+    h('pre', { tabindex: 0, 'aria-label': 'Card of the deck' }, card.text, card.cut ? h('span', { class: 'soft' }, '\n… the card goes on') : ''),
+    parameters.length > 0 ? h('table', { class: 'values', 'aria-label': 'Parameters' }, h('tbody', {}, ...parameters.map(({ name, value }) =>
+      h('tr', {}, h('th', { scope: 'row' }, h('code', {}, name)), h('td', {}, value))))) : '');
 }
 
 /** What the deck says of an element's shape. */

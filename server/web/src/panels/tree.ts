@@ -1,7 +1,7 @@
 /** The model as a tree with search: nodes, elements, and their variables. */
 import type { Desk } from '../desk';
 import { h, iconButton } from '../dom';
-import { matches, partTitle, shortName, variablesByPart, type Model, type Part, type VariableInfo } from '../model';
+import { matches, otherParts, partTitle, shortName, variablesByPart, type Model, type Part, type VariableInfo } from '../model';
 
 /** Rows at once; a search finds the rest. */
 const MOST = 400;
@@ -22,7 +22,7 @@ export function treePanel(desk: Desk): HTMLElement {
     const rows: HTMLElement[] = [];
     let left = MOST;
     const families = new Map<string, Part[]>();
-    for (const part of [...model.nodes, ...model.elements]) {
+    for (const part of [...model.nodes, ...model.elements, ...otherParts(model)]) {
       const family = part.id.startsWith('node.') ? `${part.family} nodes` : part.family;
       families.set(family, [...(families.get(family) ?? []), part]);
     }
