@@ -13,6 +13,8 @@
 #include <fstream>
 #include <optional>
 
+#include "files/folder_size.h"
+
 namespace mbcosim::server {
 namespace {
 
@@ -22,23 +24,6 @@ constexpr std::int64_t kLongestRecord = 1LL << 40;
 constexpr std::size_t kPiece = 1 << 20;
 const std::string kSnapshot = "snapshot-";
 const std::string kDamaged = ".damaged";
-
-std::int64_t size_of(const std::string& path) {
-  std::error_code none;
-  const auto size = fs::file_size(path, none);
-  return none ? 0 : static_cast<std::int64_t>(size);
-}
-
-std::int64_t bytes_in(const std::string& folder) {
-  std::int64_t bytes = 0;
-  std::error_code error;
-  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    std::error_code none;
-    if (entry->is_regular_file(none)) bytes += size_of(entry->path());
-  }
-  return bytes;
-}
 
 int take_lock(const std::string& path) {
   const std::string name = path + "/lock";
@@ -116,7 +101,7 @@ std::vector<std::string> StateFolder::list() const {
 template <class Write>
 void StateFolder::write_file(const std::string& id, const std::string& name, Write&& write) {
   const std::string path = folder(id) + "/" + name;
-  const std::int64_t before = size_of(path);
+  const std::int64_t before = bytes_of_file(path);
   AtomicFile file(path);
   std::int64_t taken = 0;
   try {
@@ -167,7 +152,7 @@ void StateFolder::write_snapshot(const std::string& id, int number, const std::s
 
 void StateFolder::remove_snapshot(const std::string& id, int number) {
   const std::string path = folder(id) + "/" + kSnapshot + std::to_string(number);
-  const std::int64_t size = size_of(path);
+  const std::int64_t size = bytes_of_file(path);
   if (::unlink(path.c_str()) == 0) give_back(size);
 }
 

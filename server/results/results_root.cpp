@@ -7,24 +7,13 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "files/folder_size.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::int64_t bytes_in(const std::string& folder) {
-  std::int64_t bytes = 0;
-  std::error_code error;
-  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    std::error_code none;
-    const auto size = entry->is_symlink(none) ? 0 : entry->file_size(none);
-    if (!none) bytes += static_cast<std::int64_t>(size);
-  }
-  return bytes;
-}
 
 std::string usable(const std::string& path) {
   if (path.empty()) return path;
