@@ -11,19 +11,7 @@
 namespace mbcosim::server {
 namespace {
 
-constexpr std::size_t kHeader = 16;
-constexpr std::string_view kMagic = "mbcosim 2 ";
-
-void put(std::string& out, std::uint64_t value, int bytes) {
-  for (int k = 0; k < bytes; ++k) out += static_cast<char>(value >> (8 * k));
-}
-
-std::uint64_t get(std::string_view bytes, std::size_t at, int count) {
-  std::uint64_t value = 0;
-  for (int k = count - 1; k >= 0; --k)
-    value = value << 8 | static_cast<unsigned char>(bytes[at + static_cast<std::size_t>(k)]);
-  return value;
-}
+constexpr std::string_view kMagic = "mbcosim 1 ";
 
 std::uint32_t checksum(std::string_view first, std::string_view second) {
   const auto add = [](uLong crc, std::string_view bytes) {
@@ -40,17 +28,43 @@ std::string folder_of(const std::string& path) { return path.substr(0, path.rfin
 
 }  // namespace
 
-// ------------------------------------------------------------------ writing
-
-void RecordWriter::begin(const std::string& file) {
-  add(RecordKind::begin, std::string(kMagic) + file);
+std::string number_bytes(std::uint64_t value, std::size_t count) {
+  std::string bytes;
+  for (std::size_t k = 0; k < count; ++k) bytes += static_cast<char>(value >> (8 * k));
+  return bytes;
 }
 
+std::uint64_t number_at(std::string_view bytes, std::size_t at, std::size_t count) {
+  std::uint64_t value = 0;
+  for (std::size_t k = count; k-- > 0;)
+    value = value << 8 | static_cast<unsigned char>(bytes[at + k]);
+  return value;
+}
+
+std::string begin_of(const std::string& file) { return std::string(kMagic) + file; }
+
+bool claims_to_end_within(std::string_view bytes) {
+  return bytes.size() >= kRecordHeader && number_at(bytes, 4, 8) <= bytes.size() - kRecordHeader;
+}
+
+std::optional<RecordView> record_at(std::string_view bytes) {
+  if (!claims_to_end_within(bytes)) return std::nullopt;
+  const auto kind = number_at(bytes, 0, 4);
+  if (kind < 1 || kind > static_cast<std::uint64_t>(RecordKind::entry)) return std::nullopt;
+  const std::string_view content =
+      bytes.substr(kRecordHeader, static_cast<std::size_t>(number_at(bytes, 4, 8)));
+  if (number_at(bytes, 12, 4) != checksum(bytes.substr(0, 12), content)) return std::nullopt;
+  return RecordView{static_cast<RecordKind>(kind), content, kRecordHeader + content.size()};
+}
+
+// ------------------------------------------------------------------ writing
+
+void RecordWriter::begin(const std::string& file) { add(RecordKind::begin, begin_of(file)); }
+
 void RecordWriter::add(RecordKind kind, std::string_view content) {
-  std::string header;
-  put(header, static_cast<std::uint32_t>(kind), 4);
-  put(header, content.size(), 8);
-  put(header, checksum(header, content), 4);
+  std::string header = number_bytes(static_cast<std::uint32_t>(kind), 4);
+  header += number_bytes(content.size(), 8);
+  header += number_bytes(checksum(header, content), 4);
   sink_(header);
   sink_(content);
 }
@@ -71,15 +85,15 @@ void RecordReader::take(std::string_view bytes) {
 
 bool RecordReader::next() {
   const std::string_view all = std::string_view(bytes_).substr(taken_);
-  if (all.size() < kHeader) return false;
-  const std::uint64_t length = get(all, 4, 8);
+  if (all.size() < kRecordHeader) return false;
+  const std::uint64_t length = number_at(all, 4, 8);
   if (length > static_cast<std::uint64_t>(most_)) damaged("its length makes no sense");
-  const std::size_t whole = kHeader + static_cast<std::size_t>(length);
+  const std::size_t whole = kRecordHeader + static_cast<std::size_t>(length);
   if (all.size() < whole) return false;
-  if (get(all, 12, 4) != checksum(all.substr(0, 12), all.substr(kHeader, length)))
+  if (number_at(all, 12, 4) != checksum(all.substr(0, 12), all.substr(kRecordHeader, length)))
     damaged("its checksum differs");
-  const auto kind = static_cast<RecordKind>(get(all, 0, 4));
-  std::string content(all.substr(kHeader, length));
+  const auto kind = static_cast<RecordKind>(number_at(all, 0, 4));
+  std::string content(all.substr(kRecordHeader, length));
   check_order(kind, content);
   taken_ += whole;
   handler_(kind, std::move(content));

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -19,7 +20,8 @@ enum class RecordKind : std::uint32_t {
   head = 3,
   file = 4,
   point = 5,
-  state = 6
+  state = 6,
+  entry = 7
 };
 
 /// What cannot be written, as the system says. The message has no path.
@@ -27,6 +29,25 @@ class StorageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
+
+constexpr std::size_t kRecordHeader = 16;  ///< bytes before a record's content
+
+/// Whole numbers as records have them: the lowest byte first.
+std::string number_bytes(std::uint64_t value, std::size_t count);
+std::uint64_t number_at(std::string_view bytes, std::size_t at, std::size_t count);
+
+/// A whole record at the start of some bytes.
+struct RecordView {
+  RecordKind kind;
+  std::string_view content;
+  std::size_t size;  ///< with its header
+};
+/// Nothing: the bytes begin with no record, or not with all of it, or it is damaged.
+std::optional<RecordView> record_at(std::string_view bytes);
+/// Do the bytes begin with a header whose record would end within them?
+bool claims_to_end_within(std::string_view bytes);
+/// Content of the first record of a file.
+std::string begin_of(const std::string& file);
 
 /// Where bytes of records go.
 using ByteSink = std::function<void(std::string_view)>;

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kLongestRecord = 1LL << 40;
 constexpr std::size_t kPiece = 1 << 20;
-const std::string kSnapshot = "snapshot-";
+const std::string kSnapshot = "snapshot-", kJournal = "journal-";
 const std::string kDamaged = ".damaged";
 
 int take_lock(const std::string& path) {
@@ -41,11 +41,12 @@ void parse(const std::string& content, Message* message) {
   if (!message->ParseFromString(content)) throw StorageError("a record cannot be understood");
 }
 
-std::optional<int> snapshot_number(const std::string& name) {
-  if (name.compare(0, kSnapshot.size(), kSnapshot) != 0) return std::nullopt;
+/// N of a file "PREFIXN".
+std::optional<int> number_of(const std::string& name, const std::string& prefix) {
+  if (name.compare(0, prefix.size(), prefix) != 0) return std::nullopt;
   int number = 0;
   const char* end = name.data() + name.size();
-  const auto [at, error] = std::from_chars(name.data() + kSnapshot.size(), end, number);
+  const auto [at, error] = std::from_chars(name.data() + prefix.size(), end, number);
   if (error != std::errc() || at != end || number < 1) return std::nullopt;
   return number;
 }
@@ -229,19 +230,62 @@ std::vector<std::string> StateFolder::files_of(const std::string& id) const {
   return paths;
 }
 
-std::vector<int> StateFolder::snapshots(const std::string& id) const {
+std::vector<int> StateFolder::numbered(const std::string& id, const std::string& prefix) const {
   std::vector<int> numbers;
   std::error_code error;
   for (fs::directory_iterator entry(folder(id), error), end; !error && entry != end;
        entry.increment(error))
-    if (const auto number = snapshot_number(entry->path().filename())) numbers.push_back(*number);
+    if (const auto number = number_of(entry->path().filename(), prefix)) numbers.push_back(*number);
   std::sort(numbers.begin(), numbers.end());
   return numbers;
 }
 
+std::vector<int> StateFolder::snapshots(const std::string& id) const {
+  return numbered(id, kSnapshot);
+}
+
 std::int64_t StateFolder::written_at(const std::string& id) const {
-  struct stat info {};
-  return ::stat((folder(id) + "/point").c_str(), &info) == 0 ? info.st_mtime : 0;
+  std::int64_t last = 0;
+  const auto look = [&](const std::string& path) {
+    struct stat info {};
+    if (::stat(path.c_str(), &info) == 0) last = std::max<std::int64_t>(last, info.st_mtime);
+  };
+  look(folder(id) + "/point");
+  for (const int number : journals(id)) look(journal_path(id, number));
+  return last;
+}
+
+// ------------------------------------------------------------------ journals
+
+std::vector<int> StateFolder::journals(const std::string& id) const {
+  return numbered(id, kJournal);
+}
+
+void StateFolder::read_journals(const std::string& id, const EntryHandler& handler) {
+  for (const int number : journals(id)) {
+    const std::string name = journal_name(number), path = journal_path(id, number);
+    std::ifstream file(path, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    if (!file) throw StorageError(id + "/" + name + ": it cannot be read");
+    try {
+      const std::size_t whole = read_journal(bytes, name, handler);
+      if (whole == bytes.size()) continue;
+      if (::truncate(path.c_str(), static_cast<off_t>(whole)) != 0)
+        throw StorageError(std::string("it cannot be cut: ") + std::strerror(errno));
+      give_back(static_cast<std::int64_t>(bytes.size() - whole));
+    } catch (const StorageError& error) {
+      throw StorageError(id + "/" + name + ": " + error.what());
+    }
+  }
+}
+
+void StateFolder::remove_journals(const std::string& id, int end) {
+  for (const int number : journals(id)) {
+    if (number >= end) return;
+    const std::string path = journal_path(id, number);
+    const std::int64_t size = bytes_of_file(path);
+    if (::unlink(path.c_str()) == 0) give_back(size);
+  }
 }
 
 }  // namespace mbcosim::server

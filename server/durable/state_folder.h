@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "durable/journal.h"
 #include "durable/record_file.h"
 #include "mbcosim/v1/checkpoints.pb.h"
 #include "threads/mutex.h"
@@ -23,8 +24,8 @@ struct StoredPoint {
 };
 
 /// DIR/lock, which one daemon holds; DIR/simulations/ID with the files "model" (written once),
-/// "point" (replaced by each checkpoint) and "snapshot-N". Thread-safe, as long as each simulation
-/// is written by one thread at a time.
+/// "point" (replaced by each checkpoint), "snapshot-N" and "journal-N". Thread-safe, as long as
+/// each simulation is written by one thread at a time.
 class StateFolder {
  public:
   /// `most`: bytes of all that is in it. Throws std::runtime_error when the folder cannot be used
@@ -47,7 +48,24 @@ class StateFolder {
   std::string read_snapshot(const std::string& id, int number) const;
   std::vector<int> snapshots(const std::string& id) const;
   void remove_snapshot(const std::string& id, int number);
-  /// When its last checkpoint was written [s since 1970].
+
+  // --- its journal
+  static std::string journal_name(int number) { return "journal-" + std::to_string(number); }
+  std::string journal_path(const std::string& id, int number) const {
+    return folder(id) + "/" + journal_name(number);
+  }
+  std::vector<int> journals(const std::string& id) const;
+  /// All entries, the oldest first. What was being written when the daemon was killed is cut off.
+  void read_journals(const std::string& id, const EntryHandler& handler);
+  /// Those before file `end`.
+  void remove_journals(const std::string& id, int end);
+  /// The names of its files are on the disk.
+  void sync(const std::string& id) const { sync_path(folder(id)); }
+  /// Counts bytes that are about to be written, or are gone. Throws StorageError.
+  void take(std::int64_t bytes) TS_EXCLUDES(mutex_);
+  void give_back(std::int64_t bytes) TS_EXCLUDES(mutex_);
+
+  /// When it was written last [s since 1970].
   std::int64_t written_at(const std::string& id) const;
   /// Nothing when there is none.
   void remove(const std::string& id);
@@ -64,8 +82,7 @@ class StateFolder {
   void write_file(const std::string& id, const std::string& name, Write&& write);
   void read_file(const std::string& id, const std::string& name,
                  const RecordReader::Handler& handler) const;
-  void take(std::int64_t bytes) TS_EXCLUDES(mutex_);
-  void give_back(std::int64_t bytes) TS_EXCLUDES(mutex_);
+  std::vector<int> numbered(const std::string& id, const std::string& prefix) const;
 
   const std::string path_;
   const std::int64_t most_;
