@@ -108,6 +108,38 @@ void Coupler::reset() {
   }
 }
 
+// ------------------------------------------------------------------ from process to process
+
+google::protobuf::RepeatedPtrField<v1::CheckpointPort> Coupler::memory() const {
+  google::protobuf::RepeatedPtrField<v1::CheckpointPort> memory;
+  for (const Line& line : lines_) {
+    v1::CheckpointPort* out = memory.Add();
+    out->set_port(line.port->model().name());
+    out->set_had_peer(line.port->had_peer());
+    out->set_input_hold(line.agreement.hold);
+    if (line.answered_for >= 0) out->set_answered_for_step(line.answered_for);
+    for (const InputHistory::Point& point : line.history.points()) {
+      v1::CheckpointAnswer* answer = out->add_answers();
+      answer->set_time(point.time);
+      answer->mutable_values()->Add(point.values.begin(), point.values.end());
+    }
+  }
+  return memory;
+}
+
+void Coupler::take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointPort>& memory) {
+  for (const v1::CheckpointPort& in : memory)
+    for (Line& line : lines_) {
+      if (line.port->model().name() != in.port()) continue;
+      if (in.had_peer()) line.port->expect_peer();
+      line.agreement.hold = in.input_hold();
+      line.history = InputHistory(line.agreement.held_answers());
+      for (const v1::CheckpointAnswer& answer : in.answers())
+        line.history.add(answer.time(), {answer.values().begin(), answer.values().end()});
+      if (in.has_answered_for_step()) line.answered_for = in.answered_for_step();
+    }
+}
+
 // ------------------------------------------------------------------ explicit ports
 
 void Coupler::await_peers(const CancelToken& cancel) {

@@ -9,6 +9,7 @@
 #include "coupling/fixed_point.h"
 #include "coupling/input_history.h"
 #include "coupling/port.h"
+#include "mbcosim/v1/checkpoints.pb.h"
 
 namespace mbcosim::server {
 
@@ -43,6 +44,10 @@ class Coupler {
   void finish(const Simulation& simulation);
   /// The simulation went to another state: what peers answered before says nothing any more.
   void reset();
+
+  /// What explicit ports remember, for a later process, and back: before the first step.
+  google::protobuf::RepeatedPtrField<v1::CheckpointPort> memory() const;
+  void take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointPort>& memory);
 
   // --- window ports: redo the step
   /// `again`: the passes before agreed, but the step is done anew with another length; the peers

@@ -19,13 +19,15 @@ class InputHistory {
   /// Values at `time` [s]. There must be an answer.
   std::vector<double> at(double time) const;
 
- private:
   struct Point {
     double time;
     std::vector<double> values;
   };
+  const std::deque<Point>& points() const { return points_; }  ///< oldest first
+
+ private:
   std::size_t most_;
-  std::deque<Point> points_;  ///< oldest first
+  std::deque<Point> points_;
 };
 
 }  // namespace mbcosim::server

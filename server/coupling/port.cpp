@@ -163,6 +163,16 @@ bool Port::has_peer() const {
   return link_ != nullptr;
 }
 
+bool Port::had_peer() const {
+  std::lock_guard guard(mutex_);
+  return agreement_.generation > 0;
+}
+
+void Port::expect_peer() {
+  std::lock_guard guard(mutex_);
+  if (agreement_.generation == 0) agreement_.generation = 1;
+}
+
 bool Port::is_idle() const {
   std::lock_guard guard(mutex_);
   return model_.layout().optional() && agreement_.generation == 0;

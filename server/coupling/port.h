@@ -89,6 +89,10 @@ class Port {
   bool has_peer() const;
   /// Optional, and nobody has attached so far: the port takes no part in steps.
   bool is_idle() const;
+  /// Has a peer ever attached?
+  bool had_peer() const;
+  /// One has, in an earlier process: the port takes part in steps.
+  void expect_peer();
   /// Waits until a peer is attached, as long as the policy says.
   void await_peer(const CancelToken& cancel);
   /// Sends what `model().fill` put into `message` for the peer of this handshake. Does not throw:

@@ -23,6 +23,8 @@ int main(int argc, char** argv) {
   // would take a multiple of what it uses.
   mallopt(M_ARENA_MAX, static_cast<int>(std::max(2u, std::thread::hardware_concurrency())));
 
+  signal(SIGXFSZ, SIG_IGN);  // a file that must not grow is an error of the write
+
   sigset_t signals;  // blocked before any thread starts, so that only sigwait below sees them
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);

@@ -51,8 +51,8 @@ void Durability::start(const Parts& parts) {
       {[this](const auto& name, const Caller& caller) { return wake(name, caller); },
        [this](const auto& name, const Caller& caller) { return remove(name, caller); },
        [this](Session& session) { return suspend(session); },
-       [this](const auto& name) { unsuspend(name); },
-       [this](Session& session) { forget(session); }});
+       [this](const auto& name) { unsuspend(name); }, [this](Session& session) { forget(session); },
+       [this](Session& session) { store(session); }});
   thread_ = std::thread([this] { loop(); });
 }
 
@@ -88,12 +88,46 @@ void Durability::read_folder() {
 void Durability::read_one(const std::string& id) {
   Suspended found;
   found.head = folder_->read_head(id);
-  found.info = folder_->read_point(id).point.info();
+  found.info = read_latest(id).point.info();
   found.since = folder_->written_at(id);
   if (found.head.simulation() != kPrefix + id)
     throw StorageError(id + "/model: it is of " + found.head.simulation());
   Guard guard(mutex_);
   suspended_[found.head.simulation()] = std::move(found);
+}
+
+namespace {
+
+// What was kept later under the same id takes the place of what was kept before.
+void keep_replies(const v1::JournalEntry& entry, v1::CheckpointPoint* point) {
+  auto* kept = point->mutable_kept_replies();
+  for (const v1::KeptReply& reply : entry.kept_replies()) {
+    const auto same = std::remove_if(kept->begin(), kept->end(), [&](const v1::KeptReply& other) {
+      return other.request_id() == reply.request_id() && other.identity() == reply.identity();
+    });
+    kept->erase(same, kept->end());
+    *kept->Add() = reply;
+  }
+  const int over = kept->size() - static_cast<int>(KeptReplies::kReplies);
+  if (over > 0) kept->DeleteSubrange(0, over);
+}
+
+}  // namespace
+
+// The last checkpoint, and what the journal tells of later.
+StoredPoint Durability::read_latest(const std::string& id) const {
+  StoredPoint latest = folder_->read_point(id);
+  v1::JournalEntry entry;
+  folder_->read_journals(id, [&](StoredEntry stored) {
+    if (!entry.ParseFromString(stored.message)) throw StorageError("an entry cannot be understood");
+    if (entry.changes() <= latest.point.changes()) return;
+    latest.point.set_changes(entry.changes());
+    *latest.point.mutable_info() = entry.info();
+    *latest.point.mutable_ports() = entry.ports();
+    keep_replies(entry, &latest.point);
+    latest.state = std::move(stored.state);
+  });
+  return latest;
 }
 
 // ------------------------------------------------------------------ checkpoints
@@ -106,6 +140,7 @@ bool Durability::wanted(const v1::CreateOptions& options, const Session* origina
     case v1::DURABILITY_NONE:
       return false;
     case v1::DURABILITY_CHECKPOINT:
+    case v1::DURABILITY_JOURNAL:
       if (possible) return true;
       throw Refusal(v1::REASON_NOT_DURABLE,
                     available() ? "the original of the fork has durability NONE: its deck is not "
@@ -130,7 +165,7 @@ void Durability::begin(Session& session, const KeptDeck& deck, const v1::CreateO
   *model.head.mutable_options() = options;
   *model.head.mutable_model_options() = deck.options;
   model.files = deck.files;
-  session.set_keeping(std::make_unique<Keeping>(options, config_.checkpoint_interval));
+  session.set_keeping(make_keeping(session.identity().id, options));
   try {
     folder_->write_model(id, model);
     write(session);
@@ -141,6 +176,14 @@ void Durability::begin(Session& session, const KeptDeck& deck, const v1::CreateO
     folder_->remove(id);
     throw;
   }
+}
+
+std::unique_ptr<Keeping> Durability::make_keeping(const std::string& simulation,
+                                                  const v1::CreateOptions& options) const {
+  auto keeping = std::make_unique<Keeping>(options, config_.checkpoint_interval);
+  if (options.durability() == v1::DURABILITY_JOURNAL)
+    keeping->journal = std::make_unique<Journal>(*folder_, id_of(simulation));
+  return keeping;
 }
 
 KeptDeck Durability::deck_of(const Session& session) const {
@@ -154,6 +197,10 @@ KeptDeck Durability::deck_of(const Session& session) const {
 
 MemoryBudget& Durability::memory_of(const Session& session) const {
   return parts_->runtime.budgets.of(session.identity().owner);
+}
+
+void Durability::store(Session& session) try { write(session); } catch (const StorageError& error) {
+  refuse_storage("what was done is not stored yet", error);
 }
 
 void Durability::write(Session& session) {
@@ -172,6 +219,7 @@ void Durability::write(Session& session) {
   for (const int number : keeping.snapshots)
     if (kept.count(number) == 0) folder_->remove_snapshot(id, number);
   keeping.snapshots = std::move(kept);
+  folder_->remove_journals(id, captured.journal_end);
   keeping.done(captured.changes, captured.state.step);
   metrics_.count_checkpoint(
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
@@ -362,7 +410,7 @@ bool Durability::wake(const std::string& simulation, const Caller& caller) {
 SessionPtr Durability::revive(const std::string& simulation, const Suspended& suspended) try {
   const std::string id = id_of(simulation);
   StoredModel model = folder_->read_model(id);
-  const StoredPoint point = folder_->read_point(id);
+  const StoredPoint point = read_latest(id);
   std::map<int, std::string> snapshots;
   for (const v1::CheckpointSnapshot& snapshot : point.point.snapshots())
     snapshots[snapshot.number()] = folder_->read_snapshot(id, snapshot.number());
@@ -402,7 +450,7 @@ SessionPtr Durability::revive(const std::string& simulation, const Suspended& su
   });
   session->set_memory(std::move(share));
   session->take_over(point.point, snapshots);
-  session->set_keeping(std::make_unique<Keeping>(options, config_.checkpoint_interval));
+  session->set_keeping(make_keeping(simulation, options));
   {
     Guard guard(session->keeping()->mutex);
     for (const auto& [number, state] : snapshots) session->keeping()->snapshots.insert(number);

@@ -71,6 +71,10 @@ class Durability {
   void write_snapshots(Session& session, Keeping& keeping, const std::string& id,
                        v1::CheckpointPoint& point) TS_REQUIRES(keeping.mutex);
   bool may_see(const Suspended& suspended, const Caller& caller, Access access) const;
+  std::unique_ptr<Keeping> make_keeping(const std::string& simulation,
+                                        const v1::CreateOptions& options) const;
+  StoredPoint read_latest(const std::string& id) const;
+  void store(Session& session);
   void read_folder();
   void read_one(const std::string& id);
   MemoryBudget& memory_of(const Session& session) const;  ///< its owner's

@@ -9,6 +9,9 @@ namespace {
 
 using google::protobuf::util::TimeUtil;
 
+constexpr std::int64_t kLongestJournal = 64 << 20;  // a checkpoint takes its place then
+constexpr std::chrono::seconds kPause(1);           // also where checkpoints fail
+
 std::chrono::milliseconds interval_of(const v1::CreateOptions& options,
                                       std::chrono::milliseconds usual) {
   if (!options.has_checkpoint_interval()) return usual;
@@ -34,7 +37,8 @@ Keeping::Keeping(const v1::CreateOptions& options, std::chrono::milliseconds usu
 bool Keeping::due(std::int64_t changes, std::int64_t step, Clock::time_point now) const {
   Guard guard(look_);
   if (changes == changes_) return false;
-  return now - last_ >= interval_ || (steps_ && step - step_ >= *steps_);
+  const bool long_journal = journal && journal->bytes() > kLongestJournal && now - last_ >= kPause;
+  return now - last_ >= interval_ || (steps_ && step - step_ >= *steps_) || long_journal;
 }
 
 bool Keeping::stale(std::int64_t changes) const {

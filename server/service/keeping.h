@@ -3,15 +3,17 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <set>
 
+#include "durable/journal.h"
 #include "mbcosim/v1/simulations.pb.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::server {
 
-/// One thread at a time takes a checkpoint: it holds `mutex`.
+/// One thread at a time takes a checkpoint, or changes what one holds: it has `mutex`.
 class Keeping {
  public:
   using Clock = std::chrono::steady_clock;
@@ -32,6 +34,9 @@ class Keeping {
     Guard guard(mutex);
     over = true;
   }
+
+  /// JOURNAL: the session's lock protects it. Null: CHECKPOINT. Before others know the session.
+  std::unique_ptr<Journal> journal;
 
   mutable Mutex mutex;
   std::set<int> snapshots TS_GUARDED_BY(mutex);  ///< that have files

@@ -53,7 +53,8 @@ KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::stri
       throw Refusal(v1::REASON_BAD_ARGUMENT,
                     "`request_id` \"" + utf8(id_) + "\" was another request's");
     if (!entry->at_work) {
-      known_ = entry->reply;
+      (entry->begun ? begun_ : known_) = entry->reply;
+      entry->at_work = entry->begun;
       return;
     }
     if (entry->awaited && !waits)
@@ -65,7 +66,7 @@ KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::stri
     if (Entry* still = kept_.find(identity_, id_)) still->awaited = false;
     throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
   }
-  kept_.entries_.push_back({identity_, id_, digest_, true, false, {}});
+  kept_.entries_.push_back({identity_, id_, digest_, true, false, {}, false});
 }
 
 KeptReplies::Turn::~Turn() {
@@ -76,14 +77,35 @@ KeptReplies::Turn::~Turn() {
   kept_.changed_.notify_all();
 }
 
-void KeptReplies::Turn::keep(const google::protobuf::MessageLite& reply) {
+void KeptReplies::Turn::keep(const google::protobuf::MessageLite& reply) { put(reply, false); }
+
+void KeptReplies::Turn::break_off(const google::protobuf::MessageLite& reply) {
+  put(reply, /*begun=*/true);
+}
+
+void KeptReplies::Turn::put(const google::protobuf::MessageLite& reply, bool begun) {
   if (id_.empty() || known_) return;
   std::string bytes = reply.SerializeAsString();
   Guard guard(kept_.mutex_);
-  if (!kept_.make_room(static_cast<std::int64_t>(bytes.size()))) return;
   Entry* entry = kept_.find(identity_, id_);
+  kept_.share_.shrink(static_cast<std::int64_t>(entry->reply.size()));  // of what was begun
+  entry->reply.clear();
+  if (!kept_.make_room(static_cast<std::int64_t>(bytes.size()))) return;
+  entry = kept_.find(identity_, id_);
   entry->reply = std::move(bytes);
   entry->at_work = false;
+  entry->begun = begun;
+}
+
+v1::KeptReply KeptReplies::Turn::described(const google::protobuf::MessageLite& reply,
+                                           bool begun) const {
+  v1::KeptReply kept;
+  kept.set_identity(identity_);
+  kept.set_request_id(id_);
+  kept.set_request_digest(digest_);
+  kept.set_reply(reply.SerializeAsString());
+  kept.set_begun(begun);
+  return kept;
 }
 
 // ------------------------------------------------------------------ the store
@@ -112,6 +134,7 @@ void KeptReplies::describe(google::protobuf::RepeatedPtrField<v1::KeptReply>* ou
     kept->set_request_id(entry.id);
     kept->set_request_digest(entry.digest);
     kept->set_reply(entry.reply);
+    kept->set_begun(entry.begun);
   }
 }
 
@@ -120,7 +143,7 @@ void KeptReplies::take_over(const google::protobuf::RepeatedPtrField<v1::KeptRep
   for (const v1::KeptReply& reply : kept)
     if (make_room(std::ssize(reply.reply())))
       entries_.push_back({reply.identity(), reply.request_id(), reply.request_digest(), false,
-                          false, reply.reply()});
+                          false, reply.reply(), reply.begun()});
 }
 
 bool KeptReplies::drop_oldest() {

@@ -46,12 +46,20 @@ class KeptReplies {
     /// The reply of the first, serialized; null: this is the first.
     const std::string* known() const { return known_ ? &*known_ : nullptr; }
     void keep(const google::protobuf::MessageLite& reply);
+    /// What the request had done before it was broken off; null: nothing.
+    const std::string* begun() const { return begun_ ? &*begun_ : nullptr; }
+    /// It is broken off, and a repeat goes on from there.
+    void break_off(const google::protobuf::MessageLite& reply);
+    /// Is there an id, so that a repeat can be told from another request?
+    bool has_id() const { return !id_.empty(); }
+    v1::KeptReply described(const google::protobuf::MessageLite& reply, bool begun) const;
 
    private:
+    void put(const google::protobuf::MessageLite& reply, bool begun);
     KeptReplies& kept_;
     const std::string identity_, id_;
     const std::uint64_t digest_;
-    std::optional<std::string> known_;
+    std::optional<std::string> known_, begun_;
   };
 
  private:
@@ -60,6 +68,7 @@ class KeptReplies {
     std::uint64_t digest;
     bool at_work = true, awaited = false;
     std::string reply;
+    bool begun = false;  ///< and broken off
   };
   using Entries = std::deque<Entry>;
 

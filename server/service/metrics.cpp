@@ -27,6 +27,8 @@ Metrics::Metrics()
       created_(counter(*registry_, "mbcosim_simulations_created_total", "Simulations created")),
       steps_(counter(*registry_, "mbcosim_steps_total", "Steps accepted")),
       iterations_(counter(*registry_, "mbcosim_iterations_total", "Linear solutions in steps")),
+      journal_bytes_(counter(*registry_, "mbcosim_journal_bytes_total",
+                             "Bytes of entries in the journals of simulations")),
       advance_seconds_(&prometheus::BuildHistogram()
                             .Name("mbcosim_step_seconds")
                             .Help("Mean solver time of a step in one call")
@@ -38,7 +40,13 @@ Metrics::Metrics()
                .Name("mbcosim_checkpoint_seconds")
                .Help("Time that a checkpoint takes, beside the steps")
                .Register(*registry_)
-               .Add({}, prometheus::Histogram::BucketBoundaries{1e-3, 1e-2, 0.1, 1, 10, 60})) {}
+               .Add({}, prometheus::Histogram::BucketBoundaries{1e-3, 1e-2, 0.1, 1, 10, 60})),
+      journal_seconds_(&prometheus::BuildHistogram()
+                            .Name("mbcosim_journal_seconds")
+                            .Help("Time that an entry of a journal takes to get to the disk")
+                            .Register(*registry_)
+                            .Add({}, prometheus::Histogram::BucketBoundaries{1e-4, 1e-3, 1e-2, 0.1,
+                                                                             1, 10, 60})) {}
 
 void Metrics::expose(const std::string& address) {
   exposer_ = std::make_unique<prometheus::Exposer>(address);

@@ -27,6 +27,10 @@ class Metrics {
   void count_failure(v1::Reason reason);
   void set_sessions(int count) { sessions_->Set(count); }
   void count_checkpoint(double seconds) { checkpoint_seconds_->Observe(seconds); }
+  void count_journal_entry(std::int64_t bytes, double seconds) {
+    journal_bytes_->Increment(static_cast<double>(bytes));
+    journal_seconds_->Observe(seconds);
+  }
   void count_created() { created_->Increment(); }
 
  private:
@@ -34,8 +38,8 @@ class Metrics {
   std::unique_ptr<prometheus::Exposer> exposer_;
   prometheus::Family<prometheus::Counter>& failures_;
   prometheus::Gauge* sessions_;
-  prometheus::Counter *created_, *steps_, *iterations_;
-  prometheus::Histogram *advance_seconds_, *checkpoint_seconds_;
+  prometheus::Counter *created_, *steps_, *iterations_, *journal_bytes_;
+  prometheus::Histogram *advance_seconds_, *checkpoint_seconds_, *journal_seconds_;
 };
 
 }  // namespace mbcosim::server

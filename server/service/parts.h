@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -61,32 +62,59 @@ void once(Session& session, const CallFrame& frame, const Request& request, Repl
   session.note_change();
 }
 
+/// The same for what changes a durable session: no checkpoint is taken between the change and its
+/// reply, and with JOURNAL both are on the disk before the caller is told.
+template <class Request, class Reply, class Body>
+void once_stored(const SessionStore& store, Session& session, const CallFrame& frame,
+                 const Request& request, Reply* reply, Body& body) {
+  constexpr bool stores = std::is_invocable_v<Body, Session&, const Request&, Reply*,
+                                              const CallFrame&, const KeptReplies::Turn*>;
+  const std::string& id = request.request_id();
+  const std::uint64_t digest =
+      id.empty() ? 0 : digest_of(Request::descriptor()->name().c_str(), request);
+  KeptReplies::Turn turn(session.kept(), frame.caller, id, digest, frame.call);
+  if (turn.known()) {
+    reply->ParseFromString(*turn.known());
+    return;
+  }
+  {
+    std::unique_lock<Mutex> no_checkpoint;
+    if (session.keeping()) no_checkpoint = std::unique_lock(session.keeping()->mutex);
+    if constexpr (stores)
+      body(session, request, reply, frame, &turn);
+    else if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*,
+                                           const CallFrame&>)
+      body(session, request, reply, frame);
+    else
+      body(session, request, reply);
+    turn.keep(*reply);
+    session.note_change();
+  }
+  if (!stores) store.put_on_disk(session);
+}
+
 /// A method that works on one simulation, which is found and kept alive meanwhile; a request with
-/// an id is done once. The role tells what the caller must be allowed to do with it, unless
-/// `other_access` does.
+/// an id changes it, and is done once. The role tells what the caller must be allowed to do with
+/// it, unless `other_access` does.
 template <class Request, class Reply, class Body>
 Method on_session(const Parts& parts, Role role, Lane lane, Body body,
                   std::optional<Access> other_access = {}) {
   const Access access =
       other_access.value_or(role == Role::observe ? Access::observe : Access::control);
-  return unary<Request, Reply>(role, lane,
-                               [&parts, access, body = std::move(body)](
-                                   const CallFrame& frame, const Request& request, Reply* reply) {
-                                 const SessionHold session(parts.store, request.simulation(),
-                                                           frame.caller, access);
-                                 const auto work = [&] {
-                                   if constexpr (std::is_invocable_v<Body, Session&, const Request&,
-                                                                     Reply*, const CallFrame&>)
-                                     body(*session, request, reply, frame);
-                                   else
-                                     body(*session, request, reply);
-                                 };
-                                 if constexpr (requires { request.request_id(); } &&
-                                               !std::is_same_v<Request, v1::StepRequest>)
-                                   once(*session, frame, request, reply, work);
-                                 else
-                                   work();
-                               });
+  return unary<Request, Reply>(
+      role, lane,
+      [&parts, access, body = std::move(body)](const CallFrame& frame, const Request& request,
+                                               Reply* reply) {
+        const SessionHold session(parts.store, request.simulation(), frame.caller, access);
+        if constexpr (requires { request.request_id(); } &&
+                      !std::is_same_v<Request, v1::StepRequest>)
+          once_stored(parts.store, *session, frame, request, reply, body);
+        else if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*,
+                                               const CallFrame&>)
+          body(*session, request, reply, frame);
+        else
+          body(*session, request, reply);
+      });
 }
 
 }  // namespace mbcosim::server

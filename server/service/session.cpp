@@ -128,7 +128,8 @@ void Session::set_policy(v1::NonConvergencePolicy kind, std::optional<double> mi
   status_.set_policy(policy);
 }
 
-void Session::update(const v1::UpdateSimulationRequest& request, const Caller& caller) {
+void Session::update(const v1::UpdateSimulationRequest& request, const Caller& caller,
+                     v1::UpdateSimulationReply* reply, const KeptReplies::Turn* turn) {
   if (request.has_grants() && !grants_.allow(caller, Access::own))
     throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
                   {{"wanted", "own"}});
@@ -144,6 +145,8 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
         minimum);
   if (request.has_grants()) grants_.replace(request.grants().grants());
   if (request.has_display_name()) status_.set_display_name(request.display_name());
+  fill(reply->mutable_simulation(), caller);
+  store_change(turn, *reply);
 }
 
 const Recorder& Session::record() const {
@@ -169,7 +172,9 @@ void Session::fill(v1::SimulationInfo* out) const {
   out->set_late_steps(p.late_steps);
   out->set_worst_delay_seconds(p.worst_delay);
   out->set_owner(identity_.owner);
-  out->set_durability(keeping_ ? v1::DURABILITY_CHECKPOINT : v1::DURABILITY_NONE);
+  out->set_durability(!keeping_     ? v1::DURABILITY_NONE
+                      : journaled() ? v1::DURABILITY_JOURNAL
+                                    : v1::DURABILITY_CHECKPOINT);
   out->set_state(p.failed     ? v1::SIMULATION_STATE_FAILED
                  : p.stepping ? v1::SIMULATION_STATE_STEPPING
                  : p.finished ? v1::SIMULATION_STATE_FINISHED
@@ -282,7 +287,8 @@ void Session::read(const v1::ReadVariablesRequest& request, v1::ReadVariablesRep
   variables_.read(*simulation_, request.handles(), reply->mutable_values());
 }
 
-void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply) {
+void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply,
+                    const KeptReplies::Turn* turn) {
   require_usable();
   variables_.check_inputs(request.values());
   if (status_.stepping())
@@ -290,10 +296,19 @@ void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariables
                   "a call advances the simulation; inputs are written between advances");
   std::lock_guard lock(lock_);
   if (request.has_expected_step()) check_step(request.expected_step());
+  std::optional<State> before;
+  if (journaled()) before = simulation_->state();
   variables_.write(request.values(), *simulation_);
   ++changes_;
-  if (recorder_) recorder_->inputs(request.values());
   reply->set_step(simulation_->step_number());
+  try {
+    store_change(turn, *reply);
+  } catch (const Refusal&) {
+    if (const Status status = simulation_->restore(*before); !status)
+      status_.fail(status.error().message);
+    throw;
+  }
+  if (recorder_) recorder_->inputs(request.values());
 }
 
 // ------------------------------------------------------------------ results

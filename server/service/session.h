@@ -39,6 +39,7 @@ struct CapturedPoint {
   v1::CheckpointPoint point;
   State state;
   std::int64_t changes = 0;  ///< of the session, at that moment
+  int journal_end = 0;       ///< the journal's files before this one tell of nothing later
 };
 
 /// Thread-safe. One call at a time advances the simulation; others read between its steps. Methods
@@ -97,11 +98,14 @@ class Session {
             const Progress& progress = {}, RowTable* table = nullptr);
   bool interrupt();  ///< was anything advancing?
   /// Throws NOT_GRANTED when the caller must not change grants.
-  void update(const v1::UpdateSimulationRequest& request, const Caller& caller);
+  void update(const v1::UpdateSimulationRequest& request, const Caller& caller,
+              v1::UpdateSimulationReply* reply, const KeptReplies::Turn* turn);
   /// The record of the ports. Throws NOT_RECORDING.
   const Recorder& record() const;
   void read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply);
-  void write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply);
+  /// `turn`: what keeps the reply, or null.
+  void write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply,
+             const KeptReplies::Turn* turn);
 
   void linearize(const v1::LinearizeRequest& request, Call& call, v1::LinearizeReply* reply);
   void eigenvalues(const v1::ComputeEigenvaluesRequest& request, Call& call,
@@ -181,8 +185,9 @@ class Session {
   class SteppingClaim;
   class ExchangeInStep;
 
-  void advance(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
-               const Progress& progress, RowTable* table);
+  void run(Advance& advance, const Progress& progress);
+  void go_on(Advance& advance);
+  void break_off(Advance& advance);
   void go_to(const State& state, std::int64_t results_until);
   void check(const v1::StepRequest& request) const;
   void check_step(std::int64_t expected) const;
@@ -192,9 +197,12 @@ class Session {
   bool choose(Advance& advance);
   bool may_write(Advance& advance);
   void begin(Advance& advance);
+  void take_inputs(Advance& advance);
   bool run_slice(Advance& advance);
+  bool step_for_a_while(Advance& advance);
   bool run_coupled_step(Advance& advance);
   void step_coupled(Advance& advance);
+  void settle_coupled(Advance& advance, bool accepted);
   void lose_peer(Advance& advance, const std::string& why);
   void reject_step(Advance& advance, const PeerRejected& rejected);
   void end_unsolved(Advance& advance, v1::StepOutcome outcome);
@@ -207,7 +215,16 @@ class Session {
   void account(Advance& advance, const StepReport& report);
   void account_pieces(v1::StepReply& reply, const StepReport& report);
   void account_delay(Advance& advance);
+  void tell(Advance& advance, const StepReport& report);
   void finish(Advance& advance);
+  void conclude(Advance& advance);
+  bool journaled() const { return keeping_ && keeping_->journal; }
+  bool is_told_at_once(const StepReport& report) const;
+  void settle(Advance& advance, bool whole = false);
+  void go_back(Advance& advance);
+  void store(const std::optional<v1::KeptReply>& reply);
+  void store_change(const KeptReplies::Turn* turn, const google::protobuf::MessageLite& reply);
+  void fill_stored(v1::SimulationInfo* out) const;
   void describe_variables(const v1::DescribeSimulationRequest& request,
                           v1::ModelDescription* out) const;
   void require_usable() const;
@@ -234,11 +251,15 @@ class Session {
   ReplyPages<v1::ComputeEigenvaluesReply> spectrum_;
   const std::shared_ptr<TelemetryHub> telemetry_;
 
-  FairMutex lock_;                                 // protects the four below
+  FairMutex lock_;                                 // protects all below
   const std::unique_ptr<SessionResults> results_;  // null: none are written; outlives its writer
   std::unique_ptr<Simulation> simulation_;
   const std::unique_ptr<Recorder> recorder_;  // thread-safe; null: nothing is recorded
   Coupler coupler_;                           // its ports are thread-safe by themselves
+
+  Advance* at_work_ = nullptr;                                          ///< of a durable session
+  google::protobuf::RepeatedPtrField<v1::CheckpointPort> peer_memory_;  ///< after the last step
+  google::protobuf::RepeatedPtrField<v1::KeptReply> unstored_;  ///< JOURNAL: for the next entry
 };
 
 }  // namespace mbcosim::server

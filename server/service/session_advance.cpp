@@ -17,6 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr auto kSlice =
     std::chrono::milliseconds(5);  // longest hold of lock and slot by many short steps
+constexpr auto kJournalSlice = std::chrono::milliseconds(50);  // a write to the disk follows
 bool is_accepted(StepOutcome outcome) {
   return outcome == StepOutcome::accepted || outcome == StepOutcome::finished ||
          outcome == StepOutcome::not_written;
@@ -55,27 +56,32 @@ class Session::SteppingClaim {
 
 void Session::step(const v1::StepRequest& request, const Caller& caller, Call& call,
                    v1::StepReply* reply, const Progress& progress, RowTable* table) {
-  if (request.request_id().empty()) return advance(request, call, reply, progress, table);
-  KeptReplies::Turn turn(kept_, caller, request.request_id(), digest_of("Step", request), call);
+  KeptReplies::Turn turn(kept_, caller, request.request_id(),
+                         request.request_id().empty() ? 0 : digest_of("Step", request), call);
   if (turn.known()) {
     reply->ParseFromString(*turn.known());
     return;
   }
-  advance(request, call, reply, progress, table);
-  turn.keep(*reply);
-  note_change();
-}
-
-void Session::advance(const v1::StepRequest& request, Call& call, v1::StepReply* reply,
-                      const Progress& progress, RowTable* table) {
-  const Clock::time_point start = Clock::now();
   require_usable();
   check(request);
-  Advance advance{request, *reply, {}, 1, {}, StepPace(pace_), table, false, false};
-  const SteppingClaim claim(*this, call, advance.token);
+  Advance advance{request, *reply, turn, {}, 1, {}, StepPace(pace_), table};
   if (request.has_steps()) advance.steps_left = request.steps();
   if (request.has_until_time() || (request.has_until() && !request.has_steps()))
     advance.steps_left = INT64_MAX;
+  if (turn.begun()) go_on(advance);
+  const SteppingClaim claim(*this, call, advance.token);
+  try {
+    run(advance, progress);
+  } catch (...) {
+    break_off(advance);
+    throw;
+  }
+  shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
+                                reply->solver_seconds());
+  if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
+}
+
+void Session::run(Advance& advance, const Progress& progress) {
   const bool coupled = !coupler_.ports().empty();
   while (!(coupled ? run_coupled_step(advance) : run_slice(advance))) {
     wait_for_subscribers();
@@ -84,10 +90,22 @@ void Session::advance(const v1::StepRequest& request, Call& call, v1::StepReply*
   }
   advance.pace.wait(advance.token, progress);
   while (must_wait(advance)) wait_for_subscribers();
-  reply->set_total_seconds(seconds_since(start));
-  shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
-                                reply->solver_seconds());
-  if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
+}
+
+// The request was begun before: only the rest is done.
+void Session::go_on(Advance& advance) {
+  advance.reply.ParseFromString(*advance.turn.begun());
+  advance.steps_left -= advance.reply.steps_done();
+  advance.ended = advance.reply.condition_met();
+  advance.goes_on = true;
+}
+
+// What was done stays, and a repeat of the request goes on from there.
+void Session::break_off(Advance& advance) {
+  std::lock_guard lock(lock_);
+  at_work_ = nullptr;
+  if (advance.reply.steps_done() > 0 && advance.turn.has_id())
+    advance.turn.break_off(advance.reply);
 }
 
 // Does a subscriber keep the session waiting?
@@ -129,17 +147,26 @@ bool Session::may_write(Advance& advance) {
 void Session::begin(Advance& advance) {
   if (advance.started) return;
   const v1::StepRequest& request = advance.request;
-  if (request.has_expected_step()) check_step(request.expected_step());
+  if (request.has_expected_step() && !advance.goes_on) check_step(request.expected_step());
   check_choice(request, *simulation_);
-  variables_.write(request.inputs(), *simulation_);
-  ++changes_;
-  if (recorder_ && request.inputs().handles_size() > 0) recorder_->inputs(request.inputs());
+  if (journaled()) advance.before = simulation_->state();
+  if (!advance.goes_on) take_inputs(advance);
   advance.started = true;
+  if (keeping_) at_work_ = &advance;
   advance.pace.start(simulation_->time());
   advance.reply.set_request_id(request.request_id());
   advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
                                                     : v1::STEP_OUTCOME_ACCEPTED);
+  advance.told_before = advance.reply;
   if (advance.table) advance.table->start(*simulation_);
+}
+
+void Session::take_inputs(Advance& advance) {
+  const auto& inputs = advance.request.inputs();
+  variables_.write(inputs, *simulation_);
+  ++changes_;
+  advance.unsettled = inputs.handles_size() > 0;
+  if (recorder_ && inputs.handles_size() > 0) recorder_->inputs(inputs);
 }
 
 // Steps for a while with lock and slot held. True: the advance has ended and the reply is complete.
@@ -147,25 +174,37 @@ bool Session::run_slice(Advance& advance) {
   std::lock_guard lock(lock_);
   begin(advance);
   if (must_wait(advance)) return false;
-  if (!wants_more(advance)) {
-    finish(advance);
-    return true;
+  if (wants_more(advance) && !step_for_a_while(advance)) {
+    settle(advance);
+    return false;
   }
-  const SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
-  const Clock::time_point slice_end = Clock::now() + kSlice;
+  conclude(advance);
+  return true;
+}
+
+// True: the advance has ended.
+bool Session::step_for_a_while(Advance& advance) {
+  std::optional<SolverSlots::Slot> slot(shared_.slots.acquire(advance.token));
+  const Clock::time_point slice_end = Clock::now() + (journaled() ? kJournalSlice : kSlice);
   while (choose(advance)) {
-    if (!slot || advance.token.cancelled()) {
+    if (!*slot || advance.token.cancelled()) {
       advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
-      break;
+      return true;
     }
-    account(advance, attempt(advance));
-    if (!wants_more(advance)) break;
+    const StepReport report = attempt(advance);
+    account(advance, report);
+    if (journaled() && is_told_at_once(report)) {
+      slot.reset();  // nobody waits for the disk with a slot
+      settle(advance);
+      slot.emplace(shared_.slots.acquire(advance.token));
+    }
+    tell(advance, report);
+    if (!wants_more(advance)) return true;
     const bool send = advance.table && advance.table->full();
     if (send || must_wait(advance) || advance.pace.holds() || lock_.contended() ||
         Clock::now() >= slice_end)
       return false;
   }
-  finish(advance);
   return true;
 }
 
@@ -199,30 +238,39 @@ void Session::account(Advance& advance, const StepReport& report) {
   reply.set_residual_error(report.residual_error);
   if (report.solution_error != 0) reply.set_solution_error(report.solution_error);
   reply.set_solver_seconds(reply.solver_seconds() + report.solver_seconds);
+  advance.ended = report.error || !is_accepted(report.outcome);
+  if (report.error && report.outcome != StepOutcome::interrupted)
+    to_proto(*report.error, reply.mutable_failure());
+  if (!is_accepted(report.outcome)) return;
+  ++changes_;
+  advance.unsettled = true;
+  account_pieces(reply, report);
+  account_delay(advance);
+  if (report.restarted) reply.set_restarted_steps(reply.restarted_steps() + 1);
+  --advance.steps_left;
+  if (advance.request.has_until() && variables_.holds(advance.request.until(), *simulation_)) {
+    reply.set_condition_met(true);
+    advance.ended = true;
+  }
+}
+
+// Tells of one step, or of its failure. With JOURNAL the step may be kept from all but the reply
+// until it is on the disk.
+void Session::tell(Advance& advance, const StepReport& report) {
+  if (advance.table && is_accepted(report.outcome)) advance.table->add(*simulation_);
+  if (journaled() && advance.unsettled) return;
   if (recorder_)
     recorder_->stepped(is_accepted(report.outcome), simulation_->step_number(),
                        simulation_->time());
   status_.publish(*simulation_);
-  advance.ended = report.error || !is_accepted(report.outcome);
+  const v1::StepReply& reply = advance.reply;
   if (report.error && report.outcome != StepOutcome::interrupted) {
-    to_proto(*report.error, reply.mutable_failure());
     status_.remember_failure(reply.failure().message());
     shared_.log.step_failed(subject(), reply.outcome(), reply.failure());
   }
   if (report.outcome == StepOutcome::finished)
     shared_.log.state_changed(subject(), v1::SIMULATION_STATE_FINISHED, simulation_->step_number());
-  if (!is_accepted(report.outcome)) return;
-  ++changes_;
-  account_pieces(reply, report);
-  account_delay(advance);
-  if (report.restarted) reply.set_restarted_steps(reply.restarted_steps() + 1);
-  --advance.steps_left;
-  if (!telemetry_->empty()) telemetry_->publish(*simulation_);
-  if (advance.table) advance.table->add(*simulation_);
-  if (advance.request.has_until() && variables_.holds(advance.request.until(), *simulation_)) {
-    reply.set_condition_met(true);
-    advance.ended = true;
-  }
+  if (is_accepted(report.outcome) && !telemetry_->empty()) telemetry_->publish(*simulation_);
 }
 
 void Session::account_pieces(v1::StepReply& reply, const StepReport& report) {
@@ -251,6 +299,20 @@ void Session::finish(Advance& advance) {
   variables_.read(*simulation_, advance.request.outputs(), reply.mutable_outputs());
 }
 
+// The reply is complete.
+void Session::conclude(Advance& advance) {
+  finish(advance);
+  advance.reply.set_total_seconds(seconds_since(advance.start));
+  at_work_ = nullptr;
+  const bool stored = advance.unsettled;
+  settle(advance, /*whole=*/true);
+  advance.turn.keep(advance.reply);
+  if (advance.turn.has_id()) ++changes_;
+  if (!journaled() || stored || !advance.turn.has_id()) return;
+  *unstored_.Add() = advance.turn.described(advance.reply, /*begun=*/false);
+  if (unstored_.size() > static_cast<int>(KeptReplies::kReplies)) unstored_.DeleteSubrange(0, 1);
+}
+
 // ------------------------------------------------------------------ with ports
 
 // One step with its exchanges. The session's lock is free while peers compute, except between
@@ -261,7 +323,7 @@ bool Session::run_coupled_step(Advance& advance) {
     begin(advance);
     if (must_wait(advance)) return false;
     if (!choose(advance)) {
-      finish(advance);
+      conclude(advance);
       return true;
     }
   }
@@ -283,11 +345,11 @@ bool Session::run_coupled_step(Advance& advance) {
     coupler_.notify(false, *simulation_);
     reject_step(advance, rejected);
   }
+  std::lock_guard lock(lock_);
   advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() +
                                       coupler_.waited_seconds());
-  std::lock_guard lock(lock_);
   if (wants_more(advance)) return false;
-  finish(advance);
+  conclude(advance);
   return true;
 }
 
@@ -296,8 +358,22 @@ void Session::step_coupled(Advance& advance) {
   coupler_.start_iterations(*simulation_);
   const StepReport report = attempt_in_slot(advance);
   account(advance, report);
+  settle_coupled(advance, is_accepted(report.outcome));
+  tell(advance, report);
   coupler_.notify(is_accepted(report.outcome), *simulation_);
   if (is_accepted(report.outcome)) coupler_.finish(*simulation_);
+}
+
+// Before peers hear of the step.
+void Session::settle_coupled(Advance& advance, bool accepted) {
+  if (!keeping_ || !accepted) return;
+  peer_memory_ = coupler_.memory();
+  try {
+    settle(advance);
+  } catch (...) {
+    coupler_.notify(false, *simulation_);
+    throw;
+  }
 }
 
 /// While it lives, steps exchange with tight ports at each iteration and are redone until window

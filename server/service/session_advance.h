@@ -9,14 +9,23 @@ namespace mbcosim::server {
 
 /// Goal and progress of one call of `step`.
 struct Session::Advance {
+  using Clock = std::chrono::steady_clock;
   const v1::StepRequest& request;
   v1::StepReply& reply;
+  KeptReplies::Turn& turn;
   CancelToken token;
   std::int64_t steps_left = 1;
   StepChoice choice;  ///< of the next step
   StepPace pace;
   RowTable* table = nullptr;  ///< of rows on the way; null: none are wanted
   bool started = false, ended = false;
+  bool goes_on = false;  ///< an earlier process, or call, has done some of it
+  Clock::time_point start = Clock::now();
+
+  // --- JOURNAL
+  bool unsettled = false;                      ///< something was done that is not on the disk
+  std::optional<State> before = std::nullopt;  ///< what is on the disk
+  v1::StepReply told_before = {};              ///< the reply that goes with it
 };
 
 }  // namespace mbcosim::server

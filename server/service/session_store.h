@@ -53,11 +53,16 @@ class SessionStore {
     std::function<bool(Session&)> suspend;                             ///< false: it must live on
     std::function<void(const std::string& id)> unsuspend;              ///< it lives on after all
     std::function<void(Session&)> forget;
+    std::function<void(Session&)> store;  ///< a checkpoint now; throws STORAGE_FULL
   };
   /// Before anybody uses the store.
   void set_keeper(Keeper keeper) { keeper_ = std::move(keeper); }
 
   void add(SessionPtr session);
+  /// With JOURNAL: all that the session holds. Throws STORAGE_FULL.
+  void put_on_disk(Session& session) const {
+    if (session.keeping() && session.keeping()->journal) keeper_.store(session);
+  }
   std::vector<SessionPtr> all() const;
   bool has(const std::string& id) const;
   /// Throws NO_SUCH_SIMULATION, also for one that the caller may not see, and NOT_GRANTED.

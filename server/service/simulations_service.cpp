@@ -128,9 +128,10 @@ void add_life(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("UpdateSimulation"),
            on_session<v1::UpdateSimulationRequest, v1::UpdateSimulationReply>(
                parts, Role::control, Lane::work,
-               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
-                 session.update(request, frame.caller);
-                 session.fill(reply->mutable_simulation(), frame.caller);
+               [](Session& session, const v1::UpdateSimulationRequest& request,
+                  v1::UpdateSimulationReply* reply, const CallFrame& frame,
+                  const KeptReplies::Turn* turn) {
+                 session.update(request, frame.caller, reply, turn);
                }));
   gate.add(
       simulations_path("DescribeSimulation"),
@@ -147,12 +148,12 @@ void add_variables(Gate& gate, const Parts& parts) {
           parts, Role::observe, Lane::work, [](Session& session, const auto& request, auto* reply) {
             session.read(request, reply);
           }));
-  gate.add(
-      simulations_path("WriteVariables"),
-      on_session<v1::WriteVariablesRequest, v1::WriteVariablesReply>(
-          parts, Role::control, Lane::work, [](Session& session, const auto& request, auto* reply) {
-            session.write(request, reply);
-          }));
+  gate.add(simulations_path("WriteVariables"),
+           on_session<v1::WriteVariablesRequest, v1::WriteVariablesReply>(
+               parts, Role::control, Lane::work,
+               [](Session& session, const v1::WriteVariablesRequest& request,
+                  v1::WriteVariablesReply* reply, const CallFrame&,
+                  const KeptReplies::Turn* turn) { session.write(request, reply, turn); }));
 }
 
 void add_analysis(Gate& gate, const Parts& parts) {

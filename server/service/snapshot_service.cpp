@@ -35,11 +35,12 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
     if (!session_)
       throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
     v1::ImportSnapshotReply reply;
-    Session& session = **session_;
-    once(session, frame_of(exchange), question(), &reply, [&] {
+    const auto import = [this](Session& session, const v1::ImportSnapshotHeader&,
+                               v1::ImportSnapshotReply* out) {
       session.import_state(bytes_, header_.display_name(), header_.restore(),
-                           reply.mutable_snapshot());
-    });
+                           out->mutable_snapshot());
+    };
+    once_stored(parts_.store, **session_, frame_of(exchange), question(), &reply, import);
     exchange.end(serialized(reply));
   }
 

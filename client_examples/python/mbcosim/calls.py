@@ -168,7 +168,7 @@ class ServerCalls(Generic[SimulationKind]):
         results_quota most bytes of them; None: the server's limit
         symbols       values by name in place of those that the deck declares: numbers, strings, bools
         grants        who else may use the simulation: a list of mbcosim.grant(...)
-        durability    whether it outlives the server: "none" or "checkpoint"; None: "checkpoint" where the server has a state folder
+        durability    whether it outlives the server: "none", "checkpoint" or "journal"; None: "checkpoint" where the server has a state folder
         checkpoint_interval, checkpoint_steps
                       longest time [s], and steps, between two checkpoints; None: the server's, and any
         pace          seconds of the model in a second of the wall clock, 1: real time; None: as fast as it can. Late steps are counted in the replies

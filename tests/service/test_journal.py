@@ -1,0 +1,292 @@
+"""Simulations with a journal: whatever anybody was told outlives a kill, requests are done once, and runs go on bit for bit."""
+import os
+import random
+import resource
+import threading
+import time
+
+import grpc
+import numpy as np
+import pytest
+
+import decks
+import mbcosim
+from conftest import wait_for
+from mbcosim.v1 import simulations_pb2 as pb
+from test_durable import X, bits, deck, folder, start, state_of  # noqa: F401 (fixtures)
+
+KILLS = int(os.environ.get("MBCOSIM_KILLS", "6"))  # 1000 for the long form
+LOST = (grpc.RpcError, mbcosim.Error)
+
+
+def step_of(server, name):
+    return int(server.attach(name).read(["step"])["step"])
+
+
+class Watcher:
+    """Everybody who may learn of a step: one who asks, one who reads, one who subscribes."""
+
+    def __init__(self, daemon, name, *, subscribes=False):
+        self.seen, self._over = 0, False
+        jobs = [self._ask, self._read] + ([self._subscribe] if subscribes else [])
+        self._threads = [threading.Thread(target=self._run, args=(job, daemon, name)) for job in jobs]
+        for thread in self._threads:
+            thread.start()
+
+    def _run(self, job, daemon, name):
+        with daemon.connect() as server:
+            try:
+                job(server, name)
+            except LOST:
+                pass  # the daemon was killed
+
+    def _ask(self, server, name):
+        while not self._over:
+            self._note(next(info.step for info in server.list() if info.name == name))
+            time.sleep(0.003)
+
+    def _read(self, server, name):
+        simulation = server.attach(name)
+        while not self._over:
+            self._note(int(simulation.read(["step"])["step"]))
+            time.sleep(0.01)
+
+    def _subscribe(self, server, name):
+        with server.attach(name).subscribe(["time"]) as samples:
+            for step, _, _ in samples:
+                self._note(step)
+
+    def _note(self, step):
+        self.seen = max(self.seen, step)
+
+    def end(self):
+        self._over = True
+        for thread in self._threads:
+            thread.join(60)
+        return self.seen
+
+
+def requests_of(rolls, name, number):
+    return pb.StepRequest(simulation=name, steps=rolls.choice([1, 1, 3, 40, 400]), request_id=f"request {number}")
+
+
+@pytest.mark.parametrize("watched", ["by polling", "by subscription"])
+def test_kills_at_random_moments_lose_nothing_that_was_told(start, watched):
+    """The short form; MBCOSIM_KILLS=1000 for the long one. Each request is done once, however often it is repeated."""
+    rolls, text = random.Random(20), deck(10_000_000)
+    options = ("--checkpoint-interval", "0.1")
+    daemon = start(*options)
+    with daemon.connect() as server:
+        name = server.load_text(text, durability="journal").name
+    number, due, told, unanswered = 0, 0, 0, None
+    for _ in range(KILLS):
+        watcher = Watcher(daemon, name, subscribes=watched == "by subscription")
+        killer = threading.Timer(rolls.uniform(0.02, 0.4), daemon.kill)
+        with daemon.connect() as server:
+            killer.start()
+            try:
+                while True:
+                    if not unanswered:
+                        number += 1
+                        unanswered = requests_of(rolls, name, number)
+                        due += unanswered.steps
+                    reply = server.simulations.Step(unanswered)
+                    assert reply.step == due, "a request was done twice, or not whole"
+                    told, unanswered = reply.step, None
+            except LOST:
+                killer.join()
+        seen = watcher.end()
+        daemon = start(*options)
+        with daemon.connect() as server:
+            resumed = step_of(server, name)
+            assert max(told, seen) <= resumed <= due
+    with daemon.connect() as server:
+        if unanswered:
+            assert server.simulations.Step(unanswered).step == due
+        again = server.attach(name)
+        with server.load_text(text, durability="none") as straight:
+            straight.step(due)
+            assert bits(straight) == bits(again)
+
+
+class Spring:
+    """A peer that comes back to whatever daemon there is. Its answers follow from the exchange alone."""
+
+    def __init__(self, **options):
+        self.seen, self.options = 0, options
+
+    def answer(self, motion):
+        self.seen = max(self.seen, motion.step - (self.options["mode"] in ("tight", "window")))
+        return [-100.0 * np.asarray(motion.x[0]) * (1 + 1e-3 * motion.step)]
+
+    def couple(self, simulation):
+        return simulation.couple("spring", self.answer, **self.options)
+
+
+COUPLINGS = [{"mode": "loose"}, {"mode": "loose", "every": 3, "hold": "quadratic"}, {"mode": "staggered"},
+             {"mode": "staggered", "every": 2, "hold": "linear"}, {"mode": "tight"}, {"mode": "window"}]
+
+
+def coupled(server, durability):
+    text = decks._OSCILLATOR.replace("final time: 10.", "final time: 1.e6") % (1, "")
+    text = text[:text.index("  joint: 2,")] + text[text.index("end: elements;"):]
+    return server.load_text(text, ports=[mbcosim.structural_port("spring", nodes=[1])], durability=durability)
+
+
+@pytest.mark.parametrize("options", COUPLINGS, ids=lambda o: " ".join(str(value) for value in o.values()))
+def test_kills_with_a_peer_lose_nothing_that_it_was_told(start, options):
+    rolls, spring = random.Random(21), Spring(**options)
+    daemon = start()
+    with daemon.connect() as server:
+        name = coupled(server, "journal").name
+    number, due, unanswered = 0, 0, None
+    for _ in range(max(3, KILLS // 2)):
+        with daemon.connect() as server:
+            simulation = server.attach(name)
+            assert spring.seen <= step_of(server, name) <= due
+            killer = threading.Timer(rolls.uniform(0.05, 0.4), daemon.kill)
+            peer = spring.couple(simulation)
+            killer.start()
+            try:
+                while True:
+                    if not unanswered:
+                        number += 1
+                        unanswered = pb.StepRequest(simulation=name, steps=rolls.choice([1, 2, 7]), request_id=f"{number}")
+                        due += unanswered.steps
+                    assert server.simulations.Step(unanswered).step == due
+                    unanswered = None
+            except LOST:
+                killer.join()
+            try:
+                peer.close()
+            except LOST:
+                pass
+        daemon = start()
+    with daemon.connect() as server:
+        again = server.attach(name)
+        with spring.couple(again):
+            again.step(due + 5 - step_of(server, name))
+        straight = coupled(server, "none")
+        with Spring(**options).couple(straight):
+            straight.step(due + 5)
+        assert due > 5 and bits(straight) == bits(again)
+
+
+def test_changes_of_every_kind_outlive_a_kill(start):
+    daemon = start("--checkpoint-interval", "3600")
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal")
+        name = simulation.name
+        assert simulation.info.durability == pb.DURABILITY_JOURNAL
+        simulation.step(7)
+        simulation.snapshot("seven")
+        simulation.step(5)
+        simulation.update(name="renamed", policy="cut_step", grants=[mbcosim.grant("token:x", "observe")])
+        simulation.snapshots()[0].restore()
+        simulation.step(2)
+    daemon.kill()
+    with start().connect() as server:
+        again = server.attach(name)
+        assert (again.info.display_name, again.info.step) == ("renamed", 9)
+        assert again.info.non_convergence_policy == pb.NON_CONVERGENCE_POLICY_CUT_STEP and again.info.grants[0].identity == "token:x"
+        assert [(s.display_name, s.step) for s in again.snapshots()] == [("seven", 7)]
+
+
+def test_results_go_on_from_what_the_journal_tells(start, tmp_path):
+    root = tmp_path / "results"
+    root.mkdir()
+    options = ("--results-root", str(root), "--checkpoint-interval", "3600")
+    daemon = start(*options)
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal", results="text", summed_time=True)
+        name = simulation.name
+        for _ in range(20):
+            simulation.step(3)
+    daemon.kill()
+    with start(*options).connect() as server:
+        again = server.attach(name)
+        again.step(40)
+        with server.load_text(deck(), durability="none", results="text", summed_time=True) as straight:
+            straight.step(100)
+            for file in straight.result_files():
+                assert straight.result_file(file) == again.result_file(file), file
+
+
+def test_the_last_64_replies_are_kept(start):
+    daemon = start("--checkpoint-interval", "3600")
+    with daemon.connect() as server:
+        name = server.load_text(deck(), durability="journal").name
+        requests = [pb.StepRequest(simulation=name, steps=1, request_id=str(k), outputs=[0]) for k in range(70)]
+        replies = [server.simulations.Step(request) for request in requests]
+    daemon.kill()
+    with start().connect() as server:
+        for request, reply in list(zip(requests, replies))[-64:]:
+            assert server.simulations.Step(request) == reply
+        assert step_of(server, name) == 70
+        assert server.simulations.Step(requests[0]).step == 71  # forgotten: done anew
+
+
+def entries(folder, name):
+    return sorted(path for path in (folder / name).iterdir() if path.name.startswith("journal-"))
+
+
+def test_a_damaged_journal_is_named_and_stops_nobody_else(start, folder):
+    daemon = start("--checkpoint-interval", "3600")
+    with daemon.connect() as server:
+        bad, good = (server.load_text(deck(), durability="journal") for _ in range(2))
+        for simulation in (bad, good):
+            for _ in range(5):
+                simulation.step()
+        bad, good = bad.name, good.name
+    daemon.kill()
+    path, = entries(folder, bad)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 16
+    path.write_bytes(data)
+    path, = entries(folder, good)
+    path.write_bytes(path.read_bytes()[:-3])  # as if the last entry had been on its way
+    daemon = start()
+    with daemon.connect() as server:
+        assert [info.name for info in server.list()] == [good]
+        assert step_of(server, good) == 4
+    line, = [line for line in daemon.log().splitlines() if "put aside" in line]
+    assert f"{bad.split('/')[1]}/{path.name}: record " in line and " at byte " in line
+
+
+def test_a_full_disk_takes_steps_back_and_loses_nothing(start):
+    daemon = start("--checkpoint-interval", "3600")
+    limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal")
+        simulation.step(10)
+        before = bits(simulation)
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (1000, limits[1]))
+        with pytest.raises(mbcosim.LimitExceeded) as caught:
+            simulation.step(5)
+        assert caught.value.reason == "STORAGE_FULL" and "cannot be written: File too large" in str(caught.value)
+        assert bits(simulation) == before and server.attach(simulation.name).info.step == 10
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, limits)
+        simulation.step(5)
+        after = bits(simulation)
+        name = simulation.name
+    daemon.kill()
+    with start().connect() as server:
+        assert bits(server.attach(name)) == after
+
+
+def test_checkpoints_take_the_journals_place(start, folder):
+    with start("--checkpoint-interval", "0.2").connect() as server:
+        simulation = server.load_text(deck(), durability="journal")
+        for _ in range(20):
+            simulation.step(10)
+        wait_for(lambda: entries(folder, simulation.name) == [])
+        assert simulation.step().step == 201
+
+
+def test_a_lease_that_ends_suspends_and_leaves_no_journal(start, folder):
+    with start().connect() as server:
+        simulation = server.load_text(deck(), durability="journal", lease=0.5)
+        simulation.step(10)
+        wait_for(lambda: state_of(server, simulation.name) == pb.SIMULATION_STATE_SUSPENDED, 20)
+        assert entries(folder, simulation.name) == []
+        assert simulation.step(5).step == 15
