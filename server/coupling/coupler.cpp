@@ -182,7 +182,9 @@ void Coupler::take_answer(Line& line, const CancelToken& cancel) {
 
 // All peers compute at the same time: everything is sent before the first answer is awaited.
 void Coupler::exchange(const CancelToken& cancel) {
-  const Stopwatch watch(waited_);
+  const Stopwatch watch(waited_), exchange(exchanged_);
+  if (std::any_of(lines_.begin(), lines_.end(), [](const Line& line) { return line.due; }))
+    ++exchanges_;
   for (Line& line : lines_) {
     if (!line.due || line.sent_for >= 0) continue;
     line.sent_for = line.message.exchange().step();
@@ -302,7 +304,8 @@ bool Coupler::take_with_tangent(Line& line, Simulation& simulation, const Cancel
 }
 
 bool Coupler::exchange_window(const Simulation& simulation, int pass, const CancelToken& cancel) {
-  const Stopwatch watch(waited_);
+  const Stopwatch watch(waited_), exchange(exchanged_);
+  ++exchanges_;
   for (Line& line : lines_) {
     if (!line.agreement.is_window()) continue;
     fill(line, simulation, simulation.time(), pass);
@@ -315,7 +318,8 @@ bool Coupler::exchange_window(const Simulation& simulation, int pass, const Canc
 }
 
 bool Coupler::exchange_iteration(Simulation& simulation, int iteration, const CancelToken& cancel) {
-  const Stopwatch watch(waited_);
+  const Stopwatch watch(waited_), exchange(exchanged_);
+  ++exchanges_;
   const auto takes_part = [&](const Line& line) {
     return line.agreement.is_tight() && iteration % line.agreement.every == 0;
   };

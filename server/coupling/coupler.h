@@ -70,8 +70,14 @@ class Coupler {
   /// Tells window and tight peers how the step ended.
   void notify(bool accepted, const Simulation& simulation);
 
-  double waited_seconds() const { return waited_; }  ///< in exchanges since the last `start_clock`
-  void start_clock() { waited_ = 0; }
+  // --- since the last `start_clock`
+  void start_clock() {
+    waited_ = exchanged_ = 0;
+    exchanges_ = 0;
+  }
+  double waited_seconds() const { return waited_; }  ///< for peers to come, and in exchanges
+  int exchanges() const { return exchanges_; }       ///< with all peers at once
+  double exchange_seconds() const { return exchanged_; }
 
  private:
   struct Line {  ///< what belongs to one port
@@ -106,7 +112,8 @@ class Coupler {
   std::vector<std::pair<const Port*, int>>
       announced_;           ///< ports with tangents and their handshakes
   double target_time_ = 0;  ///< end of the step [s]
-  double waited_ = 0;
+  double waited_ = 0, exchanged_ = 0;
+  int exchanges_ = 0;
 };
 
 }  // namespace mbcosim::server

@@ -12,9 +12,9 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 #include <thread>
 
+#include "daemon/tls.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "rpc/reflection.h"
 #include "service/coupling_service.h"
@@ -38,14 +38,6 @@ bool is_loopback(const std::string& address) {
   const bool in_loopback_net =
       ::inet_pton(AF_INET, host.c_str(), &number) == 1 && (ntohl(number.s_addr) >> 24) == 127;
   return host == "localhost" || host == "[::1]" || in_loopback_net;
-}
-
-std::string read_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error("cannot read " + path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
 }
 
 // A socket file that nobody listens on is stale and may be replaced; gRPC removes it when it binds.
@@ -119,6 +111,7 @@ Config checked(Config config) {
 Daemon::Daemon(const Config& config)
     : config_(checked(config)),
       authenticator_(make_authenticator(config.tokens_file)),
+      tokens_watch_(config.tokens_file),
       slots_(worker_count(config.workers)),
       lanes_(config.limits.sessions, worker_count(config.workers)),
       admission_({config.limits.open_calls, config.limits.identity_calls,
@@ -143,10 +136,39 @@ Daemon::Daemon(const Config& config)
                "mbcosim.v1.Events"}),
       parts_{config_, store_, slots_, metrics_, log_, runtime_, gate_, results_, durability_} {
   add_methods();
+  watch_values();
   durability_.start(parts_);
   listen();
   if (config_.shared_memory) open_shared_memory();
   if (!config_.http.empty()) open_http();
+}
+
+namespace {
+
+/// Memory of the process that is in the machine's [bytes].
+double resident_bytes() {
+  std::int64_t all = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return static_cast<double>(resident * ::sysconf(_SC_PAGESIZE));
+}
+
+}  // namespace
+
+void Daemon::watch_values() {
+  const auto watch = [this](const char* name, const char* help, auto value) {
+    metrics_.watch(name, help, [value] { return static_cast<double>(value()); });
+  };
+  watch("mbcosim_open_calls", "Calls and streams at once", [this] { return admission_.open(); });
+  watch("mbcosim_memory_bytes", "Memory that is counted against --limit-memory",
+        [this] { return budgets_.all().used(); });
+  watch("mbcosim_memory_limit_bytes", "--limit-memory", [this] { return budgets_.all().most(); });
+  watch("mbcosim_simulations_suspended", "Simulations that are in the state folder only",
+        [this] { return durability_.suspended(); });
+  watch("mbcosim_state_bytes", "Bytes of all that is in the state folder",
+        [this] { return durability_.bytes(); });
+  watch("process_resident_memory_bytes", "Resident memory", resident_bytes);
+  lanes_.set_on_start(
+      [this](Lane lane, double seconds) { metrics_.count_queue_wait(lane, seconds); });
 }
 
 void Daemon::expose_metrics() {
@@ -217,9 +239,9 @@ void Daemon::open_http() {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);  // replies of this very process
   door_ = std::make_unique<http::Door>(
-      options,
-      http::DoorParts{server_->InProcessChannel(arguments), authenticator_,
-                      [this] { return metrics_.text(); }, [this] { return !gate_.closing(); }});
+      options, http::DoorParts{server_->InProcessChannel(arguments), authenticator_,
+                               [this] { return metrics_.text(); },
+                               [this] { return !draining_.load() && !gate_.closing(); }});
   spdlog::info("serving HTTP on {}", door_->address());
   std::printf("page: %s\n", door_->page_address().c_str());  // not logged: it holds a secret
   std::fflush(stdout);
@@ -252,13 +274,25 @@ void Daemon::check_listener(const std::string& address) const {
 
 std::shared_ptr<grpc::ServerCredentials> Daemon::credentials_for(const std::string& address) const {
   if (is_unix(address) || config_.tls_certificate.empty()) return grpc::InsecureServerCredentials();
-  grpc::SslServerCredentialsOptions options(
-      config_.tls_client_ca.empty() ? GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE
-                                    : GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
-  options.pem_key_cert_pairs.push_back(
-      {read_file(config_.tls_key), read_file(config_.tls_certificate)});
-  if (!config_.tls_client_ca.empty()) options.pem_root_certs = read_file(config_.tls_client_ca);
-  return grpc::SslServerCredentials(options);
+  return watched_credentials(config_);
+}
+
+void Daemon::reload(bool asked) {
+  if (config_.tokens_file.empty() || (!tokens_watch_.has_changed() && !asked)) return;
+  try {
+    authenticator_.reload(config_.tokens_file);
+    spdlog::info("the tokens were read anew");
+  } catch (const std::exception& error) {
+    spdlog::error("{}; those before stay in force", error.what());
+  }
+}
+
+bool Daemon::drain() {
+  if (config_.drain.count() == 0) return false;
+  spdlog::info("draining for {} s", config_.drain.count());
+  draining_.store(true);
+  health_.stop();
+  return true;
 }
 
 bool Daemon::shut_down() {
@@ -272,22 +306,41 @@ bool Daemon::shut_down() {
   door_.reset();
   server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace);
   server_.reset();
+  metrics_.close();
   const bool ended = lanes_.stop(kLastJobs);
   durability_.stop(!ended);
   spdlog::info(ended ? "stopped" : "stopped; work that went on is dropped");
   return ended;
 }
 
-int check_health(const std::string& address) {
+namespace {
+
+std::shared_ptr<grpc::ChannelCredentials> credentials_of(const HealthCheck& check) {
+  if (check.ca.empty()) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions options;
+  options.pem_root_certs = read_file(check.ca);
+  if (!check.key.empty()) {
+    options.pem_private_key = read_file(check.key);
+    options.pem_cert_chain = read_file(check.certificate);
+  }
+  return grpc::SslCredentials(options);
+}
+
+}  // namespace
+
+int check_health(const HealthCheck& check) {
+  grpc::ChannelArguments arguments;
+  if (!check.name.empty()) arguments.SetSslTargetNameOverride(check.name);
   const auto stub = grpc::health::v1::Health::NewStub(
-      grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+      grpc::CreateCustomChannel(check.address, credentials_of(check), arguments));
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(3));
   grpc::health::v1::HealthCheckResponse response;
   const grpc::Status status = stub->Check(&context, {}, &response);
   const bool asks_credentials = status.error_code() == grpc::StatusCode::UNAUTHENTICATED;
   const bool serves =
-      status.ok() && response.status() == grpc::health::v1::HealthCheckResponse::SERVING;
+      status.ok() &&
+      (check.alive || response.status() == grpc::health::v1::HealthCheckResponse::SERVING);
   return serves || asks_credentials ? 0 : 1;
 }
 

@@ -3,11 +3,14 @@
 
 #include <grpcpp/server.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "daemon/file_watch.h"
 #include "daemon/listener.h"
+#include "daemon/options.h"
 #include "http/door.h"
 #include "rpc/health.h"
 #include "service/config.h"
@@ -23,12 +26,17 @@ class Daemon {
   explicit Daemon(const Config& config);
   ~Daemon();
 
+  /// Takes tokens that have changed, or all of them, `asked`. Certificates are watched anyway.
+  void reload(bool asked);
+  /// Health says NOT_SERVING from now on, and all is served. False: there is no time for that.
+  bool drain();
   /// Stops accepting, interrupts running steps at an iteration boundary, ends streams. False: some
   /// work goes on after the grace is over; the process must end without the daemon's destructor.
   bool shut_down();
 
  private:
   void add_methods();
+  void watch_values();
   void expose_metrics();
   void listen();
   void open_shared_memory();
@@ -37,7 +45,8 @@ class Daemon {
   std::shared_ptr<grpc::ServerCredentials> credentials_for(const std::string& address) const;
 
   const Config config_;
-  const Authenticator authenticator_;
+  Authenticator authenticator_;
+  FileWatch tokens_watch_;
   Metrics metrics_;
   EventLog log_;
   SolverSlots slots_;
@@ -56,9 +65,10 @@ class Daemon {
   std::vector<std::unique_ptr<Listener>> listeners_;
   std::vector<std::unique_ptr<SharedMemoryService>> shared_memory_;  ///< one for each Unix socket
   std::unique_ptr<http::Door> door_;
+  std::atomic<bool> draining_{false};
 };
 
-/// Whether a daemon answers at the address: exit code 0 or 1.
-int check_health(const std::string& address);
+/// Whether a daemon serves, or is alive: exit code 0 or 1.
+int check_health(const HealthCheck& check);
 
 }  // namespace mbcosim::server

@@ -80,13 +80,47 @@ void add_environment_names(CLI::App& app) {
     if (option->get_lnames().empty()) continue;
     const std::string& name = option->get_lnames().front();
     if (name == "help" || name == "version" || name == "print-config" || name == "hash-token" ||
-        name == "check")
+        (name.compare(0, 5, "check") == 0 && name != "checkpoint-interval"))
       continue;
     std::string variable = "MBCOSIMD_";
     for (const char c : name)
       variable += c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
     option->envname(variable);
   }
+}
+
+const CLI::Validator is_daemon_id(
+    [](std::string& id) {
+      const bool good =
+          !id.empty() && id.size() <= 16 &&
+          id.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789") == std::string::npos;
+      return good ? "" : "1 to 16 of a to z and 0 to 9 are expected, not \"" + id + "\"";
+    },
+    "ID");
+
+void add_check(CLI::App& app, HealthCheck& check) {
+  const auto add = [&](const char* name, std::string& value, const char* help) {
+    return app.add_option(name, value, help)->configurable(false)->group("Health of a daemon");
+  };
+  CLI::Option* address =
+      add("--check", check.address, "Ask whether a daemon serves at ADDRESS; exit code 0 or 1");
+  app.add_flag("--check-alive", check.alive, "Any answer will do, also of one that drains")
+      ->configurable(false)
+      ->group("Health of a daemon")
+      ->needs(address);
+  add("--check-ca", check.ca, "PEM file: it speaks TLS with a certificate of this authority")
+      ->needs(address)
+      ->check(CLI::ExistingFile);
+  CLI::Option* certificate =
+      add("--check-certificate", check.certificate, "PEM file: the client's certificate")
+          ->needs(address)
+          ->check(CLI::ExistingFile);
+  CLI::Option* key =
+      add("--check-key", check.key, "PEM file: its key")->needs(address)->check(CLI::ExistingFile);
+  certificate->needs(key);
+  key->needs(certificate);
+  add("--check-name", check.name, "Name in the daemon's certificate, where ADDRESS is another")
+      ->needs(address);
 }
 
 int print_hash() {
@@ -119,7 +153,7 @@ Invocation read_options(int argc, char** argv) {
   app.allow_config_extras(CLI::config_extras_mode::error);
   bool print_config = false, hash_token = false;
   std::int64_t lease = config.limits.lease.count(), grace = config.shutdown_grace.count(),
-               suspended_expiry = config.suspended_expiry.count();
+               drain = config.drain.count(), suspended_expiry = config.suspended_expiry.count();
   double checkpoint_interval = std::chrono::duration<double>(config.checkpoint_interval).count();
 
   app.add_option("--listen", config.listen,
@@ -152,6 +186,15 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--shutdown-grace", grace, "Seconds that open calls get on SIGTERM")
       ->capture_default_str()
       ->check(CLI::Range(0, 86400));
+  app.add_option("--drain", drain,
+                 "Seconds on SIGTERM in which health says NOT_SERVING and all calls are served, so "
+                 "that balancers look elsewhere; a second SIGTERM ends them")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 86400));
+  app.add_option("--daemon-id", config.daemon_id,
+                 "Begins the names of this daemon's simulations, so that a proxy can tell whose "
+                 "they are; default: none, or the one in --state-dir")
+      ->check(is_daemon_id);
   app.add_flag("--reflection,!--no-reflection", config.reflection, "Serve gRPC reflection");
   app.add_flag("--health-credentials", config.health_credentials,
                "Health asks for credentials when the service does")
@@ -185,9 +228,7 @@ Invocation read_options(int argc, char** argv) {
       ->group("Security");
   add_limits(app, config.limits, lease);
   add_environment_names(app);
-  app.add_option("--check", invocation.check_address,
-                 "Ask whether a daemon serves at ADDRESS; exit code 0 or 1")
-      ->configurable(false);
+  add_check(app, invocation.check);
   app.add_flag("--hash-token", hash_token,
                "Read a token from the standard input and print it as the tokens file keeps it")
       ->configurable(false)
@@ -207,6 +248,7 @@ Invocation read_options(int argc, char** argv) {
   }
   config.limits.lease = std::chrono::seconds(lease);
   config.shutdown_grace = std::chrono::seconds(grace);
+  config.drain = std::chrono::seconds(drain);
   config.suspended_expiry = std::chrono::seconds(suspended_expiry);
   config.checkpoint_interval =
       std::chrono::milliseconds(static_cast<std::int64_t>(checkpoint_interval * 1000));

@@ -8,9 +8,18 @@
 
 namespace mbcosim::server {
 
+/// How to ask a daemon for its health.
+struct HealthCheck {
+  std::string address;           ///< empty: do not ask
+  bool alive = false;            ///< any answer will do
+  std::string ca;                ///< PEM file of who signed its certificate; empty: no TLS
+  std::string certificate, key;  ///< PEM files of the client, or empty
+  std::string name;              ///< expected in its certificate; empty: the address's
+};
+
 struct Invocation {
   Config config;
-  std::string check_address;     ///< set: only ask whether a daemon serves there
+  HealthCheck check;
   std::optional<int> exit_code;  ///< set: nothing is left to do
 };
 

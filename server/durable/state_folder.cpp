@@ -8,10 +8,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <random>
 
 #include "files/folder_size.h"
 
@@ -83,6 +85,20 @@ void StateFolder::take(std::int64_t bytes) {
 void StateFolder::give_back(std::int64_t bytes) {
   Guard guard(mutex_);
   used_ -= bytes;
+}
+
+std::string StateFolder::name() try {
+  const std::string path = path_ + "/name";
+  std::string name;
+  if (std::getline(std::ifstream(path), name) && !name.empty()) return name;
+  char made[16];
+  std::snprintf(made, sizeof made, "%08x", std::random_device()());
+  AtomicFile file(path);
+  file.write(made);
+  file.commit();
+  return made;
+} catch (const StorageError& error) {
+  throw std::runtime_error("the state folder " + path_ + " cannot be written: " + error.what());
 }
 
 std::vector<std::string> StateFolder::list() const {

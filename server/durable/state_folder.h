@@ -23,9 +23,9 @@ struct StoredPoint {
   std::string state;  ///< of Simulation::export_state
 };
 
-/// DIR/lock, which one daemon holds; DIR/simulations/ID with the files "model" (written once),
-/// "point" (replaced by each checkpoint), "snapshot-N" and "journal-N". Thread-safe, as long as
-/// each simulation is written by one thread at a time.
+/// DIR/lock, which one daemon holds; DIR/name; DIR/simulations/ID with the files "model" (written
+/// once), "point" (replaced by each checkpoint), "snapshot-N" and "journal-N". Thread-safe, as long
+/// as each simulation is written by one thread at a time.
 class StateFolder {
  public:
   /// `most`: bytes of all that is in it. Throws std::runtime_error when the folder cannot be used
@@ -35,6 +35,9 @@ class StateFolder {
   StateFolder(const StateFolder&) = delete;
   StateFolder& operator=(const StateFolder&) = delete;
 
+  /// A name for whose folder this is, made with it: 8 of 0 to 9 and a to f. Throws
+  /// std::runtime_error when it can neither be read nor written.
+  std::string name();
   /// IDs of the simulations that are stored.
   std::vector<std::string> list() const;
 

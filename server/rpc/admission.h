@@ -45,6 +45,11 @@ class Admission {
   /// Throws LIMIT_EXCEEDED with the limit's name. `connection`: empty when connections cannot be
   /// told apart.
   Ticket admit(const std::string& identity, const std::string& connection, bool stream);
+  /// Calls and streams at once.
+  int open() const TS_EXCLUDES(mutex_) {
+    Guard guard(mutex_);
+    return all_;
+  }
 
  private:
   struct Count {
@@ -53,7 +58,7 @@ class Admission {
   void leave(const Ticket& ticket);
 
   const Limits limits_;
-  Mutex mutex_;
+  mutable Mutex mutex_;
   int all_ TS_GUARDED_BY(mutex_) = 0;
   std::map<std::string, Count> identities_ TS_GUARDED_BY(mutex_);
   std::map<std::string, int> connections_ TS_GUARDED_BY(mutex_);

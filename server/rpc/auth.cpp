@@ -84,16 +84,28 @@ const char* role_name(Role role) {
 // ------------------------------------------------------------------ the file
 
 Authenticator Authenticator::from_file(const std::string& path) {
+  Authenticator result;
+  result.tokens_required_ = true;
+  result.reload(path);
+  return result;
+}
+
+void Authenticator::reload(const std::string& path) {
+  auto tokens = std::make_shared<const Tokens>(read(path));
+  Guard guard(store_->mutex);
+  store_->tokens = std::move(tokens);
+}
+
+Authenticator::Tokens Authenticator::read(const std::string& path) {
   check_writers(path);
   std::ifstream file(path);
   if (!file) throw std::runtime_error("cannot read the tokens file");
-  Authenticator result;
-  result.tokens_required_ = true;
+  Tokens result;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     line = line.substr(0, line.find('#'));
     if (line.find_first_not_of(" \t\r") != std::string::npos)
-      result.tokens_.push_back(read_token(line, number));
+      result.push_back(read_token(line, number));
   }
   return result;
 }
@@ -115,19 +127,24 @@ Authenticator::Token Authenticator::read_token(const std::string& line, int numb
 
 // ------------------------------------------------------------------ calls
 
-const Authenticator::Token* Authenticator::find(const std::string& text) const {
+std::optional<Authenticator::Token> Authenticator::find(const std::string& text) const {
+  std::shared_ptr<const Tokens> tokens;
+  {
+    Guard guard(store_->mutex);
+    tokens = store_->tokens;
+  }
   const std::string hash = hash_of_token(text);
   const Token* found = nullptr;
-  for (const Token& token : tokens_)  // all of them, so that the time tells nothing
+  for (const Token& token : *tokens)  // all of them, so that the time tells nothing
     if (same_text(token.hash, hash)) found = &token;
-  return found;
+  return found ? std::optional(*found) : std::nullopt;
 }
 
 Caller Authenticator::caller_of(const std::string& authorization) const {
   constexpr std::string_view kScheme = "Bearer ";
   if (authorization.compare(0, kScheme.size(), kScheme) != 0)
     throw Refusal(v1::REASON_UNAUTHENTICATED, "a bearer token is required");
-  const Token* token = find(authorization.substr(kScheme.size()));
+  const std::optional<Token> token = find(authorization.substr(kScheme.size()));
   if (!token) throw Refusal(v1::REASON_UNAUTHENTICATED, "unknown bearer token");
   if (token->expiry != 0 && token->expiry < std::time(nullptr))
     throw Refusal(v1::REASON_UNAUTHENTICATED, "the bearer token has expired");

@@ -4,8 +4,12 @@
 #include <grpcpp/server_context.h>
 
 #include <ctime>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "threads/mutex.h"
 
 namespace mbcosim::server {
 
@@ -38,6 +42,9 @@ class Authenticator {
   /// names the line, or tells that others may write the file.
   static Authenticator from_file(const std::string& path);
   Authenticator() = default;
+  /// Takes the tokens of the file in the place of those before; calls at work go on. Throws as
+  /// `from_file`, and nothing changes. Thread-safe, as all else.
+  void reload(const std::string& path);
 
   /// Throws Refusal: UNAUTHENTICATED, or PERMISSION_DENIED when the role is below `required`.
   Caller check(const grpc::ServerContextBase& context, Role required) const;
@@ -52,13 +59,19 @@ class Authenticator {
     Caller caller;
     std::time_t expiry = 0;  ///< 0: never
   };
+  using Tokens = std::vector<Token>;
+  struct Store {
+    Mutex mutex;
+    std::shared_ptr<const Tokens> tokens TS_GUARDED_BY(mutex);
+  };
+  static Tokens read(const std::string& path);
   static Token read_token(const std::string& line, int number);
   Caller caller_of(const std::string& authorization) const;
   static const Caller& require(const Caller& caller, Role required);
-  const Token* find(const std::string& text) const;
+  std::optional<Token> find(const std::string& text) const;
 
   bool tokens_required_ = false;
-  std::vector<Token> tokens_;
+  std::shared_ptr<Store> store_ = std::make_shared<Store>();
 };
 
 }  // namespace mbcosim::server

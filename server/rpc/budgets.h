@@ -21,6 +21,8 @@ class MemoryBudgets {
     return parts_.try_emplace(identity, identity_most_, &all_).first->second;
   }
 
+  const MemoryBudget& all() const { return all_; }
+
  private:
   MemoryBudget all_;
   const std::int64_t identity_most_;

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -16,6 +18,12 @@ enum class Lane {
   heavy     ///< computes for long: decks, eigenvalues, reductions
 };
 
+constexpr std::size_t kLanes = 4;
+inline const char* lane_name(Lane lane) {
+  constexpr const char* kNames[] = {"quick", "work", "advance", "heavy"};
+  return kNames[static_cast<int>(lane)];
+}
+
 /// One pool for each kind of work, so that none waits behind another. Thread-safe.
 class Lanes {
  public:
@@ -26,7 +34,11 @@ class Lanes {
         advance_({"advance", sessions, sessions, 0}),
         heavy_({"heavy", heavy_threads(cores), heavy_threads(cores) - 1, 5}) {}
 
+  /// Is told of every job how long it waited for its thread [s]. Before the first job.
+  using OnStart = std::function<void(Lane, double seconds)>;
+  void set_on_start(OnStart on_start) { on_start_ = std::move(on_start); }
   void post(Lane lane, const std::string& owner, WorkPool::Job job) {
+    if (on_start_) job = timed(lane, std::move(job));
     pool(lane).post(owner, std::move(job));
   }
   /// Drops what has not started. True: what had started has ended within `wait`.
@@ -42,6 +54,13 @@ class Lanes {
   }
 
  private:
+  WorkPool::Job timed(Lane lane, WorkPool::Job job) const {
+    using Clock = std::chrono::steady_clock;
+    return [this, lane, job = std::move(job), posted = Clock::now()]() mutable {
+      on_start_(lane, std::chrono::duration<double>(Clock::now() - posted).count());
+      job();
+    };
+  }
   static int heavy_threads(int cores) { return std::max(4, 2 * cores); }
   WorkPool& pool(Lane lane) {
     switch (lane) {
@@ -57,6 +76,7 @@ class Lanes {
     return heavy_;
   }
 
+  OnStart on_start_;
   WorkPool quick_, work_, advance_, heavy_;
 };
 

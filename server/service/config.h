@@ -56,6 +56,8 @@ struct Config {
   std::vector<std::string> http_origins;  ///< web sites that are this daemon: "https://HOST"
   std::string log_level = "info", log_format = "text";
   std::chrono::seconds shutdown_grace{5};
+  std::chrono::seconds drain{0};  ///< in which all is served on SIGTERM, and health says otherwise
+  std::string daemon_id;          ///< begins the names of its simulations; empty: none
   ServiceLimits limits;
 };
 

@@ -39,10 +39,11 @@ using google::protobuf::util::TimeUtil;
   throw Refusal(error);
 }
 
-Session::Identity make_identity(const v1::CreateOptions& options, std::uint64_t digest,
-                                const Caller& caller, const ServiceLimits& limits) {
+Session::Identity make_identity(std::string name, const v1::CreateOptions& options,
+                                std::uint64_t digest, const Caller& caller,
+                                const ServiceLimits& limits) {
   Session::Identity identity;
-  identity.id = SessionStore::new_id();
+  identity.id = std::move(name);
   identity.display_name = options.display_name();
   identity.owner = caller.identity;
   identity.request_id = options.request_id();
@@ -75,7 +76,8 @@ class Fresh {
     const CallToken token(exchange.call());
     MemoryShare share;
     auto session = within(exchange.memory(), &token, &share, [&] {
-      auto identity = make_identity(options, digest, exchange.caller(), parts_.config.limits);
+      auto identity = make_identity(parts_.durability.new_name(), options, digest,
+                                    exchange.caller(), parts_.config.limits);
       std::unique_ptr<SessionResults> results;
       if (options.has_results())
         results = std::make_unique<SessionResults>(parts_.results, identity.id, options.results(),

@@ -4,8 +4,10 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <ctime>
 #include <optional>
+#include <random>
 
 #include "service/protocol.h"
 #include "service/upload.h"
@@ -31,8 +33,19 @@ std::unique_ptr<StateFolder> open_folder(const Config& config) {
 }  // namespace
 
 Durability::Durability(const Config& config, EventLog& log, Metrics& metrics)
-    : config_(config), log_(log), metrics_(metrics), folder_(open_folder(config)) {
+    : config_(config),
+      log_(log),
+      metrics_(metrics),
+      folder_(open_folder(config)),
+      daemon_(config.daemon_id.empty() && folder_ ? folder_->name() : config.daemon_id) {
   if (folder_) read_folder();
+}
+
+std::int64_t Durability::bytes() const { return folder_ ? folder_->used() : 0; }
+
+int Durability::suspended() const {
+  Guard guard(mutex_);
+  return static_cast<int>(suspended_.size());
 }
 
 Durability::~Durability() {
@@ -68,6 +81,13 @@ void Durability::stop(bool busy) {
     if (session->keeping() && session->keeping()->stale(session->changes()) &&
         (!busy || session->is_free()))
       run_caught("the last checkpoint", [&] { write(*session); });
+}
+
+std::string Durability::new_name() const {
+  std::random_device random;
+  char text[20];
+  std::snprintf(text, sizeof text, "%08x%08x", random(), random());
+  return kPrefix + daemon_ + (daemon_.empty() ? "" : "-") + text;
 }
 
 // ------------------------------------------------------------------ what is in the folder
@@ -215,14 +235,16 @@ void Durability::write(Session& session) {
   session.sync_results();
   std::set<int> kept;
   for (const auto& snapshot : captured.point.snapshots()) kept.insert(snapshot.number());
-  folder_->write_point(id, {std::move(captured.point), session.bytes_of(captured.state)});
+  std::string state = session.bytes_of(captured.state);
+  const auto bytes = static_cast<std::int64_t>(state.size() + captured.point.ByteSizeLong());
+  folder_->write_point(id, {std::move(captured.point), std::move(state)});
   for (const int number : keeping.snapshots)
     if (kept.count(number) == 0) folder_->remove_snapshot(id, number);
   keeping.snapshots = std::move(kept);
   folder_->remove_journals(id, captured.journal_end);
   keeping.done(captured.changes, captured.state.step);
   metrics_.count_checkpoint(
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+      bytes, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
 }
 
 // States of snapshots that have no file yet. One that was deleted meanwhile leaves the point.

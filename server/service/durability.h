@@ -33,6 +33,8 @@ class Durability {
   ~Durability();
 
   bool available() const { return folder_ != nullptr; }
+  /// Name for a new simulation: it tells whose it is, where this daemon has a name.
+  std::string new_name() const;
   /// Checkpoints begin. `parts` outlives `stop`.
   void start(const Parts& parts);
   /// The last checkpoints: of all sessions; when `busy` tells that some work goes on, of those that
@@ -49,6 +51,9 @@ class Durability {
   void drop(Session& session) { forget(session); }
   /// The deck of a durable session. Throws STORAGE_FULL when it cannot be read.
   KeptDeck deck_of(const Session& session) const;
+
+  std::int64_t bytes() const;  ///< of all that is stored
+  int suspended() const TS_EXCLUDES(mutex_);
 
   // --- suspended ones. None of them throws for one that is not known.
   bool knows(const std::string& simulation, const Caller& caller) const;
@@ -87,6 +92,7 @@ class Durability {
   EventLog& log_;
   Metrics& metrics_;
   const std::unique_ptr<StateFolder> folder_;
+  const std::string daemon_;  ///< name of this daemon; empty: none
   const Parts* parts_ = nullptr;
   mutable Mutex mutex_;
   Condition changed_;

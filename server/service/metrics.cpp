@@ -2,24 +2,75 @@
 
 #include <prometheus/text_serializer.h>
 
+#include <utility>
+#include <vector>
+
+#include "threads/mutex.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {
 
+using prometheus::BuildCounter;
+using prometheus::BuildGauge;
+using prometheus::BuildHistogram;
+
+/// Times from a quick exchange to a large model's step [s].
+const prometheus::Histogram::BucketBoundaries kSeconds{1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1,
+                                                       1,    10,   60,   300,  1800};
+
 prometheus::Counter* counter(prometheus::Registry& registry, const char* name, const char* help) {
-  return &prometheus::BuildCounter().Name(name).Help(help).Register(registry).Add({});
+  return &BuildCounter().Name(name).Help(help).Register(registry).Add({});
+}
+
+prometheus::Histogram* histogram(prometheus::Registry& registry, const char* name,
+                                 const char* help) {
+  return &BuildHistogram().Name(name).Help(help).Register(registry).Add({}, kSeconds);
 }
 
 }  // namespace
 
+/// Values that others know.
+class Metrics::Watched final : public prometheus::Collectable {
+ public:
+  struct Value {
+    std::string name, help;
+    std::function<double()> look;
+  };
+  void add(Value value) TS_EXCLUDES(mutex_) {
+    Guard guard(mutex_);
+    values_.push_back(std::move(value));
+  }
+  void clear() TS_EXCLUDES(mutex_) {
+    Guard guard(mutex_);
+    values_.clear();
+  }
+  std::vector<prometheus::MetricFamily> Collect() const override TS_EXCLUDES(mutex_) {
+    std::vector<prometheus::MetricFamily> families;
+    Guard guard(mutex_);
+    for (const Value& value : values_) {
+      prometheus::MetricFamily& family = families.emplace_back();
+      family.name = value.name;
+      family.help = value.help;
+      family.type = prometheus::MetricType::Gauge;
+      family.metric.emplace_back().gauge.value = value.look();
+    }
+    return families;
+  }
+
+ private:
+  mutable Mutex mutex_;
+  std::vector<Value> values_ TS_GUARDED_BY(mutex_);
+};
+
 Metrics::Metrics()
     : registry_(std::make_shared<prometheus::Registry>()),
-      failures_(prometheus::BuildCounter()
+      watched_(std::make_shared<Watched>()),
+      failures_(BuildCounter()
                     .Name("mbcosim_failures_total")
                     .Help("Calls refused and steps failed, by reason")
                     .Register(*registry_)),
-      sessions_(&prometheus::BuildGauge()
+      sessions_(&BuildGauge()
                      .Name("mbcosim_simulations")
                      .Help("Simulations alive")
                      .Register(*registry_)
@@ -27,34 +78,61 @@ Metrics::Metrics()
       created_(counter(*registry_, "mbcosim_simulations_created_total", "Simulations created")),
       steps_(counter(*registry_, "mbcosim_steps_total", "Steps accepted")),
       iterations_(counter(*registry_, "mbcosim_iterations_total", "Linear solutions in steps")),
+      dropped_(counter(*registry_, "mbcosim_samples_dropped_total",
+                       "Samples that subscribers did not read in time")),
+      checkpoint_bytes_(
+          counter(*registry_, "mbcosim_checkpoint_bytes_total", "Bytes of checkpoints")),
       journal_bytes_(counter(*registry_, "mbcosim_journal_bytes_total",
                              "Bytes of entries in the journals of simulations")),
-      advance_seconds_(&prometheus::BuildHistogram()
-                            .Name("mbcosim_step_seconds")
-                            .Help("Mean solver time of a step in one call")
-                            .Register(*registry_)
-                            .Add({}, prometheus::Histogram::BucketBoundaries{1e-6, 1e-5, 1e-4, 1e-3,
-                                                                             1e-2, 0.1, 1})),
-      checkpoint_seconds_(
-          &prometheus::BuildHistogram()
-               .Name("mbcosim_checkpoint_seconds")
-               .Help("Time that a checkpoint takes, beside the steps")
-               .Register(*registry_)
-               .Add({}, prometheus::Histogram::BucketBoundaries{1e-3, 1e-2, 0.1, 1, 10, 60})),
-      journal_seconds_(&prometheus::BuildHistogram()
-                            .Name("mbcosim_journal_seconds")
-                            .Help("Time that an entry of a journal takes to get to the disk")
-                            .Register(*registry_)
-                            .Add({}, prometheus::Histogram::BucketBoundaries{1e-4, 1e-3, 1e-2, 0.1,
-                                                                             1, 10, 60})) {}
+      advance_seconds_(
+          histogram(*registry_, "mbcosim_step_seconds", "Mean solver time of a step in one call")),
+      exchange_seconds_(histogram(*registry_, "mbcosim_exchange_seconds",
+                                  "Mean time of an exchange with peers in one step")),
+      peer_seconds_(histogram(*registry_, "mbcosim_peer_wait_seconds",
+                              "Time that a coupled step waits for its peers")),
+      slot_seconds_(histogram(*registry_, "mbcosim_slot_wait_seconds",
+                              "Time that steps wait for a processor")),
+      checkpoint_seconds_(histogram(*registry_, "mbcosim_checkpoint_seconds",
+                                    "Time that a checkpoint takes, beside the steps")),
+      journal_seconds_(histogram(*registry_, "mbcosim_journal_seconds",
+                                 "Time that an entry of a journal takes to get to the disk")) {
+  auto& queues = BuildHistogram()
+                     .Name("mbcosim_queue_wait_seconds")
+                     .Help("Time from a call's message to the work on it, by kind of work")
+                     .Register(*registry_);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    queue_seconds_[lane] = &queues.Add({{"queue", lane_name(static_cast<Lane>(lane))}}, kSeconds);
+  BuildGauge()
+      .Name("mbcosim_build_info")
+      .Help("1, with what was built")
+      .Register(*registry_)
+      .Add({{"version", MBCOSIM_VERSION}, {"compiler", __VERSION__}})
+      .Set(1);
+}
+
+Metrics::~Metrics() = default;
+
+void Metrics::watch(const std::string& name, const std::string& help,
+                    std::function<double()> value) {
+  watched_->add({name, help, std::move(value)});
+}
 
 void Metrics::expose(const std::string& address) {
   exposer_ = std::make_unique<prometheus::Exposer>(address);
   exposer_->RegisterCollectable(registry_);
+  exposer_->RegisterCollectable(watched_);
+}
+
+void Metrics::close() {
+  exposer_.reset();
+  watched_->clear();
 }
 
 std::string Metrics::text() const {
-  return prometheus::TextSerializer().Serialize(registry_->Collect());
+  auto families = registry_->Collect();
+  auto watched = watched_->Collect();
+  families.insert(families.end(), watched.begin(), watched.end());
+  return prometheus::TextSerializer().Serialize(families);
 }
 
 void Metrics::count_advance(std::int64_t steps, std::int64_t iterations, double solver_seconds) {
@@ -66,6 +144,21 @@ void Metrics::count_advance(std::int64_t steps, std::int64_t iterations, double 
 
 void Metrics::count_failure(v1::Reason reason) {
   failures_.Add({{"reason", reason_name(reason)}}).Increment();
+}
+
+void Metrics::count_coupled_step(double waited_seconds, int exchanges, double exchange_seconds) {
+  peer_seconds_->Observe(waited_seconds);
+  if (exchanges > 0) exchange_seconds_->Observe(exchange_seconds / exchanges);
+}
+
+void Metrics::count_checkpoint(std::int64_t bytes, double seconds) {
+  checkpoint_bytes_->Increment(static_cast<double>(bytes));
+  checkpoint_seconds_->Observe(seconds);
+}
+
+void Metrics::count_journal_entry(std::int64_t bytes, double seconds) {
+  journal_bytes_->Increment(static_cast<double>(bytes));
+  journal_seconds_->Observe(seconds);
 }
 
 }  // namespace mbcosim::server

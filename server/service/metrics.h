@@ -7,10 +7,13 @@
 #include <prometheus/histogram.h>
 #include <prometheus/registry.h>
 
+#include <array>
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "mbcosim/v1/common.pb.h"
+#include "rpc/lanes.h"
 
 namespace mbcosim::server {
 
@@ -18,28 +21,44 @@ namespace mbcosim::server {
 class Metrics {
  public:
   Metrics();
+  ~Metrics();
+  /// A value that is asked for whenever somebody looks, until `close`. Before `expose`.
+  void watch(const std::string& name, const std::string& help, std::function<double()> value);
   /// Serves /metrics at "HOST:PORT". Throws std::exception when the address cannot be bound.
   void expose(const std::string& address);
+  /// Nobody looks any more, and nothing is asked for.
+  void close();
   /// All of them in Prometheus' text format.
   std::string text() const;
 
   void count_advance(std::int64_t steps, std::int64_t iterations, double solver_seconds);
   void count_failure(v1::Reason reason);
   void set_sessions(int count) { sessions_->Set(count); }
-  void count_checkpoint(double seconds) { checkpoint_seconds_->Observe(seconds); }
-  void count_journal_entry(std::int64_t bytes, double seconds) {
-    journal_bytes_->Increment(static_cast<double>(bytes));
-    journal_seconds_->Observe(seconds);
-  }
   void count_created() { created_->Increment(); }
+  /// A coupled step waited so long for its peers [s], in so many exchanges for `exchange_seconds`.
+  void count_coupled_step(double waited_seconds, int exchanges, double exchange_seconds);
+  void count_slot_wait(double seconds) { slot_seconds_->Observe(seconds); }
+  void count_queue_wait(Lane lane, double seconds) {
+    queue_seconds_[static_cast<std::size_t>(lane)]->Observe(seconds);
+  }
+  void count_dropped_samples(std::int64_t count) {
+    dropped_->Increment(static_cast<double>(count));
+  }
+  void count_checkpoint(std::int64_t bytes, double seconds);
+  void count_journal_entry(std::int64_t bytes, double seconds);
 
  private:
+  class Watched;
   std::shared_ptr<prometheus::Registry> registry_;
+  std::shared_ptr<Watched> watched_;
   std::unique_ptr<prometheus::Exposer> exposer_;
   prometheus::Family<prometheus::Counter>& failures_;
+  std::array<prometheus::Histogram*, kLanes> queue_seconds_{};
   prometheus::Gauge* sessions_;
-  prometheus::Counter *created_, *steps_, *iterations_, *journal_bytes_;
-  prometheus::Histogram *advance_seconds_, *checkpoint_seconds_, *journal_seconds_;
+  prometheus::Counter *created_, *steps_, *iterations_, *dropped_, *checkpoint_bytes_,
+      *journal_bytes_;
+  prometheus::Histogram *advance_seconds_, *exchange_seconds_, *peer_seconds_, *slot_seconds_,
+      *checkpoint_seconds_, *journal_seconds_;
 };
 
 }  // namespace mbcosim::server

@@ -74,7 +74,8 @@ Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> s
       lease_(identity_.lease),
       snapshots_(identity_.id, digest_text(model_->digest), shared.limits, shared.memory),
       kept_(shared.memory),
-      telemetry_(std::make_shared<TelemetryHub>(shared.memory, shared.lanes, shared.timer)),
+      telemetry_(std::make_shared<TelemetryHub>(shared.memory, shared.lanes, shared.timer,
+                                                &shared.metrics)),
       results_(std::move(results)),
       simulation_(std::move(simulation)),
       recorder_(options.record_ports()

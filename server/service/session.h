@@ -200,6 +200,7 @@ class Session {
   void take_inputs(Advance& advance);
   bool run_slice(Advance& advance);
   bool step_for_a_while(Advance& advance);
+  SolverSlots::Slot take_slot(const Advance& advance);
   bool run_coupled_step(Advance& advance);
   void step_coupled(Advance& advance);
   void settle_coupled(Advance& advance, bool accepted);

@@ -182,9 +182,16 @@ bool Session::run_slice(Advance& advance) {
   return true;
 }
 
+SolverSlots::Slot Session::take_slot(const Advance& advance) {
+  const Clock::time_point start = Clock::now();
+  SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
+  shared_.metrics.count_slot_wait(seconds_since(start));
+  return slot;
+}
+
 // True: the advance has ended.
 bool Session::step_for_a_while(Advance& advance) {
-  std::optional<SolverSlots::Slot> slot(shared_.slots.acquire(advance.token));
+  std::optional<SolverSlots::Slot> slot(take_slot(advance));
   const Clock::time_point slice_end = Clock::now() + (journaled() ? kJournalSlice : kSlice);
   while (choose(advance)) {
     if (!*slot || advance.token.cancelled()) {
@@ -196,7 +203,7 @@ bool Session::step_for_a_while(Advance& advance) {
     if (journaled() && is_told_at_once(report)) {
       slot.reset();  // nobody waits for the disk with a slot
       settle(advance);
-      slot.emplace(shared_.slots.acquire(advance.token));
+      slot.emplace(take_slot(advance));
     }
     tell(advance, report);
     if (!wants_more(advance)) return true;
@@ -348,6 +355,8 @@ bool Session::run_coupled_step(Advance& advance) {
   std::lock_guard lock(lock_);
   advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() +
                                       coupler_.waited_seconds());
+  shared_.metrics.count_coupled_step(coupler_.waited_seconds(), coupler_.exchanges(),
+                                     coupler_.exchange_seconds());
   if (wants_more(advance)) return false;
   conclude(advance);
   return true;
@@ -424,7 +433,7 @@ class Session::ExchangeInStep {
   bool wait(Exchange&& exchange) {
     slot_.reset();
     const bool done = exchange();
-    slot_.emplace(session_.shared_.slots.acquire(advance_.token));
+    slot_.emplace(session_.take_slot(advance_));
     return done;
   }
 
@@ -435,7 +444,7 @@ class Session::ExchangeInStep {
 };
 
 StepReport Session::attempt_in_slot(Advance& advance) {
-  std::optional<SolverSlots::Slot> slot(shared_.slots.acquire(advance.token));
+  std::optional<SolverSlots::Slot> slot(take_slot(advance));
   const ExchangeInStep exchange(*this, advance, slot);
   StepReport report;
   if (*slot) {

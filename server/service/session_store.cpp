@@ -1,8 +1,6 @@
 #include "service/session_store.h"
 
 #include <algorithm>
-#include <cstdio>
-#include <random>
 
 #include "threads/top_frame.h"
 #include "wire/convert.h"
@@ -20,13 +18,6 @@ SessionStore::~SessionStore() {
   }
   changed_.notify_all();
   lease_thread_.join();
-}
-
-std::string SessionStore::new_id() {
-  std::random_device random;
-  char text[40];
-  std::snprintf(text, sizeof text, "simulations/%08x%08x", random(), random());
-  return text;
 }
 
 // ------------------------------------------------------------------ creations

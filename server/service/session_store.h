@@ -80,8 +80,6 @@ class SessionStore {
   void drop(const std::string& id, v1::DeletionCause cause = v1::DELETION_CAUSE_ASKED);
   void close_all();
 
-  static std::string new_id();
-
  private:
   using Request = std::pair<std::string, std::string>;
   SessionPtr find_request(const Request& request) const TS_REQUIRES(mutex_);

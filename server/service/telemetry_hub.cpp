@@ -51,8 +51,8 @@ struct Feed {
   std::int64_t end() const { return first + static_cast<std::int64_t>(serialized.size()); }
 };
 
-TelemetryHub::TelemetryHub(MemoryBudget& memory, Lanes& lanes, Timer& timer)
-    : memory_(memory), lanes_(lanes), timer_(timer) {}
+TelemetryHub::TelemetryHub(MemoryBudget& memory, Lanes& lanes, Timer& timer, Metrics* metrics)
+    : memory_(memory), lanes_(lanes), timer_(timer), metrics_(metrics) {}
 
 TelemetryHub::~TelemetryHub() = default;
 
@@ -326,13 +326,18 @@ const std::string& TelemetryHub::serialize(const Feed& feed, std::int64_t number
   return bytes;
 }
 
+void TelemetryHub::count_dropped(Subscription& s, std::int64_t count) {
+  s.dropped += count;
+  if (metrics_) metrics_->count_dropped_samples(count);
+}
+
 void TelemetryHub::drop_what_is_late(Subscription& s) {
   if (s.options.policy != v1::OVERFLOW_POLICY_DROP_OLDEST) return;
   const std::int64_t late = s.feed->track->end() - s.options.capacity - s.next;
   if (late <= 0) return;
   s.next += late;
   s.sequence += late;
-  s.dropped += late;
+  count_dropped(s, late);
 }
 
 // The newest sample, if it is one of those that the subscription still takes.
@@ -348,7 +353,7 @@ void TelemetryHub::decimate(Subscription& s) {
   std::deque<Subscription::Kept> rest;
   for (std::size_t i = 0; i < s.kept.size(); i += 2) rest.push_back(std::move(s.kept[i]));
   if (static_cast<std::int64_t>(rest.size()) >= s.options.capacity) rest.pop_front();
-  s.dropped += static_cast<std::int64_t>(s.kept.size() - rest.size());
+  count_dropped(s, static_cast<std::int64_t>(s.kept.size() - rest.size()));
   s.kept = std::move(rest);
   s.stride *= 2;
 }

@@ -15,6 +15,7 @@
 
 #include "mbcosim/v1/telemetry.pb.h"
 #include "rpc/lanes.h"
+#include "service/metrics.h"
 #include "service/telemetry_track.h"
 #include "simulation/simulation.h"
 #include "threads/mutex.h"
@@ -65,7 +66,8 @@ using SubscriptionPtr = std::shared_ptr<Subscription>;
 /// at most every few milliseconds; who does not is not. Thread-safe.
 class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
  public:
-  TelemetryHub(MemoryBudget& memory, Lanes& lanes, Timer& timer);
+  /// `metrics`: counts samples that are dropped; may be null.
+  TelemetryHub(MemoryBudget& memory, Lanes& lanes, Timer& timer, Metrics* metrics = nullptr);
   ~TelemetryHub();
 
   /// `sizes`: numbers that each of the handles stands for. Throws LIMIT_EXCEEDED when the samples
@@ -110,6 +112,7 @@ class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
       TS_REQUIRES(mutex_);
   void end_late_readers() TS_EXCLUDES(mutex_);
   void stall(Subscription& s) TS_REQUIRES(mutex_);
+  void count_dropped(Subscription& s, std::int64_t count) TS_REQUIRES(mutex_);
   void drop_what_is_late(Subscription& s) TS_REQUIRES(mutex_);
   void keep_for(Subscription& s) TS_REQUIRES(mutex_);
   void decimate(Subscription& s) TS_REQUIRES(mutex_);
@@ -121,6 +124,7 @@ class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
   MemoryBudget& memory_;
   Lanes& lanes_;
   Timer& timer_;
+  Metrics* const metrics_;
   mutable Mutex mutex_;
   Condition room_;
   struct Rhythmic {

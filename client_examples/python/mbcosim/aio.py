@@ -32,7 +32,7 @@ from .calls import ServerCalls, SimulationCalls, SnapshotCalls, StepResult
 from .coupling import Answer, open_stream
 from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, from_rpc_error, translated
 from .histories import History
-from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Awaiting, Bound, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
+from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
 from .simulation import subscribe_request
 
 T = TypeVar("T")
@@ -73,7 +73,7 @@ def _keep_grpc() -> None:
     grpc.aio.init_grpc_aio()
 
 
-class Connection:
+class Connection(Address):
     """A channel whose calls are awaited."""
 
     def __init__(self, channel: Any, token: Optional[str], reconnect: float) -> None:
@@ -112,7 +112,7 @@ class Connection:
                 raise
 
     async def _once(self, call: Call) -> Any:
-        answer = self.stubs.method(call.method)(call.request, metadata=self.metadata, timeout=call.timeout)
+        answer = self.stubs.method(call.method)(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
         if call.each is None:
             return await answer
         async for message in answer:
@@ -240,7 +240,7 @@ class Events(events.Course):
     """`async for` over `mbcosim.v1.Event`. Close it, or use it with `async with`."""
 
     def __init__(self, connection: Connection, simulation: str, after: Optional[int], journal: str) -> None:
-        self._stream: Any = connection.stubs.events.WatchEvents(events.watch_request(simulation, after, journal), metadata=connection.metadata)
+        self._stream: Any = connection.stubs.events.WatchEvents(events.watch_request(simulation, after, journal), metadata=connection.about(simulation))
 
     async def __aenter__(self) -> Events:
         return self
@@ -277,7 +277,7 @@ class Stepper:
         self._request = pb.StepRequest(simulation=simulation.name, outputs=output_handles)
         self._request.inputs.handles.extend(input_handles)
         connection = simulation._connection
-        self._stream = connection.stubs.simulations.StepStream(metadata=connection.metadata)
+        self._stream = connection.stubs.simulations.StepStream(metadata=connection.about(simulation.name))
 
     async def __aenter__(self: Self) -> Self:
         return self
@@ -329,7 +329,7 @@ class Subscription:
     def __init__(self, simulation: Simulation, names: list[str], request: telemetry_pb2.SubscribeRequest) -> None:
         self._simulation, self._names, self.dropped = simulation, names, 0
         connection = simulation._connection
-        self._stream = connection.stubs.telemetry.Subscribe(request, metadata=connection.metadata)
+        self._stream = connection.stubs.telemetry.Subscribe(request, metadata=connection.about(simulation.name))
 
     async def __aenter__(self: Self) -> Self:
         return self
@@ -381,7 +381,7 @@ class Peer(exchange.Course):
         self._writing = asyncio.Lock()
 
     async def _attach(self, hello: coupling_pb2.PeerMessage, timeout: Optional[float]) -> None:
-        self._stream = open_stream(self._connection.channel)(metadata=self._connection.metadata)
+        self._stream = open_stream(self._connection.channel)(metadata=self._connection.about(hello.hello.simulation))
         self.welcome = await _bounded(timeout, self._shake_hands(hello), self._stream.cancel, "attaching the peer")
         loop = asyncio.get_running_loop()
         if self._beats is not None or self._silence is not None:

@@ -94,7 +94,7 @@ class Peer(exchange.Course):
             simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout,
             heartbeat_interval=None if server_timeout is None else server_timeout / 3, **options))
         connection = simulation._connection
-        self._stream = open_stream(connection.channel)(iter(self._out.get, None), metadata=connection.metadata)
+        self._stream = open_stream(connection.channel)(iter(self._out.get, None), metadata=connection.about(simulation.name))
         with bounded(timeout, self._stream.cancel, "attaching the peer"), translated():
             self.welcome = exchange.receive(next(self._stream))[1]
         self._closing = threading.Event()

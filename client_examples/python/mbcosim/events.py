@@ -35,7 +35,7 @@ class Events(Course):
     """Iterate over `mbcosim.v1.Event`: `event.WhichOneof("content")` tells what happened. Close it, or use it as a context manager."""
 
     def __init__(self, connection: Connection, simulation: str, after: Optional[int], journal: str, timeout: Optional[float] = USUAL) -> None:
-        self._stream: Any = connection.stubs.events.WatchEvents(watch_request(simulation, after, journal), metadata=connection.metadata)
+        self._stream: Any = connection.stubs.events.WatchEvents(watch_request(simulation, after, journal), metadata=connection.about(simulation))
         with bounded(timeout, self._stream.cancel, "the beginning of the events"), translated():
             self._begin(next(self._stream), after)  # nothing is missed from now on
 

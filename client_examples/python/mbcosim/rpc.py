@@ -53,6 +53,7 @@ class Call:
     repeatable  a second call does no harm when the reply to the first was lost
     each        of a method that streams: called with every message
     through     of a call without timeout: another way to the reply; it gives None when the call is to be made all the same
+    simulation  name of the simulation that it is about, where `request` does not tell
     """
     method: str
     request: Any
@@ -60,6 +61,7 @@ class Call:
     repeatable: bool = False
     each: Optional[Callable[[Any], Any]] = None
     through: Optional[Callable[[Any], Any]] = None
+    simulation: str = ""
 
 
 Calls = Generator[Call, Any, T]  # is sent the replies, one after the other
@@ -108,6 +110,25 @@ def protocol() -> common_pb2.VersionRange:
 def metadata(token: Optional[str]) -> list[tuple[str, str]]:
     """What says who calls."""
     return [("authorization", f"Bearer {token}")] if token else []
+
+
+def simulation_of(request: Any) -> str:
+    """Name of the simulation that a request is about; empty: none, or the request is a series of messages."""
+    name = getattr(request, "simulation", None)
+    if name is None:
+        name = getattr(getattr(request, "step", None), "simulation", "")
+    return name if isinstance(name, str) else ""
+
+
+class Address:
+    """What goes with every call: who calls, and the simulation, by which a proxy finds the daemon that has it."""
+    metadata: list[tuple[str, str]]
+
+    def about(self, simulation: str) -> list[tuple[str, str]]:
+        return [*self.metadata, ("mbcosim-session", simulation)] if simulation else self.metadata
+
+    def metadata_of(self, call: Call) -> list[tuple[str, str]]:
+        return self.about(call.simulation or simulation_of(call.request))
 
 
 class Stubs:
@@ -162,7 +183,7 @@ class Retries:
         return min(_PAUSE * 2.0 ** min(self._attempts - 1, 5), left), left
 
 
-class Connection:
+class Connection(Address):
     """A channel whose calls block."""
 
     def __init__(self, channel: Any, token: Optional[str], reconnect: float) -> None:
@@ -202,12 +223,12 @@ class Connection:
         if call.through is not None and call.timeout is None and (reply := call.through(call.request)) is not None:
             return reply
         if hasattr(call.request, "SerializeToString"):  # one message: this thread does it all, and gRPC ends it at its deadline
-            return method(call.request, metadata=self.metadata, timeout=call.timeout)
+            return method(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
         return self._bounded(method, call)
 
     def _bounded(self, method: Any, call: Call) -> Any:
         """As a future: what gRPC does not end at its deadline (an upload that nobody reads) ends soon after it."""
-        future = method.future(call.request, metadata=self.metadata, timeout=call.timeout)
+        future = method.future(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
         try:
             return future.result(None if call.timeout is None else call.timeout + _AGAIN)
         except grpc.FutureTimeoutError:
@@ -215,7 +236,7 @@ class Connection:
             raise TimedOut(f"{call.method} took longer than {call.timeout} s", grpc.StatusCode.DEADLINE_EXCEEDED) from None
 
     def _stream(self, method: Any, call: Call) -> None:
-        messages = method(call.request, metadata=self.metadata, timeout=call.timeout)
+        messages = method(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
         latest = None if call.timeout is None else call.timeout + _AGAIN
         with bounded(latest, messages.cancel, call.method):
             for message in messages:

@@ -79,7 +79,7 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
 
     def _call(self, method: Any, request: Any) -> Any:
         with translated():
-            return method(request, metadata=self._connection.metadata)
+            return method(request, metadata=self._connection.about(self.name))
 
     def __enter__(self: Self) -> Self:
         return self
@@ -130,7 +130,7 @@ class Stepper:
         self._request = pb.StepRequest(simulation=simulation.name, outputs=simulation.handles(self._outputs, timeout=timeout))
         self._inputs = list(inputs)
         self._request.inputs.handles.extend(simulation.handles(self._inputs, timeout=timeout))
-        self._replies = simulation._stub.StepStream(iter(self._requests.get, None), metadata=simulation._connection.metadata)
+        self._replies = simulation._stub.StepStream(iter(self._requests.get, None), metadata=simulation._connection.about(simulation.name))
 
     def __enter__(self: Self) -> Self:
         return self
@@ -175,7 +175,7 @@ class Subscription:
         self._simulation, self._names = simulation, names
         request = subscribe_request(simulation, simulation.handles(names, timeout=timeout), every, policy, buffer, minimum_interval)
         connection = simulation._connection
-        self._stream = connection.stubs.telemetry.Subscribe(request, metadata=connection.metadata)
+        self._stream = connection.stubs.telemetry.Subscribe(request, metadata=connection.about(simulation.name))
         self.dropped = 0
         with bounded(timeout, self._stream.cancel, "the subscription"), translated():
             next(self._stream)  # the server's word that no step is missed from now on
