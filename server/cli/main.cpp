@@ -48,18 +48,24 @@ void add_reduce(CLI::App& app, mbcosim::cli::ReduceCommand& command, int& exit_c
 
 /// Subcommands that are programs of their own.
 void add_programs(CLI::App& app, int& exit_code) {
-  const auto add = [&](const std::string& name, const char* description) {
-    CLI::App* program = app.add_subcommand(name, description);
-    program->prefix_command();
-    program->set_help_flag();
-    program->callback([program, name, &exit_code] {
-      exit_code = mbcosim::cli::hand_over(name, program->remaining());
+  const auto add_to = [&](const std::string& program, const std::string& name, const char* text) {
+    CLI::App* command = app.add_subcommand(name, text);
+    command->prefix_command();
+    command->set_help_flag();
+    command->callback([command, program, name, &exit_code] {
+      std::vector<std::string> arguments = command->remaining();
+      if (program == "sessions") arguments.insert(arguments.begin(), name);
+      exit_code = mbcosim::cli::hand_over(program, arguments);
     });
   };
+  const auto add = [&](const std::string& name, const char* text) { add_to(name, name, text); };
   add("fmu", "Make an FMU of a deck, for co-simulation in other tools");
   add("peer",
       "Let an FMU, or a code that speaks MBDyn's protocol, take part in a daemon's simulation");
   add("replay", "Run a model against a record of its ports, or a recorded server against a client");
+  add_to("sessions", "sessions", "List a daemon's simulations, suspended ones too");
+  add_to("sessions", "checkpoint", "Store all of a daemon's simulation in a file");
+  add_to("sessions", "resume", "Make a simulation of such a file, or bring a suspended one back");
 }
 
 /// `-D NAME=VALUE`, any number of times.

@@ -149,8 +149,9 @@ v1::ResultOptions to_proto(const ResultOptions& options) {
 
 void fill_durability(const LoadOptions& options, v1::CreateOptions* out) {
   if (options.durability != Durability::server_default)
-    out->set_durability(options.durability == Durability::none ? v1::DURABILITY_NONE
-                                                               : v1::DURABILITY_CHECKPOINT);
+    out->set_durability(options.durability == Durability::none      ? v1::DURABILITY_NONE
+                        : options.durability == Durability::journal ? v1::DURABILITY_JOURNAL
+                                                                    : v1::DURABILITY_CHECKPOINT);
   if (options.checkpoint_steps) out->set_checkpoint_steps(*options.checkpoint_steps);
   if (options.checkpoint_interval)
     *out->mutable_checkpoint_interval() = google::protobuf::util::TimeUtil::MillisecondsToDuration(

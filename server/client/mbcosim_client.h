@@ -104,8 +104,9 @@ struct ResultOptions {
   std::optional<std::int64_t> quota = {};  ///< most bytes; none: the server's limit
 };
 
-/// Whether a simulation outlives its server.
-enum class Durability { server_default, none, checkpoint };
+/// Whether a simulation outlives its server: from its last checkpoint on, or with all that anybody
+/// was told.
+enum class Durability { server_default, none, checkpoint, journal };
 
 struct LoadOptions {
   std::string display_name = {};
@@ -471,6 +472,8 @@ class Simulation {
   /// The state as bytes: of a snapshot, or as it is now.
   std::string export_state(double timeout = kUsual) const;
   std::string export_state(const Snapshot& snapshot, double timeout = kUsual) const;
+  /// All of a durable simulation, its deck included, for Server::import_checkpoint.
+  std::string export_checkpoint(double timeout = kEndless) const;
   Snapshot import_state(const std::string& bytes, bool restore = true,
                         const std::string& display_name = {}, double timeout = kEndless);
   /// A new simulation at the present state, or at that of a snapshot; only ports, lease, policy and
@@ -541,6 +544,10 @@ class Server {
   std::vector<Diagnostic> validate(const std::string& path, double timeout = kEndless);
   /// A simulation that another client loaded, by its name; it lives on afterwards.
   Simulation find(const std::string& name, double timeout = kUsual);
+  /// A new simulation from what `export_checkpoint` gave, here or on another server; it lives on
+  /// afterwards.
+  Simulation import_checkpoint(const std::string& bytes, const std::string& display_name = {},
+                               double timeout = kEndless);
   /// Events from now on, of one simulation (by name) or of all that the caller may see; with the
   /// place where a watcher has ended also what came since.
   Events events(const std::string& simulation = {}, const EventPlace& after = {},

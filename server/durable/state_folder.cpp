@@ -55,6 +55,54 @@ std::optional<int> number_of(const std::string& name, const std::string& prefix)
 
 }  // namespace
 
+// ------------------------------------------------------------------ files in a series
+
+namespace {
+
+void add_file(const v1::FileChunk& chunk, StoredModel* model) {
+  model->files[chunk.path()] += chunk.data();
+}
+
+}  // namespace
+
+void StoredBundle::add(const std::string& file, RecordKind kind, std::string content) {
+  if (kind == RecordKind::begin || kind == RecordKind::end) return;
+  if (const auto number = number_of(file, kSnapshot); number && kind == RecordKind::state) {
+    snapshots[*number] = std::move(content);
+  } else if (file == "model" && kind == RecordKind::head) {
+    parse(content, &model.head);
+  } else if (file == "model" && kind == RecordKind::file) {
+    v1::FileChunk chunk;
+    parse(content, &chunk);
+    add_file(chunk, &model);
+  } else if (file == "point" && kind == RecordKind::point) {
+    parse(content, &point.point);
+  } else if (file == "point" && kind == RecordKind::state) {
+    point.state = std::move(content);
+  } else {
+    throw StorageError("the file \"" + file.substr(0, 100) + "\" has a record of a wrong kind");
+  }
+}
+
+OpenFiles::OpenFiles(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths)
+    if (!files_.emplace_back(path, std::ios::binary)) throw StorageError("a file cannot be opened");
+}
+
+std::string OpenFiles::read(std::size_t most) {
+  std::string piece(most, '\0');
+  for (; !files_.empty(); files_.pop_front()) {
+    files_.front().read(piece.data(), static_cast<std::streamsize>(most));
+    if (files_.front().bad()) throw StorageError("a file cannot be read");
+    if (files_.front().gcount() == 0) continue;
+    piece.resize(static_cast<std::size_t>(files_.front().gcount()));
+    return piece;
+  }
+  return {};
+}
+
+// ------------------------------------------------------------------ the folder
+
 StateFolder::StateFolder(const std::string& path, std::int64_t most) : path_(path), most_(most) {
   std::error_code error;
   if (!fs::is_directory(path_, error))
@@ -217,7 +265,7 @@ StoredModel StateFolder::read_model(const std::string& id) const {
     if (kind != RecordKind::file) return;
     v1::FileChunk chunk;
     parse(content, &chunk);
-    model.files[chunk.path()] += chunk.data();
+    add_file(chunk, &model);
   });
   return model;
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
+#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
@@ -21,6 +23,27 @@ struct StoredModel {
 struct StoredPoint {
   v1::CheckpointPoint point;
   std::string state;  ///< of Simulation::export_state
+};
+
+/// All of a stored simulation, as it is read from a series of files.
+struct StoredBundle {
+  StoredModel model;
+  StoredPoint point;
+  std::map<int, std::string> snapshots;  ///< states by number
+  /// Of the file of that name. Throws StorageError.
+  void add(const std::string& file, RecordKind kind, std::string content);
+};
+
+/// Files that are read one after the other, as they were when they were opened.
+class OpenFiles {
+ public:
+  /// Throws StorageError.
+  explicit OpenFiles(const std::vector<std::string>& paths);
+  /// At most so many bytes; none: that was all. Throws StorageError.
+  std::string read(std::size_t most);
+
+ private:
+  std::deque<std::ifstream> files_;
 };
 
 /// DIR/lock, which one daemon holds; DIR/name; DIR/simulations/ID with the files "model" (written

@@ -224,10 +224,14 @@ void Durability::store(Session& session) try { write(session); } catch (const St
 }
 
 void Durability::write(Session& session) {
-  const auto begin = std::chrono::steady_clock::now();
-  const std::string id = id_of(session.identity().id);
   Keeping& keeping = *session.keeping();
   Guard guard(keeping.mutex);
+  write_held(session, keeping);
+}
+
+void Durability::write_held(Session& session, Keeping& keeping) {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::string id = id_of(session.identity().id);
   if (keeping.over || session.has_failed()) return;
   CapturedPoint captured = session.capture();
   const MemoryShare share(memory_of(session), 2 * size_of(captured.state));
@@ -331,6 +335,85 @@ void Durability::forget(Session& session) {
   Guard guard(session.keeping()->mutex);  // no checkpoint is under way
   session.keeping()->over = true;
   folder_->remove(id_of(session.identity().id));
+}
+
+// ------------------------------------------------------------------ from server to server
+
+void Durability::require() const {
+  if (!available())
+    throw Refusal(v1::REASON_NOT_DURABLE,
+                  "the server keeps no checkpoints: it was started without --state-dir");
+}
+
+OpenFiles Durability::open_files(Session& session) try {
+  Keeping* keeping = session.keeping();
+  if (!keeping)
+    throw Refusal(v1::REASON_NOT_DURABLE,
+                  session.identity().id + " has durability NONE: its deck is not kept");
+  Guard guard(keeping->mutex);
+  write_held(session, *keeping);
+  return OpenFiles(folder_->files_of(id_of(session.identity().id)));
+} catch (const StorageError& error) {
+  refuse_storage("the checkpoint cannot be written", error);
+}
+
+v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheckpointHeader& header,
+                                      std::uint64_t digest, const Caller& caller,
+                                      const Call& call) {
+  v1::SimulationInfo info;
+  const std::string before = find_request(caller.identity, header.request_id());
+  if (!before.empty() && describe(before, caller, &info)) return info;
+  const SessionStore::Place place(parts_->store, header.request_id(), digest, caller, call);
+  if (place.known()) {
+    place.known()->fill(&info, caller);
+    return info;
+  }
+  if (bundle.model.head.simulation().empty() || bundle.point.state.empty())
+    throw Refusal(v1::REASON_DAMAGED_STATE, "the checkpoint has no model, or no state");
+  v1::CheckpointHead& head = bundle.model.head;
+  const std::string name = new_name();
+  head.set_simulation(name);
+  head.set_owner(caller.identity);
+  head.set_request_digest(digest);
+  head.mutable_options()->set_request_id(header.request_id());
+  head.mutable_options()->clear_grants();
+  v1::CheckpointPoint& point = bundle.point.point;
+  point.mutable_info()->set_name(name);
+  point.mutable_info()->set_owner(caller.identity);
+  point.mutable_info()->clear_grants();
+  if (header.has_display_name()) point.mutable_info()->set_display_name(header.display_name());
+  point.clear_kept_replies();  // of others' requests
+  const auto longest = google::protobuf::util::TimeUtil::SecondsToDuration(
+      std::chrono::duration_cast<std::chrono::seconds>(config_.limits.lease).count());
+  using google::protobuf::operator<;
+  if (longest < point.info().lease()) *point.mutable_info()->mutable_lease() = longest;
+  put_in_folder(name, bundle);
+  describe(name, caller, &info);
+  return info;
+}
+
+void Durability::put_in_folder(const std::string& simulation, const StoredBundle& bundle) {
+  const std::string id = id_of(simulation);
+  try {
+    folder_->write_model(id, bundle.model);
+    for (const v1::CheckpointSnapshot& snapshot : bundle.point.point.snapshots()) {
+      const auto state = bundle.snapshots.find(snapshot.number());
+      if (state == bundle.snapshots.end())
+        throw Refusal(v1::REASON_DAMAGED_STATE, "the checkpoint lacks the state of snapshot " +
+                                                    std::to_string(snapshot.number()));
+      folder_->write_snapshot(id, snapshot.number(), state->second);
+    }
+    folder_->write_point(id, bundle.point);
+    read_one(id);
+  } catch (const StorageError& error) {
+    folder_->remove(id);
+    refuse_storage("the simulation cannot be stored", error);
+  } catch (...) {
+    folder_->remove(id);
+    throw;
+  }
+  log_.created({simulation, bundle.model.head.owner()}, bundle.point.point.info().display_name(),
+               "");
 }
 
 // ------------------------------------------------------------------ suspended ones

@@ -55,6 +55,16 @@ class Durability {
   std::int64_t bytes() const;  ///< of all that is stored
   int suspended() const TS_EXCLUDES(mutex_);
 
+  // --- from server to server
+  /// Throws NOT_DURABLE without a state folder.
+  void require() const;
+  /// A checkpoint of now. Throws NOT_DURABLE, STORAGE_FULL.
+  OpenFiles open_files(Session& session);
+  /// A suspended simulation made of it, the caller's. `digest`: of the request. Throws
+  /// STORAGE_FULL, DAMAGED_STATE, LIMIT_EXCEEDED, BAD_ARGUMENT.
+  v1::SimulationInfo import(StoredBundle bundle, const v1::ImportCheckpointHeader& header,
+                            std::uint64_t digest, const Caller& caller, const Call& call);
+
   // --- suspended ones. None of them throws for one that is not known.
   bool knows(const std::string& simulation, const Caller& caller) const;
   bool describe(const std::string& simulation, const Caller& caller, v1::SimulationInfo* out) const;
@@ -73,6 +83,8 @@ class Durability {
   std::unique_ptr<Simulation> simulation_at(const ModelPtr& model, const Suspended& suspended,
                                             const std::string& state, SessionResults* results,
                                             bool has_files);
+  void write_held(Session& session, Keeping& keeping) TS_REQUIRES(keeping.mutex);
+  void put_in_folder(const std::string& simulation, const StoredBundle& bundle);
   void write_snapshots(Session& session, Keeping& keeping, const std::string& id,
                        v1::CheckpointPoint& point) TS_REQUIRES(keeping.mutex);
   bool may_see(const Suspended& suspended, const Caller& caller, Access access) const;

@@ -179,6 +179,7 @@ void add_simulations(Gate& gate, const Parts& parts) {
   add_stepping(gate, parts);
   add_variables(gate, parts);
   add_snapshots(gate, parts);
+  add_checkpoints(gate, parts);
   add_analysis(gate, parts);
 }
 

@@ -12,6 +12,7 @@ void add_simulations(Gate& gate, const Parts& parts);
 void add_creation(Gate& gate, const Parts& parts);
 void add_stepping(Gate& gate, const Parts& parts);
 void add_snapshots(Gate& gate, const Parts& parts);
+void add_checkpoints(Gate& gate, const Parts& parts);
 
 inline std::string simulations_path(const char* method) {
   return std::string("/mbcosim.v1.Simulations/") + method;

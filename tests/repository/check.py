@@ -45,6 +45,7 @@ ARROWS = {
     "server/shared_memory": set(),
     "server/http": {"service", "rpc", "wire", "mbcosim"},
     "server/view": {"client"},
+    "server/sessions": {"client"},
     "server/daemon": {"service", "rpc", "http", "shared_memory", "threads", "wire", "mbcosim", "grpc"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",

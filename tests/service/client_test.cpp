@@ -769,6 +769,8 @@ TEST(ASilentServer, EndsEveryCallAtItsTimeout) {
       {"reset", [&] { simulation.reset(0.3); }},
       {"export_state", [&] { simulation.export_state(0.3); }},
       {"export_state of a snapshot", [&] { simulation.export_state(saved, 0.3); }},
+      {"export_checkpoint", [&] { simulation.export_checkpoint(0.3); }},
+      {"import_checkpoint", [&] { server.import_checkpoint(bytes, "", 0.3); }},
       {"import_state", [&] { simulation.import_state(bytes, true, "", 0.3); }},
       {"fork", [&] { simulation.fork({.timeout = 0.3}); }},
       {"fork of a snapshot", [&] { simulation.fork(saved, {.timeout = 0.3}); }},

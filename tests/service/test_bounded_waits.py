@@ -60,6 +60,7 @@ CALLS = {
     "snapshot": lambda s: s.snapshot(timeout=0.3),
     "snapshots": lambda s: s.snapshots(timeout=0.3),
     "export_state": lambda s: s.export_state(timeout=0.3),
+    "export_checkpoint": lambda s: s.export_checkpoint(timeout=0.3),
     "import_state": lambda s: s.import_state(b"x" * (3 << 20), timeout=0.3),
     "fork": lambda s: s.fork(timeout=0.3),
     "eigenvalues": lambda s: s.eigenvalues(timeout=0.3),

@@ -264,6 +264,17 @@ class ServerCalls(Generic[SimulationKind]):
         reply = yield Call("Simulations/GetSimulation", pb.GetSimulationRequest(simulation=name), timeout, repeatable=True)
         return self._make(reply.simulation, owned=False)
 
+    @call
+    def import_checkpoint(self, data: bytes, *, name: Optional[str] = None, timeout: Optional[float] = None) -> Calls[SimulationKind]:
+        """A new simulation from what `Simulation.export_checkpoint` gave, here or on another server. It lives on afterwards."""
+        def messages() -> Iterator[pb.ImportCheckpointRequest]:
+            yield pb.ImportCheckpointRequest(header=pb.ImportCheckpointHeader(request_id=_new_id(), display_name=name))
+            for start in range(0, len(data), 1 << 20):
+                yield pb.ImportCheckpointRequest(data=data[start:start + (1 << 20)])
+
+        reply = yield Call("Simulations/ImportCheckpoint", messages(), timeout)
+        return self._make(reply.simulation, owned=False)
+
 
 class SimulationCalls(Generic[SnapshotKind]):
     """Calls on one simulation, and what turns names and arrays into messages and back."""
@@ -520,6 +531,11 @@ class SimulationCalls(Generic[SnapshotKind]):
         """The current state as bytes."""
         return (yield from self._collect("Simulations/ExportSnapshot", pb.ExportSnapshotRequest(simulation=self.name), timeout))
 
+    @call
+    def export_checkpoint(self, *, timeout: Optional[float] = None) -> Calls[bytes]:
+        """All of a durable simulation, its deck included, as bytes for `Server.import_checkpoint`."""
+        return (yield from self._collect("Simulations/ExportCheckpoint", pb.ExportCheckpointRequest(simulation=self.name), timeout))
+
     def _collect(self, method: str, request: Any, timeout: Optional[float]) -> Calls[bytes]:
         """The bytes that a method streams."""
         parts: list_of[bytes] = []
@@ -535,7 +551,7 @@ class SimulationCalls(Generic[SnapshotKind]):
             for start in range(0, len(data), 1 << 20):
                 yield pb.ImportSnapshotRequest(data=data[start:start + (1 << 20)])
 
-        snapshot = self._snapshot_class(self, (yield Call("Simulations/ImportSnapshot", messages(), timeout)).snapshot)
+        snapshot = self._snapshot_class(self, (yield Call("Simulations/ImportSnapshot", messages(), timeout, simulation=self.name)).snapshot)
         if restore:
             self.step_number, self.time = snapshot.step, snapshot.time
         return snapshot

@@ -1,0 +1,92 @@
+/// Methods that carry whole simulations from one server to another.
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "durable/record_file.h"
+#include "math/hash.h"
+#include "service/durability.h"
+#include "service/simulations_service.h"
+
+namespace mbcosim::server {
+namespace {
+
+using ExportReplies = Series<v1::ExportCheckpointRequest, v1::ExportCheckpointReply>;
+
+ExportReplies::Source exported(const Parts& parts, const Caller& caller,
+                               const v1::ExportCheckpointRequest& request) {
+  const SessionHold session(parts.store, request.simulation(), caller, Access::control);
+  auto files = std::make_shared<OpenFiles>(parts.durability.open_files(*session));
+  return [files](auto* reply) {
+    std::string piece = files->read(kChunkBytes);
+    const bool some = !piece.empty();
+    reply->set_data(std::move(piece));
+    return some;
+  };
+}
+
+class ImportHandler final : public Upload<v1::ImportCheckpointRequest> {
+ public:
+  explicit ImportHandler(const Parts& parts)
+      : parts_(parts), reader_(parts.config.limits.state_bytes, [this](auto kind, auto content) {
+          bundle_.add(reader_.file(), kind, std::move(content));
+        }) {}
+
+ private:
+  void add(Exchange& exchange, v1::ImportCheckpointRequest& request, MemoryShare) override {
+    if (!header_) {
+      if (!request.has_header())
+        throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
+      parts_.durability.require();
+      check_request_id(request.header().request_id());
+      header_ = request.header();
+      share_ = MemoryShare(exchange.memory());
+      return;
+    }
+    if (request.has_header())
+      throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` an import has only `data` messages");
+    share_.grow(2 * static_cast<std::int64_t>(request.data().size()));
+    digest_ = fnv1a(request.data(), digest_);
+    read([&] { reader_.take(request.data()); });
+  }
+  void complete(Exchange& exchange) override {
+    if (!header_)
+      throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
+    read([&] { reader_.finish(); });
+    v1::ImportCheckpointReply reply;
+    *reply.mutable_simulation() = parts_.durability.import(std::move(bundle_), *header_, digest_,
+                                                           exchange.caller(), exchange.call());
+    exchange.end(serialized(reply));
+  }
+  template <class Read>
+  void read(Read&& read) {
+    try {
+      read();
+    } catch (const StorageError& error) {
+      throw Refusal(v1::REASON_DAMAGED_STATE,
+                    std::string("the checkpoint cannot be read: ") + error.what());
+    }
+  }
+
+  const Parts& parts_;
+  std::optional<v1::ImportCheckpointHeader> header_;
+  StoredBundle bundle_;
+  RecordReader reader_;
+  std::uint64_t digest_ = kFnvBasis;
+  MemoryShare share_;
+};
+
+}  // namespace
+
+void add_checkpoints(Gate& gate, const Parts& parts) {
+  gate.add(simulations_path("ExportCheckpoint"),
+           series<v1::ExportCheckpointRequest, v1::ExportCheckpointReply>(
+               Role::control, Lane::work, [&parts](const CallFrame& frame, const auto& request) {
+                 return exported(parts, frame.caller, request);
+               }));
+  gate.add(simulations_path("ImportCheckpoint"),
+           stream(Role::control, [&parts] { return std::make_unique<ImportHandler>(parts); }));
+}
+
+}  // namespace mbcosim::server

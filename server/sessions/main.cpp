@@ -1,0 +1,141 @@
+/// mbcosim-sessions: what a daemon has. `mbcosim sessions`, `checkpoint` and `resume` hand over to
+/// it.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "client/mbcosim_client.h"
+
+namespace {
+
+using namespace mbcosim::client;
+
+constexpr int kDone = 0, kRefused = 4;
+
+struct Options {
+  std::string address;
+  double timeout = 10;  ///< [s], to reach the daemon
+  Credentials credentials;
+  std::string simulation, file, name;
+};
+
+std::string default_address() {
+  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime && *runtime)
+    return "unix:" + std::string(runtime) + "/mbcosim.sock";
+  return "unix:/tmp/mbcosim-" + std::to_string(::getuid()) + "/mbcosim.sock";
+}
+
+Server reach(const Options& options) {
+  return Server::connect(options.address, options.timeout, options.credentials);
+}
+
+const char* state_name(SimulationInfo::State state) {
+  constexpr const char* kNames[] = {"unknown",  "ready",  "stepping",
+                                    "finished", "failed", "suspended"};
+  return kNames[state];
+}
+
+int list(const Options& options) {
+  std::printf("%-42s %-10s %12s %14s  %s\n", "simulation", "state", "step", "time", "name");
+  for (const SimulationInfo& info : reach(options).list())
+    std::printf("%-42s %-10s %12lld %14.6g  %s\n", info.name.c_str(), state_name(info.state),
+                static_cast<long long>(info.step), info.time, info.display_name.c_str());
+  return kDone;
+}
+
+/// Under another name until all of it is there.
+void write_file(const std::string& path, const std::string& bytes) {
+  const std::string making = path + ".new";
+  std::ofstream file(making, std::ios::binary);
+  file << bytes;
+  file.close();
+  if (file) std::filesystem::rename(making, path);
+  if (!file) {
+    std::filesystem::remove(making);
+    throw std::runtime_error("cannot write " + path);
+  }
+}
+
+int checkpoint(const Options& options) {
+  Server server = reach(options);
+  const std::string bytes = server.find(options.simulation).export_checkpoint();
+  write_file(options.file, bytes);
+  std::printf("%s: %zu bytes\n", options.file.c_str(), bytes.size());
+  return kDone;
+}
+
+int resume(const Options& options) {
+  Server server = reach(options);
+  std::ifstream file(options.file, std::ios::binary);
+  if (options.file.compare(0, 12, "simulations/") == 0) {
+    Simulation simulation = server.find(options.file);
+    (void)simulation.read("step");  // what needs the state brings it back
+    std::printf("%s\n", simulation.name().c_str());
+    return kDone;
+  }
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  if (!file) throw std::runtime_error("cannot read " + options.file);
+  std::printf("%s\n", server.import_checkpoint(bytes.str(), options.name).name().c_str());
+  return kDone;
+}
+
+/// What all of them need to reach a daemon.
+CLI::App* add(CLI::App& app, const char* name, const char* text, Options& options) {
+  CLI::App* command = app.add_subcommand(name, text);
+  command->add_option("--address", options.address, "The daemon's: unix:PATH or HOST:PORT")
+      ->capture_default_str()
+      ->envname("MBCOSIM_ADDRESS");
+  command->add_option("--token", options.credentials.token, "Bearer token")
+      ->envname("MBCOSIM_TOKEN");
+  command->add_option("--ca", options.credentials.server_ca,
+                      "PEM file: authority of the daemon's certificate; the connection uses TLS");
+  command->add_option("--certificate", options.credentials.certificate, "PEM file of this client");
+  command->add_option("--key", options.credentials.key, "PEM file of its key");
+  command->add_option("--timeout", options.timeout, "Seconds to wait for the daemon")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  return command;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Simulations of a daemon.", "mbcosim"};
+  app.require_subcommand(1);
+  Options options;
+  options.address = default_address();
+  int (*chosen)(const Options&) = nullptr;
+  CLI::App* sessions =
+      add(app, "sessions", "List a daemon's simulations, suspended ones too", options);
+  sessions->callback([&] { chosen = list; });
+  CLI::App* store = add(app, "checkpoint", "Store all of a daemon's simulation in a file", options);
+  store->add_option("simulation", options.simulation, "simulations/NAME")->required();
+  store->add_option("-o,--output", options.file, "The file")->required();
+  store->callback([&] { chosen = checkpoint; });
+  CLI::App* back = add(app, "resume",
+                       "Make a simulation of such a file, or bring a suspended one back", options);
+  back->add_option("file", options.file, "The file, or simulations/NAME")->required();
+  back->add_option("--name", options.name, "Name for people; default: that of the original");
+  back->callback([&] { chosen = resume; });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kRefused;
+  }
+  return chosen(options);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "mbcosim: error: %s\n", error.what());
+    return kRefused;
+  }
+}
