@@ -45,16 +45,24 @@ export function connect(address, { token, credentials = grpc.credentials.createI
 
 const options = (timeout) => (timeout === undefined ? {} : { deadline: Date.now() + 1000 * timeout });
 
+/** Who calls, and the simulation that it is about, by which a proxy finds the daemon that has it. */
+export function about(server, simulation) {
+  if (!simulation) return server.metadata;
+  const metadata = server.metadata.clone();
+  metadata.set("mbcosim-session", simulation);
+  return metadata;
+}
+
 /** One message each way: the reply. `timeout`: seconds; undefined: as long as the server lives. */
 export function call(server, client, method, request, timeout) {
   return new Promise((resolve, reject) =>
-    client[method](request, server.metadata, options(timeout), (error, reply) => (error ? reject(error) : resolve(reply))),
+    client[method](request, about(server, request.simulation), options(timeout), (error, reply) => (error ? reject(error) : resolve(reply))),
   );
 }
 
 /** A series of messages, for `for await`. */
 export function series(server, client, method, request, timeout) {
-  return client[method](request, server.metadata, options(timeout));
+  return client[method](request, about(server, request.simulation), options(timeout));
 }
 
 /** Creates a simulation from a deck without includes. `choices`: CreateOptions. */
@@ -153,7 +161,7 @@ class Stepper {
 
   constructor(server, simulation, outputs) {
     this.request = { simulation, outputs };
-    this.stream = server.simulations.StepStream(server.metadata);
+    this.stream = server.simulations.StepStream(about(server, simulation));
     this.stream.on("data", (reply) => this.#waiting.shift()?.resolve(reply.step));
     this.stream.on("error", (error) => this.#end(error));
     this.stream.on("end", () => this.#end(new Error("the server has ended the stream")));

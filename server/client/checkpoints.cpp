@@ -5,7 +5,7 @@
 namespace mbcosim::client {
 
 std::string Simulation::export_checkpoint(double timeout) const {
-  CallContext context(*impl_->server, timeout);
+  CallContext context(*impl_->server, timeout, name());
   v1::ExportCheckpointRequest request;
   request.set_simulation(name());
   return collect<v1::ExportCheckpointReply>(

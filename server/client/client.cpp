@@ -195,7 +195,7 @@ std::vector<Diagnostic> Server::validate(const std::string& path, double timeout
 }
 
 Simulation Server::find(const std::string& name, double timeout) {
-  CallContext context(*impl_, timeout);
+  CallContext context(*impl_, timeout, name);
   v1::GetSimulationRequest request;
   request.set_simulation(name);
   v1::GetSimulationReply reply;

@@ -43,10 +43,13 @@ struct Server::Impl {
 
 constexpr double kParting = 2;  ///< longest wait of a destructor [s]
 
-/// Context of one call: says who calls, and how long it may take [s].
+/// Context of one call: says who calls, how long it may take [s], and what it is about, so that a
+/// proxy finds the daemon that has the simulation.
 struct CallContext : grpc::ClientContext {
-  explicit CallContext(const Server::Impl& server, double timeout = kEndless) {
+  explicit CallContext(const Server::Impl& server, double timeout = kEndless,
+                       const std::string& simulation = {}) {
     if (!server.authorization.empty()) AddMetadata("authorization", server.authorization);
+    if (!simulation.empty()) AddMetadata("mbcosim-session", simulation);
     if (timeout > 0)
       set_deadline(std::chrono::system_clock::now() +
                    std::chrono::microseconds(static_cast<std::int64_t>(timeout * 1e6)));

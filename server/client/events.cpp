@@ -71,7 +71,7 @@ struct Events::Impl {
   Impl(std::shared_ptr<Server::Impl> connection, const v1::WatchEventsRequest& request)
       : server(std::move(connection)),
         service(v1::Events::NewStub(server->channel)),
-        context(*server),
+        context(*server, kEndless, request.simulation()),
         stream(service->WatchEvents(&context, request)) {}
   ~Impl() {
     context.TryCancel();

@@ -114,7 +114,7 @@ Geometry Simulation::geometry(const GeometryOptions& options, double timeout) co
   request.set_simulation(name());
   if (options.line_samples) request.set_line_samples(*options.line_samples);
   request.set_without_modal_points(!options.modal_points);
-  CallContext context(*impl_->server, timeout);
+  CallContext context(*impl_->server, timeout, name());
   const auto service = v1::Geometry::NewStub(impl_->server->channel);
   const auto replies = service->DescribeGeometry(&context, request);
   Geometry geometry;

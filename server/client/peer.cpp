@@ -208,7 +208,7 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
   auto impl = std::make_unique<Peer::Impl>();
   impl->wire = options.transport == Transport::shared_memory
                    ? open_shared_memory(*server, options.peer_timeout)
-                   : open_stream(*server);
+                   : open_stream(*server, hello.simulation());
   impl->server = std::move(server);
   impl->step_ended = options.step_ended;
   v1::PeerMessage first;

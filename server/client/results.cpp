@@ -5,7 +5,7 @@
 namespace mbcosim::client {
 
 std::map<std::string, std::int64_t> Simulation::result_files(double timeout) const {
-  CallContext context(*impl_->server, timeout);
+  CallContext context(*impl_->server, timeout, name());
   v1::ListResultsRequest request;
   request.set_simulation(name());
   v1::ListResultsReply reply;
@@ -17,7 +17,7 @@ std::map<std::string, std::int64_t> Simulation::result_files(double timeout) con
 
 std::string Simulation::result_file(const std::string& file, std::int64_t offset,
                                     std::optional<std::int64_t> length, double timeout) const {
-  CallContext context(*impl_->server, timeout);
+  CallContext context(*impl_->server, timeout, name());
   v1::GetResultsRequest request;
   request.set_simulation(name());
   request.set_file(file);

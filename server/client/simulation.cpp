@@ -21,7 +21,7 @@ Simulation& Simulation::operator=(Simulation&&) noexcept = default;
 
 Simulation::~Simulation() {
   if (!impl_ || !impl_->owned) return;
-  CallContext context(*impl_->server, kParting);
+  CallContext context(*impl_->server, kParting, name());
   v1::DeleteSimulationRequest request;
   request.set_simulation(name());
   request.set_request_id(new_request_id());
@@ -151,7 +151,7 @@ Table Simulation::simulate(double time, const std::vector<std::string>& outputs,
   request.mutable_table()->set_every(options.every);
   request.mutable_table()->set_without_start(!options.start);
   put_columns(*impl_, outputs, options.step.timeout, request.mutable_table(), &table);
-  CallContext context(*impl_->server, options.step.timeout);
+  CallContext context(*impl_->server, options.step.timeout, name());
   const auto replies = impl_->server->simulations->Run(&context, request);
   v1::RunReply reply;
   while (replies->Read(&reply)) {

@@ -42,7 +42,7 @@ Reply ask(const Simulation::Impl& simulation,
           grpc::Status (v1::Simulations::Stub::*method)(grpc::ClientContext*, const Request&,
                                                         Reply*),
           Request request, double timeout) {
-  CallContext context(*simulation.server, timeout);
+  CallContext context(*simulation.server, timeout, simulation.info.name());
   request.set_simulation(simulation.info.name());
   Reply reply;
   require((*simulation.server->simulations.*method)(&context, request, &reply));

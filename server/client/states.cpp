@@ -11,7 +11,7 @@ constexpr std::size_t kChunkBytes = 1 << 20;
 
 std::string exported(const Simulation::Impl& simulation, const std::string& snapshot,
                      double timeout) {
-  CallContext context(*simulation.server, timeout);
+  CallContext context(*simulation.server, timeout, simulation.info.name());
   v1::ExportSnapshotRequest request;
   request.set_simulation(simulation.info.name());
   if (!snapshot.empty()) request.set_snapshot(snapshot);
@@ -104,7 +104,7 @@ std::string Simulation::export_state(const Snapshot& snapshot, double timeout) c
 
 Snapshot Simulation::import_state(const std::string& bytes, bool restore,
                                   const std::string& display_name, double timeout) {
-  CallContext context(*impl_->server, timeout);
+  CallContext context(*impl_->server, timeout, name());
   v1::ImportSnapshotReply reply;
   const auto upload = impl_->server->simulations->ImportSnapshot(&context, &reply);
   v1::ImportSnapshotRequest message;
@@ -162,7 +162,7 @@ Spectrum Simulation::eigenvalues(std::optional<int> count, double shift, bool ve
 }
 
 std::string Simulation::record(double timeout) const {
-  CallContext context(*impl_->server, timeout);
+  CallContext context(*impl_->server, timeout, name());
   v1::GetRecordRequest request;
   request.set_simulation(name());
   return collect<v1::GetRecordReply>(impl_->server->simulations->GetRecord(&context, request));

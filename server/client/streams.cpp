@@ -28,9 +28,9 @@ v1::OverflowPolicy to_proto(Overflow policy) {
 // ------------------------------------------------------------------ Stepper
 
 struct Stepper::Impl {
-  Impl(std::shared_ptr<Server::Impl> connection)
+  Impl(std::shared_ptr<Server::Impl> connection, const std::string& simulation)
       : server(std::move(connection)),
-        context(*server),
+        context(*server, kEndless, simulation),
         stream(server->simulations->StepStream(&context)) {}
   ~Impl() { close(); }
 
@@ -93,7 +93,7 @@ Stepper Simulation::stepper(const std::vector<std::string>& outputs,
                             const std::vector<std::string>& inputs, double timeout) {
   const std::vector<int> read = impl_->handles(outputs, timeout);
   const std::vector<int> written = impl_->handles(inputs, timeout);
-  auto impl = std::make_unique<Stepper::Impl>(impl_->server);
+  auto impl = std::make_unique<Stepper::Impl>(impl_->server, name());
   impl->request.set_simulation(name());
   impl->request.mutable_outputs()->Add(read.begin(), read.end());
   if (!written.empty())
@@ -109,7 +109,7 @@ struct Subscription::Impl {
   Impl(std::shared_ptr<Server::Impl> connection, const v1::SubscribeRequest& request)
       : server(std::move(connection)),
         telemetry(v1::Telemetry::NewStub(server->channel)),
-        context(*server),
+        context(*server, kEndless, request.simulation()),
         stream(telemetry->Subscribe(&context, request)) {}
   ~Impl() {
     context.TryCancel();

@@ -17,8 +17,8 @@ constexpr auto kLook = std::chrono::seconds(1);  // rounds of an endless wait
 
 class GrpcWire : public Wire {
  public:
-  explicit GrpcWire(Server::Impl& server)
-      : context_(server), stream_(server.coupling->Attach(&context_)) {}
+  GrpcWire(Server::Impl& server, const std::string& simulation)
+      : context_(server, kEndless, simulation), stream_(server.coupling->Attach(&context_)) {}
   bool write(const v1::PeerMessage& message) override { return stream_->Write(message); }
   bool read(v1::ServerMessage* message) override { return stream_->Read(message); }
   void cancel() override { context_.TryCancel(); }
@@ -94,8 +94,8 @@ shm::Descriptor connect_to(const std::string& path) {
 
 }  // namespace
 
-std::unique_ptr<Wire> open_stream(Server::Impl& server) {
-  return std::make_unique<GrpcWire>(server);
+std::unique_ptr<Wire> open_stream(Server::Impl& server, const std::string& simulation) {
+  return std::make_unique<GrpcWire>(server, simulation);
 }
 
 std::unique_ptr<Wire> open_shared_memory(const Server::Impl& server, double timeout) {

@@ -20,7 +20,7 @@ class Wire {
 };
 
 /// Over gRPC.
-std::unique_ptr<Wire> open_stream(Server::Impl& server);
+std::unique_ptr<Wire> open_stream(Server::Impl& server, const std::string& simulation);
 /// Over shared memory, on the server's host; `timeout` [s] bounds a write that the server does not
 /// read. Throws Error.
 std::unique_ptr<Wire> open_shared_memory(const Server::Impl& server, double timeout);
