@@ -26,6 +26,11 @@ Error no_equations_of_motion() {
                     "linearize");
 }
 
+Error another_model() {
+  return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL",
+                    "the state belongs to another model: its layout differs");
+}
+
 bool same_layout(const State& a, const State& b) {
   return a.y.size() == b.y.size() && a.rotation.size() == b.rotation.size() &&
          a.memory.size() == b.memory.size() && a.variables.size() == b.variables.size() &&
@@ -315,6 +320,8 @@ Status Simulation::start(const CancelToken* cancel) {
   } catch (const EvaluationError& e) {
     status = make_error(ErrorKind::evaluation, "EVALUATION_FAILED",
                         std::string("before the first step: ") + e.what());
+  } catch (const Stopped&) {
+    status = stopped_while_factoring(impl_->state);
   }
   if (!status && impl_->writer) (void)impl_->writer->finish();
   return status;
@@ -458,9 +465,7 @@ Status Simulation::set(int handle, std::span<const double> values) {
 }
 
 Status Simulation::restore(const State& state) {
-  if (!same_layout(state, impl_->state))
-    return make_error(ErrorKind::precondition, "STATE_OF_ANOTHER_MODEL",
-                      "the state belongs to another model: its layout differs");
+  if (!same_layout(state, impl_->state)) return another_model();
   State before = std::exchange(impl_->state, state);
   impl_->ended = false;
   if (!impl_->writer) return ok();
@@ -506,20 +511,33 @@ std::string Simulation::export_state() const {
   return state_to_bytes(impl_->state, impl_->model->digest);
 }
 
-Status Simulation::import_state(std::string_view bytes) {
+Result<State> Simulation::state_of(std::string_view bytes) const {
   auto state = state_from_bytes(bytes, impl_->model->digest);
+  if (state && !same_layout(*state, impl_->state)) return another_model();
+  return state;
+}
+
+Status Simulation::import_state(std::string_view bytes) {
+  auto state = state_of(bytes);
   if (!state) return state.error();
   return restore(*state);
 }
 
-std::unique_ptr<Simulation> Simulation::fork() const {
+std::unique_ptr<Simulation> Simulation::fork(const CancelToken* cancel) const try {
   auto impl = std::make_unique<Impl>(impl_->model);
   impl->state = impl_->state;
   // The pivots are chosen on the matrix of the derivatives phase, as in every simulation of this
   // model.
   State start = make_initial_state(*impl->model);
+  impl->stepper.set_cancelled(cancel);
   if (!impl->inverse && impl->stepper.assemble(start)) (void)impl->stepper.solve_derivatives(start);
+  impl->stepper.set_cancelled(nullptr);
+  if (cancel && cancel->cancelled()) return nullptr;
   return std::unique_ptr<Simulation>(new Simulation(std::move(impl)));
+} catch (const Stopped&) {
+  return nullptr;
 }
+
+std::size_t Simulation::factor_bytes() const { return impl_->stepper.factor_bytes(); }
 
 }  // namespace mbcosim

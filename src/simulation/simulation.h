@@ -187,8 +187,13 @@ class Simulation {
   std::string export_state() const;
   /// ErrorKind::data_loss for damaged bytes, ErrorKind::precondition for another model's.
   Status import_state(std::string_view bytes);
-  /// A new simulation at the same state, sharing the model. Without a writer.
-  std::unique_ptr<Simulation> fork() const;
+  /// The state that `import_state` would take; the simulation stays as it is.
+  Result<State> state_of(std::string_view bytes) const;
+  /// A new simulation at the same state, sharing the model. Without a writer. It chooses pivots of
+  /// its own, which may take as long as a step; null: that was cancelled.
+  std::unique_ptr<Simulation> fork(const CancelToken* cancel = nullptr) const;
+  /// Memory that factorizations take [bytes]; it may change with a step.
+  std::size_t factor_bytes() const;
 
  private:
   struct Impl;

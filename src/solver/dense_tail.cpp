@@ -41,12 +41,13 @@ struct KluReference {
 };
 
 std::unique_ptr<DenseTail> DenseTail::plan(int n, int* column_start, int* row_index, double* values,
-                                           int* rows, int* columns) {
+                                           int* rows, int* columns, const Watch& watch) {
   KluReference reference(n, column_start, row_index, values, rows, columns);
+  watch.look();
   if (!reference.numeric || reference.symbolic->nblocks != 1) return nullptr;
   std::unique_ptr<DenseTail> tail(new DenseTail(n, column_start, row_index));
   if (!tail->read_factors(reference)) return nullptr;
-  return tail->factor(values) ? std::move(tail) : nullptr;
+  return tail->factor(values, watch) ? std::move(tail) : nullptr;
 }
 
 DenseTail::DenseTail(int n, const int* column_start, const int* row_index)
@@ -150,10 +151,12 @@ bool DenseTail::read_head_column(int j) {
   return true;
 }
 
-bool DenseTail::factor_columns(const double* values) {
+bool DenseTail::factor_columns(const double* values, const Watch& watch) {
+  constexpr int kLook = 16;  // columns between two looks at the watch
   smallest_ = std::numeric_limits<double>::infinity();
   largest_ = 0;
   for (int j = 0; j < n_; ++j) {
+    if (j % kLook == 0) watch.look();
     eliminate(values, j);
     if (j < head_) {
       if (!read_head_column(j)) return false;
@@ -165,16 +168,24 @@ bool DenseTail::factor_columns(const double* values) {
   return true;
 }
 
-bool DenseTail::factor(const double* values) {
-  if (!scale_rows(values) || !factor_columns(values)) {
+bool DenseTail::factor(const double* values, const Watch& watch) {
+  if (!scale_rows(values) || !factor_columns(values, watch)) {
     std::fill(work_.begin(), work_.end(), 0.0);
     return false;
   }
   if (reference_ratio_ == 0 && head_ > 0) reference_ratio_ = smallest_ / largest_;
   if (head_ > 0 && smallest_ / largest_ < kSuspicious * reference_ratio_) return false;
+  watch.look();
   tail_factor_.compute(tail_);
   const auto diagonal = tail_factor_.matrixLU().diagonal().cwiseAbs();
   return diagonal.minCoeff() > 0 && std::isfinite(diagonal.sum());
+}
+
+std::size_t DenseTail::bytes() const {
+  std::size_t bytes = 2 * sizeof(double) * static_cast<std::size_t>(tail_.size());
+  for (const Columns* c : {&lower_, &upper_})
+    bytes += c->row.size() * sizeof(int) + c->value.size() * sizeof(double);
+  return bytes;
 }
 
 void DenseTail::solve(double* rhs) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "math/types.h"
+#include "solver/watch.h"
 
 namespace mbcosim {
 
@@ -22,14 +23,16 @@ struct KluReference;  // in dense_tail.cpp
 class DenseTail {
  public:
   /// Null when the reference matrix has no dense tail worth the trouble. rows, columns: order of
-  /// elimination (n); null: AMD of A + Aᵀ.
+  /// elimination (n); null: AMD of A + Aᵀ. Throws Stopped.
   static std::unique_ptr<DenseTail> plan(int n, int* column_start, int* row_index, double* values,
-                                         int* rows = nullptr, int* columns = nullptr);
+                                         int* rows = nullptr, int* columns = nullptr,
+                                         const Watch& watch = Watch());
 
-  /// False when pivots of the head are poor against those of the reference matrix.
-  bool factor(const double* values);
+  /// False when pivots of the head are poor against those of the reference matrix. Throws Stopped.
+  bool factor(const double* values, const Watch& watch = Watch());
   void solve(double* rhs);
   int size() const { return n_ - head_; }  ///< k
+  std::size_t bytes() const;               ///< of memory, all but some for each column
 
  private:
   struct Columns {
@@ -45,7 +48,7 @@ class DenseTail {
   bool scale_rows(const double* values);
   void eliminate(const double* values, int j);
   bool read_head_column(int j);
-  bool factor_columns(const double* values);
+  bool factor_columns(const double* values, const Watch& watch);
 
   int n_, head_ = 0;
   std::vector<int> column_start_, row_index_;

@@ -31,7 +31,7 @@ Error eigen_error(ErrorKind kind, const std::string& message) {
 /// Applies T; real and imaginary parts are solved together for a complex shift.
 class ShiftInvert {
  public:
-  ShiftInvert(const Linearization& system, Complex shift)
+  ShiftInvert(const Linearization& system, Complex shift, const Watch& watch)
       : system_(system),
         n_(system.model->unknowns),
         complex_(shift.imag() != 0),
@@ -45,6 +45,7 @@ class ShiftInvert {
           for (int k = m.column_start[j]; k < m.column_start[j + 1]; ++k)
             values.push_back(block == half ? system.a[k] - shift.real() * system.e[k]
                                            : (half == 1 ? 1 : -1) * shift.imag() * system.e[k]);
+    solver_.set_watch(watch);
     regular_ = solver_.factor(values.data()) == LinearSolver::Outcome::ok;
   }
   bool regular() const { return regular_; }
@@ -216,7 +217,7 @@ Result<Spectrum> dense_spectrum(const Linearization& system, bool vectors, const
 Result<Spectrum> arnoldi(const Linearization& system, Complex shift, int count, double tolerance,
                          int basis, const Watch& watch) {
   const int n = system.model->unknowns;
-  ShiftInvert t(system, shift);
+  ShiftInvert t(system, shift, watch);
   if (!t.regular())
     return eigen_error(ErrorKind::singular,
                        "the linearized system is singular at the shift: it is an eigenvalue, or "

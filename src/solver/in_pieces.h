@@ -3,37 +3,12 @@
 #pragma once
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <optional>
 
 #include "math/types.h"
-#include "solver/cancel.h"
+#include "solver/watch.h"
 
 namespace mbcosim {
-
-/// Thrown where the token was found cancelled.
-struct Stopped {};
-
-/// Looks at a token, which may be null.
-class Watch {
- public:
-  explicit Watch(const CancelToken* cancel) : cancel_(cancel) {}
-  void look() const {
-    if (cancel_ && cancel_->cancelled()) throw Stopped{};
-  }
-  /// Calls f(first, count) for all columns, a few at a time.
-  template <class F>
-  void columns(Eigen::Index n, F&& f) const {
-    constexpr Eigen::Index kPiece = 64;
-    for (Eigen::Index first = 0; first < n; first += kPiece) {
-      look();
-      f(first, std::min(kPiece, n - first));
-    }
-  }
-
- private:
-  const CancelToken* cancel_;
-};
 
 MatX product(const MatX& a, const MatX& b, const Watch& watch);
 MatX transposed_product(const MatX& a, const MatX& b, const Watch& watch);  ///< aᵀ b

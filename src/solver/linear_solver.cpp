@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <new>
 #include <utility>
 
 #include "solver/dense_tail.h"
@@ -19,7 +20,8 @@ constexpr double kPoorGrowth =
 constexpr double kSuspicious =
     1e-3;  ///< ratio of pivots, against the reference matrix, below which growth is looked at
 constexpr double kDenseOperations =
-    40;  ///< operations an entry from which a dense tail is looked for
+    40;                        ///< operations an entry from which a dense tail is looked for
+constexpr double kLong = 1e9;  ///< operations of a factorization that may have to be stopped
 
 SparsePattern united(int n, const std::vector<int>& column_start, const std::vector<int>& row_index,
                      const SparsePattern& more) {
@@ -63,6 +65,7 @@ struct LinearSolver::Klu {
     if (!wide) return;
     symbolic =
         klu_analyze_given(n, column_start.data(), row_index.data(), wide->P, wide->Q, &common);
+    if (wide->est_flops > kLong) common.memgrow = 1.02;  // KLU can be stopped where it allocates
     klu_free_symbolic(&wide, &common);
   }
   double operations(klu_symbolic* s, klu_numeric* n) {
@@ -120,6 +123,22 @@ struct LinearSolver::Klu {
     return kept->pivot_ratio() > kSuspicious * kept_ratio ||
            kept->pivot_growth(values) > kPoorGrowth;
   }
+  std::size_t bytes() const {
+    return common.memusage + (kept ? kept->bytes() : 0) + (tail ? tail->bytes() : 0);
+  }
+  /// Factors that nobody keeps.
+  class Factors {
+   public:
+    Factors(klu_numeric* numeric, klu_common& common) : numeric_(numeric), common_(common) {}
+    ~Factors() { klu_free_numeric(&numeric_, &common_); }
+    Factors(const Factors&) = delete;
+    Factors& operator=(const Factors&) = delete;
+    klu_numeric*& get() { return numeric_; }
+
+   private:
+    klu_numeric* numeric_;
+    klu_common& common_;
+  };
   ~Klu() {
     klu_free_numeric(&fresh, &common);
     klu_free_symbolic(&symbolic, &common);
@@ -138,30 +157,46 @@ LinearSolver::LinearSolver(int n, const std::vector<int>& column_start,
 
 LinearSolver::~LinearSolver() = default;
 
+std::size_t LinearSolver::bytes() const {
+  std::size_t bytes = 0;
+  for (const Kind& kind : kinds_) bytes += kind.klu ? kind.klu->bytes() : 0;
+  return bytes;
+}
+
+/// What it means that KLU gave no factors.
+LinearSolver::Outcome LinearSolver::without_factors(const Klu& k) {
+  watch_.look();
+  const int status = k.common.status;
+  if (status == KLU_OUT_OF_MEMORY || status == KLU_TOO_LARGE) throw std::bad_alloc();
+  if (status != KLU_SINGULAR) return Outcome::failed;
+  if (k.symbolic) singular_column_ = k.common.singular_col < n_ ? k.common.singular_col : -1;
+  return Outcome::singular;
+}
+
 LinearSolver::Outcome LinearSolver::analyze(double* values) {
   if (n_ == 0) return Outcome::ok;
-  singular_column_ = -1;
   if (klu_ == kinds_[0].klu.get()) kinds_.resize(1);  // others belong to another first matrix
-  if (!klu_->symbolic)
-    return klu_->common.status == KLU_SINGULAR ? Outcome::singular : Outcome::failed;
-  Klu& k = *klu_;
+  return analyze(*klu_, values);
+}
+
+LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values) {
+  singular_column_ = -1;
   k.kept.reset();
   k.tail.reset();
   k.current = Klu::Current::none;
-  klu_numeric* numeric =
-      klu_factor(column_start_.data(), row_index_.data(), values, k.symbolic, &k.common);
-  if (!numeric) {
-    if (k.common.status != KLU_SINGULAR) return Outcome::failed;
-    singular_column_ = k.common.singular_col < n_ ? k.common.singular_col : -1;
-    return Outcome::singular;
-  }
-  k.choose_ordering(n_, column_start_.data(), row_index_.data(), values, numeric);
-  if (k.is_dense_in_parts(numeric))
+  if (!k.symbolic) return without_factors(k);
+  Klu::Factors factors(
+      klu_factor(column_start_.data(), row_index_.data(), values, k.symbolic, &k.common), k.common);
+  if (!factors.get()) return without_factors(k);
+  watch_.look();
+  k.choose_ordering(n_, column_start_.data(), row_index_.data(), values, factors.get());
+  watch_.look();
+  if (k.is_dense_in_parts(factors.get()))
     k.tail = DenseTail::plan(n_, column_start_.data(), row_index_.data(), values, k.symbolic->P,
-                             k.symbolic->Q);
-  k.kept = std::make_unique<SupernodalLu>(column_start_, row_index_, values, k.pattern(numeric));
-  klu_free_numeric(&numeric, &k.common);
-  if (!k.kept->factor(values)) return Outcome::failed;
+                             k.symbolic->Q, watch_);
+  k.kept =
+      std::make_unique<SupernodalLu>(column_start_, row_index_, values, k.pattern(factors.get()));
+  if (!k.kept->factor(values, watch_)) return Outcome::failed;
   k.kept_ratio = k.kept->pivot_ratio();
   k.current = Klu::Current::kept;
   return Outcome::ok;
@@ -182,8 +217,7 @@ void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
   if (n_ > 0 && first.symbolic)
     klu->symbolic = klu_analyze_given(n_, column_start_.data(), row_index_.data(),
                                       first.symbolic->P, first.symbolic->Q, &klu->common);
-  klu_ = klu.get();
-  if (!values || analyze(values) != Outcome::ok) klu = nullptr;
+  if (!values || analyze(*klu, values) != Outcome::ok) klu = nullptr;
   kinds_.push_back({kind, std::move(klu)});
   select(kind);
 }
@@ -191,30 +225,28 @@ void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
 LinearSolver::Outcome LinearSolver::factor(double* values) {
   if (n_ == 0) return Outcome::ok;
   Klu& k = *klu_;
-  if (k.tail && k.tail->factor(values)) {
+  k.current = Klu::Current::none;
+  if (k.tail && k.tail->factor(values, watch_)) {
     k.current = Klu::Current::tail;
     return Outcome::ok;
   }
-  if (!k.kept || !k.kept->factor(values) || !k.pivots_are_good(values)) return factor_alone(values);
+  if (!k.kept || !k.kept->factor(values, watch_) || !k.pivots_are_good(values))
+    return factor_alone(values);
   k.current = Klu::Current::kept;
   return Outcome::ok;
 }
 
 LinearSolver::Outcome LinearSolver::factor_alone(double* values) {
   if (n_ == 0) return Outcome::ok;
-  klu_common* common = &klu_->common;
+  Klu& k = *klu_;
   singular_column_ = -1;
-  klu_->current = Klu::Current::none;
-  if (!klu_->symbolic) return common->status == KLU_SINGULAR ? Outcome::singular : Outcome::failed;
-  klu_free_numeric(&klu_->fresh, common);
-  klu_->fresh = klu_factor(column_start_.data(), row_index_.data(), values, klu_->symbolic, common);
-  if (klu_->fresh) {
-    klu_->current = Klu::Current::fresh;
-    return Outcome::ok;
-  }
-  if (common->status != KLU_SINGULAR) return Outcome::failed;
-  singular_column_ = common->singular_col < n_ ? common->singular_col : -1;
-  return Outcome::singular;
+  k.current = Klu::Current::none;
+  if (!k.symbolic) return without_factors(k);
+  klu_free_numeric(&k.fresh, &k.common);
+  k.fresh = klu_factor(column_start_.data(), row_index_.data(), values, k.symbolic, &k.common);
+  if (!k.fresh) return without_factors(k);
+  k.current = Klu::Current::fresh;
+  return Outcome::ok;
 }
 
 void LinearSolver::solve(double* rhs) {

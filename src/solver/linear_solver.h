@@ -4,12 +4,20 @@
 /// matrices depend on the matrix alone, never on what was factored before. A matrix for which the
 /// kept pivots are poor gets a factorization of its own. Results are thus the same bits wherever a
 /// state is continued.
+///
+/// A factorization of a large matrix may take minutes. It stops soon after the token of `set_watch`
+/// is cancelled and throws Stopped; while KLU chooses pivots only its allocations can be looked at,
+/// so the program's allocator has to refuse what is asked for then (that of the daemon does).
+/// Without memory std::bad_alloc is thrown. In both cases there is no factorization afterwards, and
+/// nothing else has changed.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <vector>
 
 #include "model/sparse_pattern.h"
+#include "solver/watch.h"
 
 namespace mbcosim {
 
@@ -27,6 +35,11 @@ class LinearSolver {
   /// for solutions that stand for themselves, the second for Newton's corrections: what they lack
   /// the next residual shows, and the factors have fewer entries.
   static constexpr double kAccuratePivots = 0.1, kNewtonPivots = 1e-3;
+
+  /// Asked while factoring.
+  void set_watch(const Watch& watch) { watch_ = watch; }
+  /// Memory that the factorizations take [bytes].
+  std::size_t bytes() const;
 
   enum class Outcome { ok, singular, failed };
   /// Chooses the pivots on these values; for the first kind, all others are forgotten.
@@ -52,6 +65,10 @@ class LinearSolver {
     std::vector<bool> flags;
     std::unique_ptr<Klu> klu;  ///< null: that of the first kind
   };
+  Outcome analyze(Klu& k, double* values);
+  Outcome without_factors(const Klu& k);
+
+  Watch watch_;
   std::vector<Kind> kinds_;
   Klu* klu_;  ///< of the current kind
   int n_;

@@ -39,6 +39,8 @@ class TangentSolver {
   LinearSolver::Outcome factor(double seed, const std::vector<NodeSeeds>& seeds,
                                const std::vector<double>& values);
   void solve(double* rhs) { solver_->solve(rhs); }
+  void set_watch(const Watch& watch) { solver_->set_watch(watch); }
+  std::size_t bytes() const { return solver_->bytes(); }  ///< memory of the factorization
   int singular_column() const { return solver_->singular_column(); }
 
   /// The model's pattern with the entries of tangents, and where the model's own lie in it.

@@ -8,7 +8,7 @@ ShiftedPencil::ShiftedPencil(const Linearization& system, const Watch& watch)
   const Model& m = *system.model;
   std::vector<double> values(system.a);
   for (std::size_t k = 0; k < values.size(); ++k) values[k] -= kShift * system.e[k];
-  watch.look();
+  solver_.set_watch(watch);
   if (solver_.factor(values.data()) != LinearSolver::Outcome::ok) return;
   t = MatX::Zero(m.unknowns, m.unknowns);
   for (int j = 0; j < m.unknowns; ++j)

@@ -8,6 +8,7 @@
 
 #include "model/end_of_run.h"
 #include "solver/advance_time.h"
+#include "solver/watch.h"
 
 namespace mbcosim {
 
@@ -91,10 +92,24 @@ Error evaluation_failure(const State& state, const EvaluationError& cause) {
   return error;
 }
 
+Error stopped_while_factoring(const State& state) {
+  Error error =
+      make_error(ErrorKind::cancelled, "CANCELLED",
+                 "t = " + std::to_string(state.time) + ": interrupted while a matrix was factored");
+  error.failure.time = state.time;
+  error.failure.step = static_cast<long>(state.step);
+  return error;
+}
+
 PhaseReport StepController::advance(State& state, const StepChoice& choice) {
   start_ = state;
   try {
     return choice.event ? locate(state, choice) : try_step(state, choice);
+  } catch (const Stopped&) {
+    state = start_;
+    PhaseReport phase;
+    phase.error = stopped_while_factoring(start_);
+    return phase;
   } catch (...) {  // from a callback
     state = start_;
     throw;

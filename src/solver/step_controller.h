@@ -59,6 +59,8 @@ class StepSystem {
 
 /// A drive or law that could not be evaluated, as an error at the state's time and step.
 Error evaluation_failure(const State& state, const EvaluationError& cause);
+/// Stopped, as an error at the state's time and step.
+Error stopped_while_factoring(const State& state);
 
 class StepController {
  public:

@@ -148,6 +148,19 @@ Stepper::Stepper(const Model& model)
     two_stages_ = std::make_unique<TwoStageSystem>(model, workspace_);
 }
 
+void Stepper::set_cancelled(const CancelToken* cancel) {
+  cancel_ = cancel;
+  const Watch watch(cancel);
+  workspace_.solver.set_watch(watch);
+  if (workspace_.tangents) workspace_.tangents->set_watch(watch);
+  if (two_stages_) two_stages_->set_watch(watch);
+}
+
+std::size_t Stepper::factor_bytes() const {
+  return workspace_.solver.bytes() + (workspace_.tangents ? workspace_.tangents->bytes() : 0) +
+         (two_stages_ ? two_stages_->bytes() : 0);
+}
+
 Status Stepper::assemble(State& state) {
   const std::size_t matrix = (two_stages_ ? 4 : 1) * model_.row_index.size();
   state.control = {};

@@ -20,8 +20,9 @@ class Stepper final : public StepSystem {
  public:
   explicit Stepper(const Model& model);
 
-  /// `cancel` is asked between iterations; may be null.
-  void set_cancelled(const CancelToken* cancel) { cancel_ = cancel; }
+  /// `cancel` is asked between iterations and, by throwing Stopped, while a matrix is factored; may
+  /// be null.
+  void set_cancelled(const CancelToken* cancel);
 
   /// Called before each residual of a step with the number of corrections so far; false: loads from
   /// outside have not settled. May be empty. What it throws leaves the attempt.
@@ -52,6 +53,7 @@ class Stepper final : public StepSystem {
   void explain(PhaseReport& report, const State& state) override;
 
   Workspace& workspace() { return workspace_; }
+  std::size_t factor_bytes() const;  ///< memory of the factorizations
 
  private:
   /// Pivots for all regular steps, from the matrix at the initial state: the same in every

@@ -172,10 +172,12 @@ bool SupernodalLu::finish_column(int k, int supernode) {
   return std::isfinite(pivot) && pivot != 0;
 }
 
-bool SupernodalLu::factor(const double* values) {
+bool SupernodalLu::factor(const double* values, const Watch& watch) {
+  constexpr int kLook = 16;  // columns between two looks at the watch
   double* const x = work_.data();
   bool fine = true;
   for (int k = 0; k < n_ && fine; ++k) {
+    if (k % kLook == 0) watch.look();
     const double* value = values + value_start_[k];
     for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value)
       x[entry_row_[p]] = *value * inverse_scale_[entry_row_[p]];
@@ -209,6 +211,12 @@ void SupernodalLu::solve(double* b) {
     b[column_of_[k]] = x[k];
     x[k] = 0;
   }
+}
+
+std::size_t SupernodalLu::bytes() const {
+  return sizeof(double) * (panels_.size() + upper_.size() + above_.size()) +
+         sizeof(int) * (rows_.size() + upper_row_.size() + entry_row_.size() + above_row_.size()) +
+         sizeof(Segment) * segments_.size();
 }
 
 double SupernodalLu::pivot_ratio() const {

@@ -17,6 +17,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "solver/watch.h"
+
 namespace mbcosim {
 
 /// Pattern of the factors of a reference matrix: compressed columns, rows ascending, with the
@@ -33,8 +35,9 @@ class SupernodalLu {
   SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
                const double* values, const FactorPattern& factors);
 
-  /// False when a pivot vanishes or is not a number: there are no factors then.
-  bool factor(const double* values);
+  /// False when a pivot vanishes or is not a number: there are no factors then. Throws Stopped, and
+  /// there are none, either.
+  bool factor(const double* values, const Watch& watch = Watch());
   /// Solves A x = b in place with the last factorization.
   void solve(double* b);
 
@@ -42,6 +45,7 @@ class SupernodalLu {
   /// Reciprocal pivot growth: smallest over all columns of max|R⁻¹ A| / max|U|.
   double pivot_growth(const double* values) const;
   int supernodes() const { return static_cast<int>(first_.size()) - 1; }
+  std::size_t bytes() const;  ///< of memory, all but some for each column
 
  private:
   /// The rows first .. end − 1 of a column of U: the last ones of a supernode, or those before the

@@ -135,6 +135,7 @@ void TwoStageSystem::add_tangents() {
   const TangentSolver& tangents = *ws_.tangents;
   const SparsePattern& wide = tangents.pattern();
   if (!tangent_solver_) tangent_solver_.reset(new LinearSolver(doubled_solver(model_, wide)));
+  tangent_solver_->set_watch(watch_);
   EvalContext context = model_.context(*end_, Phase::step);
   const auto loads = [&](double seed, std::vector<double>& values) {
     context.seed = seed;
@@ -164,6 +165,15 @@ void TwoStageSystem::add_tangents() {
           out[k] += (block == 0 ? load_by_rate_[wide_first + k] : 0.0) +
                     h * (block == 0 ? f_.w0 : f_.w1) * load_by_value_[wide_first + k];
       }
+}
+
+void TwoStageSystem::set_watch(const Watch& watch) {
+  watch_ = watch;
+  solver_.set_watch(watch);
+}
+
+std::size_t TwoStageSystem::bytes() const {
+  return solver_.bytes() + (tangent_solver_ ? tangent_solver_->bytes() : 0);
 }
 
 bool TwoStageSystem::factor() {

@@ -41,6 +41,8 @@ class TwoStageSystem final : public NewtonSystem {
   void choose_pivots(const State& state, const ThirdOrderFormula& f);
   /// The workspace has other load tangents.
   void tangents_changed() { tangent_solver_.reset(); }
+  void set_watch(const Watch& watch);
+  std::size_t bytes() const;  ///< memory of the factorizations
   /// Starts an iteration of `state`, which stands at its prediction for the end of a step. Its y1,
   /// yp1 and rotations hold the last accepted step. The system refers to it from now on.
   void start(State& state, const ThirdOrderFormula& f);
@@ -74,6 +76,7 @@ class TwoStageSystem final : public NewtonSystem {
   const int n_;
   const SparsePattern pattern_;  ///< of the doubled matrix
   NewtonScratch scratch_;        ///< (2n)
+  Watch watch_;
   LinearSolver solver_;
   State* end_ = nullptr;
   State stage_, marked_stage_;

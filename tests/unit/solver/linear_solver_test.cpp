@@ -44,5 +44,37 @@ TEST(LinearSolver, AloneForgetsWhatItFactored) {
   EXPECT_EQ(solution(used), solution(fresh));
 }
 
+/// What a cancelled call leaves behind has no influence on what comes after it.
+TEST(LinearSolver, StopsWhereItsTokenIsCancelledAndForgetsThat) {
+  LinearSolver fresh = full(), used = full();
+  Values across = kAcross, plain = kPlain;
+  CancelToken token;
+  token.cancel();
+  used.set_watch(Watch(&token));
+  EXPECT_THROW((void)used.analyze(plain.data()), Stopped);
+  used.set_watch(Watch());
+  ASSERT_EQ(fresh.analyze(plain.data()), LinearSolver::Outcome::ok);
+  ASSERT_EQ(used.analyze(plain.data()), LinearSolver::Outcome::ok);
+  used.set_watch(Watch(&token));
+  EXPECT_THROW((void)used.factor(across.data()), Stopped);
+  EXPECT_THROW(used.add_kind({true}, across.data()), Stopped);
+  EXPECT_FALSE(used.select({true}));
+  used.set_watch(Watch());
+  ASSERT_EQ(fresh.factor(across.data()), LinearSolver::Outcome::ok);
+  ASSERT_EQ(used.factor(across.data()), LinearSolver::Outcome::ok);
+  EXPECT_EQ(solution(used), solution(fresh));
+}
+
+TEST(LinearSolver, TellsItsMemory) {
+  LinearSolver solver = full();
+  const std::size_t ordered = solver.bytes();
+  Values plain = kPlain;
+  ASSERT_EQ(solver.analyze(plain.data()), LinearSolver::Outcome::ok);
+  const std::size_t kept = solver.bytes();
+  EXPECT_GE(kept, ordered + 6 * sizeof(double)) << "L, with the diagonal";
+  ASSERT_EQ(solver.factor_alone(plain.data()), LinearSolver::Outcome::ok);
+  EXPECT_GE(solver.bytes(), kept + 9 * sizeof(double)) << "factors of its own besides";
+}
+
 }  // namespace
 }  // namespace mbcosim

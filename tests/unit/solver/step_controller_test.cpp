@@ -16,7 +16,7 @@ using testing::ElementsAre;
 class Scripted final : public StepSystem {
  public:
   double h = 1, longest = 1e9;
-  bool has_strategy = false;
+  bool has_strategy = false, stops = false;
   std::vector<double> attempts;
   std::vector<bool> chosen;
   int explained = 0;
@@ -44,6 +44,7 @@ class Scripted final : public StepSystem {
     else
       advance_time(state, length);
     report.flagged = attempt.accept_unconverged && length > longest;
+    if (stops) throw Stopped{};
     if (length <= longest || report.flagged) {
       state.y[0] += length;
       return report;
@@ -197,6 +198,14 @@ TEST_F(StepControllerTest, GoesBackWhenACallbackThrows) {
     if (accepted) throw 2;  // in the middle of the step
   });
   EXPECT_THROW((void)controller_.advance(state_), int);
+  expect_untouched();
+}
+
+TEST_F(StepControllerTest, TakesAStepBackWhoseFactorizationWasStopped) {
+  system_.stops = true;
+  const PhaseReport report = controller_.advance(state_);
+  ASSERT_TRUE(report.error);
+  EXPECT_EQ(report.error->kind, ErrorKind::cancelled);
   expect_untouched();
 }
 
