@@ -3,6 +3,7 @@
 #include <google/protobuf/util/time_util.h>
 
 #include <cmath>
+#include <exception>
 #include <thread>
 
 #include "wire/refusal.h"
@@ -30,7 +31,7 @@ PeerRejected to_rejection(const std::string& name, const v1::Rejection& rejectio
 }  // namespace
 
 void Port::fill(v1::PortLayout* out) const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   *out = model_.layout();
   out->set_has_peer(link_ != nullptr);
   *out->mutable_peer_timeout() =
@@ -38,7 +39,7 @@ void Port::fill(v1::PortLayout* out) const {
 }
 
 std::optional<v1::PortWait> Port::waiting() const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   if (!waiting_since_) return std::nullopt;
   v1::PortWait wait;
   wait.set_port(model_.name());
@@ -50,7 +51,7 @@ std::optional<v1::PortWait> Port::waiting() const {
 // ------------------------------------------------------------------ the peer's thread
 
 void Port::reserve(const Agreement& agreement) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   if (reserved_)
     throw Refusal(v1::REASON_PORT_TAKEN, in_port(model_.name(), "a peer is attached already"));
   reserved_ = true;
@@ -61,7 +62,7 @@ void Port::reserve(const Agreement& agreement) {
 
 void Port::attach(PeerLink* link, const v1::Welcome& welcome) {
   {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     if (recorder_) recorder_->attached(model_.name(), welcome);
     link_ = link;
     heard_.store(Clock::now().time_since_epoch().count());
@@ -76,18 +77,19 @@ void Port::attach(PeerLink* link, const v1::Welcome& welcome) {
 }
 
 void Port::end(const Refusal& why) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   ended_ = why;
   if (link_) link_->refuse(why);
 }
 
 void Port::detach() {
-  std::unique_lock guard(mutex_);
-  changed_.wait(guard, [&] { return !link_in_use_; });
-  if (recorder_ && link_) recorder_->detached(model_.name());
-  link_ = nullptr;
-  reserved_ = false;
-  guard.unlock();
+  {
+    const Guard guard(mutex_);
+    while (link_in_use_) changed_.wait(mutex_);
+    if (recorder_ && link_) recorder_->detached(model_.name());
+    link_ = nullptr;
+    reserved_ = false;
+  }
   changed_.notify_all();
 }
 
@@ -106,7 +108,7 @@ void Port::receive(const v1::PeerMessage& message) {
 
 void Port::deliver(const v1::PeerExchange& answer) {
   {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     if (answer.index() < 1 || answer.index() > index_ || (answer.index() == index_ && answer_))
       throw Refusal(v1::REASON_OUT_OF_TURN,
                     in_port(model_.name(), "answer to exchange " + std::to_string(answer.index()) +
@@ -154,12 +156,12 @@ void Port::check_rejection(const v1::Rejection& rejection) const {
 // ------------------------------------------------------------------ the session's thread
 
 Agreement Port::agreement() const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return agreement_;
 }
 
 bool Port::has_peer() const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return link_ != nullptr;
 }
 
@@ -174,23 +176,23 @@ void Port::expect_peer() {
 }
 
 bool Port::is_idle() const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return model_.layout().optional() && agreement_.generation == 0;
 }
 
 bool Port::is_waiting() const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return awaited_;
 }
 
 void Port::forget() {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   awaited_ = false;
   answer_.reset();
 }
 
 void Port::await_peer(const CancelToken& cancel) {
-  std::unique_lock guard(mutex_);
+  const Guard guard(mutex_);
   const bool patient =
       agreement_.policy == v1::PEER_POLICY_WAIT || agreement_.policy == v1::PEER_POLICY_FAIL_STEP;
   const bool idle = model_.layout().optional() && agreement_.generation == 0;
@@ -198,36 +200,47 @@ void Port::await_peer(const CancelToken& cancel) {
   const bool forever = agreement_.policy == v1::PEER_POLICY_WAIT;
   const Clock::time_point deadline = Clock::now() + (forever ? longest_wait_ : agreement_.timeout);
   waiting_since_ = Clock::now();
-  while (!link_ && Clock::now() < deadline && !cancel.cancelled()) changed_.wait_for(guard, kLook);
+  while (!link_ && Clock::now() < deadline && !cancel.cancelled()) changed_.wait_for(mutex_, kLook);
   waiting_since_.reset();
 }
 
-// Sending may block while the peer does not read, so it happens without the lock; `detach` waits
-// for its end.
-void Port::send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message) {
+// Without the lock, since a link may block while the peer does not read; `detach` waits for the
+// end, whatever is thrown.
+template <class Use>
+void Port::use_link(Use&& use) {
   PeerLink* link = link_;
-  const Clock::time_point deadline = Clock::now() + agreement_.timeout;
   link_in_use_ = true;
-  guard.unlock();
-  link->send(message, deadline);  // a broken link is noticed by the peer's thread, which detaches
-  guard.lock();
+  mutex_.unlock();
+  std::exception_ptr thrown;
+  try {
+    use(*link);
+  } catch (...) {
+    thrown = std::current_exception();
+  }
+  mutex_.lock();
   link_in_use_ = false;
-  guard.unlock();
   changed_.notify_all();
+  if (thrown) std::rethrow_exception(thrown);
+}
+
+// A broken link is noticed by the peer's thread, which detaches.
+void Port::send_message(const v1::ServerMessage& message) {
+  const Clock::time_point deadline = Clock::now() + agreement_.timeout;
+  use_link([&](PeerLink& link) { link.send(message, deadline); });
 }
 
 void Port::send(v1::ServerMessage& message, int generation) {
-  std::unique_lock guard(mutex_);
+  const Guard guard(mutex_);
   if (!link_ || generation != agreement_.generation) return;
   message.mutable_exchange()->set_index(++index_);
   awaited_ = true;
   answer_.reset();
   if (recorder_) recorder_->sent(model_.name(), message);
-  send_unlocked(guard, message);
+  send_message(message);
 }
 
 std::optional<Answer> Port::take(const CancelToken& cancel) {
-  std::unique_lock guard(mutex_);
+  Guard guard(mutex_);
   for (int spin = 0; spin < kSpins && awaited_ && !answer_ && link_ && !link_->pulls(); ++spin) {
     guard.unlock();
     std::this_thread::yield();
@@ -237,7 +250,7 @@ std::optional<Answer> Port::take(const CancelToken& cancel) {
   const Clock::time_point deadline = Clock::now() + (forever ? longest_wait_ : agreement_.timeout);
   waiting_since_ = Clock::now();
   while (awaited_ && !answer_ && link_ && Clock::now() < deadline && !cancel.cancelled())
-    if (!link_->pulls() || !pull(guard)) changed_.wait_for(guard, kLook);
+    if (!link_->pulls() || !pull()) changed_.wait_for(mutex_, kLook);
   waiting_since_.reset();
   const bool answered = awaited_ && answer_.has_value();
   const bool late = awaited_ && !answered && link_;
@@ -251,21 +264,18 @@ std::optional<Answer> Port::take(const CancelToken& cancel) {
   return std::move(answer_);
 }
 
-// One look at a link that pulls, without the lock. False: nothing will come through it any more.
-bool Port::pull(std::unique_lock<std::mutex>& guard) {
-  PeerLink* link = link_;
-  link_in_use_ = true;
-  guard.unlock();
-  PeerLink::Pulled pulled = link->pull(&pulled_, Clock::now() + kLook);
-  try {
-    if (pulled == PeerLink::Pulled::message) receive(pulled_);
-  } catch (const Refusal& refusal) {
-    link->refuse(refusal);
-    pulled = PeerLink::Pulled::closed;
-  }
-  guard.lock();
-  link_in_use_ = false;
-  changed_.notify_all();
+// One look at a link that pulls. False: nothing will come through it any more.
+bool Port::pull() {
+  PeerLink::Pulled pulled = PeerLink::Pulled::closed;
+  use_link([&](PeerLink& link) {
+    pulled = link.pull(&pulled_, Clock::now() + kLook);
+    try {
+      if (pulled == PeerLink::Pulled::message) receive(pulled_);
+    } catch (const Refusal& refusal) {
+      link.refuse(refusal);
+      pulled = PeerLink::Pulled::closed;
+    }
+  });
   return pulled != PeerLink::Pulled::closed;
 }
 
@@ -291,10 +301,10 @@ std::optional<Answer> Port::go_on_without(const std::string& why) {
 void Port::notify(bool accepted, std::int64_t step, double time) {
   v1::ServerMessage message;
   *(accepted ? message.mutable_accepted() : message.mutable_rejected()) = step_notice(step, time);
-  std::unique_lock guard(mutex_);
+  const Guard guard(mutex_);
   if (!link_) return;
   if (recorder_) recorder_->sent(model_.name(), message);
-  send_unlocked(guard, message);
+  send_message(message);
 }
 
 }  // namespace mbcosim::server

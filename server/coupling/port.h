@@ -3,9 +3,7 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -13,6 +11,7 @@
 #include "coupling/recorder.h"
 #include "mbcosim/v1/coupling.pb.h"
 #include "mbcosim/v1/simulations.pb.h"
+#include "threads/mutex.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -108,30 +107,32 @@ class Port {
 
  private:
   using Clock = std::chrono::steady_clock;
-  void send_unlocked(std::unique_lock<std::mutex>& guard, const v1::ServerMessage& message);
-  bool pull(std::unique_lock<std::mutex>& guard);
-  Answer take_content(const v1::PeerExchange& exchange);
+  template <class Use>
+  void use_link(Use&& use) TS_REQUIRES(mutex_);
+  void send_message(const v1::ServerMessage& message) TS_REQUIRES(mutex_);
+  bool pull() TS_REQUIRES(mutex_);
+  Answer take_content(const v1::PeerExchange& exchange) TS_REQUIRES(mutex_);
   void check_rejection(const v1::Rejection& rejection) const;
   [[noreturn]] void lose(const std::string& why);
-  std::optional<Answer> go_on_without(const std::string& why);
+  std::optional<Answer> go_on_without(const std::string& why) TS_REQUIRES(mutex_);
 
   PortModel model_;
   const std::chrono::milliseconds longest_wait_;
   Recorder* const recorder_;
   std::function<void(const std::string&)> on_missed_;
-  mutable std::mutex mutex_;  // protects all below; `model_` too while an answer is decoded
-  std::condition_variable changed_;
-  Agreement agreement_;
-  bool reserved_ = false, link_in_use_ = false;
-  PeerLink* link_ = nullptr;
-  std::int64_t index_ = 0;     ///< of the last exchange on the present stream
-  bool awaited_ = false;       ///< its answer is wanted
-  v1::PeerExchange received_;  ///< what `answer_` was made of, for the record
-  std::optional<Answer> answer_;
-  std::string peer_failure_;  ///< the peer could not compute
-  std::optional<PeerRejected> rejection_;
-  std::optional<Refusal> ended_;
-  std::optional<Clock::time_point> waiting_since_;
+  mutable Mutex mutex_;  // protects `model_`, too, while an answer is decoded
+  Condition changed_;
+  Agreement agreement_ TS_GUARDED_BY(mutex_);
+  bool reserved_ TS_GUARDED_BY(mutex_) = false, link_in_use_ TS_GUARDED_BY(mutex_) = false;
+  PeerLink* link_ TS_GUARDED_BY(mutex_) = nullptr;
+  std::int64_t index_ TS_GUARDED_BY(mutex_) = 0;     ///< of the last exchange on the present stream
+  bool awaited_ TS_GUARDED_BY(mutex_) = false;       ///< its answer is wanted
+  v1::PeerExchange received_ TS_GUARDED_BY(mutex_);  ///< what `answer_` was made of, for the record
+  std::optional<Answer> answer_ TS_GUARDED_BY(mutex_);
+  std::string peer_failure_ TS_GUARDED_BY(mutex_);  ///< the peer could not compute
+  std::optional<PeerRejected> rejection_ TS_GUARDED_BY(mutex_);
+  std::optional<Refusal> ended_ TS_GUARDED_BY(mutex_);
+  std::optional<Clock::time_point> waiting_since_ TS_GUARDED_BY(mutex_);
   std::atomic<Clock::rep> heard_{0};  ///< when the peer last sent something
   v1::PeerMessage pulled_;            ///< of the session's thread
 };

@@ -15,7 +15,7 @@ v1::StepNotice step_notice(std::int64_t step, double time) {
 }
 
 void Recorder::add(const v1::RecordEntry& entry) {
-  const std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   if (full_) return;
   const v1::RecordEntry* kept = &entry;
   v1::RecordEntry end;
@@ -102,7 +102,7 @@ void Recorder::chosen(const v1::StepRequest& step) {
 }
 
 std::string Recorder::read(std::size_t at, std::size_t size) const {
-  const std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return at < bytes_.size() ? bytes_.substr(at, size) : std::string();
 }
 

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <mutex>
 #include <string>
 
 #include "mbcosim/v1/record.pb.h"
+#include "threads/mutex.h"
 #include "wire/memory.h"
 
 namespace mbcosim::server {
@@ -34,13 +34,13 @@ class Recorder {
   std::string read(std::size_t at, std::size_t size) const;
 
  private:
-  bool has_room(std::int64_t bytes);
+  bool has_room(std::int64_t bytes) TS_REQUIRES(mutex_);
 
   const std::int64_t most_bytes_;
-  mutable std::mutex mutex_;  // protects all below
-  MemoryShare memory_;        ///< at least that of `bytes_`
-  std::string bytes_;
-  bool full_ = false;
+  mutable Mutex mutex_;
+  MemoryShare memory_ TS_GUARDED_BY(mutex_);  ///< at least that of `bytes_`
+  std::string bytes_ TS_GUARDED_BY(mutex_);
+  bool full_ TS_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace mbcosim::server

@@ -2,6 +2,8 @@
 
 #include <sys/socket.h>
 
+#include "threads/top_frame.h"
+
 namespace mbcosim::server::http {
 namespace {
 
@@ -9,11 +11,11 @@ constexpr std::chrono::milliseconds kLook{100};  // how late a socket may be end
 
 }  // namespace
 
-Reaper::Reaper() : thread_([this] { loop(); }) {}
+Reaper::Reaper() : thread_([this] { run_caught("http reaper", [this] { loop(); }); }) {}
 
 Reaper::~Reaper() {
   {
-    const std::lock_guard lock(mutex_);
+    const Guard lock(mutex_);
     stop_ = true;
   }
   changed_.notify_one();
@@ -22,21 +24,21 @@ Reaper::~Reaper() {
 
 void Reaper::arm(int socket, std::chrono::milliseconds time) {
   if (socket < 0) return;
-  const std::lock_guard lock(mutex_);
+  const Guard lock(mutex_);
   deadlines_[socket] = Clock::now() + time;
   if (deadlines_.size() == 1) changed_.notify_one();
 }
 
 void Reaper::disarm(int socket) {
-  const std::lock_guard lock(mutex_);
+  const Guard lock(mutex_);
   deadlines_.erase(socket);
 }
 
 void Reaper::loop() {
-  std::unique_lock lock(mutex_);
+  const Guard lock(mutex_);
   while (!stop_) {
     if (deadlines_.empty()) {
-      changed_.wait(lock);
+      changed_.wait(mutex_);
       continue;
     }
     const Clock::time_point now = Clock::now();
@@ -45,7 +47,7 @@ void Reaper::loop() {
       if (late) ::shutdown(entry->first, SHUT_RDWR);
       entry = late ? deadlines_.erase(entry) : std::next(entry);
     }
-    changed_.wait_for(lock, kLook);
+    changed_.wait_for(mutex_, kLook);
   }
 }
 

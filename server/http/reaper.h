@@ -3,10 +3,10 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <map>
-#include <mutex>
 #include <thread>
+
+#include "threads/mutex.h"
 
 namespace mbcosim::server::http {
 
@@ -27,10 +27,10 @@ class Reaper {
  private:
   void loop();
 
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::map<int, Clock::time_point> deadlines_;  ///< by socket
-  bool stop_ = false;
+  Mutex mutex_;
+  Condition changed_;
+  std::map<int, Clock::time_point> deadlines_ TS_GUARDED_BY(mutex_);  ///< by socket
+  bool stop_ TS_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -141,7 +141,7 @@ class RpcHandler::StreamPlace {
  public:
   StreamPlace(RpcHandler& handler, const std::string& identity)
       : handler_(handler), identity_(identity) {
-    const std::lock_guard lock(handler_.mutex_);
+    const Guard lock(handler_.mutex_);
     int& mine = handler_.streams_[identity_];
     if (mine >= handler_.limits_.streams_per_identity ||
         handler_.open_streams_ >= handler_.limits_.streams)
@@ -151,7 +151,7 @@ class RpcHandler::StreamPlace {
     held_ = true;
   }
   ~StreamPlace() {
-    const std::lock_guard lock(handler_.mutex_);
+    const Guard lock(handler_.mutex_);
     const auto mine = handler_.streams_.find(identity_);
     if (held_) --handler_.open_streams_, --mine->second;
     if (mine->second == 0) handler_.streams_.erase(mine);

@@ -7,12 +7,12 @@
 #include <atomic>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "http/codec.h"
 #include "http/connection.h"
 #include "http/generic_call.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::server::http {
 
@@ -59,9 +59,9 @@ class RpcHandler {
   std::shared_ptr<grpc::Channel> channel_;
   const Limits limits_;
   std::atomic<bool> closing_{false};
-  std::mutex mutex_;
-  std::map<std::string, int> streams_;  ///< open ones by identity
-  int open_streams_ = 0;
+  Mutex mutex_;
+  std::map<std::string, int> streams_ TS_GUARDED_BY(mutex_);  ///< open ones by identity
+  int open_streams_ TS_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace mbcosim::server::http

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <mutex>
 #include <optional>
+
+#include "threads/mutex.h"
 
 namespace mbcosim::server {
 
@@ -18,28 +19,28 @@ class Lease {
 
   /// False: it has ended.
   bool take() {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     if (!ended_) ++uses_;
     return !ended_;
   }
   void give_back() {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     --uses_;
     last_use_ = Clock::now();
     warned_ = false;
   }
   /// Has nobody used it for its length?
   bool is_over(Clock::time_point now) const {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     return !ended_ && uses_ == 0 && now - last_use_ > length_;
   }
   void renew() {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     last_use_ = Clock::now();
   }
   /// True: it ends now, because nobody uses it and its time is over.
   bool expire(Clock::time_point now) {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     if (ended_ || uses_ > 0 || now - last_use_ <= length_) return false;
     ended_ = true;
     return true;
@@ -47,27 +48,27 @@ class Lease {
   /// Once, shortly before it expires: what is left of it.
   std::optional<Clock::duration> warn(Clock::time_point now) {
     const Clock::duration notice = std::min<Clock::duration>(length_ / 4, std::chrono::minutes(1));
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     const Clock::duration left = length_ - (now - last_use_);
     if (ended_ || uses_ > 0 || warned_ || left > notice) return std::nullopt;
     warned_ = true;
     return std::max(left, Clock::duration::zero());
   }
   void end() {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     ended_ = true;
   }
   bool ended() const {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     return ended_;
   }
 
  private:
   const std::chrono::milliseconds length_;
-  mutable std::mutex mutex_;  // protects all below
-  int uses_ = 0;
-  Clock::time_point last_use_ = Clock::now();
-  bool ended_ = false, warned_ = false;
+  mutable Mutex mutex_;
+  int uses_ TS_GUARDED_BY(mutex_) = 0;
+  Clock::time_point last_use_ TS_GUARDED_BY(mutex_) = Clock::now();
+  bool ended_ TS_GUARDED_BY(mutex_) = false, warned_ TS_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace mbcosim::server

@@ -6,7 +6,7 @@ namespace mbcosim::server {
 
 void SessionStatus::publish(const Simulation& simulation) {
   const double next_step = simulation.next_step_size();
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   view_.step = simulation.step_number();
   view_.time = simulation.time();
   view_.next_step = next_step;
@@ -14,50 +14,50 @@ void SessionStatus::publish(const Simulation& simulation) {
 }
 
 void SessionStatus::set_display_name(const std::string& name) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   view_.display_name = name;
 }
 
 void SessionStatus::set_policy(const StepPolicy& policy) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   view_.policy = policy;
 }
 
 void SessionStatus::count_late_step(double delay) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   ++view_.late_steps;
   view_.worst_delay = std::max(view_.worst_delay, delay);
 }
 
 void SessionStatus::remember_failure(const std::string& why) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   view_.last_failure = why;
 }
 
 void SessionStatus::fail(const std::string& why) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   view_.failed = true;
   view_.last_failure = why;
 }
 
 void SessionStatus::recover() {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   view_.failed = false;
   view_.last_failure.clear();
 }
 
 bool SessionStatus::failed() const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return view_.failed;
 }
 
 bool SessionStatus::stepping() const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return view_.stepping;
 }
 
 bool SessionStatus::claim(CancelToken* token) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   if (view_.stepping) return false;
   view_.stepping = true;
   running_ = token;
@@ -65,13 +65,13 @@ bool SessionStatus::claim(CancelToken* token) {
 }
 
 void SessionStatus::release() {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   view_.stepping = false;
   running_ = nullptr;
 }
 
 bool SessionStatus::interrupt() {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   if (!running_) return false;
   running_->cancel();
   return true;

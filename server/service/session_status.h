@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <mutex>
 #include <string>
 
 #include "simulation/simulation.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::server {
 
@@ -22,7 +22,7 @@ class SessionStatus {
     double worst_delay = 0;       ///< [s]
   };
   View view() const {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     return view_;
   }
   void publish(const Simulation& simulation);
@@ -44,9 +44,9 @@ class SessionStatus {
   bool interrupt();
 
  private:
-  mutable std::mutex mutex_;  // protects all below
-  View view_;
-  CancelToken* running_ = nullptr;
+  mutable Mutex mutex_;
+  View view_ TS_GUARDED_BY(mutex_);
+  CancelToken* running_ TS_GUARDED_BY(mutex_) = nullptr;
 };
 
 }  // namespace mbcosim::server

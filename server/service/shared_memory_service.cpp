@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "service/peer_seat.h"
+#include "threads/mutex.h"
 #include "threads/top_frame.h"
 
 namespace mbcosim::server {
@@ -104,7 +105,7 @@ class SharedMemoryStream : public PeerLink {
     }
   }
   void refuse(const Refusal& refusal) override {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     if (!refusal_) refusal_ = refusal;
     channel_.close();
   }
@@ -148,15 +149,15 @@ class SharedMemoryStream : public PeerLink {
     }
   }
   void throw_refusal() {
-    std::lock_guard guard(mutex_);
+    const Guard guard(mutex_);
     if (refusal_) throw Refusal(*refusal_);
   }
 
   shm::Channel& channel_;
   const Gate& gate_;
   const std::atomic<bool>& stop_;
-  std::mutex mutex_;
-  std::optional<Refusal> refusal_;
+  Mutex mutex_;
+  std::optional<Refusal> refusal_ TS_GUARDED_BY(mutex_);
 };
 
 }  // namespace

@@ -34,7 +34,7 @@ int number_of_snapshot(const std::string& name, std::string* simulation) {
 }
 
 void SnapshotShelf::check_room(std::int64_t bytes) const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   require_room(bytes);
   const MemoryShare probe(memory_, bytes);
 }
@@ -51,7 +51,7 @@ void SnapshotShelf::require_room(std::int64_t bytes) const {
 int SnapshotShelf::add(State state, const std::string& display_name, v1::Snapshot* out,
                        std::int64_t results_end) {
   const std::int64_t bytes = size_of(state), agrees_until = std::min(results_end, state.step);
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   require_room(bytes);
   MemoryShare share(memory_, bytes);
   const auto added =
@@ -63,22 +63,22 @@ int SnapshotShelf::add(State state, const std::string& display_name, v1::Snapsho
 }
 
 State SnapshotShelf::get(int number) const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return find(number).state;
 }
 
 std::int64_t SnapshotShelf::agrees_until(int number) const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return find(number).agrees_until;
 }
 
 void SnapshotShelf::results_end_at(std::int64_t step) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   for (auto& [number, saved] : saved_) saved.agrees_until = std::min(saved.agrees_until, step);
 }
 
 std::int64_t SnapshotShelf::remove(int number) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   const std::int64_t step = find(number).state.step;
   bytes_ -= find(number).share.bytes();
   saved_.erase(number);
@@ -86,12 +86,12 @@ std::int64_t SnapshotShelf::remove(int number) {
 }
 
 void SnapshotShelf::list(v1::ListSnapshotsReply* out) const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   for (const auto& [number, saved] : saved_) fill(number, saved, out->add_snapshots());
 }
 
 void SnapshotShelf::describe(v1::CheckpointPoint* out) const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   out->set_next_snapshot(next_);
   for (const auto& [number, saved] : saved_) {
     v1::CheckpointSnapshot* snapshot = out->add_snapshots();
@@ -102,14 +102,14 @@ void SnapshotShelf::describe(v1::CheckpointPoint* out) const {
 }
 
 std::optional<State> SnapshotShelf::find_state(int number) const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   const auto found = saved_.find(number);
   return found == saved_.end() ? std::nullopt : std::optional(found->second.state);
 }
 
 void SnapshotShelf::put(const v1::CheckpointSnapshot& snapshot, State state) {
   const std::int64_t bytes = size_of(state);
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   require_room(bytes);
   MemoryShare share(memory_, bytes);
   saved_.emplace(snapshot.number(), Saved{snapshot.display_name(), std::move(state),
@@ -118,7 +118,7 @@ void SnapshotShelf::put(const v1::CheckpointSnapshot& snapshot, State state) {
 }
 
 void SnapshotShelf::go_on_from(int number) {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   next_ = std::max(next_, number);
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -11,6 +10,7 @@
 #include "mbcosim/v1/simulations.pb.h"
 #include "model/state.h"
 #include "service/config.h"
+#include "threads/mutex.h"
 #include "wire/memory.h"
 
 namespace mbcosim::server {
@@ -63,17 +63,17 @@ class SnapshotShelf {
     MemoryShare share;
     std::int64_t agrees_until;
   };
-  void require_room(std::int64_t bytes) const;
-  const Saved& find(int number) const;
+  void require_room(std::int64_t bytes) const TS_REQUIRES(mutex_);
+  const Saved& find(int number) const TS_REQUIRES(mutex_);
   void fill(int number, const Saved& saved, v1::Snapshot* out) const;
 
   const std::string simulation_, digest_;
   const ServiceLimits& limits_;
   MemoryBudget& memory_;
-  mutable std::mutex mutex_;  // protects all below
-  std::map<int, Saved> saved_;
-  int next_ = 1;
-  std::int64_t bytes_ = 0;
+  mutable Mutex mutex_;
+  std::map<int, Saved> saved_ TS_GUARDED_BY(mutex_);
+  int next_ TS_GUARDED_BY(mutex_) = 1;
+  std::int64_t bytes_ TS_GUARDED_BY(mutex_) = 0;
 };
 
 /// Number in "simulations/ID/snapshots/N"; `simulation` gets its name. Throws NO_SUCH_SNAPSHOT when
