@@ -6,15 +6,11 @@
 #include <cmath>
 #include <map>
 
+#include "wire/convert.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {
-
-std::chrono::milliseconds milliseconds(const google::protobuf::Duration& duration) {
-  return std::chrono::milliseconds(
-      google::protobuf::util::TimeUtil::DurationToMilliseconds(duration));
-}
 
 /// Collects what does not fit in a handshake, so that all of it is told at once.
 class Mismatches {
@@ -132,13 +128,14 @@ void check_iteration(const v1::InterfaceIteration& iteration, Mismatches& mismat
 
 void check_presence(const v1::PeerPresence& presence, Mismatches& mismatches) {
   constexpr std::chrono::milliseconds kShortest(10);
-  const auto interval = milliseconds(presence.heartbeat_interval()),
-             timeout = milliseconds(presence.heartbeat_timeout());
+  const auto interval = milliseconds_of(presence.heartbeat_interval(), "heartbeat_interval"),
+             timeout = milliseconds_of(presence.heartbeat_timeout(), "heartbeat_timeout");
   mismatches.expect(v1::PeerPolicy_IsValid(presence.policy()), "presence",
                     "a choice is unknown to this server");
-  mismatches.expect(!presence.has_peer_timeout() ||
-                        milliseconds(presence.peer_timeout()) > std::chrono::milliseconds(0),
-                    "peer_timeout", "must be positive");
+  mismatches.expect(
+      !presence.has_peer_timeout() ||
+          milliseconds_of(presence.peer_timeout(), "peer_timeout") > std::chrono::milliseconds(0),
+      "peer_timeout", "must be positive");
   mismatches.expect(!presence.has_heartbeat_interval() || interval >= kShortest,
                     "heartbeat_interval", "must be at least 10 ms");
   mismatches.expect(!presence.has_heartbeat_timeout() || timeout >= std::max(interval, kShortest),
@@ -181,9 +178,11 @@ Agreement choose(const v1::Hello& hello, const PortModel& port) {
   if (iteration.has_maximum_passes()) agreement.maximum_passes = iteration.maximum_passes();
   const v1::PeerPresence& presence = hello.presence();
   agreement.policy = chosen(presence.policy(), agreement.policy);
-  if (presence.has_peer_timeout()) agreement.timeout = milliseconds(presence.peer_timeout());
-  agreement.heartbeat_interval = milliseconds(presence.heartbeat_interval());
-  agreement.heartbeat_timeout = milliseconds(presence.heartbeat_timeout());
+  if (presence.has_peer_timeout())
+    agreement.timeout = milliseconds_of(presence.peer_timeout(), "peer_timeout");
+  agreement.heartbeat_interval =
+      milliseconds_of(presence.heartbeat_interval(), "heartbeat_interval");
+  agreement.heartbeat_timeout = milliseconds_of(presence.heartbeat_timeout(), "heartbeat_timeout");
   return agreement;
 }
 

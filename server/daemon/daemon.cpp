@@ -177,7 +177,12 @@ void Daemon::expose_metrics() {
     throw std::runtime_error("refused to serve metrics on " + config_.metrics +
                              ": they are told to anybody; an address other than loopback needs "
                              "--insecure");
-  metrics_.expose(config_.metrics);
+  try {
+    metrics_.expose(config_.metrics);
+  } catch (const std::exception& error) {
+    throw std::runtime_error("cannot serve metrics on " + config_.metrics +
+                             ", which must be HOST:PORT: " + error.what());
+  }
 }
 
 void Daemon::add_methods() {

@@ -12,6 +12,8 @@
 namespace mbcosim::server {
 namespace {
 
+constexpr std::int64_t kLongestTime = 1'000'000'000;  ///< [s], some 30 years
+
 void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   const auto add = [&](const char* name, auto& value, const char* help) {
     app.add_option(name, value, help)
@@ -71,7 +73,11 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
       "Bytes of the result files of one simulation, default and largest quota");
   add("--limit-results-root-bytes", limits.results_root_bytes,
       "Bytes of all result files in the folder of results, quotas of running simulations included");
-  add("--lease", lease, "Seconds that a simulation lives without calls, default and longest");
+  app.add_option("--lease", lease,
+                 "Seconds that a simulation lives without calls, default and longest")
+      ->group("Limits")
+      ->capture_default_str()
+      ->check(CLI::Range(std::int64_t{1}, kLongestTime));
 }
 
 // Every option is also an environment variable: --model-root is MBCOSIMD_MODEL_ROOT.
@@ -170,7 +176,7 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--suspended-expiry", suspended_expiry,
                  "Seconds after which a suspended simulation is removed")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(std::int64_t{1}, kLongestTime));
   app.add_option("--results-root", config.results_root,
                  "Folder in which simulations may have folders for result files")
       ->check(CLI::ExistingDirectory);

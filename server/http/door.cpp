@@ -13,6 +13,7 @@
 #include "http/reaper.h"
 #include "http/rpc_error.h"
 #include "http/rpc_handler.h"
+#include "threads/top_frame.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server::http {
@@ -140,14 +141,20 @@ void Door::Impl::fail(Connection& connection, v1::Reason reason, const std::stri
 
 int Door::Impl::serve(mg_connection* raw) {
   opened.wait();
-  Connection connection(raw, reaper);
-  try {
-    route(connection);
-  } catch (const std::exception& error) {
-    spdlog::error("http {}: {}", connection.path(), error.what());
-    fail(connection, v1::REASON_INTERNAL, "internal error");
-  }
-  return connection.status();
+  int status = 500;
+  run_caught("http", [&] {
+    Connection connection(raw, reaper);
+    try {
+      route(connection);
+    } catch (const Refusal& refusal) {
+      fail(connection, refusal.reason(), refusal.what());
+    } catch (const std::exception& error) {
+      spdlog::error("http {}: {}", connection.path(), error.what());
+      fail(connection, v1::REASON_INTERNAL, "internal error");
+    }
+    status = connection.status();
+  });
+  return status;
 }
 
 void Door::Impl::route(Connection& connection) {

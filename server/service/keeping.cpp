@@ -1,13 +1,10 @@
 #include "service/keeping.h"
 
-#include <google/protobuf/util/time_util.h>
-
+#include "wire/convert.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
 namespace {
-
-using google::protobuf::util::TimeUtil;
 
 constexpr std::int64_t kLongestJournal = 64 << 20;  // a checkpoint takes its place then
 constexpr std::chrono::seconds kPause(1);           // also where checkpoints fail
@@ -15,8 +12,8 @@ constexpr std::chrono::seconds kPause(1);           // also where checkpoints fa
 std::chrono::milliseconds interval_of(const v1::CreateOptions& options,
                                       std::chrono::milliseconds usual) {
   if (!options.has_checkpoint_interval()) return usual;
-  const std::chrono::milliseconds interval(
-      TimeUtil::DurationToMilliseconds(options.checkpoint_interval()));
+  const std::chrono::milliseconds interval =
+      milliseconds_of(options.checkpoint_interval(), "checkpoint_interval");
   if (interval <= std::chrono::milliseconds(0))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`checkpoint_interval` must be at least 1 ms");
   return interval;

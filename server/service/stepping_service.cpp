@@ -1,5 +1,4 @@
 /// Methods that advance simulations.
-#include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
 #include <atomic>
@@ -9,12 +8,12 @@
 #include "service/durability.h"
 #include "service/row_table.h"
 #include "service/simulations_service.h"
+#include "wire/convert.h"
 
 namespace mbcosim::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using google::protobuf::util::TimeUtil;
 
 // ------------------------------------------------------------------ StepStream
 
@@ -77,10 +76,11 @@ class Progress {
     end_time_ = info_.final_time();
     if (request.step().has_until_time())
       end_time_ = std::min(end_time_, request.step().until_time());
-    const auto wanted = request.has_progress_interval()
-                            ? TimeUtil::DurationToMilliseconds(request.progress_interval())
-                            : 500;
-    interval_ = std::chrono::milliseconds(std::max<std::int64_t>(wanted, 20));
+    constexpr std::chrono::milliseconds kUsual(500), kShortest(20);
+    interval_ = kUsual;
+    if (request.has_progress_interval())
+      interval_ =
+          std::max(milliseconds_of(request.progress_interval(), "progress_interval"), kShortest);
   }
 
   /// Sends what is due, unless the client has not taken the last one.

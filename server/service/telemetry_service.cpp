@@ -5,6 +5,8 @@
 
 #include <optional>
 
+#include "wire/convert.h"
+
 namespace mbcosim::server {
 namespace {
 
@@ -49,10 +51,8 @@ Subscription::Options make_options(const v1::SubscribeRequest& request, const Se
     throw limit_refusal("telemetry_samples", limits.telemetry_samples,
                         "the buffer is larger than allowed");
   if (request.has_buffer_samples()) options.capacity = request.buffer_samples();
-  if (request.has_block_timeout()) {
-    options.block_timeout = std::chrono::milliseconds(
-        google::protobuf::util::TimeUtil::DurationToMilliseconds(request.block_timeout()));
-  }
+  if (request.has_block_timeout())
+    options.block_timeout = milliseconds_of(request.block_timeout(), "block_timeout");
   return options;
 }
 

@@ -1,6 +1,9 @@
 #include "wire/convert.h"
 
+#include <google/protobuf/util/time_util.h>
+
 #include <cstdio>
+#include <cstdlib>
 
 #include "wire/refusal.h"
 
@@ -53,6 +56,21 @@ v1::Causality to_proto(Causality causality) {
 }
 
 }  // namespace
+
+std::chrono::milliseconds milliseconds_of(const google::protobuf::Duration& duration,
+                                          const char* field) {
+  constexpr std::int64_t kLongest = 1'000'000'000;
+  constexpr std::int32_t kSecond = 1'000'000'000;  // [ns]
+  const bool fits = std::abs(duration.nanos()) < kSecond && duration.seconds() <= kLongest &&
+                    duration.seconds() >= -kLongest;
+  if (!fits)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`" + std::string(field) +
+                      "` is no duration of at most 10^9 s: " + std::to_string(duration.seconds()) +
+                      " s and " + std::to_string(duration.nanos()) + " ns");
+  return std::chrono::milliseconds(
+      google::protobuf::util::TimeUtil::DurationToMilliseconds(duration));
+}
 
 std::string utf8(const std::string& text) {
   std::string out;

@@ -1,6 +1,10 @@
 /// Engine types to wire types.
 #pragma once
 
+#include <google/protobuf/duration.pb.h>
+
+#include <chrono>
+
 #include "math/hash.h"
 #include "mbcosim/v1/simulations.pb.h"
 #include "simulation/load.h"
@@ -20,6 +24,10 @@ void to_proto(const Model& model, const ElementRef& element, v1::ElementDescript
 void to_proto(const DeckSymbol& symbol, v1::DeckSymbol* out);
 v1::StepOutcome to_proto(StepOutcome outcome);
 v1::NonConvergencePolicy to_proto(const StepPolicy& policy);
+/// Throws BAD_ARGUMENT, naming the field, for more than 10⁹ s (some 30 years) either way, which the
+/// clocks could not take.
+std::chrono::milliseconds milliseconds_of(const google::protobuf::Duration& duration,
+                                          const char* field);
 std::string utf8(const std::string& text);  ///< bytes that are not UTF-8 replaced by '?'
 
 }  // namespace mbcosim::server

@@ -59,5 +59,19 @@ TEST(Utf8, ReplacesOnlyWhatIsNotUtf8) {
   EXPECT_EQ(utf8("\xed\xa0\x80"), "???");
 }
 
+TEST(Durations, ThatNoClockCouldTakeAreRefused) {
+  google::protobuf::Duration duration;
+  duration.set_seconds(2);
+  duration.set_nanos(500'000'000);
+  EXPECT_EQ(milliseconds_of(duration, "lease"), std::chrono::milliseconds(2500));
+  duration.set_seconds(1'000'000'001);
+  EXPECT_THROW((void)milliseconds_of(duration, "lease"), Refusal);
+  duration.set_seconds(INT64_MIN);
+  EXPECT_THROW((void)milliseconds_of(duration, "lease"), Refusal);
+  duration.set_seconds(0);
+  duration.set_nanos(1'000'000'000);
+  EXPECT_THROW((void)milliseconds_of(duration, "lease"), Refusal);
+}
+
 }  // namespace
 }  // namespace mbcosim::server
