@@ -1,5 +1,4 @@
 /// Methods that make simulations, or only look at a deck.
-#include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
 #include <optional>
@@ -12,8 +11,6 @@
 
 namespace mbcosim::server {
 namespace {
-
-using google::protobuf::util::TimeUtil;
 
 [[noreturn]] void refuse_deck(const LoadReport& report) {
   Error error;
@@ -50,7 +47,7 @@ Session::Identity make_identity(std::string name, const v1::CreateOptions& optio
   identity.request_digest = digest;
   identity.lease = limits.lease;
   if (options.has_lease()) {
-    const std::chrono::milliseconds lease(TimeUtil::DurationToMilliseconds(options.lease()));
+    const std::chrono::milliseconds lease = milliseconds_of(options.lease(), "lease");
     if (lease <= std::chrono::milliseconds(0))
       throw Refusal(v1::REASON_BAD_ARGUMENT, "`lease` must be positive");
     if (lease > identity.lease)
@@ -337,8 +334,9 @@ class ValidateInlineHandler final : public OneRequest<v1::InlineUpload> {
 // ------------------------------------------------------------------ ForkSimulation
 
 /// A fork, with result files of its own.
-std::unique_ptr<Simulation> branch(Session& source, int snapshot, SessionResults* results) {
-  std::unique_ptr<Simulation> simulation = source.fork(snapshot);
+std::unique_ptr<Simulation> branch(Session& source, int snapshot, SessionResults* results,
+                                   const CancelToken& cancel) {
+  std::unique_ptr<Simulation> simulation = source.fork(snapshot, cancel);
   if (!results) return simulation;
   const Status begun = simulation->write_to(results->start(simulation->model()));
   if (!begun) throw Refusal(results->without_paths(begun.error()));
@@ -347,7 +345,8 @@ std::unique_ptr<Simulation> branch(Session& source, int snapshot, SessionResults
 
 class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
  public:
-  explicit ForkHandler(const Parts& parts) : OneRequest(Lane::work), parts_(parts), fresh_(parts) {}
+  explicit ForkHandler(const Parts& parts)
+      : OneRequest(Lane::heavy), parts_(parts), fresh_(parts) {}
 
  private:
   void serve(Exchange& exchange, const v1::ForkSimulationRequest& request) override {
@@ -377,10 +376,11 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
     KeptDeck deck;
     const bool durable = parts_.durability.wanted(request.options(), &*source);
     if (durable) deck = parts_.durability.deck_of(*source);
-    const auto make = [&](const CancelToken&, SessionResults* results, Session::Origin* origin) {
+    const auto make = [&](const CancelToken& token, SessionResults* results,
+                          Session::Origin* origin) {
       *origin = source->origin();
       origin->forked = true;
-      return branch(*source, number, results);
+      return branch(*source, number, results, token);
     };
     return fresh_.add(request.options(), digest, exchange, durable ? &deck : nullptr, make,
                       request.simulation());

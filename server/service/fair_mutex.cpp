@@ -5,34 +5,45 @@
 
 namespace mbcosim::server {
 
-SolverSlots::Slot SolverSlots::acquire(const CancelToken& cancel) {
-  std::unique_lock guard(mutex_);
-  if (free_ > 0 && waiting_.empty()) {
-    --free_;
-    return Slot(this);
-  }
-  Waiter waiter;
-  waiting_.push_back(&waiter);
-  while (!waiter.granted) {
-    waiter.granted_signal.wait_for(guard, std::chrono::milliseconds(10));
-    if (!waiter.granted && cancel.cancelled()) {
-      waiting_.erase(std::find(waiting_.begin(), waiting_.end(), &waiter));
-      return Slot(nullptr);
-    }
-  }
-  return Slot(this);
+bool SolverSlots::take(const std::string& owner) {
+  int& held = held_[owner];
+  if (free_ <= 0 && held > 0) return false;
+  --free_;
+  ++held;
+  return true;
 }
 
-void SolverSlots::release() {
-  std::lock_guard guard(mutex_);
-  if (waiting_.empty()) {
-    ++free_;
-    return;
+SolverSlots::Slot SolverSlots::acquire(const std::string& owner, const CancelToken& cancel) {
+  const Guard guard(mutex_);
+  const bool first = waiting_.empty() || held_.count(owner) == 0;
+  if (first && take(owner)) return {this, owner};
+  Waiter waiter{owner, {}, false};
+  waiting_.push_back(&waiter);
+  while (!waiter.granted) {
+    waiter.granted_signal.wait_for(mutex_, std::chrono::milliseconds(10));
+    if (!waiter.granted && cancel.cancelled()) {
+      waiting_.erase(std::find(waiting_.begin(), waiting_.end(), &waiter));
+      return {};
+    }
   }
-  Waiter* first = waiting_.front();
-  waiting_.pop_front();
-  first->granted = true;
-  first->granted_signal.notify_one();
+  return {this, owner};
+}
+
+void SolverSlots::release(const std::string& owner) {
+  const Guard guard(mutex_);
+  ++free_;
+  const auto held = held_.find(owner);
+  if (--held->second == 0) held_.erase(held);
+  for (auto next = waiting_.begin(); next != waiting_.end();) {
+    Waiter& waiter = **next;
+    if (!take(waiter.owner)) {
+      ++next;
+      continue;
+    }
+    next = waiting_.erase(next);
+    waiter.granted = true;
+    waiter.granted_signal.notify_one();
+  }
 }
 
 }  // namespace mbcosim::server

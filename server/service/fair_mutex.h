@@ -1,51 +1,55 @@
 /// Locks that serve whoever waits longest.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
-#include <mutex>
+#include <map>
+#include <string>
+#include <utility>
 
 #include "simulation/simulation.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::server {
 
 /// A mutex that is granted in the order of requests: a session that steps without pause still
 /// answers its readers.
-class FairMutex {
+class TS_CAPABILITY("mutex") FairMutex {
  public:
-  bool try_lock() {
-    std::lock_guard guard(mutex_);
+  bool try_lock() TS_TRY_ACQUIRE(true) {
+    const Guard guard(mutex_);
     if (serving_ != next_) return false;
     ++next_;
     return true;
   }
-  void lock() {
-    std::unique_lock guard(mutex_);
+  void lock() TS_ACQUIRE() {
+    const Guard guard(mutex_);
     const std::uint64_t ticket = next_++;
-    turn_.wait(guard, [&] { return serving_ == ticket; });
+    while (serving_ != ticket) turn_.wait(mutex_);
   }
-  void unlock() {
+  void unlock() TS_RELEASE() {
     {
-      std::lock_guard guard(mutex_);
+      const Guard guard(mutex_);
       ++serving_;
       if (serving_ == next_) return;
     }
     turn_.notify_all();
   }
   /// Does anybody wait while the caller holds the lock?
-  bool contended() {
-    std::lock_guard guard(mutex_);
+  bool contended() TS_EXCLUDES(mutex_) {
+    const Guard guard(mutex_);
     return next_ - serving_ > 1;
   }
 
  private:
-  std::mutex mutex_;
-  std::condition_variable turn_;
-  std::uint64_t next_ = 0, serving_ = 0;
+  Mutex mutex_;
+  Condition turn_;
+  std::uint64_t next_ TS_GUARDED_BY(mutex_) = 0, serving_ TS_GUARDED_BY(mutex_) = 0;
 };
 
-/// The bounded pool: so many sessions may be inside the solver at once, first come first served.
+/// The bounded pool: so many sessions may be inside the solver at once, first come first served. A
+/// step cannot be taken off its slot, and that of a large model may take long: so an owner without
+/// any slot gets one at once, beyond the number.
 class SolverSlots {
  public:
   explicit SolverSlots(int count) : free_(count) {}
@@ -53,30 +57,41 @@ class SolverSlots {
   /// A slot while it lives. Test it: empty when the wait was cancelled.
   class Slot {
    public:
-    explicit Slot(SolverSlots* slots) : slots_(slots) {}
-    Slot(Slot&& other) noexcept : slots_(other.slots_) { other.slots_ = nullptr; }
+    Slot() = default;
+    Slot(SolverSlots* slots, const std::string& owner) : slots_(slots), owner_(&owner) {}
+    Slot(Slot&& other) noexcept
+        : slots_(std::exchange(other.slots_, nullptr)), owner_(other.owner_) {}
     Slot& operator=(Slot&&) = delete;
     ~Slot() {
-      if (slots_) slots_->release();
+      if (slots_) slots_->release(*owner_);
     }
     explicit operator bool() const { return slots_ != nullptr; }
 
    private:
-    SolverSlots* slots_;
+    SolverSlots* slots_ = nullptr;
+    const std::string* owner_ = nullptr;
   };
 
-  Slot acquire(const CancelToken& cancel);
+  /// `owner` outlives the slot.
+  Slot acquire(const std::string& owner, const CancelToken& cancel) TS_EXCLUDES(mutex_);
+  std::size_t waiting() TS_EXCLUDES(mutex_) {
+    const Guard guard(mutex_);
+    return waiting_.size();
+  }
 
  private:
   struct Waiter {
-    std::condition_variable granted_signal;
+    const std::string& owner;
+    Condition granted_signal;
     bool granted = false;
   };
-  void release();
+  bool take(const std::string& owner) TS_REQUIRES(mutex_);
+  void release(const std::string& owner) TS_EXCLUDES(mutex_);
 
-  std::mutex mutex_;
-  int free_;
-  std::deque<Waiter*> waiting_;
+  Mutex mutex_;
+  int free_ TS_GUARDED_BY(mutex_);                         ///< negative: as many beyond the number
+  std::map<std::string, int> held_ TS_GUARDED_BY(mutex_);  ///< by owner
+  std::deque<Waiter*> waiting_ TS_GUARDED_BY(mutex_);
 };
 
 }  // namespace mbcosim::server

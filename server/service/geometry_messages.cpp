@@ -77,11 +77,12 @@ void fill(const Owner& owner, const WrittenCard& card, v1::DeckCard* out) {
 
 }  // namespace
 
-GeometryMessages::GeometryMessages(std::unique_ptr<Simulation> simulation, DeckFiles files,
-                                   const v1::DescribeGeometryRequest& request)
-    : simulation_(std::move(simulation)),
-      model_(simulation_->model()),
-      view_(model_, simulation_->state()),
+GeometryMessages::GeometryMessages(const Model& model, State state, Handles handles,
+                                   DeckFiles files, const v1::DescribeGeometryRequest& request)
+    : model_(model),
+      state_(std::move(state)),
+      handle_of_(std::move(handles)),
+      view_(model_, state_),
       files_(std::move(files)),
       request_(request) {
   if (request.has_line_samples() && (request.line_samples() < 2 || request.line_samples() > 1000))
@@ -125,8 +126,8 @@ bool GeometryMessages::next(v1::DescribeGeometryReply* reply) {
 
 void GeometryMessages::fill_header(v1::GeometryHeader* h) const {
   h->set_model_digest(digest_text(model_.digest));
-  h->set_step(simulation_->step_number());
-  h->set_time(simulation_->time());
+  h->set_step(state_.step);
+  h->set_time(state_.time);
   h->set_nodes(static_cast<int>(model_.structural.size()));
   h->set_elements(static_cast<int>(model_.elements.size()));
   if (model_.structural.empty()) return;
@@ -155,10 +156,10 @@ void GeometryMessages::fill(int k, v1::NodeGeometry* out) const {
   out->set_name(utf8(n.name));
   put(n.x, out->mutable_position());
   const std::string prefix = "node.structural." + std::to_string(n.label) + ".";
-  out->set_position_handle(simulation_->find_variable(prefix + "X"));
+  out->set_position_handle(handle_of_(prefix + "X"));
   if (!n.oriented) return;
   put(n.R, out->mutable_orientation());
-  out->set_orientation_handle(simulation_->find_variable(prefix + "R"));
+  out->set_orientation_handle(handle_of_(prefix + "R"));
 }
 
 void GeometryMessages::fill_elements(v1::ElementGeometryList* out) {
@@ -209,7 +210,7 @@ void GeometryMessages::fill(const ElementGeometry& g, const ElementGeometry::Lin
   out->set_name(line.name);
   out->mutable_points()->Add(line.points.begin(), line.points.end());
   out->set_curved(line.curved);
-  if (!line.variable.empty()) out->set_value_handle(simulation_->find_variable(line.variable));
+  if (!line.variable.empty()) out->set_value_handle(handle_of_(line.variable));
   if (!line.curved || !request_.has_line_samples()) return;
   for (const Vec3& x : view_.trace(g, line, request_.line_samples())) put(x, out->mutable_trace());
 }
@@ -217,7 +218,7 @@ void GeometryMessages::fill(const ElementGeometry& g, const ElementGeometry::Lin
 void GeometryMessages::fill(const ElementGeometry::Arrow& a, const std::string& variable,
                             v1::GeometryArrow* out) const {
   out->set_point(a.point);
-  out->set_handle(simulation_->find_variable(variable));
+  out->set_handle(handle_of_(variable));
   out->set_reversed(a.sign < 0);
   out->set_moment(variable.ends_with(".M"));
 }
@@ -257,7 +258,7 @@ void GeometryMessages::begin_modal_points(const ElementGeometry::Modes& m,
     put(m.R0, out->mutable_fixed_orientation());
   }
   for (const std::string& name : view_.amplitude_variables(index_, m))
-    out->add_amplitude_handles(simulation_->find_variable(name));
+    out->add_amplitude_handles(handle_of_(name));
   out->set_count(static_cast<int>(m.labels->size()));
   out->set_first(point_);
 }

@@ -1,20 +1,22 @@
 /// The geometry of a simulation as messages of bounded size.
 #pragma once
 
-#include <memory>
+#include <functional>
+#include <string>
 
 #include "mbcosim/v1/geometry.pb.h"
 #include "model/deck_file.h"
 #include "simulation/geometry_view.h"
-#include "simulation/simulation.h"
 
 namespace mbcosim::server {
 
 /// Tells all that can be drawn of a simulation as it stands, message by message.
 class GeometryMessages {
  public:
-  /// `files`: of the deck, for its cards. Throws Refusal when the request is wrong.
-  GeometryMessages(std::unique_ptr<Simulation> simulation, DeckFiles files,
+  using Handles = std::function<int(const std::string& variable)>;  ///< negative: no such variable
+  /// `model` outlives this; `files`: of the deck, for its cards. Throws Refusal when the request is
+  /// wrong.
+  GeometryMessages(const Model& model, State state, Handles handles, DeckFiles files,
                    const v1::DescribeGeometryRequest& request);
 
   /// Fills the next message; false: there is none.
@@ -38,8 +40,9 @@ class GeometryMessages {
   void fill(const ElementGeometry::Arrow& a, const std::string& variable,
             v1::GeometryArrow* out) const;
 
-  const std::unique_ptr<Simulation> simulation_;
   const Model& model_;
+  const State state_;
+  const Handles handle_of_;
   const GeometryView view_;
   const DeckFiles files_;
   const v1::DescribeGeometryRequest request_;

@@ -11,9 +11,13 @@ void add_geometry(Gate& gate, const Parts& parts) {
                [&parts](const CallFrame& frame, const v1::DescribeGeometryRequest& request) {
                  auto session = std::make_shared<SessionHold>(parts.store, request.simulation(),
                                                               frame.caller, Access::observe);
+                 State state = (*session)->state();
+                 auto share = std::make_shared<MemoryShare>(frame.memory, size_of(state));
                  auto messages = std::make_shared<GeometryMessages>(
-                     (*session)->fork(/*snapshot=*/-1), (*session)->origin().files, request);
-                 return [session, messages](v1::DescribeGeometryReply* reply) {
+                     (*session)->model(), std::move(state),
+                     [session](const std::string& name) { return (*session)->find_variable(name); },
+                     (*session)->origin().files, request);
+                 return [session, share, messages](v1::DescribeGeometryReply* reply) {
                    return messages->next(reply);
                  };
                }));

@@ -120,15 +120,20 @@ class ReduceHandler final : public Upload<v1::ReduceRequest> {
     const ReductionJob job = read_request(*header_, files);
     const FeModel model = within(exchange.memory(), &token, &model_share_,
                                  [&] { return load(job, files, parts_.config.limits.engine); });
-    const auto reduction =
-        reduce(model, job.options, [&](const std::string& phase, double fraction) {
-          sender.send(phase, fraction);
-          return !exchange.call().cancelled();
-        });
-    if (!reduction) throw Refusal(reduction.error());
-    std::string text = write_fem_text(reduction->data, reduction->comments);
+    const auto progress = [&](const std::string& phase, double fraction) {
+      const MemoryPause uncounted;
+      sender.send(phase, fraction);
+      return !exchange.call().cancelled();
+    };
+    v1::ReduceReply report;
+    std::string text = within(exchange.memory(), &token, &text_share_, [&] {
+      const auto reduction = reduce(model, job.options, progress);
+      if (!reduction) throw Refusal(reduction.error());
+      report = message_of(reduction->report);
+      return write_fem_text(reduction->data, reduction->comments);
+    });
     Guard guard(mutex_);
-    exchange.write(serialized(message_of(reduction->report)));
+    exchange.write(serialized(report));
     text_ = std::move(text);
   }
   void on_written(Exchange& exchange) override {
@@ -149,7 +154,7 @@ class ReduceHandler final : public Upload<v1::ReduceRequest> {
   const Parts& parts_;
   std::optional<v1::ReduceHeader> header_;
   std::optional<Bundle> bundle_;
-  MemoryShare model_share_;
+  MemoryShare model_share_, text_share_;
   Mutex mutex_;
   std::optional<std::string> text_ TS_GUARDED_BY(mutex_);  ///< when the report has been sent
   std::size_t sent_ TS_GUARDED_BY(mutex_) = 0;

@@ -69,6 +69,7 @@ Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> s
       model_(&simulation->model()),
       variables_(simulation->variables()),
       pace_(rate_of(options)),
+      factor_bytes_(static_cast<std::int64_t>(simulation->factor_bytes())),
       origin_(std::move(origin)),
       grants_(identity_.owner, options.grants()),
       lease_(identity_.lease),
@@ -135,7 +136,7 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
     throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
                   {{"wanted", "own"}});
   if (request.has_grants()) Grants::check(request.grants().grants());  // before anything changes
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   ++changes_;
   const StepPolicy now = simulation_->policy();
   std::optional<double> minimum = minimum_in(request);
@@ -244,6 +245,10 @@ Port& Session::port(const std::string& name) const {
                 identity_.id + " has no port named \"" + name.substr(0, 100) + "\"");
 }
 
+int Session::find_variable(const std::string& name) const {
+  return simulation_->find_variable(name);
+}
+
 void Session::require_usable() const {
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
   if (status_.failed())
@@ -282,7 +287,7 @@ bool Session::interrupt() { return status_.interrupt(); }
 void Session::read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply) {
   require_usable();
   variables_.check(request.handles());
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   reply->set_step(simulation_->step_number());
   reply->set_time(simulation_->time());
   variables_.read(*simulation_, request.handles(), reply->mutable_values());
@@ -295,7 +300,7 @@ void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariables
   if (status_.stepping())
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; inputs are written between advances");
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   if (request.has_expected_step()) check_step(request.expected_step());
   std::optional<State> before;
   if (journaled()) before = simulation_->state();
@@ -322,13 +327,13 @@ SessionResults& Session::results() const {
 
 void Session::list_results(v1::ListResultsReply* out) {
   SessionResults& files = results();
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   files.list(out);
 }
 
 std::int64_t Session::size_of_result(const std::string& file, std::int64_t* cuts) {
   SessionResults& files = results();
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   return files.size_of(file, cuts);
 }
 

@@ -77,12 +77,17 @@ class Session {
           const v1::CreateOptions& options = {}, std::unique_ptr<SessionResults> results = nullptr);
 
   /// What the model and the state take, held until the end.
-  void set_memory(MemoryShare share) { memory_ = std::move(share); }
+  void set_memory(MemoryShare share) TS_EXCLUDES(lock_) {
+    const Guard lock(lock_);
+    memory_ = std::move(share);
+  }
   const Identity& identity() const { return identity_; }
   EventLog::Subject subject() const { return {identity_.id, identity_.owner}; }
   const Model& model() const { return *model_; }
   const std::vector<Variable>& variables() const { return variables_.variables(); }
   const VariableAccess& variable_access() const { return variables_; }
+  /// Negative: none. Handles never change, so that nobody waits for a step.
+  int find_variable(const std::string& name) const TS_NO_THREAD_SAFETY_ANALYSIS;
   void fill(v1::SimulationInfo* out) const;
   /// With the grants, when the caller may change them.
   void fill(v1::SimulationInfo* out, const Caller& caller) const;
@@ -119,7 +124,9 @@ class Session {
   std::string export_state(int snapshot);  ///< negative: the current state
   void import_state(const std::string& bytes, const std::string& display_name, bool also_restore,
                     v1::Snapshot* out);
-  std::unique_ptr<Simulation> fork(int snapshot);  ///< negative: the current state
+  /// `snapshot`: negative: the current state. Throws CANCELLED.
+  std::unique_ptr<Simulation> fork(int snapshot, const CancelToken& cancel);
+  State state();  ///< a copy
 
   /// Waits for the end of a step. Throws NO_RESULTS.
   void list_results(v1::ListResultsReply* out);
@@ -151,8 +158,9 @@ class Session {
   bool has_failed() const { return status_.failed(); }
   /// Nobody works on it.
   bool is_free() {
-    const std::unique_lock lock(lock_, std::try_to_lock);
-    return lock.owns_lock();
+    const bool free = lock_.try_lock();
+    if (free) lock_.unlock();
+    return free;
   }
   /// Waits for the end of a step.
   CapturedPoint capture();
@@ -190,42 +198,45 @@ class Session {
   void break_off(Advance& advance);
   void go_to(const State& state, std::int64_t results_until);
   void check(const v1::StepRequest& request) const;
-  void check_step(std::int64_t expected) const;
+  void check_step(std::int64_t expected) const TS_REQUIRES(lock_);
   bool must_wait(const Advance& advance) const;
   void wait_for_subscribers();
-  bool wants_more(const Advance& advance) const;
-  bool choose(Advance& advance);
-  bool may_write(Advance& advance);
-  void begin(Advance& advance);
-  void take_inputs(Advance& advance);
+  bool wants_more(const Advance& advance) const TS_REQUIRES(lock_);
+  bool choose(Advance& advance) TS_REQUIRES(lock_);
+  bool may_write(Advance& advance) TS_REQUIRES(lock_);
+  void begin(Advance& advance) TS_REQUIRES(lock_);
+  void take_inputs(Advance& advance) TS_REQUIRES(lock_);
   bool run_slice(Advance& advance);
-  bool step_for_a_while(Advance& advance);
+  bool step_for_a_while(Advance& advance) TS_REQUIRES(lock_);
   SolverSlots::Slot take_slot(const Advance& advance);
   bool run_coupled_step(Advance& advance);
-  void step_coupled(Advance& advance);
-  void settle_coupled(Advance& advance, bool accepted);
+  void step_coupled(Advance& advance) TS_REQUIRES(lock_);
+  void settle_coupled(Advance& advance, bool accepted) TS_REQUIRES(lock_);
   void lose_peer(Advance& advance, const std::string& why);
   void reject_step(Advance& advance, const PeerRejected& rejected);
-  void end_unsolved(Advance& advance, v1::StepOutcome outcome);
+  void end_unsolved(Advance& advance, v1::StepOutcome outcome) TS_REQUIRES(lock_);
   void tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason reason,
-                    const std::string& why);
-  StepReport attempt(Advance& advance);
-  StepReport attempt_in_slot(Advance& advance);
-  void set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum);
-  void start_record(const v1::CreateOptions& options);
-  void account(Advance& advance, const StepReport& report);
+                    const std::string& why) TS_REQUIRES(lock_);
+  std::optional<StepReport> attempt(Advance& advance) TS_REQUIRES(lock_);
+  std::optional<StepReport> counted_step(Advance& advance) TS_REQUIRES(lock_);
+  void end_without_memory(Advance& advance, const MemoryScope& scope) TS_REQUIRES(lock_);
+  std::optional<StepReport> attempt_in_slot(Advance& advance) TS_REQUIRES(lock_);
+  void set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum) TS_REQUIRES(lock_);
+  void start_record(const v1::CreateOptions& options) TS_REQUIRES(lock_);
+  void account(Advance& advance, const StepReport& report) TS_REQUIRES(lock_);
   void account_pieces(v1::StepReply& reply, const StepReport& report);
-  void account_delay(Advance& advance);
-  void tell(Advance& advance, const StepReport& report);
-  void finish(Advance& advance);
-  void conclude(Advance& advance);
+  void account_delay(Advance& advance) TS_REQUIRES(lock_);
+  void tell(Advance& advance, const StepReport& report) TS_REQUIRES(lock_);
+  void finish(Advance& advance) TS_REQUIRES(lock_);
+  void conclude(Advance& advance) TS_REQUIRES(lock_);
   bool journaled() const { return keeping_ && keeping_->journal; }
   bool is_told_at_once(const StepReport& report) const;
-  void settle(Advance& advance, bool whole = false);
-  void go_back(Advance& advance);
-  void store(const std::optional<v1::KeptReply>& reply);
-  void store_change(const KeptReplies::Turn* turn, const google::protobuf::MessageLite& reply);
-  void fill_stored(v1::SimulationInfo* out) const;
+  void settle(Advance& advance, bool whole = false) TS_REQUIRES(lock_);
+  void go_back(Advance& advance) TS_REQUIRES(lock_);
+  void store(const std::optional<v1::KeptReply>& reply) TS_REQUIRES(lock_);
+  void store_change(const KeptReplies::Turn* turn, const google::protobuf::MessageLite& reply)
+      TS_REQUIRES(lock_);
+  void fill_stored(v1::SimulationInfo* out) const TS_REQUIRES(lock_);
   void describe_variables(const v1::DescribeSimulationRequest& request,
                           v1::ModelDescription* out) const;
   void require_usable() const;
@@ -237,7 +248,8 @@ class Session {
   const VariableAccess variables_;
   const double pace_;  ///< seconds of the model in a second of the wall clock; 0: not held back
 
-  MemoryShare memory_;
+  MemoryShare memory_ TS_GUARDED_BY(lock_);
+  std::int64_t factor_bytes_ TS_GUARDED_BY(lock_);  ///< the part that factorizations take
   const Origin origin_;
   std::unique_ptr<Keeping> keeping_;
   std::atomic<std::int64_t> changes_{0};
@@ -254,7 +266,7 @@ class Session {
 
   FairMutex lock_;                                 // protects all below
   const std::unique_ptr<SessionResults> results_;  // null: none are written; outlives its writer
-  std::unique_ptr<Simulation> simulation_;
+  const std::unique_ptr<Simulation> simulation_ TS_PT_GUARDED_BY(lock_);
   const std::unique_ptr<Recorder> recorder_;  // thread-safe; null: nothing is recorded
   Coupler coupler_;                           // its ports are thread-safe by themselves
 

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <new>
 #include <optional>
 #include <utility>
 
@@ -102,7 +103,7 @@ void Session::go_on(Advance& advance) {
 
 // What was done stays, and a repeat of the request goes on from there.
 void Session::break_off(Advance& advance) {
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   at_work_ = nullptr;
   if (advance.reply.steps_done() > 0 && advance.turn.has_id())
     advance.turn.break_off(advance.reply);
@@ -171,7 +172,7 @@ void Session::take_inputs(Advance& advance) {
 
 // Steps for a while with lock and slot held. True: the advance has ended and the reply is complete.
 bool Session::run_slice(Advance& advance) {
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   begin(advance);
   if (must_wait(advance)) return false;
   if (wants_more(advance) && !step_for_a_while(advance)) {
@@ -184,7 +185,7 @@ bool Session::run_slice(Advance& advance) {
 
 SolverSlots::Slot Session::take_slot(const Advance& advance) {
   const Clock::time_point start = Clock::now();
-  SolverSlots::Slot slot = shared_.slots.acquire(advance.token);
+  SolverSlots::Slot slot = shared_.slots.acquire(identity_.owner, advance.token);
   shared_.metrics.count_slot_wait(seconds_since(start));
   return slot;
 }
@@ -198,14 +199,14 @@ bool Session::step_for_a_while(Advance& advance) {
       advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
       return true;
     }
-    const StepReport report = attempt(advance);
-    account(advance, report);
-    if (journaled() && is_told_at_once(report)) {
+    const std::optional<StepReport> report = attempt(advance);
+    if (report) account(advance, *report);
+    if (report && journaled() && is_told_at_once(*report)) {
       slot.reset();  // nobody waits for the disk with a slot
       settle(advance);
       slot.emplace(take_slot(advance));
     }
-    tell(advance, report);
+    if (report) tell(advance, *report);
     if (!wants_more(advance)) return true;
     const bool send = advance.table && advance.table->full();
     if (send || must_wait(advance) || advance.pace.holds() || lock_.contended() ||
@@ -215,14 +216,15 @@ bool Session::step_for_a_while(Advance& advance) {
   return true;
 }
 
-StepReport Session::attempt(Advance& advance) {
+// One step. Nothing: it was not solved, and the reply says so.
+std::optional<StepReport> Session::attempt(Advance& advance) {
   if (recorder_ && !is_the_decks(advance.choice))
     recorder_->chosen(request_of(advance.choice, advance.request, *simulation_));
   try {
-    auto report = simulation_->step(advance.choice, &advance.token);
-    if (!report) throw Refusal(report.error());
-    if (results_ && report->error) report->error = results_->without_paths(*report->error);
-    return std::move(*report);
+    std::optional<StepReport> report = counted_step(advance);
+    if (results_ && report && report->error)
+      report->error = results_->without_paths(*report->error);
+    return report;
   } catch (const Refusal&) {
     throw;
   } catch (const std::exception& error) {
@@ -232,6 +234,35 @@ StepReport Session::attempt(Advance& advance) {
     throw Refusal(v1::REASON_INTERNAL,
                   "internal error while stepping; restore a snapshot or delete the simulation");
   }
+}
+
+// A step whose factorizations stay within the budget, and can be stopped where they allocate. When
+// they cannot, the state is that before the step.
+std::optional<StepReport> Session::counted_step(Advance& advance) {
+  MemoryScope scope(shared_.memory, &advance.token);
+  std::optional<Result<StepReport>> report;
+  try {
+    report = simulation_->step(advance.choice, &advance.token);
+  } catch (const std::bad_alloc&) {  // `scope` knows why
+  }
+  scope.leave();
+  const auto factor_bytes = static_cast<std::int64_t>(simulation_->factor_bytes());
+  memory_.change(factor_bytes - std::exchange(factor_bytes_, factor_bytes));
+  if (report && !*report) throw Refusal(report->error());
+  if (report && (!scope.refused() || (*report)->steps_done > 0)) return std::move(**report);
+  end_without_memory(advance, scope);
+  return {};
+}
+
+void Session::end_without_memory(Advance& advance, const MemoryScope& scope) {
+  if (advance.token.cancelled()) return end_unsolved(advance, v1::STEP_OUTCOME_INTERRUPTED);
+  std::string why = "the server is out of memory";
+  try {
+    scope.check();
+  } catch (const Refusal& refusal) {
+    why = refusal.what();
+  }
+  tell_failure(advance, v1::STEP_OUTCOME_LIMIT, v1::REASON_LIMIT_EXCEEDED, why);
 }
 
 // Enters one step, or its failure, into the reply.
@@ -326,7 +357,7 @@ void Session::conclude(Advance& advance) {
 // passes of window ports.
 bool Session::run_coupled_step(Advance& advance) {
   {
-    std::lock_guard lock(lock_);
+    const Guard lock(lock_);
     begin(advance);
     if (must_wait(advance)) return false;
     if (!choose(advance)) {
@@ -338,12 +369,12 @@ bool Session::run_coupled_step(Advance& advance) {
   try {
     coupler_.await_peers(advance.token);
     {
-      std::lock_guard lock(lock_);
+      const Guard lock(lock_);
       coupler_.prepare(*simulation_, length_of(advance.choice, *simulation_),
                        bool(advance.choice.event));
     }
     coupler_.exchange(advance.token);
-    std::lock_guard lock(lock_);
+    const Guard lock(lock_);
     step_coupled(advance);
   } catch (const PeerLost& lost) {
     coupler_.notify(false, *simulation_);
@@ -352,7 +383,7 @@ bool Session::run_coupled_step(Advance& advance) {
     coupler_.notify(false, *simulation_);
     reject_step(advance, rejected);
   }
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() +
                                       coupler_.waited_seconds());
   shared_.metrics.count_coupled_step(coupler_.waited_seconds(), coupler_.exchanges(),
@@ -365,12 +396,13 @@ bool Session::run_coupled_step(Advance& advance) {
 void Session::step_coupled(Advance& advance) {
   coupler_.apply(*simulation_);
   coupler_.start_iterations(*simulation_);
-  const StepReport report = attempt_in_slot(advance);
-  account(advance, report);
-  settle_coupled(advance, is_accepted(report.outcome));
-  tell(advance, report);
-  coupler_.notify(is_accepted(report.outcome), *simulation_);
-  if (is_accepted(report.outcome)) coupler_.finish(*simulation_);
+  const std::optional<StepReport> report = attempt_in_slot(advance);
+  if (report) account(advance, *report);
+  const bool accepted = report && is_accepted(report->outcome);
+  settle_coupled(advance, accepted);
+  if (report) tell(advance, *report);
+  coupler_.notify(accepted, *simulation_);
+  if (accepted) coupler_.finish(*simulation_);
 }
 
 // Before peers hear of the step.
@@ -405,10 +437,13 @@ class Session::ExchangeInStep {
 
  private:
   Coupler& coupler() { return session_.coupler_; }
-  Simulation& simulation() { return *session_.simulation_; }
+  /// The lock is held: by the step, and while the peer computes by nobody else.
+  Simulation& simulation() TS_NO_THREAD_SAFETY_ANALYSIS { return *session_.simulation_; }
   void iterate() {
-    simulation().set_attempt_ended(
-        [this](bool accepted) { coupler().end_attempt(accepted, simulation()); });
+    simulation().set_attempt_ended([this](bool accepted) {
+      const MemoryPause uncounted;
+      coupler().end_attempt(accepted, simulation());
+    });
     simulation().set_exchange([this](int iteration) {
       return wait(
           [&] { return coupler().exchange_iteration(simulation(), iteration, advance_.token); });
@@ -418,6 +453,7 @@ class Session::ExchangeInStep {
     StepPasses passes;
     passes.most = coupler().maximum_passes();
     passes.begin = [this](int pass) {
+      const MemoryPause uncounted;
       if (pass == 1) coupler().start_passes(simulation(), std::exchange(agreed_, false));
       coupler().apply_window(simulation());
       if (pass > 1) coupler().start_iterations(simulation());
@@ -431,6 +467,7 @@ class Session::ExchangeInStep {
   /// Without the slot.
   template <class Exchange>
   bool wait(Exchange&& exchange) {
+    const MemoryPause uncounted;
     slot_.reset();
     const bool done = exchange();
     slot_.emplace(session_.take_slot(advance_));
@@ -443,22 +480,22 @@ class Session::ExchangeInStep {
   bool agreed_ = false;  ///< the interfaces, in the last pass
 };
 
-StepReport Session::attempt_in_slot(Advance& advance) {
+std::optional<StepReport> Session::attempt_in_slot(Advance& advance) {
   std::optional<SolverSlots::Slot> slot(take_slot(advance));
   const ExchangeInStep exchange(*this, advance, slot);
-  StepReport report;
   if (*slot) {
     const double waited = coupler_.waited_seconds();
-    report = attempt(advance);
-    report.solver_seconds -= coupler_.waited_seconds() - waited;
+    std::optional<StepReport> report = attempt(advance);
+    if (report) report->solver_seconds -= coupler_.waited_seconds() - waited;
     return report;
   }
+  StepReport report;
   report.outcome = StepOutcome::interrupted;
   return report;
 }
 
 void Session::lose_peer(Advance& advance, const std::string& why) {
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   if (advance.token.cancelled())
     end_unsolved(advance, v1::STEP_OUTCOME_INTERRUPTED);
   else
@@ -466,7 +503,7 @@ void Session::lose_peer(Advance& advance, const std::string& why) {
 }
 
 void Session::reject_step(Advance& advance, const PeerRejected& rejected) {
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   tell_failure(advance, v1::STEP_OUTCOME_REJECTED_BY_PEER, v1::REASON_REJECTED_BY_PEER,
                rejected.text);
   if (rejected.preferred) advance.reply.set_preferred_step_size(*rejected.preferred);

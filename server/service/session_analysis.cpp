@@ -142,7 +142,7 @@ State Session::state_at_rest(std::int64_t* step) {
   if (status_.stepping())
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; it is analysed between advances");
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   *step = simulation_->step_number();
   return simulation_->snapshot();
 }

@@ -20,7 +20,7 @@ void Session::fill_stored(v1::SimulationInfo* out) const {
 
 CapturedPoint Session::capture() {
   CapturedPoint captured;
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   captured.changes = changes();
   captured.point.set_changes(captured.changes);
   fill_stored(captured.point.mutable_info());
@@ -44,7 +44,7 @@ std::string Session::bytes_of(const State& state) const {
 
 void Session::take_over(const v1::CheckpointPoint& point,
                         const std::map<int, std::string>& snapshots) {
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   changes_ = point.changes();
   peer_memory_ = point.ports();
   coupler_.take_over(peer_memory_);

@@ -6,7 +6,7 @@ namespace mbcosim::server {
 
 void Session::save(const std::string& display_name, v1::Snapshot* out) {
   require_usable();
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   snapshots_.check_room(size_of(simulation_->state()));
   snapshots_.add(simulation_->snapshot(), display_name, out);
   ++changes_;
@@ -40,7 +40,7 @@ void Session::go_to(const State& state, std::int64_t results_until) {
     SessionStatus& status;
     ~Release() { status.release(); }
   } const release{status_};
-  std::lock_guard lock(lock_);
+  const Guard lock(lock_);
   if (results_) results_->expect(results_until);
   const auto status = simulation_->restore(state);
   if (results_) results_->restored();
@@ -62,10 +62,11 @@ void Session::forget(int snapshot) {
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_DELETED, snapshots_.name_of(snapshot), step);
 }
 
-std::unique_ptr<Simulation> Session::fork(int snapshot) {
+std::unique_ptr<Simulation> Session::fork(int snapshot, const CancelToken& cancel) {
   if (snapshot < 0) require_usable();
-  std::lock_guard lock(lock_);
-  std::unique_ptr<Simulation> branch = simulation_->fork();
+  const Guard lock(lock_);
+  std::unique_ptr<Simulation> branch = simulation_->fork(&cancel);
+  if (!branch) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
   if (snapshot >= 0) {
     const auto status = branch->restore(snapshots_.get(snapshot));
     if (!status) throw Refusal(status.error());
@@ -73,25 +74,26 @@ std::unique_ptr<Simulation> Session::fork(int snapshot) {
   return branch;
 }
 
-std::string Session::export_state(int snapshot) {
-  if (snapshot >= 0) return fork(snapshot)->export_state();
+State Session::state() {
   require_usable();
-  std::lock_guard lock(lock_);
-  return simulation_->export_state();
+  const Guard lock(lock_);
+  return simulation_->snapshot();
+}
+
+std::string Session::export_state(int snapshot) {
+  return bytes_of(snapshot >= 0 ? snapshots_.get(snapshot) : state());
 }
 
 void Session::import_state(const std::string& bytes, const std::string& display_name,
                            bool also_restore, v1::Snapshot* out) {
-  std::unique_ptr<Simulation> scratch;
   std::int64_t results_end = 0;  // an imported state is taken for one of this history so far
-  {
-    std::lock_guard lock(lock_);
-    scratch = simulation_->fork();
+  Result<State> state = [&] {
+    const Guard lock(lock_);
     results_end = results_ ? results_->end() : 0;
-  }
-  const auto status = scratch->import_state(bytes);
-  if (!status) throw Refusal(status.error());
-  const int number = snapshots_.add(scratch->snapshot(), display_name, out, results_end);
+    return simulation_->state_of(bytes);
+  }();
+  if (!state) throw Refusal(state.error());
+  const int number = snapshots_.add(std::move(*state), display_name, out, results_end);
   ++changes_;
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
   if (also_restore) restore(number);

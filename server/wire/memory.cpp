@@ -93,6 +93,9 @@ MemoryShare MemoryScope::keep() {
   return share;
 }
 
+MemoryPause::MemoryPause() : scope_(std::exchange(scope_of_thread, nullptr)) {}
+MemoryPause::~MemoryPause() { scope_of_thread = scope_; }
+
 }  // namespace mbcosim::server
 
 // ------------------------------------------------------------------ what is counted

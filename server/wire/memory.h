@@ -1,6 +1,7 @@
 /// How much memory the daemon's work may take, counted before it is taken.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <utility>
@@ -70,6 +71,8 @@ class MemoryShare {
     budget_->give_back(bytes);
     bytes_ -= bytes;
   }
+  /// By what is there already or has gone: never refused.
+  void change(std::int64_t bytes) { shrink(std::min(-bytes, bytes_)); }
 
  private:
   friend class MemoryScope;
@@ -93,7 +96,9 @@ class MemoryScope {
   MemoryScope(const MemoryScope&) = delete;
   MemoryScope& operator=(const MemoryScope&) = delete;
 
-  /// Throws LIMIT_EXCEEDED or CANCELLED when the work came to its end so.
+  /// Did the work come to its end so?
+  bool refused() const { return exceeded_ || cancelled_; }
+  /// Throws LIMIT_EXCEEDED or CANCELLED when it did.
   void check() const;
   /// What was allocated and is still there, handed over. Nothing is counted from then on.
   MemoryShare keep();
@@ -114,6 +119,18 @@ class MemoryScope {
   int calls_ = 0;
   const MemoryBudget* exceeded_ = nullptr;  ///< the one that was
   bool cancelled_ = false, left_ = false;
+};
+
+/// While it lives, nothing that this thread allocates is counted: for calls out of counted work.
+class MemoryPause {
+ public:
+  MemoryPause();
+  ~MemoryPause();
+  MemoryPause(const MemoryPause&) = delete;
+  MemoryPause& operator=(const MemoryPause&) = delete;
+
+ private:
+  MemoryScope* const scope_;
 };
 
 /// Does work within the budget. What it makes and `kept` is told of stays counted there; else all

@@ -3,11 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
 namespace mbcosim::server {
 namespace {
+
+const std::string kOwner = "local";
 
 TEST(FairMutex, ServesAWaiterThoughTheHolderComesBackAtOnce) {
   FairMutex mutex;
@@ -44,7 +48,7 @@ TEST(SolverSlots, NeverGrantsMoreThanItHas) {
     threads.emplace_back([&] {
       for (int i = 0; i < 200; ++i) {
         const CancelToken token;
-        const auto slot = slots.acquire(token);
+        const auto slot = slots.acquire(kOwner, token);
         ASSERT_TRUE(slot);
         const int now = ++inside;
         int before = most.load();
@@ -61,10 +65,40 @@ TEST(SolverSlots, NeverGrantsMoreThanItHas) {
 TEST(SolverSlots, ACancelledWaitEndsWithoutASlot) {
   SolverSlots slots(1);
   CancelToken token;
-  const auto held = slots.acquire(token);
+  const auto held = slots.acquire(kOwner, token);
   CancelToken cancelled;
   cancelled.cancel();
-  EXPECT_FALSE(slots.acquire(cancelled));
+  EXPECT_FALSE(slots.acquire(kOwner, cancelled));
+}
+
+/// A step of a large model may take long: whoever has no other slot does not wait for its end.
+TEST(SolverSlots, AnOwnerWithoutASlotGetsOneAtOnce) {
+  const std::string other = "token:other";
+  SolverSlots slots(2);
+  CancelToken token, cancelled;
+  cancelled.cancel();
+  const auto first = slots.acquire(kOwner, token), second = slots.acquire(kOwner, token);
+  EXPECT_FALSE(slots.acquire(kOwner, cancelled)) << "the owner has its share";
+  {
+    const auto beyond = slots.acquire(other, cancelled);
+    EXPECT_TRUE(beyond);
+    EXPECT_FALSE(slots.acquire(other, cancelled)) << "one, not more";
+  }
+  EXPECT_FALSE(slots.acquire(kOwner, cancelled)) << "what was beyond the number is gone";
+}
+
+TEST(SolverSlots, AWaiterGetsTheSlotThatItsOwnerGivesBack) {
+  const std::string other = "token:other";
+  SolverSlots slots(1);
+  const CancelToken token;
+  const auto held = slots.acquire(kOwner, token);
+  std::optional<SolverSlots::Slot> beyond(slots.acquire(other, token));
+  std::atomic<bool> granted{false};
+  std::thread waiter([&] { granted = bool(slots.acquire(other, token)); });
+  while (slots.waiting() == 0) std::this_thread::yield();
+  beyond.reset();
+  waiter.join();
+  EXPECT_TRUE(granted) << "though the pool is still beyond its number";
 }
 
 }  // namespace

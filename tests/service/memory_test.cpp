@@ -52,6 +52,16 @@ TEST(Memory, WhatWorkLeavesBehindStaysCountedUntilItsEnd) {
   EXPECT_EQ(budget.used(), 0);
 }
 
+TEST(Memory, WhatACallbackTakesIsNotCounted) {
+  MemoryBudget budget(64 << 20);
+  MemoryShare share;
+  const auto kept = within(budget, nullptr, &share, [] {
+    const MemoryPause uncounted;
+    return std::make_unique<std::vector<char>>(10 << 20);
+  });
+  EXPECT_LT(share.bytes(), 1 << 20);
+}
+
 TEST(Memory, CancelledWorkEndsThoughItNeverLooks) {
   MemoryBudget budget(1LL << 40);
   CancelToken token;
@@ -76,6 +86,19 @@ TEST(Memory, SharesGrowUpToTheBudgetAndGiveBack) {
     EXPECT_EQ(budget.used(), 100);
     const MemoryShare moved = std::move(share);
     EXPECT_EQ(budget.used(), 100);
+  }
+  EXPECT_EQ(budget.used(), 0);
+}
+
+TEST(Memory, WhatIsThereAlreadyIsNeverRefused) {
+  MemoryBudget budget(100);
+  {
+    MemoryShare share(budget);
+    share.change(150);
+    EXPECT_EQ(budget.used(), 150);
+    EXPECT_THROW(MemoryShare(budget, 1), Refusal);
+    share.change(-200);
+    EXPECT_EQ(share.bytes(), 0);
   }
   EXPECT_EQ(budget.used(), 0);
 }
