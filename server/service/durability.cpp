@@ -283,17 +283,33 @@ void Durability::loop() {
 void Durability::look() {
   for (const SessionPtr& session : parts_->store.all()) {
     Keeping* keeping = session->keeping();
-    if (!keeping ||
-        !keeping->due(session->changes(), session->step_number(), Keeping::Clock::now()))
-      continue;
+    if (keeping && !keeping->posted &&
+        keeping->due(session->changes(), session->step_number(), Keeping::Clock::now()))
+      post(session);
+  }
+  expire();
+}
+
+// A thread of its owner's takes the checkpoint: it waits for the end of a step, and with that
+// perhaps for a peer, for which no other simulation waits.
+void Durability::post(const SessionPtr& session) {
+  const auto take = [this, session] {
+    Keeping& keeping = *session->keeping();
     try {
       write(*session);
     } catch (const std::exception& error) {
-      keeping->failed();
+      keeping.failed();
       log_.checkpoint_failed(session->subject(), error.what());
     }
+    keeping.posted = false;
+  };
+  session->keeping()->posted = true;
+  try {
+    parts_->runtime.lanes.post(Lane::work, session->identity().owner, take);
+  } catch (...) {
+    session->keeping()->posted = false;
+    throw;
   }
-  expire();
 }
 
 void Durability::expire() {

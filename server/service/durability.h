@@ -98,6 +98,7 @@ class Durability {
   void write(Session& session);
   void loop();
   void look();
+  void post(const SessionPtr& session);
   void expire();
 
   const Config& config_;

@@ -1,6 +1,7 @@
 /// What is known of the checkpoints of one session.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -37,6 +38,7 @@ class Keeping {
 
   /// JOURNAL: the session's lock protects it. Null: CHECKPOINT. Before others know the session.
   std::unique_ptr<Journal> journal;
+  std::atomic<bool> posted{false};  ///< one is on its way
 
   mutable Mutex mutex;
   std::set<int> snapshots TS_GUARDED_BY(mutex);  ///< that have files

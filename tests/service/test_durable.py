@@ -340,6 +340,29 @@ def test_steps_between_checkpoints(start, folder):
         wait_for(lambda: on_disk(folder, simulation.name) == 100)
 
 
+def test_a_peer_that_does_not_answer_holds_up_no_other_checkpoint(start, folder):
+    """A step with a tight peer keeps its simulation locked."""
+    answer = threading.Event()
+
+    def silent(motion):
+        answer.wait(30 * TIME_FACTOR)
+        return -motion.x
+
+    with start("--checkpoint-interval", "0.05").connect() as server:
+        waiting = server.load_text(deck(), ports=[mbcosim.structural_port("spring", nodes=[1])])
+        with waiting.couple("spring", silent, mode="tight", peer_timeout=60 * TIME_FACTOR):
+            step = threading.Thread(target=waiting.step)
+            step.start()
+            wait_for(lambda: "port spring since" in waiting.refresh().waiting_for)
+            other = server.load_text(deck())
+            time.sleep(0.3)  # now the checkpoint of the other, too, is due
+            other.step(7)
+            wait_for(lambda: on_disk(folder, other.name) == 7)
+            answer.set()
+            step.join()
+            assert waiting.refresh().step == 1
+
+
 def test_long_suspended_ones_are_removed(start, folder):
     daemon = start()
     with daemon.connect() as server:
