@@ -8,16 +8,20 @@ import json
 import os
 import random
 import socket
+import subprocess
 import sys
 import threading
 import time
 
 import grpc
 
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "service"))
+import decks
 from fuzzer import Fuzzer
 from google.protobuf import descriptor_pool, message_factory
 from google.protobuf.duration_pb2 import Duration
-from mbcosim.v1 import coupling_pb2, reduction_pb2, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
+from mbcosim.v1 import (coupling_pb2, events_pb2, geometry_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb,
+                        simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc)
 
 BODY = """
 begin: data; problem: initial value; end: data;
@@ -76,9 +80,8 @@ class Attacker:
         fuzzer = Fuzzer(self.random)
         pool = descriptor_pool.Default()
         methods = []
-        for file in ("mbcosim/v1/simulations.proto", "mbcosim/v1/telemetry.proto", "mbcosim/v1/coupling.proto",
-                     "mbcosim/v1/reduction.proto"):
-            for service in pool.FindFileByName(file).services_by_name.values():
+        for file in (pb, telemetry_pb2, coupling_pb2, reduction_pb2, geometry_pb2, results_pb2, events_pb2):
+            for service in pool.FindFileByName(file.DESCRIPTOR.name).services_by_name.values():
                 methods += [(service, method) for method in service.methods]
         get_class = getattr(message_factory, "GetMessageClass", None) or message_factory.MessageFactory().GetPrototype
         while self.going():
@@ -253,7 +256,7 @@ class Attacker:
             stream = self.channel.stream_stream(path, request_serializer=bytes, response_deserializer=bytes)
             calls.append(stream(silence(), metadata=self.metadata if self.random.random() < 0.8 else None))
             time.sleep(0.01)
-            if len(calls) >= 250:
+            if len(calls) >= 650:
                 done = [call for call in calls if call.done()]
                 for call in done:
                     self.count(call if call.code() is not grpc.StatusCode.OK else None)
@@ -313,12 +316,42 @@ class Attacker:
             else:
                 self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
 
+    def large(self):
+        """Models whose factorizations take seconds, made, forked, stepped and analysed, and broken off."""
+        upload = [pb.UploadRequest(header=pb.UploadHeader(bundle_main_file="deck")),
+                  pb.UploadRequest(chunk={"path": "deck", "data": decks.cube(11).encode()})]
+        name = None
+        while self.going():
+            name = name or self.create(decks.cube(8))
+            options = dict(metadata=self.metadata, timeout=20)
+            starts = [lambda: self.stub.CreateSimulation.future(iter(upload), **options),
+                      lambda: self.stub.ForkSimulation.future(pb.ForkSimulationRequest(simulation=name), **options),
+                      lambda: self.stub.Step.future(pb.StepRequest(simulation=name, steps=100000), **options),
+                      lambda: self.stub.ComputeEigenvalues.future(pb.ComputeEigenvaluesRequest(simulation=name, count=50), **options)]
+            calls = [start() for start in starts if self.random.random() < 0.5]
+            time.sleep(self.random.choice([0.1, 1, 3]))
+            for call in calls:
+                call.cancel()
+                self.codes["CANCELLED" if call.cancelled() else "OK"] += 1
+            if self.random.random() < 0.2 and name:
+                self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))
+                name = None
+
     def descriptors(self):
-        """More connections than the daemon has file descriptors."""
+        """More connections than the daemon has file descriptors, from several processes at once."""
+        others = [subprocess.Popen([sys.executable, __file__, "crowd", *sys.argv[2:]], stdout=subprocess.PIPE, text=True)
+                  for _ in range(3)]
+        self.crowd()
+        for other in others:
+            self.codes.update(json.loads(other.communicate()[0])["codes"])
+
+    def crowd(self):
+        """For one second in four: connections, of which some are served and others ended at once."""
         path = self.address[len("unix:"):]
         while self.going():
+            time.sleep(4 - time.time() % 4)  # all processes at the same moment
             held = []
-            for _ in range(700):
+            for _ in range(200):
                 try:
                     connection = socket.socket(socket.AF_UNIX)
                     connection.settimeout(0.5)
@@ -326,15 +359,26 @@ class Attacker:
                     held.append(connection)
                 except OSError:
                     self.codes["REFUSED"] += 1
-                    break
             time.sleep(1)
             for connection in held:
+                self.codes["OK" if is_open(connection) else "DROPPED"] += 1
                 connection.close()
-            time.sleep(1)
 
 
-KINDS = ["fuzz", "cancel", "race", "slow", "silent", "half_open", "greedy", "descriptors"]
-REACHING = ["fuzz", "race", "greedy"]  # some of their calls must succeed
+def is_open(connection):
+    connection.setblocking(False)
+    try:
+        return connection.recv(64) != b""
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+
+
+# What each kind must have come to, or it attacks nothing.
+KINDS = {"fuzz": ["OK", "INVALID_ARGUMENT", "NOT_FOUND"], "cancel": ["CANCELLED"], "race": ["OK", "NOT_FOUND"], "slow": ["OK"],
+         "silent": ["UNAUTHENTICATED"], "half_open": ["OK"], "greedy": ["OK"], "large": ["CANCELLED"],
+         "descriptors": ["OK", "DROPPED"]}
 
 
 def main():

@@ -2,6 +2,7 @@
 from google.protobuf.descriptor import FieldDescriptor as F
 
 NUMBERS = [0, 1, -1, 2, 7, 63, 100, 255, 2**31 - 1, -2**31]
+LARGE = [2**63 - 1, -2**63, 2**53, 9_300_000_000, 2**33]  # for 64 bits; beyond the seconds that 64 bits of nanoseconds hold
 REALS = [0.0, -0.0, 1.0, -1.0, 1e-3, 1e300, -1e300, 1e-308, float("inf"), float("-inf"), float("nan")]
 TEXTS = ["", "a", "x" * 300, "../../etc/passwd", "\u0000", "simulations/none", "é☃"]
 
@@ -23,8 +24,9 @@ class Fuzzer:
             return self.random.choice(self.known[field.name])
         if field.name in ("steps", "count"):  # a run is to end
             return self.random.choice([0, 1, 3, 200, -1])
-        low = 0 if field.cpp_type in (F.CPPTYPE_UINT32, F.CPPTYPE_UINT64) else -2**31
-        return max(low, self.random.choice(NUMBERS))
+        wide = field.cpp_type in (F.CPPTYPE_INT64, F.CPPTYPE_UINT64)
+        low = 0 if field.cpp_type in (F.CPPTYPE_UINT32, F.CPPTYPE_UINT64) else -2**63
+        return max(low, self.random.choice(NUMBERS + LARGE if wide else NUMBERS))
 
     def text(self, field):
         if self.random.random() < 0.85 and self.known.get(field.name):
