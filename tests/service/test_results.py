@@ -3,6 +3,7 @@ import asyncio
 import os
 import subprocess
 import threading
+import time
 
 import grpc
 import pytest
@@ -10,7 +11,7 @@ import pytest
 import decks
 import mbcosim
 import mbcosim.aio
-from conftest import BIN, MODELS, wait_for
+from conftest import BIN, MODELS, TIME_FACTOR, wait_for
 from mbcosim.v1 import results_pb2, simulations_pb2 as pb
 
 DECKS = ["pendulum.mbd", "tumbling.mbd"]
@@ -308,3 +309,13 @@ def test_a_reader_that_stops_does_not_hold_others(server, tumbling):
         stream.cancel()
         wait_for(lambda: simulation.refresh().state == pb.SIMULATION_STATE_READY)
         assert 0 < simulation.step_number < 500_000
+
+
+def test_a_table_comes_at_a_million_values_a_second(server):
+    with server.load_text(decks.body(final_time="1000.")) as simulation:
+        names = [name for name in simulation.variables if name.startswith("node.structural.1.")]
+        begin = time.perf_counter()
+        history = simulation.simulate(names, steps=20_000)
+        seconds = time.perf_counter() - begin
+        values = sum(history[name].size for name in names)
+        assert values > 700_000 and values / seconds > 1e6 / TIME_FACTOR
