@@ -1,6 +1,7 @@
 #include "coupling/port_model.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 
@@ -44,7 +45,8 @@ v1::RotationForm to_form(OrientationDescription description) {
 
 PortModel::PortModel(const v1::PortDefinition& definition, const Simulation& simulation)
     : model_(&simulation.model()) {
-  if (definition.name().empty()) throw Refusal(v1::REASON_BAD_ARGUMENT, "a port must have a name");
+  if (definition.name().empty())
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`ports.name` of a port is empty");
   layout_.set_name(definition.name());
   layout_.set_kind(definition.kind());
   switch (definition.kind()) {
@@ -55,6 +57,9 @@ PortModel::PortModel(const v1::PortDefinition& definition, const Simulation& sim
       make_signal(definition, simulation);
       break;
     default:
+      if (!v1::PortKind_IsValid(definition.kind()))
+        throw Refusal(v1::REASON_BAD_ARGUMENT,
+                      "`ports.kind` of \"" + definition.name() + "\" is unknown to this server");
       throw Refusal(v1::REASON_NOT_SERVED,
                     "port \"" + definition.name() +
                         "\": ports of this kind are attached when the simulation is created");
@@ -96,6 +101,9 @@ void PortModel::make_structural(const v1::PortDefinition& definition,
   if (definition.offsets_size() != 0 && definition.offsets_size() != 3 * n)
     throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": `offsets` must have " +
                                                std::to_string(3 * n) + " numbers");
+  for (const double offset : definition.offsets())
+    if (!std::isfinite(offset))
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": `offsets` must be finite");
   for (int i = 0; i < n; ++i) {
     Point point = find_point(simulation, definition.node_labels(i));
     if (point.load < 0)

@@ -1,6 +1,7 @@
 #include "service/grants.h"
 
 #include <algorithm>
+#include <string_view>
 
 #include "wire/refusal.h"
 
@@ -9,6 +10,15 @@ namespace {
 
 constexpr int kMostGrants = 1000;
 constexpr std::size_t kLongestIdentity = 1000;
+
+/// "*", "local", "token:NAME" or "cert:…".
+bool is_identity(const std::string& text) {
+  if (text == "*" || text == "local") return true;
+  if (text.size() > kLongestIdentity) return false;
+  for (const std::string_view kind : {"token:", "cert:"})
+    if (text.size() > kind.size() && text.compare(0, kind.size(), kind) == 0) return true;
+  return false;
+}
 
 bool gives(const v1::Grant& grant, Access access, const std::string& port) {
   const bool control = grant.right() == v1::RIGHT_CONTROL;
@@ -37,7 +47,7 @@ void Grants::check(const List& grants) {
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "`grants` must not have more than " + std::to_string(kMostGrants) + " entries");
   for (const v1::Grant& grant : grants) {
-    if (grant.identity().empty() || grant.identity().size() > kLongestIdentity)
+    if (!is_identity(grant.identity()))
       throw Refusal(
           v1::REASON_BAD_ARGUMENT,
           "`grants.identity` must be \"*\" or an identity such as \"token:NAME\", got \"" +

@@ -83,6 +83,7 @@ Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> s
                     ? std::make_unique<Recorder>(shared.limits.record_bytes, shared.memory)
                     : nullptr),
       coupler_(options.ports(), *simulation_, identity_.lease, recorder_.get()) {
+  check_grants(options.grants());
   status_.set_display_name(identity_.display_name);
   set_policy(options.non_convergence_policy(), minimum_in(options));
   status_.publish(*simulation_);
@@ -135,7 +136,7 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
   if (request.has_grants() && !grants_.allow(caller, Access::own))
     throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
                   {{"wanted", "own"}});
-  if (request.has_grants()) Grants::check(request.grants().grants());  // before anything changes
+  if (request.has_grants()) check_grants(request.grants().grants());  // before anything changes
   const Guard lock(lock_);
   ++changes_;
   const StepPolicy now = simulation_->policy();
@@ -149,6 +150,15 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
   if (request.has_display_name()) status_.set_display_name(request.display_name());
   fill(reply->mutable_simulation(), caller);
   store_change(turn, *reply);
+}
+
+void Session::check_grants(const Grants::List& grants) const {
+  Grants::check(grants);
+  for (const v1::Grant& grant : grants)
+    for (const std::string& port : grant.ports())
+      if (!coupler_.find(port))
+        throw Refusal(v1::REASON_BAD_ARGUMENT,
+                      "`grants.ports`: no port is named \"" + port.substr(0, 100) + "\"");
 }
 
 const Recorder& Session::record() const {
@@ -266,9 +276,11 @@ void Session::check(const v1::StepRequest& request) const {
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`until_time` is not a number");
   if (request.exact() && !request.has_until_time())
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`exact` belongs to `until_time`, which is missing");
+  if (request.exact() && std::isinf(request.until_time()))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`until_time` must be finite with `exact`");
   if (request.has_until()) variables_.check_condition(request.until());
   variables_.check(request.outputs());
-  variables_.check_inputs(request.inputs());
+  variables_.check_inputs(request.inputs(), "inputs");
 }
 
 void Session::check_step(std::int64_t expected) const {
@@ -296,7 +308,7 @@ void Session::read(const v1::ReadVariablesRequest& request, v1::ReadVariablesRep
 void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply,
                     const KeptReplies::Turn* turn) {
   require_usable();
-  variables_.check_inputs(request.values());
+  variables_.check_inputs(request.values(), "values");
   if (status_.stepping())
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; inputs are written between advances");

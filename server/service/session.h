@@ -223,6 +223,7 @@ class Session {
   std::optional<StepReport> attempt_in_slot(Advance& advance) TS_REQUIRES(lock_);
   void set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum) TS_REQUIRES(lock_);
   void start_record(const v1::CreateOptions& options) TS_REQUIRES(lock_);
+  void check_grants(const Grants::List& grants) const;
   void account(Advance& advance, const StepReport& report) TS_REQUIRES(lock_);
   void account_pieces(v1::StepReply& reply, const StepReport& report);
   void account_delay(Advance& advance) TS_REQUIRES(lock_);

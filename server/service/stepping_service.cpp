@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "service/durability.h"
+#include "service/durations.h"
 #include "service/row_table.h"
 #include "service/simulations_service.h"
-#include "wire/convert.h"
 
 namespace mbcosim::server {
 namespace {
@@ -76,11 +76,9 @@ class Progress {
     end_time_ = info_.final_time();
     if (request.step().has_until_time())
       end_time_ = std::min(end_time_, request.step().until_time());
-    constexpr std::chrono::milliseconds kUsual(500), kShortest(20);
-    interval_ = kUsual;
     if (request.has_progress_interval())
       interval_ =
-          std::max(milliseconds_of(request.progress_interval(), "progress_interval"), kShortest);
+          span_of(request.progress_interval(), "progress_interval", std::chrono::milliseconds(20));
   }
 
   /// Sends what is due, unless the client has not taken the last one.

@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "wire/convert.h"
+#include "service/durations.h"
 
 namespace mbcosim::server {
 namespace {
@@ -51,8 +51,10 @@ Subscription::Options make_options(const v1::SubscribeRequest& request, const Se
     throw limit_refusal("telemetry_samples", limits.telemetry_samples,
                         "the buffer is larger than allowed");
   if (request.has_buffer_samples()) options.capacity = request.buffer_samples();
-  if (request.has_block_timeout())
-    options.block_timeout = milliseconds_of(request.block_timeout(), "block_timeout");
+  if (request.has_block_timeout()) {
+    options.block_timeout =
+        span_of(request.block_timeout(), "block_timeout", std::chrono::milliseconds(1));
+  }
   return options;
 }
 

@@ -34,7 +34,7 @@ void VariableAccess::check(int handle) const {
                                                  std::to_string(variables_.size()));
 }
 
-void VariableAccess::check_inputs(const v1::Values& inputs) const {
+void VariableAccess::check_inputs(const v1::Values& inputs, const std::string& field) const {
   std::int64_t size = 0;
   for (const int handle : inputs.handles()) {
     check(handle);
@@ -45,12 +45,13 @@ void VariableAccess::check_inputs(const v1::Values& inputs) const {
     size += variable.size;
   }
   if (size != inputs.values_size())
-    throw Refusal(v1::REASON_BAD_ARGUMENT, "the variables to write take " + std::to_string(size) +
-                                               " values, got " +
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`" + field + ".values`: the variables to write take " +
+                                               std::to_string(size) + " values, got " +
                                                std::to_string(inputs.values_size()));
   for (const double value : inputs.values())
     if (!std::isfinite(value))
-      throw Refusal(v1::REASON_BAD_ARGUMENT, "a value to write is not finite");
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    "`" + field + ".values`: a value to write is not finite");
 }
 
 void VariableAccess::check_condition(const v1::Condition& condition) const {
@@ -61,6 +62,12 @@ void VariableAccess::check_condition(const v1::Condition& condition) const {
                   "`until.element` must be from 0 to " + std::to_string(size - 1));
   if (condition.comparison() == v1::COMPARISON_UNSPECIFIED)
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`until.comparison` is missing");
+  if (!v1::Comparison_IsValid(condition.comparison()))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`until.comparison` is unknown to this server");
+  if (std::isnan(condition.threshold()))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`until.threshold` is not a number");
+  if (condition.has_locate_within() && std::isinf(condition.locate_within()))
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`until.locate_within` must be finite");
 }
 
 void VariableAccess::write(const v1::Values& inputs, Simulation& simulation) const {

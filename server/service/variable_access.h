@@ -1,6 +1,7 @@
 /// Reading and writing a simulation's variables as clients ask: by handles, checked first.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "mbcosim/v1/simulations.pb.h"
@@ -19,8 +20,8 @@ class VariableAccess {
   void check(const google::protobuf::RepeatedField<int>& handles) const {
     for (const int handle : handles) check(handle);
   }
-  /// Throws NO_SUCH_VARIABLE, NOT_WRITABLE or BAD_ARGUMENT.
-  void check_inputs(const v1::Values& inputs) const;
+  /// Throws NO_SUCH_VARIABLE, NOT_WRITABLE or BAD_ARGUMENT, which names the request's `field`.
+  void check_inputs(const v1::Values& inputs, const std::string& field) const;
   /// Throws BAD_ARGUMENT when the condition makes no sense.
   void check_condition(const v1::Condition& condition) const;
 

@@ -10,7 +10,8 @@ import pytest
 import decks
 import mbcosim
 from conftest import TIME_FACTOR, wait_for
-from mbcosim.v1 import common_pb2, coupling_pb2, simulations_pb2 as pb
+from google.protobuf import duration_pb2
+from mbcosim.v1 import common_pb2, coupling_pb2, coupling_types_pb2, simulations_pb2 as pb, telemetry_pb2
 from test_coupling import PORT, spring
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -260,6 +261,76 @@ def test_a_wrong_number_is_refused_by_its_field_and_nothing_is_applied(server, m
         error = mbcosim.errors.from_rpc_error(caught.value)
         assert (error.code, error.field) == (grpc.StatusCode.INVALID_ARGUMENT, field), str(error)
         assert simulation.export_state() == before
+
+
+NAN, INFINITE = float("nan"), float("inf")
+DURATION = duration_pb2.Duration
+
+
+def until(**wrong):
+    return pb.StepRequest(until=pb.Condition(**{"comparison": pb.COMPARISON_GREATER, "threshold": 1e9, **wrong}))
+
+
+@pytest.mark.parametrize("request_, field", [
+    (until(locate_within=0.0), "until.locate_within"), (until(locate_within=NAN), "until.locate_within"),
+    (until(locate_within=INFINITE), "until.locate_within"), (until(locate_within=1e-30), "until.locate_within"),
+    (until(threshold=NAN), "until.threshold"), (until(comparison=0), "until.comparison"), (until(comparison=77), "until.comparison"),
+    (until(element=-1), "until.element"), (until(element=9), "until.element"),
+    (pb.StepRequest(exact=True), "exact"), (pb.StepRequest(until_time=INFINITE, exact=True), "until_time"),
+    (pb.StepRequest(inputs=common_pb2.Values(handles=[11], values=[1.0])), "inputs.values"),
+    (pb.StepRequest(inputs=common_pb2.Values(handles=[11], values=[NAN] * 6)), "inputs.values")], ids=str)
+def test_a_step_that_makes_no_sense_is_refused_by_its_field(server, request_, field):
+    with server.load_text(decks.body()) as simulation:
+        assert simulation.handles(["node.structural.1.load"]) == [11]
+        request_.simulation = simulation.name
+        refused(field, lambda: server.simulations.Step(request_, metadata=server.metadata))
+        for rows in (pb.TableRequest(), pb.TableRequest(every=0)):
+            wrong = pb.RunRequest(step=request_, table=rows)
+            with pytest.raises(grpc.RpcError):
+                list(server.simulations.Run(wrong, metadata=server.metadata))
+        assert simulation.refresh().step == 0
+
+
+@pytest.mark.parametrize("seconds", [0, -1, 10**12])
+def test_a_wrong_span_is_refused_by_its_field(server, seconds):
+    with server.load_text(decks.body()) as simulation:
+        run = pb.RunRequest(step=pb.StepRequest(simulation=simulation.name), progress_interval=DURATION(seconds=seconds))
+        refused("progress_interval", lambda: list(server.simulations.Run(run, metadata=server.metadata)))
+        block = telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=[0], policy=telemetry_pb2.OVERFLOW_POLICY_BLOCK,
+                                               block_timeout=DURATION(seconds=seconds))
+        refused("block_timeout", lambda: next(server.telemetry.Subscribe(block, metadata=server.metadata)))
+        assert simulation.refresh().step == 0
+
+
+def refused(field, call):
+    with pytest.raises(grpc.RpcError) as caught:
+        call()
+    error = mbcosim.errors.from_rpc_error(caught.value)
+    assert (error.code, error.field) == (grpc.StatusCode.INVALID_ARGUMENT, field), str(error)
+
+
+def port(**wrong):
+    return pb.CreateOptions(ports=[coupling_types_pb2.PortDefinition(**{"name": "p", "kind": 1, "node_labels": [1], **wrong})])
+
+
+@pytest.mark.parametrize("options, field", [
+    (pb.CreateOptions(lease=DURATION()), "lease"), (pb.CreateOptions(minimum_step_size=NAN), "minimum_step_size"),
+    (pb.CreateOptions(pace=pb.Pace(rate=NAN)), "pace.rate"), (pb.CreateOptions(pace=pb.Pace()), "pace.rate"),
+    (pb.CreateOptions(durability=77), "durability"), (pb.CreateOptions(non_convergence_policy=77), "non_convergence_policy"),
+    (pb.CreateOptions(request_id="x" * 129), "request_id"), (pb.CreateOptions(symbols={"x": pb.SymbolValue()}), "symbols"),
+    (pb.CreateOptions(grants=[pb.Grant(identity="nobody", right=pb.RIGHT_OBSERVE)]), "grants.identity"),
+    (pb.CreateOptions(grants=[pb.Grant(identity="token:", right=pb.RIGHT_OBSERVE)]), "grants.identity"),
+    (pb.CreateOptions(grants=[pb.Grant(identity="*", right=pb.RIGHT_COUPLE, ports=["none"])]), "grants.ports"),
+    (pb.CreateOptions(protocol=common_pb2.VersionRange(lowest=3, highest=2)), "protocol"),
+    (pb.CreateOptions(protocol=common_pb2.VersionRange(lowest=-1, highest=2)), "protocol"),
+    (port(name=""), "ports.name"), (port(kind=77), "ports.kind"), (port(offsets=[1.0]), "offsets"), (port(offsets=[0.0, NAN, 0.0]), "offsets"),
+], ids=str)
+def test_a_wrong_choice_at_creation_is_refused_by_its_field(server, options, field):
+    upload = pb.InlineUpload(header=pb.UploadHeader(bundle_main_file="deck", options=options),
+                             files=[common_pb2.FileChunk(path="deck", data=decks.body().encode())])
+    before = len(server.list())
+    refused(field, lambda: server.simulations.CreateSimulationInline(upload, metadata=server.metadata))
+    assert len(server.list()) == before
 
 
 @pytest.mark.parametrize("group, field, value", [

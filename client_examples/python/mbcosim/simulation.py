@@ -56,7 +56,7 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self._line = StepLine(self._stub, self._connection.metadata)
+        self._line = StepLine(self._stub, self._connection.about(self.name))
         self._through = self._line.step
 
     def step(self, count: int = 1, *, step_size: Optional[float] = None,  # type: ignore[override]  # of a method made by runs_calls
