@@ -93,7 +93,7 @@ TEST(VariableAccess, RefusesHandlesWrongSizesAndWhatIsNoInput) {
     v1::Values inputs;
     inputs.mutable_handles()->Assign(handles.begin(), handles.end());
     inputs.mutable_values()->Assign(values.begin(), values.end());
-    return reason_of_refusal([&] { access.check_inputs(inputs); });
+    return reason_of_refusal([&] { access.check_inputs(inputs, "values"); });
   };
   EXPECT_EQ(refused({1}, {1, 2}), v1::REASON_UNSPECIFIED);
   EXPECT_EQ(refused({2}, {1}), v1::REASON_NO_SUCH_VARIABLE);
