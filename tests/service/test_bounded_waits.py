@@ -92,6 +92,7 @@ SERVER_CALLS = {
     "events": lambda s: s.events(timeout=0.3),
     "list": lambda s: s.list(timeout=0.3),
     "attach": lambda s: s.attach("simulations/x", timeout=0.3),
+    "import_checkpoint": lambda s: s.import_checkpoint(b"x" * (3 << 20), timeout=0.3),
 }
 
 

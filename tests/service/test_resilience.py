@@ -404,20 +404,6 @@ def test_the_work_of_a_cancelled_analysis_ends_within_a_second(daemon, long_chai
     assert time.monotonic() - cancelled < (1 + 0.35) * TIME_FACTOR  # the look takes 0.3 s by itself
 
 
-def test_a_cancelled_creation_stops_in_the_middle_of_a_factorization(daemon):
-    with grpc.insecure_channel(daemon.address) as channel:
-        stub = simulations_pb2_grpc.SimulationsStub(channel)
-        for after in (0.7, 2, 4):  # of some 10 s, most of which are those of a single factorization
-            wait_for(lambda: is_at_rest(daemon), 30)
-            call = stub.CreateSimulation.future(iter(upload(decks.cube(13))))
-            time.sleep(after)
-            assert not call.done()
-            call.cancel()
-            cancelled = time.monotonic()
-            wait_for(lambda: is_at_rest(daemon), 30)
-            assert time.monotonic() - cancelled < (1 + 0.35) * TIME_FACTOR
-
-
 def test_the_daemon_ends_within_its_grace_whatever_runs(start_daemon):
     daemon = ready(start_daemon())
     with grpc.insecure_channel(daemon.address) as channel:
