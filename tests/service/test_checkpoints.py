@@ -1,0 +1,98 @@
+"""Simulations as bytes: carried to another daemon they go on bit for bit; the commands that list, store and bring back."""
+import os
+import subprocess
+
+import pytest
+
+import mbcosim
+from conftest import BIN
+from mbcosim.v1 import simulations_pb2 as pb
+from test_durable import at_the_end, bits, deck, folder, start, state_of  # noqa: F401 (fixtures)
+
+
+@pytest.fixture
+def other(start_daemon, tmp_path):
+    """A second daemon with a folder of its own."""
+    (tmp_path / "other").mkdir()
+    return start_daemon("--state-dir", str(tmp_path / "other"))
+
+
+def run(*arguments):
+    done = subprocess.run([os.path.join(BIN, "mbcosim"), *arguments], capture_output=True, text=True, timeout=60)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_a_carried_simulation_goes_on_bit_for_bit(start, other):
+    with start().connect() as here, other.connect() as there:
+        expected = at_the_end(here, deck(400))
+        simulation = here.load_text(deck(400), name="body")
+        simulation.step(100)
+        saved = simulation.snapshot("here")
+        simulation.step(100)
+        data = simulation.export_checkpoint()
+        carried = there.import_checkpoint(data)
+        assert state_of(there, carried.info.name) == pb.SIMULATION_STATE_SUSPENDED
+        assert (carried.info.display_name, carried.info.step) == ("body", 200)
+        carried.run_until(1e9)
+        assert bits(carried) == expected
+        assert [s.display_name for s in carried.snapshots()] == ["here"]
+        simulation.run_until(1e9)  # the original is not touched
+        assert bits(simulation) == expected
+        simulation.restore(saved)
+        carried.restore(carried.snapshots()[0])
+        assert bits(carried) == bits(simulation)
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[:-1], lambda b: b[:100], lambda b: b"", lambda b: b"x" * 1000,
+                                    lambda b: b[:len(b) // 2] + bytes([b[len(b) // 2] ^ 1]) + b[len(b) // 2 + 1:]],
+                         ids=["cut", "short", "empty", "foreign", "flipped"])
+def test_damaged_bytes_are_refused_and_leave_nothing(start, damage):
+    with start().connect() as server:
+        with server.load_text(deck(100), name="body") as simulation:
+            data = simulation.export_checkpoint()
+            with pytest.raises(mbcosim.Error) as refused:
+                server.import_checkpoint(damage(data))
+            assert refused.value.reason in ("DAMAGED_STATE", "BAD_ARGUMENT"), refused.value
+            assert [info.name for info in server.list()] == [simulation.info.name]
+
+
+def test_what_is_not_durable_is_refused_by_name(start, start_daemon):
+    with start().connect() as server, start_daemon().connect() as without:
+        with server.load_text(deck(100), durability="none") as simulation:
+            with pytest.raises(mbcosim.PreconditionFailed) as refused:
+                simulation.export_checkpoint()
+            assert refused.value.reason == "NOT_DURABLE"
+        durable = server.load_text(deck(100))
+        with pytest.raises(mbcosim.PreconditionFailed) as refused:
+            without.import_checkpoint(durable.export_checkpoint())
+        assert refused.value.reason == "NOT_DURABLE"
+
+
+def test_the_commands_list_store_and_bring_back(start, other, tmp_path):
+    file = str(tmp_path / "body.checkpoint")
+    daemon = start()
+    with daemon.connect() as here, other.connect() as there:
+        simulation = here.load_text(deck(400), name="body")
+        simulation.step(50)
+        name = simulation.info.name
+        code, listing, _ = run("sessions", "--address", daemon.address)
+        assert code == 0 and any(line.split()[:3] == [name, "ready", "50"] for line in listing.splitlines()), listing
+        assert run("checkpoint", name, "-o", file, "--address", daemon.address)[0] == 0
+        code, printed, errors = run("resume", file, "--name", "again", "--address", other.address)
+        assert code == 0, errors
+        carried = there.attach(printed.strip())
+        assert (carried.info.display_name, carried.info.step) == ("again", 50)
+        assert bits(carried) == bits(simulation)
+        assert run("resume", printed.strip(), "--address", other.address)[0] == 0
+
+
+def test_commands_say_what_is_wrong(start, tmp_path):
+    daemon = start()
+    missing = str(tmp_path / "missing")
+    for arguments, text in [(("checkpoint", "simulations/nobody", "-o", missing), "nobody"), (("resume", missing), f"cannot read {missing}"),
+                            (("checkpoint", "simulations/nobody"), "--output is required")]:
+        code, _, errors = run(*arguments, "--address", daemon.address)
+        assert code == 4 and text in errors, errors
+        assert not os.path.exists(missing)
+    code, _, errors = run("sessions", "--address", f"unix:{missing}", "--timeout", "0.3")
+    assert code == 4 and missing in errors
