@@ -153,7 +153,7 @@ TEST(RodBezier, PullsAlongTheDirectionsOfTheStart) {
 /// On ground that moves and is tilted, with an axle that is no unit vector.
 TEST(Wheel, HasTheForcesOfItsSlip) {
   DeckRun run(
-      deck(1e-3, 1,
+      deck(1e-4, 1,
            "structural: 1, dynamic, .1,.2,.45, euler123, .1,-.2,.3, 3.,.7,-.4, .5,4.,.2; "
            "structural: 2, dynamic, .2,.1,.1, euler123, .05,.1,-.1, .2,.1,.1, .1,.2,.1;",
            "body: 1, 1, 20., null, diag, 1.,1.,1.; body: 2, 2, 500., null, diag, "
@@ -161,7 +161,7 @@ TEST(Wheel, HasTheForcesOfItsSlip) {
            ".4, .1, .9, 3e5, 1.3, 12., slip, linear, .2, .5, linear, .1, .7, linear, .3, "
            ".4, threshold, .2, .9;"));
   ASSERT_TRUE(run.ready());
-  run.step(5);
+  run.step(5);  // the slip has not come to rest yet, where the law jumps
   const NodeState w = run.node(1), g = run.node(2);
   constexpr double R0 = .4, r0 = .1, pi = 3.14159265358979323846;
   const Vec3 P(.1, .05, -.02), n = (g.R * Vec3(.1, .2, 2)).normalized(),
