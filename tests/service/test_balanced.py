@@ -57,9 +57,15 @@ class Cluster:
         self.proxy.terminate()
         self.proxy.wait(30)
         for daemon in self.daemons.values():
-            daemon.process.send_signal(signal.SIGTERM)  # begins to drain; the next one ends that
-        for daemon in self.daemons.values():
+            wait_for(lambda: self._ends(daemon), 30)
             daemon.stop()
+
+    @staticmethod
+    def _ends(daemon):
+        """The first SIGTERM begins to drain, the next one ends that; two that are pending at once count as one."""
+        if daemon.process.poll() is None:
+            daemon.process.send_signal(signal.SIGTERM)
+        return daemon.process.poll() is not None
 
 
 @pytest.fixture

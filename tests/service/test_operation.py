@@ -173,7 +173,7 @@ def test_metrics_tell_of_peers_queues_and_the_disk(start_daemon, tmp_path):
 
         with simulation.couple("hand", slow):
             simulation.step(5)
-        found = metrics(daemon)
+            found = metrics(daemon)
     assert found['mbcosim_exchange_seconds_count'] == found['mbcosim_peer_wait_seconds_count'] == 5
     assert 0.1 <= found['mbcosim_exchange_seconds_sum'] <= found['mbcosim_peer_wait_seconds_sum']
     assert found['mbcosim_journal_seconds_count'] >= 5 and found['mbcosim_journal_bytes_total'] > 1000
