@@ -166,12 +166,12 @@ bool Port::has_peer() const {
 }
 
 bool Port::had_peer() const {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   return agreement_.generation > 0;
 }
 
 void Port::expect_peer() {
-  std::lock_guard guard(mutex_);
+  const Guard guard(mutex_);
   if (agreement_.generation == 0) agreement_.generation = 1;
 }
 

@@ -101,6 +101,7 @@ constexpr const char* kTypes3[] = {"Boolean", "Int32", "Float64", "String"};
 std::string start_text(const Value& value) {
   if (const double* real = std::get_if<double>(&value)) return exact(*real);
   if (const bool* truth = std::get_if<bool>(&value)) return *truth ? "true" : "false";
+  if (const auto* text = std::get_if<std::string>(&value)) return *text;
   return printed(value);
 }
 

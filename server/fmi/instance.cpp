@@ -344,7 +344,8 @@ const FmuSymbol* Instance::find_symbol(std::uint32_t reference, ValueType type) 
 Value Instance::value_of(const FmuSymbol& symbol) const {
   if (const auto chosen = chosen_.find(symbol.name); chosen != chosen_.end()) return chosen->second;
   const auto declared = declared_.find(symbol.name);
-  return declared == declared_.end() ? symbol.start : declared->second;
+  const bool known = chosen_ == read_ && declared != declared_.end();
+  return known ? declared->second : symbol.start;
 }
 
 Status Instance::may_choose(const FmuSymbol& symbol) {

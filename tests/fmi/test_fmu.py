@@ -538,14 +538,14 @@ def test_variables_can_be_chosen(ports, standard):
 # ------------------------------------------------------------------ symbols of the deck
 
 SYMBOLS = """set: const real L = 1.; set: real M = 2.*L; set: const integer INPUTS = 2; set: const bool HEAVY = TRUE;
-set: const string KIND = "plain";
+set: const string NOTE = "plain";
 begin: data; problem: initial value; end: data;
 begin: initial value; initial time: 0.; final time: 1.; time step: 1e-2; tolerance: 1e-9; max iterations: 20; end: initial value;
 begin: control data; structural nodes: 1; rigid bodies: 1; forces: 1; file drivers: 1; gravity; end: control data;
 begin: nodes; structural: 1, dynamic, L,0.,0., eye, null, 0.,0.,1.; end: nodes;
 begin: drivers; file: 1, stream, stream drive name, "push", create, no, path, "nobody", INPUTS; end: drivers;
 begin: elements; body: 1, 1, M, null, diag, 1.,2.,3.; gravity: uniform, 0.,0.,-1., 9.81*(HEAVY == TRUE);
-force: 1, absolute, 1, position, null, 1.,0.,0., const, L*(KIND == "plain"); end: elements;
+force: 1, absolute, 1, position, null, 1.,0.,0., const, L; end: elements;
 """
 
 
@@ -572,18 +572,19 @@ def test_symbols_are_fixed_parameters_with_the_types_of_the_deck(symbols, standa
     fmu = symbols(standard)
     real, integer = ("Real", "Integer") if standard == "2" else ("Float64", "Int32")
     assert {name: (fmu.type(name), fmu.start(name)) for name in fmu.names("parameter")} == {
-        "symbol.HEAVY": ("Boolean", "true"), "symbol.INPUTS": (integer, "2"), "symbol.KIND": ("String", "plain"),
+        "symbol.HEAVY": ("Boolean", "true"), "symbol.INPUTS": (integer, "2"), "symbol.NOTE": ("String", "plain"),
         "symbol.L": (real, [1.0]), "symbol.M": (real, [2.0])}
     assert all(fmu.variables[name].get("variability") == "fixed" for name in fmu.names("parameter"))
     with instance_of(fmu) as instance:
-        assert [instance.parameter(name) for name in sorted(fmu.names("parameter"))] == [True, 2, b"plain", 1.0, 2.0]
+        instance.enter_initialization(0.0)
+        assert [instance.parameter(name) for name in sorted(fmu.names("parameter"))] == [True, 2, 1.0, 2.0, b"plain"]
 
 
 @pytest.mark.parametrize("standard", STANDARDS)
 def test_symbols_that_are_set_give_the_bits_of_an_fmu_exported_with_them(symbols, standard):
-    values = {"L": 0.5, "HEAVY": False, "KIND": b"other"}
+    values = {"L": 0.5, "HEAVY": False, "NOTE": b"other"}
     fmu = symbols(standard)
-    with instance_of(symbols(standard, "-D", "L=0.5", "-D", "HEAVY=FALSE", "-D", "KIND=other")) as with_values:
+    with instance_of(symbols(standard, "-D", "L=0.5", "-D", "HEAVY=FALSE", "-D", "NOTE=other")) as with_values:
         with_values.initialize()
         expected = positions(with_values)
         assert with_values.archive.start("symbol.L") == [0.5] and with_values.archive.start("symbol.HEAVY") == "false"
@@ -594,8 +595,8 @@ def test_symbols_that_are_set_give_the_bits_of_an_fmu_exported_with_them(symbols
         assert instance.parameter("symbol.M") == 1.0  # the deck computes it from L
         assert positions(instance) == expected
         assert instance.call("Reset") == OK
-        assert instance.parameter("symbol.L") == 1.0
         instance.initialize()
+        assert instance.parameter("symbol.L") == 1.0 and instance.parameter("symbol.M") == 2.0
         assert positions(instance) != expected
 
 
