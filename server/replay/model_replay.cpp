@@ -181,7 +181,8 @@ class ModelReplay {
     v1::WriteVariablesRequest request;
     v1::WriteVariablesReply reply;
     *request.mutable_values() = values;
-    session_.write(request, &reply, /*turn=*/nullptr);
+    const server::Call nobody;
+    session_.write(request, nobody, &reply, /*turn=*/nullptr);
   }
   void step(const v1::RecordEntry& entry) {
     const bool accepted = entry.has_accepted();

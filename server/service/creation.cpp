@@ -335,8 +335,8 @@ class ValidateInlineHandler final : public OneRequest<v1::InlineUpload> {
 
 /// A fork, with result files of its own.
 std::unique_ptr<Simulation> branch(Session& source, int snapshot, SessionResults* results,
-                                   const CancelToken& cancel) {
-  std::unique_ptr<Simulation> simulation = source.fork(snapshot, cancel);
+                                   const Call& call, const CancelToken& cancel) {
+  std::unique_ptr<Simulation> simulation = source.fork(snapshot, call, cancel);
   if (!results) return simulation;
   const Status begun = simulation->write_to(results->start(simulation->model()));
   if (!begun) throw Refusal(results->without_paths(begun.error()));
@@ -380,7 +380,7 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
                           Session::Origin* origin) {
       *origin = source->origin();
       origin->forked = true;
-      return branch(*source, number, results, token);
+      return branch(*source, number, results, exchange.call(), token);
     };
     return fresh_.add(request.options(), digest, exchange, durable ? &deck : nullptr, make,
                       request.simulation());

@@ -3,7 +3,31 @@
 #include <algorithm>
 #include <chrono>
 
+#include "wire/refusal.h"
+
 namespace mbcosim::server {
+namespace {
+
+constexpr std::chrono::milliseconds kLook(10);  // how soon the end of a call is noticed
+
+}  // namespace
+
+bool FairMutex::lock_for(const Call& call) {
+  const Guard guard(mutex_);
+  const std::uint64_t ticket = next_++;
+  while (serving_ != ticket) {
+    if (call.cancelled()) {
+      given_up_.insert(ticket);
+      return false;
+    }
+    turn_.wait_for(mutex_, kLook);
+  }
+  return true;
+}
+
+CallGuard::CallGuard(FairMutex& mutex, const Call& call) : mutex_(mutex) {
+  if (!mutex_.lock_for(call)) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+}
 
 bool SolverSlots::take(const std::string& owner) {
   int& held = held_[owner];
@@ -20,7 +44,7 @@ SolverSlots::Slot SolverSlots::acquire(const std::string& owner, const CancelTok
   Waiter waiter{owner, {}, false};
   waiting_.push_back(&waiter);
   while (!waiter.granted) {
-    waiter.granted_signal.wait_for(mutex_, std::chrono::milliseconds(10));
+    waiter.granted_signal.wait_for(mutex_, kLook);
     if (!waiter.granted && cancel.cancelled()) {
       waiting_.erase(std::find(waiting_.begin(), waiting_.end(), &waiter));
       return {};

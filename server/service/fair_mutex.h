@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 
+#include "rpc/call.h"
 #include "simulation/simulation.h"
 #include "threads/mutex.h"
 
@@ -27,10 +29,13 @@ class TS_CAPABILITY("mutex") FairMutex {
     const std::uint64_t ticket = next_++;
     while (serving_ != ticket) turn_.wait(mutex_);
   }
+  /// Gives up when the call has ended. True: the caller holds the lock.
+  bool lock_for(const Call& call) TS_TRY_ACQUIRE(true) TS_EXCLUDES(mutex_);
   void unlock() TS_RELEASE() {
     {
       const Guard guard(mutex_);
       ++serving_;
+      while (given_up_.erase(serving_) > 0) ++serving_;
       if (serving_ == next_) return;
     }
     turn_.notify_all();
@@ -45,6 +50,20 @@ class TS_CAPABILITY("mutex") FairMutex {
   Mutex mutex_;
   Condition turn_;
   std::uint64_t next_ TS_GUARDED_BY(mutex_) = 0, serving_ TS_GUARDED_BY(mutex_) = 0;
+  std::set<std::uint64_t> given_up_ TS_GUARDED_BY(mutex_);
+};
+
+/// Holds a lock for a call. Throws CANCELLED when the call ends before its turn comes.
+class TS_SCOPED_CAPABILITY CallGuard {
+ public:
+  CallGuard(FairMutex& mutex, const Call& call)
+      TS_ACQUIRE(mutex) TS_NO_THREAD_SAFETY_ANALYSIS;  // clang knows no throwing acquisition
+  ~CallGuard() TS_RELEASE() { mutex_.unlock(); }
+  CallGuard(const CallGuard&) = delete;
+  CallGuard& operator=(const CallGuard&) = delete;
+
+ private:
+  FairMutex& mutex_;
 };
 
 /// The bounded pool: so many sessions may be inside the solver at once, first come first served. A

@@ -11,7 +11,7 @@ void add_geometry(Gate& gate, const Parts& parts) {
                [&parts](const CallFrame& frame, const v1::DescribeGeometryRequest& request) {
                  auto session = std::make_shared<SessionHold>(parts.store, request.simulation(),
                                                               frame.caller, Access::observe);
-                 State state = (*session)->state();
+                 State state = (*session)->state(frame.call);
                  auto share = std::make_shared<MemoryShare>(frame.memory, size_of(state));
                  auto messages = std::make_shared<GeometryMessages>(
                      (*session)->model(), std::move(state),

@@ -20,12 +20,12 @@ std::int64_t end_of(const v1::GetResultsRequest& request, std::int64_t size) {
   return request.offset_bytes() + std::min(left, request.length_bytes());
 }
 
-FileReplies::Source file_pieces(const Parts& parts, const Caller& caller,
+FileReplies::Source file_pieces(const Parts& parts, const CallFrame& frame,
                                 const v1::GetResultsRequest& request) {
-  auto session =
-      std::make_shared<SessionHold>(parts.store, request.simulation(), caller, Access::observe);
+  auto session = std::make_shared<SessionHold>(parts.store, request.simulation(), frame.caller,
+                                               Access::observe);
   std::int64_t cuts = 0;
-  const std::int64_t size = (*session)->size_of_result(request.file(), &cuts);
+  const std::int64_t size = (*session)->size_of_result(request.file(), frame.call, &cuts);
   const std::int64_t end = end_of(request, size);
   return [session, file = request.file(), at = request.offset_bytes(), end,
           cuts](v1::GetResultsReply* reply) mutable {
@@ -43,11 +43,13 @@ void add_results(Gate& gate, const Parts& parts) {
   gate.add("/mbcosim.v1.Results/ListResults",
            on_session<v1::ListResultsRequest, v1::ListResultsReply>(
                parts, Role::observe, Lane::work,
-               [](Session& session, const auto&, auto* reply) { session.list_results(reply); }));
+               [](Session& session, const auto&, auto* reply, const CallFrame& frame) {
+                 session.list_results(frame.call, reply);
+               }));
   gate.add("/mbcosim.v1.Results/GetResults",
            series<v1::GetResultsRequest, v1::GetResultsReply>(
                Role::observe, Lane::work, [&parts](const CallFrame& frame, const auto& request) {
-                 return file_pieces(parts, frame.caller, request);
+                 return file_pieces(parts, frame, request);
                }));
 }
 

@@ -132,12 +132,13 @@ void Session::set_policy(v1::NonConvergencePolicy kind, std::optional<double> mi
 }
 
 void Session::update(const v1::UpdateSimulationRequest& request, const Caller& caller,
-                     v1::UpdateSimulationReply* reply, const KeptReplies::Turn* turn) {
+                     const Call& call, v1::UpdateSimulationReply* reply,
+                     const KeptReplies::Turn* turn) {
   if (request.has_grants() && !grants_.allow(caller, Access::own))
     throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
                   {{"wanted", "own"}});
   if (request.has_grants()) check_grants(request.grants().grants());  // before anything changes
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   ++changes_;
   const StepPolicy now = simulation_->policy();
   std::optional<double> minimum = minimum_in(request);
@@ -296,23 +297,24 @@ bool Session::interrupt() { return status_.interrupt(); }
 
 // ------------------------------------------------------------------ reading and writing
 
-void Session::read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply) {
+void Session::read(const v1::ReadVariablesRequest& request, const Call& call,
+                   v1::ReadVariablesReply* reply) {
   require_usable();
   variables_.check(request.handles());
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   reply->set_step(simulation_->step_number());
   reply->set_time(simulation_->time());
   variables_.read(*simulation_, request.handles(), reply->mutable_values());
 }
 
-void Session::write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply,
-                    const KeptReplies::Turn* turn) {
+void Session::write(const v1::WriteVariablesRequest& request, const Call& call,
+                    v1::WriteVariablesReply* reply, const KeptReplies::Turn* turn) {
   require_usable();
   variables_.check_inputs(request.values(), "values");
   if (status_.stepping())
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; inputs are written between advances");
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   if (request.has_expected_step()) check_step(request.expected_step());
   std::optional<State> before;
   if (journaled()) before = simulation_->state();
@@ -337,15 +339,16 @@ SessionResults& Session::results() const {
   return *results_;
 }
 
-void Session::list_results(v1::ListResultsReply* out) {
+void Session::list_results(const Call& call, v1::ListResultsReply* out) {
   SessionResults& files = results();
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   files.list(out);
 }
 
-std::int64_t Session::size_of_result(const std::string& file, std::int64_t* cuts) {
+std::int64_t Session::size_of_result(const std::string& file, const Call& call,
+                                     std::int64_t* cuts) {
   SessionResults& files = results();
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   return files.size_of(file, cuts);
 }
 

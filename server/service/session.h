@@ -42,8 +42,8 @@ struct CapturedPoint {
   int journal_end = 0;       ///< the journal's files before this one tell of nothing later
 };
 
-/// Thread-safe. One call at a time advances the simulation; others read between its steps. Methods
-/// throw Refusal.
+/// Thread-safe. One call at a time advances the simulation; others read between its steps, and wait
+/// for the end of one as long as their `call` lasts. Methods throw Refusal.
 class Session {
  public:
   struct Identity {
@@ -103,35 +103,36 @@ class Session {
             const Progress& progress = {}, RowTable* table = nullptr);
   bool interrupt();  ///< was anything advancing?
   /// Throws NOT_GRANTED when the caller must not change grants.
-  void update(const v1::UpdateSimulationRequest& request, const Caller& caller,
+  void update(const v1::UpdateSimulationRequest& request, const Caller& caller, const Call& call,
               v1::UpdateSimulationReply* reply, const KeptReplies::Turn* turn);
   /// The record of the ports. Throws NOT_RECORDING.
   const Recorder& record() const;
-  void read(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply);
+  void read(const v1::ReadVariablesRequest& request, const Call& call,
+            v1::ReadVariablesReply* reply);
   /// `turn`: what keeps the reply, or null.
-  void write(const v1::WriteVariablesRequest& request, v1::WriteVariablesReply* reply,
-             const KeptReplies::Turn* turn);
+  void write(const v1::WriteVariablesRequest& request, const Call& call,
+             v1::WriteVariablesReply* reply, const KeptReplies::Turn* turn);
 
   void linearize(const v1::LinearizeRequest& request, Call& call, v1::LinearizeReply* reply);
   void eigenvalues(const v1::ComputeEigenvaluesRequest& request, Call& call,
                    v1::ComputeEigenvaluesReply* reply);
 
-  void save(const std::string& display_name, v1::Snapshot* out);
-  void restore(int snapshot);
+  void save(const std::string& display_name, const Call& call, v1::Snapshot* out);
+  void restore(int snapshot, const Call& call);
   void forget(int snapshot);
-  void reset(const CancelToken& cancel);  ///< to the initial solution
+  void reset(const Call& call, const CancelToken& cancel);  ///< to the initial solution
   SnapshotShelf& snapshots() { return snapshots_; }
-  std::string export_state(int snapshot);  ///< negative: the current state
+  std::string export_state(int snapshot, const Call& call);  ///< negative: the current state
   void import_state(const std::string& bytes, const std::string& display_name, bool also_restore,
-                    v1::Snapshot* out);
+                    const Call& call, v1::Snapshot* out);
   /// `snapshot`: negative: the current state. Throws CANCELLED.
-  std::unique_ptr<Simulation> fork(int snapshot, const CancelToken& cancel);
-  State state();  ///< a copy
+  std::unique_ptr<Simulation> fork(int snapshot, const Call& call, const CancelToken& cancel);
+  State state(const Call& call);  ///< a copy
 
   /// Waits for the end of a step. Throws NO_RESULTS.
-  void list_results(v1::ListResultsReply* out);
+  void list_results(const Call& call, v1::ListResultsReply* out);
   /// Bytes of a result file; `*cuts` is for `SessionResults::read`. Throws NO_SUCH_FILE.
-  std::int64_t size_of_result(const std::string& file, std::int64_t* cuts);
+  std::int64_t size_of_result(const std::string& file, const Call& call, std::int64_t* cuts);
   /// Throws NO_RESULTS.
   SessionResults& results() const;
   /// They go with the simulation.
@@ -196,7 +197,7 @@ class Session {
   void run(Advance& advance, const Progress& progress);
   void go_on(Advance& advance);
   void break_off(Advance& advance);
-  void go_to(const State& state, std::int64_t results_until);
+  void go_to(const State& state, const Call& call, std::int64_t results_until);
   void check(const v1::StepRequest& request) const;
   void check_step(std::int64_t expected) const TS_REQUIRES(lock_);
   bool must_wait(const Advance& advance) const;
@@ -241,7 +242,7 @@ class Session {
   void describe_variables(const v1::DescribeSimulationRequest& request,
                           v1::ModelDescription* out) const;
   void require_usable() const;
-  State state_at_rest(std::int64_t* step);
+  State state_at_rest(const Call& call, std::int64_t* step);
 
   const Identity identity_;
   const Shared shared_;

@@ -133,7 +133,7 @@ void tell_pages(ReplyPages<Reply>& kept, const Request& request, MemoryBudget& m
 }  // namespace
 
 // A copy: the analysis of a large model takes long, and the simulation is free meanwhile.
-State Session::state_at_rest(std::int64_t* step) {
+State Session::state_at_rest(const Call& call, std::int64_t* step) {
   require_usable();
   if (inverse_problem(*model_))
     throw Refusal(
@@ -142,7 +142,7 @@ State Session::state_at_rest(std::int64_t* step) {
   if (status_.stepping())
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; it is analysed between advances");
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   *step = simulation_->step_number();
   return simulation_->snapshot();
 }
@@ -154,7 +154,7 @@ void Session::linearize(const v1::LinearizeRequest& request, Call& call,
   tell_pages(linearization_, request, shared_.memory, call, reply,
              [&](const CancelToken& token, LinearizePages& pages) {
                std::int64_t step = 0;
-               const State state = state_at_rest(&step);
+               const State state = state_at_rest(call, &step);
                const Linearization system = mbcosim::linearize(*model_, state);
                const auto io = linearize_inputs_outputs(
                    *model_, state, Variables(*model_),
@@ -179,7 +179,7 @@ void Session::eigenvalues(const v1::ComputeEigenvaluesRequest& request, Call& ca
   tell_pages(spectrum_, request, shared_.memory, call, reply,
              [&](const CancelToken& token, auto& pages) {
                std::int64_t step = 0;
-               const State state = state_at_rest(&step);
+               const State state = state_at_rest(call, &step);
                const auto spectrum = eigen(mbcosim::linearize(*model_, state), request.count(),
                                            std::complex<double>(0, 2 * M_PI * request.shift()),
                                            {request.eigenvectors(), &token});

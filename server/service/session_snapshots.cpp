@@ -4,23 +4,23 @@
 
 namespace mbcosim::server {
 
-void Session::save(const std::string& display_name, v1::Snapshot* out) {
+void Session::save(const std::string& display_name, const Call& call, v1::Snapshot* out) {
   require_usable();
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   snapshots_.check_room(size_of(simulation_->state()));
   snapshots_.add(simulation_->snapshot(), display_name, out);
   ++changes_;
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
 }
 
-void Session::restore(int snapshot) {
+void Session::restore(int snapshot, const Call& call) {
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
-  go_to(snapshots_.get(snapshot), results_ ? snapshots_.agrees_until(snapshot) : 0);
+  go_to(snapshots_.get(snapshot), call, results_ ? snapshots_.agrees_until(snapshot) : 0);
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
                        status_.view().step);
 }
 
-void Session::reset(const CancelToken& cancel) {
+void Session::reset(const Call& call, const CancelToken& cancel) {
   constexpr std::int64_t kNothing = -1, kInitialSolution = 0;
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
   MemoryShare share;
@@ -28,11 +28,11 @@ void Session::reset(const CancelToken& cancel) {
     return Simulation::create(origin_.model, &cancel, /*writer=*/nullptr, origin_.time_keeping);
   });
   if (!fresh) throw Refusal(fresh.error());
-  go_to((*fresh)->state(), origin_.forked ? kNothing : kInitialSolution);
+  go_to((*fresh)->state(), call, origin_.forked ? kNothing : kInitialSolution);
 }
 
 // `results_until`: the state shares its history with the result files up to this step.
-void Session::go_to(const State& state, std::int64_t results_until) {
+void Session::go_to(const State& state, const Call& call, std::int64_t results_until) {
   if (!status_.claim(nullptr))
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; restore when it has ended");
@@ -40,7 +40,7 @@ void Session::go_to(const State& state, std::int64_t results_until) {
     SessionStatus& status;
     ~Release() { status.release(); }
   } const release{status_};
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   if (results_) results_->expect(results_until);
   const auto status = simulation_->restore(state);
   if (results_) results_->restored();
@@ -62,9 +62,10 @@ void Session::forget(int snapshot) {
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_DELETED, snapshots_.name_of(snapshot), step);
 }
 
-std::unique_ptr<Simulation> Session::fork(int snapshot, const CancelToken& cancel) {
+std::unique_ptr<Simulation> Session::fork(int snapshot, const Call& call,
+                                          const CancelToken& cancel) {
   if (snapshot < 0) require_usable();
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   std::unique_ptr<Simulation> branch = simulation_->fork(&cancel);
   if (!branch) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
   if (snapshot >= 0) {
@@ -74,21 +75,21 @@ std::unique_ptr<Simulation> Session::fork(int snapshot, const CancelToken& cance
   return branch;
 }
 
-State Session::state() {
+State Session::state(const Call& call) {
   require_usable();
-  const Guard lock(lock_);
+  const CallGuard lock(lock_, call);
   return simulation_->snapshot();
 }
 
-std::string Session::export_state(int snapshot) {
-  return bytes_of(snapshot >= 0 ? snapshots_.get(snapshot) : state());
+std::string Session::export_state(int snapshot, const Call& call) {
+  return bytes_of(snapshot >= 0 ? snapshots_.get(snapshot) : state(call));
 }
 
 void Session::import_state(const std::string& bytes, const std::string& display_name,
-                           bool also_restore, v1::Snapshot* out) {
+                           bool also_restore, const Call& call, v1::Snapshot* out) {
   std::int64_t results_end = 0;  // an imported state is taken for one of this history so far
   Result<State> state = [&] {
-    const Guard lock(lock_);
+    const CallGuard lock(lock_, call);
     results_end = results_ ? results_->end() : 0;
     return simulation_->state_of(bytes);
   }();
@@ -96,7 +97,7 @@ void Session::import_state(const std::string& bytes, const std::string& display_
   const int number = snapshots_.add(std::move(*state), display_name, out, results_end);
   ++changes_;
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
-  if (also_restore) restore(number);
+  if (also_restore) restore(number, call);
 }
 
 }  // namespace mbcosim::server

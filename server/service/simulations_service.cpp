@@ -131,7 +131,7 @@ void add_life(Gate& gate, const Parts& parts) {
                [](Session& session, const v1::UpdateSimulationRequest& request,
                   v1::UpdateSimulationReply* reply, const CallFrame& frame,
                   const KeptReplies::Turn* turn) {
-                 session.update(request, frame.caller, reply, turn);
+                 session.update(request, frame.caller, frame.call, reply, turn);
                }));
   gate.add(
       simulations_path("DescribeSimulation"),
@@ -142,18 +142,19 @@ void add_life(Gate& gate, const Parts& parts) {
 }
 
 void add_variables(Gate& gate, const Parts& parts) {
+  gate.add(simulations_path("ReadVariables"),
+           on_session<v1::ReadVariablesRequest, v1::ReadVariablesReply>(
+               parts, Role::observe, Lane::work,
+               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+                 session.read(request, frame.call, reply);
+               }));
   gate.add(
-      simulations_path("ReadVariables"),
-      on_session<v1::ReadVariablesRequest, v1::ReadVariablesReply>(
-          parts, Role::observe, Lane::work, [](Session& session, const auto& request, auto* reply) {
-            session.read(request, reply);
-          }));
-  gate.add(simulations_path("WriteVariables"),
-           on_session<v1::WriteVariablesRequest, v1::WriteVariablesReply>(
-               parts, Role::control, Lane::work,
-               [](Session& session, const v1::WriteVariablesRequest& request,
-                  v1::WriteVariablesReply* reply, const CallFrame&,
-                  const KeptReplies::Turn* turn) { session.write(request, reply, turn); }));
+      simulations_path("WriteVariables"),
+      on_session<v1::WriteVariablesRequest, v1::WriteVariablesReply>(
+          parts, Role::control, Lane::work,
+          [](Session& session, const v1::WriteVariablesRequest& request,
+             v1::WriteVariablesReply* reply, const CallFrame& frame,
+             const KeptReplies::Turn* turn) { session.write(request, frame.call, reply, turn); }));
 }
 
 void add_analysis(Gate& gate, const Parts& parts) {

@@ -36,8 +36,8 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
       throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
     v1::ImportSnapshotReply reply;
     const auto import = [this](Session& session, const v1::ImportSnapshotHeader&,
-                               v1::ImportSnapshotReply* out) {
-      session.import_state(bytes_, header_.display_name(), header_.restore(),
+                               v1::ImportSnapshotReply* out, const CallFrame& frame) {
+      session.import_state(bytes_, header_.display_name(), header_.restore(), frame.call,
                            out->mutable_snapshot());
     };
     once_stored(parts_.store, **session_, frame_of(exchange), question(), &reply, import);
@@ -60,14 +60,14 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
 
 using ExportReplies = Series<v1::ExportSnapshotRequest, v1::ExportSnapshotReply>;
 
-ExportReplies::Source exported(const Parts& parts, const Caller& caller,
+ExportReplies::Source exported(const Parts& parts, const CallFrame& frame,
                                const v1::ExportSnapshotRequest& request) {
-  const SessionHold session(parts.store, request.simulation(), caller, Access::observe);
+  const SessionHold session(parts.store, request.simulation(), frame.caller, Access::observe);
   const int number = request.has_snapshot() ? snapshot_in(request) : -1;
   auto bytes = std::make_shared<std::string>();
   auto share = std::make_shared<MemoryShare>();
-  *bytes = within(parts.runtime.budgets.of(caller.identity), nullptr, share.get(),
-                  [&] { return session->export_state(number); });
+  *bytes = within(parts.runtime.budgets.of(frame.caller.identity), nullptr, share.get(),
+                  [&] { return session->export_state(number, frame.call); });
   return [bytes, share, at = std::size_t{0}](auto* reply) mutable {
     if (at >= bytes->size()) return false;
     reply->set_data(bytes->substr(at, kChunkBytes));
@@ -93,12 +93,12 @@ RecordReplies::Source recorded(const Parts& parts, const Caller& caller,
 }
 
 void add_saved(Gate& gate, const Parts& parts) {
-  gate.add(
-      simulations_path("CreateSnapshot"),
-      on_session<v1::CreateSnapshotRequest, v1::CreateSnapshotReply>(
-          parts, Role::control, Lane::work, [](Session& session, const auto& request, auto* reply) {
-            session.save(request.display_name(), reply->mutable_snapshot());
-          }));
+  gate.add(simulations_path("CreateSnapshot"),
+           on_session<v1::CreateSnapshotRequest, v1::CreateSnapshotReply>(
+               parts, Role::control, Lane::work,
+               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+                 session.save(request.display_name(), frame.call, reply->mutable_snapshot());
+               }));
   gate.add(simulations_path("ListSnapshots"),
            on_session<v1::ListSnapshotsRequest, v1::ListSnapshotsReply>(
                parts, Role::observe, Lane::work, [](Session& session, const auto&, auto* reply) {
@@ -108,7 +108,7 @@ void add_saved(Gate& gate, const Parts& parts) {
            on_session<v1::RestoreSnapshotRequest, v1::RestoreSnapshotReply>(
                parts, Role::control, Lane::work,
                [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
-                 session.restore(snapshot_in(request));
+                 session.restore(snapshot_in(request), frame.call);
                  session.fill(reply->mutable_simulation(), frame.caller);
                }));
   gate.add(simulations_path("ResetSimulation"),
@@ -116,7 +116,7 @@ void add_saved(Gate& gate, const Parts& parts) {
                parts, Role::control, Lane::heavy,
                [](Session& session, const auto&, auto* reply, const CallFrame& frame) {
                  const CallToken token(frame.call);
-                 session.reset(token);
+                 session.reset(frame.call, token);
                  session.fill(reply->mutable_simulation(), frame.caller);
                }));
   gate.add(simulations_path("DeleteSnapshot"),
@@ -133,7 +133,7 @@ void add_snapshots(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("ExportSnapshot"),
            series<v1::ExportSnapshotRequest, v1::ExportSnapshotReply>(
                Role::observe, Lane::work, [&parts](const CallFrame& frame, const auto& request) {
-                 return exported(parts, frame.caller, request);
+                 return exported(parts, frame, request);
                }));
   gate.add(simulations_path("ImportSnapshot"),
            stream(Role::control, [&parts] { return std::make_unique<ImportHandler>(parts); }));

@@ -1,4 +1,5 @@
 #include "service/fair_mutex.h"
+#include "wire/refusal.h"
 
 #include <gtest/gtest.h>
 
@@ -37,6 +38,39 @@ TEST(FairMutex, TryLockFailsWhileLocked) {
   EXPECT_FALSE(mutex.try_lock());
   mutex.unlock();
   EXPECT_TRUE(mutex.try_lock());
+  mutex.unlock();
+}
+
+TEST(FairMutex, AnEndedCallWaitsNoLongerAndHoldsUpNobody) {
+  FairMutex mutex;
+  Call call;
+  mutex.lock();
+  std::atomic<bool> gave_up{false}, served{false};
+  std::thread hasty([&] { gave_up = !mutex.lock_for(call); });
+  while (!mutex.contended()) std::this_thread::yield();
+  std::thread patient([&] {
+    const Guard lock(mutex);
+    served = true;
+  });
+  call.cancel();
+  hasty.join();
+  EXPECT_TRUE(gave_up);
+  EXPECT_FALSE(served);
+  mutex.unlock();
+  patient.join();
+  EXPECT_TRUE(served);
+}
+
+TEST(FairMutex, ACallGuardHoldsTheLockOrThrows) {
+  FairMutex mutex;
+  Call call;
+  {
+    const CallGuard lock(mutex, call);
+    EXPECT_FALSE(mutex.try_lock());
+    call.cancel();
+    EXPECT_THROW(CallGuard(mutex, call), Refusal);
+  }
+  EXPECT_TRUE(mutex.try_lock()) << "the ticket that was given up is passed over";
   mutex.unlock();
 }
 
