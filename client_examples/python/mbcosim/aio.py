@@ -28,12 +28,13 @@ from mbcosim.v1 import common_pb2, coupling_pb2, events_pb2, simulations_pb2 as 
 
 from . import access, events, exchange
 from .access import Attempts, default_address
-from .calls import ServerCalls, SimulationCalls, SnapshotCalls, StepResult
+from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepResult, Values
 from .coupling import Answer, open_stream
 from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, from_rpc_error, translated
 from .histories import History
 from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
 from .simulation import subscribe_request
+from .stepping import AwaitedStepLine, exchange_step, status_of
 
 T = TypeVar("T")
 Self = TypeVar("Self")
@@ -112,6 +113,8 @@ class Connection(Address):
                 raise
 
     async def _once(self, call: Call) -> Any:
+        if call.through is not None and call.timeout is None and (reply := await call.through(call.request)) is not None:
+            return reply
         answer = self.stubs.method(call.method)(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
         if call.each is None:
             return await answer
@@ -128,6 +131,20 @@ def awaited(function: Callable[..., Calls[T]]) -> Callable[..., Awaitable[T]]:
         result: T = await self._connection.run(function(self, *arguments, **options))
         return result
     return method
+
+
+async def _until_cancelled(stream: Any) -> AsyncIterator[Any]:
+    """Every message until the server ends the stream, or somebody here cancels it."""
+    try:
+        while True:
+            with translated():
+                message = await stream.read()
+            if message is grpc.aio.EOF:
+                return
+            yield message
+    except asyncio.CancelledError:
+        if not stream.cancelled():
+            raise
 
 
 async def _bounded(seconds: Optional[float], awaitable: Awaitable[T], cancel: Callable[[], object], what: str) -> T:
@@ -156,6 +173,24 @@ class Snapshot(Awaiting, SnapshotCalls):
 class Simulation(Awaiting, SimulationCalls[Snapshot]):
     """A simulation; `async with` deletes it at the end (unless it was attached)."""
     _snapshot_class = Snapshot
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._line = AwaitedStepLine(self._connection.stubs.simulations, self._connection.about(self.name))
+        self._through = self._line.step
+
+    async def step(self, count: int = 1, *, step_size: Optional[float] = None,  # type: ignore[override]  # of a method made by runs_calls
+                   until: Optional[Condition] = None, inputs: Optional[Values] = None, outputs: Iterable[str] = (),
+                   timeout: Optional[float] = None) -> StepResult:
+        """As mbcosim.Simulation.step."""
+        names = list(outputs)
+        if step_size is None and until is None and timeout is None and not inputs and (request := self._quick_step(count, names)) is not None:
+            return self.result(await self._connection.perform(Call("Simulations/Step", request, repeatable=True, through=self._through)), names)
+        result: StepResult = await self._connection.run(self._steps(count, step_size, until, inputs, names, timeout))
+        return result
+
+    def _leave(self) -> None:
+        self._line.close()
 
     async def __aenter__(self: Self) -> Self:
         return self
@@ -249,16 +284,8 @@ class Events(events.Course):
         self.close()
 
     async def __aiter__(self) -> AsyncIterator[events_pb2.Event]:
-        try:
-            while True:
-                with translated():
-                    event = await self._stream.read()
-                if event is grpc.aio.EOF:
-                    return
-                yield self._take(event)
-        except asyncio.CancelledError:
-            if not self._stream.cancelled():
-                raise
+        async for event in _until_cancelled(self._stream):
+            yield self._take(event)
 
     def close(self) -> None:
         """Ends the watching."""
@@ -297,19 +324,8 @@ class Stepper:
         if request.inputs.handles:
             request.inputs.values.extend(np.ravel(np.asarray(values, float)))
         with translated():
-            reply = await _bounded(timeout, self._exchange(request), self._stream.cancel, "the step")
+            reply = await _bounded(timeout, exchange_step(self._stream, request), self._stream.cancel, "the step")
         return self._simulation.result(reply.step, self._outputs)
-
-    async def _exchange(self, request: pb.StepRequest) -> pb.StepStreamReply:
-        try:
-            await self._stream.write(request)
-            reply = await self._stream.read()
-        except asyncio.InvalidStateError:  # the stream has ended
-            reply = grpc.aio.EOF
-        if reply is grpc.aio.EOF:
-            raise await _status(self._stream)
-        answer: pb.StepStreamReply = reply
-        return answer
 
     async def close(self, *, timeout: Optional[float] = PARTING) -> None:
         """Ends the stream."""
@@ -338,28 +354,14 @@ class Subscription:
         self.close()
 
     async def __aiter__(self) -> AsyncIterator[tuple[int, float, dict[str, Any]]]:
-        try:
-            while True:
-                with translated():
-                    batch = await self._stream.read()
-                if batch is grpc.aio.EOF:
-                    return
-                self.dropped = batch.total_dropped
-                for sample in batch.samples:
-                    yield sample.step, sample.time, self._simulation.split(self._names, sample.values)
-        except asyncio.CancelledError:
-            if not self._stream.cancelled():
-                raise
+        async for batch in _until_cancelled(self._stream):
+            self.dropped = batch.total_dropped
+            for sample in batch.samples:
+                yield sample.step, sample.time, self._simulation.split(self._names, sample.values)
 
     def close(self) -> None:
         """Ends the subscription."""
         self._stream.cancel()
-
-
-async def _status(stream: Any) -> grpc.RpcError:
-    """How a stream ended, as an exception of grpc."""
-    code, details = await stream.code(), await stream.details()
-    return grpc.aio.AioRpcError(code, await stream.initial_metadata(), await stream.trailing_metadata(), details)
 
 
 class Peer(exchange.Course):
@@ -398,7 +400,7 @@ class Peer(exchange.Course):
                 return welcome
         except (grpc.RpcError, asyncio.InvalidStateError):
             pass
-        raise from_rpc_error(await _status(self._stream)) from None
+        raise from_rpc_error(await status_of(self._stream)) from None
 
     async def __aenter__(self: Self) -> Self:
         return self
@@ -436,7 +438,7 @@ class Peer(exchange.Course):
             motion = self._take(data)
             if motion is not None:
                 yield motion
-        status = await _status(self._stream)
+        status = await status_of(self._stream)
         if status.code() not in (grpc.StatusCode.OK, grpc.StatusCode.CANCELLED):
             self.error = self.error or from_rpc_error(status)
 

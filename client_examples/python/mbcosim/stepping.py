@@ -1,6 +1,7 @@
 """A loop of steps that are asked for one by one: they travel on an open stream, which takes less time than calls."""
 from __future__ import annotations
 
+import asyncio
 import queue
 import threading
 import time
@@ -78,3 +79,76 @@ class StepLine:
             self._requests.put(None)
         if replies is not None:
             replies.cancel()
+
+
+async def status_of(stream: Any) -> Any:
+    """How a stream of asyncio has ended, as an exception of grpc."""
+    code, details = await stream.code(), await stream.details()
+    return grpc.aio.AioRpcError(code, await stream.initial_metadata(), await stream.trailing_metadata(), details)
+
+
+async def exchange_step(stream: Any, request: pb.StepRequest) -> pb.StepStreamReply:
+    """One request and its reply; raises what the stream has ended with."""
+    try:
+        await stream.write(request)
+        reply = await stream.read()
+    except asyncio.InvalidStateError:  # the stream has ended
+        reply = grpc.aio.EOF
+    if reply is grpc.aio.EOF:
+        raise await status_of(stream)
+    answer: pb.StepStreamReply = reply
+    return answer
+
+
+class AwaitedStepLine:
+    """StepLine for asyncio, within one event loop."""
+
+    def __init__(self, stub: Any, metadata: Any) -> None:
+        self._stub, self._metadata = stub, metadata
+        self._stream: Any = None
+        self._idle: Optional[asyncio.TimerHandle] = None
+        self._last, self._allowed, self._taken = float("-inf"), True, False
+
+    async def step(self, request: pb.StepRequest) -> Optional[pb.StepReply]:
+        """See StepLine.step."""
+        if self._taken:
+            return None
+        self._taken = True
+        try:
+            stream = self._open()
+            return None if stream is None else (await exchange_step(stream, request)).step
+        except grpc.RpcError as error:
+            self.close()
+            code = error.code()
+            self._allowed = code != grpc.StatusCode.RESOURCE_EXHAUSTED  # as many streams as one may have
+            if code == grpc.StatusCode.OK or not self._allowed:
+                return None
+            raise
+        except BaseException:  # the reply of a step that nobody awaits any more would be taken for the next one's
+            self.close()
+            raise
+        finally:
+            self._last, self._taken = time.monotonic(), False
+
+    def _open(self) -> Any:
+        if self._stream is None and self._allowed and time.monotonic() - self._last < _SOON:
+            self._stream = self._stub.StepStream(metadata=self._metadata)
+            self._watch()
+        return self._stream
+
+    def _watch(self) -> None:
+        self._idle = asyncio.get_running_loop().call_later(_IDLE / 2, self._close_when_idle)
+
+    def _close_when_idle(self) -> None:
+        if not self._taken and time.monotonic() - self._last > _IDLE:
+            self.close()
+        else:
+            self._watch()
+
+    def close(self) -> None:
+        """Ends the stream; a later loop opens another one."""
+        stream, self._stream = self._stream, None
+        if self._idle is not None:
+            self._idle.cancel()
+        if stream is not None:
+            stream.cancel()

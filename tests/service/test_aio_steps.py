@@ -1,0 +1,115 @@
+"""Steps one by one in a loop of the asyncio client: they travel on an open stream, as those of the blocking one do (test_stepping.py)."""
+import asyncio
+
+import pytest
+
+import decks
+import mbcosim
+import mbcosim.aio
+from conftest import TIME_FACTOR
+from mbcosim.v1 import simulations_pb2 as pb
+
+POSITION = "node.structural.1.X"
+
+
+async def in_a_loop(simulation, count=5, **options):
+    return [await simulation.step(outputs=[POSITION], **options) for _ in range(count)]
+
+
+def has_a_stream(simulation):
+    return simulation._line._stream is not None
+
+
+def run(daemon, body):
+    async def main():
+        async with mbcosim.aio.connect(daemon.address) as server:
+            await body(server)
+
+    asyncio.run(asyncio.wait_for(main(), 60 * TIME_FACTOR))
+
+
+def test_steps_in_a_loop_share_a_stream_that_ends_when_they_do(daemon):
+    async def body(server):
+        async with await server.load_text(decks.body()) as simulation, await server.load_text(decks.body()) as other:
+            await simulation.step()
+            assert not has_a_stream(simulation)  # one step is a call
+            alike = [[r.values[POSITION].tolist() for r in await in_a_loop(simulation)]]
+            assert has_a_stream(simulation)
+            await other.step()
+            alike.append([r.values[POSITION].tolist() for r in await in_a_loop(other, timeout=60.0)])
+            assert not has_a_stream(other)  # with a timeout each is a call
+            assert alike[0] == alike[1] and await simulation.export_state() == await other.export_state()
+            while has_a_stream(simulation):
+                await asyncio.sleep(0.05)
+            assert (await simulation.step()).step == 7
+            await in_a_loop(simulation)
+        assert not has_a_stream(simulation)
+
+    run(daemon, body)
+
+
+def test_an_error_in_a_loop_is_that_of_a_call_and_the_loop_goes_on(daemon):
+    async def body(server):
+        async with await server.load_text(decks.body()) as simulation:
+            await in_a_loop(simulation)
+            for _ in range(3):
+                with pytest.raises(mbcosim.Error) as caught:
+                    await simulation.step(step_size=-1.0)
+                assert (caught.value.reason, caught.value.field) == ("BAD_ARGUMENT", "step_size")
+            assert (await in_a_loop(simulation))[-1].step == 10 and has_a_stream(simulation)
+
+    run(daemon, body)
+
+
+def test_two_tasks_step_one_simulation_in_a_loop(daemon):
+    async def body(server):
+        async with await server.load_text(decks.body()) as simulation:
+            async def loop():
+                for _ in range(50):
+                    while True:
+                        try:
+                            await simulation.step()
+                            break
+                        except mbcosim.Busy:
+                            pass
+
+            await asyncio.gather(loop(), loop())
+            assert (await simulation.refresh()).step == 100
+
+    run(daemon, body)
+
+
+def test_a_step_that_nobody_awaits_any_more_leaves_no_reply_for_the_next(daemon):
+    async def body(server):
+        async with await server.load_text(decks.endless()) as simulation:
+            await in_a_loop(simulation)
+            for _ in range(3):
+                with pytest.raises(asyncio.TimeoutError):
+                    await asyncio.wait_for(simulation.step(10**9), 0.2)
+                while (await simulation.refresh()).state != pb.SIMULATION_STATE_READY:
+                    await asyncio.sleep(0.01)
+                before = simulation.info.step
+                assert [r.step for r in await in_a_loop(simulation)] == list(range(before + 1, before + 6))
+
+    run(daemon, body)
+
+
+def test_where_no_stream_is_to_be_had_a_loop_makes_calls(start_daemon):
+    async def body(server):
+        async with await server.load_text(decks.body()) as simulation, await simulation.subscribe(["time"]):
+            assert (await in_a_loop(simulation, 20))[-1].step == 20 and not has_a_stream(simulation)
+
+    run(start_daemon("--limit-identity-streams", "1"), body)
+
+
+def test_a_daemon_that_dies_in_a_loop_is_noticed(start_daemon):
+    daemon = start_daemon()
+
+    async def body(server):
+        simulation = await server.load_text(decks.body())
+        await in_a_loop(simulation)
+        daemon.kill()
+        with pytest.raises(mbcosim.Unavailable):
+            await in_a_loop(simulation)
+
+    run(daemon, body)
