@@ -4,12 +4,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Optional
 
-import grpc
-
 from mbcosim.v1 import events_pb2
 
 from .errors import translated
-from .rpc import USUAL, Connection, bounded
+from .rpc import USUAL, Connection, bounded, until_cancelled
 
 
 def watch_request(simulation: str, after: Optional[int], journal: str) -> events_pb2.WatchEventsRequest:
@@ -46,13 +44,8 @@ class Events(Course):
         self.close()
 
     def __iter__(self) -> Iterator[events_pb2.Event]:
-        try:
-            for event in self._stream:
-                yield self._take(event)
-        except grpc.RpcError as error:
-            if error.code() != grpc.StatusCode.CANCELLED:
-                with translated():
-                    raise
+        for event in until_cancelled(self._stream):
+            yield self._take(event)
 
     def close(self) -> None:
         """Ends the watching."""

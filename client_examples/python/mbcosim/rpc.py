@@ -282,6 +282,16 @@ def bounded(seconds: Optional[float], cancel: Callable[[], object], what: str) -
         timer.cancel()
 
 
+def until_cancelled(messages: Any) -> Iterator[Any]:
+    """Every message until the server ends the stream, or somebody here cancels it."""
+    try:
+        yield from messages
+    except grpc.RpcError as error:
+        if error.code() != grpc.StatusCode.CANCELLED:
+            with translated():
+                raise
+
+
 @contextlib.contextmanager
 def parting() -> Iterator[None]:
     """Ends what is on the server as far as it can be reached: what cannot ends with its lease."""

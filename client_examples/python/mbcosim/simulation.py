@@ -5,7 +5,6 @@ import queue
 from collections.abc import Iterable, Iterator
 from typing import Any, Optional, TypeVar
 
-import grpc
 import numpy as np
 import numpy.typing as npt
 
@@ -17,7 +16,7 @@ from .coupling import Answer, Peer
 from .errors import translated
 from .histories import Histories
 from .objects import ModelObjects
-from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, parting, runs_calls
+from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, parting, runs_calls, until_cancelled
 from .stepping import StepLine
 from .words import pick
 
@@ -187,15 +186,10 @@ class Subscription:
         self.close()
 
     def __iter__(self) -> Iterator[tuple[int, float, dict[str, Any]]]:
-        try:
-            for batch in self._stream:
-                self.dropped = batch.total_dropped
-                for sample in batch.samples:
-                    yield sample.step, sample.time, self._simulation.split(self._names, sample.values)
-        except grpc.RpcError as error:
-            if error.code() != grpc.StatusCode.CANCELLED:
-                with translated():
-                    raise
+        for batch in until_cancelled(self._stream):
+            self.dropped = batch.total_dropped
+            for sample in batch.samples:
+                yield sample.step, sample.time, self._simulation.split(self._names, sample.values)
 
     def close(self) -> None:
         """Ends the subscription."""
