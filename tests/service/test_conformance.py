@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 
+import grpc
 import pytest
 
 import mbcosim
@@ -11,6 +12,7 @@ from conftest import BIN
 
 KIT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "conformance")
 sys.path.insert(0, KIT)
+import check_calls  # noqa: E402
 import check_peer  # noqa: E402
 import check_server  # noqa: E402
 import scripted_server  # noqa: E402
@@ -33,6 +35,71 @@ def test_errors_of_servers_are_found(tmp_path, monkeypatch, fault):
     with scripted_server.ScriptedServer(f"unix:{tmp_path}/s", fault):
         found = check_server.check_server(f"unix:{tmp_path}/s", first_only=True)
     assert found, f"the kit does not notice: {fault}"
+
+
+# ---------------------------------------------------------------- calls
+
+def test_the_daemons_calls_conform(daemon):
+    assert check_calls.check_calls(daemon.address) == {}
+
+
+class Tampering(grpc.UnaryUnaryClientInterceptor):
+    """Stands between the kit and a good server, which so looks like a wrong one."""
+
+    def __init__(self, request=None, reply=None, instead=()):
+        self._request, self._reply, self._instead = request, reply, dict(instead)
+
+    def intercept_unary_unary(self, continuation, details, request):
+        service, _, method = details.method.rpartition("/")
+        if method in self._instead:
+            details = details._replace(method=f"{service}/{self._instead[method]}")
+        sent = type(request).FromString(request.SerializeToString())
+        if self._request:
+            self._request(method, sent)
+        answer = continuation(details, sent)
+        if self._reply and answer.code() == grpc.StatusCode.OK:
+            self._reply(answer.result())
+        return answer
+
+
+def without(method, field):
+    """Forgets a field of a request: of a creation, of its options."""
+    def tamper(called, request):
+        if called == method:
+            (request.header.options if method == "CreateSimulationInline" else request).ClearField(field)
+    return Tampering(request=tamper)
+
+
+def in_options(called, request):
+    if called == "ForkSimulation":
+        request.options.ClearField("request_id")
+
+
+FAULTS = {
+    **{f"repeated {method}": without(method, "request_id") for method in check_calls.REPEATED},
+    "repeated creation": without("CreateSimulationInline", "request_id"), "repeated fork": Tampering(request=in_options),
+    "repeated end": without("DeleteSimulation", "request_id"), "repeated steps are done once": without("Step", "request_id"),
+    **{f"wrong {field}": without(method, field.partition(".")[0]) for field, (method, _) in check_calls.WRONG.items()},
+    **{f"wrong option {field}": without("CreateSimulationInline", {"offsets": "ports"}.get(field, field.partition(".")[0]))
+       for field in check_calls.WRONG_OPTIONS},
+    **{f"pages of {what}": without(method, "page_size") for what, method in (
+        ("a description", "DescribeSimulation"), ("a linearization", "Linearize"), ("eigenvectors", "ComputeEigenvalues"), ("the list", "ListSimulations"))},
+    "reset": Tampering(instead={"ResetSimulation": "GetSimulation"}),
+}
+
+
+@pytest.mark.parametrize("check", FAULTS)
+def test_a_server_that_forgets_a_field_is_found(daemon, check):
+    assert check in check_calls.check_calls(daemon.address, [FAULTS[check]], [check])
+
+
+@pytest.mark.parametrize("check", ["pages of a description", "pages of a linearization", "pages of eigenvectors", "pages of the list"])
+def test_a_server_that_ends_its_pages_too_early_is_found(daemon, check):
+    def cut(reply):
+        if "next_page_token" in reply.DESCRIPTOR.fields_by_name:
+            reply.next_page_token = ""
+
+    assert check in check_calls.check_calls(daemon.address, [Tampering(reply=cut)], [check])
 
 
 def python_peer(address, simulation, port):
