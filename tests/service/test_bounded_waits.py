@@ -177,6 +177,29 @@ def test_a_silent_server_is_noticed_in_the_middle_of_a_step_without_a_timeout(fa
         took(begin, 2 + TIME_FACTOR)
 
 
+def test_asyncio_notices_a_silent_server_in_a_step_without_a_timeout_and_in_a_loop_of_steps(falls_silent):
+    address, silence = falls_silent
+
+    async def main():
+        async with mbcosim.aio.connect(address) as server:
+            simulation, looping = await server.load_text(decks.endless()), await server.load_text(decks.endless())
+
+            async def loop():
+                while True:
+                    await looping.step()
+
+            asyncio.get_running_loop().call_later(1.0, silence)
+            begin = time.monotonic()
+            ended = await asyncio.gather(simulation.run_until(1e9), loop(), return_exceptions=True)
+            assert all(isinstance(error, mbcosim.Unavailable) for error in ended), ended
+            took(begin, 1 + SILENT + 2 * TIME_FACTOR)
+            begin = time.monotonic()
+            await simulation.__aexit__()
+            took(begin, 2 + TIME_FACTOR)
+
+    asyncio.run(main())
+
+
 def test_an_awaited_peer_shows_signs_of_life_while_it_computes(daemon):
     async def main():
         async with mbcosim.aio.connect(daemon.address) as server:

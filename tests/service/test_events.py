@@ -162,3 +162,14 @@ def test_lines_of_the_log_have_the_same_fields(start_daemon):
         "session": simulation.name, "method": "Simulations/Step", "identity": "local", "request_id": 'my "request"', "trace_id": trace}
     refused, = [line for line in lines if "refused to" in line["message"]]
     assert refused["reason"] == "NO_SUCH_SIMULATION" and refused["method"] == "Simulations/Step" and "trace_id" not in refused
+
+
+def test_lines_about_peers_name_port_and_identity(start_daemon):
+    daemon = start_daemon("--log-format", "json")
+    with daemon.connect() as server, server.load_text(decks.body(), ports=PORT) as simulation:
+        with simulation.couple("port", lambda motion: [0.0] * 6):
+            simulation.step()
+        wait_for(lambda: "left" in daemon.log())
+    lines = [json.loads(line) for line in daemon.log().splitlines()]
+    told = [line for line in lines if "port" in line]
+    assert len(told) >= 2 and all((line["session"], line["port"], line["peer"]) == (simulation.name, "port", "local") for line in told)

@@ -4,7 +4,8 @@ import pytest
 
 import decks
 import mbcosim
-from mbcosim.v1 import coupling_pb2, coupling_types_pb2 as types, geometry_pb2, geometry_pb2_grpc, simulations_pb2 as pb, telemetry_pb2
+from mbcosim.v1 import (coupling_pb2, coupling_types_pb2 as types, events_pb2, geometry_pb2, geometry_pb2_grpc, results_pb2, simulations_pb2 as pb,
+                        telemetry_pb2)
 from test_coupling import PORT, spring
 from test_geometry import CHAIN
 
@@ -37,6 +38,7 @@ def calls(server, name, port="spring"):
     """Calls on a simulation by name, and which access each needs; those that change nothing come first."""
     stub, metadata = server.simulations, server.metadata
     geometry = geometry_pb2_grpc.GeometryStub(server._channel)
+    results, events = server._connection.stubs.results, server._connection.stubs.events
 
     def unary(method, request):
         return lambda: method(request, metadata=metadata, timeout=30)
@@ -56,6 +58,9 @@ def calls(server, name, port="spring"):
         ("ExportSnapshot", "observe", stream(stub.ExportSnapshot, pb.ExportSnapshotRequest(simulation=name))),
         ("GetRecord", "observe", stream(stub.GetRecord, pb.GetRecordRequest(simulation=name))),
         ("Subscribe", "observe", stream(server.telemetry.Subscribe, telemetry_pb2.SubscribeRequest(simulation=name))),
+        ("ListResults", "observe", unary(results.ListResults, results_pb2.ListResultsRequest(simulation=name))),
+        ("GetResults", "observe", stream(results.GetResults, results_pb2.GetResultsRequest(simulation=name, file="results.mov"))),
+        ("WatchEvents", "observe", stream(events.WatchEvents, events_pb2.WatchEventsRequest(simulation=name))),
         ("DescribeGeometry", "observe", stream(geometry.DescribeGeometry, geometry_pb2.DescribeGeometryRequest(simulation=name))),
         ("Attach", "couple", attach),
         ("WriteVariables", "control", unary(stub.WriteVariables, pb.WriteVariablesRequest(simulation=name))),
@@ -65,6 +70,9 @@ def calls(server, name, port="spring"):
         ("Interrupt", "control", unary(stub.Interrupt, pb.InterruptRequest(simulation=name))),
         ("CreateSnapshot", "control", unary(stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))),
         ("RestoreSnapshot", "control", unary(stub.RestoreSnapshot, pb.RestoreSnapshotRequest(simulation=name, snapshot=name + "/snapshots/1"))),
+        ("DeleteSnapshot", "control", unary(stub.DeleteSnapshot, pb.DeleteSnapshotRequest(simulation=name, snapshot=name + "/snapshots/9"))),
+        ("ImportSnapshot", "control", unary(stub.ImportSnapshot, iter([pb.ImportSnapshotRequest(header=pb.ImportSnapshotHeader(simulation=name))]))),
+        ("ExportCheckpoint", "control", stream(stub.ExportCheckpoint, pb.ExportCheckpointRequest(simulation=name))),
         ("ResetSimulation", "control", unary(stub.ResetSimulation, pb.ResetSimulationRequest(simulation=name))),
         ("Linearize", "control", unary(stub.Linearize, pb.LinearizeRequest(simulation=name))),
         ("ComputeEigenvalues", "control", unary(stub.ComputeEigenvalues, pb.ComputeEigenvaluesRequest(simulation=name))),
@@ -73,6 +81,18 @@ def calls(server, name, port="spring"):
         ("UpdateSimulation grants", "own", unary(stub.UpdateSimulation, pb.UpdateSimulationRequest(simulation=name, grants=pb.Grants()))),
         ("DeleteSimulation", "own", unary(stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))),
     ]
+
+
+def test_the_table_has_every_method_on_a_simulation(shared):
+    def names_one(message, depth=2):
+        return "simulation" in message.fields_by_name or depth > 0 and any(
+            names_one(f.message_type, depth - 1) for f in message.fields if f.message_type is not None)
+
+    files = (pb, coupling_pb2, geometry_pb2, telemetry_pb2, results_pb2, events_pb2)
+    methods = {m.name for file in files for service in file.DESCRIPTOR.services_by_name.values() for m in service.methods if names_one(m.input_type)}
+    with shared("ann").load_text(decks.body(), ports=PORT) as simulation:
+        tabled = {method.split()[0] for method, _, _ in calls(shared("ann"), simulation.name)}
+    assert methods - {"ListSimulations"} == tabled - {"ListSimulations"}
 
 
 def outcome(call):
