@@ -90,7 +90,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   void define_all(const Model& model) {
     model_ = &model;
     time_dimension_ = file_.dimension("time", NetcdfFile::kUnlimited);
-    dimensions_ = {{3, file_.dimension("Vec3", 3)}};
+    dimensions_ = {{1, file_.dimension("Vec1", 1)}, {3, file_.dimension("Vec3", 3)}};
     step_ = define("run.step", NetcdfFile::Type::integer, {time_dimension_}, "", "integer",
                    "time step index");
     time_ =
@@ -117,12 +117,13 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
     if (values.empty()) return;
     std::string dimension_name = name.substr(name.find('.') + 1) +
                                  (name[0] == 'n' ? "_node_labels_dim" : "_elem_labels_dim");
-    const int id =
-        define(name, NetcdfFile::Type::integer, {file_.dimension(dimension_name, values.size())},
-               "", "integer", description);
+    const int size = file_.dimension(dimension_name, values.size()),
+              id = define(name, NetcdfFile::Type::integer, {size}, "", "integer", description);
+    if (name == "node.struct") node_dimension_ = size;
     label_values_.emplace_back(id, values);
   }
   void define_labels();
+  void put_first_unknowns(const EigenReport& report);
 
   /// The fields of the line that starts; known by file and label.
   void start_line(OutputFile file, const std::string& label) {
@@ -204,6 +205,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   const Model* model_ = nullptr;
   NetcdfFile file_;
   int time_dimension_ = -1, step_ = -1, time_ = -1, h_ = -1;
+  int node_dimension_ = -1, first_unknowns_ = -1;
   std::map<std::size_t, int> dimensions_;  ///< by length
   std::vector<std::pair<int, std::vector<int>>> label_values_;
   std::unordered_map<std::string, std::vector<Field>> lines_;
@@ -218,7 +220,7 @@ void NetcdfWriter::define_labels() {
   std::vector<int> nodes;
   for (const StructuralNode& n : model_->structural) {
     if (n.output) nodes.push_back(n.label);
-    define("node.struct." + std::to_string(n.label), NetcdfFile::Type::integer, {}, "",
+    define("node.struct." + std::to_string(n.label), NetcdfFile::Type::integer, {dimension(1)}, "",
            kind_name(n.kind), "");
   }
   labels("node.struct", nodes, "labels of the structural nodes");
@@ -239,13 +241,27 @@ void NetcdfWriter::define_labels() {
   for (const auto& [id, values] : label_values_) file_.put(id, values);
 }
 
+// In the order of `node.struct`; -1: the node has no unknowns.
+void NetcdfWriter::put_first_unknowns(const EigenReport& report) {
+  std::map<int, int> first;
+  for (const auto& n : report.nodes) first[n.label] = n.first_unknown;
+  std::vector<int> values;
+  for (const StructuralNode& n : model_->structural)
+    if (n.output) values.push_back(first.contains(n.label) ? first.at(n.label) : -1);
+  if (values.empty()) return;
+  if (first_unknowns_ < 0)
+    first_unknowns_ = define("eig.idx", NetcdfFile::Type::integer, {node_dimension_}, "", "integer",
+                             "first unknown of each structural node, from zero");
+  file_.put(first_unknowns_, values);
+}
+
 void NetcdfWriter::eigenanalysis(const EigenReport& report) {
   const std::string name = "eig." + std::to_string(report.index),
                     size_name = "eig_" + std::to_string(report.index);
   using Type = NetcdfFile::Type;
   const auto number = [&](const char* what, Type type, const char* units, const char* description) {
-    return define(name + what, type, {}, units, type == Type::integer ? "integer" : "real",
-                  description);
+    return define(name + what, type, {dimension(1)}, units,
+                  type == Type::integer ? "integer" : "real", description);
   };
   const int step = number(".step", Type::integer, "", "time step of the analysis"),
             time = number(".time", Type::real, "s", "its time"),
@@ -253,17 +269,19 @@ void NetcdfWriter::eigenanalysis(const EigenReport& report) {
   file_.put(step, std::vector<int>{static_cast<int>(report.step)});
   file_.put(time, std::vector<double>{report.time});
   file_.put(kappa, std::vector<double>{report.pencil.kappa});
+  if (report.settings.geometry) put_first_unknowns(report);
   if (report.modes.empty()) return;
 
   const std::size_t n = static_cast<std::size_t>(model_->unknowns), m = report.modes.size();
   const int size = file_.dimension(size_name + "_iSize", n),
-            modes = file_.dimension(size_name + "_modes", m), three = dimension(3),
+            modes = file_.dimension(size_name + "_iNVec_out", m), three = dimension(3),
             two = dimension(2);
   std::vector<double> alpha;
-  for (const VecX* v : {&report.solution.alpha_r, &report.solution.alpha_i, &report.solution.beta})
-    for (const int k : report.modes) alpha.push_back((*v)(k));
+  const GeneralizedEigen& s = report.solution;
+  for (const int k : report.modes)
+    alpha.insert(alpha.end(), {s.alpha_r(k), s.alpha_i(k), s.beta(k)});
   file_.put(
-      define(name + ".alpha", Type::real, {three, modes}, "", "real", "re(alpha), im(alpha), beta"),
+      define(name + ".alpha", Type::real, {modes, three}, "", "real", "re(alpha), im(alpha), beta"),
       alpha);
   if (report.settings.matrices_full || report.settings.matrices_sparse)
     for (const bool plus : {true, false}) {
@@ -278,9 +296,9 @@ void NetcdfWriter::eigenanalysis(const EigenReport& report) {
     if (v.cols() == 0) continue;
     std::vector<double> data;
     for (const bool real : {true, false})
-      for (std::size_t i = 0; i < n; ++i)
-        for (const int k : report.modes) data.push_back(real ? v(i, k).real() : v(i, k).imag());
-    file_.put(define(name + (right ? ".VR" : ".VL"), Type::real, {two, size, modes}, "", "real",
+      for (const int k : report.modes)
+        for (std::size_t i = 0; i < n; ++i) data.push_back(real ? v(i, k).real() : v(i, k).imag());
+    file_.put(define(name + (right ? ".VR" : ".VL"), Type::real, {two, modes, size}, "", "real",
                      "real and imaginary parts"),
               data);
   }

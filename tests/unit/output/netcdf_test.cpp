@@ -1,6 +1,7 @@
 /// NetCDF results, read back with the C library.
 #include <netcdf.h>
 
+#include <complex>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -14,7 +15,7 @@ namespace {
 
 const char* const kDeck = R"(begin: data; problem: initial value; end: data;
 begin: initial value; initial time: 0.; final time: .05; time step: 1e-2; max iterations: 20; tolerance: 1e-9;
-  derivatives tolerance: 1e-3; eigenanalysis: list, 2, 0., .02, parameter, .1, output full matrices, output eigenvectors;
+  derivatives tolerance: 1e-3; eigenanalysis: list, 2, 0., .02, parameter, .1, output full matrices, output eigenvectors, output geometry;
 end: initial value;
 begin: control data; structural nodes: 3; rigid bodies: 2; joints: 2; forces: 2; gravity; default output: all, accelerations;
   output results: netcdf, no text; end: control data;
@@ -136,10 +137,53 @@ TEST_F(NetcdfResults, DescribeThemselves) {
 TEST_F(NetcdfResults, HoldEigenanalyses) {
   EXPECT_EQ(values("eig.1.step"), std::vector<double>{2});
   EXPECT_EQ(values("eig.0.dCoef"), std::vector<double>{.05});
-  const std::size_t n = simulation_->model().unknowns, m = shape("eig.0.alpha")[1];
-  EXPECT_EQ(shape("eig.0.alpha")[0], 3u);
+  EXPECT_EQ(shape("eig.0.step"), Shape{1});
+  const std::size_t n = simulation_->model().unknowns, m = shape("eig.0.alpha")[0];
+  EXPECT_EQ(shape("eig.0.alpha"), (Shape{m, 3}));
   EXPECT_EQ(shape("eig.0.Aplus"), (Shape{n, n}));
-  EXPECT_EQ(shape("eig.0.VR"), (Shape{2, n, m}));
+  EXPECT_EQ(shape("eig.0.VR"), (Shape{2, m, n}));
+}
+
+/// beta Aminus v = alpha Aplus v tells that rows, columns, modes and parts are where readers
+/// (Blendyn 2026 among them) look for them.
+TEST_F(NetcdfResults, HoldEigenpairsOfTheirMatrices) {
+  using Complex = std::complex<double>;
+  const std::vector<double> ratio = values("eig.0.alpha"), v = values("eig.0.VR"),
+                            plus = values("eig.0.Aplus"), minus = values("eig.0.Aminus");
+  const std::size_t n = simulation_->model().unknowns, m = ratio.size() / 3;
+  ASSERT_GT(m, 4u);
+  for (std::size_t k = 0; k < m; ++k) {
+    const Complex alpha(ratio[3 * k], ratio[3 * k + 1]);
+    for (std::size_t i = 0; i < n; ++i) {
+      Complex sum = 0;
+      double size = 0;
+      for (std::size_t j = 0; j < n; ++j) {
+        const Complex entry = ratio[3 * k + 2] * minus[i * n + j] - alpha * plus[i * n + j];
+        sum += entry * Complex(v[k * n + j], v[(m + k) * n + j]);
+        size += std::abs(entry);
+      }
+      EXPECT_LE(std::abs(sum), 1e-10 * size) << "mode " << k << ", equation " << i;
+    }
+  }
+}
+
+TEST_F(NetcdfResults, TellWhereTheUnknownsOfEachNodeBegin) {
+  const std::vector<double> first = values("eig.idx");
+  ASSERT_EQ(shape("eig.idx"), shape("node.struct"));
+  for (std::size_t k = 0; k < first.size(); ++k)
+    EXPECT_EQ(first[k], simulation_->model().structural[k].first);
+}
+
+/// Readers take the first axis of each variable for granted.
+TEST_F(NetcdfResults, HaveAnAxisInEachVariable) {
+  int count = 0;
+  ASSERT_EQ(nc_inq_nvars(file_, &count), NC_NOERR);
+  for (int k = 0; k < count; ++k) {
+    char name[NC_MAX_NAME + 1];
+    int axes = 0;
+    ASSERT_EQ(nc_inq_var(file_, k, name, nullptr, &axes, nullptr, nullptr), NC_NOERR);
+    EXPECT_GE(axes, 1) << name;
+  }
 }
 
 /// `custom output` of beams; the lines of .act keep their columns.
