@@ -449,6 +449,63 @@ def test_garbage_is_answered_or_dropped_and_the_next_caller_served(door, garbage
     assert door.call("Simulations/ListSimulations")[0] == 200
 
 
+def all_of(link):
+    """What comes until the other side closes, or says nothing more."""
+    link.settimeout(2 * TIME_FACTOR)
+    data = b""
+    try:
+        while more := link.recv(65536):
+            data += more
+    except OSError:
+        pass
+    link.close()
+    return data
+
+
+def test_pipelined_requests_are_answered_in_their_order(door):
+    link = door.raw()
+    paths = ["healthz", "readyz", "nothing", "healthz"]
+    requests = [f"GET /{path} HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nAuthorization: Bearer {door.token}\r\n" for path in paths]
+    link.sendall("\r\n".join([*requests[:-1], requests[-1] + "Connection: close\r\n", ""]).encode())
+    answers = all_of(link).split(b"HTTP/1.1 ")[1:]
+    assert [answer[:3] for answer in answers] == [b"200", b"200", b"404", b"200"]
+    assert answers[0].endswith(b"ok\n") and answers[1].endswith(b"ready\n")
+
+
+@pytest.mark.parametrize("behind", [b"\0\xff" * 500, b"{}{}{}\r\n\r\n", b"GET /healthz HTTP/1.1\r\n", b"\r\n" * 1000])
+def test_garbage_behind_a_good_request_is_no_call(door, server, pendulum, behind):
+    """A call of a body with more behind it than its length says: the rest is a request of its own, and a bad one."""
+    with server.load(pendulum) as simulation:
+        body = json.dumps({"simulation": simulation.name, "steps": 1}).encode()
+        head = (f"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nAuthorization: Bearer {door.token}\r\n"
+                f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n").encode()
+        link = door.raw()
+        link.sendall(head + body + behind)
+        link.shutdown(socket.SHUT_WR)
+        assert all_of(link).startswith(b"HTTP/1.1 200")
+        simulation.refresh()
+        assert simulation.info.step == 1
+    assert door.call("Simulations/ListSimulations")[0] == 200
+
+
+@pytest.mark.parametrize("framing", ["Content-Length: 2\r\nTransfer-Encoding: chunked", "Content-Length: 2\r\nContent-Length: 400",
+                                     "Transfer-Encoding: chunked, identity", "Content-Length: 2, 400"])
+def test_a_request_with_two_lengths_smuggles_no_other(door, server, pendulum, framing):
+    """The call that stands in the body of the first one is without a token, and is not made with the first one's."""
+    with server.load(pendulum) as simulation:
+        body = json.dumps({"simulation": simulation.name, "steps": 1})
+        inner = (f"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nContent-Type: application/json\r\n"
+                 f"Content-Length: {len(body)}\r\n\r\n{body}")
+        link = door.raw()
+        link.sendall((f"POST /mbcosim.v1.Simulations/GetServerInfo HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nAuthorization: Bearer {door.token}\r\n"
+                      f"Content-Type: application/json\r\n{framing}\r\n\r\n{{}}{inner}").encode())
+        link.shutdown(socket.SHUT_WR)
+        all_of(link)
+        simulation.refresh()
+        assert simulation.info.step == 0
+    assert door.call("Simulations/ListSimulations")[0] == 200
+
+
 def test_ten_thousand_requests_on_a_few_connections_are_all_answered(door):
     connections = [http.client.HTTPConnection(door.host, door.port, timeout=20 * TIME_FACTOR) for _ in range(4)]
     headers = {"Authorization": f"Bearer {door.token}", "Content-Type": "application/json"}
