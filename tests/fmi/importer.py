@@ -22,6 +22,7 @@ class Archive:
     """An unpacked FMU and its modelDescription.xml."""
 
     def __init__(self, path):
+        self.path = path
         self._folder = tempfile.TemporaryDirectory()
         self.folder = self._folder.name
         with zipfile.ZipFile(path) as archive:
