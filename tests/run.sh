@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, and runs every test. Works on Debian 12 as root or with sudo.
 #
-# usage: tests/run.sh [--asan | --tsan | --fuzz] [--hostile [SECONDS]] [--quick] [ctest arguments …]
+# usage: tests/run.sh [--asan | --tsan | --fuzz] [--hostile [SECONDS] | --soak [MINUTES]] [--quick] [ctest arguments …]
 #        tests/run.sh --tidy [REVISION | --all]
 #   --asan   address and undefined-behaviour sanitizers, in build-asan/
 #   --tsan   thread sanitizer, in build-tsan/
 #   --fuzz   fuzzes the deck reader for 60 seconds (clang), in build-fuzz/; no other test
 #   --hostile  hostile clients against the daemon for SECONDS (default: 300); no other test
+#   --soak   a daemon in long use (default: 10^6 steps), then one that is killed again and again (default: 1000 times), each for
+#            MINUTES; no other test
 #   --quick  skips the tests labelled `slow`
 #   --tidy   clang-tidy on the sources changed since REVISION (default: the commit before the last), instead of the tests
 set -euo pipefail
@@ -16,6 +18,7 @@ preset=release
 arguments=()
 tidy=
 hostile=
+soak=
 while [ $# -gt 0 ]; do
   case $1 in
     --asan) preset=asan ;;
@@ -25,9 +28,13 @@ while [ $# -gt 0 ]; do
       hostile=300
       [[ ${2:-} =~ ^[0-9]+$ ]] && hostile=$2 && shift
       ;;
+    --soak)
+      soak=yes minutes=()
+      [[ ${2:-} =~ ^[0-9]+$ ]] && minutes=(--minutes "$2") && shift
+      ;;
     --quick) arguments+=(--label-exclude slow) ;;
     --tidy) tidy=yes ;;
-    -h | --help) sed -n '2,11s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,13s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) arguments+=("$1") ;;
   esac
   shift
@@ -46,8 +53,12 @@ case $preset in  # what bounds on time are multiplied by
 esac
 export TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp history_size=7 ${TSAN_OPTIONS:-}"
 export ASAN_OPTIONS="detect_leaks=1 ${ASAN_OPTIONS:-}" LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp ${LSAN_OPTIONS:-}"
+[ -z "$hostile$soak" ] || export MBCOSIM_BIN=$PWD/$folder/bin PYTHONPATH=$PWD/$folder/python PYTHONDONTWRITEBYTECODE=1
 if [ -n "$hostile" ]; then
-  export PYTHONPATH=$PWD/$folder/python PYTHONDONTWRITEBYTECODE=1
   exec /usr/bin/python3 tests/hostile/hostile.py $folder/bin --seconds "$hostile" --seed "$(date +%s)"
+fi
+if [ -n "$soak" ]; then
+  /usr/bin/python3 tests/soak/soak.py "${minutes[@]}" --seed "$(date +%s)"
+  exec /usr/bin/python3 tests/soak/kills.py "${minutes[@]}" --seed "$(date +%s)"
 fi
 exec ctest --test-dir $folder --output-on-failure --parallel "$jobs" "${arguments[@]}"

@@ -29,26 +29,27 @@ class Watcher:
     def __init__(self, daemon, name, *, subscribes=False):
         self.seen, self._over = 0, False
         jobs = [self._ask, self._read] + ([self._subscribe] if subscribes else [])
-        self._threads = [threading.Thread(target=self._run, args=(job, daemon, name)) for job in jobs]
+        self._threads = [threading.Thread(target=self._run, args=(job, daemon.connect(), name)) for job in jobs]
         for thread in self._threads:
             thread.start()
 
-    def _run(self, job, daemon, name):
-        with daemon.connect() as server:
+    def _run(self, job, server, name):
+        with server:
             try:
                 job(server, name)
             except LOST:
                 pass  # the daemon was killed
 
+    # By bare calls: the client's own are tried again for two seconds when the daemon is gone.
     def _ask(self, server, name):
         while not self._over:
-            self._note(next(info.step for info in server.list() if info.name == name))
+            listed = server.simulations.ListSimulations(pb.ListSimulationsRequest()).simulations
+            self._note(next(info.step for info in listed if info.name == name))
             time.sleep(0.003)
 
     def _read(self, server, name):
-        simulation = server.attach(name)
         while not self._over:
-            self._note(int(simulation.read(["step"])["step"]))
+            self._note(server.simulations.ReadVariables(pb.ReadVariablesRequest(simulation=name)).step)
             time.sleep(0.01)
 
     def _subscribe(self, server, name):
