@@ -371,3 +371,77 @@ def test_long_suspended_ones_are_removed(start, folder):
     os.utime(folder / name / "point", (time.time() - 100,) * 2)
     with start("--suspended-expiry", "50").connect() as server:
         wait_for(lambda: server.list() == [] and not (folder / name).exists())
+
+
+def test_a_missing_folder_is_named_and_not_made(tmp_path):
+    missing = tmp_path / "missing"
+    done = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/socket", "--state-dir", str(missing)],
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60 * TIME_FACTOR)
+    assert done.returncode == 4 and f"Directory does not exist: {missing}" in done.stdout, done.stdout
+    assert not missing.exists()
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of half a mebibyte; skipped where mounting is not allowed."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=512k", "none", str(place)], capture_output=True).returncode != 0:
+        pytest.skip("this user may not mount a disk")
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def remount(place, how):
+    subprocess.run(["mount", "-o", f"remount,{how}", str(place)], check=True)
+
+
+def fill(place):
+    """Writes until nothing more goes on the disk."""
+    with open(place / "filler", "wb", buffering=0) as file, pytest.raises(OSError, match="No space"):
+        while True:
+            file.write(b"x" * 4096)
+
+
+def test_a_full_disk_is_told_and_loses_nothing(start_daemon, small_disk):
+    daemon = start_daemon("--state-dir", str(small_disk), "--checkpoint-interval", "0.05")
+    with daemon.connect() as server, server.events() as watcher:
+        journal, checkpoints = (server.load_text(deck(), durability=how) for how in ("journal", "checkpoint"))
+        for simulation in (journal, checkpoints):
+            simulation.step(10)
+        fill(small_disk)
+        with pytest.raises(mbcosim.LimitExceeded) as caught:
+            for _ in range(1000):  # the last page of a file may have room
+                journal.step()
+        assert caught.value.reason == "STORAGE_FULL" and "No space left on device" in str(caught.value)
+        stands = bits(journal)
+        with pytest.raises(mbcosim.LimitExceeded) as caught:
+            server.load_text(deck())
+        assert caught.value.reason == "STORAGE_FULL"
+        assert checkpoints.step(10).step == 20
+        failed = next(event for event in watcher if event.WhichOneof("content") == "checkpoint_failed")
+        assert "No space left on device" in failed.checkpoint_failed.message
+        assert len(server.list()) == 2
+        name = journal.name
+    kill(daemon)
+    (small_disk / "filler").unlink()
+    with start_daemon("--state-dir", str(small_disk)).connect() as server:
+        assert len(server.list()) == 2
+        assert bits(server.attach(name)) == stands
+
+
+def test_a_read_only_disk_is_refused_by_name_and_loses_nothing(start_daemon, small_disk):
+    daemon = start_daemon("--state-dir", str(small_disk), "--checkpoint-interval", "3600")
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal")
+        simulation.step(10)
+        name, stands = simulation.name, bits(simulation)
+    kill(daemon)
+    remount(small_disk, "ro")
+    refused = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{small_disk}/../socket", "--state-dir", str(small_disk)],
+                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60 * TIME_FACTOR)
+    assert refused.returncode == 4
+    assert refused.stdout.splitlines()[-1] == f"mbcosimd: error: the state folder {small_disk} cannot be used: Read-only file system"
+    remount(small_disk, "rw")
+    with start_daemon("--state-dir", str(small_disk)).connect() as server:
+        assert bits(server.attach(name)) == stands
