@@ -178,6 +178,10 @@ void fill(const LoadOptions& options, v1::CreateOptions* out) {
   if (options.results) *out->mutable_results() = to_proto(*options.results);
   fill_durability(options, out);
   if (options.pace) out->mutable_pace()->set_rate(*options.pace);
+  if (options.deck_sockets)
+    *out->mutable_deck_sockets()->mutable_peer_timeout() =
+        google::protobuf::util::TimeUtil::MillisecondsToDuration(
+            std::llround(1000 * *options.deck_sockets));
 }
 
 StepResult to_result(const v1::StepReply& reply) {

@@ -124,6 +124,8 @@ struct LoadOptions {
   Durability durability = Durability::server_default;
   std::optional<double> checkpoint_interval = {};     ///< wall time [s]; none: the server's
   std::optional<std::int64_t> checkpoint_steps = {};  ///< none: by time alone
+  /// Serves the sockets that the deck names, and waits at most so long for each code [s].
+  std::optional<double> deck_sockets = {};
   std::optional<double> pace = {};  ///< seconds of the model in one of the clock; none: all speed
 };
 

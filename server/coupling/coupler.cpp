@@ -26,10 +26,16 @@ class Stopwatch {
 
 Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
                  const Simulation& simulation, std::chrono::milliseconds longest_wait,
-                 Recorder* recorder)
+                 Recorder* recorder, const std::set<std::string>& served)
     : longest_wait_(longest_wait), recorder_(recorder) {
+  const auto add_own = [&](PortModel model) {
+    if (served.count(model.name()) > 0)
+      claim(model, simulation);
+    else
+      add(std::move(model), simulation);
+  };
   for (const PortElementRef& element : port_elements(simulation.model()))
-    add({element, simulation}, simulation);
+    add_own({element, simulation});
   for (const v1::PortDefinition& definition : ports) {
     const bool in_model =
         definition.kind() == v1::PORT_KIND_MOTION || definition.kind() == v1::PORT_KIND_MODAL;
@@ -38,25 +44,31 @@ Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& p
       add({definition, simulation}, simulation);
   }
   for (const StructuralPort& port : simulation.model().structural_ports)
-    add({port, simulation}, simulation);
+    add_own({port, simulation});
   for (const StreamInput& stream : simulation.model().stream_inputs) {
     PortModel model(stream, simulation);
     const bool taken = written_.count(model.written().front()) > 0;  // by a port of the client
-    if (!taken && !find(model.name())) add(std::move(model), simulation);
+    if (served.count(model.name()) > 0 || (!taken && !find(model.name())))
+      add_own(std::move(model));
   }
 }
 
 void Coupler::add(PortModel model, const Simulation& simulation) {
   if (find(model.name()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "two ports are named \"" + model.name() + "\"");
+  claim(model, simulation);
+  ports_.push_back(std::make_unique<Port>(std::move(model), longest_wait_, recorder_));
+  lines_.emplace_back().port = ports_.back().get();
+}
+
+/// What it writes belongs to it alone.
+void Coupler::claim(const PortModel& model, const Simulation& simulation) {
   for (const int handle : model.written()) {
     if (!written_.insert(handle).second)
       throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + model.name() + "\": variable \"" +
                                                  simulation.variables()[handle].name +
                                                  "\" is written by another port, too");
   }
-  ports_.push_back(std::make_unique<Port>(std::move(model), longest_wait_, recorder_));
-  lines_.emplace_back().port = ports_.back().get();
 }
 
 Port* Coupler::find(const std::string& name) const {

@@ -25,10 +25,10 @@ namespace mbcosim::server {
 class Coupler {
  public:
   /// `longest_wait`: for peers with policy WAIT. `recorder`: keeps what crosses the ports; may be
-  /// null.
+  /// null. `served`: names of ports of the deck that belong to somebody else.
   Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
           const Simulation& simulation, std::chrono::milliseconds longest_wait,
-          Recorder* recorder = nullptr);
+          Recorder* recorder = nullptr, const std::set<std::string>& served = {});
 
   Port* find(const std::string& name) const;
   const std::vector<std::unique_ptr<Port>>& ports() const { return ports_; }
@@ -95,6 +95,7 @@ class Coupler {
     int tangent = -1;           ///< tight: number among the simulation's load tangents; −1: none
   };
   void add(PortModel model, const Simulation& simulation);
+  void claim(const PortModel& model, const Simulation& simulation);
   void fill(Line& line, const Simulation& simulation, double target_time, int iteration);
   void take_answer(Line& line, const CancelToken& cancel);
   bool asks(const Line& line, std::int64_t step) const;

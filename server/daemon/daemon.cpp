@@ -128,13 +128,15 @@ Daemon::Daemon(const Config& config)
             metrics_.count_failure(refusal.reason());
           }},
       results_(config_.results_root, config_.limits.results_root_bytes),
+      deck_sockets_(config_.deck_sockets, config_.limits.deck_sockets, config_.listen),
       durability_(config_, log_, metrics_),
       store_(config_.limits, metrics_, log_),
       gate_(runtime_),
       health_({"mbcosim.v1.Simulations", "mbcosim.v1.Coupling", "mbcosim.v1.Telemetry",
                "mbcosim.v1.Geometry", "mbcosim.v1.Reduction", "mbcosim.v1.Results",
                "mbcosim.v1.Events"}),
-      parts_{config_, store_, slots_, metrics_, log_, runtime_, gate_, results_, durability_} {
+      parts_{config_,  store_, slots_,   metrics_,    log_,
+             runtime_, gate_,  results_, durability_, deck_sockets_} {
   add_methods();
   watch_values();
   durability_.start(parts_);

@@ -14,6 +14,7 @@
 #include "http/door.h"
 #include "rpc/health.h"
 #include "service/config.h"
+#include "service/deck_sockets.h"
 #include "service/durability.h"
 #include "service/parts.h"
 #include "service/shared_memory_service.h"
@@ -56,6 +57,7 @@ class Daemon {
   MemoryBudgets budgets_;
   const Runtime runtime_;
   ResultsRoot results_;
+  DeckSocketFolder deck_sockets_;
   Durability durability_;  ///< outlives the store, which calls it
   SessionStore store_;
   Gate gate_;

@@ -66,6 +66,7 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   add("--limit-shared-memory-peers", limits.shared_memory_peers, "Peers over shared memory");
   add("--limit-http-connections", limits.http_connections, "Connections served at once over HTTP");
   add("--limit-http-streams", limits.http_streams, "Streams of one identity over HTTP");
+  add("--limit-deck-sockets", limits.deck_sockets, "Sockets that decks name, of all simulations");
   add("--limit-telemetry-samples", limits.telemetry_samples,
       "Samples buffered for one subscription");
   add("--limit-state-bytes", limits.state_bytes, "Bytes of all that is in the state folder");
@@ -179,6 +180,10 @@ Invocation read_options(int argc, char** argv) {
       ->check(CLI::Range(std::int64_t{1}, kLongestTime));
   app.add_option("--results-root", config.results_root,
                  "Folder in which simulations may have folders for result files")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--deck-sockets", config.deck_sockets,
+                 "Folder in which decks may open the Unix sockets that they name, for simulations "
+                 "that ask for it")
       ->check(CLI::ExistingDirectory);
   app.add_option("--workers", config.workers, "Simulations that step at once; 0: one per core")
       ->capture_default_str()

@@ -55,9 +55,7 @@ Channels::Channels(const std::vector<const DeckChannel*>& channels, Simulation& 
   simulation.set_exchange([this](int iteration) { return exchange(iteration, false); });
   simulation.set_start_exchange([this](int iteration) { return exchange(iteration, true); },
                                 [this](StartEvent event) { observe(event); });
-  simulation.set_attempt_ended([this](bool) {
-    for (const auto& force : forces_) force->attempt_failed();
-  });
+  simulation.set_attempt_ended([this](bool) { attempt_failed(); });
 }
 
 Channels::~Channels() {
@@ -88,6 +86,10 @@ void Channels::open(const DeckChannel& channel, std::unique_ptr<Link> link) {
 void Channels::step_begins() {
   for (const auto& receiver : receivers_) receiver->step_begins(simulation_);
   for (const auto& force : forces_) force->step_begins();
+}
+
+void Channels::attempt_failed() {
+  for (const auto& force : forces_) force->attempt_failed();
 }
 
 void Channels::converged() {
@@ -141,7 +143,8 @@ std::optional<std::string> Channels::wants_end() const {
 void Channels::end() {
   if (ended_) return;
   ended_ = true;
-  for (const auto& force : forces_) force->end();
+  const auto until = Clock::now() + patience_.farewell;
+  for (const auto& force : forces_) force->end(until);
 }
 
 }  // namespace mbcosim::mbdyn

@@ -27,6 +27,14 @@ class Channels {
   /// Starts the simulation, and takes steps; like the methods of the same name.
   Status start(const CancelToken* cancel);
   StepReport step(const CancelToken* cancel);
+
+  // --- the parts of `step`, for who takes the steps with callbacks of their own
+  void step_begins();
+  /// Before each residual, with the number of corrections; false: a code is not done.
+  bool exchange(int iteration, bool in_derivatives = false);
+  void attempt_failed();  ///< another follows
+  void converged();       ///< the step is accepted
+
   /// A code has asked for the end of the run: its name.
   std::optional<std::string> wants_end() const;
   /// Tells the codes that the run is over.
@@ -34,10 +42,7 @@ class Channels {
 
  private:
   void open(const DeckChannel& channel, std::unique_ptr<Link> link);
-  void step_begins();
-  void converged();
   void observe(StartEvent event);
-  bool exchange(int iteration, bool in_derivatives);
 
   Simulation& simulation_;
   const Patience patience_;

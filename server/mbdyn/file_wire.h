@@ -15,7 +15,7 @@ class FileWire : public ForceWire {
   FileWire(const ChannelAddress& address, std::string name, ForceForm form, Patience patience);
   void send(Command command, const ForceState& state) override;
   Command receive(ForceLoads& loads) override;
-  void end() override {}
+  void end(std::chrono::steady_clock::time_point) override {}
 
  private:
   void wait_until(bool exists, const std::string& path) const;

@@ -11,6 +11,7 @@
 /// step; in tight mode 2 asks for another exchange. Source: MBDyn input manual, external forces.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
@@ -27,7 +28,8 @@ class ForceWire {
   virtual void send(Command command, const ForceState& state) = 0;
   /// What the peer says; loads only with kData and kLastData.
   virtual Command receive(ForceLoads& loads) = 0;
-  virtual void end() = 0;  ///< tells the peer, if it can be told
+  /// Tells the peer, if it can be told; at most until then.
+  virtual void end(std::chrono::steady_clock::time_point until) = 0;
 };
 
 class ForceDialogue {
@@ -40,7 +42,7 @@ class ForceDialogue {
   /// Before each residual, with the number of corrections; false: the code is not done.
   bool exchange(Simulation& simulation, int iteration, bool in_derivatives);
   void converged(const Simulation& simulation);  ///< of a step or the derivatives phase
-  void end() { wire_->end(); }
+  void end(std::chrono::steady_clock::time_point until) { wire_->end(until); }
   /// The code asked for the end of the run.
   bool wants_end() const { return wants_end_; }
   const std::string& name() const { return name_; }

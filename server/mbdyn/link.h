@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdio>
 #include <functional>
 #include <memory>
 #include <stdexcept>
@@ -25,10 +26,14 @@ class ChannelEnded : public ChannelLost {
 
 using Clock = std::chrono::steady_clock;
 
-/// How long a wait may be, and what ends it before.
+/// How long a wait may be, what ends it before, and who hears of what does not end a run.
 struct Patience {
   std::chrono::milliseconds time{60000};
+  std::chrono::milliseconds farewell{1000};  ///< for all codes of a run to hear of its end
   std::function<bool()> cancelled = [] { return false; };
+  std::function<void(const std::string&)> warn = [](const std::string& text) {
+    std::fprintf(stderr, "warning: %s\n", text.c_str());
+  };
 };
 
 /// A connected stream socket. Throws ChannelLost; the texts begin with `name`.
@@ -41,6 +46,7 @@ class Link {
   Link& operator=(const Link&) = delete;
 
   const std::string& name() const { return name_; }
+  void warn(const std::string& text) const { patience_.warn(text); }
   void set_patience(std::chrono::milliseconds time) { patience_.time = time; }
   /// Sends all.
   void send(const std::string& bytes);

@@ -1,5 +1,7 @@
 #include "mbdyn/socket_wire.h"
 
+#include <algorithm>
+
 namespace mbcosim::mbdyn {
 namespace {
 
@@ -58,11 +60,16 @@ Command SocketWire::receive(ForceLoads& loads) {
   return static_cast<Command>(command);
 }
 
-void SocketWire::end() {
+void SocketWire::end(Clock::time_point until) {
+  using std::chrono::milliseconds;
+  const auto left = [until] {
+    return std::max(std::chrono::duration_cast<milliseconds>(until - Clock::now()),
+                    milliseconds(0));
+  };
   try {
-    link_->set_patience(kFarewell);
+    link_->set_patience(left());
     link_->send(std::string(1, kEnd));
-    link_->finish(kFarewell);
+    link_->finish(left());
   } catch (const ChannelLost&) {  // who is gone needs no farewell
   }
 }

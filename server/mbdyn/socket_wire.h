@@ -16,7 +16,7 @@ class SocketWire : public ForceWire {
   SocketWire(std::unique_ptr<Link> link, ForceForm form, bool listened);
   void send(Command command, const ForceState& state) override;
   Command receive(ForceLoads& loads) override;
-  void end() override;
+  void end(Clock::time_point until) override;
 
  private:
   void answer_request();

@@ -1,6 +1,5 @@
 #include "mbdyn/stream.h"
 
-#include <cstdio>
 #include <iomanip>
 
 #include "elements/ports/port_element.h"
@@ -57,10 +56,10 @@ void StreamSender::send(const Simulation& simulation) {
       link_->send_if_room(message);  // what finds no room is dropped, as in MBDyn
     write_echo(values);
   } catch (const ChannelLost& e) {
-    link_.reset();
     wants_end_ = channel_.abort_if_broken;
-    std::fprintf(stderr, "warning: %s; %s\n", e.what(),
-                 wants_end_ ? "the run ends, as the deck asks" : "nothing more is sent");
+    link_->warn(std::string(e.what()) +
+                (wants_end_ ? "; the run ends, as the deck asks" : "; nothing more is sent"));
+    link_.reset();
   }
 }
 
@@ -96,7 +95,7 @@ void StreamReceiver::receive(Simulation& simulation) {
   } catch (const ChannelLost& e) {
     const std::string what = e.what();
     if (what.find("closed by the peer") == std::string::npos) throw;
-    std::fprintf(stderr, "warning: %s; the last values stay\n", e.what());
+    link_->warn(what + "; the last values stay");
     return link_.reset();
   }
   std::vector<double> values;

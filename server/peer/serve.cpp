@@ -247,7 +247,7 @@ void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
 
 void serve_socket(const PeerCall& call, const SocketCall& socket) {
   const mbdyn::Patience patience{
-      std::chrono::milliseconds(static_cast<long long>(1000 * call.timeout)), [] { return false; }};
+      .time = std::chrono::milliseconds(static_cast<long long>(1000 * call.timeout))};
   client::Server server = connect(call);
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
@@ -277,7 +277,7 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
       throw;
     }
   }
-  wire.end();
+  wire.end(mbdyn::Clock::now() + patience.farewell);
 }
 
 }  // namespace mbcosim::peer

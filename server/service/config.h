@@ -29,6 +29,7 @@ struct ServiceLimits {
   int shared_memory_peers = 64;
   int http_connections = 64;                     ///< served at once through the HTTP door
   int http_streams = 16;                         ///< of one identity through the HTTP door
+  int deck_sockets = 64;                         ///< that decks name, of all simulations
   int telemetry_samples = 1 << 16;               ///< buffer of one subscription
   std::int64_t state_bytes = 64LL << 30;         ///< of all that is in the state folder
   std::int64_t results_bytes = 1LL << 30;        ///< of the result files of one simulation
@@ -44,6 +45,7 @@ struct Config {
   std::chrono::milliseconds checkpoint_interval{10000};
   std::chrono::seconds suspended_expiry{30 * 24 * 3600};
   std::string results_root;  ///< folder of result files; empty: none are written
+  std::string deck_sockets;  ///< folder of the sockets that decks may name; empty: none are opened
   int workers = 0;           ///< simulations that step at once; 0: one per core
   std::string tls_certificate, tls_key, tls_client_ca;  ///< PEM files
   std::string tokens_file;                              ///< see Authenticator::from_file

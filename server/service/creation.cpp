@@ -58,6 +58,12 @@ Session::Identity make_identity(std::string name, const v1::CreateOptions& optio
   return identity;
 }
 
+/// A simulation at its initial solution, or wherever it was branched off.
+struct Made {
+  std::unique_ptr<Simulation> simulation;
+  std::unique_ptr<DeckSockets> deck_sockets = nullptr;  ///< go before it does
+};
+
 /// A simulation whose creator vanished before it learned the name: nobody would ever delete it. So
 /// what the call has made goes with the call, and half an upload leaves nothing behind.
 class Fresh {
@@ -80,10 +86,10 @@ class Fresh {
         results = std::make_unique<SessionResults>(parts_.results, identity.id, options.results(),
                                                    parts_.config.limits.results_bytes);
       Session::Origin origin;
-      std::unique_ptr<Simulation> simulation = make(token, results.get(), &origin);
+      Made made = make(token, results.get(), &origin);
       return std::make_shared<Session>(std::move(identity), std::move(origin),
-                                       std::move(simulation), parts_.shared(exchange.memory()),
-                                       options, std::move(results));
+                                       std::move(made.simulation), parts_.shared(exchange.memory()),
+                                       options, std::move(results), std::move(made.deck_sockets));
     });
     session->set_memory(std::move(share));
     if (deck) keep(*session, *deck, options);
@@ -133,15 +139,23 @@ void check_eigenanalyses(const Model& model) {
                           "`use arpack, <number>, <basis>, <tolerance>`");
 }
 
-/// The model of a deck at its initial solution.
-std::unique_ptr<Simulation> initial_solution(const Session::Origin& origin, SessionResults* results,
-                                             const CancelToken& token) {
+/// The model of a deck at its initial solution, with the codes at its sockets where the options ask
+/// for them.
+Made initial_solution(const Session::Origin& origin, const v1::CreateOptions& options,
+                      SessionResults* results, DeckSocketFolder& folder, const CancelToken& token) {
   if (results) check_eigenanalyses(*origin.model);
-  auto simulation = Simulation::create(
-      origin.model, &token, results ? results->start(*origin.model) : nullptr, origin.time_keeping);
-  if (!simulation)
-    throw Refusal(results ? results->without_paths(simulation.error()) : simulation.error());
-  return std::move(*simulation);
+  Made made{Simulation::prepare(origin.model, results ? results->start(*origin.model) : nullptr,
+                                origin.time_keeping)};
+  if (options.has_deck_sockets()) {
+    if (options.record_ports())
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    "`record_ports` keeps nothing of what crosses the deck's sockets");
+    made.deck_sockets = folder.open(*made.simulation, options.deck_sockets(), token);
+  }
+  const Status started =
+      made.deck_sockets ? made.deck_sockets->start(token) : made.simulation->start(&token);
+  if (!started) throw Refusal(results ? results->without_paths(started.error()) : started.error());
+  return made;
 }
 
 /// What an earlier process made for this request id is brought back, so that it is found.
@@ -201,7 +215,7 @@ class Creation {
                  options.symbols(),
                  false,
                  std::move(report.files)};
-      return initial_solution(*origin, results, token);
+      return initial_solution(*origin, options, results, parts_.deck_sockets, token);
     };
     fresh_.add(options, digest, exchange, kept, make)
         ->fill(reply->mutable_simulation(), exchange.caller());
@@ -372,6 +386,9 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
                              Access::control);
     if (request.options().symbols_size() > 0)
       throw Refusal(v1::REASON_BAD_ARGUMENT, "`symbols` cannot change the model of a fork");
+    if (request.options().has_deck_sockets())
+      throw Refusal(v1::REASON_BAD_ARGUMENT,
+                    "`deck_sockets`: the codes of the deck are with the simulation that is forked");
     const int number = request.has_snapshot() ? snapshot_in(request) : -1;
     KeptDeck deck;
     const bool durable = parts_.durability.wanted(request.options(), &*source);
@@ -380,7 +397,7 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
                           Session::Origin* origin) {
       *origin = source->origin();
       origin->forked = true;
-      return branch(*source, number, results, exchange.call(), token);
+      return Made{branch(*source, number, results, exchange.call(), token)};
     };
     return fresh_.add(request.options(), digest, exchange, durable ? &deck : nullptr, make,
                       request.simulation());

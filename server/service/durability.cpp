@@ -153,7 +153,8 @@ StoredPoint Durability::read_latest(const std::string& id) const {
 // ------------------------------------------------------------------ checkpoints
 
 bool Durability::wanted(const v1::CreateOptions& options, const Session* original) const {
-  const bool possible = available() && (!original || original->keeping());
+  const bool possible =
+      available() && (!original || original->keeping()) && !options.has_deck_sockets();
   switch (options.durability()) {
     case v1::DURABILITY_UNSPECIFIED:
       return possible;
@@ -162,6 +163,10 @@ bool Durability::wanted(const v1::CreateOptions& options, const Session* origina
     case v1::DURABILITY_CHECKPOINT:
     case v1::DURABILITY_JOURNAL:
       if (possible) return true;
+      if (options.has_deck_sockets())
+        throw Refusal(v1::REASON_NOT_DURABLE,
+                      "`durability`: the codes at the sockets that the deck names do not outlive "
+                      "the server");
       throw Refusal(v1::REASON_NOT_DURABLE,
                     available() ? "the original of the fork has durability NONE: its deck is not "
                                   "kept"

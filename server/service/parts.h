@@ -14,6 +14,7 @@
 
 namespace mbcosim::server {
 
+class DeckSocketFolder;
 class Durability;
 
 /// The parts of a daemon that handlers use. All of it outlives the services.
@@ -27,6 +28,7 @@ struct Parts {
   const Gate& gate;
   ResultsRoot& results;
   Durability& durability;
+  DeckSocketFolder& deck_sockets;
 
   /// What every session gets; `memory`: its owner's.
   Session::Shared shared(MemoryBudget& memory) const {

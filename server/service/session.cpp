@@ -63,7 +63,7 @@ std::optional<double> minimum_in(const Message& message) {
 
 Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> simulation,
                  Shared shared, const v1::CreateOptions& options,
-                 std::unique_ptr<SessionResults> results)
+                 std::unique_ptr<SessionResults> results, std::unique_ptr<DeckSockets> deck_sockets)
     : identity_(std::move(identity)),
       shared_(shared),
       model_(&simulation->model()),
@@ -79,10 +79,12 @@ Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> s
                                                 &shared.metrics)),
       results_(std::move(results)),
       simulation_(std::move(simulation)),
+      deck_sockets_(std::move(deck_sockets)),
       recorder_(options.record_ports()
                     ? std::make_unique<Recorder>(shared.limits.record_bytes, shared.memory)
                     : nullptr),
-      coupler_(options.ports(), *simulation_, identity_.lease, recorder_.get()) {
+      coupler_(options.ports(), *simulation_, identity_.lease, recorder_.get(),
+               deck_sockets_ ? DeckSockets::ports(*model_) : std::set<std::string>{}) {
   check_grants(options.grants());
   status_.set_display_name(identity_.display_name);
   set_policy(options.non_convergence_policy(), minimum_in(options));
@@ -252,12 +254,21 @@ void Session::describe_variables(const v1::DescribeSimulationRequest& request,
 
 Port& Session::port(const std::string& name) const {
   if (Port* found = coupler_.find(name)) return *found;
+  if (deck_sockets_ && DeckSockets::ports(*model_).count(name) > 0)
+    throw Refusal(v1::REASON_PORT_TAKEN,
+                  "port \"" + name + "\": the code at the socket that the deck names has it");
   throw Refusal(v1::REASON_NO_SUCH_PORT,
                 identity_.id + " has no port named \"" + name.substr(0, 100) + "\"");
 }
 
 int Session::find_variable(const std::string& name) const {
   return simulation_->find_variable(name);
+}
+
+void Session::require_way_back() const {
+  if (deck_sockets_)
+    throw Refusal(v1::REASON_DECK_SOCKETS,
+                  "the codes at the sockets that the deck names cannot go back");
 }
 
 void Session::require_usable() const {
@@ -280,6 +291,7 @@ void Session::check(const v1::StepRequest& request) const {
   if (request.exact() && std::isinf(request.until_time()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`until_time` must be finite with `exact`");
   if (request.has_until()) variables_.check_condition(request.until());
+  if (request.until().has_locate_within()) require_way_back();
   variables_.check(request.outputs());
   variables_.check_inputs(request.inputs(), "inputs");
 }

@@ -15,6 +15,7 @@
 #include "results/session_results.h"
 #include "rpc/call.h"
 #include "service/config.h"
+#include "service/deck_sockets.h"
 #include "service/event_log.h"
 #include "service/fair_mutex.h"
 #include "service/grants.h"
@@ -74,7 +75,8 @@ class Session {
   using Progress = std::function<void()>;  ///< called between slices of a long advance
 
   Session(Identity identity, Origin origin, std::unique_ptr<Simulation> simulation, Shared shared,
-          const v1::CreateOptions& options = {}, std::unique_ptr<SessionResults> results = nullptr);
+          const v1::CreateOptions& options = {}, std::unique_ptr<SessionResults> results = nullptr,
+          std::unique_ptr<DeckSockets> deck_sockets = nullptr);
 
   /// What the model and the state take, held until the end.
   void set_memory(MemoryShare share) TS_EXCLUDES(lock_) {
@@ -145,7 +147,7 @@ class Session {
                  const google::protobuf::RepeatedField<int>& handles);
   TelemetryHub& telemetry() { return *telemetry_; }
 
-  /// Throws NO_SUCH_PORT. The port lives as long as the session.
+  /// Throws NO_SUCH_PORT, PORT_TAKEN. The port lives as long as the session.
   Port& port(const std::string& name) const;
 
   // --- outliving the daemon
@@ -221,6 +223,7 @@ class Session {
   std::optional<StepReport> attempt(Advance& advance) TS_REQUIRES(lock_);
   std::optional<StepReport> counted_step(Advance& advance) TS_REQUIRES(lock_);
   void end_without_memory(Advance& advance, const MemoryScope& scope) TS_REQUIRES(lock_);
+  double waited_seconds() const;
   std::optional<StepReport> attempt_in_slot(Advance& advance) TS_REQUIRES(lock_);
   void set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum) TS_REQUIRES(lock_);
   void start_record(const v1::CreateOptions& options) TS_REQUIRES(lock_);
@@ -242,6 +245,7 @@ class Session {
   void describe_variables(const v1::DescribeSimulationRequest& request,
                           v1::ModelDescription* out) const;
   void require_usable() const;
+  void require_way_back() const;
   State state_at_rest(const Call& call, std::int64_t* step);
 
   const Identity identity_;
@@ -269,8 +273,9 @@ class Session {
   FairMutex lock_;                                 // protects all below
   const std::unique_ptr<SessionResults> results_;  // null: none are written; outlives its writer
   const std::unique_ptr<Simulation> simulation_ TS_PT_GUARDED_BY(lock_);
-  const std::unique_ptr<Recorder> recorder_;  // thread-safe; null: nothing is recorded
-  Coupler coupler_;                           // its ports are thread-safe by themselves
+  const std::unique_ptr<DeckSockets> deck_sockets_;  // null: none are served
+  const std::unique_ptr<Recorder> recorder_;         // thread-safe; null: nothing is recorded
+  Coupler coupler_;                                  // its ports are thread-safe by themselves
 
   Advance* at_work_ = nullptr;                                          ///< of a durable session
   google::protobuf::RepeatedPtrField<v1::CheckpointPort> peer_memory_;  ///< after the last step

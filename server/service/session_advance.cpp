@@ -83,7 +83,7 @@ void Session::step(const v1::StepRequest& request, const Caller& caller, Call& c
 }
 
 void Session::run(Advance& advance, const Progress& progress) {
-  const bool coupled = !coupler_.ports().empty();
+  const bool coupled = deck_sockets_ || !coupler_.ports().empty();
   while (!(coupled ? run_coupled_step(advance) : run_slice(advance))) {
     wait_for_subscribers();
     advance.pace.wait(advance.token, progress);
@@ -366,6 +366,7 @@ bool Session::run_coupled_step(Advance& advance) {
     }
   }
   coupler_.start_clock();
+  if (deck_sockets_) deck_sockets_->start_clock();
   try {
     coupler_.await_peers(advance.token);
     {
@@ -384,13 +385,17 @@ bool Session::run_coupled_step(Advance& advance) {
     reject_step(advance, rejected);
   }
   const Guard lock(lock_);
-  advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() +
-                                      coupler_.waited_seconds());
-  shared_.metrics.count_coupled_step(coupler_.waited_seconds(), coupler_.exchanges(),
+  advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() + waited_seconds());
+  shared_.metrics.count_coupled_step(waited_seconds(), coupler_.exchanges(),
                                      coupler_.exchange_seconds());
   if (wants_more(advance)) return false;
   conclude(advance);
   return true;
+}
+
+/// For peers and codes, since the step began.
+double Session::waited_seconds() const {
+  return coupler_.waited_seconds() + (deck_sockets_ ? deck_sockets_->waited_seconds() : 0);
 }
 
 void Session::step_coupled(Advance& advance) {
@@ -403,6 +408,7 @@ void Session::step_coupled(Advance& advance) {
   if (report) tell(advance, *report);
   coupler_.notify(accepted, *simulation_);
   if (accepted) coupler_.finish(*simulation_);
+  if (accepted && deck_sockets_) deck_sockets_->accepted(advance.token);
 }
 
 // Before peers hear of the step.
@@ -417,14 +423,14 @@ void Session::settle_coupled(Advance& advance, bool accepted) {
   }
 }
 
-/// While it lives, steps exchange with tight ports at each iteration and are redone until window
-/// ports agree; the slot is free while peers compute.
+/// While it lives, steps exchange with tight ports and the codes at the deck's sockets at each
+/// iteration and are redone until window ports agree; the slot is free while others compute.
 class Session::ExchangeInStep {
  public:
   using Slot = std::optional<SolverSlots::Slot>;
   ExchangeInStep(Session& session, Advance& advance, Slot& slot)
       : session_(session), advance_(advance), slot_(slot) {
-    if (coupler().has_tight()) iterate();
+    if (coupler().has_tight() || sockets()) iterate();
     if (coupler().has_window()) repeat();
   }
   ~ExchangeInStep() {
@@ -435,18 +441,31 @@ class Session::ExchangeInStep {
   ExchangeInStep(const ExchangeInStep&) = delete;
   ExchangeInStep& operator=(const ExchangeInStep&) = delete;
 
+  /// A new step, or another attempt at it. Throws PeerLost.
+  void begin() {
+    if (sockets())
+      (void)wait([&] {
+        sockets()->begin(advance_.token);
+        return true;
+      });
+  }
+
  private:
   Coupler& coupler() { return session_.coupler_; }
+  DeckSockets* sockets() TS_NO_THREAD_SAFETY_ANALYSIS { return session_.deck_sockets_.get(); }
   /// The lock is held: by the step, and while the peer computes by nobody else.
   Simulation& simulation() TS_NO_THREAD_SAFETY_ANALYSIS { return *session_.simulation_; }
   void iterate() {
     simulation().set_attempt_ended([this](bool accepted) {
       const MemoryPause uncounted;
       coupler().end_attempt(accepted, simulation());
+      if (sockets()) sockets()->attempt_failed();
     });
     simulation().set_exchange([this](int iteration) {
-      return wait(
-          [&] { return coupler().exchange_iteration(simulation(), iteration, advance_.token); });
+      return wait([&] {
+        const bool done = !sockets() || sockets()->exchange(iteration, advance_.token);
+        return coupler().exchange_iteration(simulation(), iteration, advance_.token) && done;
+      });
     });
   }
   void repeat() {
@@ -482,11 +501,12 @@ class Session::ExchangeInStep {
 
 std::optional<StepReport> Session::attempt_in_slot(Advance& advance) {
   std::optional<SolverSlots::Slot> slot(take_slot(advance));
-  const ExchangeInStep exchange(*this, advance, slot);
+  ExchangeInStep exchange(*this, advance, slot);
+  exchange.begin();
   if (*slot) {
-    const double waited = coupler_.waited_seconds();
+    const double waited = waited_seconds();
     std::optional<StepReport> report = attempt(advance);
-    if (report) report->solver_seconds -= coupler_.waited_seconds() - waited;
+    if (report) report->solver_seconds -= waited_seconds() - waited;
     return report;
   }
   StepReport report;

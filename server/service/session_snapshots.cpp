@@ -15,6 +15,7 @@ void Session::save(const std::string& display_name, const Call& call, v1::Snapsh
 
 void Session::restore(int snapshot, const Call& call) {
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
+  require_way_back();
   go_to(snapshots_.get(snapshot), call, results_ ? snapshots_.agrees_until(snapshot) : 0);
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
                        status_.view().step);
@@ -23,6 +24,7 @@ void Session::restore(int snapshot, const Call& call) {
 void Session::reset(const Call& call, const CancelToken& cancel) {
   constexpr std::int64_t kNothing = -1, kInitialSolution = 0;
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
+  require_way_back();
   MemoryShare share;
   const auto fresh = within(shared_.memory, &cancel, &share, [&] {
     return Simulation::create(origin_.model, &cancel, /*writer=*/nullptr, origin_.time_keeping);
@@ -87,6 +89,7 @@ std::string Session::export_state(int snapshot, const Call& call) {
 
 void Session::import_state(const std::string& bytes, const std::string& display_name,
                            bool also_restore, const Call& call, v1::Snapshot* out) {
+  if (also_restore) require_way_back();
   std::int64_t results_end = 0;  // an imported state is taken for one of this history so far
   Result<State> state = [&] {
     const CallGuard lock(lock_, call);

@@ -81,6 +81,7 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_NOT_RECORDING:
     case v1::REASON_NO_RESULTS:
     case v1::REASON_NOT_DURABLE:
+    case v1::REASON_DECK_SOCKETS:
     case v1::REASON_NOT_CONVERGED:
     case v1::REASON_SINGULAR:
     case v1::REASON_EVALUATION:

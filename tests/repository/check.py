@@ -40,7 +40,7 @@ ARROWS = {
     "server/durable": {"files", "threads", "mbcosim"},
     "server/results": {"files", "output", "threads", "wire", "mbcosim"},
     "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "durable", "results", "rpc", "threads", "wire", "mbcosim",
-                       "shared_memory"},
+                       "shared_memory", "mbdyn"},
     "server/client": {"mbcosim", "shared_memory", "wire"},
     "server/shared_memory": set(),
     "server/http": {"service", "rpc", "threads", "wire", "mbcosim"},

@@ -171,6 +171,8 @@ class ServerCalls(Generic[SimulationKind]):
         durability    whether it outlives the server: "none", "checkpoint" or "journal"; None: "checkpoint" where the server has a state folder
         checkpoint_interval, checkpoint_steps
                       longest time [s], and steps, between two checkpoints; None: the server's, and any
+        deck_sockets  serves the sockets that the deck names to the codes for which it was written, where the server allows it: True, or the longest
+                      wait for a code [s]; the call ends when they have come
         pace          seconds of the model in a second of the wall clock, 1: real time; None: as fast as it can. Late steps are counted in the replies
         timeout       seconds that the call may take; None: as long as the server lives
         """
@@ -186,7 +188,7 @@ class ServerCalls(Generic[SimulationKind]):
                 record: bool = False, summed_time: bool = False, symbols: Optional[Mapping[str, Symbol]] = None,
                 grants: Iterable[pb.Grant] = (), results: Results = False, results_quota: Optional[int] = None,
                 durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None, pace: Optional[float] = None,
-                timeout: Optional[float] = None) -> Calls[SimulationKind]:
+                deck_sockets: Union[bool, float] = False, timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = _new_id()
         header.options.protocol.CopyFrom(protocol())
         header.options.display_name = name
@@ -208,6 +210,10 @@ class ServerCalls(Generic[SimulationKind]):
             header.options.checkpoint_steps = checkpoint_steps
         if pace is not None:
             header.options.pace.rate = pace
+        if deck_sockets is not False:
+            header.options.deck_sockets.SetInParent()
+        if deck_sockets is not False and deck_sockets is not True:
+            header.options.deck_sockets.peer_timeout.FromMilliseconds(round(deck_sockets * 1000))
         if lease is not None:
             header.options.lease.FromMilliseconds(int(lease * 1000))
         reply = yield Call("Simulations/CreateSimulation", bundle.requests(header, files), timeout)
