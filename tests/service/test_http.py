@@ -135,6 +135,22 @@ def test_a_run_streams_progress_and_ends_with_done(door, server, pendulum):
         assert json.loads(pieces[-2][1])["done"]["step"] == "50" and json.loads(pieces[-1][1]) == {}
 
 
+def test_a_state_crosses_as_one_message_each_way(door, server, pendulum):
+    with server.load(pendulum) as ours, server.load(pendulum) as theirs:
+        ours.step(10)
+        pieces = door.stream("Simulations/ExportSnapshot", {"simulation": ours.name})
+        state = b"".join(base64.b64decode(json.loads(piece)["data"]) for flags, piece in pieces if flags == 0)
+        request = {"simulation": theirs.name, "restore": True, "requestId": "import", "data": base64.b64encode(state).decode()}
+        for _ in range(2):  # the second time it is the reply of the first
+            status, reply = door.call("Simulations/ImportSnapshotInline", request)
+            assert status == 200 and reply["snapshot"]["step"] == "10"
+        assert len(theirs.snapshots()) == 1
+        assert list(theirs["node.structural.2.X"]) == list(ours["node.structural.2.X"])
+        request.update(requestId="", data=base64.b64encode(state[:-1]).decode())
+        status, error = door.call("Simulations/ImportSnapshotInline", request)
+        assert error["details"][0]["debug"]["reason"] == "DAMAGED_STATE"
+
+
 def test_the_error_of_a_stream_stands_in_its_last_envelope(door):
     pieces = door.stream("Telemetry/Subscribe", {"simulation": "simulations/none"})
     assert [flags for flags, _ in pieces] == [2]

@@ -72,6 +72,7 @@ def calls(server, name, port="spring"):
         ("RestoreSnapshot", "control", unary(stub.RestoreSnapshot, pb.RestoreSnapshotRequest(simulation=name, snapshot=name + "/snapshots/1"))),
         ("DeleteSnapshot", "control", unary(stub.DeleteSnapshot, pb.DeleteSnapshotRequest(simulation=name, snapshot=name + "/snapshots/9"))),
         ("ImportSnapshot", "control", unary(stub.ImportSnapshot, iter([pb.ImportSnapshotRequest(header=pb.ImportSnapshotHeader(simulation=name))]))),
+        ("ImportSnapshotInline", "control", unary(stub.ImportSnapshotInline, pb.ImportSnapshotInlineRequest(simulation=name))),
         ("ExportCheckpoint", "control", stream(stub.ExportCheckpoint, pb.ExportCheckpointRequest(simulation=name))),
         ("ResetSimulation", "control", unary(stub.ResetSimulation, pb.ResetSimulationRequest(simulation=name))),
         ("Linearize", "control", unary(stub.Linearize, pb.LinearizeRequest(simulation=name))),
