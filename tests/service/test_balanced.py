@@ -25,6 +25,11 @@ def free_port():
         return probe.getsockname()[1]
 
 
+def listens(port):
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
 class Cluster:
     """The proxy, and daemons that can be killed and started again on their folders."""
 
@@ -42,6 +47,7 @@ class Cluster:
             text = text.replace(f"mbcosimd-{id}:50051", f"127.0.0.1:{grpc_port} check port {http_port}")
         (folder / "haproxy.cfg").write_text(text)
         self.proxy = subprocess.Popen(["haproxy", "-f", str(folder / "haproxy.cfg")], stdout=subprocess.DEVNULL, stderr=open(folder / "haproxy.log", "wb"))
+        wait_for(lambda: listens(self.port))
 
     def start(self, id):
         own = self.folder / f"run-{id}-{len(os.listdir(self.folder))}"
