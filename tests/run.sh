@@ -52,10 +52,12 @@ case $preset in  # what bounds on time are multiplied by
   tsan) export MBCOSIM_TIME_FACTOR=20 ;;
 esac
 export TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp history_size=7 ${TSAN_OPTIONS:-}"
+export UBSAN_OPTIONS="print_stacktrace=1 halt_on_error=1 ${UBSAN_OPTIONS:-}"
 export ASAN_OPTIONS="detect_leaks=1 ${ASAN_OPTIONS:-}" LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp ${LSAN_OPTIONS:-}"
 [ -z "$hostile$soak" ] || export MBCOSIM_BIN=$PWD/$folder/bin PYTHONPATH=$PWD/$folder/python PYTHONDONTWRITEBYTECODE=1
 if [ -n "$hostile" ]; then
-  exec /usr/bin/python3 tests/hostile/hostile.py $folder/bin --seconds "$hostile" --seed "$(date +%s)"
+  [ $preset = release ] || arguments+=(--sanitized)
+  exec /usr/bin/python3 tests/hostile/hostile.py $folder/bin --seconds "$hostile" --seed "$(date +%s)" "${arguments[@]}"
 fi
 if [ -n "$soak" ]; then
   /usr/bin/python3 tests/soak/soak.py "${minutes[@]}" --seed "$(date +%s)"

@@ -61,8 +61,8 @@ std::chrono::milliseconds milliseconds_of(const google::protobuf::Duration& dura
                                           const char* field) {
   constexpr std::int64_t kLongest = 1'000'000'000;
   constexpr std::int32_t kSecond = 1'000'000'000;  // [ns]
-  const bool fits = std::abs(duration.nanos()) < kSecond && duration.seconds() <= kLongest &&
-                    duration.seconds() >= -kLongest;
+  const bool fits = duration.nanos() < kSecond && duration.nanos() > -kSecond &&
+                    duration.seconds() <= kLongest && duration.seconds() >= -kLongest;
   if (!fits)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "`" + std::string(field) +

@@ -143,6 +143,7 @@ MatX transposed_product(const MatX& a, const MatX& b, const Watch& watch) {
 
 MatX solve(const Eigen::PartialPivLU<MatX>& a, const MatX& b, const Watch& watch) {
   MatX x(b.rows(), b.cols());
+  if (x.size() == 0) return x;  // Eigen's triangular solvers bind references to what is not there
   watch.columns(b.cols(), [&](Index first, Index count) {
     x.middleCols(first, count) = a.solve(b.middleCols(first, count));
   });

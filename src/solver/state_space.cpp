@@ -96,11 +96,12 @@ Result<StateSpace> eliminate(const Linearization& system, const InputsOutputs& i
   StateSpace result;
   result.a = solve(regular_lu, MatX::Identity(states, states), watch) +
              kShift * MatX::Identity(states, states);
-  result.b = regular_lu.solve(b_regular);
+  result.b = solve(regular_lu, b_regular, watch);
   const MatX b_nilpotent = b - right * b_regular;
   const MatX nilpotent = t - product(product(right, regular, watch), projected, watch);
-  const MatX direct =
-      -(MatX::Identity(t.rows(), t.cols()) + kShift * nilpotent).partialPivLu().solve(b_nilpotent);
+  const Eigen::PartialPivLU<MatX> shifted_lu(MatX::Identity(t.rows(), t.cols()) +
+                                             kShift * nilpotent);
+  const MatX direct = -solve(shifted_lu, b_nilpotent, watch);
   result.c = c0 * right + c1 * right * result.a;
   result.d = io.d0 + c0 * direct + c1 * right * result.b;
   const MatX by_rate = c1 * direct + c0 * nilpotent * direct;

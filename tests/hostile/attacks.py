@@ -241,20 +241,24 @@ class Attacker:
 
     def silent(self):
         """Streams that say nothing, more than one identity may have."""
-        stop = threading.Event()
-
-        def silence():
-            stop.wait()
+        def silence(ended):
+            ended.wait()
             return
             yield
+
+        def open_one(path, metadata):
+            ended = threading.Event()  # grpcio has a thread in `silence` until then
+            stream = self.channel.stream_stream(path, request_serializer=bytes, response_deserializer=bytes)
+            call = stream(silence(ended), metadata=metadata)
+            if not call.add_callback(ended.set):
+                ended.set()
+            return call
 
         paths = ["/mbcosim.v1.Coupling/Attach", "/mbcosim.v1.Simulations/StepStream",
                  "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"]
         calls = []
         while self.going():
-            path = self.random.choice(paths)
-            stream = self.channel.stream_stream(path, request_serializer=bytes, response_deserializer=bytes)
-            calls.append(stream(silence(), metadata=self.metadata if self.random.random() < 0.8 else None))
+            calls.append(open_one(self.random.choice(paths), self.metadata if self.random.random() < 0.8 else None))
             time.sleep(0.01)
             if len(calls) >= 650:
                 done = [call for call in calls if call.done()]
@@ -263,7 +267,6 @@ class Attacker:
                     calls.remove(call)
                 if not done:
                     calls.pop(0).cancel()
-        stop.set()
         for call in calls:
             call.cancel()
 

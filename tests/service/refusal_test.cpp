@@ -69,8 +69,10 @@ TEST(Durations, ThatNoClockCouldTakeAreRefused) {
   duration.set_seconds(INT64_MIN);
   EXPECT_THROW((void)milliseconds_of(duration, "lease"), Refusal);
   duration.set_seconds(0);
-  duration.set_nanos(1'000'000'000);
-  EXPECT_THROW((void)milliseconds_of(duration, "lease"), Refusal);
+  for (const std::int32_t nanos : {1'000'000'000, -1'000'000'000, INT32_MAX, INT32_MIN}) {
+    duration.set_nanos(nanos);
+    EXPECT_THROW((void)milliseconds_of(duration, "lease"), Refusal) << nanos;
+  }
 }
 
 }  // namespace

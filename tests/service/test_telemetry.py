@@ -74,7 +74,7 @@ def test_a_minimum_interval_leaves_out_steps_on_the_way(server):
         assert all(values["time"] == time_ for _, time_, values in got)
 
 
-@pytest.mark.parametrize("seconds, nanos", [(0, 0), (-1, 0), (0, -1), (3600, 1), (10**12, 0)])
+@pytest.mark.parametrize("seconds, nanos", [(0, 0), (-1, 0), (0, -1), (3600, 1), (10**12, 0), (0, -2**31)])
 def test_a_wrong_minimum_interval_is_refused(server, seconds, nanos):
     with server.load_text(decks.body()) as simulation:
         request = telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=[0])

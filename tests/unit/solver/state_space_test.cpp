@@ -30,6 +30,19 @@ begin: elements;
 end: elements;
 )";
 
+TEST(StateSpace, NeedsNoInputsAndOutputs) {
+  DeckRun run{std::string(kOscillator)};
+  ASSERT_TRUE(run.ready());
+  const auto io = linearize_inputs_outputs(run.model(), run.simulation().state(),
+                                           Variables(run.model()), {}, {});
+  ASSERT_TRUE(io) << io.error().message;
+  const auto reduced = state_space(linearize(run.model(), run.simulation().state()), *io);
+  ASSERT_TRUE(reduced) << reduced.error().message;
+  EXPECT_NEAR(reduced->a.trace(), -4, 1e-6) << "2 s^2 + 8 s + 800 = 0";
+  EXPECT_EQ(reduced->b.cols(), 0);
+  EXPECT_EQ(reduced->c.rows(), 0);
+}
+
 TEST(StateSpace, OfAConstrainedOscillator) {
   DeckRun run{std::string(kOscillator)};
   ASSERT_TRUE(run.ready());
