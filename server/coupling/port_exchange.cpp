@@ -109,7 +109,7 @@ void PortModel::put_expressions(const Simulation& simulation, v1::ServerExchange
 
 // x̂ = H x and its rates; the peer's points have no orientation.
 void PortModel::fill_mapped(const Agreement& agreement, v1::ServerExchange* out) const {
-  const MatX& H = *element_->element->mapping();
+  const MappingMatrix& H = *element_->element->mapping();
   VecX x(H.cols()), v(H.cols()), a(H.cols());
   for (std::size_t k = 0; k < sent_.size(); ++k) {
     Motion m = sent_[k];
@@ -199,7 +199,7 @@ std::string PortModel::decode_motion(const v1::PeerAnswer& in, const Agreement& 
 // F = Hᵀ F̂ on the points.
 void PortModel::decode_mapped(const v1::PeerAnswer& in, const Agreement& agreement,
                               Answer* answer) const {
-  const MatX& H = *element_->element->mapping();
+  const MappingMatrix& H = *element_->element->mapping();
   const VecX f = H.transpose() * Eigen::Map<const VecX>(in.forces().data(), in.forces_size());
   for (std::size_t k = 0; k < points_.size(); ++k) {
     const Vec3 force = to_global(agreement, k) * f.segment<3>(static_cast<Eigen::Index>(3 * k));

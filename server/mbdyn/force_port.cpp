@@ -23,7 +23,7 @@ PortElementRef find_element(const Model& model, const std::string& name) {
 }
 
 /// One column of x, y, z of all points: v = H v of each of the kinds of vectors.
-void map_vectors(const MatX& H, std::vector<PointState>& points, Vec3 PointState::*vector,
+void map_vectors(const MappingMatrix& H, std::vector<PointState>& points, Vec3 PointState::*vector,
                  std::vector<PointState>& mapped) {
   VecX all(3 * points.size());
   for (std::size_t k = 0; k < points.size(); ++k)

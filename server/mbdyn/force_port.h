@@ -30,7 +30,7 @@ class ForcePort {
 
   ForceForm form_;
   std::optional<PointMotion> points_, reference_;
-  const MatX* mapping_ = nullptr;  ///< mapped: H
+  const MappingMatrix* mapping_ = nullptr;  ///< mapped: H
   bool reference_loads_ = false, rotate_reference_loads_ = true;
   int input_ = -1, output_ = -1;  ///< handles
 };

@@ -27,7 +27,7 @@ class MappedModal : public GeneralElement, public PortElement {
     int reference = -1;              ///< structural node; −1: none
     bool use_rigid_loads = true;     ///< F₁ = F₀
     bool rotate_rigid_loads = true;  ///< F₀, M₀ come in the frame of r
-    MatX H;                          ///< (m × 6n)
+    MappingMatrix H;                 ///< (m × 6n)
   };
   /// `input`: the state at input.
   MappedModal(ElementPort port, Settings settings, const Model& model, const EvalContext& input);

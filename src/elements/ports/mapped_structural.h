@@ -13,7 +13,7 @@ namespace mbcosim {
 /// forces, external structural mapping.
 class MappedStructural : public ExternalStructural, public PortElement {
  public:
-  MappedStructural(StructuralPort points, ElementPort port, MatX mapping)
+  MappedStructural(StructuralPort points, ElementPort port, MappingMatrix mapping)
       : ExternalStructural(points, false),
         points_(std::move(points)),
         port_(std::move(port)),
@@ -21,12 +21,12 @@ class MappedStructural : public ExternalStructural, public PortElement {
   const ElementPort& port() const override { return port_; }
   void outputs(const GeneralView&, std::vector<double>&) const override {}
   const StructuralPort* points() const override { return &points_; }
-  const MatX* mapping() const override { return &mapping_; }
+  const MappingMatrix* mapping() const override { return &mapping_; }
 
  private:
   StructuralPort points_;
   ElementPort port_;
-  MatX mapping_;  ///< H (3 × peer's points, 3 × points)
+  MappingMatrix mapping_;  ///< H (3 × peer's points, 3 × points)
 };
 
 }  // namespace mbcosim

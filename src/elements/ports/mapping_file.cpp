@@ -28,7 +28,10 @@ int count_rows(Card& card, const std::string& name, const std::vector<double>& n
   return (static_cast<int>(rows) + step - 1) / step * step;
 }
 
-void fill_sparse(Card& card, const std::string& name, const std::vector<double>& numbers, MatX& H) {
+/// Of an entry that is given twice, the last counts.
+void fill_sparse(Card& card, const std::string& name, const std::vector<double>& numbers,
+                 MappingMatrix& H) {
+  std::vector<Eigen::Triplet<double>> entries;
   for (std::size_t k = 0; k < numbers.size(); k += 3) {
     const double i = numbers[k], j = numbers[k + 1];
     if (!(i >= 1 && i <= H.rows() && j >= 1 && j <= H.cols() && i == std::floor(i) &&
@@ -36,8 +39,24 @@ void fill_sparse(Card& card, const std::string& name, const std::vector<double>&
       refuse(card, name,
              "entry " + std::to_string(k / 3 + 1) + " lies outside of " + std::to_string(H.rows()) +
                  " by " + std::to_string(H.cols()));
-    H(static_cast<int>(i) - 1, static_cast<int>(j) - 1) = numbers[k + 2];
+    entries.emplace_back(static_cast<int>(i) - 1, static_cast<int>(j) - 1, numbers[k + 2]);
   }
+  H.setFromTriplets(entries.begin(), entries.end(), [](double, double later) { return later; });
+}
+
+void fill_full(Card& card, const std::string& name, const std::vector<double>& numbers,
+               MappingMatrix& H) {
+  if (numbers.size() != static_cast<std::size_t>(H.rows()) * H.cols())
+    refuse(card, name,
+           "the matrix must be " + std::to_string(H.rows()) + " by " + std::to_string(H.cols()) +
+               ", found " + std::to_string(numbers.size()) + " numbers");
+  const double* value = numbers.data();
+  for (Eigen::Index i = 0; i < H.rows(); ++i) {
+    H.startVec(i);
+    for (Eigen::Index j = 0; j < H.cols(); ++j, ++value)
+      if (*value != 0) H.insertBack(i, j) = *value;
+  }
+  H.finalize();
 }
 
 }  // namespace
@@ -61,7 +80,7 @@ std::vector<double> read_mapping_numbers(Card& card, const std::string& text, st
   return numbers;
 }
 
-MatX read_mapping_file(Card& card, int rows, int columns, int step) {
+MappingMatrix read_mapping_file(Card& card, int rows, int columns, int step) {
   const bool sparse = card.required("mapping", {"full mapping file", "sparse mapping file"}) == 1;
   const double threshold = card.keyword("threshold") ? card.real("threshold") : 0;
   if (!(threshold >= 0)) card.fail("the threshold of a mapping must not be negative");
@@ -76,17 +95,13 @@ MatX read_mapping_file(Card& card, int rows, int columns, int step) {
     refuse(card, name,
            step == 3 ? "the matrix must have three rows for each mapped point"
                      : "the matrix must have a row for each mode");
-  MatX H = MatX::Zero(rows, columns);
-  if (sparse) {
+  MappingMatrix H(rows, columns);
+  if (sparse)
     fill_sparse(card, name, numbers, H);
-  } else {
-    if (numbers.size() != static_cast<std::size_t>(rows) * columns)
-      refuse(card, name,
-             "the matrix must be " + std::to_string(rows) + " by " + std::to_string(columns) +
-                 ", found " + std::to_string(numbers.size()) + " numbers");
-    for (std::size_t k = 0; k < numbers.size(); ++k) H(k / columns, k % columns) = numbers[k];
-  }
-  return H.unaryExpr([&](double x) { return std::abs(x) <= threshold ? 0.0 : x; });
+  else
+    fill_full(card, name, numbers, H);
+  H.prune([&](Eigen::Index, Eigen::Index, double x) { return std::abs(x) > threshold; });
+  return H;
 }
 
 }  // namespace mbcosim

@@ -1,7 +1,7 @@
 /// Matrices that map the motion of a model's nodes to what an external code sees.
 #pragma once
 
-#include "math/types.h"
+#include "elements/ports/mapping_matrix.h"
 #include "model/card.h"
 
 namespace mbcosim {
@@ -9,7 +9,7 @@ namespace mbcosim {
 /// `{full | sparse} mapping file, [threshold, t,] "file"`: numbers by rows, or lines `row column
 /// value` counted from 1; values of modulus up to the threshold are 0. `rows` −1: as many as the
 /// file has, `step` at a time.
-MatX read_mapping_file(Card& card, int rows, int columns, int step);
+MappingMatrix read_mapping_file(Card& card, int rows, int columns, int step);
 
 /// Numbers of a text; lines that start with # are comments. `lines`: those with numbers.
 std::vector<double> read_mapping_numbers(Card& card, const std::string& text, std::size_t* lines);

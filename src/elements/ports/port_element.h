@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "elements/general_element.h"
+#include "elements/ports/mapping_matrix.h"
 #include "model/model.h"
 #include "model/structural_port.h"
 
@@ -46,7 +47,7 @@ class PortElement {
   virtual int first_amplitude() const { return -1; }
   /// mapped: the points, and H (3 × peer's points, 3 × points).
   virtual const StructuralPort* points() const { return nullptr; }
-  virtual const MatX* mapping() const { return nullptr; }
+  virtual const MappingMatrix* mapping() const { return nullptr; }
 };
 
 /// Where a port element stands.

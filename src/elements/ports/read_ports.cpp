@@ -1,4 +1,7 @@
 /// Cards of ports besides `external structural` and `external modal mapping`.
+#include <cmath>
+#include <limits>
+
 #include "elements/families.h"
 #include "elements/ports/external_modal.h"
 #include "elements/ports/mapped_structural.h"
@@ -37,9 +40,13 @@ void read_mapped_points(Card& card, StructuralPort& port) {
 
 /// `mapped points number, {from file | n}, {full | sparse} mapping file, [threshold, t,] "file" [,
 /// labels]`
-MatX read_mapping(Card& card, StructuralPort& port) {
+MappingMatrix read_mapping(Card& card, StructuralPort& port) {
   const int columns = 3 * port.points();
-  if (!card.keyword("mapped points number")) return MatX::Identity(columns, columns);
+  if (!card.keyword("mapped points number")) {
+    MappingMatrix same(columns, columns);
+    same.setIdentity();
+    return same;
+  }
   int rows = -1;
   if (!card.keyword("from file")) {
     const int count = card.integer("number of mapped points");
@@ -48,15 +55,20 @@ MatX read_mapping(Card& card, StructuralPort& port) {
                 ", got " + std::to_string(count));
     rows = 3 * count;
   }
-  const MatX H = read_mapping_file(card, rows, columns, 3);
+  MappingMatrix H = read_mapping_file(card, rows, columns, 3);
   const int mapped = static_cast<int>(H.rows()) / 3;
   port.point_labels.clear();
   if (card.keyword("mapped labels file")) {
     std::string name;
     std::size_t lines = 0;
     for (const double label :
-         read_mapping_numbers(card, card.file_contents("labels of mapped points", &name), &lines))
+         read_mapping_numbers(card, card.file_contents("labels of mapped points", &name), &lines)) {
+      if (!(label >= 0 && label <= std::numeric_limits<int>::max() && label == std::floor(label)))
+        card.fail("\"" + name +
+                  "\": labels of mapped points are whole numbers, not negative, got " +
+                  std::to_string(label));
       port.point_labels.push_back(static_cast<int>(label));
+    }
     if (static_cast<int>(port.point_labels.size()) != mapped)
       card.fail("\"" + name + "\" has " + std::to_string(port.point_labels.size()) +
                 " labels for " + std::to_string(mapped) + " mapped points");
@@ -80,7 +92,7 @@ void read_external_mapping(Card& card, ElementInfo& info) {
   read_mapped_points(card, points);
   if (card.keyword("membrane"))
     card.fail("`membrane` is not supported", "give the matrix in a mapping file");
-  MatX H = read_mapping(card, points);
+  MappingMatrix H = read_mapping(card, points);
   if (card.keyword("echo"))
     card.fail("`echo` is not supported",
               "leave it out; DescribeSimulation tells the port's layout");

@@ -26,8 +26,9 @@ class MappedModes : public ::testing::TestWithParam<Form> {
     s.nodes = {bench_.first, bench_.second};
     if (form.reference) s.reference = bench_.add_node(StructuralKind::static_);
     s.rotate_rigid_loads = form.rotate;
-    s.H = MatX(kModes, 12);
-    for (Eigen::Index k = 0; k < s.H.size(); ++k) s.H(k) = bench_.number();
+    MatX H(kModes, 12);
+    for (Eigen::Index k = 0; k < H.size(); ++k) H(k) = bench_.number();
+    s.H = H.sparseView();
     ElementPort port;
     port.kind = ElementPort::Kind::modal;
     port.name = "p";

@@ -1,4 +1,4 @@
-set(SOURCES ports_test.cpp mapped_modal_test.cpp)
+set(SOURCES ports_test.cpp mapped_modal_test.cpp mapped_points_test.cpp)
 list(APPEND SOURCES registered_elements_test.cpp beam_test.cpp body_tangent_test.cpp external_structural_test.cpp force_test.cpp
     genel_test.cpp hydraulic_circuit_test.cpp joint_conformance_test.cpp hydraulic_actuator_test.cpp
     joint_reference_test.cpp friction_conformance_test.cpp
