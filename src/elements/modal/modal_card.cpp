@@ -110,7 +110,12 @@ class ModalJointReader {
   }
 
   void read_node_count() {
-    if (!card_.keyword("from file")) fem_nodes_ = card_.integer("number of FEM nodes");
+    if (card_.keyword("from file")) return;
+    fem_nodes_ = card_.integer("number of FEM nodes");
+    if (fem_nodes_ < 1)
+      card_.fail("modal joint: the number of FEM nodes must be at least 1, got " +
+                     std::to_string(fem_nodes_),
+                 "write `from file` to take it from the FEM data file");
   }
 
   double ratio(const char* what) {

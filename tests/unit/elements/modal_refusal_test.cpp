@@ -53,6 +53,7 @@ TEST(ModalCard, NamesWhatItRefuses) {
       {card("modal, 1,", "modal, 2,"), "structural node 2 is not a modal node"},
       {card("modal, 1,", "modal, 7,"), "structural node 7 is not defined"},
       {card("1, 2, 3", "1, 0, 3"), "the number of modes must be at least 1, got 0"},
+      {card("1, 2, 3", "1, 2, -3"), "the number of FEM nodes must be at least 1, got -3"},
       {card("1, 2, 3", "1, 3, 3"), "has 2 modes, but mode 3 is asked for"},
       {card("1, 2, 3", "1, 2, list, 2, 1, 3"),
        "the list of modes must be ascending, got 1 after 2"},
