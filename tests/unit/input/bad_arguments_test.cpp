@@ -7,6 +7,7 @@
 #include <set>
 
 #include "deck_fixture.h"
+#include "word_cards.h"
 
 namespace mbcosim::testing {
 namespace {
@@ -87,23 +88,6 @@ DeckText deck(const GoodCard& c, const std::string& card) {
       ".5,0.,0., eye, null, null; thermal: 4, value, 1.; thermal: 5; abstract: 6;";
   d.elements = std::string(c.before) + "\n" + card + ";";
   return d;
-}
-
-/// The arguments, blanks removed at their ends; the first has the head.
-std::vector<std::string> arguments(const std::string& card) {
-  std::vector<std::string> parts(1);
-  for (const char ch : card)
-    if (ch == ',')
-      parts.emplace_back();
-    else if (ch != ' ' || !parts.back().empty())
-      parts.back() += ch;
-  return parts;
-}
-
-std::string joined(const std::vector<std::string>& parts) {
-  std::string text = parts[0];
-  for (std::size_t k = 1; k < parts.size(); ++k) text += ", " + parts[k];
-  return text;
 }
 
 class BadArguments : public ::testing::TestWithParam<GoodCard> {
