@@ -102,6 +102,19 @@ ExitCode exit_code_of(const LoadReport& report) {
   return any("internal") ? kInternalError : any("limit-") ? kRefused : kDeckRefused;
 }
 
+bool has_nothing_to_run(const LoadReport& report) {
+  return report.ok() && report.model->unknowns == 0 && report.model->elements.empty() &&
+         report.printed.empty();
+}
+
+void print_nothing_to_run(const std::string& deck, const char* severity, std::FILE* out) {
+  std::fprintf(out,
+               "%s: %s: there is nothing to run: the deck has no nodes and no elements\n"
+               "  hint: a deck consists of the blocks data, initial value, control data, nodes "
+               "and elements\n",
+               deck.c_str(), severity);
+}
+
 ExitCode exit_code_of(const Error& error) {
   switch (error.kind) {
     case ErrorKind::deck:

@@ -25,6 +25,11 @@ void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* ou
 ExitCode exit_code_of(const LoadReport& report);
 ExitCode exit_code_of(const Error& error);
 
+/// Is there neither a node nor an element, and was nothing printed, as a calculation would?
+bool has_nothing_to_run(const LoadReport& report);
+/// Says so; `severity`: "error" or "warning".
+void print_nothing_to_run(const std::string& deck, const char* severity, std::FILE* out);
+
 /// An error of the solver: message, residual history, worst equations.
 void print_error(const Error& error, std::FILE* out);
 

@@ -101,13 +101,8 @@ int run(const RunOptions& options) {
   std::fputs(report.printed.c_str(), stdout);
   print_diagnostics(report.diagnostics, stderr);
   if (!report.ok()) return exit_code_of(report);
-  const bool nothing = report.model->unknowns == 0 && report.model->elements.empty();
-  if (nothing && report.printed.empty()) {  // else a calculation
-    std::fprintf(stderr,
-                 "%s: error: there is nothing to run: the deck has no nodes and no elements\n"
-                 "  hint: a deck consists of the blocks data, initial value, control data, nodes "
-                 "and elements\n",
-                 options.deck.c_str());
+  if (has_nothing_to_run(report)) {
+    print_nothing_to_run(options.deck, "error", stderr);
     return kDeckRefused;
   }
   const std::vector<const DeckChannel*> channels = deck_channels(*report.model);

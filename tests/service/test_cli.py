@@ -180,6 +180,15 @@ def test_interrupt_exits_with_130(tmp_path):
     assert process.wait(60 * TIME_FACTOR) == 130
 
 
+def test_validate_warns_of_a_deck_that_run_would_refuse(tmp_path):
+    empty = tmp_path / "empty.mbd"
+    empty.write_text("set: real m = 1.;\n")
+    checked = mbcosim("validate", str(empty))
+    assert checked.returncode == 0
+    assert f"{empty}: warning: there is nothing to run" in checked.stdout
+    assert mbcosim("run", str(empty), "-o", str(tmp_path / "out")).returncode == 2
+
+
 def test_validate_and_describe_as_json(deck, tmp_path):
     good = mbcosim("validate", str(deck), "--json")
     assert good.returncode == 0 and json.loads(good.stdout) == {"ok": True, "diagnostics": []}
