@@ -16,7 +16,7 @@
 namespace mbcosim::server {
 namespace {
 
-constexpr std::string_view kHash = "sha256:";
+constexpr std::string_view kHash = "sha256:", kToken = "token:";
 
 [[noreturn]] void refuse_line(int line, const std::string& what) {
   throw std::runtime_error("tokens file, line " + std::to_string(line) + ": " + what);
@@ -119,7 +119,7 @@ Authenticator::Token Authenticator::read_token(const std::string& line, int numb
   if (hashed && !is_hash(text))
     refuse_line(number, "after \"sha256:\" there must be 64 hexadecimal digits");
   token.hash = hashed ? text : hash_of_token(text);
-  token.caller = {"token:" + name, role_of(role, number)};
+  token.caller = {std::string(kToken) + name, role_of(role, number)};
   if (words >> expiry) token.expiry = time_of(expiry, number);
   if (words >> more) refuse_line(number, "nothing is expected after the expiry");
   return token;
@@ -127,15 +127,23 @@ Authenticator::Token Authenticator::read_token(const std::string& line, int numb
 
 // ------------------------------------------------------------------ calls
 
+std::shared_ptr<const Authenticator::Tokens> Authenticator::tokens() const {
+  Guard guard(store_->mutex);
+  return store_->tokens;
+}
+
+bool Authenticator::may_be_known(const std::string& identity) const {
+  if (!tokens_required_ || identity.compare(0, kToken.size(), kToken) != 0) return true;
+  const auto all = tokens();
+  return std::any_of(all->begin(), all->end(),
+                     [&](const Token& token) { return token.caller.identity == identity; });
+}
+
 std::optional<Authenticator::Token> Authenticator::find(const std::string& text) const {
-  std::shared_ptr<const Tokens> tokens;
-  {
-    Guard guard(store_->mutex);
-    tokens = store_->tokens;
-  }
+  const auto all = tokens();
   const std::string hash = hash_of_token(text);
   const Token* found = nullptr;
-  for (const Token& token : *tokens)  // all of them, so that the time tells nothing
+  for (const Token& token : *all)  // all of them, so that the time tells nothing
     if (same_text(token.hash, hash)) found = &token;
   return found ? std::optional(*found) : std::nullopt;
 }

@@ -50,6 +50,8 @@ class Authenticator {
   Caller check(const grpc::ServerContextBase& context, Role required) const;
   /// The same for a caller on this host that gRPC does not know: `authorization` is "Bearer TOKEN".
   Caller check_local(const std::string& authorization, Role required) const;
+  /// Whether a "token:NAME" has a line in the file; all else may be somebody.
+  bool may_be_known(const std::string& identity) const;
   /// Whether callers that gRPC does not know must show a token.
   bool needs_token() const { return tokens_required_; }
 
@@ -69,6 +71,7 @@ class Authenticator {
   Caller caller_of(const std::string& authorization) const;
   static const Caller& require(const Caller& caller, Role required);
   std::optional<Token> find(const std::string& text) const;
+  std::shared_ptr<const Tokens> tokens() const;
 
   bool tokens_required_ = false;
   std::shared_ptr<Store> store_ = std::make_shared<Store>();

@@ -202,6 +202,7 @@ class Creation {
   template <class Reply>
   void create(Exchange& exchange, const v1::CreateOptions& options, std::uint64_t digest,
               Reply* reply) {
+    Grants::check_known(options.grants(), parts_.runtime.authenticator);
     DeckReport report;
     KeptDeck deck;
     KeptDeck* const kept = parts_.durability.wanted(options, nullptr) ? &deck : nullptr;
@@ -389,6 +390,7 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
     if (request.options().has_deck_sockets())
       throw Refusal(v1::REASON_BAD_ARGUMENT,
                     "`deck_sockets`: the codes of the deck are with the simulation that is forked");
+    Grants::check_known(request.options().grants(), parts_.runtime.authenticator);
     const int number = request.has_snapshot() ? snapshot_in(request) : -1;
     KeptDeck deck;
     const bool durable = parts_.durability.wanted(request.options(), &*source);

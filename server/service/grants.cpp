@@ -61,6 +61,13 @@ void Grants::check(const List& grants) {
   }
 }
 
+void Grants::check_known(const List& grants, const Authenticator& authenticator) {
+  for (const v1::Grant& grant : grants)
+    if (!authenticator.may_be_known(grant.identity()))
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`grants.identity`: the server has no token named \"" +
+                                                 grant.identity().substr(0, 100) + "\"");
+}
+
 Grants::Grants(std::string owner, const List& grants) : owner_(std::move(owner)), grants_(grants) {
   check(grants);
 }

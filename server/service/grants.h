@@ -21,6 +21,9 @@ class Grants {
 
   /// Throws BAD_ARGUMENT.
   static void check(const List& grants);
+  /// Throws BAD_ARGUMENT for a token that the daemon does not have. Of requests: grants that were
+  /// stored stay when their tokens go.
+  static void check_known(const List& grants, const Authenticator& authenticator);
   /// Throws BAD_ARGUMENT.
   Grants(std::string owner, const List& grants);
   /// Throws BAD_ARGUMENT, and changes nothing then.

@@ -125,14 +125,17 @@ void add_life(Gate& gate, const Parts& parts) {
                  const SessionHold session(parts.store, name, frame.caller, Access::see);
                  session->fill(reply->mutable_simulation(), frame.caller);
                }));
-  gate.add(simulations_path("UpdateSimulation"),
-           on_session<v1::UpdateSimulationRequest, v1::UpdateSimulationReply>(
-               parts, Role::control, Lane::work,
-               [](Session& session, const v1::UpdateSimulationRequest& request,
-                  v1::UpdateSimulationReply* reply, const CallFrame& frame,
-                  const KeptReplies::Turn* turn) {
-                 session.update(request, frame.caller, frame.call, reply, turn);
-               }));
+  gate.add(
+      simulations_path("UpdateSimulation"),
+      on_session<v1::UpdateSimulationRequest, v1::UpdateSimulationReply>(
+          parts, Role::control, Lane::work,
+          [&parts](Session& session, const v1::UpdateSimulationRequest& request,
+                   v1::UpdateSimulationReply* reply, const CallFrame& frame,
+                   const KeptReplies::Turn* turn) {
+            if (session.grants().allow(frame.caller, Access::own))  // else it is refused anyway
+              Grants::check_known(request.grants().grants(), parts.runtime.authenticator);
+            session.update(request, frame.caller, frame.call, reply, turn);
+          }));
   gate.add(
       simulations_path("DescribeSimulation"),
       on_session<v1::DescribeSimulationRequest, v1::DescribeSimulationReply>(

@@ -173,6 +173,8 @@ def test_grants_change_while_the_simulation_lives(shared):
 
 @pytest.mark.parametrize("wrong, field", [
     (pb.Grant(identity="", right=pb.RIGHT_OBSERVE), "grants.identity"),
+    (pb.Grant(identity="token:nobody", right=pb.RIGHT_OBSERVE), "grants.identity"),
+    (pb.Grant(identity="token:bob ", right=pb.RIGHT_OBSERVE), "grants.identity"),
     (pb.Grant(identity="token:bob"), "grants.right"),
     (pb.Grant(identity="token:bob", right=17), "grants.right"),
     (pb.Grant(identity="token:bob", right=pb.RIGHT_OBSERVE, ports=["wing"]), "grants.ports")])
