@@ -1,8 +1,7 @@
 /// Events as they come.
 #include <google/protobuf/util/time_util.h>
 
-#include "client/connection.h"
-#include "client/deadline.h"
+#include "client/reading.h"
 #include "mbcosim/v1/events.grpc.pb.h"
 
 namespace mbcosim::client {
@@ -69,28 +68,13 @@ decltype(Event::content) to_content(const v1::Event& from) {
 
 struct Events::Impl {
   Impl(std::shared_ptr<Server::Impl> connection, const v1::WatchEventsRequest& request)
-      : server(std::move(connection)),
-        service(v1::Events::NewStub(server->channel)),
-        context(*server, kEndless, request.simulation()),
-        stream(service->WatchEvents(&context, request)) {}
-  ~Impl() {
-    context.TryCancel();
-    finish();
-  }
-  /// OK also when the watcher himself has ended it.
-  grpc::Status finish() {
-    if (finished) return grpc::Status::OK;
-    finished = true;
-    const grpc::Status status = stream->Finish();
-    return status.error_code() == grpc::StatusCode::CANCELLED ? grpc::Status::OK : status;
-  }
+      : stream(std::move(connection), request.simulation(),
+               [&](v1::Events::Stub& stub, grpc::ClientContext* context) {
+                 return stub.WatchEvents(context, request);
+               }) {}
 
-  std::shared_ptr<Server::Impl> server;
-  std::unique_ptr<v1::Events::Stub> service;
-  CallContext context;
-  std::unique_ptr<grpc::ClientReader<v1::Event>> stream;
+  Reading<v1::Events, v1::Event> stream;
   EventPlace place;
-  bool finished = false;
 };
 
 Events::Events(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -98,14 +82,11 @@ Events::Events(Events&&) noexcept = default;
 Events& Events::operator=(Events&&) noexcept = default;
 Events::~Events() = default;
 EventPlace Events::place() const { return impl_->place; }
-void Events::close() { impl_->context.TryCancel(); }
+void Events::close() { impl_->stream.cancel(); }
 
 bool Events::next(Event& event) {
   v1::Event from;
-  if (impl_->finished || !impl_->stream->Read(&from)) {
-    require(impl_->finish());
-    return false;
-  }
+  if (!impl_->stream.next(&from)) return false;
   event.sequence.reset();
   if (from.has_sequence()) impl_->place.last = event.sequence = from.sequence();
   const auto since = std::chrono::nanoseconds(
@@ -126,16 +107,10 @@ Events Server::events(const std::string& simulation, const EventPlace& after, do
   request.set_journal(after.journal);
   if (after.last) request.set_after_sequence(*after.last);
   auto impl = std::make_unique<Events::Impl>(impl_, request);
-  const Deadline deadline(timeout, [&] { impl->context.TryCancel(); });
-  v1::Event started;  // the server's word that nothing is missed from now on
-  if (impl->stream->Read(&started)) {
-    impl->place = {started.started().journal(), after.last};
-    return Events(std::move(impl));
-  }
-  const grpc::Status status = impl->finish();
-  if (deadline.is_over()) throw_late("the beginning of the events", timeout);
-  require(status);
-  throw Error("the events have ended", static_cast<int>(grpc::StatusCode::UNAVAILABLE), "", {});
+  v1::Event started;
+  impl->stream.begin(&started, timeout, "the beginning of the events");
+  impl->place = {started.started().journal(), after.last};
+  return Events(std::move(impl));
 }
 
 }  // namespace mbcosim::client

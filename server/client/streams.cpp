@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "client/convert.h"
-#include "client/deadline.h"
+#include "client/reading.h"
 #include "client/simulation.h"
 
 namespace mbcosim::client {
@@ -107,30 +107,15 @@ Stepper Simulation::stepper(const std::vector<std::string>& outputs,
 
 struct Subscription::Impl {
   Impl(std::shared_ptr<Server::Impl> connection, const v1::SubscribeRequest& request)
-      : server(std::move(connection)),
-        telemetry(v1::Telemetry::NewStub(server->channel)),
-        context(*server, kEndless, request.simulation()),
-        stream(telemetry->Subscribe(&context, request)) {}
-  ~Impl() {
-    context.TryCancel();
-    finish();
-  }
-  /// OK also when the subscriber himself has ended it.
-  grpc::Status finish() {
-    if (finished) return grpc::Status::OK;
-    finished = true;
-    const grpc::Status status = stream->Finish();
-    return status.error_code() == grpc::StatusCode::CANCELLED ? grpc::Status::OK : status;
-  }
+      : stream(std::move(connection), request.simulation(),
+               [&](v1::Telemetry::Stub& stub, grpc::ClientContext* context) {
+                 return stub.Subscribe(context, request);
+               }) {}
 
-  std::shared_ptr<Server::Impl> server;
-  std::unique_ptr<v1::Telemetry::Stub> telemetry;
-  CallContext context;
-  std::unique_ptr<grpc::ClientReader<v1::SubscribeReply>> stream;
+  Reading<v1::Telemetry, v1::SubscribeReply> stream;
   v1::SubscribeReply batch;
   int at = 0;  ///< next sample of the batch
   std::int64_t dropped = 0;
-  bool finished = false;
 };
 
 Subscription::Subscription(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -138,14 +123,11 @@ Subscription::Subscription(Subscription&&) noexcept = default;
 Subscription& Subscription::operator=(Subscription&&) noexcept = default;
 Subscription::~Subscription() = default;
 std::int64_t Subscription::dropped() const { return impl_->dropped; }
-void Subscription::close() { impl_->context.TryCancel(); }
+void Subscription::close() { impl_->stream.cancel(); }
 
 bool Subscription::next(Sample& sample) {
   while (impl_->at >= impl_->batch.samples_size()) {
-    if (impl_->finished || !impl_->stream->Read(&impl_->batch)) {
-      require(impl_->finish());
-      return false;
-    }
+    if (!impl_->stream.next(&impl_->batch)) return false;
     impl_->at = 0;
     impl_->dropped = impl_->batch.total_dropped();
   }
@@ -169,14 +151,8 @@ Subscription Simulation::subscribe(const std::vector<std::string>& variables,
     *request.mutable_minimum_interval() = google::protobuf::util::TimeUtil::NanosecondsToDuration(
         std::llround(*options.minimum_interval * 1e9));
   auto impl = std::make_unique<Subscription::Impl>(impl_->server, request);
-  const Deadline deadline(options.timeout, [&] { impl->context.TryCancel(); });
-  // The first message is the server's word that no step is missed from now on.
-  if (impl->stream->Read(&impl->batch)) return Subscription(std::move(impl));
-  const grpc::Status status = impl->finish();
-  if (deadline.is_over()) throw_late("the subscription", options.timeout);
-  require(status);
-  throw Error("the subscription has ended", static_cast<int>(grpc::StatusCode::UNAVAILABLE), "",
-              {});
+  impl->stream.begin(&impl->batch, options.timeout, "the subscription");
+  return Subscription(std::move(impl));
 }
 
 }  // namespace mbcosim::client
