@@ -1,5 +1,6 @@
 #include "fmi/description.h"
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -8,12 +9,15 @@
 #include <sstream>
 
 #include "fmi/log.h"
-#include "fmi/units.h"
+#include "model/unit_system.h"
 
 namespace mbcosim::fmi {
 namespace {
 
 using Role = FmuVariable::Role;
+
+/// Attributes of unit definitions, in the order of Dimension.
+constexpr std::array<const char*, 8> kBaseUnits = {"kg", "m", "s", "A", "K", "mol", "cd", "rad"};
 
 /// The shortest text that is read back as the same number.
 std::string exact(double value) {
@@ -73,11 +77,12 @@ void add_units(pugi::xml_node root, const std::vector<Entry>& entries) {
   for (const std::string& unit : units) {
     pugi::xml_node node = definitions.append_child("Unit");
     set(node, "name", unit);
-    const auto base = base_unit(unit);
-    if (!base) continue;
-    pugi::xml_node exponents = node.append_child("BaseUnit");
-    for (std::size_t k = 0; k < BaseUnit::kNames.size(); ++k)
-      if (base->exponents[k] != 0) set(exponents, BaseUnit::kNames[k], base->exponents[k]);
+    const auto known = read_unit(unit);
+    if (!known) continue;
+    pugi::xml_node base = node.append_child("BaseUnit");
+    for (std::size_t k = 0; k < kBaseUnits.size(); ++k)
+      if (known->dimension[k] != 0) set(base, kBaseUnits[k], known->dimension[k]);
+    if (known->si != 1) set(base, "factor", exact(known->si));
   }
 }
 
