@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "model/model_part.h"
+#include "model/unit_system.h"
+
 namespace mbcosim::fmi {
 namespace {
 
@@ -53,8 +56,11 @@ class Catalogue {
     for (const Variable& variable : simulation_.variables()) add(variable);
     for (const StructuralPort& port : simulation_.model().structural_ports) add_motion(port);
     if (auto unused = check(); !unused) return unused.error();
-    for (std::size_t k = 0; k < entries_.size(); ++k)
+    const UnitSystem* units = find_part<UnitSystem>(simulation_.model());
+    for (std::size_t k = 0; k < entries_.size(); ++k) {
       entries_[k].variable.reference = static_cast<std::uint32_t>(k);
+      if (units) entries_[k].unit = units->name(entries_[k].unit);
+    }
     return std::move(entries_);
   }
 

@@ -6,6 +6,7 @@
 #include "input/suggest.h"
 #include "model/family.h"
 #include "model/model_part.h"
+#include "model/unit_system.h"
 #include "model/user_elements.h"
 
 namespace mbcosim {
@@ -201,6 +202,19 @@ void read_output_results(DeckCard& card) {
 
 void read_title(DeckCard& card) { card.model().title = card.quoted("title"); }
 
+void read_units(DeckCard& card) {
+  UnitSystem& units = part<UnitSystem>(card.builder());
+  if (!units.length.empty()) card.fail_at(card.head(), "units are given twice");
+  card.required("quantity", {"length"});
+  units.length = card.quoted("unit of length");
+  const bool by_force = card.required("quantity", {"mass", "force"}) == 1;
+  (by_force ? units.force : units.mass) = card.quoted(by_force ? "unit of force" : "unit of mass");
+  card.required("quantity", {"time"});
+  units.time = card.quoted("unit of time");
+  if (const auto fault = check(units))
+    card.fail_at(card.head(), std::string("units: ") + fault->member + " " + fault->text);
+}
+
 void read_print(DeckCard& card) {
   while (card.more())
     card.required(
@@ -348,6 +362,7 @@ const std::vector<std::pair<const char*, Reader>>& control_cards() {
       {"finite difference jacobian meter", ignored},
       {"use automatic differentiation", read_automatic_differentiation},
       {"output units", ignored},
+      {"units", read_units},
       {"read solution array", read_solution_array},
       {"output file name", read_output_file_name},
       {"gravity", read_gravity_flag},

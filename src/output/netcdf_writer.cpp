@@ -5,6 +5,8 @@
 #include <unordered_map>
 
 #include "model/family.h"
+#include "model/model_part.h"
+#include "model/unit_system.h"
 #include "output/netcdf_file.h"
 #include "output/record.h"
 
@@ -89,6 +91,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
  private:
   void define_all(const Model& model) {
     model_ = &model;
+    units_ = find_part<UnitSystem>(model);
     time_dimension_ = file_.dimension("time", NetcdfFile::kUnlimited);
     dimensions_ = {{1, file_.dimension("Vec1", 1)}, {3, file_.dimension("Vec3", 3)}};
     step_ = define("run.step", NetcdfFile::Type::integer, {time_dimension_}, "", "integer",
@@ -102,7 +105,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   int define(const std::string& name, NetcdfFile::Type type, const std::vector<int>& dimensions,
              const std::string& units, const std::string& kind, const std::string& description) {
     const int id = file_.variable(name, type, dimensions);
-    file_.attribute(id, "units", units);
+    file_.attribute(id, "units", units_ ? units_->name(units) : units);
     file_.attribute(id, "type", kind);
     file_.attribute(id, "description", description);
     return id;
@@ -203,6 +206,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   const std::string prefix_;
   ResultBudget* const budget_;  ///< may be null
   const Model* model_ = nullptr;
+  const UnitSystem* units_ = nullptr;  ///< that the deck declares
   NetcdfFile file_;
   int time_dimension_ = -1, step_ = -1, time_ = -1, h_ = -1;
   int node_dimension_ = -1, first_unknowns_ = -1;

@@ -9,6 +9,8 @@
 
 #include "input/value.h"
 #include "math/hash.h"
+#include "model/model_part.h"
+#include "model/unit_system.h"
 
 namespace mbcosim {
 
@@ -241,6 +243,8 @@ ModelDescription describe(const Model& model, std::vector<Variable> variables,
   for (const ReferenceFrame& f : model.frames) d.frames.push_back(f.label);
   d.symbols = std::move(symbols);
   d.variables = std::move(variables);
+  const UnitSystem* units = find_part<UnitSystem>(model);
+  for (Variable& v : d.variables) v.unit = unit_name(units, v.unit);
   return d;
 }
 

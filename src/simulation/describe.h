@@ -49,7 +49,7 @@ struct ModelDescription {
   std::vector<DriveDescription> drives;
   std::vector<int> frames;          ///< labels of reference frames
   std::vector<DeckSymbol> symbols;  ///< of `set` cards
-  std::vector<Variable> variables;  ///< what can be read and written
+  std::vector<Variable> variables;  ///< what can be read and written, in the units of the deck
 };
 
 /// `variables` of a simulation of the model, `symbols` of its deck; may be left out.

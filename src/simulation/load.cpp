@@ -4,6 +4,7 @@
 #include "elements/families.h"
 #include "input/deck_reader.h"
 #include "input/symbol_values.h"
+#include "model/model_part.h"
 #include "simulation/model_check.h"
 
 namespace mbcosim {
@@ -94,9 +95,21 @@ bool attach(ModelBuilder& builder, const std::vector<PortAttachment>& ports,
   return true;
 }
 
+bool declare_units(ModelBuilder& builder, const std::optional<UnitSystem>& given,
+                   const std::string& file, std::vector<Diagnostic>& extra) {
+  if (!given) return true;
+  const UnitSystem* told = find_part<UnitSystem>(builder.model());
+  if (told && !(*told == *given)) {
+    extra.push_back(plain_error("units", file, "the card `units` of the deck tells other units"));
+    return false;
+  }
+  if (!told) part<UnitSystem>(builder) = *given;
+  return true;
+}
+
 /// Reads into `reading`; the model, or null with the reason in the reading's diagnostics.
-ModelPtr read_model(Reading& reading, ModelBuilder& builder,
-                    const std::vector<PortAttachment>& ports, std::vector<Diagnostic>& extra) {
+ModelPtr read_model(Reading& reading, ModelBuilder& builder, const LoadRequest& request,
+                    std::vector<Diagnostic>& extra) {
   Deck deck(reading, builder, full_registry());
   Statements statements(reading);
   DeckReader(deck, statements).read();
@@ -104,7 +117,8 @@ ModelPtr read_model(Reading& reading, ModelBuilder& builder,
   if (reading.errors() > 0) return nullptr;
   extra = unreached_symbols(reading);
   if (!extra.empty()) return nullptr;
-  if (!attach(builder, ports, reading.file(0).name, extra)) return nullptr;
+  if (!attach(builder, request.ports, reading.file(0).name, extra)) return nullptr;
+  if (!declare_units(builder, request.units, reading.file(0).name, extra)) return nullptr;
   Model& model = builder.model();
   if (const std::int64_t n = count_unknowns(model); n > reading.limits.unknowns) {
     extra.push_back(plain_error("limit-unknowns", reading.file(0).name,
@@ -114,7 +128,7 @@ ModelPtr read_model(Reading& reading, ModelBuilder& builder,
     return nullptr;
   }
   model.digest =
-      digest_with(digest_with(digest(reading, deck.data_files), ports), reading.options.symbols);
+      digest_with(digest_with(digest(reading, deck.data_files), request.ports), request.symbols);
   store_symbols(reading, model);
   Result<ModelPtr> finished = builder.finish();
   if (!finished) {
@@ -150,7 +164,7 @@ DeckReport read_deck(const FileSource& files, const std::string& main_file,
       return report;
     }
     std::vector<Diagnostic> extra;
-    report.model = read_model(reading, builder, request.ports, extra);
+    report.model = read_model(reading, builder, request, extra);
     if (report.model) report.symbols = declared_symbols(reading);
     report.files = reading.files();
     report.printed = reading.printed;

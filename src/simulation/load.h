@@ -7,6 +7,7 @@
 #include "input/symbols.h"
 #include "model/deck_file.h"
 #include "model/symbol.h"
+#include "model/unit_system.h"
 #include "simulation/simulation.h"
 
 namespace mbcosim {
@@ -18,6 +19,9 @@ struct LoadRequest {
   /// not, also in includes; what the deck assigns later holds. The model's digest covers them. A
   /// name that is not declared or a value of another type is a diagnostic with code "symbol".
   SymbolValues symbols = {};
+  /// The units that the deck is written in; where its card `units` tells others, that is a
+  /// diagnostic with code "units". Changes no number, nor the digest.
+  std::optional<UnitSystem> units = {};
 };
 
 struct DeckReport : LoadReport {

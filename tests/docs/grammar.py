@@ -152,7 +152,8 @@ VALUES = {
     "level": [".1"], "coefficient": [".5"], "declaration or expression": ["real new$ = 1."], "exponent": ["2."], "stress": ["1."],
     "strain drive": ["const, 1."], "a1": ["1."], "e": ["1."], "gain": ["2."], "base": ["2."], "loss 1 to 2": ["1."], "loss 2 to 1": ["1."],
     "q": [".1"], "velocity threshold": [".1"], "length": ["2."], "start position": [".1"], "angle": [".1"], "pipe area": ["1e-3"],
-    "spool area": ["1e-3"], "scale": ["2."], "module arguments": ["1"], "mean": ["0."], "threshold": ["1e-9"], "time": [".1"],
+    "spool area": ["1e-3"], "scale": ["2."], "module arguments": ["1"], "unit of length": ["mm"], "unit of mass": ["t"],
+    "unit of force": ["N"], "unit of time": ["s"], "mean": ["0."], "threshold": ["1e-9"], "time": [".1"],
 }
 # Numbers with units that 1. does not do for.
 NUMBERS = {"t0": ["0."], "t1": ["1."], "t2": ["2."], "t3": ["3."], "limit": ["10."], "lower limit": ["0."], "h": [".1"], "diameter": [".01"],

@@ -7,6 +7,8 @@ import re
 import shutil
 import subprocess
 import threading
+import zipfile
+from xml.etree import ElementTree
 
 import pytest
 
@@ -665,6 +667,18 @@ def test_wrong_selections_and_decks_are_refused(tmp_path):
     code, text = export(pendulum, "-D", "NOBODY=1")
     assert code == 2 and "NOBODY" in text
     assert export(pendulum, "-D", "L")[0] == 4
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_declared_units_have_their_names_and_factors(tmp_path, standard):
+    deck, fmu = tmp_path / "deck.mbd", tmp_path / "deck.fmu"
+    deck.write_text(PORTS.replace("begin: control data;", 'begin: control data; units: length, "mm", mass, "t", time, "s";'))
+    subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", deck, "-o", fmu, "--fmi", standard], check=True, capture_output=True, timeout=300)
+    description = ElementTree.fromstring(zipfile.ZipFile(fmu).read("modelDescription.xml"))
+    units = {unit.get("name"): unit.find("BaseUnit").attrib for unit in description.iter("Unit")}
+    assert {key: float(value) for key, value in units["mm/s"].items()} == pytest.approx({"m": 1, "s": -1, "factor": 1e-3})
+    assert units["N"] == {"kg": "1", "m": "1", "s": "-2"}
+    assert float(units["N mm"]["factor"]) == pytest.approx(1e-3) and "m" not in units
 
 
 def test_only_functions_of_fmi_are_visible(ports):

@@ -280,6 +280,9 @@ use automatic differentiation
 output units
   = <word>
   ! ignored: a newer word; units are those of the deck
+units
+  = length , "<unit of length>" , { mass , "<unit of mass>" | force , "<unit of force>" } , time , "<unit of time>"
+  ! yes: a card of ours: descriptions name these units and ports convert them; no result changes
 read solution array
   ! no: use snapshots
 output file name

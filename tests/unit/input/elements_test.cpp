@@ -169,16 +169,21 @@ TEST(Describe, PutsVariablesBelowTheirOwners) {
   const ModelDescription description = describe(*model, (*simulation)->variables());
   const std::string text = to_text(description);
   for (const char* lines :
-       {"\n  structural node 2 \"base\", static, at 0 0 0\n    node.structural.2.X[3] [m], global, "
+       {"\n  structural node 2 \"base\", static, at 0 0 0\n    node.structural.2.X[3] [deck unit "
+        "of "
+        "length], global, "
         "state: "
         "position\n",
-        "\n  thermal node 5, differential, at 2\n    node.thermal.5.x [K], state: value\n"
+        "\n  thermal node 5, differential, at 2\n    node.thermal.5.x [deck unit of temperature], "
+        "state: value\n"
         "    node.thermal.5.xP, state: time derivative\nelements (2)\n",
-        "\n  joint 7, clamp, nodes 2\n    joint.7.Fx [N], output: private datum Fx\n",
-        "\n    joint.7.Mz [N m], output: private datum Mz\n",
-        "\n    body.3.E [J], output: private datum E\n",
+        "\n  joint 7, clamp, nodes 2\n    joint.7.Fx [deck unit of force], output: private datum "
+        "Fx\n",
+        "\n    joint.7.Mz [deck unit of force length], output: private datum Mz\n",
+        "\n    body.3.E [deck unit of energy], output: private datum E\n",
         "\n  drive caller 4 \"ramp\"\n    drive.4, output: value of the drive caller\nsymbols (",
-        "\nvariables of the model (2)\n  time [s], output: simulation time\n  step, output: number "
+        "\nvariables of the model (2)\n  time [deck unit of time], output: simulation time\n  "
+        "step, output: number "
         "of the "
         "last accepted step\n"})
     EXPECT_NE(text.find(lines), std::string::npos) << lines << "\nin\n" << text;
