@@ -101,6 +101,19 @@ v1::PortDefinition to_proto(const Port& port) {
   return out;
 }
 
+v1::UnitSystem to_proto(const Units& units) {
+  v1::UnitSystem out;
+  out.set_length(units.length);
+  if (!units.mass.empty()) out.set_mass(units.mass);
+  if (!units.force.empty()) out.set_force(units.force);
+  out.set_time(units.time);
+  return out;
+}
+
+Units to_units(const v1::UnitSystem& units) {
+  return {units.length(), units.mass(), units.force(), units.time()};
+}
+
 v1::Comparison to_proto(Condition::Kind kind) {
   switch (kind) {
     case Condition::less:
@@ -182,6 +195,7 @@ void fill(const LoadOptions& options, v1::CreateOptions* out) {
     *out->mutable_deck_sockets()->mutable_peer_timeout() =
         google::protobuf::util::TimeUtil::MillisecondsToDuration(
             std::llround(1000 * *options.deck_sockets));
+  if (options.units) *out->mutable_units() = to_proto(*options.units);
 }
 
 StepResult to_result(const v1::StepReply& reply) {
@@ -210,6 +224,7 @@ SimulationInfo to_info(const v1::SimulationInfo& info) {
   out.display_name = info.display_name();
   out.owner = info.owner();
   out.model_digest = info.model_digest();
+  if (info.has_units()) out.units = to_units(info.units());
   out.last_failure = info.last_failure();
   out.waiting_for = info.waiting_for();
   out.state = to_state(info.state());
@@ -234,6 +249,7 @@ Variable to_variable(const v1::Variable& variable) {
   Variable out;
   out.name = variable.name();
   out.unit = variable.unit();
+  out.si_unit = variable.si_unit();
   out.frame = variable.frame();
   out.description = variable.description();
   out.shape.assign(variable.shape().begin(), variable.shape().end());

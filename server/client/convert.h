@@ -13,6 +13,8 @@ v1::PortDefinition to_proto(const Port& port);
 v1::Comparison to_proto(Condition::Kind kind);
 v1::NonConvergencePolicy to_proto(NonConvergence policy);
 v1::Grant to_proto(const Grant& grant);
+v1::UnitSystem to_proto(const Units& units);
+Units to_units(const v1::UnitSystem& units);
 /// With a new request id.
 void fill(const LoadOptions& options, v1::CreateOptions* out);
 

@@ -74,6 +74,11 @@ class Error : public std::runtime_error {
 /// or the amplitudes of a modal joint.
 enum class PortKind { loads_or_signals, motion, modal };
 
+/// A consistent system of units by names: "mm", "t", "s". One of `mass` and `force` is empty.
+struct Units {
+  std::string length, mass, force, time;
+};
+
 /// A place where peers attach: points on structural nodes, or variables out and inputs in.
 struct Port {
   std::string name;
@@ -127,6 +132,7 @@ struct LoadOptions {
   /// Serves the sockets that the deck names, and waits at most so long for each code [s].
   std::optional<double> deck_sockets = {};
   std::optional<double> pace = {};  ///< seconds of the model in one of the clock; none: all speed
+  std::optional<Units> units = {};  ///< that the deck is written in; none: as its card `units` says
 };
 
 /// `unknown`: the server tells one that this library does not know; never a success.
@@ -207,7 +213,8 @@ struct Table {
   }
 };
 
-/// What a peer gets: n points, global frame unless agreed otherwise, SI units.
+/// What a peer gets: n points, global frame unless agreed otherwise; in the deck's units, which are
+/// written here as SI, unless `PeerOptions::units` are given.
 struct Motion {
   std::int64_t step = 0;
   double time = 0;                ///< of the values [s]
@@ -284,16 +291,21 @@ struct PeerOptions {
   /// which has no other sign of it, 20 s.
   double server_timeout = 0;
   Transport transport = Transport::stream;
+  /// The peer's units: the server converts all that crosses the port, times and derivatives too.
+  /// The deck's must be declared. None: the deck's.
+  std::optional<Units> units = {};
   StepEnded step_ended = {};  ///< called by the thread that reads: `next`, or the peer's own
 };
 
 /// What crosses a port, as the server said at the handshake.
 struct PortLayout {
   bool modal = false;
-  std::vector<int> node_labels;              ///< of the points, or the modal node
-  int reference_node = 0;                    ///< label; 0: none
-  std::vector<std::string> outputs, inputs;  ///< variables of a signal or modal port
-  std::vector<int> mode_numbers;             ///< of a modal port
+  std::vector<int> node_labels;                        ///< of the points, or the modal node
+  int reference_node = 0;                              ///< label; 0: none
+  std::vector<std::string> outputs, inputs;            ///< variables of a signal or modal port
+  std::vector<int> mode_numbers;                       ///< of a modal port
+  std::vector<std::string> output_units, input_units;  ///< of `outputs` and `inputs`
+  std::optional<Units> units;  ///< of all that crosses; none: the deck's, not declared
 };
 
 /// An attached peer. Ends when it is destroyed.
@@ -330,6 +342,7 @@ using Answer = std::function<Loads(const Motion&)>;
 struct Variable {
   enum Causality { input, output, parameter, state };
   std::string name, unit, frame, description;
+  std::string si_unit;     ///< that it has in a deck written in SI units
   std::vector<int> shape;  ///< empty: a number
   int handle = 0, size = 1;
   Causality causality = output;
@@ -342,6 +355,7 @@ struct SimulationInfo {
   State state = unknown;
   std::int64_t step = 0;
   double time = 0, next_step_size = 0, final_time = 0;  ///< [s]
+  std::optional<Units> units;  ///< that the deck is written in; none: not declared
 };
 
 /// A saved state.

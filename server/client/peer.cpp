@@ -6,6 +6,7 @@
 #include <chrono>
 #include <functional>
 
+#include "client/convert.h"
 #include "client/deadline.h"
 
 namespace mbcosim::client {
@@ -164,6 +165,9 @@ PortLayout to_layout(const v1::PortLayout& from) {
   layout.outputs.assign(from.output_names().begin(), from.output_names().end());
   layout.inputs.assign(from.input_names().begin(), from.input_names().end());
   layout.mode_numbers.assign(from.mode_numbers().begin(), from.mode_numbers().end());
+  layout.output_units.assign(from.output_units().begin(), from.output_units().end());
+  layout.input_units.assign(from.input_units().begin(), from.input_units().end());
+  if (from.has_units()) layout.units = to_units(from.units());
   return layout;
 }
 
@@ -176,6 +180,7 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   hello.set_simulation(simulation.name());
   hello.set_port(port);
   hello.mutable_expected()->set_model_digest(simulation.model_digest());
+  if (options.units) *hello.mutable_units() = to_proto(*options.units);
   v1::ExchangeForm* form = hello.mutable_form();
   form->set_rotation_form(to_proto(options.rotation));
   form->set_frame(to_proto(options.frame));

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 
 #include "coupling/fixed_point.h"
+#include "coupling/unit_conversion.h"
 #include "mbcosim/v1/coupling.pb.h"
 
 namespace mbcosim::server {
@@ -24,6 +26,7 @@ struct Agreement {
   v1::TangentForm tangent = v1::TANGENT_FORM_NONE;
   std::chrono::milliseconds heartbeat_interval{0};  ///< of the server; 0: none
   std::chrono::milliseconds heartbeat_timeout{0};   ///< longest silence of the peer; 0: any
+  std::shared_ptr<const UnitConversion> units;      ///< null: the peer counts in the deck's
   int generation = 0;                               ///< number of the handshake on this port
 
   /// Answers that the held inputs follow.

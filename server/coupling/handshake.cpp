@@ -143,6 +143,26 @@ void check_presence(const v1::PeerPresence& presence, Mismatches& mismatches) {
                     "must be at least 10 ms and not below `heartbeat_interval`");
 }
 
+/// Null: the peer counts in the units of the deck.
+std::shared_ptr<const UnitConversion> conversion_of(const v1::Hello& hello, const PortModel& port,
+                                                    Mismatches& mismatches) {
+  if (!hello.has_units()) return nullptr;
+  const UnitSystem units = to_units(hello.units());
+  if (const auto fault = check(units)) {
+    mismatches.expect(false, ("units." + std::string(fault->member)).c_str(), utf8(fault->text));
+    return nullptr;
+  }
+  mismatches.expect(port.units(), "units",
+                    "the deck's are not declared: give `CreateOptions.units` or a card `units`");
+  if (!port.units()) return nullptr;
+  try {
+    return std::make_shared<const UnitConversion>(port.conversion(units));
+  } catch (const Refusal& unknown) {
+    mismatches.expect(false, "units", unknown.what());
+    return nullptr;
+  }
+}
+
 /// What does not fit together once the defaults are filled in.
 void check_agreement(const Agreement& agreement, const PortModel& port, Mismatches& mismatches) {
   mismatches.expect(!port.is_motion() || agreement.policy != v1::PEER_POLICY_ZERO, "policy",
@@ -196,21 +216,26 @@ Agreement agree(const v1::Hello& hello, const PortModel& port, const std::string
   mismatches.expect(
       any || (range.lowest() <= kProtocolVersion && range.highest() >= kProtocolVersion),
       "protocol", version_mismatch(range));
-  check_expected(hello.expected(), port.layout(), digest, step_size, mismatches);
+  const auto units = conversion_of(hello, port, mismatches);
+  const double peers_step = units ? step_size * units->time() : step_size;
+  check_expected(hello.expected(), port.layout(), digest, peers_step, mismatches);
   check_form(hello.form(), port, mismatches);
   check_schedule(hello.schedule(), mismatches);
   check_iteration(hello.iteration(), mismatches);
   check_presence(hello.presence(), mismatches);
-  const Agreement agreement = choose(hello, port);
+  Agreement agreement = choose(hello, port);
+  agreement.units = units;
   check_agreement(agreement, port, mismatches);
   mismatches.refuse_if_any(hello.port());
   return agreement;
 }
 
-void fill_agreed(const v1::Hello& hello, const Agreement& agreement, v1::Hello* out) {
+void fill_agreed(const v1::Hello& hello, const Agreement& agreement, const UnitSystem* deck,
+                 v1::Hello* out) {
   using google::protobuf::util::TimeUtil;
   *out = hello;
   fill_protocol(out->mutable_protocol());
+  if (!agreement.units && deck) to_proto(*deck, out->mutable_units());
   v1::ExchangeForm* form = out->mutable_form();
   form->set_rotation_form(agreement.rotation_form);
   form->set_frame(agreement.frame);

@@ -13,7 +13,8 @@ namespace mbcosim::server {
 /// does not fit. `step_size`: of the next step [s].
 Agreement agree(const v1::Hello& hello, const PortModel& port, const std::string& digest,
                 double step_size);
-/// `hello` with every choice filled in.
-void fill_agreed(const v1::Hello& hello, const Agreement& agreement, v1::Hello* out);
+/// `hello` with every choice filled in; `deck`: its units, null: not declared.
+void fill_agreed(const v1::Hello& hello, const Agreement& agreement, const UnitSystem* deck,
+                 v1::Hello* out);
 
 }  // namespace mbcosim::server

@@ -6,6 +6,7 @@
 #include <exception>
 #include <thread>
 
+#include "wire/convert.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -33,6 +34,7 @@ PeerRejected to_rejection(const std::string& name, const v1::Rejection& rejectio
 void Port::fill(v1::PortLayout* out) const {
   const Guard guard(mutex_);
   *out = model_.layout();
+  if (model_.units()) to_proto(*model_.units(), out->mutable_units());
   out->set_has_peer(link_ != nullptr);
   *out->mutable_peer_timeout() =
       google::protobuf::util::TimeUtil::MillisecondsToDuration(agreement_.timeout.count());
@@ -133,10 +135,13 @@ Answer Port::take_content(const v1::PeerExchange& exchange) {
     case v1::PeerExchange::kFailure:
       peer_failure_ = exchange.failure().empty() ? "it gave no reason" : exchange.failure();
       break;
-    case v1::PeerExchange::kReject:
-      check_rejection(exchange.reject());
-      rejection_ = to_rejection(model_.name(), exchange.reject());
+    case v1::PeerExchange::kReject: {
+      v1::Rejection rejection = exchange.reject();
+      if (agreement_.units) agreement_.units->to_deck(&rejection);
+      check_rejection(rejection);
+      rejection_ = to_rejection(model_.name(), rejection);
       break;
+    }
     default:
       throw Refusal(v1::REASON_BAD_ARGUMENT,
                     in_port(model_.name(), "`exchange` must have `answer`, `failure` or `reject`"));
@@ -300,9 +305,11 @@ std::optional<Answer> Port::go_on_without(const std::string& why) {
 
 void Port::notify(bool accepted, std::int64_t step, double time) {
   v1::ServerMessage message;
-  *(accepted ? message.mutable_accepted() : message.mutable_rejected()) = step_notice(step, time);
+  v1::StepNotice* notice = accepted ? message.mutable_accepted() : message.mutable_rejected();
+  *notice = step_notice(step, time);
   const Guard guard(mutex_);
   if (!link_) return;
+  if (agreement_.units) agreement_.units->to_peer(notice);
   if (recorder_) recorder_->sent(model_.name(), message);
   send_message(message);
 }

@@ -61,10 +61,16 @@ void PortModel::fill(const Simulation& simulation, const Agreement& agreement,
   if (has_reference_) sent_reference_ = motion(simulation, reference_);
   sent_.clear();
   for (const Point& point : points_) sent_.push_back(motion(simulation, point));
-  if (is_mapped()) return fill_mapped(agreement, out);
-  for (const Motion& m : sent_) put_motion(m, agreement, out);
-  if (reactions_ < 0) return;
-  values.clear();
+  if (is_mapped())
+    fill_mapped(agreement, out);
+  else
+    for (const Motion& m : sent_) put_motion(m, agreement, out);
+  if (reactions_ >= 0) put_reactions(simulation, out);
+  if (agreement.units) agreement.units->to_peer(out);
+}
+
+void PortModel::put_reactions(const Simulation& simulation, v1::ServerExchange* out) const {
+  std::vector<double> values;
   simulation.get(reactions_, values);
   for (std::size_t i = 0; i < values.size(); i += 6) {
     out->mutable_forces()->Add(values.begin() + i, values.begin() + i + 3);
@@ -142,6 +148,15 @@ int PortModel::peer_points() const {
 
 std::string PortModel::decode(const v1::PeerAnswer& in, const Agreement& agreement,
                               Answer* answer) const {
+  if (!agreement.units) return decode_own(in, agreement, answer);
+  v1::PeerAnswer own = in;
+  agreement.units->to_deck(&own);
+  return decode_own(own, agreement, answer);
+}
+
+// In the deck's units.
+std::string PortModel::decode_own(const v1::PeerAnswer& in, const Agreement& agreement,
+                                  Answer* answer) const {
   answer->unfinished = in.unfinished();
   if (is_motion()) return decode_motion(in, agreement, answer);
   const bool loads = !points_.empty();

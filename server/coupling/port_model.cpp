@@ -163,8 +163,7 @@ void PortModel::make_signal(const v1::PortDefinition& definition, const Simulati
   for (const std::string& variable : definition.output_variables()) {
     outputs_.push_back(handle_of(simulation, variable));
     output_size += variables[outputs_.back()].size;
-    layout_.add_output_names(variable);
-    layout_.add_output_units(variables[outputs_.back()].unit);
+    add_output(variable, {variables[outputs_.back()].unit, variables[outputs_.back()].size});
   }
   for (const std::string& variable : definition.input_variables()) {
     const int handle = handle_of(simulation, variable);
@@ -175,8 +174,7 @@ void PortModel::make_signal(const v1::PortDefinition& definition, const Simulati
     inputs_.push_back(handle);
     written_.push_back(handle);
     answer_size_ += variables[handle].size;
-    layout_.add_input_names(variable);
-    layout_.add_input_units(variables[handle].unit);
+    add_input(variable, {variables[handle].unit, variables[handle].size});
   }
   for (const v1::OutputExpression& expression : definition.output_expressions())
     make_expression(expression, simulation);
@@ -221,8 +219,7 @@ void PortModel::make_expression(const v1::OutputExpression& definition,
     throw Refusal(v1::REASON_BAD_ARGUMENT, "port \"" + name() + "\": " + compiled.error().message);
   formula.expression = *compiled;
   formulas_.push_back(std::move(formula));
-  layout_.add_output_names(definition.name());
-  layout_.add_output_units(definition.unit());
+  add_output(definition.name(), {definition.unit(), 1, /*is_si=*/false});
 }
 
 bool PortModel::offers_accelerations() const {
@@ -285,9 +282,9 @@ void PortModel::make_modal(const Simulation& simulation) {
   }
   *layout_.mutable_point_labels() = layout_.node_labels();
   if (port.output_size > 0) outputs_.push_back(handle_of(simulation, port_output_name(port)));
-  for (const char* name : {"q.", "qP."})
-    for (const int mode : port.mode_numbers) layout_.add_output_names(name + std::to_string(mode));
-  for (const int mode : port.mode_numbers) layout_.add_input_names("f." + std::to_string(mode));
+  for (const int mode : port.mode_numbers) add_output("q." + std::to_string(mode), {""});
+  for (const int mode : port.mode_numbers) add_output("qP." + std::to_string(mode), {"1/s"});
+  for (const int mode : port.mode_numbers) add_input("f." + std::to_string(mode), {"N m"});
   layout_.set_output_size(port.output_size);
   layout_.set_input_size(static_cast<int>(port.mode_numbers.size()));
 }
@@ -304,10 +301,7 @@ void PortModel::make_output() {
   const ElementPort& port = element_->port();
   layout_.set_kind(v1::PORT_KIND_SIGNAL);
   layout_.set_optional(true);
-  for (const std::string& name : port.output_names) {
-    layout_.add_output_names(name);
-    layout_.add_output_units("");
-  }
+  for (const std::string& name : port.output_names) add_output(name, {""});
   layout_.set_output_size(port.output_size);
 }
 

@@ -8,6 +8,7 @@
 #include "coupling/agreement.h"
 #include "mbcosim/v1/coupling_types.pb.h"
 #include "model/expression.h"
+#include "model/model_part.h"
 #include "simulation/simulation.h"
 
 namespace mbcosim::server {
@@ -47,6 +48,13 @@ class PortModel {
   bool takes_tangents() const;
   /// Numbers in an answer: 6 for each node, or the inputs' sizes.
   int answer_size() const { return answer_size_; }
+  /// The system that the deck is written in; null: not declared.
+  const UnitSystem* units() const { return units_; }
+  /// For a peer that counts in other units; the deck must have declared its own. Throws
+  /// BAD_ARGUMENT for a signal whose unit is unknown.
+  UnitConversion conversion(const UnitSystem& peer) const;
+  /// Names these units in a layout.
+  void tell_units(const UnitSystem& units, v1::PortLayout* out) const;
   /// Handles that the port writes.
   const std::vector<int>& written() const { return written_; }
 
@@ -70,10 +78,13 @@ class PortModel {
     Mat3 R;
     Vec3 arm;  ///< R f, global [m]
   };
+  void add_output(const std::string& name, SignalUnit unit);
+  void add_input(const std::string& name, SignalUnit unit);
   Point find_point(const Simulation& simulation, int label) const;
   void make_structural(const v1::PortDefinition& definition, const Simulation& simulation);
   void make_signal(const v1::PortDefinition& definition, const Simulation& simulation);
   void make_expression(const v1::OutputExpression& definition, const Simulation& simulation);
+  void put_reactions(const Simulation& simulation, v1::ServerExchange* out) const;
   void put_expressions(const Simulation& simulation, v1::ServerExchange* out) const;
   Motion motion(const Simulation& simulation, const Point& point) const;
   void make_relative(Motion& motion) const;
@@ -91,6 +102,8 @@ class PortModel {
   void make_output();
   void put_motion(const Motion& m, const Agreement& agreement, v1::ServerExchange* out) const;
   void fill_mapped(const Agreement& agreement, v1::ServerExchange* out) const;
+  std::string decode_own(const v1::PeerAnswer& in, const Agreement& agreement,
+                         Answer* answer) const;
   std::string decode_motion(const v1::PeerAnswer& in, const Agreement& agreement,
                             Answer* answer) const;
   void decode_mapped(const v1::PeerAnswer& in, const Agreement& agreement, Answer* answer) const;
@@ -117,6 +130,8 @@ class PortModel {
   int reactions_ = -1;  ///< motion: handle of the reactions
   std::optional<PortElementRef> element_;
   const Model* model_;
+  const UnitSystem* units_ = find_part<UnitSystem>(*model_);
+  std::vector<SignalUnit> output_units_, input_units_;  ///< one for each name in the layout
   bool has_reference_ = false, needs_accelerations_ = false;
   Point reference_{};
   std::vector<Motion> sent_;  ///< global, of the last `fill`

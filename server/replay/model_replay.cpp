@@ -81,9 +81,9 @@ Session::Origin load_model(const std::string& deck, const v1::CreateOptions& opt
                            const v1::RecordHeader& header) {
   const std::filesystem::path path(deck);
   const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
-  const DeckReport report =
-      read_deck(FolderSource(folder, /*unrestricted=*/true), path.filename().string(),
-                {{}, server::attachments(options), server::symbols_of(options)});
+  const DeckReport report = read_deck(
+      FolderSource(folder, /*unrestricted=*/true), path.filename().string(),
+      {{}, server::attachments(options), server::symbols_of(options), server::units_of(options)});
   for (const Diagnostic& d : report.diagnostics)
     if (d.severity == Severity::error) throw std::runtime_error(d.text());
   const std::string digest = digest_text(report.model->digest);
@@ -112,6 +112,7 @@ v1::CreateOptions options_of(const v1::RecordHeader& header) {
   options.set_non_convergence_policy(header.non_convergence_policy());
   if (header.has_minimum_step_size()) options.set_minimum_step_size(header.minimum_step_size());
   *options.mutable_symbols() = header.symbols();
+  if (header.has_units()) *options.mutable_units() = header.units();
   options.set_summed_time(header.summed_time());
   return options;
 }

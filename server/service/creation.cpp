@@ -27,6 +27,8 @@ namespace {
     constexpr std::string_view kLimit = "limit-";
     if (first->code == "internal") error.kind = ErrorKind::internal;
     if (first->code == "port") throw Refusal(v1::REASON_BAD_ARGUMENT, utf8(first->message));
+    if (first->code == "units")
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`units`: " + utf8(first->message));
     if (first->code.compare(0, kLimit.size(), kLimit) == 0) {
       error.kind = ErrorKind::limit;
       error.reason = first->code.substr(kLimit.size());
@@ -390,6 +392,8 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
     if (request.options().has_deck_sockets())
       throw Refusal(v1::REASON_BAD_ARGUMENT,
                     "`deck_sockets`: the codes of the deck are with the simulation that is forked");
+    if (request.options().has_units())
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`units` of a fork are those of its original");
     Grants::check_known(request.options().grants(), parts_.runtime.authenticator);
     const int number = request.has_snapshot() ? snapshot_in(request) : -1;
     KeptDeck deck;

@@ -51,7 +51,11 @@ PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& cal
   welcome->set_step_size(info.next_step_size());
   welcome->set_step(info.step());
   welcome->set_time(info.time());
-  fill_agreed(hello, agreement, welcome->mutable_agreed());
+  fill_agreed(hello, agreement, port_.model().units(), welcome->mutable_agreed());
+  if (!agreement.units) return;
+  port_.model().tell_units(agreement.units->peer(), welcome->mutable_layout());
+  welcome->set_step_size(welcome->step_size() * agreement.units->time());
+  welcome->set_time(welcome->time() * agreement.units->time());
 }
 
 PeerSeat::~PeerSeat() {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "model/model_part.h"
 #include "service/session_advance.h"
 #include "wire/convert.h"
 #include "wire/protocol.h"
@@ -107,6 +108,8 @@ void Session::start_record(const v1::CreateOptions& options) {
   *header->mutable_ports() = options.ports();
   header->set_summed_time(origin_.time_keeping == TimeKeeping::summed);
   *header->mutable_symbols() = origin_.given;
+  if (const UnitSystem* units = find_part<UnitSystem>(*model_))
+    to_proto(*units, header->mutable_units());
   if (simulation_->step_number() > 0) header->set_state(simulation_->export_state());
   for (const auto& port : coupler_.ports()) *header->add_layouts() = port->model().layout();
   header->set_non_convergence_policy(to_proto(simulation_->policy()));
@@ -181,6 +184,8 @@ void Session::fill(v1::SimulationInfo* out) const {
   const SessionStatus::View p = status_.view();
   out->set_name(identity_.id);
   out->set_display_name(p.display_name);
+  if (const UnitSystem* units = find_part<UnitSystem>(*model_))
+    to_proto(*units, out->mutable_units());
   out->set_non_convergence_policy(to_proto(p.policy));
   if (p.policy.minimum > 0) out->set_minimum_step_size(p.policy.minimum);
   if (pace_ > 0) out->mutable_pace()->set_rate(pace_);
@@ -226,9 +231,10 @@ void Session::describe(const v1::DescribeSimulationRequest& request,
   for (const ElementRef& e : model_->elements)
     if (page.takes()) to_proto(*model_, e, out->add_elements());
   const std::string& prefix = request.variable_prefix();
+  const UnitSystem* units = find_part<UnitSystem>(*model_);
   for (std::size_t i = 0; i < variables().size(); ++i)
     if (variables()[i].name.compare(0, prefix.size(), prefix) == 0 && page.takes())
-      to_proto(variables()[i], static_cast<int>(i), out->add_variables());
+      to_proto(variables()[i], static_cast<int>(i), units, out->add_variables());
   page.close(reply);
   if (!first) return;
   for (const DeckSymbol& symbol : origin_.symbols) to_proto(symbol, out->add_symbols());
@@ -242,13 +248,14 @@ void Session::describe_variables(const v1::DescribeSimulationRequest& request,
   for (std::size_t i = 0; i < variables().size(); ++i)
     if (const auto wanted = handles.find(variables()[i].name); wanted != handles.end())
       wanted->second = static_cast<int>(i);
+  const UnitSystem* units = find_part<UnitSystem>(*model_);
   for (const std::string& name : request.variable_names()) {
     const int handle = handles.at(name);
     const std::string shown = utf8(name.substr(0, 100));
     if (handle < 0)
       throw Refusal(v1::REASON_NO_SUCH_VARIABLE, "no variable is named \"" + shown + "\"",
                     {{"name", shown}});
-    to_proto(variables()[handle], handle, out->add_variables());
+    to_proto(variables()[handle], handle, units, out->add_variables());
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "math/hash.h"
 #include "service/kept_replies.h"
+#include "wire/convert.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -43,7 +44,7 @@ class KeepingSource final : public FileSource {
 
 DeckReport read(const FileSource& files, const std::string& main_file,
                 const v1::CreateOptions& options, const Limits& limits, KeptDeck* kept) {
-  const LoadRequest request{limits, attachments(options), symbols_of(options)};
+  const LoadRequest request{limits, attachments(options), symbols_of(options), units_of(options)};
   if (!kept) return read_deck(files, main_file, request);
   kept->main_file = main_file;
   kept->options = options;
@@ -89,6 +90,15 @@ SymbolValues symbols_of(const v1::CreateOptions& options) {
     }
   }
   return values;
+}
+
+std::optional<UnitSystem> units_of(const v1::CreateOptions& options) {
+  if (!options.has_units()) return std::nullopt;
+  UnitSystem units = to_units(options.units());
+  if (const auto fault = check(units))
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "`units." + std::string(fault->member) + "` " + utf8(fault->text));
+  return units;
 }
 
 std::vector<PortAttachment> attachments(const v1::CreateOptions& options) {

@@ -65,6 +65,8 @@ DeckReport load(DeckUpload& upload, const Config& config, const Limits& limits,
 DeckReport load(KeptDeck deck, const Config& config);
 /// Throws BAD_ARGUMENT for a symbol without a value.
 SymbolValues symbols_of(const v1::CreateOptions& options);
+/// Throws BAD_ARGUMENT for what is no system of units.
+std::optional<UnitSystem> units_of(const v1::CreateOptions& options);
 /// Ports that need equations of their own in the model.
 std::vector<PortAttachment> attachments(const v1::CreateOptions& options);
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "model/model_part.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -120,12 +121,26 @@ void to_proto(const Error& error, v1::SolverFailure* out) {
   }
 }
 
-void to_proto(const Variable& variable, int handle, v1::Variable* out) {
+void to_proto(const UnitSystem& units, v1::UnitSystem* out) {
+  out->set_length(units.length);
+  if (units.mass.empty())
+    out->set_force(units.force);
+  else
+    out->set_mass(units.mass);
+  out->set_time(units.time);
+}
+
+UnitSystem to_units(const v1::UnitSystem& units) {
+  return {units.length(), units.mass(), units.force(), units.time()};
+}
+
+void to_proto(const Variable& variable, int handle, const UnitSystem* units, v1::Variable* out) {
   out->set_handle(handle);
   out->set_name(utf8(variable.name));
   out->mutable_shape()->Assign(variable.shape.begin(), variable.shape.end());
   out->set_size(variable.size);
-  out->set_unit(utf8(variable.unit));
+  out->set_unit(utf8(unit_name(units, variable.unit)));
+  out->set_si_unit(utf8(variable.unit));
   out->set_frame(variable.frame);
   out->set_causality(to_proto(variable.causality));
   out->set_description(utf8(variable.description));
@@ -139,6 +154,8 @@ void to_proto(const Model& model, v1::ModelDescription* out) {
   out->set_initial_time(model.initial_value.initial_time);
   out->set_final_time(model.initial_value.final_time);
   out->set_step_size(model.initial_value.time_step);
+  if (const UnitSystem* units = find_part<UnitSystem>(model))
+    to_proto(*units, out->mutable_units());
 }
 
 int node_count(const Model& model) {

@@ -7,6 +7,7 @@
 
 #include "math/hash.h"
 #include "mbcosim/v1/simulations.pb.h"
+#include "model/unit_system.h"
 #include "simulation/load.h"
 
 namespace mbcosim::server {
@@ -15,7 +16,10 @@ using DiagnosticList = google::protobuf::RepeatedPtrField<v1::Diagnostic>;
 
 void to_proto(const std::vector<Diagnostic>& diagnostics, DiagnosticList* out);
 void to_proto(const Error& error, v1::SolverFailure* out);
-void to_proto(const Variable& variable, int handle, v1::Variable* out);
+/// `units`: of the deck; null: not declared.
+void to_proto(const Variable& variable, int handle, const UnitSystem* units, v1::Variable* out);
+void to_proto(const UnitSystem& units, v1::UnitSystem* out);
+UnitSystem to_units(const v1::UnitSystem& units);
 /// What is told of the model as a whole.
 void to_proto(const Model& model, v1::ModelDescription* out);
 int node_count(const Model& model);

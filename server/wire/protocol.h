@@ -11,10 +11,10 @@ namespace mbcosim::server {
 constexpr int kProtocolVersion = 2;
 
 /// Additions to this version, by name; the newest last.
-constexpr const char* kFeatures[] = {"grants",           "geometry", "symbols",     "step_sizes",
-                                     "request_ids",      "pages",    "reset",       "results",
-                                     "tables",           "events",   "checkpoints", "pace",
-                                     "sample_intervals", "journal",  "deck_sockets"};
+constexpr const char* kFeatures[] = {"grants",           "geometry", "symbols",      "step_sizes",
+                                     "request_ids",      "pages",    "reset",        "results",
+                                     "tables",           "events",   "checkpoints",  "pace",
+                                     "sample_intervals", "journal",  "deck_sockets", "units"};
 
 inline void fill_protocol(v1::VersionRange* out) {
   out->set_lowest(kProtocolVersion);

@@ -17,6 +17,7 @@ from mbcosim.v1 import common_pb2, coupling_types_pb2 as types, simulations_pb2 
 
 NAN = math.nan
 LOAD = "node.structural.1.load"
+MILLIMETRES = common_pb2.UnitSystem(length="mm", mass="t", time="s")
 
 
 class Bench:
@@ -312,6 +313,10 @@ WRONG = {
 WRONG_OPTIONS = {
     "lease": [dict(lease={"seconds": x}) for x in (0, -1)], "pace.rate": [dict(pace=pb.Pace(rate=x)) for x in (0.0, -1.0, NAN, math.inf)],
     "durability": [dict(durability=77)], "symbols": [dict(symbols={"x": pb.SymbolValue()})],
+    "units.length": [dict(units=common_pb2.UnitSystem(length=x, mass="kg", time="s")) for x in ("", "furlong", "kg")],
+    "units.mass": [dict(units=common_pb2.UnitSystem(length="m", mass=x, time="s")) for x in ("", "m")],
+    "units.force": [dict(units=common_pb2.UnitSystem(length="m", force="kg", time="s"))],
+    "units.time": [dict(units=common_pb2.UnitSystem(length="m", mass="kg", time=x)) for x in ("", "m")],
     "ports.name": [dict(ports=[types.PortDefinition(kind=1, node_labels=[1])])],
     "offsets": [dict(ports=[types.PortDefinition(name="p", kind=1, node_labels=[1], offsets=x)]) for x in ([1.0], [0.0, NAN, 0.0])],
 }
@@ -335,12 +340,27 @@ def wrong_option(field):
     return check
 
 
+def units(bench):
+    """A declaration changes names, not numbers."""
+    told = bench.create("", units=MILLIMETRES).simulation
+    try:
+        model = bench.call("DescribeSimulation", pb.DescribeSimulationRequest(simulation=told.name, page_size=100000)).model
+        names = {v.name: v.unit for v in model.variables}
+        require(model.units == told.units == MILLIMETRES, "the units are not told")
+        require((names["node.structural.1.X"], names[LOAD]) == ("mm", "N, N mm"), f"units are named {names['node.structural.1.X']}, {names[LOAD]}")
+        require(told.model_digest == bench.info.model_digest, "the declaration of units changes the digest")
+        undeclared = bench.variables()["node.structural.1.X"]
+        require((undeclared.unit, undeclared.si_unit) == ("deck unit of length", "m"), f"undeclared units are {undeclared.unit}, {undeclared.si_unit}")
+    finally:
+        bench.delete(told.name)
+
+
 CHECKS = {
     **{f"repeated {method}": repeats(method) for method in REPEATED},
     "repeated steps are done once": repeated_step_is_done_once, "repeats on a stream": repeated_stream, "repeated creation": repeated_creation,
     "repeated fork": repeated_fork, "repeated import": repeated_import, "repeated end": repeated_end, "refused, then done": refused_then_done,
     "pages of a description": described_pages, "pages of a linearization": linearized_pages, "pages of eigenvectors": eigenvalue_pages,
-    "pages of the list": listed_pages, "reset": reset,
+    "pages of the list": listed_pages, "reset": reset, "units": units,
     **{f"wrong {field}": wrong(field) for field in WRONG}, **{f"wrong option {field}": wrong_option(field) for field in WRONG_OPTIONS},
 }
 

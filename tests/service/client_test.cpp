@@ -63,7 +63,7 @@ TEST(Table, HasWhatSingleStepsGive) {
   const Table table = one.simulate(0.1, names, {.every = 4});
   ASSERT_EQ(table.steps.size(), 26u);
   ASSERT_EQ(table.width, 4);
-  EXPECT_EQ(table.columns[0].unit, "m");
+  EXPECT_EQ(table.columns[0].unit, "deck unit of length");
   EXPECT_EQ(table.columns[1].first, 3);
   EXPECT_EQ(table.steps.back(), 100);
   EXPECT_EQ(table.result.step, 100);
@@ -687,6 +687,66 @@ TEST(Client, AModelOfTenThousandBodiesIsDescribedDrawnLinearizedAndStepped) {
   EXPECT_GE(linear.state_names.size(), 12 * kBodies);
   EXPECT_EQ(linear.A.values.size(), linear.A.column_indices.size());
   EXPECT_EQ(simulation.step().step, 1);
+}
+
+const Units kSi{"m", "kg", "", "s"}, kMillimetres{"mm", "t", "", "s"}, kByForce{"mm", "", "N", "s"};
+
+TEST_P(Coupled, APeerCountsInUnitsOfItsOwn) {
+  Server server = connect();
+  LoadOptions load = with_port();
+  load.units = kMillimetres;
+  Simulation simulation = server.load_text(body(), load);
+  for (const Variable& v : simulation.variables())
+    if (v.name == "node.structural.1.load") {
+      EXPECT_EQ(v.unit, "N, N mm");
+      EXPECT_EQ(v.si_unit, "N, N m");
+    }
+  ASSERT_TRUE(simulation.refresh().units);
+  EXPECT_EQ(simulation.refresh().units->mass, "t");
+  PeerOptions options = this->options();
+  options.mode = Mode::loose;
+  options.units = kSi;
+  std::vector<double> seen;
+  {
+    Peer peer = simulation.couple(
+        "spring",
+        [&](const Motion& motion) {
+          seen.push_back(motion.v[1]);
+          return Loads{.forces = {1, 2, 3}, .moments = {4, 5, 6}};
+        },
+        options);
+    EXPECT_EQ(peer.layout().units->length, "m");
+    EXPECT_EQ(simulation.step().outcome, Outcome::accepted);
+  }
+  EXPECT_DOUBLE_EQ(seen.at(0), 1e-3) << "1 mm/s";
+  const std::vector<double> loads = simulation.read("node.structural.1.load");
+  const std::vector<double> expected = {1, 2, 3, 4000, 5000, 6000};
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_DOUBLE_EQ(loads[i], expected[i]);
+  simulation.reset();
+  options.units = kByForce;  // the deck's own, told by its force
+  Peer same = simulation.couple(
+      "spring",
+      [](const Motion&) {
+        return Loads{.forces = {7, 8, 9}};
+      },
+      options);
+  simulation.step();
+  EXPECT_EQ(simulation.read("node.structural.1.load").at(2), 9);
+}
+
+TEST(Client, UnitsThatAreNoneAreRefusedByTheirField) {
+  Server server = connect();
+  LoadOptions options;
+  options.units = Units{"furlong", "kg", "", "s"};
+  try {
+    server.load_text(body(), options);
+    FAIL() << "taken";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.field(), "units.length");
+  }
+  Simulation simulation = server.load_text(body(), with_port());
+  EXPECT_EQ(code_of([&] { simulation.attach("spring", {.units = kSi}); }), 9)
+      << "the deck's units are not declared";
 }
 
 TEST(Client, FetchesResultFiles) {

@@ -84,7 +84,7 @@ FAULTS = {
        for field in check_calls.WRONG_OPTIONS},
     **{f"pages of {what}": without(method, "page_size") for what, method in (
         ("a description", "DescribeSimulation"), ("a linearization", "Linearize"), ("eigenvectors", "ComputeEigenvalues"), ("the list", "ListSimulations"))},
-    "reset": Tampering(instead={"ResetSimulation": "GetSimulation"}),
+    "units": without("CreateSimulationInline", "units"), "reset": Tampering(instead={"ResetSimulation": "GetSimulation"}),
 }
 
 

@@ -156,7 +156,7 @@ def test_parts_are_found_by_label_by_name_and_by_family(server):
         assert list(top.position) == list(simulation["node.structural.1.X"])
         assert top["angular_velocity"] == pytest.approx(simulation["node.structural.1.Omega"])
         assert {"position", "XP", "load"} <= set(dir(top))
-        assert repr(top).startswith('<dynamic node 1 "top", t = 0 s>\n  X[3] [m], global: position')
+        assert repr(top).startswith('<dynamic node 1 "top", t = 0 s>\n  X[3] [deck unit of length], global: position')
 
 
 def test_inputs_are_set_by_the_names_of_their_nodes(server):
@@ -201,7 +201,7 @@ def test_a_history_has_what_single_steps_give(server, pendulum):
         history = one.simulate([name], until=0.5, every=10)
         rows = [other[name], *(other.step(10, outputs=[name]).values[name] for _ in range(10))]
     np.testing.assert_array_equal(history[name], rows)
-    assert history.time == pytest.approx(np.linspace(0, 0.5, 11)) and history.units == {name: "m"}
+    assert history.time == pytest.approx(np.linspace(0, 0.5, 11)) and history.units == {name: "deck unit of length"}
     assert list(history.columns()) == [f"{name}[{k}]" for k in (1, 2, 3)]
     with pytest.raises(KeyError, match="did you mean 'node.structural.2.X'"):
         history["node.structural.2.Y"]
@@ -235,7 +235,8 @@ def test_a_history_is_a_table(swing, tmp_path):
     history = swing.simulate(["node.structural.2.X", "time"], steps=3)
     history.save(tmp_path / "h.csv")
     lines = (tmp_path / "h.csv").read_text().splitlines()
-    assert lines[0] == "time [s],node.structural.2.X[1] [m],node.structural.2.X[2] [m],node.structural.2.X[3] [m],time [s]"
+    length, time = "[deck unit of length]", "time [deck unit of time]"
+    assert lines[0] == ",".join([time, *(f"node.structural.2.X[{k}] {length}" for k in (1, 2, 3)), time])
     assert len(lines) == 5
     for module, convert in (("pandas", history.to_pandas), ("xarray", history.to_xarray)):
         try:
@@ -245,7 +246,7 @@ def test_a_history_is_a_table(swing, tmp_path):
                 convert()
             continue
         table = convert()
-        assert "node.structural.2.X[1]" in table if module == "pandas" else table["node.structural.2.X"].attrs["units"] == "m"
+        assert "node.structural.2.X[1]" in table if module == "pandas" else table["node.structural.2.X"].attrs["units"] == "deck unit of length"
 
 
 def test_a_snapshot_as_a_block_leaves_the_state_as_it_was(swing):

@@ -53,6 +53,33 @@ test("errors carry their code, reason and field", async () => {
   assert.equal(gone.code, 5);
 });
 
+test("units that are declared are named, and a peer counts in its own", async () => {
+  const ports = [{ name: "tip", kind: "PORT_KIND_STRUCTURAL", node_labels: [1] }];
+  const simulation = await loadText(server, body, { ports, units: { length: "mm", mass: "t", time: "s" } });
+  const { model } = await call(server, server.simulations, "DescribeSimulation", { simulation: simulation.name }, 5);
+  const load = model.variables.find(({ name }) => name === "node.structural.1.load");
+  assert.deepEqual([load.unit, load.si_unit, model.units.inertia], ["N, N mm", "N, N m", "mass"]);
+  const peer = server.coupling.Attach();
+  const hello = { simulation: simulation.name, port: "tip", protocol: { lowest: 2, highest: 2 }, units: { length: "m", mass: "kg", time: "s" } };
+  const exchanged = new Promise((resolve, reject) => {
+    peer.on("error", reject);
+    peer.on("data", ({ exchange }) => {
+      if (!exchange) return;
+      peer.write({ exchange: { index: exchange.index, answer: { forces: [1, 0, 0], moments: [0, 2, 0] } } });
+      resolve(exchange.velocities[0]);
+    });
+  });
+  await new Promise((resolve) => {
+    peer.once("data", ({ welcome }) => resolve(assert.equal(welcome.layout.units.length, "m")));
+    peer.write({ hello });
+  });
+  await simulation.step();
+  assert.ok(Math.abs((await exchanged) - 1e-3) < 1e-15); // 1 mm/s
+  assert.deepEqual(await simulation.read("node.structural.1.load"), [1, 0, 0, 0, 2000, 0]);
+  peer.end();
+  await simulation.delete();
+});
+
 test("a model of 10 000 bodies passes the client's default limits", async () => {
   const n = 10_000;
   const simulation = await loadText(server, chain(n));

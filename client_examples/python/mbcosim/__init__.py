@@ -11,7 +11,7 @@
 from ._version import __version__
 from .access import default_address
 from .analysis import Modes, StateSpace
-from .calls import Condition, Geometry, StepResult, grant
+from .calls import Condition, Geometry, StepResult, grant, units
 from .client import Server, connect
 from .coupling import Peer, modal_port, motion_port, signal_port, structural_port
 from .errors import (Busy, DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
@@ -26,5 +26,5 @@ __all__ = [
     "__version__", "connect", "connect_or_start", "local", "default_address", "Server", "LocalServer", "Simulation", "Snapshot", "StepResult",
     "Stepper", "Subscription", "Events", "History", "StateSpace", "Modes", "Motion", "Loads", "Condition", "Reject", "Peer", "modal_port",
     "motion_port", "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound",
-    "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable", "Geometry", "Busy", "grant",
+    "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable", "Geometry", "Busy", "grant", "units",
 ]

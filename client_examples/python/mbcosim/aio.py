@@ -227,13 +227,13 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
         if (until is None) == (steps is None):
             raise ValueError("say how long with `until` or with `steps`")
         request = pb.StepRequest(steps=steps) if until is None else pb.StepRequest(until_time=until)
-        names, title = [outputs] if isinstance(outputs, str) else list(outputs), str(self.info.display_name)
+        names = [outputs] if isinstance(outputs, str) else list(outputs)
         try:
             rows, _ = await self._connection.run(self._tabulate(names, request, every, inputs, None, timeout))
         except StepFailed as error:
-            error.history = History.of_rows(error.rows, title)
+            error.history = History.of_rows(error.rows, self)
             raise
-        return History.of_rows(rows, title)
+        return History.of_rows(rows, self)
 
     async def subscribe(self, names: Iterable[str], *, every: int = 1, policy: str = "drop_oldest", buffer: int = 1024,
                         minimum_interval: Optional[float] = None, timeout: Optional[float] = USUAL) -> Subscription:

@@ -64,6 +64,11 @@ def grant(identity: str, right: str, ports: Iterable[str] = ()) -> pb.Grant:
     return pb.Grant(identity=identity, right=value, ports=ports)
 
 
+def units(length: str, *, time: str, mass: Optional[str] = None, force: Optional[str] = None) -> common_pb2.UnitSystem:
+    """A consistent system of units by names: `units("mm", mass="t", time="s")`, or the same with `force="N"` in place of the mass."""
+    return common_pb2.UnitSystem(length=length, time=time, mass=mass, force=force)
+
+
 def _symbol(value: Symbol) -> pb.SymbolValue:
     """`mbcosim.v1.SymbolValue`."""
     if isinstance(value, (bool, np.bool_)):
@@ -173,6 +178,8 @@ class ServerCalls(Generic[SimulationKind]):
                       longest time [s], and steps, between two checkpoints; None: the server's, and any
         deck_sockets  serves the sockets that the deck names to the codes for which it was written, where the server allows it: True, or the longest
                       wait for a code [s]; the call ends when they have come
+        units         that the deck is written in, mbcosim.units(...), where it does not tell by a card: descriptions name them, and ports
+                      convert them for peers that count in others; no value changes
         pace          seconds of the model in a second of the wall clock, 1: real time; None: as fast as it can. Late steps are counted in the replies
         timeout       seconds that the call may take; None: as long as the server lives
         """
@@ -188,7 +195,8 @@ class ServerCalls(Generic[SimulationKind]):
                 record: bool = False, summed_time: bool = False, symbols: Optional[Mapping[str, Symbol]] = None,
                 grants: Iterable[pb.Grant] = (), results: Results = False, results_quota: Optional[int] = None,
                 durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None, pace: Optional[float] = None,
-                deck_sockets: Union[bool, float] = False, timeout: Optional[float] = None) -> Calls[SimulationKind]:
+                deck_sockets: Union[bool, float] = False, units: Optional[common_pb2.UnitSystem] = None,
+                timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = _new_id()
         header.options.protocol.CopyFrom(protocol())
         header.options.display_name = name
@@ -208,6 +216,8 @@ class ServerCalls(Generic[SimulationKind]):
             header.options.checkpoint_interval.FromMilliseconds(round(checkpoint_interval * 1000))
         if checkpoint_steps is not None:
             header.options.checkpoint_steps = checkpoint_steps
+        if units is not None:
+            header.options.units.CopyFrom(units)
         if pace is not None:
             header.options.pace.rate = pace
         if deck_sockets is not False:
@@ -298,6 +308,11 @@ class SimulationCalls(Generic[SnapshotKind]):
         self.diagnostics = diagnostics
         self.printed = printed
         self.step_number, self.time = info.step, info.time
+
+    @property
+    def time_unit(self) -> str:
+        """As `mbcosim.v1.Variable.unit` of a time."""
+        return self.info.units.time or "deck unit of time"
 
     def _leave(self) -> None:
         """Ends what is open of it here."""

@@ -77,6 +77,7 @@ class Peer(exchange.Course):
     mode       "loose", "staggered", "tight" or "window"; None: the port's own, "loose" unless its deck says otherwise
     frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
     tangent    "dense" or "block_diagonal" when answers are Loads with derivatives
+    units      of the peer, mbcosim.units(...): the server converts all that crosses, times and derivatives too; None: the deck's
     peer_timeout        the server waits so long for an answer [s]
     server_timeout      the server gives signs of life; when none comes for so long [s], the peer ends with an error
     heartbeat_timeout   the peer shows signs of life at least that often [s], also while it computes; the library sends them

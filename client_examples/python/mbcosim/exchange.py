@@ -9,7 +9,7 @@ from typing import Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
-from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
+from mbcosim.v1 import common_pb2, coupling_pb2 as pb, coupling_types_pb2 as types
 
 from .errors import Error
 from .rpc import protocol
@@ -23,7 +23,8 @@ _EMPTY = np.zeros(0)
 
 @dataclasses.dataclass
 class Motion:
-    """What the simulation sends. Arrays are n x 3 for n nodes, SI units, in the frame agreed; read-only."""
+    """What the simulation sends. Arrays are n x 3 for n nodes, in the frame agreed; read-only. Units are the deck's, written here as SI, unless the
+    peer has given its own."""
     step: int
     time: float            # of the values [s]
     target_time: float     # for which an answer is wanted [s]
@@ -70,10 +71,11 @@ def hello(simulation: Any, port: str, *, mode: Optional[str] = None, rotation: s
           accelerations: bool = False, every: Optional[int] = None, hold: str = "zero_order", peer_timeout: float = 10.0,
           policy: str = "fail_step", acceleration: str = "none", relaxation: Optional[float] = None, tolerance: Optional[float] = None,
           maximum_passes: Optional[int] = None, check_model: bool = True, tangent: str = "none",
-          heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None) -> pb.PeerMessage:
+          heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None,
+          units: Optional[common_pb2.UnitSystem] = None) -> pb.PeerMessage:
     """First message of a peer."""
     message = pb.Hello(
-        protocol=protocol(), simulation=simulation.name, port=port,
+        protocol=protocol(), simulation=simulation.name, port=port, units=units,
         expected=pb.PeerExpectation(model_digest=simulation.info.model_digest if check_model else ""),
         form=pb.ExchangeForm(rotation_form=_enum(types.RotationForm, "ROTATION_FORM_", rotation),
                              frame=_enum(types.PortFrame, "PORT_FRAME_", frame), accelerations=accelerations),

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from mbcosim.v1 import simulations_pb2 as pb
 
-from .calls import StepResult
+from .calls import SimulationCalls, StepResult
 from .errors import StepFailed
 from .rpc import USUAL
 from .table import Rows
@@ -24,20 +24,21 @@ Input = Union[float, Sequence[float], Array, Callable[[float], Any]]
 
 
 class History(Mapping[str, Array]):
-    """Times [s] and, by name, values of variables at those times: the first axis is time.
+    """Times and, by name, values of variables at those times: the first axis is time.
 
-    `history["node.structural.2.X"]` is an array (instants x 3); units are in `units`. See also plot, animate, to_pandas, to_xarray.
+    `history["node.structural.2.X"]` is an array (instants x 3); units are in `units`, that of `time` in `time_unit`. See also plot, animate,
+    to_pandas, to_xarray.
     """
 
     def __init__(self, time: Array, values: dict[str, Array], units: dict[str, str], title: str = "",
-                 steps: Optional[npt.NDArray[np.int64]] = None) -> None:
-        self.time, self._values, self.units, self.title = time, values, units, title
+                 steps: Optional[npt.NDArray[np.int64]] = None, time_unit: str = "s") -> None:
+        self.time, self._values, self.units, self.title, self.time_unit = time, values, units, title, time_unit
         self.steps = steps  # numbers of the steps
 
     @classmethod
-    def of_rows(cls, rows: Rows, title: str) -> History:
+    def of_rows(cls, rows: Rows, simulation: SimulationCalls[Any]) -> History:
         """What one call brought."""
-        return cls(rows.times, rows.values(), rows.units(), title, rows.steps)
+        return cls(rows.times, rows.values(), rows.units(), str(simulation.info.display_name), rows.steps, simulation.time_unit)
 
     def __getitem__(self, name: str) -> Array:
         try:
@@ -52,7 +53,8 @@ class History(Mapping[str, Array]):
         return len(self._values)
 
     def __repr__(self) -> str:
-        span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else "empty"
+        unit = f"({self.time_unit})" if " " in self.time_unit else self.time_unit
+        span = f"{self.time[0]:g} to {self.time[-1]:g} {unit}" if len(self.time) else "empty"
         lines = [f"  {name} {list(v.shape[1:]) or ''}{' [' + self.units[name] + ']' if self.units[name] else ''}" for name, v in self.items()]
         return "\n".join([f"<History, {len(self.time)} instants, {span}>", *lines])
 
@@ -71,16 +73,16 @@ class History(Mapping[str, Array]):
         fields = {name: values for name, values in {**own, **{k: v for k, v in self.items() if k not in own}}.items() if values is not None}
         columns: Any = [(name, values.dtype, values.shape[1:]) for name, values in fields.items()]
         dtype: Any = np.dtype
-        kinds = dtype(columns, metadata={"units": {"step": "", "time": "s", **self.units}})
+        kinds = dtype(columns, metadata={"units": {"step": "", "time": self.time_unit, **self.units}})
         table: Any = np.empty(len(self.time), kinds)
         for name, values in fields.items():
             table[name] = values
         return table
 
     def to_pandas(self) -> Any:
-        """A pandas.DataFrame with one column for each number, indexed by time [s]; units in `attrs["units"]`."""
+        """A pandas.DataFrame with one column for each number, indexed by time; units in `attrs["units"]`."""
         pandas = needed("pandas", "a data frame")
-        frame = pandas.DataFrame(self.columns(), index=pandas.Index(self.time, name="time [s]"))
+        frame = pandas.DataFrame(self.columns(), index=pandas.Index(self.time, name=f"time [{self.time_unit}]"))
         frame.attrs["units"] = dict(self.units)
         return frame
 
@@ -89,12 +91,12 @@ class History(Mapping[str, Array]):
         xarray = needed("xarray", "a data set")
         data = {name: (["time", *(f"{name} {axis + 1}" for axis in range(values.ndim - 1))], values, {"units": self.units[name]})
                 for name, values in self.items()}
-        return xarray.Dataset(data, coords={"time": ("time", self.time, {"units": "s"})}, attrs={"title": self.title})
+        return xarray.Dataset(data, coords={"time": ("time", self.time, {"units": self.time_unit})}, attrs={"title": self.title})
 
     def save(self, path: Union[str, "os.PathLike[str]"]) -> None:
         """Writes a table with one column for each number, units in its heading."""
         columns = self.columns()
-        heads = ["time [s]"]
+        heads = [f"time [{self.time_unit}]"]
         for name in columns:
             unit = self.units[name.split("[")[0]] if name not in self.units else self.units[name]
             heads.append(f"{name} [{unit}]" if unit else name)
@@ -130,12 +132,12 @@ class _Collector:
     def history(self) -> History:
         known = self._simulation.variables
         values = {name: np.array(rows, dtype=float) for name, rows in self._values.items()}
-        title: str = self._simulation.info.display_name
+        title, time_unit = str(self._simulation.info.display_name), self._simulation.time_unit
         units = {name: known[name].unit for name in self._names}
-        return History(np.array(self._times, dtype=float), values, units, title, np.array(self._steps, dtype=np.int64))
+        return History(np.array(self._times, dtype=float), values, units, title, np.array(self._steps, dtype=np.int64), time_unit)
 
 
-def bar(total: float, show: bool, unit: str = "s") -> Any:
+def bar(total: float, show: bool, unit: str) -> Any:
     """A progress bar, in terminals and notebooks; without `show` one that shows nothing."""
     if not show:
         return _NoBar()
@@ -167,7 +169,7 @@ def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Op
     rows, done, start = _Collector(simulation, names), 0, simulation.time
     total = float(steps) if end is None and steps is not None else float(end or 0.0) - start
     size = simulation.info.next_step_size
-    with simulation.stepper(names, list(inputs)) as stepper, bar(total, progress, "s" if end is not None else "step") as shown:
+    with simulation.stepper(names, list(inputs)) as stepper, bar(total, progress, simulation.time_unit if end is not None else "step") as shown:
         while True:
             left = steps - done if end is None and steps is not None else round((float(end or 0.0) - simulation.time) / size) if size > 0 else 0
             if left <= 0:
@@ -189,7 +191,6 @@ def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Op
 
 def _run_in_one_call(simulation: Any, names: list[str], request: pb.StepRequest, every: int, inputs: Mapping[str, Any], progress: bool,
                      timeout: Optional[float]) -> History:
-    title: str = simulation.info.display_name
     with bar(1.0, progress, "of the run") as shown:
         last = 0.0
 
@@ -201,10 +202,10 @@ def _run_in_one_call(simulation: Any, names: list[str], request: pb.StepRequest,
         try:
             rows, _ = simulation._connection.run(simulation._tabulate(names, request, every, inputs, report, timeout))
         except StepFailed as error:
-            error.history = History.of_rows(error.rows, title)
+            error.history = History.of_rows(error.rows, simulation)
             raise
         shown.update(1.0 - last)
-    return History.of_rows(rows, title)
+    return History.of_rows(rows, simulation)
 
 
 class Histories:

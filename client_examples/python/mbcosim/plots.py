@@ -71,7 +71,7 @@ def plot_history(history: History, names: Union[None, str, Iterable[str]] = None
         place.set_ylabel(f"[{unit}]" if unit else "")
         place.grid(alpha=0.3)
         place.legend(fontsize="small", frameon=False)
-    places[-1].set_xlabel("time [s]")
+    places[-1].set_xlabel(f"time [{history.time_unit}]")
     if history.title:
         places[0].set_title(history.title)
     return _finish(figure, save)

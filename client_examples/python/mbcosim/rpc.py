@@ -25,7 +25,7 @@ _Class = TypeVar("_Class", bound=type)
 
 PROTOCOL_VERSION = 2
 FEATURES = ("grants", "geometry", "symbols", "step_sizes", "request_ids", "pages", "reset", "results", "tables", "events", "checkpoints",
-            "pace", "sample_intervals", "journal", "deck_sockets")  # that this library knows
+            "pace", "sample_intervals", "journal", "deck_sockets", "units")  # that this library knows
 USUAL = 30.0    # seconds that a call which advances nothing may take
 PARTING = 2.0   # seconds that leaving a `with` block may take
 _AGAIN = 2.0    # seconds in which a repeatable call is asked again after the connection broke

@@ -64,19 +64,19 @@ describe('a flexible body', () => {
       expect(size).toBeGreaterThan(1e-4);
       const reached = Math.max(...tenfold.map((x, i) => Math.abs(x - straight[i])));
       expect(reached / size).toBeGreaterThan(5);
-      await page.locator('.hud .scale', { hasText: /^deformation0[\d.e−]+ m$/ }).waitFor();
+      await page.locator('.hud .scale', { hasText: /^deformation0[\d.e−]+$/ }).waitFor();
     });
   });
 });
 
 describe('pressures', () => {
-  test('are colours whose ends are told with their unit', async () => {
+  test('are colours whose ends are told', async () => {
     await withPage(browser, 'actuated_beam.mbd', async ({ page }) => {
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
       const scale = page.locator('.hud .scale', { hasText: 'pressure' });
       await scale.waitFor();
-      expect(await scale.textContent()).toMatch(/^pressure1\.01\S*e\+5\S* Pa$/);
+      expect(await scale.textContent()).toMatch(/^pressure1\.01\S*e\+5\S*$/);
     });
   });
 });

@@ -9,6 +9,7 @@ export interface VariableInfo {
   handle: number;
   name: string;
   size: number;
+  /** "mm"; where the deck's units are not declared the quantity: "length". */
   unit: string;
   frame: string;
   kind: Kind;
@@ -53,6 +54,8 @@ export interface Model {
   elements: Part[];
   variables: VariableInfo[];
   parameters: Parameter[];
+  /** The deck's units are declared: `unit` may stand behind a number. */
+  unitsDeclared?: boolean;
 }
 
 const KINDS: Record<number, Kind> = {
@@ -90,13 +93,14 @@ export function modelOf(description: ModelDescription, cards: ReadonlyMap<string
       handle: variable.handle,
       name: variable.name,
       size: variable.size,
-      unit: variable.unit,
+      unit: variable.unit.replaceAll('deck unit of ', ''),
       frame: variable.frame,
       kind: KINDS[variable.causality] ?? 'output',
       description: variable.description,
       owner: variable.owner,
     })),
     parameters: description.symbols.map(({ name, value }) => ({ name, value: written(value) })),
+    unitsDeclared: description.units !== undefined,
   };
 }
 

@@ -140,7 +140,7 @@ export class ScenePanel {
   /** Of a variable; of lengths without one. */
   private unit({ model, geometry }: Shown, handle = geometry.nodes[0]?.positionHandle): string {
     const unit = model.variables.find((variable) => variable.handle === handle)?.unit;
-    return unit ? ` ${unit}` : '';
+    return unit && model.unitsDeclared ? ` ${unit}` : '';
   }
 
   private updateOther(time: number): void {
