@@ -52,6 +52,8 @@ std::map<std::string, std::string> collect_bundle(const std::string& folder,
   const fs::path root = fs::canonical(folder.empty() ? "." : folder);
   std::map<std::string, std::string> files;
   std::vector<std::string> waiting = {main};
+  const std::string view = fs::path(main).replace_extension(".view.json").generic_string();
+  if (fs::is_regular_file(root / view)) waiting.push_back(view);
   while (!waiting.empty()) {
     const std::string name = waiting.back();
     waiting.pop_back();

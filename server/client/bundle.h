@@ -6,8 +6,8 @@
 
 namespace mbcosim::client {
 
-/// Bytes of the deck `main` in `folder` and of every file below the folder that it or they name in
-/// quotes, by name.
+/// Bytes of the deck `main` in `folder`, of `NAME.view.json` beside it, and of every file below the
+/// folder that they name in quotes, by name.
 std::map<std::string, std::string> collect_bundle(const std::string& folder,
                                                   const std::string& main);
 

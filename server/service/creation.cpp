@@ -205,19 +205,20 @@ class Creation {
   void create(Exchange& exchange, const v1::CreateOptions& options, std::uint64_t digest,
               Reply* reply) {
     Grants::check_known(options.grants(), parts_.runtime.authenticator);
-    DeckReport report;
+    LoadedDeck report;
     KeptDeck deck;
     KeptDeck* const kept = parts_.durability.wanted(options, nullptr) ? &deck : nullptr;
     const auto make = [&](const CancelToken& token, SessionResults* results,
                           Session::Origin* origin) {
-      report = load(*upload_, parts_.config, parts_.config.limits.engine, kept);
+      report = load(*upload_, parts_.config, kept);
       if (!report.ok()) refuse_deck(report);
       *origin = {report.model,
                  std::move(report.symbols),
                  options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact,
                  options.symbols(),
                  false,
-                 std::move(report.files)};
+                 std::move(report.files),
+                 std::move(report.attached)};
       return initial_solution(*origin, options, results, parts_.deck_sockets, token);
     };
     fresh_.add(options, digest, exchange, kept, make)
@@ -299,7 +300,7 @@ Reply look_at(DeckUpload& upload, const Config& config, const Limits& limits, Ex
   const CallToken token(exchange.call());
   MemoryShare share;
   return within(exchange.memory(), &token, &share, [&] {
-    const DeckReport report = load(upload, config, limits);
+    const DeckReport report = read_alone(upload, config, limits);
     Reply reply;
     reply.set_ok(report.ok());
     to_proto(report.diagnostics, reply.mutable_diagnostics());

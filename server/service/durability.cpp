@@ -545,7 +545,7 @@ SessionPtr Durability::revive(const std::string& simulation, const Suspended& su
   MemoryShare share;
   MemoryBudget& memory = parts_->runtime.budgets.of(suspended.head.owner());
   auto session = within(memory, nullptr, &share, [&] {
-    DeckReport report =
+    LoadedDeck report =
         load({model.head.main_file(), std::move(model.files), model.head.model_options()}, config_);
     if (!report.ok() || digest_text(report.model->digest) != model.head.model_digest())
       throw Refusal(v1::REASON_OTHER_MODEL, simulation + " was stored by mbcosim " +
@@ -570,7 +570,8 @@ SessionPtr Durability::revive(const std::string& simulation, const Suspended& su
                            options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact,
                            model.head.model_options().symbols(),
                            model.head.forked(),
-                           std::move(report.files)};
+                           std::move(report.files),
+                           std::move(report.attached)};
     return std::make_shared<Session>(std::move(identity), std::move(origin), std::move(made),
                                      parts_->shared(memory), options, std::move(results));
   });

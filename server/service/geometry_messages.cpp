@@ -78,15 +78,18 @@ void fill(const Owner& owner, const WrittenCard& card, v1::DeckCard* out) {
 }  // namespace
 
 GeometryMessages::GeometryMessages(const Model& model, State state, Handles handles,
-                                   DeckFiles files, const v1::DescribeGeometryRequest& request)
+                                   DeckFiles files, std::shared_ptr<const AttachedFiles> attached,
+                                   const v1::DescribeGeometryRequest& request)
     : model_(model),
       state_(std::move(state)),
       handle_of_(std::move(handles)),
       view_(model_, state_),
       files_(std::move(files)),
+      attached_(std::move(attached)),
       request_(request) {
   if (request.has_line_samples() && (request.line_samples() < 2 || request.line_samples() > 1000))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`line_samples` must be from 2 to 1000");
+  if (attached_) file_ = attached_->begin();
 }
 
 bool GeometryMessages::next(v1::DescribeGeometryReply* reply) {
@@ -119,9 +122,12 @@ bool GeometryMessages::next(v1::DescribeGeometryReply* reply) {
     part_ = Part::cards;
     index_ = 0;
   }
-  if (part_ == Part::end || !request_.cards()) return false;
-  fill_cards(reply->mutable_cards());
-  return reply->cards().cards_size() > 0;
+  if (part_ == Part::cards) {
+    if (request_.cards()) fill_cards(reply->mutable_cards());
+    if (reply->cards().cards_size() > 0) return true;
+    part_ = attached_ && request_.attachments() ? Part::attachments : Part::end;
+  }
+  return part_ == Part::attachments && next_attachment(reply->mutable_attachment());
 }
 
 void GeometryMessages::fill_header(v1::GeometryHeader* h) const {
@@ -196,6 +202,19 @@ void GeometryMessages::fill_cards(v1::DeckCardList* out) {
     server::fill(owner, *card, out->add_cards());
     bytes += out->cards().rbegin()->ByteSizeLong();
   }
+}
+
+/// False: all files were told.
+bool GeometryMessages::next_attachment(v1::FileChunk* out) {
+  if (file_ == attached_->end()) return false;
+  const auto& [path, data] = *file_;
+  out->set_path(utf8(path));
+  out->set_data(data.substr(sent_, kMessageBytes));
+  sent_ += kMessageBytes;
+  if (sent_ < data.size()) return true;
+  sent_ = 0;
+  ++file_;
+  return true;
 }
 
 void GeometryMessages::fill(const ElementGeometry::Point& p, v1::GeometryPoint* out) const {

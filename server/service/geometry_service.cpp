@@ -16,7 +16,7 @@ void add_geometry(Gate& gate, const Parts& parts) {
                  auto messages = std::make_shared<GeometryMessages>(
                      (*session)->model(), std::move(state),
                      [session](const std::string& name) { return (*session)->find_variable(name); },
-                     (*session)->origin().files, request);
+                     (*session)->origin().files, (*session)->origin().attached, request);
                  return [session, share, messages](v1::DescribeGeometryReply* reply) {
                    return messages->next(reply);
                  };

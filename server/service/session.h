@@ -14,6 +14,7 @@
 #include "mbcosim/v1/simulations.pb.h"
 #include "results/session_results.h"
 #include "rpc/call.h"
+#include "service/attached_files.h"
 #include "service/config.h"
 #include "service/deck_sockets.h"
 #include "service/event_log.h"
@@ -71,6 +72,7 @@ class Session {
     google::protobuf::Map<std::string, v1::SymbolValue> given;  ///< `CreateOptions.symbols`
     bool forked = false;   ///< it did not begin at the initial solution
     DeckFiles files = {};  ///< the deck and what it includes
+    std::shared_ptr<const AttachedFiles> attached = {};  ///< for viewers
   };
   using Progress = std::function<void()>;  ///< called between slices of a long advance
 

@@ -42,17 +42,28 @@ class KeepingSource final : public FileSource {
   KeptDeck& kept_;
 };
 
+/// Where an uploaded deck is.
+struct DeckPlace {
+  std::unique_ptr<const FileSource> files;
+  std::string main_file;
+};
+
 DeckReport read(const FileSource& files, const std::string& main_file,
-                const v1::CreateOptions& options, const Limits& limits, KeptDeck* kept) {
-  const LoadRequest request{limits, attachments(options), symbols_of(options), units_of(options)};
-  if (!kept) return read_deck(files, main_file, request);
-  kept->main_file = main_file;
-  kept->options = options;
-  return read_deck(KeepingSource(files, *kept), main_file, request);
+                const v1::CreateOptions& options, const Limits& limits) {
+  return read_deck(files, main_file,
+                   {limits, attachments(options), symbols_of(options), units_of(options)});
 }
 
-DeckReport load_from_root(const std::string& name, const v1::CreateOptions& options,
-                          const std::string& model_root, const Limits& limits, KeptDeck* kept) {
+LoadedDeck read_all(const FileSource& files, const std::string& main_file,
+                    const v1::CreateOptions& options, const Limits& limits) {
+  LoadedDeck deck{read(files, main_file, options, limits), nullptr};
+  if (deck.ok())
+    deck.attached =
+        std::make_shared<const AttachedFiles>(read_attached(files, main_file, limits.deck_bytes));
+  return deck;
+}
+
+DeckPlace place_in_root(const std::string& name, const std::string& model_root) {
   if (model_root.empty())
     throw Refusal(v1::REASON_NO_SUCH_MODEL, "the server has no model root; upload a bundle");
   check_name(name);
@@ -65,8 +76,20 @@ DeckReport load_from_root(const std::string& name, const v1::CreateOptions& opti
   if (!inside || !fs::is_regular_file(file, error))
     throw Refusal(v1::REASON_NO_SUCH_MODEL,
                   "no deck is named \"" + name + "\" under the model root");
-  return read(FolderSource(file.parent_path().string()), file.filename().string(), options, limits,
-              kept);
+  return {std::make_unique<FolderSource>(file.parent_path().string()), file.filename().string()};
+}
+
+DeckPlace place_of(DeckUpload& upload, const Config& config) {
+  const v1::UploadHeader& header = upload.header();
+  if (header.has_model_root_file())
+    return place_in_root(header.model_root_file(), config.model_root);
+  const std::string& main_file = header.bundle_main_file();
+  check_name(main_file);
+  std::map<std::string, std::string> files = upload.take_files();
+  if (files.count(main_file) == 0)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
+  return {std::make_unique<BundleSource>(std::move(files)), main_file};
 }
 
 }  // namespace
@@ -174,23 +197,24 @@ const v1::UploadHeader& DeckUpload::header() const {
   return *header_;
 }
 
-DeckReport load(KeptDeck deck, const Config& config) {
-  return read(BundleSource(std::move(deck.files)), deck.main_file, deck.options,
-              config.limits.engine, nullptr);
+DeckReport read_alone(DeckUpload& upload, const Config& config, const Limits& limits) {
+  const DeckPlace place = place_of(upload, config);
+  return read(*place.files, place.main_file, upload.header().options(), limits);
 }
 
-DeckReport load(DeckUpload& upload, const Config& config, const Limits& limits, KeptDeck* kept) {
-  const v1::UploadHeader& header = upload.header();
-  if (header.has_model_root_file())
-    return load_from_root(header.model_root_file(), header.options(), config.model_root, limits,
-                          kept);
-  const std::string& main_file = header.bundle_main_file();
-  check_name(main_file);
-  std::map<std::string, std::string> files = upload.take_files();
-  if (files.count(main_file) == 0)
-    throw Refusal(v1::REASON_BAD_ARGUMENT,
-                  "the main file \"" + main_file.substr(0, 100) + "\" is not in the bundle");
-  return read(BundleSource(std::move(files)), main_file, header.options(), limits, kept);
+LoadedDeck load(DeckUpload& upload, const Config& config, KeptDeck* kept) {
+  const DeckPlace place = place_of(upload, config);
+  const v1::CreateOptions& options = upload.header().options();
+  if (!kept) return read_all(*place.files, place.main_file, options, config.limits.engine);
+  kept->main_file = place.main_file;
+  kept->options = options;
+  return read_all(KeepingSource(*place.files, *kept), place.main_file, options,
+                  config.limits.engine);
+}
+
+LoadedDeck load(KeptDeck deck, const Config& config) {
+  return read_all(BundleSource(std::move(deck.files)), deck.main_file, deck.options,
+                  config.limits.engine);
 }
 
 }  // namespace mbcosim::server

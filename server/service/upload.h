@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "mbcosim/v1/simulations.pb.h"
+#include "service/attached_files.h"
 #include "service/config.h"
 #include "simulation/load.h"
 #include "wire/memory.h"
@@ -57,12 +59,18 @@ struct KeptDeck {
   v1::CreateOptions options;  ///< with which it was read
 };
 
+/// A deck that was read, and what viewers get with it.
+struct LoadedDeck : DeckReport {
+  std::shared_ptr<const AttachedFiles> attached;  ///< null: the deck is wrong
+};
+
 /// Reads the deck. Throws Refusal when the model root or the file in it is not to be had; a wrong
-/// deck is in the report. `kept` is filled; null: nothing is kept.
-DeckReport load(DeckUpload& upload, const Config& config, const Limits& limits,
-                KeptDeck* kept = nullptr);
+/// deck is in the report.
+DeckReport read_alone(DeckUpload& upload, const Config& config, const Limits& limits);
+/// With what is attached to it; `kept` is filled, null: nothing is kept.
+LoadedDeck load(DeckUpload& upload, const Config& config, KeptDeck* kept);
 /// The same deck again.
-DeckReport load(KeptDeck deck, const Config& config);
+LoadedDeck load(KeptDeck deck, const Config& config);
 /// Throws BAD_ARGUMENT for a symbol without a value.
 SymbolValues symbols_of(const v1::CreateOptions& options);
 /// Throws BAD_ARGUMENT for what is no system of units.

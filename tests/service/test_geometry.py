@@ -135,3 +135,78 @@ def test_what_a_client_attaches_has_no_card(daemon, server):
     with server.load_text(decks.body(), ports=[mbcosim.motion_port("hand", nodes=[1])]) as simulation:
         elements = {(False, element.family, element.label) for element in simulation.describe().elements}
         assert elements - set(cards_of(daemon, simulation))
+
+
+def attachments_of(daemon, simulation):
+    """What is attached to a simulation's deck, by path."""
+    import grpc
+    with grpc.insecure_channel(daemon.address) as channel:
+        request = geometry_pb2.DescribeGeometryRequest(simulation=simulation.name, attachments=True)
+        replies = list(geometry_pb2_grpc.GeometryStub(channel).DescribeGeometry(request))
+    assert max(r.ByteSize() for r in replies) < 1 << 20
+    files = {}
+    for reply in replies:
+        if reply.WhichOneof("content") == "attachment":
+            files[reply.attachment.path] = files.get(reply.attachment.path, b"") + reply.attachment.data
+    return files
+
+
+ATTACHED = {
+    "arm.view.json": b'{"meshes": [{"node": 1, "file": "parts/arm.stl"}, {"file": "floor.gltf"}, {"file": "lost.obj"}]}',
+    "parts/arm.stl": bytes(range(256)) * 6000,  # comes in pieces
+    "floor.gltf": b'{"buffers": [{"uri": "floor.bin"}]}',
+    "floor.bin": b"floor",
+}
+
+
+def write_attached(folder):
+    """A deck with a sidecar, what that names, and what it does not."""
+    (folder / "parts").mkdir(parents=True)
+    (folder / "arm.mbd").write_text(CHAIN.format(n=2))
+    for name, data in {**ATTACHED, "other.stl": b"other", "other.view.json": b"{}"}.items():
+        (folder / name).write_bytes(data)
+    return str(folder / "arm.mbd")
+
+
+def test_a_sidecar_comes_with_what_it_names_also_to_forks(daemon, server, tmp_path):
+    with server.load(write_attached(tmp_path)) as simulation, simulation.fork() as branch:
+        assert attachments_of(daemon, simulation) == attachments_of(daemon, branch) == ATTACHED
+    with server.load_text(CHAIN.format(n=2)) as simulation:
+        assert attachments_of(daemon, simulation) == {}
+
+
+def test_a_sidecar_of_the_model_root_names_nothing_outside_the_decks_folder(start_daemon, tmp_path):
+    write_attached(tmp_path / "root" / "arm")
+    (tmp_path / "root" / "secret").write_text("secret")
+    (tmp_path / "root" / "arm" / "link").symlink_to(tmp_path / "root" / "secret")
+    (tmp_path / "root" / "arm" / "arm.view.json").write_text('{"meshes": [{"file": "../secret"}, {"file": "%s"}, {"file": "link"}, {"file": "floor.bin"}]}'
+                                                          % (tmp_path / "root" / "secret"))
+    daemon = start_daemon("--model-root", str(tmp_path / "root"))
+    with daemon.connect() as server, server.load_from_root("arm/arm.mbd") as simulation:
+        assert set(attachments_of(daemon, simulation)) == {"arm.view.json", "floor.bin"}
+
+
+def test_a_sidecar_is_stored_with_its_simulation(start_daemon, tmp_path):
+    (tmp_path / "state").mkdir()
+    daemon = start_daemon("--state-dir", str(tmp_path / "state"))
+    with daemon.connect() as server:
+        simulation = server.load(write_attached(tmp_path / "deck"))
+        daemon.kill()
+    again = start_daemon("--state-dir", str(tmp_path / "state"))
+    with again.connect() as server:
+        assert attachments_of(again, server.attach(simulation.name)) == ATTACHED
+
+
+def test_attached_files_that_are_larger_than_a_deck_may_be_are_refused(start_daemon, tmp_path):
+    write_attached(tmp_path / "deck")
+    daemon = start_daemon("--model-root", str(tmp_path / "deck"), "--limit-deck-bytes", "1000000")
+    with daemon.connect() as server:
+        with pytest.raises(mbcosim.Error, match="attached to the deck are larger") as caught:
+            server.load_from_root("arm.mbd")
+        assert caught.value.metadata["limit"] == "deck_bytes"
+
+
+@pytest.mark.parametrize("text", [b"{", b"[" * 100000, b'"' + b"x" * 100000, b"\xff\xfe", b'{"meshes": [{"file": "\\u0000"}, {"file": ""}]}'])
+def test_a_sidecar_that_is_no_json_is_told_as_it_is(daemon, server, text):
+    with server.load_bundle("arm.mbd", {"arm.mbd": CHAIN.format(n=2).encode(), "arm.view.json": text}) as simulation:
+        assert attachments_of(daemon, simulation) == {"arm.view.json": text}

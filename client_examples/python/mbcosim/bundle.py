@@ -14,11 +14,12 @@ _QUOTED = re.compile(rb'"([^"\n]{1,1000})"')
 
 
 def collect(deck: Path) -> tuple[str, dict[str, bytes]]:
-    """Name of the main file, and the bytes of it and of every file below its folder that it names in quotes, by name."""
+    """Name of the main file, and the bytes of it, of `NAME.view.json` beside it, and of every file below its folder that they name in quotes, by name."""
     folder = os.path.realpath(os.path.dirname(os.path.abspath(deck)))
     main = os.path.basename(deck)
     files: dict[str, bytes] = {}
-    waiting = [main]
+    view = os.path.splitext(main)[0] + ".view.json"
+    waiting = [main, view] if os.path.isfile(os.path.join(folder, view)) else [main]
     while waiting:
         name = waiting.pop()
         if name in files:
