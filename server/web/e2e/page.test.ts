@@ -135,6 +135,26 @@ describe('time', () => {
     });
   });
 
+  test('a step whose reply is lost is asked for again, and taken once', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page, faults }, view) => {
+      let lost = 0;
+      await page.route('**/mbcosim.v1.Simulations/Step', async (route) => {
+        if (lost > 0) return route.continue();
+        ++lost;
+        await route.fetch();  // the step is taken
+        await route.abort('connectionreset');
+      });
+      await page.getByRole('button', { name: 'One step (S)' }).click();
+      await atStep(page, 1);
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 11);
+      expect(lost).toBe(1);
+      expect((await view.read([])).step).toBe(11);
+      await page.unrouteAll({ behavior: 'wait' });
+      expect(faults.splice(0).join()).toContain('ERR_CONNECTION_RESET');
+    });
+  });
+
   test('runs until a given time', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
       await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('0.25');

@@ -7,9 +7,10 @@ import { Events } from './gen/mbcosim/v1/events_pb';
 import { Geometry } from './gen/mbcosim/v1/geometry_pb';
 import { Simulations } from './gen/mbcosim/v1/simulations_pb';
 import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
+import { newRequestId, repeatable } from './requests';
 import { chunks, type NamedFile } from './upload';
 
-const transport = createConnectTransport({ baseUrl: globalThis.location?.origin ?? '', useBinaryFormat: true });
+const transport = createConnectTransport({ baseUrl: globalThis.location?.origin ?? '', useBinaryFormat: true, interceptors: [repeatable] });
 
 export const simulations = createClient(Simulations, transport);
 export const telemetry = createClient(Telemetry, transport);
@@ -18,7 +19,7 @@ export const events = createClient(Events, transport);
 
 /** Loads a deck; the new simulation's name. */
 export async function loadDeck(files: readonly NamedFile[], main: string): Promise<string> {
-  const options = { displayName: main, requestId: crypto.randomUUID() };
+  const options = { displayName: main, requestId: newRequestId() };
   const reply = await simulations.createSimulationInline({ header: { source: { case: 'bundleMainFile', value: main }, options }, files: chunks(files) });
   return reply.simulation?.name ?? '';
 }

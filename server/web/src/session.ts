@@ -11,6 +11,7 @@ import { modelOf, type Model, type VariableInfo } from './model';
 import { modesOf, type Mode } from './modes';
 import { Pace } from './pace';
 import { Layout, Recording, type Sample } from './recording';
+import { newRequestId } from './requests';
 import { Signal } from './signal';
 
 /** What the panels and the scene show: a running simulation, or one out of a file. */
@@ -40,8 +41,8 @@ export interface LogEntry {
   level: 'info' | 'error';
 }
 
-/** Samples a second are at most so many. */
-const RATE = 60;
+/** Samples a second of wall time are at most so many, and at most so many bytes. */
+const RATE = 120, BYTES = 8e6;
 const RETRY_MILLISECONDS = 1500;
 
 export type Playing = 'no' | 'paced' | 'fast';
@@ -70,6 +71,9 @@ export class Session implements Shown {
   /** Step of the last sample of the stream. */
   private streamed = -1;
   private busy = false;
+  /** Steps that are asked for and not begun. */
+  private owed = 0;
+  private stepping = false;
 
   private constructor(info: SimulationInfo, readonly model: Model, readonly geometry: Geometry) {
     this.info = new Signal(info);
@@ -150,7 +154,7 @@ export class Session implements Shown {
       const layout = this.layout;
       try {
         const batches = telemetry.subscribe(
-          { simulation: this.name, handles: [...layout.handles], every: BigInt(this.every()), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64 },
+          { simulation: this.name, handles: [...layout.handles], minimumInterval: duration(shortestInterval(layout)), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64 },
           { signal: this.stream.signal },
         );
         for await (const batch of batches) this.takeBatch(batch, layout);
@@ -180,11 +184,6 @@ export class Session implements Shown {
         await pause(RETRY_MILLISECONDS);
       }
     }
-  }
-
-  private every(): number {
-    const speed = Number.isFinite(this.speed.value) ? this.speed.value : 1;
-    return Math.max(1, Math.floor(speed / RATE / (this.model.step || 1)));
   }
 
   private takeBatch(batch: SubscribeReply, layout: Layout): void {
@@ -226,8 +225,21 @@ export class Session implements Shown {
 
   // ---- what is done
 
-  step(steps: number): Promise<void> {
-    return this.advance({ case: 'steps', value: BigInt(steps) });
+  /** Steps that are asked for while another call advances are taken after it. */
+  async step(steps: number): Promise<void> {
+    this.owed += steps;
+    if (this.stepping) return;
+    this.stepping = true;
+    while (this.owed > 0) {
+      if (this.busy) {
+        await pause(8);
+        continue;
+      }
+      const count = this.owed;
+      this.owed = 0;
+      await this.advance({ case: 'steps', value: BigInt(count) });
+    }
+    this.stepping = false;
   }
 
   runUntil(time: number): Promise<void> {
@@ -256,6 +268,7 @@ export class Session implements Shown {
   }
 
   pause(): void {
+    this.owed = 0;
     if (this.playing.value === 'fast') this.fast.abort();
     this.playing.value = 'no';
   }
@@ -264,7 +277,6 @@ export class Session implements Shown {
     const again = this.playing.value !== 'no';
     this.pause();
     this.speed.value = speed;
-    this.stream.abort();  // another `every`
     if (again) setTimeout(() => this.play(), 0);
   }
 
@@ -358,7 +370,7 @@ export class Session implements Shown {
   async branch(snapshot: Snapshot | undefined, displayName: string): Promise<string | undefined> {
     let name: string | undefined;
     await this.attempt(async () => {
-      const reply = await simulations.forkSimulation({ simulation: this.name, snapshot: snapshot?.name, options: { displayName } });
+      const reply = await simulations.forkSimulation({ simulation: this.name, snapshot: snapshot?.name, options: { displayName, requestId: newRequestId() } });
       name = reply.simulation?.name;
     });
     return name;
@@ -401,6 +413,11 @@ export class Session implements Shown {
   note(text: string, level: 'info' | 'error' = 'info'): void {
     this.log.value = [...this.log.value.slice(-199), { wall: new Date(), text, level }];
   }
+}
+
+/** Wall time between samples, in seconds, so that the page never slows a run. */
+function shortestInterval({ width }: Layout): number {
+  return Math.max(1 / RATE, (width * Float64Array.BYTES_PER_ELEMENT) / BYTES);
 }
 
 function pause(milliseconds: number): Promise<void> {

@@ -48,8 +48,9 @@ export class TimeBar {
 
   step(count: number): void {
     this.goLive();
-    this.desk.session?.pause();
-    void this.desk.session?.step(count);
+    const session = this.desk.session;
+    if (session?.playing.value !== 'no') session?.pause();
+    void session?.step(count);
   }
 
   /** Looks one recorded sample back or on. */
