@@ -35,7 +35,7 @@ const policy = [
   `script-src 'sha256-${hash}'`,
   "style-src 'unsafe-inline'",
   "img-src data: blob:",
-  "connect-src 'self'",
+  "connect-src 'self' blob: data:",  // these hold parts of glTF files
   "base-uri 'none'",
   "form-action 'none'",
 ].join('; ');

@@ -28,11 +28,22 @@ interface Stored {
   layout: { handle: number; size: number }[];
   steps: number[];
   times: number[];
-  values: string;
+  values: Float32Array;
 }
 
-/** JSON has no infinity. */
+/** JSON has no infinity, and no compact form of many numbers. */
 const INFINITE = '∞';
+
+function forJson(value: unknown): unknown {
+  if (value instanceof Float32Array) return { float32: base64(new Uint8Array(value.buffer, value.byteOffset, value.byteLength)) };
+  return value === Infinity ? INFINITE : value;
+}
+
+function fromJson(value: unknown): unknown {
+  const packed = (value as { float32?: unknown } | null)?.float32;
+  if (typeof packed === 'string') return new Float32Array(bytesOf(packed).buffer);
+  return value === INFINITE ? Infinity : value;
+}
 
 export function store(shown: Shown): string {
   const samples = shown.recording.samples;
@@ -55,16 +66,16 @@ export function store(shown: Shown): string {
     layout: [...handles].map(([handle, size]) => ({ handle, size })),
     steps: samples.map((sample) => sample.step),
     times: samples.map((sample) => sample.time),
-    values: base64(new Uint8Array(values.buffer)),
+    values,
   };
-  return JSON.stringify(stored, (_, value) => (value === Infinity ? INFINITE : value)).replaceAll('<', '\\u003c');
+  return JSON.stringify(stored, (_, value) => forJson(value)).replaceAll('<', '\\u003c');
 }
 
 export function unstore(text: string): Shown {
-  const stored = JSON.parse(text, (_, value) => (value === INFINITE ? Infinity : value)) as Stored;
+  const stored = JSON.parse(text, (_, value) => fromJson(value)) as Stored;
   if (stored.format !== 'mbcosim-recording-1') throw new Error('this is no recording of mbcosim');
   const layout = new Layout(stored.layout);
-  const values = Float64Array.from(new Float32Array(bytesOf(stored.values).buffer));
+  const values = Float64Array.from(stored.values);
   const recording = new Recording(Infinity);
   stored.times.forEach((time, i) =>
     recording.push({ step: stored.steps[i], time, layout, values: values.slice(i * layout.width, (i + 1) * layout.width) }));

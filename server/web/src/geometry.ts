@@ -51,10 +51,28 @@ export interface FlexibleBody {
   shapes: number[];
 }
 
+/** A mesh in place of the ellipsoid of a body, or fixed in space. */
+export interface MeshShape {
+  /** Of the only body of its node; of the node where there are others; "": it is fixed in space. */
+  id: string;
+  /** Its origin. */
+  point: PointShape;
+  /** Its axes to those of the point's node. */
+  orientation: Mat3;
+  scale: number;
+  /** "#8090a0"; absent: that of bodies. */
+  colour?: string;
+  /** Index into `Geometry.triangles`. */
+  triangles: number;
+}
+
 export interface Geometry {
   nodes: NodeShape[];
   elements: ElementShape[];
   bodies: FlexibleBody[];
+  meshes: MeshShape[];
+  /** Corners of the triangles of each mesh file, nine numbers a triangle. */
+  triangles: Float32Array[];
   /** Diagonal of the box around all points at the start; where they are one point, three times the largest ellipsoid; 1 when there is nothing. */
   extent: number;
   centre: Vec3;
@@ -162,7 +180,7 @@ export function deformedPoints(body: FlexibleBody, pose: Pose, amplitudes: reado
 const LARGEST_BODY = 0.34;
 
 /** Fills in what follows from the rest. */
-export function finish(nodes: NodeShape[], elements: ElementShape[], bodies: FlexibleBody[]): Geometry {
+export function finish(nodes: NodeShape[], elements: ElementShape[], bodies: FlexibleBody[], meshes: MeshShape[] = [], triangles: Float32Array[] = []): Geometry {
   const pose = initialPose(nodes);
   const lower = [Infinity, Infinity, Infinity], upper = [-Infinity, -Infinity, -Infinity];
   const include = (x: ArrayLike<number>) => {
@@ -182,7 +200,7 @@ export function finish(nodes: NodeShape[], elements: ElementShape[], bodies: Fle
   const centre = lower.map((low, k) => (known ? (low + upper[k]) / 2 : 0)) as unknown as Vec3;
   const extent = (known && Math.hypot(...lower.map((low, k) => upper[k] - low))) || 3 * largest || 1;
   const room = (LARGEST_BODY * extent) / Math.sqrt(Math.max(count, 1));
-  return { nodes, elements, bodies, extent, centre, bodyScale: largest > room ? room / largest : 1 };
+  return { nodes, elements, bodies, meshes, triangles, extent, centre, bodyScale: largest > room ? room / largest : 1 };
 }
 
 /** The largest semi-axis of an ellipsoid of inertia, and how many there are. */

@@ -1,14 +1,24 @@
-/** Reads `DescribeGeometry` into plain data: what is drawn, and the cards of the deck. */
+/** Reads `DescribeGeometry` into plain data: what is drawn, with the meshes of the deck's sidecar, and the cards of the deck. */
 import { geometry as client } from './api';
 import { mat3, vec3, type Mat3 } from './algebra';
 import { finish, type ElementShape, type FlexibleBody, type Geometry, type NodeShape } from './geometry';
+import { meshesOf, type Meshes } from './meshes';
 import { cardOf, type Card } from './model';
+import { SidecarError } from './sidecar';
 import type { ElementGeometry, ModalPoints, NodeGeometry } from './gen/mbcosim/v1/geometry_pb';
 
-export async function loadGeometry(simulation: string, signal?: AbortSignal): Promise<{ geometry: Geometry; cards: Map<string, Card> }> {
+export interface Loaded {
+  geometry: Geometry;
+  cards: Map<string, Card>;
+  /** Why the sidecar's meshes are not drawn. */
+  fault?: string;
+}
+
+export async function loadGeometry(simulation: string, signal?: AbortSignal): Promise<Loaded> {
   const nodes: NodeShape[] = [], elements: ElementShape[] = [], bodies: FlexibleBody[] = [];
   const indexOf = new Map<number, number>(), cards = new Map<string, Card>();
-  for await (const reply of client.describeGeometry({ simulation, cards: true }, { signal })) {
+  const pieces = new Map<string, Uint8Array[]>();
+  for await (const reply of client.describeGeometry({ simulation, cards: true, attachments: true }, { signal })) {
     switch (reply.content.case) {
       case 'nodes':
         for (const node of reply.content.value.nodes) {
@@ -25,9 +35,27 @@ export async function loadGeometry(simulation: string, signal?: AbortSignal): Pr
       case 'cards':
         for (const card of reply.content.value.cards) cards.set(...cardOf(card));
         break;
+      case 'attachment': {
+        const { path, data } = reply.content.value;
+        pieces.set(path, [...(pieces.get(path) ?? []), data]);
+        break;
+      }
     }
   }
-  return { geometry: finish(nodes, elements, bodies), cards };
+  const { meshes, triangles, fault } = await attached(pieces, nodes, elements);
+  return { geometry: finish(nodes, elements, bodies, meshes, triangles), cards, fault };
+}
+
+/** A sidecar that is wrong keeps nobody from looking at the rest. */
+async function attached(pieces: ReadonlyMap<string, Uint8Array[]>, nodes: NodeShape[], elements: ElementShape[]): Promise<Meshes & { fault?: string }> {
+  const files = await Promise.all([...pieces].map(async ([path, parts]): Promise<[string, Uint8Array]> =>
+    [path, new Uint8Array(await new Blob(parts as BlobPart[]).arrayBuffer())]));
+  try {
+    return await meshesOf(new Map(files), nodes, elements);
+  } catch (thrown) {
+    if (!(thrown instanceof SidecarError)) throw thrown;
+    return { meshes: [], triangles: [], fault: thrown.message };
+  }
 }
 
 function nodeShape(node: NodeGeometry): NodeShape {

@@ -93,9 +93,10 @@ export class Session implements Shown {
 
   /** Reads all about the simulation `name` and follows it until `close`. */
   static async open(name: string): Promise<Session> {
-    const [info, description, { geometry, cards }] = await Promise.all([look(name), describe(name), loadGeometry(name)]);
+    const [info, description, { geometry, cards, fault }] = await Promise.all([look(name), describe(name), loadGeometry(name)]);
     const session = new Session(info, modelOf(description, cards), geometry);
     await session.read();
+    if (fault) session.tell({ message: fault, reason: '', metadata: {}, diagnostics: [], cancelled: false });
     void session.follow();
     void session.poll();
     void session.watch();

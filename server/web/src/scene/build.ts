@@ -9,6 +9,7 @@ import { FaceBatch } from './batches/faces';
 import { FlexibleBatch } from './batches/flexible';
 import { GlyphBatch } from './batches/glyphs';
 import { LineBatch, type LineItem } from './batches/lines';
+import { MeshBatch } from './batches/meshes';
 import { glyph, MANY } from './glyphs';
 import { Items, nodeItems } from './items';
 import type { Palette } from './palette';
@@ -60,6 +61,8 @@ export class Drawn {
     this.add('nodes', this.nodes);
     this.addLines('links', items.links, 'link', 2);
     this.addBodies();
+    for (const { triangles, colour, items: copies } of items.meshes)
+      this.add('bodies', new MeshBatch(triangles, copies, items.points, colour ? new THREE.Color(colour) : this.colour('body')));
     for (const [name, list] of items.joints) this.add('joints', new GlyphBatch(glyph(name, list.length), list, items.points, this.colour('joint')));
     if (items.beams.length > 0) this.add('beams', new BeamBatch(items.beams, items.points, this.colour('beam')));
     this.addLines('beams', items.sections, 'section', 1.2);
@@ -124,6 +127,7 @@ export class Drawn {
     const add = (from: ArrayLike<number>, at: number, radius: number) => balls.push(new THREE.Sphere(new THREE.Vector3(from[at], from[at + 1], from[at + 2]), radius));
     for (let i = 0; i < x.length; i += 3) add(x, i, 0);
     for (const { point, size } of bodies) add(x, 3 * point, Math.max(...size));
+    for (const { batch } of this.batches) if (batch instanceof MeshBatch) balls.push(...batch.balls());
     for (const { batch } of this.batches) if (batch instanceof FlexibleBatch) for (let i = 0; i < batch.where.length; i += 3) add(batch.where, i, 0);
     return around(balls);
   }

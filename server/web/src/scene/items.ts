@@ -2,7 +2,7 @@
 import * as THREE from 'three';
 import { IDENTITY, inertiaEllipsoid, norm, type Mat3, type Vec3 } from '../algebra';
 import { BeamCurve } from '../beam_curve';
-import { initialPose, orientationOf, type ElementShape, type Geometry, type NodeShape, type Pose } from '../geometry';
+import { initialPose, orientationOf, type ElementShape, type Geometry, type MeshShape, type NodeShape, type Pose } from '../geometry';
 import type { ArrowItem } from './batches/arrows';
 import type { BarItem } from './batches/bars';
 import type { BeamItem } from './batches/beams';
@@ -21,6 +21,13 @@ const BEAM_STATIONS = 13, MANY_BEAMS = 150;
 /** Sections that are drawn between the ends of a beam are one less; so much wider than the beam. */
 const SECTIONS = 4, SECTION_RIM = 1.5;
 
+/** Copies of one mesh in one colour. */
+export interface MeshCopies {
+  triangles: Float32Array;
+  colour?: string;
+  items: GlyphItem[];
+}
+
 export class Items {
   readonly points: Points;
   readonly links: LineItem[] = [];
@@ -31,6 +38,7 @@ export class Items {
   readonly rods: BarItem[] = [];
   readonly joints = new Map<GlyphName, GlyphItem[]>();
   readonly bodies: GlyphItem[] = [];
+  readonly meshes: MeshCopies[] = [];
   readonly faces: FaceItem[] = [];
   readonly forces: ArrowItem[] = [];
   readonly moments: ArrowItem[] = [];
@@ -58,6 +66,7 @@ export class Items {
     const beams = geometry.elements.reduce((sum, element) => sum + Number(isBeam(element)), 0);
     this.stations = beams > MANY_BEAMS ? 5 : BEAM_STATIONS;
     for (const element of geometry.elements) this.collect(element);
+    for (const mesh of geometry.meshes) this.addMesh(mesh);
     geometry.nodes.forEach((node, i) => this.addNode(node, i));
     this.points.update(this.pose);
   }
@@ -89,9 +98,18 @@ export class Items {
     this.axes.push(...axes(id, point, local, length * this.size, this.points, colours));
   }
 
+  private addMesh({ id, point, orientation, scale, colour, triangles: index }: MeshShape): void {
+    const triangles = this.geometry.triangles[index];
+    let copies = this.meshes.find((known) => known.triangles === triangles && known.colour === colour);
+    if (!copies) this.meshes.push((copies = { triangles, colour, items: [] }));
+    copies.items.push({ id, point: this.points.add(point), local: orientation, size: [scale, scale, scale] });
+  }
+
+  /** Bodies whose nodes have meshes are seen by them. */
   private addMasses(element: ElementShape, points: number[]): void {
     const least = 0.3 * this.size;  // a point mass is seen, too
     for (const mass of element.masses) {
+      if (this.geometry.meshes.some(({ point }) => point.node >= 0 && point.node === element.points[mass.point].node)) continue;
       const axes = inertiaEllipsoid(mass.mass, mass.moments);
       this.bodies.push({ id: element.id, point: points[mass.point], local: mass.axes, size: axes.map((axis) => Math.max(this.geometry.bodyScale * axis, least)) as unknown as Vec3 });
     }
