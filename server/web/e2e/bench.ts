@@ -234,13 +234,17 @@ export async function withPage(browser: Browser, deck: string, work: (visit: Vis
 interface Inside {
   mbcosim: {
     desk: {
-      shown: { value?: { geometry: { nodes: { label: number }[] }; recording: { samples: { step: number; time: number }[] } } };
+      shown: { value?: {
+        geometry: { nodes: { label: number }[] };
+        model: { variables: { name: string; handle: number }[] };
+        recording: { samples: { step: number; time: number; layout: { offset(handle: number): number | undefined }; values: Float64Array }[] };
+      } };
       session?: { name: string; playing: { value: string } };
       sample?: { step: number; time: number };
     };
     scene: {
       view: {
-        nodeMatrix(index: number): number[]; picture(): Promise<Blob>; drawCalls: number; layers(): string[];
+        nodeMatrix(index: number): number[]; trails?: { object: { geometry: { attributes: { position?: { array: ArrayLike<number> } } } } }; picture(): Promise<Blob>; drawCalls: number; layers(): string[];
         camera: { projectionMatrix: { elements: number[] }; matrixWorldInverse: { elements: number[] } };
         canvas: HTMLCanvasElement;
         drawn: { batches: { layer: string; batch: { where: ArrayLike<number> } }[] };
@@ -297,6 +301,19 @@ export function placeOf(page: Page, label: number): Promise<{ x: number; y: numb
     const across = at[0] / at[3], up = at[1] / at[3], box = view.canvas.getBoundingClientRect();
     return { x: box.left + ((across + 1) / 2) * box.width, y: box.top + ((1 - up) / 2) * box.height, across, up };
   }, label);
+}
+
+/** The trails that are drawn: ends of their pieces, three numbers each. */
+export function trails(page: Page): Promise<number[]> {
+  return page.evaluate(() => Array.from((window as unknown as Inside).mbcosim.scene.view.trails?.object.geometry.attributes.position?.array ?? []));
+}
+
+/** Where the page has seen a variable go, three numbers each. */
+export function recordedPath(page: Page, variable: string): Promise<number[]> {
+  return page.evaluate((name) => {
+    const { recording, model } = (window as unknown as Inside).mbcosim.desk.shown.value ?? {}, handle = model?.variables.find((known) => known.name === name)?.handle ?? -1;
+    return recording?.samples.flatMap(({ layout, values }) => Array.from(values.slice(layout.offset(handle), (layout.offset(handle) ?? 0) + 3))) ?? [];
+  }, variable);
 }
 
 /** Whether all nodes are seen. */

@@ -20,7 +20,7 @@ import { Session, type Shown } from './session';
 const KEYS: [string, string][] = [
   ['Space', 'run and pause'], ['S', 'one step'], ['← →', 'one recorded sample back, on (turn the scene while it has the focus)'],
   ['L', 'back to live'], ['B', 'save the state'], ['/', 'search'], ['F', 'follow the selected node'], ['T', 'trail of the selected node'],
-  ['H', 'whole model'], ['1 2 3', 'views along the axes'], ['O', 'parallel projection'], ['D', 'dark and light'], ['?', 'these keys'],
+  ['Z', 'look at what is selected'], ['H', 'whole model'], ['1 2 3', 'views along the axes'], ['O', 'parallel projection'], ['D', 'dark and light'], ['?', 'these keys'],
 ];
 
 const GONE = 'The daemon does not know this simulation any more. What was seen of it can still be looked at; others are in the list of simulations.';
@@ -126,7 +126,7 @@ export class App {
 
   private right(): HTMLElement {
     return h('aside', { class: 'right', 'aria-label': 'Panels' },
-      selectionPanel(this.desk, (id) => this.scene.follow(id)),
+      selectionPanel(this.desk, this.scene),
       inputsPanel(this.desk),
       snapshotsPanel(this.desk, (name) => void this.open(name)),
       solverPanel(this.desk),
@@ -237,6 +237,7 @@ export class App {
       '/': () => this.shell.querySelector<HTMLInputElement>('.search input')?.focus(),
       f: () => press('F'),
       t: () => this.scene.toggleTrail(),
+      z: () => this.scene.lookAt(this.desk.selected.value),
       h: () => this.scene.view.look('iso'),
       '1': () => this.scene.view.look('front'),
       '2': () => this.scene.view.look('side'),

@@ -35,6 +35,7 @@ const ICONS: Record<string, string> = {
   plus: 'M12 5v14M5 12h14',
   close: 'M6 6l12 12M18 6L6 18',
   fit: 'M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5',
+  zoom: 'M10 4a6 6 0 100 12 6 6 0 000-12zM15 15l5 5M10 7v6M7 10h6',
   camera: 'M4 8h4l2-3h4l2 3h4v11H4zM12 16a3 3 0 100-6 3 3 0 000 6',
   theme: 'M12 4a8 8 0 108 8 6 6 0 01-8-8z',
   help: 'M9 9a3 3 0 115 2c-1 1-2 1.5-2 3M12 17.5v.5',

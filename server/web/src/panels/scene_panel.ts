@@ -1,10 +1,9 @@
 /** The scene with its tools. */
-import { vec3, type Vec3 } from '../algebra';
+import { add, norm, scale, subtract, vec3, type Vec3 } from '../algebra';
 import type { Desk } from '../desk';
 import { h, icon, iconButton } from '../dom';
 import { number } from '../format';
-
-import { PoseReader } from '../geometry';
+import { pointAt, PoseReader, positionOf, type Pose } from '../geometry';
 import { amplitude, MovedPose, type Mode } from '../modes';
 import { ASKED_FOR, type Layer, type Legend } from '../scene/build';
 import { DARK, LIGHT } from '../scene/palette';
@@ -16,6 +15,8 @@ const LAYERS: [Layer, string][] = [
   ['forces', 'forces and moments'], ['reactions', 'reactions of joints'], ['velocities', 'velocities of nodes'], ['links', 'links to nodes'], ['nodes', 'nodes'], ['axes', 'axes of nodes and joints'],
 ];
 const TRAIL_SAMPLES = 2000;
+/** What is looked at from near by has so much room around it, and is at least such a part of the model's extent. */
+const ROOM = 1.3, LEAST_LOOK = 0.12;
 /** Modes are shown at this pace, whatever their frequency. */
 const MODE_HERTZ = 0.8;
 
@@ -27,7 +28,11 @@ export class ScenePanel {
   private readonly layers = new Map(LAYERS.map(([layer, name]) => [layer, check(name, !ASKED_FOR.includes(layer), (on) => this.setLayer(layer, on))]));
   private readonly deformation = h('label');
   private readonly hud = h('div', { class: 'hud', role: 'status', 'aria-live': 'off' });
+  private readonly following: HTMLElement = iconButton('follow', 'Follow the selected node (F)',
+    () => this.follow(this.following.getAttribute('aria-pressed') === 'true' ? undefined : this.desk.selected.value), { 'aria-pressed': 'false' });
   private reader = new PoseReader([]);
+  /** That is drawn; undefined: nothing is yet. */
+  private pose?: Pose;
   private other?: Session;
   private otherReader = new PoseReader([]);
   private mode?: { mode: Mode; factor: number; pose: MovedPose };
@@ -44,9 +49,10 @@ export class ScenePanel {
     desk.shown.watch((shown) => {
       this.trails.clear();
       this.compareWith(undefined);
-      this.view.follow(-1);
+      this.follow(undefined);
       this.mode = undefined;
       this.reader = new PoseReader(shown?.geometry.nodes ?? []);
+      this.pose = undefined;
       if (shown) this.show(shown);
     });
     desk.selected.watch((id) => this.view.select(id));
@@ -80,7 +86,21 @@ export class ScenePanel {
   }
 
   follow(id: string | undefined): void {
-    this.view.follow(this.nodeIndex(id));
+    const node = this.nodeIndex(id);
+    this.view.follow(node);
+    this.following.setAttribute('aria-pressed', String(node >= 0));
+  }
+
+  /** Looks at the node or element from near by. */
+  lookAt(id: string | undefined): void {
+    const geometry = this.desk.shown.value?.geometry, node = this.nodeIndex(id);
+    const shape = geometry?.elements.find((element) => element.id === id);
+    if (!geometry || !this.pose) return;
+    const pose = this.pose, points = node >= 0 ? [positionOf(pose, node)] : shape?.points.map((point) => pointAt(pose, point)) ?? [];
+    if (points.length === 0) return;
+    const centre = scale(points.reduce(add), 1 / points.length);
+    const reach = Math.max(...points.map((point) => norm(subtract(point, centre))));
+    this.view.lookAt(centre, Math.max(ROOM * reach, LEAST_LOOK * geometry.extent));
   }
 
   toggleTrail(): void {
@@ -130,7 +150,8 @@ export class ScenePanel {
     if (!shown || !sample) return this.hud.replaceChildren();
     const pose = this.reader.read(sample);
     const phase = (performance.now() / 1000) * 2 * Math.PI * MODE_HERTZ;
-    this.view.setPose(this.mode ? this.mode.pose.move(pose, this.mode.mode, phase, this.mode.factor) : pose);
+    this.pose = this.mode ? this.mode.pose.move(pose, this.mode.mode, phase, this.mode.factor) : pose;
+    this.view.setPose(this.pose);
     this.updateOther(sample.time);
     this.view.setTrails([...this.trails].map((node) => this.path(node)));
     this.hud.replaceChildren(h('strong', {}, `${number(sample.time, 6)} s`), h('div', { class: 'soft' }, `step ${sample.step}`), h('div', { class: 'soft' }, `grid ${number(this.view.cell, 3)}${this.unit(shown)}`),
@@ -164,13 +185,13 @@ export class ScenePanel {
 
   private layerTools(): HTMLElement {
     const deformation = h('input', { type: 'range', min: 0, max: 3, step: 0.05, value: 0, 'aria-label': 'Deformation scale' });
-    const scale = h('span', { class: 'number' }, '× 1');
+    const times = h('span', { class: 'number' }, '× 1');
     deformation.addEventListener('input', () => {
       const factor = 10 ** deformation.valueAsNumber;
-      scale.textContent = `× ${number(factor, 2)}`;
+      times.textContent = `× ${number(factor, 2)}`;
       this.view.setDeformation(factor);
     });
-    this.deformation.append('deformation', deformation, scale);
+    this.deformation.append('deformation', deformation, times);
     const menu = h('div', { class: 'menu hidden' },
       ...this.layers.values(),
       check('names', false, (on) => this.view.setLabels(on)),
@@ -183,18 +204,13 @@ export class ScenePanel {
 
   private viewTools(): HTMLElement {
     const look = (name: ViewName, label: string) => h('button', { type: 'button', class: 'button', title: `View: ${name}`, onclick: () => this.view.look(name) }, label);
-    let flat = false, followed = false;
+    let flat = false;
     const orthographic = h('button', { type: 'button', class: 'button wide', 'aria-pressed': 'false', title: 'Parallel projection (O)', onclick: () => {
       flat = !flat;
       orthographic.setAttribute('aria-pressed', String(flat));
       this.view.setOrthographic(flat);
     } }, 'ortho');
-    const follow = iconButton('follow', 'Follow the selected node (F)', () => {
-      followed = !followed && this.nodeIndex(this.desk.selected.value) >= 0;
-      follow.setAttribute('aria-pressed', String(followed));
-      this.follow(followed ? this.desk.selected.value : undefined);
-    }, { 'aria-pressed': 'false' });
-    return h('div', { class: 'toolbar views' }, look('front', 'X–Z'), look('side', 'Y–Z'), look('top', 'X–Y'), iconButton('fit', 'Whole model (H)', () => this.view.look('iso')), orthographic, follow);
+    return h('div', { class: 'toolbar views' }, look('front', 'X–Z'), look('side', 'Y–Z'), look('top', 'X–Y'), iconButton('fit', 'Whole model (H)', () => this.view.look('iso')), orthographic, this.following);
   }
 }
 

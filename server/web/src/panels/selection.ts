@@ -9,7 +9,13 @@ import { valueOf } from '../recording';
 /** Variables whose values are followed while something is selected. */
 const MOST = 24;
 
-export function selectionPanel(desk: Desk, follow: (id: string | undefined) => void): HTMLElement {
+/** What the scene can do about what is selected. */
+export interface Looking {
+  follow(id: string | undefined): void;
+  lookAt(id: string | undefined): void;
+}
+
+export function selectionPanel(desk: Desk, scene: Looking): HTMLElement {
   const body = h('div', { class: 'inside' });
   const panel = h('details', { class: 'section', open: true }, h('summary', {}, h('h2', {}, 'Selection')), body);
   let cells: { variable: VariableInfo; cell: HTMLElement }[] = [];
@@ -25,7 +31,8 @@ export function selectionPanel(desk: Desk, follow: (id: string | undefined) => v
     const node = part.id.startsWith('node.structural:');
     body.replaceChildren(
       h('div', { class: 'row' }, h('strong', { class: 'name' }, partTitle(part)), h('span', { class: 'spacer' }),
-        node ? iconButton('follow', 'Follow this node with the camera', () => follow(part.id)) : '',
+        node || shape?.points.length ? iconButton('zoom', 'Look at it from near by (Z)', () => scene.lookAt(part.id)) : '',
+        node ? iconButton('follow', 'Follow this node with the camera', () => scene.follow(part.id)) : '',
         iconButton('close', 'Select nothing', () => (desk.selected.value = undefined), { class: 'icon-button small' })),
       part.card ? cardText(part.card, model) : '',
       shape ? facts(shape, desk) : '',

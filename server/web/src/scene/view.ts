@@ -239,20 +239,44 @@ export class View {
     return controls;
   }
 
-  /** From where all that the view shows fits into the picture, however wide or high that is. */
-  private distance(): number {
+  /** From where a ball fits into the picture, however wide or high that is. */
+  private distance(radius = this.radius): number {
     const half = (this.perspective.fov * Math.PI) / 360;
-    return this.radius / Math.sin(Math.min(half, Math.atan(this.perspective.aspect * Math.tan(half))));
+    return radius / Math.sin(Math.min(half, Math.atan(this.perspective.aspect * Math.tan(half))));
+  }
+
+  /** Both projections have the same size where the camera looks at: so many lengths there are half the picture's height. */
+  private get halfHeight(): number {
+    if (this.camera === this.orthographic) return this.orthographic.top / this.orthographic.zoom;
+    return this.camera.position.distanceTo(this.controls.target) * Math.tan((this.perspective.fov * Math.PI) / 360);
   }
 
   setOrthographic(on: boolean): void {
-    const next = on ? this.orthographic : this.perspective;
+    const next = on ? this.orthographic : this.perspective, half = this.halfHeight;
     if (next === this.camera) return;
-    next.position.copy(this.camera.position);
+    const away = on ? this.distance() : half / Math.tan((this.perspective.fov * Math.PI) / 360);  // a parallel one cuts nothing off that is near
+    next.position.copy(this.camera.position).sub(this.controls.target).setLength(away).add(this.controls.target);
     next.up.copy(this.camera.up);
     this.camera = next;
     this.controls.object = next;
     this.resize();
+    if (on) this.zoomTo(half);
+    this.controls.update();
+    this.invalidate();
+  }
+
+  private zoomTo(halfHeight: number): void {
+    this.orthographic.zoom = this.orthographic.top / halfHeight;
+    this.orthographic.updateProjectionMatrix();
+  }
+
+  /** Looks at a ball, from the side that it is looked at. */
+  lookAt(centre: Vec3, radius: number): void {
+    const { target } = this.controls, offset = this.camera.position.clone().sub(target);
+    target.set(...centre);
+    if (this.camera === this.perspective) offset.setLength(this.distance(radius));
+    else this.zoomTo(radius / Math.min(1, this.perspective.aspect));
+    this.camera.position.copy(target).add(offset);
     this.controls.update();
     this.invalidate();
   }
