@@ -213,6 +213,20 @@ describe('time', () => {
   });
 });
 
+describe('on a narrow screen', () => {
+  test('all of time is at hand, and nothing is wider than the screen', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
+      await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('0.1');
+      await page.getByRole('button', { name: 'Run until this time' }).click();
+      await atStep(page, 20);
+      for (const name of ['Run (space)', 'One step (S)', '+10', 'live', 'Replay what was recorded, in a loop', 'ortho']) expect(await page.getByRole('button', { name }).isVisible(), name).toBe(true);
+      await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.5');
+      expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBe(390);
+      expect((await page.locator('.time').boundingBox())?.height).toBeLessThan(110);
+    }, { width: 390, height: 780 });
+  });
+});
+
 describe('plots', () => {
   test('grow with the run', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }) => {
@@ -619,6 +633,22 @@ describe('for everybody', () => {
         expect(await seriousFaults(visited)).toEqual([]);
       }
     }, options);
+  });
+
+  test('no serious fault where a deck is refused, in the list and in the help', async () => {
+    await withPage(browser, 'pendulum.mbd', async (visited) => {
+      const { page } = visited;
+      await page.keyboard.press('?');
+      await page.getByRole('dialog', { name: 'Keys' }).waitFor();
+      expect(await seriousFaults(visited)).toEqual([]);
+      await page.keyboard.press('Escape');
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await page.getByLabel('Files of a deck').setInputFiles({ name: 'bad.mbd', mimeType: 'text/plain', buffer: Buffer.from('begin: data;\n  problem: nonsense;\nend: data;\n') });
+      await page.locator('.diagnostic mark').first().waitFor();
+      expect(await seriousFaults(visited)).toEqual([]);
+      visited.faults.length = 0;  // the browser reports the refusal, too
+    });
   });
 
   test('the keyboard alone is enough', async () => {

@@ -205,7 +205,7 @@ export class ScenePanel {
   private viewTools(): HTMLElement {
     const look = (name: ViewName, label: string) => h('button', { type: 'button', class: 'button', title: `View: ${name}`, onclick: () => this.view.look(name) }, label);
     let flat = false;
-    const orthographic = h('button', { type: 'button', class: 'button wide', 'aria-pressed': 'false', title: 'Parallel projection (O)', onclick: () => {
+    const orthographic = h('button', { type: 'button', class: 'button', 'aria-pressed': 'false', title: 'Parallel projection (O)', onclick: () => {
       flat = !flat;
       orthographic.setAttribute('aria-pressed', String(flat));
       this.view.setOrthographic(flat);

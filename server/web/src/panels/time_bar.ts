@@ -12,7 +12,7 @@ export class TimeBar {
   private readonly live = h('button', { type: 'button', class: 'button live', 'aria-pressed': 'true', onclick: () => this.goLive() }, 'live');
   private readonly slider = h('input', { type: 'range', min: 0, max: 1, step: 'any', value: 1, 'aria-label': 'Time looked at' });
   private readonly time = h('output', { 'aria-label': 'Time' });
-  private readonly until = h('input', { type: 'number', step: 'any', placeholder: 'until [s]', 'aria-label': 'Run until, in seconds', class: 'wide' });
+  private readonly until = h('input', { type: 'number', step: 'any', placeholder: 'until [s]', 'aria-label': 'Run until, in seconds' });
   private readonly speed = h('select', { 'aria-label': 'Speed' }, ...SPEEDS.map((speed) => h('option', { value: speed }, Number.isFinite(speed) ? `${speed} ×` : 'full speed')));
   private readonly loop: HTMLButtonElement;
   private readonly controls: HTMLElement[];
@@ -22,10 +22,10 @@ export class TimeBar {
 
   constructor(private readonly desk: Desk) {
     this.play = h('button', { type: 'button', class: 'icon-button play', onclick: () => this.toggle() }, icon('play'));
-    this.loop = iconButton('loop', 'Replay what was recorded, in a loop', () => this.toggleLoop(), { 'aria-pressed': 'false' });
+    this.loop = iconButton('loop', 'Replay what was recorded, in a loop', () => this.toggleLoop(), { 'aria-pressed': 'false', class: 'icon-button loop' });
     const step = iconButton('step', 'One step (S)', () => this.step(1));
-    const ten = h('button', { type: 'button', class: 'button wide', title: 'Ten steps', onclick: () => this.step(10) }, '+10');
-    const run = iconButton('until', 'Run until this time', () => this.runUntil(), { class: 'icon-button wide' });
+    const ten = h('button', { type: 'button', class: 'button', title: 'Ten steps', onclick: () => this.step(10) }, '+10');
+    const run = iconButton('until', 'Run until this time', () => this.runUntil());
     this.speed.value = '1';
     this.speed.addEventListener('change', () => desk.session?.setSpeed(Number(this.speed.value)));
     this.slider.addEventListener('input', () => this.look());
