@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -179,7 +180,7 @@ TEST_P(Coupled, PeersHearHowImplicitStepsEnd) {
   options.step_ended = [&](bool good, std::int64_t step, double) {
     (good ? accepted : rejected).push_back(step);
   };
-  int calls = 0;
+  std::atomic<int> calls = 0;
   Peer peer = simulation.couple(
       "spring",
       [&](const Motion& motion) {
