@@ -26,6 +26,7 @@ import mbcosim  # noqa: E402
 from conftest import TIME_FACTOR, Daemon  # noqa: E402
 
 PHASES, SETTLED = 10, 3  # phases of a run; those after which it has all that it keeps
+POOLS = ("quick", "work", "advance", "heavy")  # server/rpc/lanes.h
 SESSIONS = [(durability, coupled) for coupled in (False, True) for durability in ("none", "checkpoint", "checkpoint", "journal")]
 X, V, LOAD = "node.structural.1.X", "node.structural.1.XP", "node.structural.1.load"
 
@@ -192,12 +193,24 @@ class Worker:
         self.start(seed)
 
 
+def names_of_threads(pid):
+    names = []
+    for task in os.listdir(f"/proc/{pid}/task"):
+        try:
+            with open(f"/proc/{pid}/task/{task}/comm") as file:
+                names.append(file.read().strip())
+        except OSError:  # it has ended
+            pass
+    return names
+
+
 def measure(pid):
-    """Anonymous memory [bytes], threads, descriptors: the least of some looks, for what ends meanwhile."""
+    """Anonymous memory [bytes], threads, descriptors: the least of some looks, for what ends meanwhile. Threads of the work pools,
+    which are bounded and outlive their work by a while, are not counted."""
     def look():
         with open(f"/proc/{pid}/status") as file:
             memory = int(next(line for line in file if line.startswith("RssAnon")).split()[1]) << 10
-        return memory, len(os.listdir(f"/proc/{pid}/task")), len(os.listdir(f"/proc/{pid}/fd"))
+        return memory, sum(name not in POOLS for name in names_of_threads(pid)), len(os.listdir(f"/proc/{pid}/fd"))
 
     looks = []
     for _ in range(6):
