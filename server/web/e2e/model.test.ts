@@ -30,7 +30,7 @@ describe('what is picked', () => {
       const parameters = await written.getByRole('row').allTextContents();
       expect(parameters).toContain('m1');
       expect(parameters.map((row) => row.slice(0, 1)).sort()).toEqual([...new Set(card.text.match(/\b[mlACI]\b/g))].sort());
-      expect(await page.getByRole('table', { name: 'Variables' }).textContent()).toContain('E J');
+      expect(await page.getByRole('table', { name: 'Variables' }).textContent()).toContain('E energy');
     });
   });
 

@@ -243,7 +243,7 @@ describe('plots', () => {
       await page.getByRole('button', { name: 'Export' }).click();
       await page.getByRole('button', { name: 'Table of the plots (CSV)' }).click();
       const lines = readFileSync(await (await download).path(), 'utf8').trim().split('\n');
-      expect(lines[0]).toBe('step,time [s],node.structural.2.X.x [m],node.structural.2.X.y [m],node.structural.2.X.z [m]');
+      expect(lines[0]).toBe('step,time [s],node.structural.2.X.x [length],node.structural.2.X.y [length],node.structural.2.X.z [length]');
       const [step, time, x, , z] = lines[lines.length - 1].split(',').map(Number);
       expect([step, time]).toEqual([20, expect.closeTo(0.1, 9)]);
       expect(Math.hypot(x, z)).toBeCloseTo(1, 5);
@@ -605,8 +605,9 @@ describe('layers', () => {
       await until(page, () => document.querySelectorAll('.labels span').length >= 3, undefined);
       const end = Date.now() + 20_000;
       let after = before;
-      while (after.covered <= before.covered * 1.02 && Date.now() < end) after = await picture(page);
-      expect(after.covered).toBeGreaterThan(before.covered * 1.02);
+      // the meshes of this deck cover most of what the arrows do
+      while (after.covered <= before.covered * 1.01 && Date.now() < end) after = await picture(page);
+      expect(after.covered).toBeGreaterThan(before.covered * 1.01);
       expect(await page.locator('.labels').textContent()).toContain('spherical hinge 2');
     });
   });
