@@ -1,11 +1,13 @@
 """The asyncio client: steps, reads, writes, couples; the same numbers as the blocking one."""
 import asyncio
+import gc
 
 import pytest
 
 import decks
 import mbcosim
 import mbcosim.aio
+from conftest import TIME_FACTOR
 from test_coupling import PORT, oscillator, position, spring
 
 X = "node.structural.1.X"
@@ -102,6 +104,36 @@ def test_failures(daemon):
         await wrong.close()
 
     run(daemon, body)
+
+
+def test_a_peer_that_computes_while_the_server_dies_is_told(start_daemon):
+    daemon, stray = start_daemon(), []
+
+    async def body():
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: stray.append(context))
+        async with mbcosim.aio.connect(daemon.address) as server:
+            simulation = await server.load_text(decks.OSCILLATOR, ports=PORT)
+            begun, dead = asyncio.Event(), asyncio.Event()
+
+            async def slow(motion):
+                begun.set()
+                await dead.wait()
+                return spring(motion)
+
+            peer = await simulation.couple("spring", slow, peer_timeout=600, heartbeat_timeout=0.3)
+            step = asyncio.ensure_future(simulation.step())
+            await begun.wait()
+            daemon.kill()
+            with pytest.raises(mbcosim.Unavailable):
+                await step
+            dead.set()
+            await asyncio.wait([peer._task])
+            await peer.close()
+            assert isinstance(peer.error, mbcosim.Unavailable)
+
+    asyncio.run(asyncio.wait_for(body(), 60 * TIME_FACTOR))
+    gc.collect()
+    assert stray == []
 
 
 def test_synchronous_peers_and_views(server):

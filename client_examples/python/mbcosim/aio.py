@@ -452,7 +452,8 @@ class Peer(exchange.Course):
 
     async def _write(self, message: coupling_pb2.PeerMessage) -> None:
         async with self._writing:  # the heart writes, too
-            await self._stream.write(message)
+            with contextlib.suppress(grpc.RpcError, asyncio.InvalidStateError):  # the stream has ended: who reads is told how
+                await self._stream.write(message)
 
     async def _beat(self) -> None:
         """Sends signs of life, and looks for those of the server."""
@@ -467,10 +468,7 @@ class Peer(exchange.Course):
             if self._beats is None:
                 continue
             count += 1
-            try:
-                await self._write(coupling_pb2.PeerMessage(heartbeat=coupling_pb2.Heartbeat(count=count)))
-            except (grpc.RpcError, asyncio.InvalidStateError):
-                return
+            await self._write(coupling_pb2.PeerMessage(heartbeat=coupling_pb2.Heartbeat(count=count)))
 
     async def _serve(self) -> None:
         assert self._function is not None
