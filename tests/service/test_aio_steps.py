@@ -1,12 +1,15 @@
 """Steps one by one in a loop of the asyncio client: they travel on an open stream, as those of the blocking one do (test_stepping.py)."""
 import asyncio
+import types
 
+import grpc
 import pytest
 
 import decks
 import mbcosim
 import mbcosim.aio
 from conftest import TIME_FACTOR
+from mbcosim.stepping import AwaitedStepLine
 from mbcosim.v1 import simulations_pb2 as pb
 
 POSITION = "node.structural.1.X"
@@ -94,12 +97,37 @@ def test_a_step_that_nobody_awaits_any_more_leaves_no_reply_for_the_next(daemon)
     run(daemon, body)
 
 
+async def subscribed(simulation):
+    """A subscription in the only place for streams. The upload of the deck has it until the server knows that its reply has arrived."""
+    while True:
+        try:
+            return await simulation.subscribe(["time"])
+        except mbcosim.LimitExceeded:
+            await asyncio.sleep(0.01)
+
+
 def test_where_no_stream_is_to_be_had_a_loop_makes_calls(start_daemon):
     async def body(server):
-        async with await server.load_text(decks.body()) as simulation, await simulation.subscribe(["time"]):
+        async with await server.load_text(decks.body()) as simulation, await subscribed(simulation):
             assert (await in_a_loop(simulation, 20))[-1].step == 20 and not has_a_stream(simulation)
 
     run(start_daemon("--limit-identity-streams", "1"), body)
+
+
+def test_a_write_that_meets_the_end_of_its_stream_leaves_the_step_to_a_call():
+    class Ended:
+        async def write(self, _):
+            raise grpc.aio.AioRpcError(grpc.StatusCode.INTERNAL, grpc.aio.Metadata(), grpc.aio.Metadata(), "Internal error from Core")
+
+        def cancel(self):
+            pass
+
+    async def body():
+        line = AwaitedStepLine(types.SimpleNamespace(StepStream=lambda metadata: Ended()), [])
+        assert [await line.step(pb.StepRequest()) for _ in range(3)] == [None] * 3
+        assert line._stream is None
+
+    asyncio.run(body())
 
 
 def test_a_daemon_that_dies_in_a_loop_is_noticed(start_daemon):

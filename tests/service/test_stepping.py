@@ -1,4 +1,5 @@
 """Steps: one by one, in chunks, on a stream, with retries; the same bits each time."""
+import contextlib
 import threading
 import time
 
@@ -189,9 +190,22 @@ def test_two_threads_step_one_simulation_in_a_loop(server):
         assert errors == [] and simulation.refresh().step == 200
 
 
+def subscribed(simulation):
+    """A subscription in the only place for streams. The upload of the deck has it until the server knows that its reply has arrived."""
+    found = []
+
+    def try_it():
+        with contextlib.suppress(mbcosim.LimitExceeded):
+            found.append(simulation.subscribe(["time"]))
+        return found
+
+    wait_for(try_it)
+    return found[0]
+
+
 def test_where_no_stream_is_to_be_had_a_loop_makes_calls(start_daemon):
     daemon = start_daemon("--limit-identity-streams", "1")
-    with daemon.connect() as server, server.load_text(decks.body()) as simulation, simulation.subscribe(["time"]):
+    with daemon.connect() as server, server.load_text(decks.body()) as simulation, subscribed(simulation):
         assert in_a_loop(simulation, 20)[-1].step == 20
         assert not opens_a_stream(simulation)
 
