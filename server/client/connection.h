@@ -34,6 +34,20 @@ std::string collect(Stream stream) {
   return bytes;
 }
 
+/// The other way: pieces of `bytes` after `header`, and the end.
+template <class Request>
+void upload(grpc::ClientWriter<Request>& stream, Request header, const std::string& bytes) {
+  constexpr std::size_t kChunkBytes = 1 << 20;
+  bool open = stream.Write(header);
+  for (std::size_t at = 0; open && at < bytes.size(); at += kChunkBytes) {
+    Request piece;
+    piece.set_data(bytes.substr(at, kChunkBytes));
+    open = stream.Write(piece);
+  }
+  stream.WritesDone();
+  require(stream.Finish());
+}
+
 struct Server::Impl {
   std::string address, authorization;  ///< "Bearer …", or empty
   std::shared_ptr<grpc::Channel> channel;

@@ -66,12 +66,14 @@ Variable::Causality to_causality(v1::Causality causality) {
   switch (causality) {
     case v1::CAUSALITY_INPUT:
       return Variable::input;
+    case v1::CAUSALITY_OUTPUT:
+      return Variable::output;
     case v1::CAUSALITY_PARAMETER:
       return Variable::parameter;
     case v1::CAUSALITY_STATE:
       return Variable::state;
     default:
-      return Variable::output;
+      return Variable::unknown;
   }
 }
 
@@ -167,11 +169,20 @@ void fill_durability(const LoadOptions& options, v1::CreateOptions* out) {
                                                                     : v1::DURABILITY_CHECKPOINT);
   if (options.checkpoint_steps) out->set_checkpoint_steps(*options.checkpoint_steps);
   if (options.checkpoint_interval)
-    *out->mutable_checkpoint_interval() = google::protobuf::util::TimeUtil::MillisecondsToDuration(
-        std::llround(1000 * *options.checkpoint_interval));
+    *out->mutable_checkpoint_interval() =
+        to_duration(*options.checkpoint_interval, "checkpoint_interval");
 }
 
 }  // namespace
+
+google::protobuf::Duration to_duration(double seconds, const char* field) {
+  constexpr double kLongest = 1e9;
+  if (!(std::abs(seconds) <= kLongest))
+    throw Error("`" + std::string(field) +
+                    "` is no duration of at most 1e9 s: " + std::to_string(seconds) + " s",
+                /*code=*/3, "BAD_ARGUMENT", {}, field);
+  return google::protobuf::util::TimeUtil::NanosecondsToDuration(std::llround(seconds * 1e9));
+}
 
 void fill(const LoadOptions& options, v1::CreateOptions* out) {
   out->set_request_id(new_request_id());
@@ -180,9 +191,7 @@ void fill(const LoadOptions& options, v1::CreateOptions* out) {
   for (const Port& port : options.ports) *out->add_ports() = to_proto(port);
   out->set_non_convergence_policy(to_proto(options.policy));
   if (options.minimum_step) out->set_minimum_step_size(*options.minimum_step);
-  if (options.lease)
-    *out->mutable_lease() = google::protobuf::util::TimeUtil::MillisecondsToDuration(
-        static_cast<std::int64_t>(1000 * *options.lease));
+  if (options.lease) *out->mutable_lease() = to_duration(*options.lease, "lease");
   out->set_record_ports(options.record);
   out->set_summed_time(options.summed_time);
   for (const auto& [name, value] : options.symbols)
@@ -193,8 +202,7 @@ void fill(const LoadOptions& options, v1::CreateOptions* out) {
   if (options.pace) out->mutable_pace()->set_rate(*options.pace);
   if (options.deck_sockets)
     *out->mutable_deck_sockets()->mutable_peer_timeout() =
-        google::protobuf::util::TimeUtil::MillisecondsToDuration(
-            std::llround(1000 * *options.deck_sockets));
+        to_duration(*options.deck_sockets, "deck_sockets.peer_timeout");
   if (options.units) *out->mutable_units() = to_proto(*options.units);
 }
 

@@ -1,6 +1,8 @@
 /// Internal to the client library: messages from and to what its users see.
 #pragma once
 
+#include <google/protobuf/duration.pb.h>
+
 #include <string>
 #include <vector>
 
@@ -25,6 +27,10 @@ Variable to_variable(const v1::Variable& variable);
 Matrix to_matrix(const v1::Matrix& matrix);
 std::vector<Diagnostic> to_diagnostics(
     const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics);
+
+/// `seconds` [s] to the nanosecond. Throws Error (INVALID_ARGUMENT, `field`) for NaN, and beyond
+/// the 1e9 s that servers take.
+google::protobuf::Duration to_duration(double seconds, const char* field);
 
 /// A text that no other request has.
 std::string new_request_id();

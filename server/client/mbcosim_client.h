@@ -340,7 +340,7 @@ using Answer = std::function<Loads(const Motion&)>;
 
 /// A variable of the model.
 struct Variable {
-  enum Causality { input, output, parameter, state };
+  enum Causality { input, output, parameter, state, unknown };  ///< unknown: of a newer server
   std::string name, unit, frame, description;
   std::string si_unit;     ///< that it has in a deck written in SI units
   std::vector<int> shape;  ///< empty: a number

@@ -1,7 +1,5 @@
 #include "client/peer.h"
 
-#include <google/protobuf/util/time_util.h>
-
 #include <algorithm>
 #include <chrono>
 #include <functional>
@@ -101,11 +99,6 @@ v1::TangentForm to_proto(Tangent form) {
   }
 }
 
-google::protobuf::Duration to_duration(double seconds) {
-  return google::protobuf::util::TimeUtil::MillisecondsToDuration(
-      static_cast<std::int64_t>(seconds * 1000));
-}
-
 std::int64_t nanoseconds_now() {
   return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -196,14 +189,15 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   iteration->set_tolerance(options.tolerance);
   iteration->set_maximum_passes(options.maximum_passes);
   v1::PeerPresence* presence = hello.mutable_presence();
-  *presence->mutable_peer_timeout() = to_duration(options.peer_timeout);
+  *presence->mutable_peer_timeout() = to_duration(options.peer_timeout, "peer_timeout");
   presence->set_policy(to_proto(options.policy));
   if (options.heartbeat_timeout > 0)
-    *presence->mutable_heartbeat_timeout() = to_duration(options.heartbeat_timeout);
+    *presence->mutable_heartbeat_timeout() =
+        to_duration(options.heartbeat_timeout, "heartbeat_timeout");
   if (options.server_timeout > 0) {
     double interval = options.server_timeout / 3;
     if (options.heartbeat_timeout > 0) interval = std::min(interval, options.heartbeat_timeout);
-    *presence->mutable_heartbeat_interval() = to_duration(interval);
+    *presence->mutable_heartbeat_interval() = to_duration(interval, "heartbeat_interval");
   }
   return hello;
 }

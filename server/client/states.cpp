@@ -7,7 +7,6 @@ namespace mbcosim::client {
 namespace {
 
 using Stub = v1::Simulations::Stub;
-constexpr std::size_t kChunkBytes = 1 << 20;
 
 std::string exported(const Simulation::Impl& simulation, const std::string& snapshot,
                      double timeout) {
@@ -106,20 +105,14 @@ Snapshot Simulation::import_state(const std::string& bytes, bool restore,
                                   const std::string& display_name, double timeout) {
   CallContext context(*impl_->server, timeout, name());
   v1::ImportSnapshotReply reply;
-  const auto upload = impl_->server->simulations->ImportSnapshot(&context, &reply);
+  const auto stream = impl_->server->simulations->ImportSnapshot(&context, &reply);
   v1::ImportSnapshotRequest message;
   v1::ImportSnapshotHeader* header = message.mutable_header();
   header->set_simulation(name());
   header->set_display_name(display_name);
   header->set_restore(restore);
   header->set_request_id(new_request_id());
-  bool open = upload->Write(message);
-  for (std::size_t at = 0; open && at < bytes.size(); at += kChunkBytes) {
-    message.set_data(bytes.substr(at, kChunkBytes));
-    open = upload->Write(message);
-  }
-  upload->WritesDone();
-  require(upload->Finish());
+  upload(*stream, std::move(message), bytes);
   return to_snapshot(reply.snapshot());
 }
 

@@ -1,8 +1,5 @@
 /// Steps on an open stream, and samples as they come.
-#include <google/protobuf/util/time_util.h>
 #include <grpcpp/client_context.h>
-
-#include <cmath>
 
 #include "client/convert.h"
 #include "client/reading.h"
@@ -148,8 +145,8 @@ Subscription Simulation::subscribe(const std::vector<std::string>& variables,
   request.set_policy(to_proto(options.policy));
   request.set_buffer_samples(options.buffer);
   if (options.minimum_interval)
-    *request.mutable_minimum_interval() = google::protobuf::util::TimeUtil::NanosecondsToDuration(
-        std::llround(*options.minimum_interval * 1e9));
+    *request.mutable_minimum_interval() =
+        to_duration(*options.minimum_interval, "minimum_interval");
   auto impl = std::make_unique<Subscription::Impl>(impl_->server, request);
   impl->stream.begin(&impl->batch, options.timeout, "the subscription");
   return Subscription(std::move(impl));

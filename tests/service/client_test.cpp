@@ -735,6 +735,29 @@ TEST_P(Coupled, APeerCountsInUnitsOfItsOwn) {
   EXPECT_EQ(simulation.read("node.structural.1.load").at(2), 9);
 }
 
+TEST(Client, DurationsThatAreNoneAreRefusedByTheirField) {
+  Server server = connect();
+  const auto refused = [](const auto& work) -> std::string {
+    try {
+      work();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), 3);
+      return error.field();
+    }
+    return "nothing";
+  };
+  for (const double none : {std::nan(""), HUGE_VAL, 1e300}) {
+    LoadOptions options;
+    options.lease = none;
+    EXPECT_EQ(refused([&] { server.load_text(body(), options); }), "lease");
+    Simulation simulation = server.load_text(body(), with_port());
+    EXPECT_EQ(refused([&] { simulation.subscribe({"time"}, {.minimum_interval = none}); }),
+              "minimum_interval");
+    EXPECT_EQ(refused([&] { simulation.attach("spring", {.peer_timeout = none}); }),
+              "peer_timeout");
+  }
+}
+
 TEST(Client, UnitsThatAreNoneAreRefusedByTheirField) {
   Server server = connect();
   LoadOptions options;
