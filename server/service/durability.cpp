@@ -25,6 +25,20 @@ std::string id_of(const std::string& simulation) { return simulation.substr(kPre
   throw Refusal(v1::REASON_STORAGE_FULL, what + ": " + error.what());
 }
 
+// All of it, or nothing is left.
+template <class Write>
+void store_new(StateFolder& folder, const std::string& id, Write write) {
+  try {
+    write();
+  } catch (const StorageError& error) {
+    folder.remove(id);
+    refuse_storage("the simulation cannot be stored", error);
+  } catch (...) {
+    folder.remove(id);
+    throw;
+  }
+}
+
 std::unique_ptr<StateFolder> open_folder(const Config& config) {
   if (config.state_dir.empty()) return nullptr;
   return std::make_unique<StateFolder>(config.state_dir, config.limits.state_bytes);
@@ -191,16 +205,10 @@ void Durability::begin(Session& session, const KeptDeck& deck, const v1::CreateO
   *model.head.mutable_model_options() = deck.options;
   model.files = deck.files;
   session.set_keeping(make_keeping(session.identity().id, options));
-  try {
+  store_new(*folder_, id, [&] {
     folder_->write_model(id, model);
     write(session);
-  } catch (const StorageError& error) {
-    folder_->remove(id);
-    refuse_storage("the simulation cannot be stored", error);
-  } catch (...) {
-    folder_->remove(id);
-    throw;
-  }
+  });
 }
 
 std::unique_ptr<Keeping> Durability::make_keeping(const std::string& simulation,
@@ -382,9 +390,9 @@ v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheck
                                       std::uint64_t digest, const Caller& caller,
                                       const Call& call) {
   v1::SimulationInfo info;
-  const std::string before = find_request(caller.identity, header.request_id());
-  if (!before.empty() && describe(before, caller, &info)) return info;
+  if (imported(header.request_id(), digest, caller, &info)) return info;
   const SessionStore::Place place(parts_->store, header.request_id(), digest, caller, call);
+  if (imported(header.request_id(), digest, caller, &info)) return info;  // beside this call
   if (place.known()) {
     place.known()->fill(&info, caller);
     return info;
@@ -413,9 +421,19 @@ v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheck
   return info;
 }
 
+bool Durability::imported(const std::string& request_id, std::uint64_t digest, const Caller& caller,
+                          v1::SimulationInfo* out) const {
+  Guard guard(mutex_);
+  const Suspended* found = made_by(caller.identity, request_id);
+  if (!found) return false;
+  if (found->head.request_digest() != digest) refuse_other_request(request_id);
+  *out = found->info;
+  return true;
+}
+
 void Durability::put_in_folder(const std::string& simulation, const StoredBundle& bundle) {
   const std::string id = id_of(simulation);
-  try {
+  store_new(*folder_, id, [&] {
     folder_->write_model(id, bundle.model);
     for (const v1::CheckpointSnapshot& snapshot : bundle.point.point.snapshots()) {
       const auto state = bundle.snapshots.find(snapshot.number());
@@ -426,13 +444,7 @@ void Durability::put_in_folder(const std::string& simulation, const StoredBundle
     }
     folder_->write_point(id, bundle.point);
     read_one(id);
-  } catch (const StorageError& error) {
-    folder_->remove(id);
-    refuse_storage("the simulation cannot be stored", error);
-  } catch (...) {
-    folder_->remove(id);
-    throw;
-  }
+  });
   log_.created({simulation, bundle.model.head.owner()}, bundle.point.point.info().display_name(),
                "");
 }
@@ -489,12 +501,18 @@ bool Durability::remove(const std::string& simulation, const Caller& caller) {
 
 std::string Durability::find_request(const std::string& owner,
                                      const std::string& request_id) const {
-  if (request_id.empty()) return "";
   Guard guard(mutex_);
+  const Suspended* found = made_by(owner, request_id);
+  return found ? found->head.simulation() : "";
+}
+
+const Suspended* Durability::made_by(const std::string& owner,
+                                     const std::string& request_id) const {
+  if (request_id.empty()) return nullptr;
   for (const auto& [name, suspended] : suspended_)
     if (suspended.head.owner() == owner && suspended.head.options().request_id() == request_id)
-      return name;
-  return "";
+      return &suspended;
+  return nullptr;
 }
 
 // ------------------------------------------------------------------ from disk to memory

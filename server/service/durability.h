@@ -87,6 +87,10 @@ class Durability {
   void put_in_folder(const std::string& simulation, const StoredBundle& bundle);
   void write_snapshots(Session& session, Keeping& keeping, const std::string& id,
                        v1::CheckpointPoint& point) TS_REQUIRES(keeping.mutex);
+  const Suspended* made_by(const std::string& owner, const std::string& request_id) const
+      TS_REQUIRES(mutex_);  ///< null: none
+  bool imported(const std::string& request_id, std::uint64_t digest, const Caller& caller,
+                v1::SimulationInfo* out) const TS_EXCLUDES(mutex_);
   bool may_see(const Suspended& suspended, const Caller& caller, Access access) const;
   std::unique_ptr<Keeping> make_keeping(const std::string& simulation,
                                         const v1::CreateOptions& options) const;

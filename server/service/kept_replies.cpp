@@ -38,6 +38,10 @@ void check_request_id(const std::string& id) {
                   "`request_id` must not be longer than " + std::to_string(kLongestId) + " bytes");
 }
 
+void refuse_other_request(const std::string& id) {
+  throw Refusal(v1::REASON_BAD_ARGUMENT, "`request_id` \"" + utf8(id) + "\" was another request's");
+}
+
 // ------------------------------------------------------------------ one request
 
 KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::string& request_id,
@@ -49,9 +53,7 @@ KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::stri
   Guard guard(kept_.mutex_);
   bool waits = false;
   for (Entry* entry = kept_.find(identity_, id_); entry; entry = kept_.find(identity_, id_)) {
-    if (entry->digest != digest_)
-      throw Refusal(v1::REASON_BAD_ARGUMENT,
-                    "`request_id` \"" + utf8(id_) + "\" was another request's");
+    if (entry->digest != digest_) refuse_other_request(id_);
     if (!entry->at_work) {
       (entry->begun ? begun_ : known_) = entry->reply;
       entry->at_work = entry->begun;

@@ -87,4 +87,7 @@ class KeptReplies {
 /// Throws BAD_ARGUMENT for an id that is too long.
 void check_request_id(const std::string& id);
 
+/// Throws BAD_ARGUMENT: a repeat must be the request that it repeats.
+[[noreturn]] void refuse_other_request(const std::string& id);
+
 }  // namespace mbcosim::server

@@ -33,9 +33,7 @@ SessionStore::Place::Place(SessionStore& store, const std::string& request_id, s
       store_.changed_.wait_for(store_.mutex_, kLook);
     if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
     known_ = store_.find_request(request_);
-    if (known_ && known_->identity().request_digest != digest)
-      throw Refusal(v1::REASON_BAD_ARGUMENT,
-                    "`request_id` \"" + utf8(request_id) + "\" was another request's");
+    if (known_ && known_->identity().request_digest != digest) refuse_other_request(request_id);
     if (known_) return;
   }
   store_.check_room(caller.identity);
@@ -136,8 +134,7 @@ bool SessionStore::was_removed(const std::string& id, const Request& request) co
                                   [&](const auto& removal) { return removal.first == request; });
   if (found == removals_.end()) return false;
   if (found->second == id) return true;
-  throw Refusal(v1::REASON_BAD_ARGUMENT,
-                "`request_id` \"" + utf8(request.second) + "\" was another request's");
+  refuse_other_request(request.second);
 }
 
 void SessionStore::remove(const std::string& id, const Caller& caller,

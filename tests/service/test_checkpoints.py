@@ -1,7 +1,9 @@
 """Simulations as bytes: carried to another daemon they go on bit for bit; the commands that list, store and bring back."""
+import concurrent.futures
 import os
 import subprocess
 
+import grpc
 import pytest
 
 import mbcosim
@@ -54,6 +56,31 @@ def test_damaged_bytes_are_refused_and_leave_nothing(start, damage):
                 server.import_checkpoint(damage(data))
             assert refused.value.reason in ("DAMAGED_STATE", "BAD_ARGUMENT"), refused.value
             assert [info.name for info in server.list()] == [simulation.info.name]
+
+
+def test_a_repeated_import_makes_one_simulation(start):
+    """While the first is suspended, when it lives, and when both arrive at once; other bytes with its id are refused."""
+    with start().connect() as server:
+        with server.load_text(deck(100), name="body") as simulation:
+            data, other = simulation.export_checkpoint(), (simulation.step(1), simulation.export_checkpoint())[1]
+
+        def carry(request_id, data):
+            messages = [pb.ImportCheckpointRequest(header=pb.ImportCheckpointHeader(request_id=request_id)),
+                        pb.ImportCheckpointRequest(data=data)]
+            return server.simulations.ImportCheckpoint(iter(messages), timeout=60, metadata=server.metadata).simulation.name
+
+        first = carry("one", data)
+        assert carry("one", data) == first
+        for state in (pb.SIMULATION_STATE_SUSPENDED, pb.SIMULATION_STATE_READY):
+            assert state_of(server, first) == state
+            with pytest.raises(grpc.RpcError) as refused:
+                carry("one", other)
+            assert refused.value.details() == '`request_id` "one" was another request\'s'
+            assert server.attach(first).step(1)
+        assert carry("one", data) == first
+        with concurrent.futures.ThreadPoolExecutor(8) as pool:
+            assert len(set(pool.map(lambda _: carry("many", data), range(8)))) == 1
+        assert len(server.list()) == 2
 
 
 def test_what_is_not_durable_is_refused_by_name(start, start_daemon):
