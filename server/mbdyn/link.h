@@ -18,12 +18,6 @@ class ChannelLost : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The code asked for the end of the run.
-class ChannelEnded : public ChannelLost {
- public:
-  using ChannelLost::ChannelLost;
-};
-
 using Clock = std::chrono::steady_clock;
 
 /// How long a wait may be, what ends it before, and who hears of what does not end a run.

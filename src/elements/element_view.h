@@ -234,7 +234,6 @@ class Tangent {
  public:
   using Block = Eigen::Ref<const Mat3>;
   int row_node(int k) const { return 6 * k; }
-  int row_scalar(int k) const { return 6 * nodes + k; }
   int row_own(int i) const { return 6 * nodes + scalars + i; }
   int row_momentum(int k) const { return 6 * nodes + scalars + owns + 6 * k; }
   int col_node(int k) const { return 6 * k; }

@@ -103,7 +103,6 @@ class Reading {
   void forget_trail(int trail);
   void set_trail(int trail) { trail_ = trail; }
   int trail() const { return trail_; }
-  const Trail& trail_at(int index) const { return trails_[index]; }
 
   // ------------------------------------------------------------------ model
   ModelBuilder* builder() const { return builder_; }

@@ -137,7 +137,7 @@ class Card {
 
   // ------------------------------------------------------------------ references to nodes and
   // elements
-  enum class NodeNeed { any, six_dof, dynamic_or_static_displacement, not_dummy };
+  enum class NodeNeed { any, six_dof, not_dummy };
   /// Index of a structural node read by label. `six_dof`: refuses displacement and dummy nodes.
   virtual int structural_node(NodeNeed need = NodeNeed::six_dof) = 0;
   virtual int scalar_node(ScalarKind kind) = 0;  ///< index among the scalar nodes

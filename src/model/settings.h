@@ -111,7 +111,7 @@ struct ControlSettings {
   int output_precision = 6;
   OrientationDescription orientation = OrientationDescription::euler123;
   bool output_reference_frames = false, output_drives = false;
-  bool netcdf = false, text = true;
+  bool netcdf = false;
   bool is_static = false;  ///< `model: static`
 };
 

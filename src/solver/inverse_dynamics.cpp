@@ -77,8 +77,7 @@ InverseDynamics::InverseDynamics(const Model& model)
     } else if (info.family == Family::body) {
       bodies_.push_back(e);
     } else {
-      if (settings_.role(info).ergonomy)
-        ergonomy_.push_back({e, beams_of(e) != nullptr, is_hinge(e)});
+      if (settings_.role(info).ergonomy) ergonomy_.push_back({e, is_hinge(e)});
       if (settings_.role(info).loads) loads_.push_back(e);
     }
   }

@@ -64,7 +64,7 @@ class InverseDynamics final : public StepSystem {
   /// An elastic element whose energy is minimized, or a beam that loads the nodes.
   struct Spring {
     ElementRef element;
-    bool is_beam, is_hinge;
+    bool is_hinge;
   };
   using Triplets = std::vector<Eigen::Triplet<double>>;
   using Sparse = Eigen::SparseMatrix<double>;
