@@ -24,8 +24,9 @@ def model(name: str) -> str:
 
 
 def options(description: Optional[str], plot: str, steps: Optional[int] = None, second: bool = False,
-            deck: Optional[str] = None) -> argparse.Namespace:
-    """--address of the server, --plot file; --steps and --deck if they have a default; --second server if it can be used."""
+            deck: Optional[str] = None, **others: str) -> argparse.Namespace:
+    """--address of the server, --plot file; --steps and --deck if they have a default; --second server if it can be used; others with
+    their help."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--address", help="of the server; default: the daemon of this user, or one started for the run")
     parser.add_argument("--plot", default=plot, help="picture to write; default: %(default)s")
@@ -35,6 +36,8 @@ def options(description: Optional[str], plot: str, steps: Optional[int] = None, 
         parser.add_argument("--deck", default=deck, help="model; default: %(default)s")
     if steps is not None:
         parser.add_argument("--steps", type=int, default=steps, help="length of the runs; default: %(default)s")
+    for name, text in others.items():
+        parser.add_argument("--" + name, help=text)
     return parser.parse_args()
 
 
