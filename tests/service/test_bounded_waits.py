@@ -112,6 +112,47 @@ def test_the_tables_have_every_call():
     assert calls(SnapshotCalls) == set(SNAPSHOT_CALLS)
 
 
+def waits(server, simulation):
+    """Calls of each way to wait: for one message, for a stream to its end, for one to be opened; `call(timeout)` by name."""
+    return {
+        "read": lambda seconds: simulation.read([X], timeout=seconds),
+        "load_text": lambda seconds: server.load_text(decks.body(), timeout=seconds),
+        "export_state": lambda seconds: simulation.export_state(timeout=seconds),
+        "subscribe": lambda seconds: simulation.subscribe([X], timeout=seconds),
+        "couple": lambda seconds: simulation.couple("spring", spring, timeout=seconds),
+        "events": lambda seconds: server.events(timeout=seconds),
+    }
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("client", [mbcosim, mbcosim.aio], ids=lambda m: m.__name__)
+def test_what_is_no_timeout_is_refused_by_its_name(daemon, client, seconds):
+    async def result(of):
+        return await of if inspect.isawaitable(of) else of
+
+    async def main(server):
+        simulation = await result(server.load_text(decks.body(), ports=PORT))
+        stepper = await result(simulation.stepper())
+        calls = {**waits(server, simulation), "stepper": lambda seconds: stepper.step(timeout=seconds)}
+        for name, call in calls.items():
+            with pytest.raises(mbcosim.Error, match="`timeout` must be a positive number of seconds") as caught:
+                await result(call(seconds))
+            assert (caught.value.reason, caught.value.field) == ("BAD_ARGUMENT", "timeout"), name
+        await result(stepper.close())
+        assert (await result(simulation.refresh())).step == 0
+        await result(simulation.delete())
+
+    async def awaited():
+        async with mbcosim.aio.connect(daemon.address) as server:
+            await main(server)
+
+    if client is mbcosim.aio:
+        asyncio.run(asyncio.wait_for(awaited(), 60 * TIME_FACTOR))
+    else:
+        with mbcosim.connect(daemon.address) as server:
+            asyncio.run(main(server))
+
+
 def took(begin, bound, what="it"):
     seconds = time.monotonic() - begin
     assert seconds < bound, f"{what} took {seconds:.1f} s"

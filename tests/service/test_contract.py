@@ -302,6 +302,24 @@ def test_a_wrong_span_is_refused_by_its_field(server, seconds):
         assert simulation.refresh().step == 0
 
 
+@pytest.mark.parametrize("seconds", [NAN, INFINITE, -INFINITE, 1e300])
+def test_what_is_no_duration_is_refused_by_its_field_before_it_is_sent(server, seconds):
+    with server.load_text(decks.body(), ports=PORT) as simulation:
+        calls = {"lease": lambda: server.load_text(decks.body(), lease=seconds),
+                 "checkpoint_interval": lambda: server.load_text(decks.body(), checkpoint_interval=seconds),
+                 "deck_sockets.peer_timeout": lambda: server.load_text(decks.body(), deck_sockets=seconds),
+                 "minimum_interval": lambda: simulation.subscribe([X], minimum_interval=seconds),
+                 "peer_timeout": lambda: simulation.couple("spring", spring, peer_timeout=seconds),
+                 "heartbeat_timeout": lambda: simulation.couple("spring", spring, heartbeat_timeout=seconds),
+                 "heartbeat_interval": lambda: simulation.couple("spring", spring, server_timeout=seconds)}
+        for field, call in calls.items():
+            with pytest.raises(mbcosim.Error, match="is no duration of at most 1e.09 s") as caught:
+                call()
+            assert (caught.value.code, caught.value.field) == (grpc.StatusCode.INVALID_ARGUMENT, field)
+        with simulation.couple("spring", spring, peer_timeout=9.0005):
+            assert simulation.step().step == 1
+
+
 def refused(field, call):
     with pytest.raises(grpc.RpcError) as caught:
         call()

@@ -32,7 +32,8 @@ from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepR
 from .coupling import Answer, open_stream
 from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, from_rpc_error, translated
 from .histories import History
-from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, metadata, parting, runs_calls
+from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, checked_timeout, metadata, parting,
+                  runs_calls)
 from .simulation import subscribe_request
 from .stepping import AwaitedStepLine, exchange_step, status_of
 
@@ -149,6 +150,12 @@ async def _until_cancelled(stream: Any) -> AsyncIterator[Any]:
 
 async def _bounded(seconds: Optional[float], awaitable: Awaitable[T], cancel: Callable[[], object], what: str) -> T:
     """What `awaitable` gives; after `seconds` (None: never) `cancel` is called and TimedOut raised."""
+    try:
+        checked_timeout(seconds)
+    except Error:
+        asyncio.ensure_future(awaitable).cancel()
+        cancel()
+        raise
     try:
         return await asyncio.wait_for(awaitable, seconds)
     except asyncio.TimeoutError:

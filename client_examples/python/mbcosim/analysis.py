@@ -146,8 +146,8 @@ class Analysis:
         A, B, C, D = self.linearize(sources, results, timeout=timeout)
         return StateSpace(A, B, C, D, _columns(self, sources), _columns(self, results))
 
-    def modes(self: Any, count: int = 0, *, shift: float = 0.0, timeout: Optional[float] = None) -> Modes:
-        """The modes that oscillate about the present state, by frequency: those of `count` eigenvalues nearest to `shift`, or of all (0)."""
+    def modes(self: Any, count: Optional[int] = None, *, shift: float = 0.0, timeout: Optional[float] = None) -> Modes:
+        """The modes that oscillate about the present state, by frequency: those of `count` eigenvalues nearest to `shift`, or of all."""
         values, vectors = self.eigenvalues(count, shift=shift, vectors=True, timeout=timeout)
         labels = [node.label for node in self.nodes.values() if node.family == "structural"]
         names = [f"node.structural.{label}.X" for label in labels]

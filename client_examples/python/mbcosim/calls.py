@@ -18,7 +18,7 @@ from mbcosim.v1 import common_pb2, coupling_types_pb2, geometry_pb2, reduction_p
 
 from . import bundle
 from .errors import NotFound, StepFailed, enum_name
-from .rpc import USUAL, Call, Calls, call, protocol
+from .rpc import USUAL, Call, Calls, call, fill_duration, protocol
 from .table import Rows
 from .words import choice, needed, pick, remedy
 
@@ -213,7 +213,7 @@ class ServerCalls(Generic[SimulationKind]):
             header.options.symbols[symbol].CopyFrom(_symbol(value))
         header.options.durability = choice(pb.Durability, "DURABILITY_", durability, "durability")
         if checkpoint_interval is not None:
-            header.options.checkpoint_interval.FromMilliseconds(round(checkpoint_interval * 1000))
+            fill_duration(header.options.checkpoint_interval, checkpoint_interval, "checkpoint_interval")
         if checkpoint_steps is not None:
             header.options.checkpoint_steps = checkpoint_steps
         if units is not None:
@@ -223,9 +223,9 @@ class ServerCalls(Generic[SimulationKind]):
         if deck_sockets is not False:
             header.options.deck_sockets.SetInParent()
         if deck_sockets is not False and deck_sockets is not True:
-            header.options.deck_sockets.peer_timeout.FromMilliseconds(round(deck_sockets * 1000))
+            fill_duration(header.options.deck_sockets.peer_timeout, deck_sockets, "deck_sockets.peer_timeout")
         if lease is not None:
-            header.options.lease.FromMilliseconds(int(lease * 1000))
+            fill_duration(header.options.lease, lease, "lease")
         reply = yield Call("Simulations/CreateSimulation", bundle.requests(header, files), timeout)
         return self._make(reply.simulation, reply.diagnostics, reply.printed)
 
@@ -606,10 +606,10 @@ class SimulationCalls(Generic[SnapshotKind]):
     # ---------------------------------------------------------------- analysis
 
     @call
-    def eigenvalues(self, count: int = 0, *, shift: float = 0.0, vectors: bool = False, timeout: Optional[float] = None) -> Calls[Any]:
-        """Eigenvalues [1/s] about the current state, nearest to `shift` first; 0: all finite ones. With `vectors` also
+    def eigenvalues(self, count: Optional[int] = None, *, shift: float = 0.0, vectors: bool = False, timeout: Optional[float] = None) -> Calls[Any]:
+        """Eigenvalues [1/s] about the current state, nearest to `shift` first; None: all finite ones. With `vectors` also
         the eigenvectors, one a column."""
-        request = pb.ComputeEigenvaluesRequest(simulation=self.name, count=count or None, shift=shift, eigenvectors=vectors)
+        request = pb.ComputeEigenvaluesRequest(simulation=self.name, count=count, shift=shift, eigenvectors=vectors)
         reply = yield from self._pages("Simulations/ComputeEigenvalues", request, pb.ComputeEigenvaluesReply(), timeout)
         values = np.array(reply.real) + 1j * np.array(reply.imaginary)
         return (values, _matrix(reply.vectors_real) + 1j * _matrix(reply.vectors_imaginary)) if vectors else values

@@ -154,6 +154,13 @@ def from_rpc_error(rpc_error: Any) -> Error:
     return error
 
 
+def bad_argument(field: str, message: str) -> Error:
+    """What the server would say about a field of a request, where it cannot even be sent."""
+    error = Error(message, grpc.StatusCode.INVALID_ARGUMENT, "BAD_ARGUMENT")
+    error.field = field
+    return error
+
+
 @contextlib.contextmanager
 def translated() -> Iterator[None]:
     """Turns grpc errors raised inside into exceptions of this module."""

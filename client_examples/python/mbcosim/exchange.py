@@ -12,7 +12,7 @@ import numpy.typing as npt
 from mbcosim.v1 import common_pb2, coupling_pb2 as pb, coupling_types_pb2 as types
 
 from .errors import Error
-from .rpc import protocol
+from .rpc import fill_duration, protocol
 from .words import choice
 
 _ROTATION_SIZE = {"matrix": 9, "vector": 3, "quaternion": 4, "euler_123": 3}
@@ -86,10 +86,9 @@ def hello(simulation: Any, port: str, *, mode: Optional[str] = None, rotation: s
                                         tangent=_enum(pb.TangentForm, "TANGENT_FORM_", tangent)),
         presence=pb.PeerPresence(policy=_enum(types.PeerPolicy, "PEER_POLICY_", policy)))
     presence = message.presence
-    for field, seconds in ((presence.peer_timeout, peer_timeout), (presence.heartbeat_interval, heartbeat_interval),
-                           (presence.heartbeat_timeout, heartbeat_timeout)):
+    for field, seconds in (("peer_timeout", peer_timeout), ("heartbeat_interval", heartbeat_interval), ("heartbeat_timeout", heartbeat_timeout)):
         if seconds is not None:
-            field.FromMilliseconds(int(seconds * 1000))
+            fill_duration(getattr(presence, field), seconds, field)
     return pb.PeerMessage(hello=message)
 
 

@@ -15,7 +15,7 @@ import grpc
 from mbcosim.v1 import (common_pb2, coupling_pb2_grpc, events_pb2_grpc, geometry_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
                         telemetry_pb2_grpc)
 
-from .errors import Error, TimedOut, Unavailable, translated
+from .errors import Error, TimedOut, Unavailable, bad_argument, translated
 
 if TYPE_CHECKING:
     from typing_extensions import Concatenate, ParamSpec
@@ -102,6 +102,21 @@ def runs_calls(drive: Callable[[Any], Any]) -> Callable[[_Class], _Class]:
     return decorate
 
 
+def fill_duration(out: Any, seconds: float, field: str) -> None:
+    """`seconds` of a request to the nanosecond; `field` is named when they are no duration."""
+    longest = 1e9  # [s] that servers take
+    if not abs(seconds) <= longest:
+        raise bad_argument(field, f"`{field}` is no duration of at most {longest:g} s: {seconds} s")
+    out.FromNanoseconds(round(seconds * 1e9))
+
+
+def checked_timeout(seconds: Optional[float]) -> Optional[float]:
+    """`seconds` that somebody is willing to wait."""
+    if seconds is not None and not 0 < seconds < math.inf:
+        raise bad_argument("timeout", f"`timeout` must be a positive number of seconds, or None for no bound, got {seconds}")
+    return seconds
+
+
 def protocol() -> common_pb2.VersionRange:
     """The version and the features that this library speaks."""
     return common_pb2.VersionRange(lowest=PROTOCOL_VERSION, highest=PROTOCOL_VERSION, features=FEATURES)
@@ -155,7 +170,7 @@ class Bound:
         self._begin = time.monotonic()
 
     def within(self, call: Call) -> Call:
-        if call.timeout is not None:
+        if checked_timeout(call.timeout) is not None:
             call.timeout = max(call.timeout - (time.monotonic() - self._begin), 1e-3)
         return call
 
@@ -260,6 +275,11 @@ def blocking(function: Callable[..., Calls[T]]) -> Callable[..., T]:
 @contextlib.contextmanager
 def bounded(seconds: Optional[float], cancel: Callable[[], object], what: str) -> Iterator[None]:
     """Calls `cancel` when the block takes longer than `seconds` (None: never); then TimedOut is raised."""
+    try:
+        checked_timeout(seconds)
+    except Error:
+        cancel()
+        raise
     if seconds is None:
         yield
         return

@@ -16,7 +16,7 @@ from .coupling import Answer, Peer
 from .errors import translated
 from .histories import Histories
 from .objects import ModelObjects
-from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, parting, runs_calls, until_cancelled
+from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, fill_duration, parting, runs_calls, until_cancelled
 from .stepping import StepLine
 from .words import pick
 
@@ -31,7 +31,7 @@ def subscribe_request(simulation: SimulationCalls[Any], handles: Iterable[int], 
     request = telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=handles, every=every, policy=pick(_POLICIES, policy, "policy"),
                                              buffer_samples=buffer)
     if minimum_interval is not None:
-        request.minimum_interval.FromNanoseconds(round(minimum_interval * 1e9))
+        fill_duration(request.minimum_interval, minimum_interval, "minimum_interval")
     return request
 
 
