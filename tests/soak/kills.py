@@ -216,6 +216,7 @@ class Ordeal:
         """One bit of any file."""
         candidate = self.rolls.choice([c for c in self.all if c.durability != "none"])
         path = self.rolls.choice([path for path in (self.state / candidate.name).iterdir() if path.stat().st_size > 0])
+        promised = path.suffix != ".new"  # a file that the kill met before it got its name
         data = bytearray(path.read_bytes())
         at = self.rolls.randrange(len(data))
         data[at] ^= 1 << self.rolls.randrange(8)
@@ -223,13 +224,15 @@ class Ordeal:
         self.restart()
         with self.daemon.connect() as server:
             there = {info.name for info in server.list()}
-            if candidate.name in there:
+            if promised and candidate.name in there:
                 self.faults.append(f"{candidate.kind}: a flipped bit at byte {at} of {path.name} was not found")
+            if not promised and candidate.name not in there:
+                self.faults.append(f"{candidate.kind}: damage to {path.name}, which nothing was promised of, stops it")
             for other in self.all:
                 if other.durability != "none" and other is not candidate and other.name not in there:
                     self.faults.append(f"{other.kind}: damage to another simulation stops it")
         named = f"{candidate.name.split('/')[1]}/{path.name}: record "
-        if named not in self.daemon.log():
+        if promised and named not in self.daemon.log():
             self.faults.append(f"{candidate.kind}: the log does not name {path.name}")
         self.damages["flipped"] += 1
 
