@@ -62,7 +62,7 @@ class Candidate:
                 Pull(**self.coupling).couple(self.twin)
 
     def _load(self, server, durability):
-        return coupled(server, durability) if self.coupling else server.load_text(deck(10_000_000), durability=durability)
+        return coupled(server, durability) if self.coupling else server.load_text(deck(1_000_000_000), durability=durability)
 
     def run(self, server, killed, rolls):
         """Steps until the daemon is killed; `killed` is set just before."""
