@@ -82,6 +82,14 @@ void throw_late(const std::string& what, double seconds) {
               static_cast<int>(grpc::StatusCode::DEADLINE_EXCEEDED), "", {});
 }
 
+double checked_timeout(double seconds) {
+  constexpr double kLongest = 1e9;
+  if (seconds == kEndless || (seconds > 0 && seconds <= kLongest)) return seconds;
+  throw Error("`timeout` must be kEndless or a positive number of seconds, at most 1e9, got " +
+                  std::to_string(seconds),
+              static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT), "BAD_ARGUMENT", {}, "timeout");
+}
+
 // ------------------------------------------------------------------ Server
 
 Server::Server(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -97,8 +105,9 @@ Server Server::connect(const std::string& address, double timeout, const Credent
       grpc::CreateCustomChannel(address, channel_credentials(credentials), channel_arguments());
   impl->simulations = v1::Simulations::NewStub(impl->channel);
   impl->coupling = v1::Coupling::NewStub(impl->channel);
-  const auto deadline = std::chrono::system_clock::now() +
-                        std::chrono::milliseconds(static_cast<std::int64_t>(timeout * 1000));
+  const auto deadline =
+      std::chrono::system_clock::now() +
+      std::chrono::milliseconds(static_cast<std::int64_t>(checked_timeout(timeout) * 1000));
   if (!impl->channel->WaitForConnected(deadline))
     throw Error("no server answers at " + address, static_cast<int>(grpc::StatusCode::UNAVAILABLE),
                 "", {});

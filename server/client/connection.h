@@ -8,6 +8,7 @@
 #include <chrono>
 #include <memory>
 
+#include "client/deadline.h"
 #include "client/mbcosim_client.h"
 #include "mbcosim/v1/coupling.grpc.pb.h"
 #include "mbcosim/v1/simulations.grpc.pb.h"
@@ -64,7 +65,7 @@ struct CallContext : grpc::ClientContext {
                        const std::string& simulation = {}) {
     if (!server.authorization.empty()) AddMetadata("authorization", server.authorization);
     if (!simulation.empty()) AddMetadata("mbcosim-session", simulation);
-    if (timeout > 0)
+    if (checked_timeout(timeout) != kEndless)
       set_deadline(std::chrono::system_clock::now() +
                    std::chrono::microseconds(static_cast<std::int64_t>(timeout * 1e6)));
   }

@@ -9,13 +9,19 @@
 #include <thread>
 #include <utility>
 
+#include "client/mbcosim_client.h"
+
 namespace mbcosim::client {
 
-/// Calls `cancel` when it lives longer than `seconds`; 0: never.
+/// `seconds` that somebody is willing to wait: kEndless, or positive and at most 1e9. Throws Error
+/// (INVALID_ARGUMENT, `timeout`) for all else.
+double checked_timeout(double seconds);
+
+/// Calls `cancel` when it lives longer than `seconds`; kEndless: never.
 class Deadline {
  public:
   Deadline(double seconds, std::function<void()> cancel) {
-    if (seconds <= 0) return;
+    if (checked_timeout(seconds) == kEndless) return;
     watch_ = std::thread([this, seconds, cancel = std::move(cancel)] {
       std::unique_lock guard(mutex_);
       const std::chrono::duration<double> bound(seconds);

@@ -316,9 +316,11 @@ class Peer {
   Peer(Peer&&) noexcept;
   Peer& operator=(Peer&&) noexcept;
   ~Peer();
-  /// Synchronous use: waits for the next exchange; false: the stream has ended. Answer each with
-  /// `answer` or `fail`.
+  /// Synchronous use: waits for the next exchange; false: the stream has ended, see `error`. Answer
+  /// each with `answer` or `fail`.
   bool next(Motion& motion);
+  /// What ended the stream; none: it stands, or it ended in good order.
+  std::optional<Error> error() const;
   void answer(const Loads& loads);
   /// The peer cannot compute; the step fails with this text.
   void fail(const std::string& why);

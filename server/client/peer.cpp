@@ -266,7 +266,11 @@ void Peer::Impl::start_heart(const PeerOptions& options) {
     std::unique_lock guard(heart_mutex);
     while (!stop.wait_for(guard, std::chrono::duration<double>(period), [&] { return stopping; })) {
       const std::int64_t since = reading_since.load();
-      if (limit > 0 && since > 0 && nanoseconds_now() - since > 1e9 * limit) wire->cancel();
+      if (limit > 0 && since > 0 && nanoseconds_now() - since > 1e9 * limit) {
+        blame(Error("the server was silent for " + std::to_string(limit) + " s",
+                    static_cast<int>(grpc::StatusCode::UNAVAILABLE), "", {}));
+        wire->cancel();
+      }
       if (beats <= 0) continue;
       beat.mutable_heartbeat()->set_count(beat.heartbeat().count() + 1);
       write(beat);
@@ -275,10 +279,33 @@ void Peer::Impl::start_heart(const PeerOptions& options) {
 }
 
 bool Peer::Impl::read() {
+  if (ended) return false;
   reading_since.store(nanoseconds_now());
   const bool open_still = wire->read(&in);
   reading_since.store(0);
+  if (!open_still) end();
   return open_still;
+}
+
+void Peer::Impl::end() {
+  if (ended.exchange(true)) return;
+  const grpc::Status status = wire->finish();
+  if (status.error_code() == grpc::StatusCode::CANCELLED) return;  // by this side
+  try {
+    require(status);
+  } catch (const Error& error) {
+    blame(error);
+  }
+}
+
+void Peer::Impl::blame(const Error& error) {
+  const std::lock_guard guard(blame_mutex);
+  if (!failure) failure = error;
+}
+
+std::optional<Error> Peer::Impl::error() const {
+  const std::lock_guard guard(blame_mutex);
+  return failure;
 }
 
 void Peer::Impl::stop_heart() {
@@ -328,7 +355,7 @@ void Peer::Impl::close() {
   wire->cancel();  // ends a read that is under way
   stop_heart();
   if (thread.joinable()) thread.join();
-  wire->finish();
+  end();
 }
 
 Peer::Peer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -337,6 +364,7 @@ Peer& Peer::operator=(Peer&&) noexcept = default;
 Peer::~Peer() = default;
 
 bool Peer::next(Motion& motion) { return impl_->next(motion); }
+std::optional<Error> Peer::error() const { return impl_->error(); }
 void Peer::answer(const Loads& loads) { impl_->answer(loads); }
 void Peer::fail(const std::string& why) { impl_->fail(why); }
 void Peer::reject(const Reject& rejection) { impl_->reject(rejection); }

@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -19,6 +20,7 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
 struct Peer::Impl {
   ~Impl() { close(); }
   bool next(Motion& motion);
+  std::optional<Error> error() const;
   void answer(const Loads& loads);
   void fail(const std::string& why);
   void reject(const Reject& rejection);
@@ -26,6 +28,8 @@ struct Peer::Impl {
   void start_heart(const PeerOptions& options);
   void stop_heart();
   bool read();
+  void end();                      ///< learns how the stream has ended
+  void blame(const Error& error);  ///< the first counts
   void write(const v1::PeerMessage& message);
   void close();
 
@@ -43,6 +47,9 @@ struct Peer::Impl {
   std::condition_variable stop;
   bool stopping = false;
   std::atomic<std::int64_t> exchanges{0};
+  std::atomic<bool> ended{false};
+  mutable std::mutex blame_mutex;
+  std::optional<Error> failure;
   bool open = true;
 };
 

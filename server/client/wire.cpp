@@ -12,7 +12,8 @@ namespace mbcosim::client {
 namespace {
 
 constexpr std::size_t kLongestMessage = std::size_t{1} << 30;
-constexpr int kBoundSeconds = 5;                 // of the handshake and of the server's last words
+constexpr int kBoundSeconds = 5;                 // of the handshake
+constexpr int kPartingSeconds = 2;               // of the server's last words
 constexpr auto kLook = std::chrono::seconds(1);  // rounds of an endless wait
 
 class GrpcWire : public Wire {
@@ -58,6 +59,8 @@ class SharedMemoryWire : public Wire {
     ::shutdown(channel_.socket(), SHUT_WR);
   }
   grpc::Status finish() override {
+    const timeval bound{kPartingSeconds, 0};
+    ::setsockopt(channel_.socket(), SOL_SOCKET, SO_RCVTIMEO, &bound, sizeof bound);
     const auto status = shm::receive_status(channel_.socket());
     if (!status) return {grpc::StatusCode::UNAVAILABLE, "the server is gone"};
     return to_grpc(*status);

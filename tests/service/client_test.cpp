@@ -450,8 +450,12 @@ TEST_P(Coupled, AnAnswerOfTheWrongLengthEndsThePeer) {
   Motion motion;
   ASSERT_TRUE(peer.next(motion));
   peer.answer(Loads{.forces = {1, 2}});
+  EXPECT_FALSE(peer.error());
   EXPECT_FALSE(peer.next(motion));
   stepper.join();
+  ASSERT_TRUE(peer.error());
+  EXPECT_EQ(peer.error()->reason(), "BAD_ARGUMENT");
+  EXPECT_FALSE(peer.next(motion)) << "what has ended stays so";
   EXPECT_EQ(simulation.step(0).step, 0);
 }
 
@@ -525,6 +529,41 @@ TEST_P(Coupled, ASilentServerEndsThePeerThatWantsSignsOfLife) {
   EXPECT_TRUE(peer.next(motion)) << "the server gave no signs of life";
   peer.answer(spring(motion));
   stepper.join();
+}
+
+TEST_P(Coupled, APeerThatLeavesEndsInGoodOrder) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  Peer peer = simulation.couple("spring", spring, options());
+  EXPECT_TRUE(simulation.step().ok());
+  peer.close();
+  EXPECT_FALSE(peer.error()) << peer.error()->what();
+}
+
+TEST(Client, WhatIsNoTimeoutIsRefusedByItsName) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  Stepper stepper = simulation.stepper();
+  for (const double seconds : {-1.0, double(NAN), double(INFINITY), 1e10}) {
+    const std::vector<std::function<void()>> calls = {
+        [&] { Server::connect(std::getenv("MBCOSIM_ADDRESS"), seconds); },
+        [&] { simulation.read("time", seconds); },
+        [&] { server.load_text(body(), {.timeout = seconds}); },
+        [&] { simulation.export_state(seconds); },
+        [&] { simulation.subscribe({"time"}, {.timeout = seconds}); },
+        [&] { simulation.attach("spring", {.timeout = seconds}); },
+        [&] { server.events({}, {}, seconds); },
+        [&] { stepper.step({}, 1, {}, seconds); }};
+    for (const auto& call : calls) {
+      try {
+        call();
+        ADD_FAILURE() << seconds << " s is taken";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.field(), "timeout") << error.what();
+      }
+    }
+  }
+  EXPECT_EQ(simulation.refresh().step, 0);
 }
 
 TEST_P(Coupled, SignalsOfManyNumbers) {
@@ -878,19 +917,58 @@ TEST(ASilentServer, EndsEveryCallAtItsTimeout) {
   EXPECT_LT(seconds_of([&] { Simulation(std::move(simulation)); }), 2 + 2 * time_factor());
 }
 
-TEST(ASilentServer, IsNoticedInAStepWithoutATimeout) {
+/// The server has shared memory unless something stands between.
+std::vector<Transport> transports_of(Server& server) {
+  Simulation simulation = server.load_text(body(), with_port());
+  try {
+    simulation.attach("spring", {.transport = Transport::shared_memory});
+  } catch (const Error&) {
+    return {Transport::stream};
+  }
+  return {Transport::stream, Transport::shared_memory};
+}
+
+TEST(ASilentServer, IsNoticedInAStepWithoutATimeoutAndByPeersThatWait) {
   if (!std::getenv("MBCOSIM_SILENCE")) GTEST_SKIP() << "only with a daemon of its own";
   Server server = connect();
   Simulation simulation = server.load_text(endless());
+  std::vector<Simulation> coupled;
+  std::vector<Peer> peers;
+  for (const Transport transport : transports_of(server)) {
+    coupled.push_back(server.load_text(body(), with_port()));
+    peers.push_back(coupled.back().attach("spring", {.transport = transport}));
+  }
   std::thread later([] {
     std::this_thread::sleep_for(std::chrono::seconds(1));
     silence();
   });
+  const double bound = 1 + 25 + 2 * time_factor();
+  std::vector<std::thread> waiting;
+  for (Peer& peer : peers)
+    waiting.emplace_back([&] {
+      Motion motion;
+      EXPECT_LT(seconds_of([&] { EXPECT_FALSE(peer.next(motion)); }), bound);
+    });
   int code = 0;
-  EXPECT_LT(seconds_of([&] { code = code_of([&] { simulation.run_until(1e9); }); }),
-            1 + 25 + 2 * time_factor());
+  EXPECT_LT(seconds_of([&] { code = code_of([&] { simulation.run_until(1e9); }); }), bound);
   later.join();
   EXPECT_EQ(code, 14);
+  for (std::thread& thread : waiting) thread.join();
+  for (const Peer& peer : peers) EXPECT_EQ(peer.error() ? peer.error()->code() : 0, 14);
+}
+
+TEST(ASilentServer, KeepsNoDestructorOfAPeer) {
+  if (!std::getenv("MBCOSIM_SILENCE")) GTEST_SKIP() << "only with a daemon of its own";
+  Server server = connect();
+  std::vector<Simulation> coupled;
+  std::vector<Peer> peers;
+  for (const Transport transport : transports_of(server)) {
+    coupled.push_back(server.load_text(body(), with_port()));
+    peers.push_back(coupled.back().couple("spring", spring, {.transport = transport}));
+  }
+  silence();
+  for (Peer& peer : peers)
+    EXPECT_LT(seconds_of([&] { Peer(std::move(peer)); }), 2 + 2 * time_factor());
 }
 
 }  // namespace

@@ -124,7 +124,7 @@ def waits(server, simulation):
     }
 
 
-@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf"), 1e10])
 @pytest.mark.parametrize("client", [mbcosim, mbcosim.aio], ids=lambda m: m.__name__)
 def test_what_is_no_timeout_is_refused_by_its_name(daemon, client, seconds):
     async def result(of):

@@ -15,7 +15,7 @@ def test_the_library(start_daemon, tmp_path):
     assert run.returncode == 0, run.stdout
 
 
-@pytest.mark.parametrize("test", ["EndsEveryCallAtItsTimeout", "IsNoticedInAStepWithoutATimeout"])
+@pytest.mark.parametrize("test", ["EndsEveryCallAtItsTimeout", "IsNoticedInAStepWithoutATimeoutAndByPeersThatWait", "KeepsNoDestructorOfAPeer"])
 def test_a_silent_server_ends_every_call(falls_silent, tmp_path, test):
     address, silence = falls_silent
     wanted = tmp_path / "silence"

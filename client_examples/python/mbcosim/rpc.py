@@ -27,6 +27,7 @@ PROTOCOL_VERSION = 2
 FEATURES = ("grants", "geometry", "symbols", "step_sizes", "request_ids", "pages", "reset", "results", "tables", "events", "checkpoints",
             "pace", "sample_intervals", "journal", "deck_sockets", "units")  # that this library knows
 USUAL = 30.0    # seconds that a call which advances nothing may take
+LONGEST = 1e9   # seconds of a duration or timeout
 PARTING = 2.0   # seconds that leaving a `with` block may take
 _AGAIN = 2.0    # seconds in which a repeatable call is asked again after the connection broke
 _PAUSE = 0.05   # first pause between two attempts [s]
@@ -104,16 +105,15 @@ def runs_calls(drive: Callable[[Any], Any]) -> Callable[[_Class], _Class]:
 
 def fill_duration(out: Any, seconds: float, field: str) -> None:
     """`seconds` of a request to the nanosecond; `field` is named when they are no duration."""
-    longest = 1e9  # [s] that servers take
-    if not abs(seconds) <= longest:
-        raise bad_argument(field, f"`{field}` is no duration of at most {longest:g} s: {seconds} s")
+    if not abs(seconds) <= LONGEST:
+        raise bad_argument(field, f"`{field}` is no duration of at most {LONGEST:g} s: {seconds} s")
     out.FromNanoseconds(round(seconds * 1e9))
 
 
 def checked_timeout(seconds: Optional[float]) -> Optional[float]:
     """`seconds` that somebody is willing to wait."""
-    if seconds is not None and not 0 < seconds < math.inf:
-        raise bad_argument("timeout", f"`timeout` must be a positive number of seconds, or None for no bound, got {seconds}")
+    if seconds is not None and not 0 < seconds <= LONGEST:
+        raise bad_argument("timeout", f"`timeout` must be a positive number of seconds, at most {LONGEST:g}, or None for no bound, got {seconds}")
     return seconds
 
 
