@@ -15,6 +15,7 @@ import { loadSync } from "@grpc/proto-loader";
 const PROTOS = process.env.MBCOSIM_PROTOS ?? fileURLToPath(new URL("../../proto", import.meta.url));
 const PROTOCOL = { lowest: 2, highest: 2 };
 const FILES = ["simulations", "telemetry", "geometry", "coupling"].map((name) => `mbcosim/v1/${name}.proto`);
+const LONGEST = 1e9; // seconds of a timeout
 const USUAL = 30; // seconds that a call may take which advances nothing
 
 // Ping after 10 s of silence, dead after 10 more: a server that is stopped is noticed.
@@ -43,7 +44,25 @@ export function connect(address, { token, credentials = grpc.credentials.createI
   return { ...stubs, metadata, close };
 }
 
-const options = (timeout) => (timeout === undefined ? {} : { deadline: Date.now() + 1000 * timeout });
+function options(timeout) {
+  if (timeout === undefined) return {};
+  if (timeout > 0 && timeout <= LONGEST) return { deadline: Date.now() + 1000 * timeout };
+  throw new RangeError(`timeout: must be a positive number of seconds, at most ${LONGEST}, or undefined for no bound, got ${timeout}`);
+}
+
+/** Protobuf would make a whole number of anything. */
+function whole(count, name) {
+  if (Number.isSafeInteger(count)) return count;
+  throw new RangeError(`${name}: must be a whole number, got ${count}`);
+}
+
+/** Protobuf would leave out what it does not know. */
+function checked(choices) {
+  const known = v1.CreateOptions.type.field.map(({ name }) => name);
+  const strange = Object.keys(choices).find((name) => !known.includes(name));
+  if (strange !== undefined) throw new RangeError(`no choice is called "${strange}"; choose from ${known.join(", ")}`);
+  return choices;
+}
 
 /** Who calls, and the simulation that it is about, by which a proxy finds the daemon that has it. */
 export function about(server, simulation) {
@@ -54,7 +73,7 @@ export function about(server, simulation) {
 }
 
 /** One message each way: the reply. `timeout`: seconds; undefined: as long as the server lives. */
-export function call(server, client, method, request, timeout) {
+export async function call(server, client, method, request, timeout) {
   return new Promise((resolve, reject) =>
     client[method](request, about(server, request.simulation), options(timeout), (error, reply) => (error ? reject(error) : resolve(reply))),
   );
@@ -68,12 +87,12 @@ export function series(server, client, method, request, timeout) {
 /** Creates a simulation from a deck without includes. `choices`: CreateOptions. */
 export async function load(server, deck, choices = {}) {
   const name = basename(deck);
-  return create(server, { header: { bundle_main_file: name, options: { protocol: PROTOCOL, ...choices } }, files: [{ path: name, data: await readFile(deck) }] });
+  return create(server, { header: { bundle_main_file: name, options: { protocol: PROTOCOL, ...checked(choices) } }, files: [{ path: name, data: await readFile(deck) }] });
 }
 
 /** Creates a simulation from a deck given as text. */
 export async function loadText(server, text, choices = {}) {
-  return create(server, { header: { bundle_main_file: "deck", options: { protocol: PROTOCOL, ...choices } }, files: [{ path: "deck", data: Buffer.from(text) }] });
+  return create(server, { header: { bundle_main_file: "deck", options: { protocol: PROTOCOL, ...checked(choices) } }, files: [{ path: "deck", data: Buffer.from(text) }] });
 }
 
 async function create(server, upload) {
@@ -130,7 +149,7 @@ export class Simulation {
 
   /** Takes steps; StepReply. */
   async step(steps = 1, outputs = []) {
-    return this.#work("Step", { simulation: this.name, steps, outputs: await this.handles(outputs) });
+    return this.#work("Step", { simulation: this.name, steps: whole(steps, "steps"), outputs: await this.handles(outputs) });
   }
 
   /** An open stream for stepping with the least delay: `await stepper.step()`, at last `stepper.close()`. */
@@ -172,8 +191,9 @@ class Stepper {
     for (const { reject } of this.#waiting.splice(0)) reject(this.#failure);
   }
 
-  step(steps = 1, inputs) {
-    if (this.#failure) return Promise.reject(this.#failure);
+  async step(steps = 1, inputs) {
+    whole(steps, "steps");
+    if (this.#failure) throw this.#failure;
     return new Promise((resolve, reject) => {
       this.#waiting.push({ resolve, reject });
       this.stream.write({ ...this.request, steps, inputs });

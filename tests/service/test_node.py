@@ -32,7 +32,7 @@ def run(command, folder, daemon):
 
 def test_its_own_tests(node_client, daemon):
     output = run(["node", "--test", "test/"], node_client, daemon)
-    assert "fail 0" in output and "pass 4" in output
+    assert "fail 0" in output and "pass 6" in output
 
 
 def test_the_example_follows_the_pendulum(node_client, daemon):

@@ -53,6 +53,33 @@ test("errors carry their code, reason and field", async () => {
   assert.equal(gone.code, 5);
 });
 
+test("what is no timeout, no number of steps and no choice is refused before it is sent", async () => {
+  const simulation = await loadText(server, body);
+  for (const timeout of [0, -1, NaN, Infinity])
+    await assert.rejects(call(server, server.simulations, "GetSimulation", { simulation: simulation.name }, timeout), /^RangeError: timeout: must be/);
+  const stepper = await simulation.stepper();
+  for (const steps of [1.5, NaN, Infinity, "2"]) {
+    await assert.rejects(simulation.step(steps), /^RangeError: steps: must be a whole number/);
+    await assert.rejects(stepper.step(steps), /^RangeError: steps: must be a whole number/);
+  }
+  await assert.rejects(loadText(server, body, { leese: { seconds: 5 } }), /^RangeError: no choice is called "leese"; choose from .*lease/);
+  assert.equal((await stepper.step()).step, 1);
+  stepper.close();
+  await simulation.delete();
+});
+
+test("what the server refuses has its field, and nothing is applied", async () => {
+  const simulation = await loadText(server, body);
+  for (const step_size of [NaN, Infinity, -1, 0, 1e-20]) {
+    const refused = await call(server, server.simulations, "Step", { simulation: simulation.name, step_size }, 5).catch((error) => error);
+    assert.equal(refused.code, 3);
+    assert.match(refused.metadata.get("grpc-status-details-bin")[0].toString("latin1"), /google\.rpc\.BadRequest[^]*step_size/);
+  }
+  const { simulation: info } = await call(server, server.simulations, "GetSimulation", { simulation: simulation.name }, 5);
+  assert.equal(info.step, 0);
+  await simulation.delete();
+});
+
 test("units that are declared are named, and a peer counts in its own", async () => {
   const ports = [{ name: "tip", kind: "PORT_KIND_STRUCTURAL", node_labels: [1] }];
   const simulation = await loadText(server, body, { ports, units: { length: "mm", mass: "t", time: "s" } });
