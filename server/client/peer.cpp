@@ -204,10 +204,11 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
 
 std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
                                         const v1::Hello& hello, const PeerOptions& options) {
+  std::unique_ptr<Wire> wire = options.transport == Transport::shared_memory
+                                   ? open_shared_memory(*server, options.peer_timeout)
+                                   : open_stream(*server, hello.simulation());
   auto impl = std::make_unique<Peer::Impl>();
-  impl->wire = options.transport == Transport::shared_memory
-                   ? open_shared_memory(*server, options.peer_timeout)
-                   : open_stream(*server, hello.simulation());
+  impl->wire = std::move(wire);
   impl->server = std::move(server);
   impl->step_ended = options.step_ended;
   v1::PeerMessage first;
