@@ -283,19 +283,27 @@ def send_checkpoint(bench, data, request_id):
     return bench.stub.ImportCheckpoint(iter(parts), timeout=6 * WAIT).simulation
 
 
+def exported(bench, durable):
+    return b"".join(reply.data for reply in bench.stub.ExportCheckpoint(pb.ExportCheckpointRequest(simulation=durable.name), timeout=4 * WAIT))
+
+
 def checkpoints(bench):
     """Bytes that go on where they were taken; an import that is repeated is done once, before and after the simulation is woken."""
     with offered(bench, durability=pb.DURABILITY_CHECKPOINT) as durable:
         durable.call("Step", steps=7)
-        data = b"".join(reply.data for reply in bench.stub.ExportCheckpoint(pb.ExportCheckpointRequest(simulation=durable.name), timeout=4 * WAIT))
+        data = exported(bench, durable)
         request_id = uuid.uuid4().hex
         with Other(bench, send_checkpoint(bench, data, request_id)) as carried:
             require(carried.name != durable.name and carried.info.step == 7, f"the import is {carried.info}")
             require(send_checkpoint(bench, data, request_id).name == carried.name, "the repeated import makes a second simulation")
+            durable.call("CreateSnapshot")
+            other = exported(bench, durable)
+            bench.refused("request_id", lambda: send_checkpoint(bench, other, request_id))
             require(carried.state() == durable.state(), "the imported state is another one")
             for one in (carried, durable):
                 one.call("Step", steps=3)
             require(carried.state() == durable.state(), "the import goes on otherwise")
+            bench.refused("request_id", lambda: send_checkpoint(bench, other, request_id))
             again = send_checkpoint(bench, data, request_id)
             require((again.name, again.step) == (carried.name, 10), "an import that is repeated late makes a second simulation")
         for wrong in (data[:-1], data[:len(data) // 2] + bytes([data[len(data) // 2] ^ 1]) + data[len(data) // 2 + 1:], b"nothing of the kind"):

@@ -36,6 +36,15 @@ def test_health_and_socket_mode(daemon, server):
     assert subprocess.run([DAEMON, "--check", "unix:/nonexistent/socket"]).returncode == 1
 
 
+def test_health_is_told_by_the_name_of_the_service(daemon):
+    with grpc.insecure_channel(daemon.address) as channel:
+        for service in ("Simulations", "Coupling", "Telemetry", "Geometry", "Results", "Events", "Reduction"):
+            assert health(channel, f"mbcosim.v1.{service}") == 1
+        with pytest.raises(grpc.RpcError) as caught:
+            health(channel, "mbcosim.v1.Nothing")
+        assert caught.value.code() == grpc.StatusCode.NOT_FOUND
+
+
 def test_server_info(server):
     info = server.info()
     assert info.protocol.lowest == info.protocol.highest == 2
