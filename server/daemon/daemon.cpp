@@ -97,6 +97,8 @@ Config checked(Config config) {
     throw std::runtime_error(
         "--tls-client-ca needs --tls-certificate and --tls-key: without TLS no "
         "certificate is ever asked for");
+  if (config.resume == "eager" && config.state_dir.empty())
+    throw std::runtime_error("--resume eager needs --state-dir");
   int& own = config.limits.identity_sessions;
   if (config.limits.memory_bytes == 0) config.limits.memory_bytes = MemoryBudget::default_bytes();
   const bool several = !config.tokens_file.empty() || !config.tls_client_ca.empty();
@@ -143,6 +145,7 @@ Daemon::Daemon(const Config& config)
   listen();
   if (config_.shared_memory) open_shared_memory();
   if (!config_.http.empty()) open_http();
+  if (config_.resume == "eager") eager_resume_.start(parts_);
 }
 
 namespace {
@@ -307,6 +310,7 @@ bool Daemon::shut_down() {
   spdlog::info("shutting down");
   health_.stop();
   gate_.close();
+  eager_resume_.stop();
   listeners_.clear();
   store_.close_all();
   shared_memory_.clear();

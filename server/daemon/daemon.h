@@ -16,6 +16,7 @@
 #include "service/config.h"
 #include "service/deck_sockets.h"
 #include "service/durability.h"
+#include "service/eager_resume.h"
 #include "service/parts.h"
 #include "service/shared_memory_service.h"
 
@@ -59,6 +60,7 @@ class Daemon {
   ResultsRoot results_;
   DeckSocketFolder deck_sockets_;
   Durability durability_;  ///< outlives the store, which calls it
+  EagerResume eager_resume_;
   SessionStore store_;
   Gate gate_;
   Health health_;

@@ -178,6 +178,11 @@ Invocation read_options(int argc, char** argv) {
                  "Seconds after which a suspended simulation is removed")
       ->capture_default_str()
       ->check(CLI::Range(std::int64_t{1}, kLongestTime));
+  app.add_option("--resume", config.resume,
+                 "When suspended simulations come back: lazy, each with the first call that needs "
+                 "it; eager, all when the daemon starts")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"lazy", "eager"}));
   app.add_option("--results-root", config.results_root,
                  "Folder in which simulations may have folders for result files")
       ->check(CLI::ExistingDirectory);

@@ -44,7 +44,8 @@ struct Config {
   std::string state_dir;            ///< folder of simulations that outlive the daemon; empty: none
   std::chrono::milliseconds checkpoint_interval{10000};
   std::chrono::seconds suspended_expiry{30 * 24 * 3600};
-  std::string results_root;  ///< folder of result files; empty: none are written
+  std::string resume = "lazy";  ///< when suspended ones come back: "lazy", "eager"
+  std::string results_root;     ///< folder of result files; empty: none are written
   std::string deck_sockets;  ///< folder of the sockets that decks may name; empty: none are opened
   int workers = 0;           ///< simulations that step at once; 0: one per core
   std::string tls_certificate, tls_key, tls_client_ca;  ///< PEM files

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
+#include <functional>
 #include <optional>
 #include <random>
 
@@ -480,6 +481,16 @@ std::vector<v1::SimulationInfo> Durability::list(const Caller& caller) const {
     if (!may_see(suspended, caller, Access::own)) found.back().clear_grants();
   }
   return found;
+}
+
+std::vector<std::pair<std::string, std::string>> Durability::by_last_use() const {
+  std::multimap<std::int64_t, std::pair<std::string, std::string>, std::greater<>> found;
+  Guard guard(mutex_);
+  for (const auto& [name, suspended] : suspended_)
+    found.emplace(suspended.since, std::pair(name, suspended.head.owner()));
+  std::vector<std::pair<std::string, std::string>> result;
+  for (auto& [since, simulation] : found) result.push_back(std::move(simulation));
+  return result;
 }
 
 bool Durability::remove(const std::string& simulation, const Caller& caller) {

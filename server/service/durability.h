@@ -69,6 +69,8 @@ class Durability {
   bool knows(const std::string& simulation, const Caller& caller) const;
   bool describe(const std::string& simulation, const Caller& caller, v1::SimulationInfo* out) const;
   std::vector<v1::SimulationInfo> list(const Caller& caller) const;
+  /// Names and owners of all, those used last first.
+  std::vector<std::pair<std::string, std::string>> by_last_use() const;
   /// False: none of that name, or not the caller's.
   bool remove(const std::string& simulation, const Caller& caller);
   /// The simulation that the caller created with this request id; empty: none.

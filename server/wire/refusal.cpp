@@ -147,6 +147,11 @@ Refusal::Refusal(v1::Reason reason, std::string message,
                  std::map<std::string, std::string> metadata)
     : reason_(reason), message_(std::move(message)), metadata_(std::move(metadata)) {}
 
+std::string Refusal::limit() const {
+  const auto found = metadata_.find("limit");
+  return found == metadata_.end() ? "" : found->second;
+}
+
 Refusal::Refusal(const Error& error) : reason_(reason_of(error.kind)), message_(error.message) {
   if (!error.reason.empty()) metadata_["engine_reason"] = error.reason;
   if (error.kind == ErrorKind::limit) metadata_["limit"] = error.reason;

@@ -23,6 +23,8 @@ class Refusal : public std::exception {
 
   const char* what() const noexcept override { return message_.c_str(); }
   v1::Reason reason() const { return reason_; }
+  /// Name of the limit that was exceeded, or empty.
+  std::string limit() const;
   /// The status, with `ErrorStatus` in `grpc-status-details-bin`.
   grpc::Status status() const;
 

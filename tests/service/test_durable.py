@@ -210,6 +210,63 @@ def test_many_callers_wake_one_simulation_once(start):
         assert steps == [0.0] * 16 and len(server.list()) == 1
 
 
+def said(daemon, text):
+    """Waits for a line of the log that holds the text."""
+    wait_for(lambda: text in daemon.log(), 30)
+
+
+def damage(file):
+    data = bytearray(file.read_bytes())
+    data[-40] ^= 1
+    file.write_bytes(data)
+
+
+def test_all_come_back_at_the_start_when_the_operator_wants(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        expected = at_the_end(server, deck(400))
+        names = []
+        for step in (0, 10, 200, 399):
+            simulation = server.load_text(deck(400))
+            simulation.step(step) if step else simulation.snapshot()
+            names.append(simulation.name)
+    daemon.stop()
+    damage(folder / names[0] / "snapshot-1")
+    daemon = start("--resume", "eager")
+    said(daemon, "state folder: 3 simulations are back, 1 stay suspended")
+    assert f"{names[0]} stays suspended: DAMAGED_STATE: " in daemon.log()
+    with daemon.connect() as server:
+        assert [state_of(server, name) for name in names] == [pb.SIMULATION_STATE_SUSPENDED] + 3 * [pb.SIMULATION_STATE_READY]
+        for name in names[1:]:
+            simulation = server.attach(name)
+            simulation.run_until(1e9)
+            assert bits(simulation) == expected
+
+
+def test_those_used_last_come_back_when_there_is_no_room_for_all(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        names = [server.load_text(deck()).name for _ in range(4)]
+    daemon.stop()
+    for age, name in zip((300, 0, 200, 100), names):
+        os.utime(folder / name / "point", (time.time() - age,) * 2)
+    daemon = start("--resume", "eager", "--limit-sessions", "2")
+    said(daemon, "state folder: 2 simulations are back, 2 stay suspended")
+    assert f"{names[2]} stays suspended: LIMIT_EXCEEDED: " in daemon.log()
+    with daemon.connect() as server:
+        assert [name for name in names if state_of(server, name) == pb.SIMULATION_STATE_READY] == [names[1], names[3]]
+        with pytest.raises(mbcosim.LimitExceeded):
+            server.attach(names[0]).step()
+        server.attach(names[1]).delete()
+        assert server.attach(names[0]).step().step == 1  # with the first call, where there is room
+
+
+def test_nothing_comes_back_without_a_folder(tmp_path):
+    done = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/socket", "--resume", "eager"],
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60 * TIME_FACTOR)
+    assert done.returncode == 4 and done.stdout.splitlines()[-1] == "mbcosimd: error: --resume eager needs --state-dir"
+
+
 def test_deleted_ones_are_gone(start, folder):
     daemon = start()
     with daemon.connect() as server:
