@@ -14,9 +14,10 @@ namespace {
 
 using ExportReplies = Series<v1::ExportCheckpointRequest, v1::ExportCheckpointReply>;
 
-ExportReplies::Source exported(const Parts& parts, const Caller& caller,
+ExportReplies::Source exported(const Parts& parts, const CallFrame& frame,
                                const v1::ExportCheckpointRequest& request) {
-  const SessionHold session(parts.store, request.simulation(), caller, Access::control);
+  const SessionHold session(parts.store, request.simulation(), frame.caller, frame.call,
+                            Access::control);
   auto files = std::make_shared<OpenFiles>(parts.durability.open_files(*session));
   return [files](auto* reply) {
     std::string piece = files->read(kChunkBytes);
@@ -83,7 +84,7 @@ void add_checkpoints(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("ExportCheckpoint"),
            series<v1::ExportCheckpointRequest, v1::ExportCheckpointReply>(
                Role::control, Lane::work, [&parts](const CallFrame& frame, const auto& request) {
-                 return exported(parts, frame.caller, request);
+                 return exported(parts, frame, request);
                }));
   gate.add(simulations_path("ImportCheckpoint"),
            stream(Role::control, [&parts] { return std::make_unique<ImportHandler>(parts); }));

@@ -32,7 +32,8 @@ class AttachHandler final : public Handler, public PeerLink {
   void greet(Exchange& exchange) {
     if (!message_.has_hello())
       throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `hello`");
-    auto seat = std::make_unique<PeerSeat>(parts_, message_.hello(), exchange.caller(), *this);
+    auto seat = std::make_unique<PeerSeat>(parts_, message_.hello(), exchange.caller(),
+                                           exchange.call(), *this);
     exchange.write(serialized(seat->welcome()));
     seat->begin();
     {

@@ -161,9 +161,10 @@ Made initial_solution(const Session::Origin& origin, const v1::CreateOptions& op
 }
 
 /// What an earlier process made for this request id is brought back, so that it is found.
-void wake_known(const Parts& parts, const v1::CreateOptions& options, const Caller& caller) {
+void wake_known(const Parts& parts, const v1::CreateOptions& options, Exchange& exchange) {
+  const Caller& caller = exchange.caller();
   const std::string name = parts.durability.find_request(caller.identity, options.request_id());
-  if (!name.empty()) (void)parts.store.get(name, caller, Access::own);
+  if (!name.empty()) (void)parts.store.get(name, caller, exchange.call(), Access::own);
 }
 
 [[noreturn]] void refuse_empty_upload() {
@@ -188,7 +189,7 @@ class Creation {
     const v1::CreateOptions& options = upload_->header().options();
     Reply reply;
     fill_protocol(reply.mutable_protocol());
-    wake_known(parts_, options, exchange.caller());
+    wake_known(parts_, options, exchange);
     const std::uint64_t digest = options.request_id().empty() ? 0 : upload_->digest();
     const SessionStore::Place place(parts_.store, options.request_id(), digest, exchange.caller(),
                                     exchange.call());
@@ -372,7 +373,7 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
     check_protocol(options.protocol());
     v1::ForkSimulationReply reply;
     fill_protocol(reply.mutable_protocol());
-    wake_known(parts_, options, exchange.caller());
+    wake_known(parts_, options, exchange);
     const std::uint64_t digest = digest_of("ForkSimulation", request);
     const SessionStore::Place place(parts_.store, options.request_id(), digest, exchange.caller(),
                                     exchange.call());
@@ -386,7 +387,7 @@ class ForkHandler final : public OneRequest<v1::ForkSimulationRequest> {
 
   SessionPtr fork(Exchange& exchange, const v1::ForkSimulationRequest& request,
                   std::uint64_t digest) {
-    const SessionHold source(parts_.store, request.simulation(), exchange.caller(),
+    const SessionHold source(parts_.store, request.simulation(), exchange.caller(), exchange.call(),
                              Access::control);
     if (request.options().symbols_size() > 0)
       throw Refusal(v1::REASON_BAD_ARGUMENT, "`symbols` cannot change the model of a fork");

@@ -76,7 +76,9 @@ void Durability::start(const Parts& parts) {
   parts_ = &parts;
   if (!folder_) return;
   parts.store.set_keeper(
-      {[this](const auto& name, const Caller& caller) { return wake(name, caller); },
+      {[this](const auto& name, const Caller& caller, Call& call) {
+         return wake(name, caller, call);
+       },
        [this](const auto& name, const Caller& caller) { return remove(name, caller); },
        [this](Session& session) { return suspend(session); },
        [this](const auto& name) { unsuspend(name); }, [this](Session& session) { forget(session); },
@@ -529,12 +531,14 @@ const Suspended* Durability::made_by(const std::string& owner,
 // ------------------------------------------------------------------ from disk to memory
 
 // One at a time makes a session of it, others wait for that. True: it is in the store now.
-bool Durability::wake(const std::string& simulation, const Caller& caller) {
+bool Durability::wake(const std::string& simulation, const Caller& caller, Call& call) {
   constexpr std::chrono::milliseconds kLook(20);
   Suspended suspended;
   {
     Guard guard(mutex_);
-    while (waking_.count(simulation) > 0 && !stop_) changed_.wait_for(mutex_, kLook);
+    while (waking_.count(simulation) > 0 && !stop_ && !call.cancelled())
+      changed_.wait_for(mutex_, kLook);
+    if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
     const auto found = suspended_.find(simulation);
     if (found == suspended_.end()) return parts_->store.has(simulation);
     if (!may_see(found->second, caller, Access::see)) return false;
@@ -550,10 +554,9 @@ bool Durability::wake(const std::string& simulation, const Caller& caller) {
       self.changed_.notify_all();
     }
   } const done{*this, simulation};
-  Call call;
   const SessionStore::Place place(parts_->store, "", 0, {suspended.head.owner(), Role::control},
                                   call);
-  const SessionPtr session = revive(simulation, suspended);
+  const SessionPtr session = revive(simulation, suspended, call);
   parts_->store.add(session);
   unsuspend(simulation);
   v1::SimulationInfo info;
@@ -562,7 +565,8 @@ bool Durability::wake(const std::string& simulation, const Caller& caller) {
   return true;
 }
 
-SessionPtr Durability::revive(const std::string& simulation, const Suspended& suspended) try {
+SessionPtr Durability::revive(const std::string& simulation, const Suspended& suspended,
+                              Call& call) try {
   const std::string id = id_of(simulation);
   StoredModel model = folder_->read_model(id);
   const StoredPoint point = read_latest(id);
@@ -573,7 +577,8 @@ SessionPtr Durability::revive(const std::string& simulation, const Suspended& su
   const v1::CreateOptions& options = model.head.options();
   MemoryShare share;
   MemoryBudget& memory = parts_->runtime.budgets.of(suspended.head.owner());
-  auto session = within(memory, nullptr, &share, [&] {
+  const CallToken token(call);
+  auto session = within(memory, &token, &share, [&] {
     LoadedDeck report =
         load({model.head.main_file(), std::move(model.files), model.head.model_options()}, config_);
     if (!report.ok() || digest_text(report.model->digest) != model.head.model_digest())

@@ -77,11 +77,11 @@ class Durability {
   std::string find_request(const std::string& owner, const std::string& request_id) const;
 
  private:
-  bool wake(const std::string& simulation, const Caller& caller) TS_EXCLUDES(mutex_);
+  bool wake(const std::string& simulation, const Caller& caller, Call& call) TS_EXCLUDES(mutex_);
   bool suspend(Session& session);
   void unsuspend(const std::string& simulation) TS_EXCLUDES(mutex_);
   void forget(Session& session);
-  SessionPtr revive(const std::string& simulation, const Suspended& suspended);
+  SessionPtr revive(const std::string& simulation, const Suspended& suspended, Call& call);
   std::unique_ptr<Simulation> simulation_at(const ModelPtr& model, const Suspended& suspended,
                                             const std::string& state, SessionResults* results,
                                             bool has_files);

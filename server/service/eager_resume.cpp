@@ -44,9 +44,10 @@ void EagerResume::resume(const Parts& parts, const Simulations& simulations) {
     if (call_.cancelled()) return;
     if (!room.left_for(owner)) continue;
     try {
-      (void)parts.store.get(name, {owner, Role::control}, Access::own);
+      (void)parts.store.get(name, {owner, Role::control}, call_, Access::own);
       ++back;
     } catch (const Refusal& refusal) {
+      if (call_.cancelled()) return;
       if (refusal.reason() == v1::REASON_NO_SUCH_SIMULATION) {
         ++gone;  // deleted meanwhile
         continue;

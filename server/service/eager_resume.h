@@ -16,7 +16,7 @@ class EagerResume {
  public:
   /// Returns at once. `parts` outlives `stop`, and its lanes end before this does.
   void start(const Parts& parts);
-  /// No other is begun.
+  /// The one that is being brought back is given up, and no other is begun.
   void stop() { call_.cancel(); }
 
  private:

@@ -24,7 +24,7 @@ class WatchHandler final : public OneRequest<v1::WatchEventsRequest> {
     v1::SimulationInfo suspended;
     if (!simulation_.empty() &&
         !parts_.durability.describe(simulation_, exchange.caller(), &suspended))
-      (void)parts_.store.get(simulation_, exchange.caller(), Access::observe);
+      (void)parts_.store.get(simulation_, exchange.caller(), exchange.call(), Access::observe);
     ReaderPtr reader = std::make_shared<Reader>();
     reader->wants = [caller = exchange.caller(), name = simulation_](const v1::Event& event,
                                                                      const std::string& owner) {

@@ -9,8 +9,8 @@ void add_geometry(Gate& gate, const Parts& parts) {
            series<v1::DescribeGeometryRequest, v1::DescribeGeometryReply>(
                Role::observe, Lane::work,
                [&parts](const CallFrame& frame, const v1::DescribeGeometryRequest& request) {
-                 auto session = std::make_shared<SessionHold>(parts.store, request.simulation(),
-                                                              frame.caller, Access::observe);
+                 auto session = std::make_shared<SessionHold>(
+                     parts.store, request.simulation(), frame.caller, frame.call, Access::observe);
                  State state = (*session)->state(frame.call);
                  auto share = std::make_shared<MemoryShare>(frame.memory, size_of(state));
                  auto messages = std::make_shared<GeometryMessages>(

@@ -107,7 +107,8 @@ Method on_session(const Parts& parts, Role role, Lane lane, Body body,
       role, lane,
       [&parts, access, body = std::move(body)](const CallFrame& frame, const Request& request,
                                                Reply* reply) {
-        const SessionHold session(parts.store, request.simulation(), frame.caller, access);
+        const SessionHold session(parts.store, request.simulation(), frame.caller, frame.call,
+                                  access);
         if constexpr (requires { request.request_id(); } &&
                       !std::is_same_v<Request, v1::StepRequest>)
           once_stored(parts.store, *session, frame, request, reply, body);

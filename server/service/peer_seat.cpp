@@ -32,10 +32,11 @@ bool Heart::beat() {
   return true;
 }
 
-PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& caller, PeerLink& link)
+PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& caller, Call& call,
+                   PeerLink& link)
     : parts_(parts),
       identity_(caller.identity),
-      session_(parts.store, hello.simulation(), caller, Access::couple, hello.port()),
+      session_(parts.store, hello.simulation(), caller, call, Access::couple, hello.port()),
       link_(link),
       port_(session_->port(hello.port())) {
   v1::SimulationInfo info;

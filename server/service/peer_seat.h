@@ -34,8 +34,9 @@ class Heart {
 /// Keeps the port taken and the session alive.
 class PeerSeat {
  public:
-  /// Settles what `hello` asks for. Throws Refusal.
-  PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& caller, PeerLink& link);
+  /// Settles what `hello` asks for. Throws Refusal, CANCELLED when the call ends first.
+  PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& caller, Call& call,
+           PeerLink& link);
   /// Waits for the end of a message that the session sends.
   ~PeerSeat();
   PeerSeat(const PeerSeat&) = delete;

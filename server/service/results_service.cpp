@@ -23,7 +23,7 @@ std::int64_t end_of(const v1::GetResultsRequest& request, std::int64_t size) {
 FileReplies::Source file_pieces(const Parts& parts, const CallFrame& frame,
                                 const v1::GetResultsRequest& request) {
   auto session = std::make_shared<SessionHold>(parts.store, request.simulation(), frame.caller,
-                                               Access::observe);
+                                               frame.call, Access::observe);
   std::int64_t cuts = 0;
   const std::int64_t size = (*session)->size_of_result(request.file(), frame.call, &cuts);
   const std::int64_t end = end_of(request, size);

@@ -95,9 +95,9 @@ constexpr const char* kAccessNames[] = {"see", "observe", "couple", "control", "
 
 }  // namespace
 
-SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Access access,
+SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Call& call, Access access,
                              const std::string& port) const {
-  if (!has(id) && keeper_.wake) (void)keeper_.wake(id, caller);
+  if (!has(id) && keeper_.wake) (void)keeper_.wake(id, caller, call);
   Guard guard(mutex_);
   const auto found = sessions_.find(id);
   if (found == sessions_.end() || !found->second->grants().allow(caller, Access::see))
@@ -137,7 +137,7 @@ bool SessionStore::was_removed(const std::string& id, const Request& request) co
   refuse_other_request(request.second);
 }
 
-void SessionStore::remove(const std::string& id, const Caller& caller,
+void SessionStore::remove(const std::string& id, const Caller& caller, Call& call,
                           const std::string& request_id) {
   check_request_id(request_id);
   const Request request(caller.identity, request_id);
@@ -146,7 +146,7 @@ void SessionStore::remove(const std::string& id, const Caller& caller,
     if (!request_id.empty() && was_removed(id, request)) return;
   }
   if (keeper_.remove && keeper_.remove(id, caller)) return note_removal(id, request);
-  const SessionPtr session = get(id, caller, Access::own);
+  const SessionPtr session = get(id, caller, call, Access::own);
   session->discard_results();
   note_removal(id, request);
   drop(id);

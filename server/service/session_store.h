@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "rpc/auth.h"
+#include "rpc/call.h"
 #include "service/session.h"
 #include "threads/mutex.h"
 
@@ -48,10 +49,10 @@ class SessionStore {
 
   /// Who keeps sessions on the disk. Called without any lock.
   struct Keeper {
-    std::function<bool(const std::string& id, const Caller&)> wake;    ///< true: it is back
-    std::function<bool(const std::string& id, const Caller&)> remove;  ///< true: it was there
-    std::function<bool(Session&)> suspend;                             ///< false: it must live on
-    std::function<void(const std::string& id)> unsuspend;              ///< it lives on after all
+    std::function<bool(const std::string& id, const Caller&, Call&)> wake;  ///< true: it is back
+    std::function<bool(const std::string& id, const Caller&)> remove;       ///< true: it was there
+    std::function<bool(Session&)> suspend;                 ///< false: it must live on
+    std::function<void(const std::string& id)> unsuspend;  ///< it lives on after all
     std::function<void(Session&)> forget;
     std::function<void(Session&)> store;  ///< a checkpoint now; throws STORAGE_FULL
   };
@@ -66,14 +67,15 @@ class SessionStore {
   std::vector<SessionPtr> all() const;
   bool has(const std::string& id) const;
   /// Throws NO_SUCH_SIMULATION, also for one that the caller may not see, and NOT_GRANTED.
-  /// One that is on the disk is brought back.
-  SessionPtr get(const std::string& id, const Caller& caller, Access access,
+  /// One that is on the disk is brought back; CANCELLED when the call ends first.
+  SessionPtr get(const std::string& id, const Caller& caller, Call& call, Access access,
                  const std::string& port = "") const;
   /// What the caller may see, in the order of creation.
   std::vector<SessionPtr> list(const Caller& caller) const;
   /// Also one that is on the disk. A repeat with the request's id does nothing more. Throws as
   /// `get`, and BAD_ARGUMENT.
-  void remove(const std::string& id, const Caller& caller, const std::string& request_id);
+  void remove(const std::string& id, const Caller& caller, Call& call,
+              const std::string& request_id);
   /// The same for a session that nobody has seen.
   void discard(const std::string& id);
   /// Ends a session; nothing when it is gone already.
@@ -110,20 +112,20 @@ class SessionStore {
 /// A session found and kept alive. Throws as SessionStore::get.
 class SessionHold {
  public:
-  SessionHold(const SessionStore& store, const std::string& id, const Caller& caller, Access access,
-              const std::string& port = "")
-      : session_(find(store, id, caller, access, port)), use_(*session_) {}
+  SessionHold(const SessionStore& store, const std::string& id, const Caller& caller, Call& call,
+              Access access, const std::string& port = "")
+      : session_(find(store, id, caller, call, access, port)), use_(*session_) {}
   Session& operator*() const { return *session_; }
   Session* operator->() const { return session_.get(); }
 
  private:
   // A session that is going to the disk at the moment can be taken when it is there.
   static SessionPtr find(const SessionStore& store, const std::string& id, const Caller& caller,
-                         Access access, const std::string& port) {
-    SessionPtr session = store.get(id, caller, access, port);
+                         Call& call, Access access, const std::string& port) {
+    SessionPtr session = store.get(id, caller, call, access, port);
     for (int tries = 0; tries < 20 && session->lease().ended() && session->keeping(); ++tries) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      session = store.get(id, caller, access, port);
+      session = store.get(id, caller, call, access, port);
     }
     return session;
   }

@@ -169,6 +169,7 @@ SharedMemoryService::~SharedMemoryService() {
   stop_.store(true);
   thread_.join();
   ::unlink(path_.c_str());
+  for (Connection& connection : connections_) connection.call.cancel();
   for (Connection& connection : connections_) connection.thread.join();
 }
 
@@ -199,7 +200,7 @@ void SharedMemoryService::accept_one() {
   std::list<Connection> fresh(1);
   Connection& connection = fresh.front();
   connection.thread = std::thread([this, &connection, socket = std::move(socket)]() mutable {
-    run_caught("shared memory peer", [&] { serve(std::move(socket)); });
+    run_caught("shared memory peer", [&] { serve(std::move(socket), connection.call); });
     connection.ended.store(true);
   });
   connections_.splice(connections_.end(), fresh);
@@ -216,7 +217,7 @@ void SharedMemoryService::join_ended() {
   }
 }
 
-void SharedMemoryService::serve(shm::Descriptor socket) {
+void SharedMemoryService::serve(shm::Descriptor socket, Call& call) {
   shm::Request request;
   if (!readable(socket.get(), kRequestMs) || !shm::read_request(socket.get(), &request)) return;
   std::optional<shm::Channel> channel;
@@ -229,7 +230,7 @@ void SharedMemoryService::serve(shm::Descriptor socket) {
     if (!shm::send_segment(socket.get(), segment)) return;
     channel.emplace(std::move(socket), std::move(segment), shm::Channel::Side::server,
                     static_cast<std::size_t>(parts_.config.limits.message_bytes));
-    serve_peer(*channel, caller);
+    serve_peer(*channel, caller, call);
   } catch (...) {
     status = status_of_exception(parts_.runtime, "shared memory", caller.identity);
   }
@@ -237,14 +238,14 @@ void SharedMemoryService::serve(shm::Descriptor socket) {
                    {status.error_code(), status.error_details()});
 }
 
-void SharedMemoryService::serve_peer(shm::Channel& channel, const Caller& caller) {
+void SharedMemoryService::serve_peer(shm::Channel& channel, const Caller& caller, Call& call) {
   if (parts_.gate.closing())
     throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
   SharedMemoryStream stream(channel, parts_.gate, stop_);
   v1::PeerMessage message;
   if (!stream.read_hello(&message) || !message.has_hello())
     throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `hello`");
-  PeerSeat seat(parts_, message.hello(), caller, stream);
+  PeerSeat seat(parts_, message.hello(), caller, call, stream);
   if (!stream.send(seat.welcome(), Clock::now() + kHandshake)) return;
   seat.begin();
   while (stream.read(&message, seat.heart())) seat.receive(message);

@@ -22,14 +22,15 @@ class SharedMemoryService {
 
  private:
   struct Connection {
+    Call call;
     std::thread thread;
     std::atomic<bool> ended{false};
   };
   void accept_loop();
   void accept_one();
   void join_ended();
-  void serve(shm::Descriptor socket);
-  void serve_peer(shm::Channel& channel, const Caller& caller);
+  void serve(shm::Descriptor socket, Call& call);
+  void serve_peer(shm::Channel& channel, const Caller& caller, Call& call);
 
   const std::string path_;
   const Parts& parts_;

@@ -112,7 +112,8 @@ void add_life(Gate& gate, const Parts& parts) {
       simulations_path("DeleteSimulation"),
       unary<v1::DeleteSimulationRequest, v1::DeleteSimulationReply>(
           Role::control, Lane::quick, [&parts](const CallFrame& frame, const auto& request, auto*) {
-            parts.store.remove(request.simulation(), frame.caller, request.request_id());
+            parts.store.remove(request.simulation(), frame.caller, frame.call,
+                               request.request_id());
           }));
   gate.add(simulations_path("GetSimulation"),
            unary<v1::GetSimulationRequest, v1::GetSimulationReply>(
@@ -122,7 +123,8 @@ void add_life(Gate& gate, const Parts& parts) {
                  if (!parts.store.has(name) &&
                      parts.durability.describe(name, frame.caller, reply->mutable_simulation()))
                    return;
-                 const SessionHold session(parts.store, name, frame.caller, Access::see);
+                 const SessionHold session(parts.store, name, frame.caller, frame.call,
+                                           Access::see);
                  session->fill(reply->mutable_simulation(), frame.caller);
                }));
   gate.add(

@@ -20,7 +20,8 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
         throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
       header_ = request.header();
       share_ = MemoryShare(exchange.memory());
-      session_.emplace(parts_.store, header_.simulation(), exchange.caller(), Access::control);
+      session_.emplace(parts_.store, header_.simulation(), exchange.caller(), exchange.call(),
+                       Access::control);
       return;
     }
     if (request.has_header())
@@ -62,7 +63,8 @@ using ExportReplies = Series<v1::ExportSnapshotRequest, v1::ExportSnapshotReply>
 
 ExportReplies::Source exported(const Parts& parts, const CallFrame& frame,
                                const v1::ExportSnapshotRequest& request) {
-  const SessionHold session(parts.store, request.simulation(), frame.caller, Access::observe);
+  const SessionHold session(parts.store, request.simulation(), frame.caller, frame.call,
+                            Access::observe);
   const int number = request.has_snapshot() ? snapshot_in(request) : -1;
   auto bytes = std::make_shared<std::string>();
   auto share = std::make_shared<MemoryShare>();
@@ -78,10 +80,10 @@ ExportReplies::Source exported(const Parts& parts, const CallFrame& frame,
 
 using RecordReplies = Series<v1::GetRecordRequest, v1::GetRecordReply>;
 
-RecordReplies::Source recorded(const Parts& parts, const Caller& caller,
+RecordReplies::Source recorded(const Parts& parts, const CallFrame& frame,
                                const v1::GetRecordRequest& request) {
-  auto session =
-      std::make_shared<SessionHold>(parts.store, request.simulation(), caller, Access::observe);
+  auto session = std::make_shared<SessionHold>(parts.store, request.simulation(), frame.caller,
+                                               frame.call, Access::observe);
   const Recorder& record = (*session)->record();
   return [session, &record, at = std::size_t{0}](auto* reply) mutable {
     std::string piece = record.read(at, kChunkBytes);
@@ -147,7 +149,7 @@ void add_snapshots(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("GetRecord"),
            series<v1::GetRecordRequest, v1::GetRecordReply>(
                Role::observe, Lane::work, [&parts](const CallFrame& frame, const auto& request) {
-                 return recorded(parts, frame.caller, request);
+                 return recorded(parts, frame, request);
                }));
 }
 

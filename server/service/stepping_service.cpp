@@ -34,7 +34,7 @@ class StepStreamHandler final : public Handler {
   void step(Exchange& exchange) {
     if (!session_) {
       name_ = request_.simulation();
-      session_.emplace(parts_.store, name_, exchange.caller(), Access::control);
+      session_.emplace(parts_.store, name_, exchange.caller(), exchange.call(), Access::control);
     }
     if (!request_.simulation().empty() && request_.simulation() != name_)
       throw Refusal(v1::REASON_BAD_ARGUMENT,
@@ -151,7 +151,7 @@ class RunHandler final : public OneRequest<v1::RunRequest> {
  private:
   void serve(Exchange& exchange, const v1::RunRequest& request) override {
     const SessionHold session(parts_.store, request.step().simulation(), exchange.caller(),
-                              Access::control);
+                              exchange.call(), Access::control);
     Progress progress(*session, request);
     Rows rows(*session, request, exchange.memory());
     v1::RunReply done;
@@ -187,7 +187,8 @@ void add_stepping(Gate& gate, const Parts& parts) {
                [&parts](const CallFrame& frame, const auto& request, auto* reply) {
                  const std::string& name = request.simulation();
                  if (parts.durability.knows(name, frame.caller)) return;  // it rests
-                 const SessionPtr session = parts.store.get(name, frame.caller, Access::control);
+                 const SessionPtr session =
+                     parts.store.get(name, frame.caller, frame.call, Access::control);
                  once(*session, frame, request, reply,
                       [&] { reply->set_was_stepping(session->interrupt()); });
                }));

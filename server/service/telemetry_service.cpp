@@ -69,7 +69,8 @@ class SubscribeHandler final : public OneRequest<v1::SubscribeRequest> {
 
  private:
   void serve(Exchange& exchange, const v1::SubscribeRequest& request) override {
-    session_.emplace(parts_.store, request.simulation(), exchange.caller(), Access::observe);
+    session_.emplace(parts_.store, request.simulation(), exchange.caller(), exchange.call(),
+                     Access::observe);
     Subscription::Options options =
         make_options(request, **session_, exchange.caller(), parts_.config.limits);
     v1::SubscribeReply first;

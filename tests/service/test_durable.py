@@ -267,6 +267,43 @@ def test_nothing_comes_back_without_a_folder(tmp_path):
     assert done.returncode == 4 and done.stdout.splitlines()[-1] == "mbcosimd: error: --resume eager needs --state-dir"
 
 
+def slow_deck():
+    """Takes a while to read: a million statements."""
+    sums = "".join(f"set: x = x*.5 + sin({k}*i); " for k in range(5))
+    return deck().replace("begin: nodes;", f"set: real x = 0.;\nfor: integer i = 1, 200000; {sums} end for;\nbegin: nodes;", 1)
+
+
+def test_a_call_that_is_cancelled_brings_nothing_back(start):
+    daemon = start()
+    with daemon.connect() as server:
+        begin = time.monotonic()
+        name = server.load_text(slow_deck()).name
+        took = time.monotonic() - begin
+    daemon.stop()
+    daemon = start()
+    with daemon.connect() as server:
+        while "ReadVariables refused to local: CANCELLED: the call was cancelled" not in daemon.log():
+            with pytest.raises(grpc.RpcError) as caught:  # others' work is not waited for either
+                server.simulations.ReadVariables(pb.ReadVariablesRequest(simulation=name), timeout=took / 3)
+            assert caught.value.code() == grpc.StatusCode.DEADLINE_EXCEEDED
+        assert state_of(server, name) == pb.SIMULATION_STATE_SUSPENDED
+        assert server.simulations.ReadVariables(pb.ReadVariablesRequest(simulation=name)).step == 0
+    daemon.stop()
+    assert daemon.log().count(f"{name} is READY") == 1
+
+
+def test_the_end_of_the_daemon_does_not_wait_for_all_to_come_back(start):
+    daemon = start()
+    with daemon.connect() as server:
+        names = [server.load_text(slow_deck()).name for _ in range(3)]
+    daemon.stop()
+    daemon = start("--resume", "eager")
+    daemon.stop()
+    assert daemon.log().count("is READY") < 3 and "stays suspended" not in daemon.log()
+    with start().connect() as server:
+        assert [state_of(server, name) for name in names] == 3 * [pb.SIMULATION_STATE_SUSPENDED]
+
+
 def test_deleted_ones_are_gone(start, folder):
     daemon = start()
     with daemon.connect() as server:
