@@ -11,34 +11,13 @@
 #include <random>
 
 #include "service/protocol.h"
+#include "service/storing.h"
 #include "service/upload.h"
 #include "threads/top_frame.h"
 #include "wire/convert.h"
 
 namespace mbcosim::server {
 namespace {
-
-const std::string kPrefix = "simulations/";
-
-std::string id_of(const std::string& simulation) { return simulation.substr(kPrefix.size()); }
-
-[[noreturn]] void refuse_storage(const std::string& what, const StorageError& error) {
-  throw Refusal(v1::REASON_STORAGE_FULL, what + ": " + error.what());
-}
-
-// All of it, or nothing is left.
-template <class Write>
-void store_new(StateFolder& folder, const std::string& id, Write write) {
-  try {
-    write();
-  } catch (const StorageError& error) {
-    folder.remove(id);
-    refuse_storage("the simulation cannot be stored", error);
-  } catch (...) {
-    folder.remove(id);
-    throw;
-  }
-}
 
 std::unique_ptr<StateFolder> open_folder(const Config& config) {
   if (config.state_dir.empty()) return nullptr;
@@ -104,7 +83,7 @@ std::string Durability::new_name() const {
   std::random_device random;
   char text[20];
   std::snprintf(text, sizeof text, "%08x%08x", random(), random());
-  return kPrefix + daemon_ + (daemon_.empty() ? "" : "-") + text;
+  return kSimulations + daemon_ + (daemon_.empty() ? "" : "-") + text;
 }
 
 // ------------------------------------------------------------------ what is in the folder
@@ -127,7 +106,7 @@ void Durability::read_one(const std::string& id) {
   found.head = folder_->read_head(id);
   found.info = read_latest(id).point.info();
   found.since = folder_->written_at(id);
-  if (found.head.simulation() != kPrefix + id)
+  if (found.head.simulation() != kSimulations + id)
     throw StorageError(id + "/model: it is of " + found.head.simulation());
   Guard guard(mutex_);
   suspended_[found.head.simulation()] = std::move(found);
@@ -328,23 +307,6 @@ void Durability::post(const SessionPtr& session) {
   }
 }
 
-void Durability::expire() {
-  const std::int64_t now = std::time(nullptr), longest = config_.suspended_expiry.count();
-  std::vector<std::pair<std::string, std::string>> over;
-  {
-    Guard guard(mutex_);
-    for (const auto& [name, suspended] : suspended_)
-      if (now - suspended.since > longest && waking_.count(name) == 0 && !parts_->store.has(name))
-        over.emplace_back(name, suspended.head.owner());
-    for (const auto& [name, owner] : over) suspended_.erase(name);
-  }
-  for (const auto& [name, owner] : over) {
-    folder_->remove(id_of(name));
-    parts_->results.remove(name);
-    log_.deleted({name, owner}, v1::DELETION_CAUSE_LEASE_OVER);
-  }
-}
-
 // ------------------------------------------------------------------ from memory to disk
 
 bool Durability::suspend(Session& session) {
@@ -367,277 +329,6 @@ void Durability::forget(Session& session) {
   Guard guard(session.keeping()->mutex);  // no checkpoint is under way
   session.keeping()->over = true;
   folder_->remove(id_of(session.identity().id));
-}
-
-// ------------------------------------------------------------------ from server to server
-
-void Durability::require() const {
-  if (!available())
-    throw Refusal(v1::REASON_NOT_DURABLE,
-                  "the server keeps no checkpoints: it was started without --state-dir");
-}
-
-OpenFiles Durability::open_files(Session& session) try {
-  Keeping* keeping = session.keeping();
-  if (!keeping)
-    throw Refusal(v1::REASON_NOT_DURABLE,
-                  session.identity().id + " has durability NONE: its deck is not kept");
-  Guard guard(keeping->mutex);
-  write_held(session, *keeping);
-  return OpenFiles(folder_->files_of(id_of(session.identity().id)));
-} catch (const StorageError& error) {
-  refuse_storage("the checkpoint cannot be written", error);
-}
-
-v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheckpointHeader& header,
-                                      std::uint64_t digest, const Caller& caller,
-                                      const Call& call) {
-  v1::SimulationInfo info;
-  if (imported(header.request_id(), digest, caller, &info)) return info;
-  const SessionStore::Place place(parts_->store, header.request_id(), digest, caller, call);
-  if (imported(header.request_id(), digest, caller, &info)) return info;  // beside this call
-  if (place.known()) {
-    place.known()->fill(&info, caller);
-    return info;
-  }
-  if (bundle.model.head.simulation().empty() || bundle.point.state.empty())
-    throw Refusal(v1::REASON_DAMAGED_STATE, "the checkpoint has no model, or no state");
-  v1::CheckpointHead& head = bundle.model.head;
-  const std::string name = new_name();
-  head.set_simulation(name);
-  head.set_owner(caller.identity);
-  head.set_request_digest(digest);
-  head.mutable_options()->set_request_id(header.request_id());
-  head.mutable_options()->clear_grants();
-  v1::CheckpointPoint& point = bundle.point.point;
-  point.mutable_info()->set_name(name);
-  point.mutable_info()->set_owner(caller.identity);
-  point.mutable_info()->clear_grants();
-  if (header.has_display_name()) point.mutable_info()->set_display_name(header.display_name());
-  point.clear_kept_replies();  // of others' requests
-  const auto longest = google::protobuf::util::TimeUtil::SecondsToDuration(
-      std::chrono::duration_cast<std::chrono::seconds>(config_.limits.lease).count());
-  using google::protobuf::operator<;
-  if (longest < point.info().lease()) *point.mutable_info()->mutable_lease() = longest;
-  put_in_folder(name, bundle);
-  describe(name, caller, &info);
-  return info;
-}
-
-bool Durability::imported(const std::string& request_id, std::uint64_t digest, const Caller& caller,
-                          v1::SimulationInfo* out) const {
-  Guard guard(mutex_);
-  const Suspended* found = made_by(caller.identity, request_id);
-  if (!found) return false;
-  if (found->head.request_digest() != digest) refuse_other_request(request_id);
-  *out = found->info;
-  return true;
-}
-
-void Durability::put_in_folder(const std::string& simulation, const StoredBundle& bundle) {
-  const std::string id = id_of(simulation);
-  store_new(*folder_, id, [&] {
-    folder_->write_model(id, bundle.model);
-    for (const v1::CheckpointSnapshot& snapshot : bundle.point.point.snapshots()) {
-      const auto state = bundle.snapshots.find(snapshot.number());
-      if (state == bundle.snapshots.end())
-        throw Refusal(v1::REASON_DAMAGED_STATE, "the checkpoint lacks the state of snapshot " +
-                                                    std::to_string(snapshot.number()));
-      folder_->write_snapshot(id, snapshot.number(), state->second);
-    }
-    folder_->write_point(id, bundle.point);
-    read_one(id);
-  });
-  log_.created({simulation, bundle.model.head.owner()}, bundle.point.point.info().display_name(),
-               "");
-}
-
-// ------------------------------------------------------------------ suspended ones
-
-bool Durability::may_see(const Suspended& suspended, const Caller& caller, Access access) const {
-  return Grants(suspended.head.owner(), suspended.info.grants()).allow(caller, access);
-}
-
-bool Durability::knows(const std::string& simulation, const Caller& caller) const {
-  Guard guard(mutex_);
-  const auto found = suspended_.find(simulation);
-  return found != suspended_.end() && may_see(found->second, caller, Access::see);
-}
-
-bool Durability::describe(const std::string& simulation, const Caller& caller,
-                          v1::SimulationInfo* out) const {
-  Guard guard(mutex_);
-  const auto found = suspended_.find(simulation);
-  if (found == suspended_.end() || !may_see(found->second, caller, Access::see)) return false;
-  *out = found->second.info;
-  if (!may_see(found->second, caller, Access::own)) out->clear_grants();
-  return true;
-}
-
-std::vector<v1::SimulationInfo> Durability::list(const Caller& caller) const {
-  std::vector<v1::SimulationInfo> found;
-  Guard guard(mutex_);
-  for (const auto& [name, suspended] : suspended_) {
-    if (!may_see(suspended, caller, Access::see)) continue;
-    found.push_back(suspended.info);
-    if (!may_see(suspended, caller, Access::own)) found.back().clear_grants();
-  }
-  return found;
-}
-
-std::vector<std::pair<std::string, std::string>> Durability::by_last_use() const {
-  std::multimap<std::int64_t, std::pair<std::string, std::string>, std::greater<>> found;
-  Guard guard(mutex_);
-  for (const auto& [name, suspended] : suspended_)
-    found.emplace(suspended.since, std::pair(name, suspended.head.owner()));
-  std::vector<std::pair<std::string, std::string>> result;
-  for (auto& [since, simulation] : found) result.push_back(std::move(simulation));
-  return result;
-}
-
-bool Durability::remove(const std::string& simulation, const Caller& caller) {
-  std::string owner;
-  {
-    Guard guard(mutex_);
-    const auto found = suspended_.find(simulation);
-    if (found == suspended_.end() || waking_.count(simulation) > 0 ||
-        !may_see(found->second, caller, Access::own))
-      return false;
-    owner = found->second.head.owner();
-    suspended_.erase(found);
-  }
-  folder_->remove(id_of(simulation));
-  parts_->results.remove(simulation);
-  log_.deleted({simulation, owner}, v1::DELETION_CAUSE_ASKED);
-  return true;
-}
-
-std::string Durability::find_request(const std::string& owner,
-                                     const std::string& request_id) const {
-  Guard guard(mutex_);
-  const Suspended* found = made_by(owner, request_id);
-  return found ? found->head.simulation() : "";
-}
-
-const Suspended* Durability::made_by(const std::string& owner,
-                                     const std::string& request_id) const {
-  if (request_id.empty()) return nullptr;
-  for (const auto& [name, suspended] : suspended_)
-    if (suspended.head.owner() == owner && suspended.head.options().request_id() == request_id)
-      return &suspended;
-  return nullptr;
-}
-
-// ------------------------------------------------------------------ from disk to memory
-
-// One at a time makes a session of it, others wait for that. True: it is in the store now.
-bool Durability::wake(const std::string& simulation, const Caller& caller, Call& call) {
-  constexpr std::chrono::milliseconds kLook(20);
-  Suspended suspended;
-  {
-    Guard guard(mutex_);
-    while (waking_.count(simulation) > 0 && !stop_ && !call.cancelled())
-      changed_.wait_for(mutex_, kLook);
-    if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
-    const auto found = suspended_.find(simulation);
-    if (found == suspended_.end()) return parts_->store.has(simulation);
-    if (!may_see(found->second, caller, Access::see)) return false;
-    suspended = found->second;
-    waking_.insert(simulation);
-  }
-  struct Done {
-    Durability& self;
-    const std::string& name;
-    ~Done() {
-      Guard guard(self.mutex_);
-      self.waking_.erase(name);
-      self.changed_.notify_all();
-    }
-  } const done{*this, simulation};
-  const SessionStore::Place place(parts_->store, "", 0, {suspended.head.owner(), Role::control},
-                                  call);
-  const SessionPtr session = revive(simulation, suspended, call);
-  parts_->store.add(session);
-  unsuspend(simulation);
-  v1::SimulationInfo info;
-  session->fill(&info);
-  log_.state_changed(session->subject(), info.state(), info.step());
-  return true;
-}
-
-SessionPtr Durability::revive(const std::string& simulation, const Suspended& suspended,
-                              Call& call) try {
-  const std::string id = id_of(simulation);
-  StoredModel model = folder_->read_model(id);
-  const StoredPoint point = read_latest(id);
-  std::map<int, std::string> snapshots;
-  for (const v1::CheckpointSnapshot& snapshot : point.point.snapshots())
-    snapshots[snapshot.number()] = folder_->read_snapshot(id, snapshot.number());
-
-  const v1::CreateOptions& options = model.head.options();
-  MemoryShare share;
-  MemoryBudget& memory = parts_->runtime.budgets.of(suspended.head.owner());
-  const CallToken token(call);
-  auto session = within(memory, &token, &share, [&] {
-    LoadedDeck report =
-        load({model.head.main_file(), std::move(model.files), model.head.model_options()}, config_);
-    if (!report.ok() || digest_text(report.model->digest) != model.head.model_digest())
-      throw Refusal(v1::REASON_OTHER_MODEL, simulation + " was stored by mbcosim " +
-                                                model.head.program() +
-                                                ", and this program reads its deck in another way");
-    bool has_files = false;
-    std::unique_ptr<SessionResults> results;
-    if (options.has_results())
-      results = std::make_unique<SessionResults>(parts_->results, simulation, options.results(),
-                                                 config_.limits.results_bytes, &has_files);
-    auto made = simulation_at(report.model, suspended, point.state, results.get(), has_files);
-    Session::Identity identity{
-        simulation,
-        point.point.info().display_name(),
-        suspended.head.owner(),
-        options.request_id(),
-        model.head.request_digest(),
-        std::chrono::milliseconds(
-            google::protobuf::util::TimeUtil::DurationToMilliseconds(point.point.info().lease()))};
-    Session::Origin origin{report.model,
-                           std::move(report.symbols),
-                           options.summed_time() ? TimeKeeping::summed : TimeKeeping::exact,
-                           model.head.model_options().symbols(),
-                           model.head.forked(),
-                           std::move(report.files),
-                           std::move(report.attached)};
-    return std::make_shared<Session>(std::move(identity), std::move(origin), std::move(made),
-                                     parts_->shared(memory), options, std::move(results));
-  });
-  session->set_memory(std::move(share));
-  session->take_over(point.point, snapshots);
-  session->set_keeping(make_keeping(simulation, options));
-  {
-    Guard guard(session->keeping()->mutex);
-    for (const auto& [number, state] : snapshots) session->keeping()->snapshots.insert(number);
-    session->keeping()->done(session->changes(), session->step_number());
-  }
-  return session;
-} catch (const StorageError& error) {
-  throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be brought back: " + error.what());
-}
-
-std::unique_ptr<Simulation> Durability::simulation_at(const ModelPtr& model,
-                                                      const Suspended& suspended,
-                                                      const std::string& state,
-                                                      SessionResults* results, bool has_files) {
-  auto simulation = Simulation::create(
-      model, nullptr, nullptr,
-      suspended.head.options().summed_time() ? TimeKeeping::summed : TimeKeeping::exact);
-  if (!simulation) throw Refusal(simulation.error());
-  if (const Status status = (*simulation)->import_state(state); !status)
-    throw Refusal(status.error());
-  if (!results) return std::move(*simulation);
-  const auto writer = results->start(*model);
-  const Status goes_on =
-      has_files ? (*simulation)->resume_writing(writer) : (*simulation)->write_to(writer);
-  if (!goes_on) throw Refusal(results->without_paths(goes_on.error()));
-  return std::move(*simulation);
 }
 
 }  // namespace mbcosim::server

@@ -81,8 +81,9 @@ class Durability {
   bool suspend(Session& session);
   void unsuspend(const std::string& simulation) TS_EXCLUDES(mutex_);
   void forget(Session& session);
-  SessionPtr revive(const std::string& simulation, const Suspended& suspended, Call& call);
-  std::unique_ptr<Simulation> simulation_at(const ModelPtr& model, const Suspended& suspended,
+  SessionPtr revive(const std::string& simulation, Call& call);
+  SessionPtr session_of(StoredModel& model, const StoredPoint& point, MemoryBudget& memory);
+  std::unique_ptr<Simulation> simulation_at(const ModelPtr& model, TimeKeeping time_keeping,
                                             const std::string& state, SessionResults* results,
                                             bool has_files);
   void write_held(Session& session, Keeping& keeping) TS_REQUIRES(keeping.mutex);

@@ -1,0 +1,319 @@
+/// Durability: simulations that are on the disk only, and how they come there and back.
+#include <google/protobuf/util/time_util.h>
+
+#include <ctime>
+#include <functional>
+
+#include "service/durability.h"
+#include "service/storing.h"
+#include "wire/convert.h"
+
+namespace mbcosim::server {
+
+bool Durability::may_see(const Suspended& suspended, const Caller& caller, Access access) const {
+  return Grants(suspended.head.owner(), suspended.info.grants()).allow(caller, access);
+}
+
+bool Durability::knows(const std::string& simulation, const Caller& caller) const {
+  Guard guard(mutex_);
+  const auto found = suspended_.find(simulation);
+  return found != suspended_.end() && may_see(found->second, caller, Access::see);
+}
+
+bool Durability::describe(const std::string& simulation, const Caller& caller,
+                          v1::SimulationInfo* out) const {
+  Guard guard(mutex_);
+  const auto found = suspended_.find(simulation);
+  if (found == suspended_.end() || !may_see(found->second, caller, Access::see)) return false;
+  *out = found->second.info;
+  if (!may_see(found->second, caller, Access::own)) out->clear_grants();
+  return true;
+}
+
+std::vector<v1::SimulationInfo> Durability::list(const Caller& caller) const {
+  std::vector<v1::SimulationInfo> found;
+  Guard guard(mutex_);
+  for (const auto& [name, suspended] : suspended_) {
+    if (!may_see(suspended, caller, Access::see)) continue;
+    found.push_back(suspended.info);
+    if (!may_see(suspended, caller, Access::own)) found.back().clear_grants();
+  }
+  return found;
+}
+
+std::vector<std::pair<std::string, std::string>> Durability::by_last_use() const {
+  std::multimap<std::int64_t, std::pair<std::string, std::string>, std::greater<>> found;
+  Guard guard(mutex_);
+  for (const auto& [name, suspended] : suspended_)
+    found.emplace(suspended.since, std::pair(name, suspended.head.owner()));
+  std::vector<std::pair<std::string, std::string>> result;
+  for (auto& [since, simulation] : found) result.push_back(std::move(simulation));
+  return result;
+}
+
+bool Durability::remove(const std::string& simulation, const Caller& caller) {
+  std::string owner;
+  {
+    Guard guard(mutex_);
+    const auto found = suspended_.find(simulation);
+    if (found == suspended_.end() || waking_.count(simulation) > 0 ||
+        !may_see(found->second, caller, Access::own))
+      return false;
+    owner = found->second.head.owner();
+    suspended_.erase(found);
+  }
+  folder_->remove(id_of(simulation));
+  parts_->results.remove(simulation);
+  log_.deleted({simulation, owner}, v1::DELETION_CAUSE_ASKED);
+  return true;
+}
+
+std::string Durability::find_request(const std::string& owner,
+                                     const std::string& request_id) const {
+  Guard guard(mutex_);
+  const Suspended* found = made_by(owner, request_id);
+  return found ? found->head.simulation() : "";
+}
+
+const Suspended* Durability::made_by(const std::string& owner,
+                                     const std::string& request_id) const {
+  if (request_id.empty()) return nullptr;
+  for (const auto& [name, suspended] : suspended_)
+    if (suspended.head.owner() == owner && suspended.head.options().request_id() == request_id)
+      return &suspended;
+  return nullptr;
+}
+
+void Durability::expire() {
+  const std::int64_t now = std::time(nullptr), longest = config_.suspended_expiry.count();
+  std::vector<std::pair<std::string, std::string>> over;
+  {
+    Guard guard(mutex_);
+    for (const auto& [name, suspended] : suspended_)
+      if (now - suspended.since > longest && waking_.count(name) == 0 && !parts_->store.has(name))
+        over.emplace_back(name, suspended.head.owner());
+    for (const auto& [name, owner] : over) suspended_.erase(name);
+  }
+  for (const auto& [name, owner] : over) {
+    folder_->remove(id_of(name));
+    parts_->results.remove(name);
+    log_.deleted({name, owner}, v1::DELETION_CAUSE_LEASE_OVER);
+  }
+}
+
+// ------------------------------------------------------------------ from disk to memory
+
+// One at a time makes a session of it, others wait for that. True: it is in the store now.
+bool Durability::wake(const std::string& simulation, const Caller& caller, Call& call) {
+  constexpr std::chrono::milliseconds kLook(20);
+  std::string owner;
+  {
+    Guard guard(mutex_);
+    while (waking_.count(simulation) > 0 && !stop_ && !call.cancelled())
+      changed_.wait_for(mutex_, kLook);
+    if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+    const auto found = suspended_.find(simulation);
+    if (found == suspended_.end()) return parts_->store.has(simulation);
+    if (!may_see(found->second, caller, Access::see)) return false;
+    owner = found->second.head.owner();
+    waking_.insert(simulation);
+  }
+  struct Done {
+    Durability& self;
+    const std::string& name;
+    ~Done() {
+      Guard guard(self.mutex_);
+      self.waking_.erase(name);
+      self.changed_.notify_all();
+    }
+  } const done{*this, simulation};
+  const SessionStore::Place place(parts_->store, "", 0, {owner, Role::control}, call);
+  const SessionPtr session = revive(simulation, call);
+  parts_->store.add(session);
+  unsuspend(simulation);
+  v1::SimulationInfo info;
+  session->fill(&info);
+  log_.state_changed(session->subject(), info.state(), info.step());
+  return true;
+}
+
+namespace {
+
+Session::Identity identity_of(const v1::CheckpointHead& head, const v1::SimulationInfo& info) {
+  using google::protobuf::util::TimeUtil;
+  Session::Identity identity;
+  identity.id = head.simulation();
+  identity.display_name = info.display_name();
+  identity.owner = head.owner();
+  identity.request_id = head.options().request_id();
+  identity.request_digest = head.request_digest();
+  identity.lease = std::chrono::milliseconds(TimeUtil::DurationToMilliseconds(info.lease()));
+  return identity;
+}
+
+TimeKeeping time_keeping(const v1::CheckpointHead& head) {
+  return head.options().summed_time() ? TimeKeeping::summed : TimeKeeping::exact;
+}
+
+/// The deck as it was stored. Throws OTHER_MODEL when this program makes another model of it.
+LoadedDeck read_deck(StoredModel& model, const Config& config) {
+  const v1::CheckpointHead& head = model.head;
+  LoadedDeck deck = load({head.main_file(), std::move(model.files), head.model_options()}, config);
+  if (!deck.ok() || digest_text(deck.model->digest) != head.model_digest())
+    throw Refusal(v1::REASON_OTHER_MODEL, head.simulation() + " was stored by mbcosim " +
+                                              head.program() +
+                                              ", and this program reads its deck in another way");
+  return deck;
+}
+
+}  // namespace
+
+SessionPtr Durability::revive(const std::string& simulation, Call& call) try {
+  const std::string id = id_of(simulation);
+  StoredModel model = folder_->read_model(id);
+  const StoredPoint point = read_latest(id);
+  std::map<int, std::string> snapshots;
+  for (const v1::CheckpointSnapshot& snapshot : point.point.snapshots())
+    snapshots[snapshot.number()] = folder_->read_snapshot(id, snapshot.number());
+
+  MemoryShare share;
+  MemoryBudget& memory = parts_->runtime.budgets.of(model.head.owner());
+  const CallToken token(call);
+  auto session = within(memory, &token, &share, [&] { return session_of(model, point, memory); });
+  session->set_memory(std::move(share));
+  session->take_over(point.point, snapshots);
+  session->set_keeping(make_keeping(simulation, model.head.options()));
+  {
+    Guard guard(session->keeping()->mutex);
+    for (const auto& [number, state] : snapshots) session->keeping()->snapshots.insert(number);
+    session->keeping()->done(session->changes(), session->step_number());
+  }
+  return session;
+} catch (const StorageError& error) {
+  throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be brought back: " + error.what());
+}
+
+SessionPtr Durability::session_of(StoredModel& model, const StoredPoint& point,
+                                  MemoryBudget& memory) {
+  const v1::CheckpointHead& head = model.head;
+  LoadedDeck deck = read_deck(model, config_);
+  bool has_files = false;
+  std::unique_ptr<SessionResults> results;
+  if (head.options().has_results())
+    results = std::make_unique<SessionResults>(parts_->results, head.simulation(),
+                                               head.options().results(),
+                                               config_.limits.results_bytes, &has_files);
+  auto simulation =
+      simulation_at(deck.model, time_keeping(head), point.state, results.get(), has_files);
+  Session::Origin origin{deck.model,
+                         std::move(deck.symbols),
+                         time_keeping(head),
+                         head.model_options().symbols(),
+                         head.forked(),
+                         std::move(deck.files),
+                         std::move(deck.attached)};
+  return std::make_shared<Session>(identity_of(head, point.point.info()), std::move(origin),
+                                   std::move(simulation), parts_->shared(memory), head.options(),
+                                   std::move(results));
+}
+
+std::unique_ptr<Simulation> Durability::simulation_at(const ModelPtr& model,
+                                                      TimeKeeping time_keeping,
+                                                      const std::string& state,
+                                                      SessionResults* results, bool has_files) {
+  auto simulation = Simulation::create(model, nullptr, nullptr, time_keeping);
+  if (!simulation) throw Refusal(simulation.error());
+  if (const Status status = (*simulation)->import_state(state); !status)
+    throw Refusal(status.error());
+  if (!results) return std::move(*simulation);
+  const auto writer = results->start(*model);
+  const Status goes_on =
+      has_files ? (*simulation)->resume_writing(writer) : (*simulation)->write_to(writer);
+  if (!goes_on) throw Refusal(results->without_paths(goes_on.error()));
+  return std::move(*simulation);
+}
+
+// ------------------------------------------------------------------ from server to server
+
+void Durability::require() const {
+  if (!available())
+    throw Refusal(v1::REASON_NOT_DURABLE,
+                  "the server keeps no checkpoints: it was started without --state-dir");
+}
+
+OpenFiles Durability::open_files(Session& session) try {
+  Keeping* keeping = session.keeping();
+  if (!keeping)
+    throw Refusal(v1::REASON_NOT_DURABLE,
+                  session.identity().id + " has durability NONE: its deck is not kept");
+  Guard guard(keeping->mutex);
+  write_held(session, *keeping);
+  return OpenFiles(folder_->files_of(id_of(session.identity().id)));
+} catch (const StorageError& error) {
+  refuse_storage("the checkpoint cannot be written", error);
+}
+
+v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheckpointHeader& header,
+                                      std::uint64_t digest, const Caller& caller,
+                                      const Call& call) {
+  v1::SimulationInfo info;
+  if (imported(header.request_id(), digest, caller, &info)) return info;
+  const SessionStore::Place place(parts_->store, header.request_id(), digest, caller, call);
+  if (imported(header.request_id(), digest, caller, &info)) return info;  // beside this call
+  if (place.known()) {
+    place.known()->fill(&info, caller);
+    return info;
+  }
+  if (bundle.model.head.simulation().empty() || bundle.point.state.empty())
+    throw Refusal(v1::REASON_DAMAGED_STATE, "the checkpoint has no model, or no state");
+  v1::CheckpointHead& head = bundle.model.head;
+  const std::string name = new_name();
+  head.set_simulation(name);
+  head.set_owner(caller.identity);
+  head.set_request_digest(digest);
+  head.mutable_options()->set_request_id(header.request_id());
+  head.mutable_options()->clear_grants();
+  v1::CheckpointPoint& point = bundle.point.point;
+  point.mutable_info()->set_name(name);
+  point.mutable_info()->set_owner(caller.identity);
+  point.mutable_info()->clear_grants();
+  if (header.has_display_name()) point.mutable_info()->set_display_name(header.display_name());
+  point.clear_kept_replies();  // of others' requests
+  const auto longest = google::protobuf::util::TimeUtil::SecondsToDuration(
+      std::chrono::duration_cast<std::chrono::seconds>(config_.limits.lease).count());
+  using google::protobuf::operator<;
+  if (longest < point.info().lease()) *point.mutable_info()->mutable_lease() = longest;
+  put_in_folder(name, bundle);
+  describe(name, caller, &info);
+  return info;
+}
+
+bool Durability::imported(const std::string& request_id, std::uint64_t digest, const Caller& caller,
+                          v1::SimulationInfo* out) const {
+  Guard guard(mutex_);
+  const Suspended* found = made_by(caller.identity, request_id);
+  if (!found) return false;
+  if (found->head.request_digest() != digest) refuse_other_request(request_id);
+  *out = found->info;
+  return true;
+}
+
+void Durability::put_in_folder(const std::string& simulation, const StoredBundle& bundle) {
+  const std::string id = id_of(simulation);
+  store_new(*folder_, id, [&] {
+    folder_->write_model(id, bundle.model);
+    for (const v1::CheckpointSnapshot& snapshot : bundle.point.point.snapshots()) {
+      const auto state = bundle.snapshots.find(snapshot.number());
+      if (state == bundle.snapshots.end())
+        throw Refusal(v1::REASON_DAMAGED_STATE, "the checkpoint lacks the state of snapshot " +
+                                                    std::to_string(snapshot.number()));
+      folder_->write_snapshot(id, snapshot.number(), state->second);
+    }
+    folder_->write_point(id, bundle.point);
+    read_one(id);
+  });
+  log_.created({simulation, bundle.model.head.owner()}, bundle.point.point.info().display_name(),
+               "");
+}
+
+}  // namespace mbcosim::server
