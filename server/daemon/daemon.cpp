@@ -132,7 +132,7 @@ Daemon::Daemon(const Config& config)
       results_(config_.results_root, config_.limits.results_root_bytes),
       deck_sockets_(config_.deck_sockets, config_.limits.deck_sockets, config_.listen),
       durability_(config_, log_, metrics_),
-      store_(config_.limits, metrics_, log_),
+      store_(config_.limits, log_),
       gate_(runtime_),
       health_({"mbcosim.v1.Simulations", "mbcosim.v1.Coupling", "mbcosim.v1.Telemetry",
                "mbcosim.v1.Geometry", "mbcosim.v1.Reduction", "mbcosim.v1.Results",
@@ -157,6 +157,25 @@ double resident_bytes() {
   return static_cast<double>(resident * ::sysconf(_SC_PAGESIZE));
 }
 
+const char* name_of(v1::SimulationState state) {
+  switch (state) {
+    case v1::SIMULATION_STATE_STEPPING:
+      return "stepping";
+    case v1::SIMULATION_STATE_FINISHED:
+      return "finished";
+    case v1::SIMULATION_STATE_FAILED:
+      return "failed";
+    default:
+      return "ready";
+  }
+}
+
+Metrics::Values count_by_state(const SessionStore& store) {
+  Metrics::Values counts{{"ready", 0}, {"stepping", 0}, {"finished", 0}, {"failed", 0}};
+  for (const SessionPtr& session : store.all()) ++counts[name_of(session->phase())];
+  return counts;
+}
+
 }  // namespace
 
 void Daemon::watch_values() {
@@ -167,6 +186,8 @@ void Daemon::watch_values() {
   watch("mbcosim_memory_bytes", "Memory that is counted against --limit-memory",
         [this] { return budgets_.all().used(); });
   watch("mbcosim_memory_limit_bytes", "--limit-memory", [this] { return budgets_.all().most(); });
+  metrics_.watch("mbcosim_simulations", "Simulations in memory, by state", "state",
+                 [this] { return count_by_state(store_); });
   watch("mbcosim_simulations_suspended", "Simulations that are in the state folder only",
         [this] { return durability_.suspended(); });
   watch("mbcosim_state_bytes", "Bytes of all that is in the state folder",

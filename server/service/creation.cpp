@@ -102,6 +102,7 @@ class Fresh {
       throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
     }
     parts_.store.add(session);
+    parts_.metrics.count_created();
     parts_.log.created(session->subject(), options.display_name(), forked_from);
     name_ = session->identity().id;
     return session;

@@ -34,8 +34,8 @@ prometheus::Histogram* histogram(prometheus::Registry& registry, const char* nam
 class Metrics::Watched final : public prometheus::Collectable {
  public:
   struct Value {
-    std::string name, help;
-    std::function<double()> look;
+    std::string name, help, label;  ///< no label: one value
+    std::function<Values()> look;   ///< by the label's value
   };
   void add(Value value) TS_EXCLUDES(mutex_) {
     Guard guard(mutex_);
@@ -53,7 +53,11 @@ class Metrics::Watched final : public prometheus::Collectable {
       family.name = value.name;
       family.help = value.help;
       family.type = prometheus::MetricType::Gauge;
-      family.metric.emplace_back().gauge.value = value.look();
+      for (const auto& [text, number] : value.look()) {
+        prometheus::ClientMetric& metric = family.metric.emplace_back();
+        if (!value.label.empty()) metric.label.push_back({value.label, text});
+        metric.gauge.value = number;
+      }
     }
     return families;
   }
@@ -70,11 +74,6 @@ Metrics::Metrics()
                     .Name("mbcosim_failures_total")
                     .Help("Calls refused and steps failed, by reason")
                     .Register(*registry_)),
-      sessions_(&BuildGauge()
-                     .Name("mbcosim_simulations")
-                     .Help("Simulations alive")
-                     .Register(*registry_)
-                     .Add({})),
       created_(counter(*registry_, "mbcosim_simulations_created_total", "Simulations created")),
       steps_(counter(*registry_, "mbcosim_steps_total", "Steps accepted")),
       iterations_(counter(*registry_, "mbcosim_iterations_total", "Linear solutions in steps")),
@@ -114,7 +113,12 @@ Metrics::~Metrics() = default;
 
 void Metrics::watch(const std::string& name, const std::string& help,
                     std::function<double()> value) {
-  watched_->add({name, help, std::move(value)});
+  watched_->add({name, help, "", [value = std::move(value)] { return Values{{"", value()}}; }});
+}
+
+void Metrics::watch(const std::string& name, const std::string& help, const std::string& label,
+                    std::function<Values()> values) {
+  watched_->add({name, help, label, std::move(values)});
 }
 
 void Metrics::expose(const std::string& address) {

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -24,6 +25,10 @@ class Metrics {
   ~Metrics();
   /// A value that is asked for whenever somebody looks, until `close`. Before `expose`.
   void watch(const std::string& name, const std::string& help, std::function<double()> value);
+  /// Several, one for each value of a label.
+  using Values = std::map<std::string, double>;
+  void watch(const std::string& name, const std::string& help, const std::string& label,
+             std::function<Values()> values);
   /// Serves /metrics at "HOST:PORT". Throws std::exception when the address cannot be bound.
   void expose(const std::string& address);
   /// Nobody looks any more, and nothing is asked for.
@@ -33,7 +38,6 @@ class Metrics {
 
   void count_advance(std::int64_t steps, std::int64_t iterations, double solver_seconds);
   void count_failure(v1::Reason reason);
-  void set_sessions(int count) { sessions_->Set(count); }
   void count_created() { created_->Increment(); }
   /// A coupled step waited so long for its peers [s], in so many exchanges for `exchange_seconds`.
   void count_coupled_step(double waited_seconds, int exchanges, double exchange_seconds);
@@ -54,7 +58,6 @@ class Metrics {
   std::unique_ptr<prometheus::Exposer> exposer_;
   prometheus::Family<prometheus::Counter>& failures_;
   std::array<prometheus::Histogram*, kLanes> queue_seconds_{};
-  prometheus::Gauge* sessions_;
   prometheus::Counter *created_, *steps_, *iterations_, *dropped_, *checkpoint_bytes_,
       *journal_bytes_;
   prometheus::Histogram *advance_seconds_, *exchange_seconds_, *peer_seconds_, *slot_seconds_,

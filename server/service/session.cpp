@@ -180,6 +180,19 @@ void Session::fill(v1::SimulationInfo* out, const Caller& caller) const {
   if (grants_.allow(caller, Access::own)) *out->mutable_grants() = grants_.list();
 }
 
+namespace {
+
+v1::SimulationState phase_of(const SessionStatus::View& view) {
+  return view.failed     ? v1::SIMULATION_STATE_FAILED
+         : view.stepping ? v1::SIMULATION_STATE_STEPPING
+         : view.finished ? v1::SIMULATION_STATE_FINISHED
+                         : v1::SIMULATION_STATE_READY;
+}
+
+}  // namespace
+
+v1::SimulationState Session::phase() const { return phase_of(status_.view()); }
+
 void Session::fill(v1::SimulationInfo* out) const {
   const SessionStatus::View p = status_.view();
   out->set_name(identity_.id);
@@ -195,10 +208,7 @@ void Session::fill(v1::SimulationInfo* out) const {
   out->set_durability(!keeping_     ? v1::DURABILITY_NONE
                       : journaled() ? v1::DURABILITY_JOURNAL
                                     : v1::DURABILITY_CHECKPOINT);
-  out->set_state(p.failed     ? v1::SIMULATION_STATE_FAILED
-                 : p.stepping ? v1::SIMULATION_STATE_STEPPING
-                 : p.finished ? v1::SIMULATION_STATE_FINISHED
-                              : v1::SIMULATION_STATE_READY);
+  out->set_state(phase_of(p));
   out->set_step(p.step);
   out->set_time(p.time);
   out->set_next_step_size(p.next_step);

@@ -92,6 +92,7 @@ class Session {
   const VariableAccess& variable_access() const { return variables_; }
   /// Negative: none. Handles never change, so that nobody waits for a step.
   int find_variable(const std::string& name) const TS_NO_THREAD_SAFETY_ANALYSIS;
+  v1::SimulationState phase() const;  ///< READY, STEPPING, FINISHED or FAILED
   void fill(v1::SimulationInfo* out) const;
   /// With the grants, when the caller may change them.
   void fill(v1::SimulationInfo* out, const Caller& caller) const;

@@ -8,8 +8,8 @@
 
 namespace mbcosim::server {
 
-SessionStore::SessionStore(const ServiceLimits& limits, Metrics& metrics, EventLog& log)
-    : limits_(limits), metrics_(metrics), log_(log), lease_thread_([this] { watch_leases(); }) {}
+SessionStore::SessionStore(const ServiceLimits& limits, EventLog& log)
+    : limits_(limits), log_(log), lease_thread_([this] { watch_leases(); }) {}
 
 SessionStore::~SessionStore() {
   {
@@ -76,8 +76,6 @@ void SessionStore::add(SessionPtr session) {
   const std::string id = session->identity().id;
   order_.push_back(id);
   sessions_.emplace(id, std::move(session));
-  metrics_.count_created();
-  metrics_.set_sessions(static_cast<int>(sessions_.size()));
 }
 
 namespace {
@@ -179,7 +177,6 @@ SessionPtr SessionStore::take_out(const std::string& id) {
   SessionPtr session = std::move(found->second);
   sessions_.erase(found);
   std::erase(order_, id);
-  metrics_.set_sessions(static_cast<int>(sessions_.size()));
   return session;
 }
 

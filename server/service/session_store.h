@@ -24,7 +24,7 @@ using SessionPtr = std::shared_ptr<Session>;
 /// Thread-safe. Closes sessions whose lease is over.
 class SessionStore {
  public:
-  SessionStore(const ServiceLimits& limits, Metrics& metrics, EventLog& log);
+  SessionStore(const ServiceLimits& limits, EventLog& log);
   ~SessionStore();
 
   /// A place for one more session, taken before the work of creating it starts. A creation with a
@@ -94,7 +94,6 @@ class SessionStore {
   void close_expired();
 
   const ServiceLimits& limits_;
-  Metrics& metrics_;
   EventLog& log_;
   Keeper keeper_;
   mutable Mutex mutex_;

@@ -16,6 +16,7 @@ import pytest
 import decks
 import mbcosim
 from conftest import TIME_FACTOR, wait_for
+from mbcosim.v1 import simulations_pb2 as pb
 from test_health import DAEMON, certificate, health
 
 ECHO = [mbcosim.structural_port("hand", nodes=[1])]
@@ -184,6 +185,33 @@ def test_metrics_tell_of_peers_queues_and_the_disk(start_daemon, tmp_path):
     assert found['process_resident_memory_bytes'] > 1e6
     assert [name for name in found if name.startswith("mbcosim_build_info{") and 'version="' in name]
     assert 'mbcosim_step_seconds_bucket{le="300"}' in found
+
+
+def test_simulations_are_counted_by_state(start_daemon, tmp_path):
+    """Those that come back are not created again."""
+    def counts(daemon):
+        found = metrics(daemon)
+        return [found[f'mbcosim_simulations{{state="{state}"}}'] for state in ("ready", "stepping", "finished", "failed")]
+
+    (tmp_path / "state").mkdir()
+    options = ("--state-dir", str(tmp_path / "state"), "--http", "127.0.0.1:0")
+    daemon = start_daemon(*options)
+    with daemon.connect() as server:
+        assert counts(daemon) == [0, 0, 0, 0]
+        ready, finished, endless = server.load_text(decks.body()), server.load_text(decks.body()), server.load_text(decks.endless())
+        finished.run_until(1e9)
+        run = server.simulations.Run(pb.RunRequest(step=pb.StepRequest(simulation=endless.name, until_time=1e9)))
+        wait_for(lambda: counts(daemon) == [1, 1, 1, 0])
+        run.cancel()
+        wait_for(lambda: counts(daemon) == [2, 0, 1, 0])
+        assert metrics(daemon)["mbcosim_simulations_created_total"] == 3
+    daemon.stop()
+    daemon = start_daemon(*options)
+    with daemon.connect() as server:
+        assert metrics(daemon)["mbcosim_simulations_suspended"] == 3
+        server.attach(ready.name).step()
+        assert counts(daemon) == [1, 0, 0, 0]
+        assert metrics(daemon)["mbcosim_simulations_created_total"] == 0
 
 
 def test_dropped_samples_are_counted(start_daemon):
