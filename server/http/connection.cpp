@@ -90,7 +90,7 @@ Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   body->clear();
   if (info_->content_length > static_cast<long long>(limit)) return Body::too_long;
   reaper_.arm(socket_, kTransferTime);
-  std::array<char, 1 << 16> piece;
+  std::array<char, 1 << 13> piece;  // civetweb's threads have stacks of 100 KiB
   for (;;) {
     const int count = mg_read(raw_, piece.data(), piece.size());
     if (count < 0) return Body::broken;
