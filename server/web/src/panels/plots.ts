@@ -6,6 +6,9 @@ import { curveName, number } from '../format';
 import { shortName } from '../model';
 import { valueOf, type Sample } from '../recording';
 
+/** A point of a curve; null: the sample does not have it. One NaN, and uPlot finds no range for the whole curve. */
+type Value = number | null;
+
 const COLOURS = {
   dark: ['#4aa8ff', '#f0a13c', '#35c2a8', '#ff7676', '#b980ff', '#c9b458', '#d86f9a', '#8fd3ff', '#e3eaf1'],
   light: ['#0b63c4', '#b45f00', '#00755f', '#c22222', '#6d35c4', '#766300', '#a92a60', '#2f86b8', '#17212c'],
@@ -15,12 +18,18 @@ const POINTS = 3000;
 const HEIGHT = 150;
 
 /** Columns for a plot: abscissa, then one for each curve. */
-export function columns(samples: readonly Sample[], plot: Plot): number[][] {
+export function columns(samples: readonly Sample[], plot: Plot): Value[][] {
   const stride = Math.max(1, Math.ceil(samples.length / POINTS));
-  const result: number[][] = [[], ...plot.curves.map(() => [])];
+  const result: Value[][] = [[], ...plot.curves.map(() => [])];
+  const at = (sample: Sample, { variable, element }: Curve): Value => {
+    const value = valueOf(sample, variable.handle, element);
+    return Number.isFinite(value) ? value : null;
+  };
   const add = (sample: Sample) => {
-    result[0].push(plot.against ? valueOf(sample, plot.against.variable.handle, plot.against.element) : sample.time);
-    plot.curves.forEach((curve, k) => result[k + 1].push(valueOf(sample, curve.variable.handle, curve.element)));
+    const abscissa = plot.against ? at(sample, plot.against) : sample.time;
+    if (abscissa === null) return;
+    result[0].push(abscissa);
+    plot.curves.forEach((curve, k) => result[k + 1].push(at(sample, curve)));
   };
   for (let i = 0; i < samples.length; i += stride) add(samples[i]);
   if (samples.length > 0 && (samples.length - 1) % stride !== 0) add(samples[samples.length - 1]);
@@ -31,6 +40,24 @@ function label(curve: Curve): string {
   const { variable, element } = curve;
   const part = variable.name.slice(0, variable.name.length - shortName(variable.name).length).replace(/\.$/, '');
   return `${part.replace('node.structural.', 'node ').replaceAll('.', ' ')} ${curveName(shortName(variable.name), variable.size, element)}`.trim();
+}
+
+/** Scales of a curve over another one. */
+const FACETS: uPlot.Series.Facet[] = [{ scale: 'x', auto: true }, { scale: 'y', auto: true }];
+
+/** Joins the points of a curve over another one, in the order of time. (Paths of uPlot's own go from left to right.) */
+function pathOf(chart: uPlot, series: number): uPlot.Series.Paths {
+  const [x, y] = chart.data[series] as unknown as [Value[], Value[]], stroke = new Path2D();
+  let pen = false;
+  x.forEach((abscissa, i) => {
+    const ordinate = y[i];
+    if (abscissa === null || ordinate === null) return void (pen = false);
+    const at = [chart.valToPos(abscissa, 'x', true), chart.valToPos(ordinate, 'y', true)] as const;
+    if (pen) stroke.lineTo(...at);
+    else stroke.moveTo(...at);
+    pen = true;
+  });
+  return { stroke };
 }
 
 class PlotView {
@@ -57,9 +84,7 @@ class PlotView {
       this.header,
       ...this.plot.curves.map((curve, k) => this.chip(curve, colours[k % colours.length])),
       h('span', { class: 'soft' }, units && `[${units}]`),
-      h('span', { class: 'spacer' }),
-      this.abscissa(),
-      iconButton('close', 'Close this plot', () => this.desk.unplot(this.plot), { class: 'icon-button small' }),
+      h('span', { class: 'ends' }, this.abscissa(), iconButton('close', 'Close this plot', () => this.desk.unplot(this.plot), { class: 'icon-button small' })),
     );
     const style = getComputedStyle(document.documentElement);
     const axis: uPlot.Axis = {
@@ -68,27 +93,32 @@ class PlotView {
       ticks: { stroke: style.getPropertyValue('--line'), width: 1 },
       font: '11px system-ui',
     };
+    const look = this.plot.curves.map((curve, k) => ({ label: label(curve), stroke: colours[k % colours.length], width: 1.6, points: { show: false } }));
     this.chart = new uPlot(
       {
         width: this.width(),
         height: HEIGHT,
-        cursor: { drag: { x: true, y: false }, points: { size: 6 } },
         scales: { x: { time: false } },
         axes: [
           { ...axis, size: 26, values: (_, ticks) => ticks.map((tick) => number(tick, 4)) },
           { ...axis, size: 56, values: (_, ticks) => ticks.map((tick) => number(tick, 4)) },
         ],
-        series: [
-          { sorted: (this.plot.against ? 0 : 1) as 0 | 1 },
-          ...this.plot.curves.map((curve, k) => ({ label: label(curve), stroke: colours[k % colours.length], width: 1.6, points: { show: false } })),
-        ],
         hooks: { draw: [(chart) => this.drawCursor(chart)] },
+        ...(this.plot.against
+          ? { mode: 2 as const, cursor: { show: false }, series: [{}, ...look.map((one) => ({ ...one, facets: FACETS, paths: pathOf }))] }
+          : { cursor: { drag: { x: true, y: false }, points: { size: 6 } }, series: [{ sorted: 1 as const }, ...look] }),
       },
-      [[], ...this.plot.curves.map(() => [])],
+      this.data([]),
       this.canvas,
     );
     this.chart.over.addEventListener('dblclick', (event) => this.goTo(event));
     this.update();
+  }
+
+  /** As uPlot wants it: a table, or points for each curve where the abscissa goes to and fro. */
+  private data(samples: readonly Sample[]): uPlot.AlignedData {
+    const [x, ...curves] = columns(samples, this.plot);
+    return (this.plot.against ? [null, ...curves.map((y) => [x, y])] : [x, ...curves]) as uPlot.AlignedData;
   }
 
   private chip(curve: Curve, colour: string): HTMLElement {
@@ -116,7 +146,8 @@ class PlotView {
 
   private drawCursor(chart: uPlot): void {
     const sample = this.desk.sample;
-    if (!sample || this.desk.cursor.value === undefined || this.plot.against) return;
+    if (sample && this.plot.against) return this.drawPlace(chart, sample, this.plot.against);
+    if (!sample || this.desk.cursor.value === undefined) return;
     const x = chart.valToPos(sample.time, 'x', true);
     chart.ctx.save();
     chart.ctx.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue('--accent');
@@ -128,9 +159,23 @@ class PlotView {
     chart.ctx.restore();
   }
 
+  /** A dot on each curve at the time looked at. */
+  private drawPlace(chart: uPlot, sample: Sample, against: Curve): void {
+    const x = valueOf(sample, against.variable.handle, against.element);
+    chart.ctx.save();
+    chart.ctx.fillStyle = getComputedStyle(document.documentElement).getPropertyValue('--accent');
+    for (const { variable, element } of this.plot.curves) {
+      const y = valueOf(sample, variable.handle, element);
+      if (!Number.isFinite(x) || !Number.isFinite(y)) continue;
+      chart.ctx.beginPath();
+      chart.ctx.arc(chart.valToPos(x, 'x', true), chart.valToPos(y, 'y', true), 3.5 * devicePixelRatio, 0, 2 * Math.PI);
+      chart.ctx.fill();
+    }
+    chart.ctx.restore();
+  }
+
   update(): void {
-    const samples = this.desk.shown.value?.recording.samples ?? [];
-    this.chart?.setData(columns(samples, this.plot) as uPlot.AlignedData);
+    this.chart?.setData(this.data(this.desk.shown.value?.recording.samples ?? []));
   }
 }
 

@@ -1,0 +1,28 @@
+import { describe, expect, test } from 'vitest';
+import type { Curve } from '../src/desk';
+import { columns } from '../src/panels/plots';
+import { Layout, type Sample } from '../src/recording';
+
+const variable = (handle: number) => ({ handle, size: 1, name: `v${handle}` }) as Curve['variable'];
+const first = { variable: variable(1), element: 0 }, second = { variable: variable(2), element: 0 };
+const few = new Layout([variable(1)]), all = new Layout([variable(1), variable(2)]);
+const sample = (step: number, layout: Layout, ...values: number[]): Sample => ({ step, time: step / 10, layout, values: Float64Array.from(values) });
+/** The second variable is followed from the third sample on. */
+const samples = [sample(0, few, 1), sample(1, few, 0), sample(2, all, -1, 20), sample(3, all, 0, NaN), sample(4, all, 1, 40)];
+
+describe('a curve', () => {
+  test('has gaps where samples do not have its variable, or it is no number', () => {
+    expect(columns(samples, { id: 1, curves: [first, second] })).toEqual([[0, 0.1, 0.2, 0.3, 0.4], [1, 0, -1, 0, 1], [null, null, 20, null, 40]]);
+  });
+
+  test('over another one goes to and fro in the order of time, where both are known', () => {
+    expect(columns(samples, { id: 1, curves: [first], against: second })).toEqual([[20, 40], [-1, 1]]);
+    expect(columns(samples, { id: 1, curves: [second], against: first })).toEqual([[1, 0, -1, 0, 1], [null, null, 20, null, 40]]);
+  });
+
+  test('of very many samples has fewer points, and the newest', () => {
+    const many = Array.from({ length: 10_000 }, (_, step) => sample(step, few, step)), [time, values] = columns(many, { id: 1, curves: [first] });
+    expect(time.length).toBeLessThan(3500);
+    expect([time.at(-1), values.at(-1)]).toEqual([999.9, 9999]);
+  });
+});
