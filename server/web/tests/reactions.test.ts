@@ -12,20 +12,21 @@ function joint(type: string): ElementShape {
     frames: [{ name: 'hinge 1', point: 0, orientation: IDENTITY }, { name: 'hinge 2', point: 1, orientation: turn }],
   };
 }
-const handles: Record<string, number> = { 'joint.7.Fx': 10, 'joint.7.Fy': 11, 'joint.7.Fz': 12 };
+const handles: Record<string, number> = { 'joint.7.Fx': 10, 'joint.7.Fy': 11, 'joint.7.Fz': 12, 'joint.7.Mx': 13, 'joint.7.My': 14, 'joint.7.Mz': 15 };
 /** Node 0 stands straight, node 1 is turned by a quarter about z, too. */
 const pose: Pose = { x: new Float64Array(6), R: Float64Array.from([...IDENTITY, ...turn]), value: (handle) => handle - 9 };
 
-function force(type: string): number[] {
+function load(shape: ElementShape, kind: 'force' | 'moment'): number[] {
   const out = [0, 0, 0];
-  reactionOf(joint(type), [4, 5], (name) => handles[name])?.read(pose, out);
+  reactionOf(shape, [4, 5], (name) => handles[name], kind)?.read(pose, out);
   return out.map((value) => Math.round(1e9 * value) / 1e9);
 }
+const force = (type: string) => load(joint(type), 'force'), moment = (type: string) => load(joint(type), 'moment');
 
 describe('the reaction of a joint', () => {
   test('in global components acts on the second node', () => {
     expect(force('spherical hinge')).toEqual([1, 2, 3]);
-    expect(reactionOf(joint('spherical hinge'), [4, 5], (name) => handles[name])?.point).toBe(5);
+    expect(reactionOf(joint('spherical hinge'), [4, 5], (name) => handles[name], 'force')?.point).toBe(5);
   });
 
   test('in the frame of the second hinge turns with it', () => expect(force('revolute hinge')).toEqual([-1, -2, 3]));
@@ -34,14 +35,31 @@ describe('the reaction of a joint', () => {
 
   test('on a single node acts there', () => {
     const pin = { ...joint('spherical pin'), points: [{ name: 'hinge 1', node: 0, offset: [0, 0, 0] as const }, { name: 'ground', node: -1, offset: [0, 0, 0] as const }] };
-    const arrow = reactionOf(pin, [4, 5], (name) => handles[name]), out = [0, 0, 0];
+    const arrow = reactionOf(pin, [4, 5], (name) => handles[name], 'force'), out = [0, 0, 0];
     arrow?.read(pose, out);
     expect(arrow?.point).toBe(4);
     expect(out).toEqual([-1, -2, -3]);
   });
 
   test('is not drawn where its frame is not known, or it has none', () => {
-    expect(reactionOf(joint('deformable hinge'), [4, 5], (name) => handles[name])).toBeUndefined();
-    expect(reactionOf(joint('spherical hinge'), [4, 5], () => undefined)).toBeUndefined();
+    expect(reactionOf(joint('deformable hinge'), [4, 5], (name) => handles[name], 'force')).toBeUndefined();
+    expect(reactionOf(joint('spherical hinge'), [4, 5], () => undefined, 'force')).toBeUndefined();
+  });
+});
+
+describe('the moment of a joint', () => {
+  test('on the second node is in the axes that the joint has it in', () => {
+    expect(moment('clamp')).toEqual([-4, -5, -6]);
+    expect(moment('revolute hinge')).toEqual([-4, -5, 6]);
+    expect(moment('axial rotation')).toEqual([-4, -5, 6]);
+    expect(moment('drive hinge')).toEqual([-4, -5, -6]);
+  });
+
+  test('is not there where the joint lets its nodes turn', () => {
+    expect(reactionOf(joint('spherical hinge'), [4, 5], (name) => handles[name], 'moment')).toBeUndefined();
+  });
+
+  test('is not drawn where its axes are not told', () => {
+    expect(reactionOf(joint('total joint'), [4, 5], (name) => handles[name], 'moment')).toBeUndefined();
   });
 });

@@ -1,7 +1,7 @@
 /** What is drawn of a model: a batch for each kind of thing. */
 import * as THREE from 'three';
 import type { Geometry, Pose } from '../geometry';
-import { ArrowBatch, type ArrowItem } from './batches/arrows';
+import { ArrowBatch, type ArrowItem, type ArrowLook } from './batches/arrows';
 import { BarBatch } from './batches/bars';
 import type { Batch } from './batches/batch';
 import { BeamBatch } from './batches/beams';
@@ -40,6 +40,8 @@ export const ASKED_FOR: readonly Layer[] = ['reactions', 'velocities', 'axes'];
 const NODE_SIZE = 0.36;
 /** Length of the longest arrow, as a part of the model's extent. */
 const ARROW = 0.28;
+/** Moments that are smaller than such a part of the largest reaction times the model's extent are rounding. */
+const NOISE = 1e-9;
 
 /** A ball around balls: its centre is that of the box around them. */
 function around(balls: readonly THREE.Sphere[]): THREE.Sphere {
@@ -71,9 +73,10 @@ export class Drawn {
     if (items.rods.length > 0) this.add('lines', new BarBatch(items.rods, items.points, this.colour('node')));
     this.addLines('lines', items.others, 'other', 2.5);
     if (items.faces.length > 0) this.add('surfaces', new FaceBatch(items.faces, items.points, this.colour('shell')));
-    this.addArrows('forces', items.forces, 'force');
-    this.addArrows('forces', items.moments, 'moment');
-    this.addArrows('reactions', items.reactions, 'reaction');
+    this.addArrows('forces', items.forces, 'force', { tipAtPoint: true });
+    this.addArrows('forces', items.moments, 'moment', { tipAtPoint: true, heads: 2 });
+    const forces = this.addArrows('reactions', items.reactions, 'reaction'), lever = NOISE * geometry.extent;
+    this.addArrows('reactions', items.reactionMoments, 'reaction', { heads: 2, least: () => lever * (forces?.largest ?? 0) });
     this.addArrows('velocities', items.velocities, 'velocity');
     this.addLines('axes', items.axes, 'other', 2);
     for (const body of geometry.bodies) this.add('flexible', new FlexibleBatch(body, `joint:${body.joint}`, items.deformations, 0.12 * items.size));
@@ -97,10 +100,11 @@ export class Drawn {
     if (bodies.length > 0) this.add('bodies', new GlyphBatch(glyph('sphere', bodies.length), bodies, points, this.colour('body'), bodies.length > MANY ? 1 : 0.62));
   }
 
-  /** Loads push with their tips; velocities begin at their nodes. */
-  private addArrows(layer: Layer, list: ArrowItem[], name: keyof Palette): void {
-    const look = { reach: ARROW * this.items.geometry.extent, tipAtPoint: layer === 'forces', heads: name === 'moment' ? 2 : 1 } as const;
-    if (list.length > 0) this.add(layer, new ArrowBatch(list, this.items.points, this.colour(name), look));
+  private addArrows(layer: Layer, list: ArrowItem[], name: keyof Palette, look: Partial<ArrowLook> = {}): ArrowBatch | undefined {
+    if (list.length === 0) return undefined;
+    const batch = new ArrowBatch(list, this.items.points, this.colour(name), { reach: ARROW * this.items.geometry.extent, tipAtPoint: false, heads: 1, ...look });
+    this.add(layer, batch);
+    return batch;
   }
 
   /** What colours mean, as far as values were seen. */

@@ -43,6 +43,7 @@ export class Items {
   readonly forces: ArrowItem[] = [];
   readonly moments: ArrowItem[] = [];
   readonly reactions: ArrowItem[] = [];
+  readonly reactionMoments: ArrowItem[] = [];
   readonly velocities: ArrowItem[] = [];
   readonly axes: LineItem[] = [];
   readonly sections: LineItem[] = [];
@@ -82,8 +83,9 @@ export class Items {
     for (const surface of element.surfaces) this.faces.push({ id: element.id, points: surface.points.map((index) => points[index]) });
     for (const arrow of element.arrows) (arrow.moment ? this.moments : this.forces).push(vectorArrow(element.id, points[arrow.point], arrow.handle, arrow.sign));
     for (const frame of element.frames) this.addAxes(element.id, points[frame.point], frame.orientation, 1.1);
-    const reaction = reactionOf(element, points, this.handleOf);
-    if (reaction) this.reactions.push(reaction);
+    const force = reactionOf(element, points, this.handleOf, 'force'), moment = reactionOf(element, points, this.handleOf, 'moment');
+    if (force) this.reactions.push(force);
+    if (moment) this.reactionMoments.push(moment);
     this.addGlyph(element, points);
   }
 

@@ -27,6 +27,8 @@ export interface ArrowLook {
   tipAtPoint: boolean;
   /** Moments have two heads, one behind the other. */
   heads: 1 | 2;
+  /** Arrows of less than this are not drawn. */
+  least?: () => number;
 }
 
 export class ArrowBatch implements Batch {
@@ -34,7 +36,8 @@ export class ArrowBatch implements Batch {
   private readonly shafts: Solids;
   private readonly heads: Solids;
   private readonly vectors: number[][];
-  private largest = 0;
+  /** Seen so far. */
+  largest = 0;
   private readonly direction = [0, 0, 1];
   private readonly place = [0, 0, 0];
 
@@ -59,9 +62,9 @@ export class ArrowBatch implements Batch {
   }
 
   private write(i: number): void {
-    const { direction, place, vectors, points } = this, { reach, tipAtPoint, heads } = this.look;
+    const { direction, place, vectors, points } = this, { reach, tipAtPoint, heads, least } = this.look;
     const size = Math.hypot(vectors[i][0], vectors[i][1], vectors[i][2]);
-    const length = this.largest > 0 ? (reach * size) / this.largest : 0;
+    const length = size > (least?.() ?? 0) ? (reach * size) / this.largest : 0;
     const head = Math.min(reach * HEAD_LENGTH, length), from = 3 * this.items[i].point;
     for (let k = 0; k < 3; ++k) direction[k] = size > 0 ? vectors[i][k] / size : Number(k === 2);
     const begin = tipAtPoint ? -length : 0;
