@@ -55,6 +55,13 @@ describe('solids', () => {
     for (let k = 0; k < 3; ++k) expect(matrix.elements[12 + k]).toBeCloseTo(x[k], 5);
   });
 
+  test.each([true, false])('that one sees through hide nothing, with a graphics card: %s', (card) => {
+    drawnBy(card);
+    const look = (opacity: number) => solids(box, 100, opacity).object.material as THREE.Material;
+    expect([look(0.6).transparent, look(0.6).depthWrite]).toEqual([true, false]);
+    expect([look(1).transparent, look(1).depthWrite]).toEqual([false, true]);
+  });
+
   test('in one mesh stand where instances would, and are told apart', () => {
     const corner = new THREE.Vector3();
     drawnBy(false);

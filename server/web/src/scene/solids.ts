@@ -22,7 +22,6 @@ export function drawnBy(card: boolean): void {
   withCard = card;
 }
 
-
 export function hasCard(): boolean {
   return withCard;
 }
@@ -33,11 +32,16 @@ export function solids(geometry: THREE.BufferGeometry, count: number, opacity = 
   return made;
 }
 
+/** What one sees through hides nothing, not even another one at the same place. */
+function seen(opacity: number) {
+  return { opacity, transparent: opacity < 1, depthWrite: opacity >= 1 };
+}
+
 class Instanced implements Solids {
   readonly object: THREE.InstancedMesh;
 
   constructor(geometry: THREE.BufferGeometry, count: number, opacity: number) {
-    this.object = new THREE.InstancedMesh(geometry, new THREE.MeshLambertMaterial({ transparent: opacity < 1, opacity }), count);
+    this.object = new THREE.InstancedMesh(geometry, new THREE.MeshLambertMaterial(seen(opacity)), count);
     this.object.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
   }
 
@@ -84,7 +88,7 @@ class Merged implements Solids {
     const indices = new Uint32Array(index.count * count);
     for (let copy = 0; copy < count; ++copy) for (let i = 0; i < index.count; ++i) indices[copy * index.count + i] = index.getX(i) + (copy * numbers) / 3;
     all.setIndex(new THREE.BufferAttribute(indices, 1));
-    this.object = new THREE.Mesh(all, new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, transparent: opacity < 1, opacity }));
+    this.object = new THREE.Mesh(all, new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, ...seen(opacity) }));
   }
 
   moved(): void {
