@@ -382,7 +382,8 @@ describe('solver and events', () => {
       await atStep(page, 10);
       const solver = page.locator('.section', { hasText: 'iterations in the last step' });
       expect(await solver.textContent()).toMatch(/iterations in the last step[1-9]\d*residual\d\S*solver time a step\d\S* (µs|ms)/);
-      expect(await solver.locator('.bar').getAttribute('aria-label')).toMatch(/^solver \d+ %, peers \d+ %, rest \d+ %$/);
+      expect(await solver.locator('.bar').getAttribute('aria-label')).toMatch(/^solver \d+ %, peers \d+ %, rest \d+ %, wire \d+ %$/);
+      expect(await solver.locator('.legend').first().textContent()).toMatch(/^solver \d\S* (µs|ms)peers 0 srest \d\S* (µs|ms)wire \d\S* (µs|ms|s)$/);
       await page.getByRole('button', { name: 'Save state' }).click();
       await page.locator('summary', { hasText: 'Events' }).click();
       await page.getByRole('log', { name: 'Events' }).getByText('saved the state at step 10').waitFor();

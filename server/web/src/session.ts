@@ -31,7 +31,9 @@ export interface StepRecord {
   residual: number;
   solver: number;
   peers: number;
+  /** On the server; `elapsed`: until the page had the reply. */
   total: number;
+  elapsed: number;
   steps: number;
 }
 
@@ -251,7 +253,8 @@ export class Session implements Shown {
     if (this.busy) return;
     this.busy = true;
     try {
-      this.done(await simulations.step({ simulation: this.name, advance: how }));
+      const begun = performance.now();
+      this.done(await simulations.step({ simulation: this.name, advance: how }), begun);
       if (this.playing.value === 'no') await this.read();  // telemetry need not have this step
     } catch (thrown) {
       this.tell(failureOf(thrown));
@@ -296,13 +299,13 @@ export class Session implements Shown {
   private async playFast(): Promise<void> {
     this.playing.value = 'fast';
     this.fast = new AbortController();
-    const end = Number.isFinite(this.model.finalTime) ? this.model.finalTime : Number.MAX_VALUE;
+    const end = Number.isFinite(this.model.finalTime) ? this.model.finalTime : Number.MAX_VALUE, begun = performance.now();
     try {
       const run = simulations.run(
         { step: { simulation: this.name, advance: { case: 'untilTime', value: end } }, progressInterval: duration(0.2) },
         { signal: this.fast.signal },
       );
-      for await (const reply of run) if (reply.content.case === 'done') this.done(reply.content.value);
+      for await (const reply of run) if (reply.content.case === 'done') this.done(reply.content.value, begun);
     } catch (thrown) {
       const failure = failureOf(thrown);
       if (!failure.cancelled) this.tell(failure);
@@ -311,10 +314,11 @@ export class Session implements Shown {
     await this.read();
   }
 
-  private done(reply: StepReply): void {
+  /** `begun`: when the page asked, in milliseconds. */
+  private done(reply: StepReply, begun: number): void {
     const state = reply.outcome === StepOutcome.FINISHED ? SimulationState.FINISHED : SimulationState.READY;
     this.info.value = { ...this.info.value, state, step: reply.step, time: reply.time };
-    if (reply.stepsDone > 0n) this.keep(reply);
+    if (reply.stepsDone > 0n) this.keep(reply, (performance.now() - begun) / 1000);
     if (reply.outcome === StepOutcome.ACCEPTED || reply.outcome === StepOutcome.INTERRUPTED) return;
     this.pause();
     if (reply.outcome === StepOutcome.FINISHED) return;
@@ -328,7 +332,7 @@ export class Session implements Shown {
     };
   }
 
-  private keep(reply: StepReply): void {
+  private keep(reply: StepReply, elapsed: number): void {
     const steps = this.steps.value.slice(-499);
     steps.push({
       step: Number(reply.step),
@@ -338,6 +342,7 @@ export class Session implements Shown {
       solver: reply.solverSeconds,
       peers: reply.peerWaitSeconds,
       total: reply.totalSeconds,
+      elapsed,
       steps: Number(reply.stepsDone),
     });
     this.steps.value = steps;

@@ -95,6 +95,6 @@ test('lines around a place are those of the deck, as far as there are any', () =
 
 test('the parts of the wall time sum to one', () => {
   const step = { step: 1, time: 0, iterations: 2, residual: 0, steps: 1 };
-  expect(timeSplit([{ ...step, solver: 1, peers: 2, total: 4 }])).toEqual([0.25, 0.5, 0.25]);
-  expect(timeSplit([])).toEqual([0, 0, 0]);
+  expect(timeSplit([{ ...step, solver: 1, peers: 2, total: 4, elapsed: 8 }])).toEqual([0.125, 0.25, 0.125, 0.5]);
+  expect(timeSplit([])).toEqual([0, 0, 0, 0]);
 });

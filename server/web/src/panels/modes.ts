@@ -5,6 +5,9 @@ import { number } from '../format';
 import { damping, frequency, type Mode } from '../modes';
 import { section } from './section';
 
+/** Parts of the critical damping that are smaller are rounding. */
+const NO_DAMPING = 1e-11;
+
 export function modesPanel(desk: Desk, animate: (mode: Mode | undefined, size: number) => void): HTMLElement {
   const count = h('input', { type: 'number', min: 1, max: 200, value: '10', 'aria-label': 'Number of eigenvalues', style: 'width:70px' });
   const near = h('input', { type: 'number', min: 0, step: 'any', value: '1', 'aria-label': 'Nearest to this frequency, in hertz', style: 'width:70px' });
@@ -32,7 +35,7 @@ export function modesPanel(desk: Desk, animate: (mode: Mode | undefined, size: n
   const draw = () => {
     list.replaceChildren(...modes.map((mode) => h('li', {}, h('button', {
       type: 'button', class: `card${mode === shown ? ' current' : ''}`, 'aria-pressed': String(mode === shown), onclick: () => show(mode === shown ? undefined : mode),
-    }, h('span', { class: 'number' }, `${number(frequency(mode), 5)} Hz`), h('span', { class: 'spacer' }), h('span', { class: 'soft number' }, `damping ${number(100 * damping(mode), 3)} %`)))));
+    }, h('span', { class: 'number' }, `${number(frequency(mode), 5)} Hz`), h('span', { class: 'spacer' }), h('span', { class: 'soft number' }, `damping ${number(Math.abs(damping(mode)) < NO_DAMPING ? 0 : 100 * damping(mode), 3)} %`)))));
   };
 
   size.addEventListener('input', () => animate(shown, size.valueAsNumber));

@@ -10,6 +10,7 @@ const PARTS = [
   { name: 'solver', colour: '#4aa8ff', of: (step: StepRecord) => step.solver },
   { name: 'peers', colour: '#f0a13c', of: (step: StepRecord) => step.peers },
   { name: 'rest', colour: '#8795a3', of: (step: StepRecord) => Math.max(step.total - step.solver - step.peers, 0) },
+  { name: 'wire', colour: '#35c2a8', of: (step: StepRecord) => Math.max(step.elapsed - step.total, 0) },
 ];
 
 /** Parts of the wall time of the last calls; they sum to 1 unless nothing was spent. */
@@ -22,7 +23,8 @@ export function timeSplit(steps: readonly StepRecord[]): number[] {
 export function solverPanel(desk: Desk): HTMLElement {
   const facts = h('tbody');
   const bar = h('div', { class: 'bar', role: 'img' });
-  const legend = h('div', { class: 'legend' }, ...PARTS.map((part) => h('span', {}, h('i', { style: `background:${part.colour}` }), part.name)));
+  const times = PARTS.map(() => h('span'));
+  const legend = h('div', { class: 'legend' }, ...PARTS.map((part, k) => h('span', {}, h('i', { style: `background:${part.colour}` }), part.name, ' ', times[k])));
   const canvas = h('div', { style: 'height:130px' });
   const panel = section('Solver', true, h('table', { class: 'values' }, facts), bar, legend, h('div', { class: 'legend' }, h('span', { style: 'color:var(--chart-1)' }, 'iterations'), h('span', { class: 'spacer' }), h('span', { style: 'color:var(--chart-2)' }, 'residual')), canvas);
   let chart: uPlot | undefined;
@@ -35,6 +37,7 @@ export function solverPanel(desk: Desk): HTMLElement {
       ? [['iterations in the last step', String(last.iterations)], ['residual', number(last.residual, 3)], ['solver time a step', seconds(count > 0 ? solver / count : 0)]]
       : [['', 'no step from this page yet']];
     facts.replaceChildren(...rows.map(([name, text]) => h('tr', {}, h('th', { scope: 'row' }, name), h('td', {}, text))));
+    PARTS.forEach((part, k) => (times[k].textContent = count > 0 ? seconds(recent.reduce((sum, step) => sum + part.of(step), 0) / count) : ''));
     const split = timeSplit(recent);
     bar.replaceChildren(...split.map((part, k) => h('span', { style: `width:${100 * part}%;background:${PARTS[k].colour}` })));
     bar.setAttribute('aria-label', PARTS.map((part, k) => `${part.name} ${Math.round(100 * split[k])} %`).join(', '));
@@ -51,7 +54,7 @@ export function solverPanel(desk: Desk): HTMLElement {
         height: 130,
         scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(low ?? 0, 0), Math.max(high ?? 1, 1) + 1] }, log: { range: (_, low, high) => [Math.floor(low ?? -12), Math.ceil(high ?? -6)] } },
         axes: [{ ...axis, size: 30 }, { ...axis, stroke: PARTS[0].colour, size: 28, incrs: [1, 2, 5, 10, 20, 50, 100] }, { ...axis, stroke: PARTS[1].colour, size: 48, side: 1, scale: 'log', grid: { show: false }, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? `1e${tick}` : '')) }],
-        series: [{}, { label: 'iterations', stroke: PARTS[0].colour, width: 1.4, points: { show: false } }, { label: 'residual', stroke: PARTS[1].colour, scale: 'log', width: 1.2, points: { show: false } }],
+        series: [{}, { label: 'iterations', stroke: PARTS[0].colour, width: 1.4 }, { label: 'residual', stroke: PARTS[1].colour, scale: 'log', width: 1.2 }],
         cursor: { show: false },
       },
       [[], [], []],
