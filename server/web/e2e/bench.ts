@@ -1,7 +1,7 @@
 /** A daemon with a deck, and a browser before it. */
 import { spawn, type ChildProcess } from 'node:child_process';
 import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
-import { createServer } from 'node:http';
+import { createServer, request } from 'node:http';
 import { fileURLToPath } from 'node:url';
 import { chromium, type Browser, type Page } from 'playwright-core';
 import { expect } from 'vitest';
@@ -78,21 +78,23 @@ export class View {
   }
 
   async stop(): Promise<void> {
-    if (this.child.exitCode !== null) return;
+    if (this.child.exitCode !== null || this.child.signalCode !== null) return;
     const ended = new Promise((resolve) => this.child.on('exit', resolve));
     this.child.kill('SIGTERM');
     await ended;
   }
 }
 
+const TOKEN = 'a-token-of-the-tests';
+
 /** `mbcosimd` at a port of the caller's, with one token; `openSocket`: none is asked for at its socket, and the door has one of its own. It can
  * be started again where it was. */
 export class Daemon {
-  token = 'a-token-of-the-tests';
+  token: string | undefined;
   private child?: ChildProcess;
 
   constructor(private readonly folder: string, readonly port: number, private readonly options: string[] = [], private readonly openSocket = false) {
-    writeFileSync(`${folder}/tokens`, `${this.token} control reader\n`);
+    writeFileSync(`${folder}/tokens`, `${TOKEN} control reader\n`);
   }
 
   get origin(): string {
@@ -102,10 +104,15 @@ export class Daemon {
   async start(): Promise<void> {
     const tokens = this.openSocket ? [] : ['--tokens', `${this.folder}/tokens`];
     const child = spawn(`${BIN}/mbcosimd`, ['--listen', `unix:${this.folder}/socket`, '--http', `127.0.0.1:${this.port}`, ...tokens, ...this.options], { stdio: ['ignore', 'pipe', 'ignore'] });
-    child.stdout?.on('data', (said: Buffer) => (this.token = /token=(\S+)/.exec(String(said))?.[1] ?? this.token));
+    let said = '';
+    this.token = this.openSocket ? undefined : TOKEN;
+    child.stdout?.on('data', (data: Buffer) => {
+      said += data;
+      this.token ??= /token=(\S+)\s/.exec(said)?.[1];
+    });
     this.child = child;
     const end = Date.now() + 20_000 * FACTOR;
-    while (!(await fetch(`${this.origin}/healthz`).then((reply) => reply.ok, () => false))) {
+    while (this.token === undefined || !(await ask(`${this.origin}/healthz`).then(({ status }) => status === 200, () => false))) {
       if (child.exitCode !== null || Date.now() > end) throw new Error(`the daemon does not start: ${child.exitCode}`);
       await new Promise((resolve) => setTimeout(resolve, 50));
     }
@@ -142,19 +149,27 @@ export async function freePort(): Promise<number> {
   return port;
 }
 
-/** A unary call in JSON. */
-async function call<T>(origin: string, token: string, method: string, request: object): Promise<T> {
-  const reply = await fetch(`${origin}/mbcosim.v1.${method}`, {
-    method: 'POST',
-    headers: { 'Content-Type': 'application/json', Authorization: `Bearer ${token}` },
-    body: JSON.stringify(request),
+/** Status and text of what is answered; POST where there is a body. On a connection of its own: one that is kept open may be closed by the
+ * daemon in the moment in which it is used again. */
+export function ask(url: string, headers: Record<string, string> = {}, body?: string): Promise<{ status: number; text: string }> {
+  return new Promise((resolve, reject) => {
+    const call = request(url, { agent: false, method: body === undefined ? 'GET' : 'POST', headers }, (reply) => {
+      let text = '';
+      reply.setEncoding('utf8').on('data', (data: string) => (text += data)).on('error', reject).on('end', () => resolve({ status: reply.statusCode ?? 0, text }));
+    });
+    call.on('error', reject).end(body);
   });
-  if (!reply.ok) throw new Error(`${method}: ${reply.status} ${await reply.text()}`);
-  return (await reply.json()) as T;
+}
+
+/** A unary call in JSON. */
+async function call<T>(origin: string, token: string | undefined, method: string, content: object): Promise<T> {
+  const { status, text } = await ask(`${origin}/mbcosim.v1.${method}`, { 'Content-Type': 'application/json', Authorization: `Bearer ${token}` }, JSON.stringify(content));
+  if (status !== 200) throw new Error(`${method}: ${status} ${text}`);
+  return JSON.parse(text) as T;
 }
 
 /** Loads an example deck with whatever it includes; the simulation's name. */
-export async function create(server: { origin: string; token: string }, deck: string, options: object = {}): Promise<string> {
+export async function create(server: { origin: string; token?: string }, deck: string, options: object = {}): Promise<string> {
   const files = readdirSync(MODELS).filter((name) => name === deck || /\.(inc|fem)$/.test(name));
   const { simulation } = await call<{ simulation: { name: string } }>(server.origin, server.token, 'Simulations/CreateSimulationInline', {
     header: { bundleMainFile: deck, options: { displayName: deck, ...options } },
@@ -219,13 +234,14 @@ export async function visit(browser: Browser, address: string, options: { width?
 /** Runs `work` with a daemon of its own and a page on it; no error may be left in the console. */
 export async function withPage(browser: Browser, deck: string, work: (visit: Visit, view: View) => Promise<void>, options?: Parameters<typeof visit>[2]): Promise<void> {
   const view = await View.start(deck);
+  let visited: Visit | undefined;
   try {
-    const visited = await visit(browser, view.address, options);
+    visited = await visit(browser, view.address, options);
     await shown(visited.page);
     await work(visited, view);
     expect(visited.faults).toEqual([]);
-    await visited.close();
   } finally {
+    await visited?.close();
     await view.stop();
   }
 }
@@ -239,7 +255,7 @@ interface Inside {
         model: { variables: { name: string; handle: number }[] };
         recording: { samples: { step: number; time: number; layout: { offset(handle: number): number | undefined }; values: Float64Array }[] };
       } };
-      session?: { name: string; playing: { value: string } };
+      session?: { name: string; playing: { value: string }; busy: boolean };
       sample?: { step: number; time: number };
     };
     scene: {
@@ -291,8 +307,9 @@ export function scene(page: Page): Promise<{ step: number; nodes: Record<string,
   );
 }
 
-/** Where the node with a label is seen: pixels of the window; from −1 to 1 across the scene. */
-export function placeOf(page: Page, label: number): Promise<{ x: number; y: number; across: number; up: number }> {
+/** Where the node with a label is seen, once what was asked for is drawn: pixels of the window; from −1 to 1 across the scene. */
+export async function placeOf(page: Page, label: number): Promise<{ x: number; y: number; across: number; up: number }> {
+  await scene(page);  // the camera's matrices are made when it is drawn
   return page.evaluate((wanted) => {
     const { desk, scene: { view } } = (window as unknown as Inside).mbcosim;
     const index = desk.shown.value?.geometry.nodes.findIndex((node) => node.label === wanted) ?? -1;
@@ -331,6 +348,30 @@ export function flexiblePoints(page: Page): Promise<number[]> {
 /** Kinds of things that the scene has. */
 export function drawnLayers(page: Page): Promise<string[]> {
   return page.evaluate(() => (window as unknown as Inside).mbcosim.scene.view.layers());
+}
+
+/** Waits until no step of the page's is under way. */
+export function rested(page: Page): Promise<void> {
+  return until(page, () => {
+    const { session } = (window as unknown as Inside).mbcosim.desk;
+    return session?.playing.value === 'no' && !session.busy;
+  }, undefined);
+}
+
+/** Waits until in the plot with this number, from 0, so many curves are drawn: pixels have their colours. */
+export function curvesDrawn(page: Page, plot: number, curves: number): Promise<void> {
+  return until(page, ([at, wanted]) => {
+    const box = document.querySelectorAll('.plot')[at], canvas = box?.querySelector('canvas');
+    if (!canvas || canvas.width === 0) return false;
+    const { data } = (canvas.getContext('2d') as CanvasRenderingContext2D).getImageData(0, 0, canvas.width, canvas.height);
+    const colours = [...box.querySelectorAll<HTMLElement>('.curve i')].map((mark) => (getComputedStyle(mark).backgroundColor.match(/\d+/g) ?? []).map(Number));
+    const count = colours.map(([r, g, b]) => {
+      let pixels = 0;
+      for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 60 && Math.abs(data[i] - r) + Math.abs(data[i + 1] - g) + Math.abs(data[i + 2] - b) < 30) ++pixels;
+      return pixels;
+    });
+    return count.filter((pixels) => pixels > 20).length >= wanted;
+  }, [plot, curves] as [number, number]);
 }
 
 /** Steps that the page has recorded. */

@@ -79,13 +79,13 @@ describe('a flexible body', () => {
       await page.getByRole('button', { name: 'Compute' }).click();
       const mode = page.getByRole('button', { name: /Hz damping/ }).last();
       await mode.click();
+      const extent = await page.evaluate(() => (window as unknown as { mbcosim: { desk: { shown: { value: { geometry: { extent: number } } } } } }).mbcosim.desk.shown.value.geometry.extent);
       let largest = 0;
-      for (let look = 0; look < 12; ++look) {
+      while (largest < 0.005 * extent) {
+        await scene(page);  // the next picture
         const moved = await flexiblePoints(page);
         for (let i = 0; i < still.length; i += 3) largest = Math.max(largest, Math.hypot(moved[i] - still[i], moved[i + 1] - still[i + 1], moved[i + 2] - still[i + 2]));
       }
-      const extent = await page.evaluate(() => (window as unknown as { mbcosim: { desk: { shown: { value: { geometry: { extent: number } } } } } }).mbcosim.desk.shown.value.geometry.extent);
-      expect(largest).toBeGreaterThan(0.005 * extent);
       expect(largest).toBeLessThan(0.36 * extent);
       await mode.click();
       await scene(page);

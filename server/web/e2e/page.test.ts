@@ -6,7 +6,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { atStep, create, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, freePort, launch, MODELS, picture, recorded, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
+import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, freePort, launch, MODELS, picture, recorded, rested, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -126,7 +126,7 @@ describe('time', () => {
       await until(page, () => Number(document.querySelector('.time output')?.textContent?.replace(' s', '')) > 0.5, undefined);
       await page.getByRole('button', { name: 'Pause (space)' }).click();
       await page.getByRole('button', { name: 'Run (space)' }).waitFor();
-      await page.waitForTimeout(300);
+      await rested(page);
       const stopped = (await view.read([])).step;
       await page.waitForTimeout(500);
       expect((await view.read([])).step).toBe(stopped);
@@ -199,6 +199,20 @@ describe('time', () => {
     });
   });
 
+  test('what was recorded is played again and again, while the simulation stays', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
+      for (let step = 1; step <= 10; ++step) await page.keyboard.press('s').then(() => atStep(page, step));  // the page has them all
+      const loop = page.getByRole('button', { name: 'Replay what was recorded, in a loop' });
+      await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.01');  // a turn takes 5 s
+      await loop.click();
+      for (const late of [true, false, true]) await until(page, (wanted) => ((window as unknown as { mbcosim: { desk: { sample: { time: number } } } }).mbcosim.desk.sample.time > 0.025) === wanted, late);
+      await loop.click();
+      expect((await view.read([])).step).toBe(10);
+      await page.getByRole('button', { name: 'live' }).click();
+      await atStep(page, 10);
+    });
+  });
+
   test('a branch is another simulation at the same state', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
       await page.getByRole('button', { name: '+10' }).click();
@@ -233,20 +247,38 @@ describe('plots', () => {
       await page.getByRole('searchbox', { name: 'Search the model' }).fill('2.X');
       await page.getByRole('button', { name: 'Plot node.structural.2.X', exact: true }).click();
       await page.locator('.plot canvas').waitFor();
+      const table = async () => {
+        const download = page.waitForEvent('download');
+        await page.getByRole('button', { name: 'Export' }).click();
+        await page.getByRole('button', { name: 'Table of the plots (CSV)' }).click();
+        await page.keyboard.press('Escape');
+        return readFileSync(await (await download).path(), 'utf8').trim().split('\n');
+      };
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
-      const before = await recorded(page);
+      await curvesDrawn(page, 0, 2);  // the others lie over each other
+      const before = await table();
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 20);
-      expect((await recorded(page)).length).toBeGreaterThan(before.length);
-      const download = page.waitForEvent('download');
-      await page.getByRole('button', { name: 'Export' }).click();
-      await page.getByRole('button', { name: 'Table of the plots (CSV)' }).click();
-      const lines = readFileSync(await (await download).path(), 'utf8').trim().split('\n');
+      const lines = await table();
+      expect(lines.length).toBeGreaterThan(before.length);
       expect(lines[0]).toBe('step,time [s],node.structural.2.X.x [length],node.structural.2.X.y [length],node.structural.2.X.z [length]');
       const [step, time, x, , z] = lines[lines.length - 1].split(',').map(Number);
       expect([step, time]).toEqual([20, expect.closeTo(0.1, 9)]);
       expect(Math.hypot(x, z)).toBeCloseTo(1, 5);
+    });
+  });
+
+  test('of variables that were not followed before begin where they are asked for, and go over each other', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
+      for (const step of [10, 20]) await page.getByRole('button', { name: '+10' }).click().then(() => atStep(page, step));
+      await page.getByRole('searchbox', { name: 'Search the model' }).fill('2.X');
+      await page.getByRole('button', { name: 'Plot node.structural.2.XP', exact: true }).click();
+      for (let step = 30; step <= 80; step += 10) await page.getByRole('button', { name: '+10' }).click().then(() => atStep(page, step));
+      await curvesDrawn(page, 0, 3);
+      await page.getByRole('button', { name: 'Plot node.structural.2.X', exact: true }).click();
+      await page.getByRole('combobox', { name: 'Plot against' }).last().selectOption({ label: 'over node 2 XP.x' });
+      await curvesDrawn(page, 1, 3);
     });
   });
 });
@@ -265,11 +297,10 @@ describe('eigenmodes', () => {
       const still = await scene(page);
       await first.click();
       let largest = 0;
-      for (let look = 0; look < 10; ++look) {
+      while (largest === 0) {
         const moved = await scene(page);
         for (const [label, matrix] of Object.entries(moved.nodes)) largest = Math.max(largest, ...[12, 13, 14].map((k) => Math.abs(matrix[k] - still.nodes[label][k])));
       }
-      expect(largest).toBeGreaterThan(0);
       await first.click();
       expect((await scene(page)).nodes).toEqual(still.nodes);
     });
@@ -341,7 +372,7 @@ describe('inputs', () => {
       await page.locator('summary', { hasText: 'Inputs' }).click();
       await page.getByRole('slider', { name: 'stream.force' }).fill('2.5');
       let read = await view.read(['stream.force']);
-      const end = Date.now() + 20_000;
+      const end = Date.now() + 20_000 * FACTOR;
       while (read.values['stream.force'][0] !== 2.5 && Date.now() < end) read = await view.read(['stream.force']);
       expect(read.values['stream.force']).toEqual([2.5]);
     });
@@ -383,7 +414,7 @@ describe('solver and events', () => {
       const solver = page.locator('.section', { hasText: 'iterations in the last step' });
       expect(await solver.textContent()).toMatch(/iterations in the last step[1-9]\d*residual\d\S*solver time a step\d\S* (µs|ms)/);
       expect(await solver.locator('.bar').getAttribute('aria-label')).toMatch(/^solver \d+ %, peers \d+ %, rest \d+ %, wire \d+ %$/);
-      expect(await solver.locator('.legend').first().textContent()).toMatch(/^solver \d\S* (µs|ms)peers 0 srest \d\S* (µs|ms)wire \d\S* (µs|ms|s)$/);
+      expect(await solver.locator('.legend').first().textContent()).toMatch(/^solver \d\S* (µs|ms|s)peers 0 srest \d\S* (µs|ms|s)wire \d\S* (µs|ms|s)$/);
       await page.getByRole('button', { name: 'Save state' }).click();
       await page.locator('summary', { hasText: 'Events' }).click();
       await page.getByRole('log', { name: 'Events' }).getByText('saved the state at step 10').waitFor();
@@ -427,6 +458,12 @@ describe('a deck from the disk', () => {
   });
 });
 
+/** Status of a call with the token and these headers. */
+async function asked(view: View, headers: Record<string, string>): Promise<number> {
+  const call = `${view.origin}/mbcosim.v1.Simulations/ListSimulations`;
+  return (await ask(call, { 'Content-Type': 'application/json', Authorization: `Bearer ${view.token}`, ...headers }, '{}')).status;
+}
+
 describe('who comes in', () => {
   test('a foreign web site can neither call nor frame the page', async () => {
     const view = await View.start('pendulum.mbd');
@@ -447,6 +484,16 @@ describe('who comes in', () => {
         }
       }, view.origin);
       expect(outcome).toBe('refused');
+      expect(await asked(view, {})).toBe(200);
+      expect(await asked(view, { Origin: `http://127.0.0.1:${port}` })).toBe(403);
+      expect(await asked(view, { Host: 'foreign.example' })).toBe(403);
+      await visited.page.unrouteAll();  // the daemon's own page
+      await visited.page.evaluate((target) => {
+        const frame = document.createElement('iframe');
+        frame.src = target;
+        document.body.append(frame);
+      }, `${view.origin}/`);
+      await expect.poll(() => visited.faults.join(), { timeout: 20_000 * FACTOR }).toContain('X-Frame-Options');
       await visited.close();
     } finally {
       foreign.close();
@@ -557,40 +604,59 @@ describe('a daemon that keeps its simulations', () => {
 });
 
 describe('a tab that stops reading', () => {
-  /** Wall time of each of `count` steps, in milliseconds, sorted. */
-  async function steps(view: View, count: number): Promise<number[]> {
+  const ROUNDS = 8, STEPS = 100;
+
+  /** Wall time that 99 % of `STEPS` steps stay below, in milliseconds. */
+  async function p99(view: View): Promise<number> {
     const times: number[] = [];
-    for (let i = 0; i < count; ++i) {
+    for (let i = 0; i < STEPS; ++i) {
       const start = performance.now();
       await view.call('Simulations/Step', { simulation: view.simulation, steps: 1 });
       times.push(performance.now() - start);
     }
-    return times.sort((a, b) => a - b);
+    return times.sort((a, b) => a - b)[Math.floor(0.99 * STEPS)];
   }
 
-  test('does not slow the steps of others', async () => {
-    const view = await View.start('pendulum.mbd');
-    try {
-      const visited = await visit(browser, view.address);
-      await shown(visited.page);
-      await steps(view, 20);
-      const reading = await steps(view, 200);
-      const debug = await visited.page.context().newCDPSession(visited.page);
-      await debug.send('Debugger.enable');
-      await debug.send('Debugger.pause');
-      const evaluated = visited.page.evaluate(() => 1);  // the pause begins with the next statement
-      const stopped = await steps(view, 200);
-      const p99 = (times: number[]) => times[Math.floor(0.99 * times.length)], middle = (times: number[]) => times[times.length >> 1];
-      console.log(`a step beside a tab that reads: median ${middle(reading).toFixed(2)} ms, p99 ${p99(reading).toFixed(2)} ms; that has stopped: ${middle(stopped).toFixed(2)} ms, ${p99(stopped).toFixed(2)} ms`);
-      expect(middle(stopped)).toBeLessThan(2 * middle(reading) + 1);
-      expect(p99(stopped)).toBeLessThan(2 * p99(reading) + 5 * FACTOR);
-      await debug.send('Debugger.resume');
-      await evaluated;
-      await atStep(visited.page, 420);
-      await visited.close();
-    } finally {
-      await view.stop();
+  /** Steps until `done`, not for ever. */
+  async function stepUntil(view: View, done: () => Promise<boolean>): Promise<void> {
+    const end = Date.now() + 20_000 * FACTOR;
+    while (!(await done())) {
+      if (Date.now() > end) throw new Error(`stepped too long for ${done}`);
+      await view.call('Simulations/Step', { simulation: view.simulation, steps: 5 });
     }
+  }
+
+  /** Samples that the daemon has given up because nobody took them. */
+  async function dropped(view: View): Promise<number> {
+    const { text } = await ask(`${view.origin}/metrics`, { Authorization: `Bearer ${view.token}` });
+    return Number(/^mbcosim_samples_dropped_total (\S+)$/m.exec(text)?.[1]);
+  }
+
+  // A machine that does other things has its say in every single round; a tab that holds up the steps would have it in all of them.
+  test('leaves the p99 of the steps where it was', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(400));
+    await withPage(browser, join(folder, 'pendulums.mbd'), async ({ page }, view) => {
+      const debug = await page.context().newCDPSession(page);
+      await debug.send('Debugger.enable');
+      let least = Infinity;
+      for (let round = 0; round < ROUNDS && least > 1.25; ++round) {
+        const seen = (await recorded(page)).length;
+        await stepUntil(view, async () => (await recorded(page)).length >= seen + 20);  // it does read
+        const reading = await p99(view), before = await dropped(view);
+        await debug.send('Debugger.pause');
+        const evaluated = page.evaluate(() => 1);  // the pause begins with the next statement
+        await stepUntil(view, async () => (await dropped(view)) > before);
+        const stopped = await p99(view);
+        await debug.send('Debugger.resume');
+        await evaluated;
+        console.log(`p99 of a step beside a tab that reads: ${reading.toFixed(2)} ms, that has stopped: ${stopped.toFixed(2)} ms`);
+        least = Math.min(least, stopped / reading);
+      }
+      expect(least).toBeLessThan(1.25);
+      await atStep(page, (await view.read([])).step);
+    });
+    rmSync(folder, { recursive: true });
   });
 });
 
@@ -604,7 +670,7 @@ describe('layers', () => {
       await page.getByRole('button', { name: 'Show' }).click();
       for (const name of ['reactions of joints', 'velocities of nodes', 'axes of nodes and joints', 'names']) await page.getByLabel(name, { exact: true }).check();
       await until(page, () => document.querySelectorAll('.labels span').length >= 3, undefined);
-      const end = Date.now() + 20_000;
+      const end = Date.now() + 20_000 * FACTOR;
       let after = before;
       // the meshes of this deck cover most of what the arrows do
       while (after.covered <= before.covered * 1.01 && Date.now() < end) after = await picture(page);
@@ -616,6 +682,17 @@ describe('layers', () => {
 
 describe('for everybody', () => {
   const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+
+  /** Opens what is closed, with a plot and something selected. */
+  async function openAll({ page }: Visit): Promise<void> {
+    await page.getByRole('tab', { name: 'Model', exact: true }).first().click();
+    await page.getByRole('button', { name: /^Variables of dynamic node/ }).first().click();
+    await page.getByRole('button', { name: /^Plot node\.structural\.\d+\.X$/ }).first().click();
+    await page.getByRole('button', { name: /^body \d+$/ }).first().click();
+    await page.evaluate(() => document.querySelectorAll('details').forEach((details) => (details.open = true)));
+    await page.getByRole('button', { name: 'Compute' }).click();
+    await page.getByRole('button', { name: /Hz damping/ }).first().waitFor();
+  }
 
   async function seriousFaults({ page }: Visit): Promise<string[]> {
     await page.evaluate(axe);
@@ -630,6 +707,10 @@ describe('for everybody', () => {
   ])('no serious fault, $name', async ({ options }) => {
     await withPage(browser, 'actuated_beam.mbd', async (visited) => {
       expect(await seriousFaults(visited)).toEqual([]);
+      if (!options.width) {
+        await openAll(visited);
+        expect(await seriousFaults(visited)).toEqual([]);
+      }
       for (const tab of options.width ? ['Model', 'Plots', 'Panels'] : []) {
         await visited.page.getByRole('tab', { name: tab, exact: true }).last().click();
         expect(await seriousFaults(visited)).toEqual([]);
