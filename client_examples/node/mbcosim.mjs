@@ -7,6 +7,7 @@
 import { randomUUID } from "node:crypto";
 import { readFile } from "node:fs/promises";
 import { basename } from "node:path";
+import { setTimeout as delay } from "node:timers/promises";
 import { fileURLToPath } from "node:url";
 
 import grpc from "@grpc/grpc-js";
@@ -23,14 +24,20 @@ const CHANNEL = {
   "grpc.keepalive_time_ms": 10_000,
   "grpc.keepalive_timeout_ms": 10_000,
   "grpc.keepalive_permit_without_calls": 1,
+  "grpc.initial_reconnect_backoff_ms": 200,
+  "grpc.max_reconnect_backoff_ms": 2_000,
 };
 
 const { v1 } = grpc.loadPackageDefinition(
   loadSync(FILES, { includeDirs: [PROTOS], keepCase: true, longs: Number, enums: String, defaults: true, oneofs: true }),
 ).mbcosim;
 
-/** A connection: stubs of the services. `token`: bearer token; `credentials`: grpc.credentials for TLS. */
-export function connect(address, { token, credentials = grpc.credentials.createInsecure() } = {}) {
+/**
+ * A connection: stubs of the services. `token`: bearer token; `credentials`: grpc.credentials for TLS; `reconnect`: seconds for which the
+ * calls of `load` and Simulation are made again when the server cannot be reached. Each is done once all the same. Streams end.
+ */
+export function connect(address, { token, credentials = grpc.credentials.createInsecure(), reconnect = 0 } = {}) {
+  if (!(reconnect >= 0 && reconnect <= LONGEST)) throw new RangeError(`reconnect: must be a number of seconds from 0 to ${LONGEST}, got ${reconnect}`);
   const metadata = new grpc.Metadata();
   if (token) metadata.set("authorization", `Bearer ${token}`);
   const stub = (Service) => new Service(address, credentials, CHANNEL);
@@ -41,7 +48,7 @@ export function connect(address, { token, credentials = grpc.credentials.createI
     coupling: stub(v1.Coupling),
   };
   const close = () => Object.values(stubs).forEach((client) => client.close());
-  return { ...stubs, metadata, close };
+  return { ...stubs, metadata, close, reconnect };
 }
 
 function options(timeout) {
@@ -79,6 +86,22 @@ export async function call(server, client, method, request, timeout) {
   );
 }
 
+/** The same for a call of Simulations that may be repeated, as it changes nothing or has an id. The bound grows by `reconnect`. */
+async function repeated(server, method, request, timeout) {
+  options(timeout); // refuses what is none
+  const latest = timeout === undefined ? undefined : Date.now() + 1000 * (timeout + server.reconnect);
+  let end;
+  for (let pause = 50; ; pause = Math.min(2 * pause, 1000)) {
+    try {
+      return await call(server, server.simulations, method, request, latest && Math.max((latest - Date.now()) / 1000, 1e-3));
+    } catch (error) {
+      end ??= Date.now() + 1000 * server.reconnect;
+      if (error.code !== grpc.status.UNAVAILABLE || Date.now() >= end) throw error;
+      await delay(Math.min(pause, end - Date.now()));
+    }
+  }
+}
+
 /** A series of messages, for `for await`. */
 export function series(server, client, method, request, timeout) {
   return client[method](request, about(server, request.simulation), options(timeout));
@@ -96,7 +119,8 @@ export async function loadText(server, text, choices = {}) {
 }
 
 async function create(server, upload) {
-  const reply = await call(server, server.simulations, "CreateSimulationInline", upload);
+  upload.header.options.request_id ??= randomUUID();
+  const reply = await repeated(server, "CreateSimulationInline", upload);
   return new Simulation(server, reply.simulation);
 }
 
@@ -111,11 +135,11 @@ export class Simulation {
   }
 
   #call(method, request, timeout = USUAL) {
-    return call(this.server, this.server.simulations, method, request, timeout);
+    return repeated(this.server, method, request, timeout);
   }
   /** The same for calls that may take as long as they take. */
   #work(method, request) {
-    return call(this.server, this.server.simulations, method, request);
+    return repeated(this.server, method, request);
   }
 
   /** Handles of variables by name; asks for those that are not known. */
@@ -149,7 +173,12 @@ export class Simulation {
 
   /** Takes steps; StepReply. */
   async step(steps = 1, outputs = []) {
-    return this.#work("Step", { simulation: this.name, steps: whole(steps, "steps"), outputs: await this.handles(outputs) });
+    return this.#work("Step", {
+      simulation: this.name,
+      steps: whole(steps, "steps"),
+      outputs: await this.handles(outputs),
+      request_id: randomUUID(),
+    });
   }
 
   /** An open stream for stepping with the least delay: `await stepper.step()`, at last `stepper.close()`. */

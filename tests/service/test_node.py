@@ -1,11 +1,12 @@
 """The client for Node: its own tests, against a real daemon, with the packages of its lock file."""
+import functools
 import os
 import shutil
 import subprocess
 
 import pytest
 
-from conftest import MODELS, TIME_FACTOR
+from conftest import MODELS, TIME_FACTOR, Daemon, wait_for
 
 ROOT = os.path.join(MODELS, "..", "..")
 
@@ -33,6 +34,30 @@ def run(command, folder, daemon):
 def test_its_own_tests(node_client, daemon):
     output = run(["node", "--test", "test/"], node_client, daemon)
     assert "fail 0" in output and "pass 6" in output
+
+
+@pytest.mark.parametrize("reconnect", [60, 0])
+def test_calls_wait_for_a_daemon_that_comes_back_where_that_is_wanted(node_client, tmp_path, reconnect):
+    shutil.copy(os.path.join(os.path.dirname(__file__), "node_restart.mjs"), node_client)
+    (tmp_path / "state").mkdir()
+    start = functools.partial(Daemon, str(tmp_path), "--state-dir", str(tmp_path / "state"))
+    wanted, daemon = tmp_path / "kill", start()
+    environment = {**os.environ, "MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_PROTOS": os.path.realpath(os.path.join(ROOT, "proto")),
+                   "MBCOSIM_KILL": str(wanted), "MBCOSIM_RECONNECT": str(reconnect * TIME_FACTOR)}
+    client = subprocess.Popen(["node", "node_restart.mjs"], cwd=node_client, env=environment, text=True, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT)
+    try:
+        wait_for(lambda: wanted.exists() or client.poll() is not None, 60)
+        daemon.kill()
+        if reconnect:
+            daemon = start()
+            wanted.unlink(missing_ok=True)
+        output, _ = client.communicate(timeout=200 * TIME_FACTOR)
+    finally:
+        client.kill()
+        daemon.stop()
+    assert (client.returncode == 0) == (reconnect > 0), output
+    assert reconnect or "UNAVAILABLE" in output
 
 
 def test_the_example_follows_the_pendulum(node_client, daemon):
