@@ -132,7 +132,10 @@ ForceLoads FileWire::parse(const std::string& text) const {
                                static_cast<std::size_t>(form_.points()) * per_point;
   if (numbers.size() < expected)  // what stands behind them is not ours
     throw ChannelLost(name_ + ": \"" + address_.in + "\" has " + std::to_string(numbers.size()) +
-                      " numbers, not " + std::to_string(expected));
+                      " numbers, not " + std::to_string(expected) + ": " +
+                      (form_.labels ? "a label, " : "") + "a force" +
+                      (with_moment ? " and a moment" : "") + " for each " +
+                      (form_.modes ? "reference node, and a number for each mode" : "point"));
   std::string bytes;
   const auto number = [&](double value) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);

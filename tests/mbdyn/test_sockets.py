@@ -353,6 +353,21 @@ def test_a_file_that_stays_is_a_constant_load(run, tmp_path, options, text):
     assert len(lines) == 3 and all(line == pytest.approx([5, 2, 1, 0, 0.5, 0, 0.1, 0]) for line in lines)
 
 
+def test_a_file_in_tight_coupling_has_no_effect_at_the_start(run, tmp_path):
+    (tmp_path / "in.dat").write_text("1. 0. .5 0. .1 0.\n")
+    done = run(deck('force: 5, external structural, "in.dat", "out.dat", sleep time, .01, coupling, tight, 1, 2, offset, .2,0.,0.;'))
+    assert done.finish() == 0, done.errors
+    forces = [[float(number) for number in row[1:4]] for row in done.rows("frc")]
+    assert forces == [[0, 0, 0], [1, 0, 0.5], [1, 0, 0.5]]
+
+
+def test_a_file_without_its_labels_ends_the_run_with_what_is_expected(run, tmp_path):
+    (tmp_path / "in.dat").write_text("1. 0. .5 0. .1 0.\n")
+    done = run(deck('force: 5, external structural, "in.dat", "out.dat", sleep time, .01, labels, yes, 1, 2;'))
+    assert done.finish() == 5
+    assert '"in.dat" has 6 numbers, not 7: a label, a force and a moment for each point' in done.errors
+
+
 # ------------------------------------------------------------------ mapping
 
 def test_mapping(run, tmp_path):
