@@ -116,6 +116,11 @@ std::string remedy_by_course(const std::vector<double>& history,
     stays += ratio >= 0.9 && ratio <= 1.1 ? 1 : 0;
     last_falls = ratio < 0.9 ? last_falls + 1 : 0;
   }
+  constexpr double kRounding = 1e-14;  // of the largest residual
+  const auto [least, most] = std::minmax_element(history.begin(), history.end());
+  if (!history.empty() && *least < kRounding * *most && last_falls < 2)
+    return "the residual has reached what rounding leaves of it: the tolerance is too small for "
+           "loads of this size; write a larger `tolerance`";
   if ((rises >= 2 && falls >= 2) || stays >= 4)
     return "the iteration goes to and fro" + (worst.empty() ? "" : " at " + worst[0].owner) +
            ": a contact, a stop, friction or the corner of a law or drive opens and closes; "

@@ -72,7 +72,7 @@ InverseDynamics::InverseDynamics(const Model& model)
     const ElementInfo& info = e.set->info(e.index);
     if (auto constraint = inverse_constraint(e)) {
       joints_.push_back(
-          {std::move(constraint), settings_.role(info), m_, regularization_of(model, e)});
+          {std::move(constraint), e, settings_.role(info), m_, regularization_of(model, e)});
       m_ += joints_.back().constraint->rows();
     } else if (info.family == Family::body) {
       bodies_.push_back(e);
@@ -181,13 +181,30 @@ void InverseDynamics::solve_position(State& state, PhaseReport& report) {
           text, sizeof text,
           "no convergence of the positions in %d iterations, residual %.6g, tolerance %.6g",
           iteration, newton.residual_error, s.tolerance);
-      throw StageFailure{ErrorKind::not_converged, "NOT_CONVERGED", text};
+      throw StageFailure{ErrorKind::not_converged, "NOT_CONVERGED",
+                         text + obstacle(right, newton.residual_error < first_error)};
     }
     const VecX delta = solved(matrix(state, kPosition, iteration == 0), right, "position");
     correct_position(delta, state);
     correction = s.solution_test == ResidualTest::minmax ? delta.head(n_).cwiseAbs().maxCoeff()
                                                          : delta.head(n_).norm();
   }
+}
+
+std::string InverseDynamics::obstacle(const VecX& right, bool improved) const {
+  std::string text;
+  Eigen::Index worst = 0;
+  if (m_ > 0) (void)right.tail(m_).cwiseAbs().maxCoeff(&worst);
+  for (const Joint& j : joints_)
+    if (worst >= j.row && worst < j.row + j.constraint->rows())
+      text = "\n  " + model_.element_text(j.element) + ", equation " +
+             std::to_string(worst - j.row + 1) + ": farthest from its prescribed motion";
+  return text + "\n  hint: " +
+         (improved ? "the iteration comes nearer: allow more `max iterations` (1 when the card is "
+                     "missing)"
+                   : "allow more `max iterations` (1 when the card is missing); when that does not "
+                     "help, the prescribed motions are out of reach or jump: check them, or start "
+                     "from positions of the nodes that are nearer");
 }
 
 double InverseDynamics::residual_error(const VecX& right) const {

@@ -57,6 +57,7 @@ class InverseDynamics final : public StepSystem {
   enum Stage { kPosition, kVelocity, kAcceleration, kForces };  ///< the first three index weights
   struct Joint {
     std::unique_ptr<InverseConstraint> constraint;
+    ElementRef element;
     InverseRole role;
     int row;                      ///< first of its rows among those of all joints
     std::vector<double> epsilon;  ///< of its regularization (rows), or empty
@@ -80,6 +81,8 @@ class InverseDynamics final : public StepSystem {
   void solve_position(State& state, PhaseReport& report);
   bool has_converged(double correction, NewtonReport& report) const;
   double residual_error(const VecX& right) const;
+  /// The joint with the largest residual in the position stage, and what to do.
+  std::string obstacle(const VecX& right, bool improved) const;
   void correct_position(const VecX& delta, State& state) const;
   void solve_velocity(State& state);
   void solve_acceleration(State& state);

@@ -232,6 +232,25 @@ TEST(InverseDynamics, ContinuesBitForBitFromASnapshot) {
   EXPECT_EQ(first.simulation().export_state(), second.simulation().export_state());
 }
 
+/// A run without the card `max iterations` does one iteration, as in the reference solver.
+TEST(InverseDynamics, NamesTheJointAndTheRemedyWhenItDoesNotConverge) {
+  std::string deck = kActuated;
+  const std::string card = "max iterations: 50;";
+  deck.erase(deck.find(card), card.size());
+  const LoadReport report = load_deck(BundleSource({{"deck.mbd", deck}}), "deck.mbd");
+  ASSERT_TRUE(report.ok());
+  const auto simulation = Simulation::create(report.model);
+  ASSERT_FALSE(simulation);
+  EXPECT_EQ(simulation.error().kind, ErrorKind::not_converged);
+  EXPECT_THAT(
+      simulation.error().message,
+      ::testing::MatchesRegex("inverse dynamics at t = 0 \\(record 0\\): no convergence of the "
+                              "positions in 1 iterations, residual 0.24.*, tolerance 1e-12\n"
+                              "  joint 2 \\(total joint\\), equation .: farthest from its "
+                              "prescribed motion\n  hint: the iteration comes nearer: allow more "
+                              "`max iterations` \\(1 when the card is missing\\)"));
+}
+
 TEST(InverseDynamics, HasNothingToLinearize) {
   DeckRun run(redundant());
   ASSERT_TRUE(run.ready());
