@@ -24,7 +24,8 @@ enum ExitCode {
 struct RunOptions {
   std::string deck;  ///< path of the main file
   SymbolValues symbols;
-  std::string prefix;  ///< of the result files; empty: the deck's path
+  std::string prefix;                ///< of the result files; empty: the deck's path
+  std::vector<std::string> formats;  ///< "text", "netcdf"; empty: what the deck asks for
   bool quiet = false;
   bool deck_sockets = true;  ///< the sockets and files that the deck names are served
   double peer_timeout = 60;  ///< longest wait for a code behind them [s]

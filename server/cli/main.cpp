@@ -206,6 +206,12 @@ int main(int argc, char** argv) {
   run_app->add_option("-o,--output", run_options.prefix,
                       "Prefix of the result files (PREFIX.mov, PREFIX.jnt, ...); "
                       "default: the deck's name");
+  run_app
+      ->add_option("--format", run_options.formats,
+                   "Format of the results, text or netcdf, whatever the deck asks for; may be "
+                   "given twice")
+      ->check(CLI::IsMember({"text", "netcdf"}))
+      ->allow_extra_args(false);
   add_symbols(*run_app, run_options.symbols);
   run_app->add_flag("-q,--quiet", run_options.quiet,
                     "No progress bar and no summary on a terminal");

@@ -52,7 +52,13 @@ ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& wr
                   const CancelToken* cancel, const RunOptions& options) {
   auto simulation = Simulation::create(model, cancel, writer);
   if (!simulation) return complain(simulation.error());
-  if ((*simulation)->finished()) return kDone;
+  if ((*simulation)->finished()) {
+    std::fprintf(stderr,
+                 "note: no step was made: the final time, %g s (0 without the card `final time`), "
+                 "is not after the initial one\n",
+                 model->initial_value.final_time);
+    return kDone;
+  }
   const StepReport done = run_to_end(**simulation, cancel, options);
   if (done.error) return complain(*done.error);
   if (done.outcome == StepOutcome::finished && done.time < model->initial_value.final_time)
@@ -92,6 +98,15 @@ ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWri
   return kPeerLost;
 }
 
+/// Those of the command line; without them, those of the deck.
+std::vector<ResultFormat> formats_of(const RunOptions& options, const Model& model) {
+  if (options.formats.empty()) return result_formats(model);
+  std::vector<ResultFormat> formats;
+  for (const std::string& name : options.formats)
+    formats.push_back(name == "text" ? ResultFormat::text : ResultFormat::netcdf);
+  return formats;
+}
+
 }  // namespace
 
 int run(const RunOptions& options) {
@@ -120,7 +135,7 @@ int run(const RunOptions& options) {
                  input.c_str());
     return kRefused;
   }
-  const auto writer = make_result_writer(*report.model, prefix);
+  const auto writer = make_result_writer(formats_of(options, *report.model), prefix, nullptr);
   const ExitCode exit_code = coupled ? simulate_coupled(report.model, writer, interrupt, options)
                                      : simulate(report.model, writer, interrupt.token(), options);
   const bool said = !writer->status();

@@ -6,6 +6,7 @@
 #include "input/suggest.h"
 #include "model/family.h"
 #include "model/model_part.h"
+#include "model/netcdf_sync.h"
 #include "model/unit_system.h"
 #include "model/user_elements.h"
 
@@ -195,9 +196,14 @@ void read_output_results(DeckCard& card) {
     card.fail("this format is written by special builds of the reference solver only",
               "write `output results: netcdf`", "not-supported");
   c.netcdf = true;
-  while (card.more())
-    if (card.required("option", {"sync", "no text", "classic", "netcdf4", "text", "no sync"}) == 1)
-      card.warn("`no text` is ignored: the text files are written beside the NetCDF file");
+  while (card.more()) {
+    const int option =
+        card.required("option", {"sync", "no sync", "no text", "text", "classic", "netcdf4"});
+    if (option <= 1) part<NetcdfSync>(card.builder()).on = option == 0;
+    if (option == 2)
+      card.warn("`no text` is ignored: the text files are written beside the NetCDF file",
+                "`mbcosim run --format netcdf` writes the NetCDF file alone");
+  }
 }
 
 void read_title(DeckCard& card) { card.model().title = card.quoted("title"); }

@@ -6,6 +6,7 @@
 
 #include "model/family.h"
 #include "model/model_part.h"
+#include "model/netcdf_sync.h"
 #include "model/unit_system.h"
 #include "output/netcdf_file.h"
 #include "output/record.h"
@@ -66,6 +67,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
     file_.put_record(h_, record_, {}, &context.state->h);
     write_record(context, *this);
     ++record_;
+    if (sync_) (void)file_.flush(false);  // status() tells of a failure
   }
   void eigenanalysis(const EigenReport& report) override;
   Status status() const override { return file_.status(); }
@@ -92,6 +94,8 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   void define_all(const Model& model) {
     model_ = &model;
     units_ = find_part<UnitSystem>(model);
+    const NetcdfSync* const sync = find_part<NetcdfSync>(model);
+    sync_ = sync && sync->on;
     time_dimension_ = file_.dimension("time", NetcdfFile::kUnlimited);
     dimensions_ = {{1, file_.dimension("Vec1", 1)}, {3, file_.dimension("Vec3", 3)}};
     step_ = define("run.step", NetcdfFile::Type::integer, {time_dimension_}, "", "integer",
@@ -206,6 +210,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   const std::string prefix_;
   ResultBudget* const budget_;  ///< may be null
   const Model* model_ = nullptr;
+  bool sync_ = false;
   const UnitSystem* units_ = nullptr;  ///< that the deck declares
   NetcdfFile file_;
   int time_dimension_ = -1, step_ = -1, time_ = -1, h_ = -1;

@@ -53,6 +53,27 @@ def test_starters_run_without_a_warning_and_end_where_they_should(tmp_path, kind
         assert last == pytest.approx(value, rel=3e-3)
 
 
+# ---------------------------------------------------------------- formats
+
+@pytest.mark.parametrize("options, endings", [
+    ([], {".mov", ".nc"}), (["--format", "netcdf"], {".nc"}), (["--format", "text"], {".mov"}),
+    (["--format", "text", "--format", "netcdf"], {".mov", ".nc"})])
+def test_the_command_line_chooses_the_format_of_the_results(tmp_path, options, endings):
+    with open(os.path.join(MODELS, "pendulum.mbd")) as file:
+        text = file.read().replace("end: control data;", "output results: netcdf, no text; end: control data;", 1)
+    (tmp_path / "deck").write_text(text)
+    done = mbcosim("run", *options, "deck", "-o", "p", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "hint: `mbcosim run --format netcdf` writes the NetCDF file alone" in done.stderr
+    assert {ending for ending in (".mov", ".nc") if (tmp_path / f"p{ending}").exists()} == endings
+    assert endings != {".nc"} or {file.name for file in tmp_path.iterdir()} == {"deck", "p.nc"}
+
+
+def test_a_format_that_is_none_is_refused(tmp_path):
+    done = mbcosim("run", "deck", "--format", "excel", cwd=tmp_path)
+    assert done.returncode == 4 and "--format: excel not in {text,netcdf}" in done.stderr
+
+
 def test_a_starter_overwrites_nothing(tmp_path):
     (tmp_path / "beam.mbd").write_text("mine")
     again = mbcosim("init", "beam", cwd=tmp_path)

@@ -250,7 +250,7 @@ default aerodynamic output
 output results
   = { netcdf [ , { classic | netcdf4 } ] [ , { sync | no sync } ] [ , { text | no text } ] | text }
   > .nc beside the text files
-  ! partly: `no text` is ignored with a warning: the text files are written beside the `.nc`; `sync` is read, the `.nc` is complete at the end of the run
+  ! partly: `no text` is ignored with a warning: the text files are written beside the `.nc`, but with `mbcosim run --format netcdf`; with `sync` each record can be read as soon as it is written
 title
   = "<title>"
 print

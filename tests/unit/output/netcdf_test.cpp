@@ -1,5 +1,6 @@
 /// NetCDF results, read back with the C library.
 #include <netcdf.h>
+#include <unistd.h>
 
 #include <complex>
 #include <cstdio>
@@ -122,6 +123,37 @@ TEST_F(NetcdfResults, AreThoseOfTheSimulation) {
   EXPECT_EQ(shape("elem.joint.3.F"), (Shape{6, 3}));
   EXPECT_EQ(shape("node.struct.2.B"), (Shape{6, 3}));
   EXPECT_EQ(shape("node.struct.2.E"), (Shape{6, 3}));
+}
+
+/// How many records a reader finds in the file of a run that goes on.
+std::size_t records_during_a_run(const std::string& option) {
+  std::string deck = kDeck;
+  deck.replace(deck.find(", no text"), 9, option);
+  const std::size_t analysis = deck.find("eigenanalysis");  // rewrites the header
+  deck.erase(analysis, deck.find(';', analysis) + 1 - analysis);
+  const std::string prefix =
+      testing::TempDir() + "mbcosim_netcdf_open_" + std::to_string(::getpid());
+  const LoadReport report = load_deck(BundleSource({{"deck.mbd", deck}}), "deck.mbd");
+  EXPECT_TRUE(report.ok());
+  const auto writer = make_result_writer(*report.model, prefix);
+  const auto simulation = Simulation::create(report.model, nullptr, writer);
+  EXPECT_TRUE(simulation);
+  EXPECT_FALSE((*simulation)->step_many(2).error);
+  int file = -1, dimension = -1;
+  std::size_t records = 0;
+  EXPECT_EQ(nc_open((prefix + ".nc").c_str(), NC_NOWRITE, &file), NC_NOERR);
+  EXPECT_EQ(nc_inq_dimid(file, "time", &dimension), NC_NOERR);
+  EXPECT_EQ(nc_inq_dimlen(file, dimension, &records), NC_NOERR);
+  nc_close(file);
+  EXPECT_TRUE(writer->finish());
+  for (const char* end : {".nc", ".out", ".log", ".mov", ".ine", ".jnt", ".frc"})
+    std::remove((prefix + end).c_str());
+  return records;
+}
+
+TEST(NetcdfSync, LetsReadersSeeEachRecordAsSoonAsItIsWritten) {
+  EXPECT_EQ(records_during_a_run(", sync"), 3u);  // those of the start and of two steps
+  EXPECT_LT(records_during_a_run(", sync, no sync"), 3u);
 }
 
 TEST_F(NetcdfResults, DescribeThemselves) {
