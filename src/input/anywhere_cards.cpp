@@ -80,6 +80,7 @@ void read_reference(DeckCard& card) {
 
 void read_drive_output(DeckCard& card, NamedDrive& d) {
   while (card.keyword("output")) {
+    bool named = true;
     do {
       switch (card.one_of({"value", "derivative"})) {
         case 0:
@@ -90,8 +91,9 @@ void read_drive_output(DeckCard& card, NamedDrive& d) {
           break;
         default:
           d.output_value = card.yes_no("output");
+          named = false;
       }
-    } while (card.more() && card.peek_word() != "output" && card.peek_word() != "outputtrace");
+    } while (named && (card.peek_word() == "value" || card.peek_word() == "derivative"));
   }
 }
 

@@ -6,7 +6,7 @@ namespace mbcosim {
 
 void fail_unknown_card(DeckCard& card, const std::vector<std::string>& accepted) {
   card.fail_at(card.head(), "unknown card \"" + card.card_name() + "\"",
-               suggestion(card.statement().word, accepted), "unknown-word");
+               suggested_word(card.statement().word, accepted), "unknown-word");
 }
 
 void warn_old_name(DeckCard& card, SourceSpan where, std::string_view present) {

@@ -241,7 +241,7 @@ void read_default_scale(DeckCard& card) {
   for (int k = 0; k < kKinds; ++k) known.emplace_back(kind_names(static_cast<Kind>(k)).card);
   while (card.more()) {
     const std::string owner = card.word("owner of degrees of freedom");
-    const double s = card.real("scale", 1);
+    const double s = card.equation_scale();
     const bool all = owner == "all";
     const std::optional<Kind> kind = kind_of_count_card(owner);
     if (!all && !kind) {
@@ -331,7 +331,9 @@ void read_output_file_name(DeckCard& card) {
                "give the name on the command line: -o PREFIX");
 }
 void read_refused_count(DeckCard& card) {
-  card.fail_at(card.head(), "\"" + card.card_name() + "\" is not accepted");
+  card.fail_at(card.head(),
+               "\"" + card.card_name() + "\" is not served: the reference solver refuses it, too",
+               "remove the card: there is nothing to count", "not-supported");
 }
 
 using Reader = void (*)(DeckCard&);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "input/deck.h"
+#include "input/grammar/grammar.h"
 #include "input/refusals.h"
 #include "input/suggest.h"
 
@@ -151,9 +152,7 @@ void DeckCard::need_numbers(std::string_view what, std::int64_t count) {
 }
 
 void DeckCard::need_argument(std::string_view what) {
-  if (!cursor_.more())
-    fail(std::string(what) + " missing", "add the missing argument; the card ends too early",
-         "missing-argument");
+  if (!cursor_.more()) fail(std::string(what) + " missing", "", "missing-argument");
 }
 
 void DeckCard::refuse_word(std::string_view what) {
@@ -222,6 +221,15 @@ double DeckCard::real_above(std::string_view what, double bound, bool inclusive)
     fail(std::string(what) + " must be " + (inclusive ? "at least " : "greater than ") +
          text_of(bound) + ", got " + text_of(x));
   return x;
+}
+
+double DeckCard::equation_scale() {
+  const double s = real("scale", 1);
+  if (!(s > 0))
+    fail("scale must be greater than 0, got " + text_of(s),
+         "residuals are multiplied by it before they are compared with the tolerance: write 1. for "
+         "none");
+  return s;
 }
 
 int DeckCard::integer_at_least(std::string_view what, int least) {
@@ -342,6 +350,8 @@ std::string DeckCard::card_name() const {
   while (!name.empty() && name.back() == ' ') name.pop_back();
   return name;
 }
+
+void DeckCard::add_remedy(Diagnostic& d) const { add_form(d, form_.group, form_.word); }
 
 void DeckCard::expect_end() {
   if (!more()) return;

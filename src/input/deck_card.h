@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "input/cursor.h"
@@ -120,6 +121,10 @@ class DeckCard final : public Card, public BeamOutputDefault {
   void set_defining(std::string kind, int label = -1);
   const std::string& defined_kind() const { return defined_kind_; }
   int defined_label() const { return defined_label_; }
+  /// The word of the grammar that the card reads now: errors without a remedy tell its form.
+  void set_form(std::string_view group, std::string_view word) { form_ = {group, word}; }
+  /// Adds the form to an error about the card that has no hint.
+  void add_remedy(Diagnostic& d) const;
   int drive_depth() const { return drive_depth_; }
   std::string_view next_text();            ///< the next argument as it is written
   void skip();                             ///< the next argument
@@ -147,6 +152,8 @@ class DeckCard final : public Card, public BeamOutputDefault {
   /// An integer or real > 0 (or >= `least`).
   double real_above(std::string_view what, double bound, bool inclusive);
   int integer_at_least(std::string_view what, int least);
+  /// By what residuals of equations are multiplied in the residual test, > 0; 1 when empty.
+  double equation_scale();
   /// `name, "<text>"` when it is there.
   std::string optional_name();
   /// Vector, orientation or number for a `template drive caller`; see template_drive_reader.cpp.
@@ -160,6 +167,9 @@ class DeckCard final : public Card, public BeamOutputDefault {
     Vec3 x = Vec3::Zero();
     Mat3 R = Mat3::Identity();
     Vec3 v = Vec3::Zero(), w = Vec3::Zero();
+  };
+  struct Form {
+    std::string_view group, word;  ///< of the grammar; texts of tables that stay
   };
   enum class Entity { position, orientation, other };
   enum class Prefix {
@@ -193,6 +203,15 @@ class DeckCard final : public Card, public BeamOutputDefault {
   };
 
   void need_argument(std::string_view what);
+  /// What `read` makes of the arguments of a drive, law, function or fluid. An error leaves its
+  /// form.
+  template <class Read>
+  auto read_as(std::string_view group, std::string_view word, const Read& read) {
+    const Form outer = std::exchange(form_, {group, word});
+    auto made = read(*this);
+    form_ = outer;
+    return made;
+  }
   /// Consumes a keyword; a variable of the deck with the same name is hidden by it, with a warning.
   void accept_word();
   /// Refuses a matrix with more entries than the card can hold.
@@ -250,6 +269,7 @@ class DeckCard final : public Card, public BeamOutputDefault {
   int defined_label_ = -1;
   int nesting_ = 0;
   int drive_depth_ = 0;  ///< longest chain of drives that this card makes
+  Form form_;
   std::string peeked_;
   bool has_peeked_ = false;
 };

@@ -14,6 +14,10 @@ namespace {
 constexpr const char* kBlockNames[] = {"",      "data",    "initial value", "control data",
                                        "nodes", "drivers", "elements",      ""};
 
+constexpr const char* kOrder =
+    "the blocks stand in this order, once each: data, initial value (or inverse dynamics), control "
+    "data, nodes, drivers, elements";
+
 /// Is there anything but blanks and comments in `text`, other than a `parallel` block?
 bool has_content(std::string_view text) {
   std::size_t i = 0;
@@ -35,8 +39,9 @@ bool has_content(std::string_view text) {
 
 }  // namespace
 
-void DeckReader::record(const DeckError& error, const DeckCard& card) {
-  deck_.reading.report(error.diagnostic);
+void DeckReader::record(Diagnostic diagnostic, const DeckCard& card) {
+  card.add_remedy(diagnostic);
+  deck_.reading.report(std::move(diagnostic));
   if (!card.defined_kind().empty()) deck_.damage(card.defined_kind(), card.defined_label());
 }
 
@@ -59,14 +64,13 @@ void DeckReader::read_statement(const Statement& statement) {
   try {
     dispatch(card);
   } catch (const DeckError& error) {
-    record(error, card);
+    record(error.diagnostic, card);
   } catch (const InternalError& error) {
-    record(DeckError(reading.diagnostic(Severity::error, "internal", card.last(), error.what())),
-           card);
+    record(reading.diagnostic(Severity::error, "internal", card.last(), error.what()), card);
   } catch (const std::exception& error) {
-    record(DeckError(reading.diagnostic(
+    record(reading.diagnostic(
                Severity::error, "error", card.last(),
-               card.subject().empty() ? error.what() : card.subject() + ": " + error.what())),
+               card.subject().empty() ? error.what() : card.subject() + ": " + error.what()),
            card);
   }
   reading.set_damaged(false);
@@ -78,7 +82,9 @@ void DeckReader::dispatch(DeckCard& card) {
   if (word == "begin") return begin(card);
   if (word == "end") return end(card);
   if (block_ == Block::foreign) return;
+  card.set_form("statement", word);
   if (read_anywhere_card(card)) return;
+  card.set_form(group_of_cards(), word);
   switch (block_) {
     case Block::data:
       return read_data_card(card);
@@ -110,6 +116,21 @@ std::string DeckReader::block_name(int block) const {
 }
 bool DeckReader::is_inverse() const { return deck_.inverse_dynamics; }
 
+std::string_view DeckReader::group_of_cards() const {
+  switch (block_) {
+    case Block::initial_value:
+      return is_inverse() ? "inverse dynamics card" : "initial value card";
+    case Block::control_data:
+      return "control card";
+    case Block::nodes:
+      return "node";
+    case Block::elements:
+      return "element";
+    default:
+      return "";
+  }
+}
+
 void DeckReader::open(Block block, const std::string& name, SourceSpan where) {
   block_ = latest_ = block;
   name_ = name;
@@ -130,12 +151,14 @@ void DeckReader::check_order(DeckCard& card, Block block) {
         block == latest_
             ? "block \"" + std::string(kBlockNames[static_cast<int>(block)]) + "\" occurs twice"
             : "block \"" + std::string(kBlockNames[static_cast<int>(block)]) +
-                  "\" must stand before block \"" + kBlockNames[static_cast<int>(latest_)] + "\"");
+                  "\" must stand before block \"" + kBlockNames[static_cast<int>(latest_)] + "\"",
+        kOrder);
   }
   const Block last_required = std::min(block, Block::nodes);
   for (int b = static_cast<int>(latest_) + 1; b < static_cast<int>(last_required); ++b) {
     deck_.reading.report(deck_.reading.diagnostic(Severity::error, "block-order", card.last(),
-                                                  "block \"" + block_name(b) + "\" expected"));
+                                                  "block \"" + block_name(b) + "\" expected",
+                                                  kOrder));
     return;
   }
 }
@@ -148,7 +171,8 @@ void DeckReader::begin(DeckCard& card) {
   if (block_ != Block::none) {
     reading.report(reading.diagnostic(
         Severity::error, "block", card.head(),
-        "block \"" + name_ + "\" begun at line " + std::to_string(begun_.line) + " is not closed"));
+        "block \"" + name_ + "\" begun at line " + std::to_string(begun_.line) + " is not closed",
+        "close the block: `end: " + name_ + ";`"));
     close();
     done_ = false;
   }
@@ -161,9 +185,11 @@ void DeckReader::begin(DeckCard& card) {
     const Block latest = latest_;
     open(block, name, card.head());
     latest_ = latest;
+    skipped_ = true;
+    for (int k = 0; k < kKinds; ++k) deck_.damage(kind_names(static_cast<Kind>(k)).singular, -1);
     card.fail_at(where, "unknown block \"" + name + "\"",
-                 suggestion(name, {"data", block_name(static_cast<int>(Block::initial_value)),
-                                   "control data", "nodes", "drivers", "elements"}),
+                 suggested_word(name, {"data", block_name(static_cast<int>(Block::initial_value)),
+                                       "control data", "nodes", "drivers", "elements"}),
                  "unknown-word");
   }
   const std::string written = block_name(static_cast<int>(block));
@@ -185,16 +211,20 @@ void DeckReader::begin(DeckCard& card) {
 void DeckReader::end(DeckCard& card) {
   if (!card.more()) card.fail("name of the block missing", "", "missing-argument");
   const std::string name = card.word("block");
-  if (block_ == Block::none) card.fail("\"end: " + name + "\" without its \"begin\"");
+  if (block_ == Block::none)
+    card.fail("\"end: " + name + "\" without its \"begin\"",
+              "remove the card, or write `begin: " + name + ";` before the block");
   const std::string open_name = name_, line = std::to_string(begun_.line);
-  const bool same =
-      normalized(name_) == name || (block_ == Block::initial_value && name == "multistep");
+  const bool same = normalized(name_) == name || block_ == Block::foreign ||
+                    (block_ == Block::initial_value && name == "multistep");
   const SourceSpan where = card.head();
   close();
   if (!same) {
     done_ = false;
-    card.fail_at(where, "block \"" + open_name + "\" (begun at line " + line +
-                            ") closed by \"end: " + name + "\"");
+    card.fail_at(
+        where,
+        "block \"" + open_name + "\" (begun at line " + line + ") closed by \"end: " + name + "\"",
+        "write `end: " + open_name + ";`");
   }
   if (card.more())
     card.fail_at(card.next(), "unexpected argument after \"" + open_name + "\"", "",
@@ -248,8 +278,8 @@ void DeckReader::check_parameters() {
 void DeckReader::check_initial_value() {
   InitialValueSettings& s = deck_.builder.model().initial_value;
   const auto refuse = [&](SourceSpan where, const std::string& message) {
-    deck_.reading.report(
-        deck_.reading.diagnostic(Severity::error, "initial-value", where, message));
+    deck_.reading.report(deck_.reading.diagnostic(Severity::error, "initial-value", where, message,
+                                                  "correct one of the cards of the block"));
   };
   if (s.strategy == StepStrategy::factor) {
     if (s.max_iterations_factor == 0) s.max_iterations_factor = s.max_iterations;
@@ -288,10 +318,11 @@ void DeckReader::finish() {
     reading.report(reading.diagnostic(Severity::error, "block-order", begun_,
                                       std::string("block \"") +
                                           kBlockNames[static_cast<int>(latest_) + 1] +
-                                          "\" expected, end of file found"));
+                                          "\" expected, end of file found",
+                                      kOrder));
     return;
   }
-  check_counts();
+  if (!skipped_) check_counts();
   check_parameters();
   check_initial_value();
   Model& model = deck_.builder.model();

@@ -29,7 +29,8 @@ class DeckReader {
   void check_parameters();
   void check_initial_value();
   void warn_about_rest(const Statement& last);
-  void record(const DeckError& error, const DeckCard& card);
+  void record(Diagnostic diagnostic, const DeckCard& card);
+  std::string_view group_of_cards() const;  ///< of the grammar, for the open block
 
   Deck& deck_;
   Statements& statements_;
@@ -37,6 +38,7 @@ class DeckReader {
   Block latest_ = Block::none;  ///< the last block that was begun
   std::string name_;            ///< of the open block as it was written
   SourceSpan begun_;            ///< its `begin`
+  bool skipped_ = false;        ///< a block of an unknown name: what it defines is not missed
   bool done_ = false;           ///< `end: elements` was read
 };
 

@@ -1,6 +1,7 @@
 /// Cards of the `elements` block: any element by its head, `driven`, `bind`, `output`.
 #include "input/cards.h"
 #include "input/deck.h"
+#include "input/grammar/grammar.h"
 #include "input/suggest.h"
 #include "model/family.h"
 
@@ -36,13 +37,14 @@ const Registry::ElementReader& typed_reader(DeckCard& card, const Registry::Head
   if (reader != head.types.end()) {
     card.skip();
     info.type = registry.display.at(type);
+    if (find_grammar(word, type)) card.set_form(word, reader->first);
     return reader->second;
   }
   if (type.empty()) card.fail_expected(what + " expected");
   card.refuse_unsupported(where, word, type);
   std::vector<std::string> accepted;
   for (const auto& t : head.types) accepted.push_back(registry.display.at(t.first));
-  card.fail_at(where, "unknown " + what + " \"" + type + "\"", suggestion(type, accepted),
+  card.fail_at(where, "unknown " + what + " \"" + type + "\"", suggested_word(type, accepted),
                "unknown-word");
 }
 
@@ -180,6 +182,7 @@ void read_driven(DeckCard& card) {
     card.fail("inner element missing", "e.g. driven: 1, <drive>, joint: 1, clamp, ...",
               "missing-argument");
   DeckCard inner(card.deck(), card.rest_as_statement());
+  inner.set_form("element", inner.statement().word);
   if (inner.statement().word == "existing") {
     if (!driven.hints.empty())
       card.fail_at(driven.hints.front().where, "a hint with `existing` is not supported yet",
@@ -189,7 +192,12 @@ void read_driven(DeckCard& card) {
   }
   if (const FamilyFacts* const family = family_by_head(inner.statement().word))
     card.set_defining(family->name, driven.label);
-  read_element(inner, &driven);
+  try {
+    read_element(inner, &driven);
+  } catch (DeckError& error) {
+    inner.add_remedy(error.diagnostic);
+    throw;
+  }
 }
 
 // ------------------------------------------------------------------------------------------------

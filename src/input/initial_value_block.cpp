@@ -288,7 +288,7 @@ void read_output_meter(DeckCard& card) {
 void read_threads(DeckCard& card) {
   if (card.one_of({"auto", "disable"}) >= 0) return;
   card.one_of({"assembly", "solver"});
-  card.integer("number of threads");
+  card.integer_at_least("number of threads", 1);
 }
 void ignored(DeckCard& card) { ignore_rest(card, "this card has no effect"); }
 void read_real_time(DeckCard& card) {

@@ -149,7 +149,7 @@ void read_scalar_node(DeckCard& card, ScalarKind kind, ScalarNode node) {
       node.differential = card.one_of({"differential", "algebraic"}) != 1;
     read_initial_value(card, node, node.differential);
     if (card.keyword("scale"))
-      node.scale = card.keyword("default") ? deck.scalar_scale[k] : card.real("scale", 1);
+      node.scale = card.keyword("default") ? deck.scalar_scale[k] : card.equation_scale();
   }
   read_output_option(card, deck.output.scalar[k], node.output);
   card.expect_end();

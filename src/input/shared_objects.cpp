@@ -63,7 +63,7 @@ void DeckCard::fail_word(std::string_view what, const std::string& word, const T
   const SourceSpan where = next();
   refuse_unsupported(where, context, word);
   fail_at(where, "unknown " + std::string(what) + " \"" + word + "\"",
-          suggestion(word, written_words(table, registry())), "unknown-word");
+          suggested_word(word, written_words(table, registry())), "unknown-word");
 }
 
 // ----------------------------------------------------------------------------------------------
@@ -107,7 +107,7 @@ DrivePtr DeckCard::drive(std::string_view what) {
   const auto reader = registry().drives.find(peek_word());
   if (reader == registry().drives.end()) return constant_drive(what);
   accept_word();
-  return reader->second(*this);
+  return read_as("drive", reader->first, reader->second);
 }
 
 DrivePtr DeckCard::string_expression(const std::string& text) {
@@ -286,11 +286,11 @@ LawPtr<N> DeckCard::law_of() {
   const auto reader = readers.find(w);
   if (reader != readers.end()) {
     accept_word();
-    return reader->second(*this);
+    return read_as("law", reader->first, reader->second);
   }
   const auto linear = readers.find("linearelastic");
   if (N == 1 && linear != readers.end() && (w.empty() || deck_.reading.symbols.find(next_text())))
-    return linear->second(*this);
+    return read_as("law", linear->first, linear->second);
   if (w.empty())
     fail_expected("constitutive law expected, e.g. " +
                   std::string(N == 1 ? "linear elastic" : "linear elastic generic"));
@@ -321,7 +321,7 @@ ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceS
     fail_word("scalar function", w, registry().functions, "function");
   }
   skip();
-  ScalarFunctionPtr f = reader->second(*this);
+  ScalarFunctionPtr f = read_as("function", reader->first, reader->second);
   deck_.reading.functions[name] = f;
   deck_.function_places[name] = where;
   return f;
@@ -364,14 +364,14 @@ FluidPtr DeckCard::fluid_definition() {
   if (reader == registry().fluids.end()) {
     const auto plain = registry().fluids.find("incompressible");
     if (plain != registry().fluids.end() && (w == "density" || w == "viscosity"))
-      return plain->second(*this);
+      return read_as("fluid", plain->first, plain->second);
     if (w.empty())
       fail_expected(
           "hydraulic fluid expected: \"reference, <label>\" or a type such as linear compressible");
     fail_word("hydraulic fluid", w, registry().fluids, "fluid");
   }
   skip();
-  return reader->second(*this);
+  return read_as("fluid", reader->first, reader->second);
 }
 
 FileDriverPtr DeckCard::file_driver() { return labelled(*this, deck_.file_drivers, "file driver"); }
@@ -383,6 +383,7 @@ FileDriverPtr DeckCard::file_driver_definition() {
   if (reader == registry().file_drivers.end())
     fail_word("file driver type", w, registry().file_drivers, "file driver");
   skip();
+  set_form("file driver", reader->first);
   return reader->second(*this);
 }
 

@@ -26,9 +26,9 @@ Splitter::Splitter(Reading& reading, int file)
 }
 
 void Splitter::report(std::size_t at, std::size_t length, const std::string& message,
-                      const char* code) {
+                      const char* code, const std::string& hint) {
   reading_.report(
-      reading_.diagnostic(Severity::error, code, reading_.span(file_, at, length), message));
+      reading_.diagnostic(Severity::error, code, reading_.span(file_, at, length), message, hint));
 }
 
 /// Past the comment at `at`, or npos.
@@ -110,18 +110,20 @@ void Splitter::recover(std::size_t begin, const End& end) {
       at_ = text_.size();
       return;
     case Trouble::text:
-      report(end.at, 1, "unterminated string");
+      report(end.at, 1, "unterminated string", "syntax", "end it with a double quote");
       break;
     case Trouble::comment:
-      report(end.at, 2, "unterminated comment");
+      report(end.at, 2, "unterminated comment", "syntax", "end it with `*/`");
       break;
     case Trouble::end_of_file:
-      report(text_.empty() ? 0 : text_.size() - 1, 1, "\";\" expected at end of file");
+      report(text_.empty() ? 0 : text_.size() - 1, 1, "\";\" expected at end of file", "syntax",
+             "end the last card with \";\"");
       break;
     case Trouble::unbalanced: {
       report(end.at, 1,
              "unbalanced \"" + c + "\" opened at column " +
-                 std::to_string(reading_.span(file_, end.at, 1).column));
+                 std::to_string(reading_.span(file_, end.at, 1).column),
+             "syntax", std::string("close it with \"") + (c == "[" ? "]" : ")") + "\"");
       const End plain = find_end(begin, false);
       at_ = plain.trouble == Trouble::none ? plain.at + 1 : text_.size();
       return;

@@ -31,7 +31,7 @@ class Splitter {
   void recover(std::size_t begin, const End& end);
   bool check_head(std::size_t begin, Statement* statement);
   void report(std::size_t at, std::size_t length, const std::string& message,
-              const char* code = "syntax");
+              const char* code = "syntax", const std::string& hint = "");
 
   Reading& reading_;
   int file_;

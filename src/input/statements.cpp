@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "input/grammar/grammar.h"
 #include "input/lexer.h"
 #include "input/reading.h"
 #include "input/splitter.h"
@@ -55,7 +56,8 @@ struct Statements::Impl {
       try {
         count_statement(*s);
         if (!run(*s)) return s;
-      } catch (const DeckError& e) {
+      } catch (DeckError& e) {
+        add_form(e.diagnostic, "statement", s->word);
         reading.report(e.diagnostic);
       }
     }
@@ -206,7 +208,8 @@ struct Statements::Impl {
     }
     const std::string& name = reading.file(file).name;
     if (open)
-      reading.fail(where, "recursive include of \"" + name + "\"; chain: " + chain + name, "",
+      reading.fail(where, "recursive include of \"" + name + "\"; chain: " + chain + name,
+                   "a file cannot include itself: remove this card, or name another file",
                    "recursive-include");
     if (depth > reading.limits.include_depth)
       reading.fail_limit(

@@ -160,7 +160,7 @@ void read_structural_node(DeckCard& card, int label, StructuralNode node) {
     read_prediction(card);
     read_assembly(card, node);
     if (card.keyword("scale"))
-      node.scale = card.keyword("default") ? deck.structural_scale : card.real("scale", 1);
+      node.scale = card.keyword("default") ? deck.structural_scale : card.equation_scale();
     read_node_output(card, node);
     const bool moving = node.has_momentum() || node.kind == StructuralKind::modal;
     const bool accelerated = moving || deck.inverse_dynamics;

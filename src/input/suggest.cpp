@@ -14,6 +14,11 @@ std::string suggestion(std::string_view word, const std::vector<std::string>& ca
   return "";
 }
 
+std::string suggested_word(std::string_view word, const std::vector<std::string>& candidates) {
+  const std::string near = suggestion(word, candidates);
+  return near.empty() ? "`mbcosim keywords` lists the words, place by place" : near;
+}
+
 std::string enumeration(const std::vector<std::string>& words) {
   std::string text;
   for (std::size_t i = 0; i < words.size(); ++i) {

@@ -140,6 +140,13 @@ def test_a_deck_of_nothing_is_refused(tmp_path):
         assert run.returncode == 2 and "no nodes and no elements" in run.stderr
 
 
+def test_a_run_without_a_final_time_tells_that_it_made_no_step(tmp_path):
+    (tmp_path / "deck").write_text(re.sub(r"final time: *[^;]*;", "", decks.body()))
+    run = mbcosim("run", str(tmp_path / "deck"))
+    assert run.returncode == 0
+    assert "note: no step was made: the final time, 0 s (0 without the card `final time`)" in run.stderr
+
+
 def test_a_run_in_real_time_lasts_as_long_as_the_model(tmp_path):
     deck = tmp_path / "deck"
     deck.write_text(decks.body(final_time=0.4))

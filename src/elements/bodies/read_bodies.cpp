@@ -33,9 +33,10 @@ namespace {
 constexpr double kGravitationalConstant = 6.67384e-11;  ///< `G, si` [m³/(kg s²)], MBDyn's value
 
 /// mass, centre of mass, inertia about it [, {inertial | orientation}, axes]: one part of a
-/// (condensed) body.
-void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
+/// (condensed) body. Returns the place of the mass.
+SourceSpan read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
   const double m = card.real("mass");
+  const SourceSpan where = card.last();
   if (m < 0 && !negative_allowed)
     card.fail("mass must not be negative, got " + std::to_string(m),
               "write `allow negative mass` before the mass if it is meant");
@@ -50,6 +51,7 @@ void read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
   body.m += m;
   body.S0 += m * x;
   body.J0 += j - m * xx * xx;
+  return where;
 }
 
 void read_body(Card& card, ElementInfo& info) {
@@ -79,8 +81,12 @@ void read_body(Card& card, ElementInfo& info) {
   const bool negative = card.keyword("allow negative mass");
   Body body;
   body.node = node;
-  for (int i = 0; i < parts; ++i) read_body_part(card, node, negative, body);
-  if (std::abs(body.m) < 2.2204460492503131e-16 && !negative) card.fail("the mass is zero");
+  SourceSpan where;
+  for (int i = 0; i < parts; ++i) where = read_body_part(card, node, negative, body);
+  if (std::abs(body.m) < 2.2204460492503131e-16 && !negative)
+    card.fail_at(where, "the mass is zero",
+                 "give the body a mass, or remove it: a node without mass is held by joints, or is "
+                 "`static`");
   add_body(card, info, std::move(body));
 }
 

@@ -41,6 +41,7 @@ void read_texts(const char* texts, std::map<std::string, GroupGrammar>& all) {
       read_group(line, all, group);
     } else if (line[0] != ' ') {
       word = &group->words[normalized(line)];
+      word->word = line;
       group->written.push_back(line);
     } else if (line[2] == '=') {
       word->text = content(line);
@@ -52,6 +53,15 @@ void read_texts(const char* texts, std::map<std::string, GroupGrammar>& all) {
       read_support(content(line), *word);
     }
   }
+}
+
+void replace(std::string& text, std::string_view what, std::string_view with) {
+  if (const std::size_t at = text.find(what); at != text.npos) text.replace(at, what.size(), with);
+}
+
+/// Arguments that a form may have, where the word has them or has none.
+void settle_optional(std::string& form, const std::string& mark, bool some) {
+  replace(form, " [ " + mark + " <grammar> ]", some ? " " + mark + " <grammar>" : "");
 }
 
 }  // namespace
@@ -72,6 +82,29 @@ const WordGrammar* find_grammar(std::string_view group, std::string_view word) {
   if (g == grammars().end()) return nullptr;
   const auto w = g->second.words.find(normalized(word));
   return w == g->second.words.end() ? nullptr : &w->second;
+}
+
+std::string written_form(std::string_view group, std::string_view word) {
+  constexpr std::size_t kLongest = 400;  // bytes
+  const WordGrammar* const w = find_grammar(group, word);
+  if (!w) return "";
+  std::string form = grammars().at(std::string(group)).form;
+  settle_optional(form, ":", !w->text.empty());
+  settle_optional(form, ",", !w->text.empty());
+  replace(form, "<word>", w->word);
+  replace(form, "<grammar>", w->text);
+  if (form.size() <= kLongest) return form;
+  return form.substr(0, form.rfind(' ', kLongest)) + " …";
+}
+
+void add_form(Diagnostic& d, std::string_view group, std::string_view word) {
+  if (!d.hint.empty() || d.code == "internal" || d.code == "not-supported") return;
+  if (d.code.starts_with("limit-")) return;
+  const std::string form = written_form(group, word);
+  if (!form.empty())
+    d.hint = "the form is `" + form + "`";
+  else if (d.code == "missing-argument")
+    d.hint = "add the missing argument; the card ends too early";
 }
 
 std::vector<GrammarArgument> grammar_arguments(const std::string& text) {

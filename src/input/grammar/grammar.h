@@ -21,9 +21,12 @@
 #include <string_view>
 #include <vector>
 
+#include "model/diagnostic.h"
+
 namespace mbcosim {
 
 struct WordGrammar {
+  std::string word;     ///< as written in documentation
   std::string text;     ///< what stands after the word
   std::string output;   ///< columns, with units
   std::string support;  ///< empty: `yes`
@@ -40,6 +43,12 @@ struct GroupGrammar {
 const std::map<std::string, GroupGrammar>& grammars();
 /// Null when there is none.
 const WordGrammar* find_grammar(std::string_view group, std::string_view word);
+
+/// How a word of a group is written, with what stands around it; empty when there is no grammar of
+/// it. What is longer than a few lines of a terminal ends with "…".
+std::string written_form(std::string_view group, std::string_view word);
+/// The form as the hint of an error about a card that has none.
+void add_form(Diagnostic& d, std::string_view group, std::string_view word);
 
 /// A number of which a grammar tells the unit: `<mass [kg]>`.
 struct GrammarArgument {

@@ -1,7 +1,7 @@
 /// Cards of thermal, bulk and user elements, of contacts, sliders, helicoidal beams and
 /// regularizations, with
 /// arguments that are missing, too many, of another kind, not finite or out of range: each is
-/// refused at its place.
+/// refused at its place, with a remedy.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -106,6 +106,7 @@ class BadArguments : public ::testing::TestWithParam<GoodCard> {
       EXPECT_EQ(e.line, line) << e.text();
       EXPECT_GT(e.column, 0) << e.text();
       EXPECT_FALSE(e.message.empty());
+      EXPECT_FALSE(e.hint.empty()) << e.text();
     }
   }
 };
@@ -201,8 +202,11 @@ TEST(OutOfRangeArguments, AreNamedWithWhatIsAccepted) {
   for (const OutOfRange& c : cases) {
     SCOPED_TRACE(c.card);
     std::string found;
-    for (const Diagnostic& d : load(deck(kCards[0], c.card)).diagnostics)
-      if (d.severity == Severity::error && found.empty()) found = d.message;
+    for (const Diagnostic& d : load(deck(kCards[0], c.card)).diagnostics) {
+      if (d.severity != Severity::error || !found.empty()) continue;
+      found = d.message;
+      EXPECT_FALSE(d.hint.empty()) << d.text();
+    }
     EXPECT_EQ(found.substr(0, std::string(c.message).size()), c.message);
   }
 }

@@ -193,6 +193,61 @@ TEST(MalformedDeck, SuggestsTheNearestWord) {
             "did you mean \"clamp\"?");
 }
 
+TEST(MalformedDeck, RefusesAScaleThatSwitchesTheResidualTestOff) {
+  const char* const scale = "scale must be greater than 0, got ";
+  const auto message = [](const DeckText& deck) { return load(deck).diagnostics.at(0).message; };
+  EXPECT_EQ(message(control("default scale: all, 0.;")), std::string(scale) + "0");
+  EXPECT_EQ(message(nodes("abstract: 1, value, 0., scale, -2.;")),
+            "abstract node 1: " + std::string(scale) + "-2");
+  EXPECT_EQ(message(nodes("structural: 1, dynamic, null, eye, null, null, scale, 0.;")),
+            "structural node 1: " + std::string(scale) + "0");
+}
+
+/// What a block of a misspelled name defines is not missed, too.
+TEST(MalformedDeck, HasOneErrorForAMisspelledBlock) {
+  DeckText d;
+  d.control = "structural nodes: 2; joints: 1;";
+  d.nodes = std::string(kDynamic) + "structural: 2, dynamic, null, eye, null, null;";
+  d.elements = "joint: 1, spherical hinge, 1, null, 2, null;";
+  std::string text = d.text();
+  text.replace(text.find("begin: nodes"), 12, "begin: nods");
+  EXPECT_EQ(findings(load(text).diagnostics), "error: unknown block \"nods\"");
+}
+
+TEST(MalformedDeck, RefusesMoreThanTheOutputOfADrive) {
+  EXPECT_EQ(
+      load(elements("drive caller: 1, const, 1., output, yes, 77.;")).diagnostics.at(0).message,
+      "drive caller 1: unexpected argument \"77.\"");
+}
+
+TEST(MalformedDeck, ShowsTheFormOfWhatIsRead) {
+  const auto hint = [](const DeckText& deck) { return load(deck).diagnostics.at(0).hint; };
+  EXPECT_EQ(hint(control("output precision;")), "the form is `output precision : <n digits> ;`");
+  EXPECT_EQ(hint(control("skip initial joint assembly: 1;")),
+            "the form is `skip initial joint assembly ;`");
+  EXPECT_EQ(hint(elements("thermal: 1, capacitance, 3, -2.;", "thermal: 3;")),
+            "the form is `thermal : <label> , capacitance , <thermal node> , <C [J/K]> [ , output "
+            ", <yes or no> ] ;`");
+  const std::string ramp =
+      "the form is `[ function , ] ramp , <slope> , <t0 [s]> , { <t1 [s]> | forever } , <initial "
+      "value>`";
+  EXPECT_EQ(hint(elements("drive caller: 1, ramp, 1., 2.;")), ramp);
+  EXPECT_EQ(hint(elements("couple: 1, absolute, 1, 1.,0.,0., ramp, 1., 2.;", kDynamic)), ramp);
+  EXPECT_EQ(
+      hint(elements("couple: 1, absolute, 1, 1.,0.,0., ramp, 1., 2., 3., 0., 77.;", kDynamic)),
+      "the form is `couple : <label> , absolute , <node> , [ position , <offset> , ] <vec3 "
+      "drive> [ , output , <yes or no> ] ;`");
+  EXPECT_EQ(
+      hint(elements("driven: 1, const, 1., joint: 1, clamp, 1, node;", kDynamic)),
+      "the form is `joint : <label> , clamp , <node> , [ position , ] { node | <position> } , "
+      "[ orientation , ] { node | <absolute orientation> } [ , initial state , <vec3> , <vec3> "
+      "] [ , inverse dynamics , <inverse dynamics clause> ] [ , output , <yes or no> ] ;`");
+  EXPECT_EQ(hint(elements("setenv: 1;")).substr(0, 22), "the form is `setenv : ");
+  const std::string node = hint(nodes("structural: 1, dynamic, null;"));
+  EXPECT_LE(node.size(), 420u);
+  EXPECT_TRUE(node.ends_with(" …`")) << node;
+}
+
 TEST(MalformedDeck, HasACode) {
   const auto code = [](const DeckText& deck) { return load(deck).diagnostics.at(0).code; };
   EXPECT_EQ(code(elements("body: 1, 2, 1., null, eye;")), "undefined");

@@ -1,6 +1,6 @@
 /// Every word of the registry with arguments that are missing, too many, of another kind, not
-/// finite or negative: each is refused at its place, but those of which a table says that they may
-/// be so.
+/// finite or negative: each is refused at its place with a remedy, but those of which a table says
+/// that they may be so.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -287,7 +287,7 @@ class RefusedWord : public ::testing::TestWithParam<WordCard> {
     const auto found = numbers.find(GetParam().word);
     return found == numbers.end() ? "" : found->second;
   }
-  /// Refused; the first error is at a place of the card, in words.
+  /// Refused; the first error is at a place of the card, in words, with a remedy.
   static bool refused(const std::string& changed) {
     WordCard word = GetParam();
     word.card = changed;
@@ -301,6 +301,7 @@ class RefusedWord : public ::testing::TestWithParam<WordCard> {
       EXPECT_EQ(d.line, line) << changed << "\n" << d.text();
       EXPECT_GT(d.column, 0) << changed << "\n" << d.text();
       EXPECT_FALSE(d.message.empty()) << changed;
+      EXPECT_FALSE(d.hint.empty()) << changed << "\n" << d.text();
       break;
     }
     EXPECT_EQ(report.ok(), findings(report.diagnostics).find("error") == std::string::npos);

@@ -336,6 +336,7 @@ TEST(InverseDynamicsCards, AreRefusedAtTheArgument) {
     EXPECT_EQ(first.message.rfind(c.message, 0), 0u) << first.text();
     EXPECT_EQ(first.line, 3) << first.text();
     EXPECT_GT(first.column, 0) << first.text();
+    EXPECT_FALSE(first.hint.empty()) << first.text();
   }
 }
 
