@@ -4,6 +4,10 @@
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/util/time_util.h>
 
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
 #include "wire/convert.h"
 
 namespace mbcosim::server {
@@ -48,6 +52,68 @@ void add_retry_info(v1::ErrorStatus* details) {
   any->set_type_url("type.googleapis.com/google.rpc.RetryInfo");
   any->set_value(message_of(
       google::protobuf::util::TimeUtil::MillisecondsToDuration(kMilliseconds).SerializeAsString()));
+}
+
+/// Bytes of details, so that with the message all fits into the 8 KiB of metadata that clients
+/// take: a larger status reaches them as one of their own transport.
+constexpr std::size_t kMostDetails = 4800;  // 6400 in base64
+
+/// Place and message.
+v1::Diagnostic without_line_and_hint(v1::Diagnostic d) {
+  d.clear_source_line();
+  d.clear_hint();
+  return d;
+}
+
+std::size_t bytes_in_list(const v1::Diagnostic& d) {
+  constexpr std::size_t kTag = 4;
+  return d.ByteSizeLong() + kTag;
+}
+
+/// Numbers of findings: errors before others.
+std::vector<int> by_weight(const v1::DeckDiagnostics& all) {
+  std::vector<int> order(all.diagnostics_size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_partition(order.begin(), order.end(),
+                        [&](int i) { return all.diagnostics(i).severity() == v1::SEVERITY_ERROR; });
+  return order;
+}
+
+/// `all` in `room` bytes: the first errors whole, others without line of the deck and hint as it
+/// becomes narrow; what has no room at all is counted by a note.
+v1::DeckDiagnostics fitting(const v1::DeckDiagnostics& all, std::size_t room) {
+  constexpr std::size_t kNote = 100;
+  std::size_t short_rest = kNote;
+  for (const v1::Diagnostic& d : all.diagnostics())
+    short_rest += bytes_in_list(without_line_and_hint(d));
+  std::map<int, v1::Diagnostic> chosen;
+  std::size_t taken = 0;
+  for (const int i : by_weight(all)) {
+    v1::Diagnostic d = without_line_and_hint(all.diagnostics(i));
+    short_rest -= bytes_in_list(d);
+    if (taken + bytes_in_list(all.diagnostics(i)) + short_rest <= room) d = all.diagnostics(i);
+    if (taken + bytes_in_list(d) + kNote > room && !chosen.empty()) break;
+    taken += bytes_in_list(d);
+    chosen[i] = std::move(d);
+  }
+  v1::DeckDiagnostics some;
+  for (auto& [i, d] : chosen) *some.add_diagnostics() = std::move(d);
+  const int more = all.diagnostics_size() - some.diagnostics_size();
+  if (more == 0) return some;
+  v1::Diagnostic* const note = some.add_diagnostics();
+  note->set_severity(v1::SEVERITY_NOTE);
+  note->set_code("more");
+  note->set_message(std::to_string(more) + " more findings; mend these first");
+  return some;
+}
+
+/// With the last residual norms of a long iteration.
+v1::SolverFailure fitting(v1::SolverFailure failure) {
+  constexpr int kMostNorms = 100;
+  if (const int more = failure.residual_norms_size() - kMostNorms; more > 0)
+    failure.mutable_residual_norms()->erase(failure.residual_norms().begin(),
+                                            failure.residual_norms().begin() + more);
+  return failure;
 }
 
 }  // namespace
@@ -181,8 +247,11 @@ grpc::Status Refusal::status() const {
   info.SerializeToString(any->mutable_value());
   if (reason_ == v1::REASON_BAD_ARGUMENT) add_bad_request(message_, &details);
   if (reason_ == v1::REASON_SIMULATION_BUSY) add_retry_info(&details);
-  if (failure_) details.add_details()->PackFrom(*failure_);
-  if (diagnostics_) details.add_details()->PackFrom(*diagnostics_);
+  if (failure_) details.add_details()->PackFrom(fitting(*failure_));
+  const std::size_t taken = details.ByteSizeLong() + message_.size();  // which is sent beside them
+  if (diagnostics_)
+    details.add_details()->PackFrom(
+        fitting(*diagnostics_, kMostDetails - std::min(taken, kMostDetails)));
   return {code_of(reason_), message_, details.SerializeAsString()};
 }
 

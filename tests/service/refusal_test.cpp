@@ -52,6 +52,76 @@ TEST(Refusal, TellsWhatTheSolverKnew) {
   EXPECT_EQ(failure.worst_equations(0).owner(), "joint 7 (rod)");
 }
 
+/// Clients take 8 KiB of metadata: the details in base64 and the message.
+void expect_that_clients_take(const grpc::Status& status) {
+  EXPECT_LT(status.error_details().size() * 4 / 3 + status.error_message().size(), 7500u);
+}
+
+/// A refused deck with a warning before each of its errors.
+Error wrong_deck(int errors) {
+  Error error;
+  error.kind = ErrorKind::deck;
+  error.message = "the deck is refused";
+  for (int i = 0; i < 2 * errors; ++i) {
+    Diagnostic d;
+    d.severity = i % 2 ? Severity::error : Severity::warning;
+    d.message = "finding " + std::to_string(i);
+    d.source_line = std::string(i % 3 ? 100 : 5000, 'x');
+    d.hint = std::string(400, 'h');
+    error.diagnostics.push_back(d);
+  }
+  return error;
+}
+
+v1::DeckDiagnostics told(const grpc::Status& status) {
+  v1::ErrorStatus details;
+  EXPECT_TRUE(details.ParseFromString(status.error_details()));
+  v1::DeckDiagnostics diagnostics;
+  EXPECT_TRUE(details.details(1).UnpackTo(&diagnostics));
+  return diagnostics;
+}
+
+TEST(Refusal, OfTwentyErrorsTellsAllAndTheFirstWhole) {
+  const grpc::Status status = Refusal(wrong_deck(20)).status();
+  expect_that_clients_take(status);
+  const v1::DeckDiagnostics all = told(status);
+  ASSERT_EQ(all.diagnostics_size(), 40);
+  for (int i = 0; i < 40; ++i)
+    EXPECT_EQ(all.diagnostics(i).message(), "finding " + std::to_string(i));
+  EXPECT_EQ(all.diagnostics(1).hint().size(), 400u);
+  EXPECT_EQ(all.diagnostics(1).source_line().size(), 100u);
+  EXPECT_EQ(all.diagnostics(3).hint(), "");  // with a line of 5000 bytes
+  EXPECT_EQ(all.diagnostics(5).hint().size(), 400u);
+  EXPECT_EQ(all.diagnostics(39).hint(), "");
+}
+
+TEST(Refusal, OfVeryManyErrorsTellsTheFirstAndCountsTheOthers) {
+  const grpc::Status status = Refusal(wrong_deck(500)).status();
+  expect_that_clients_take(status);
+  const v1::DeckDiagnostics first = told(status);
+  const int last = first.diagnostics_size() - 1;
+  ASSERT_GT(last, 40);
+  for (int i = 0; i < last; ++i)
+    EXPECT_EQ(first.diagnostics(i).message(), "finding " + std::to_string(2 * i + 1));
+  EXPECT_EQ(first.diagnostics(last).severity(), v1::SEVERITY_NOTE);
+  EXPECT_EQ(first.diagnostics(last).message(),
+            std::to_string(1000 - last) + " more findings; mend these first");
+}
+
+TEST(Refusal, OfALongIterationTellsItsEnd) {
+  Error error;
+  error.kind = ErrorKind::not_converged;
+  for (int i = 0; i < 5000; ++i) error.failure.residual_history.push_back(i);
+  const grpc::Status status = Refusal(error).status();
+  expect_that_clients_take(status);
+  v1::ErrorStatus details;
+  ASSERT_TRUE(details.ParseFromString(status.error_details()));
+  v1::SolverFailure failure;
+  ASSERT_TRUE(details.details(1).UnpackTo(&failure));
+  ASSERT_EQ(failure.residual_norms_size(), 100);
+  EXPECT_EQ(failure.residual_norms(99), 4999);
+}
+
 TEST(Utf8, ReplacesOnlyWhatIsNotUtf8) {
   EXPECT_EQ(utf8("plain äöü €"), "plain äöü €");
   EXPECT_EQ(utf8("a\xff\xc0\x80z"), "a???z");
