@@ -10,7 +10,7 @@ from conftest import BIN, TIME_FACTOR, wait_for
 def test_the_library(start_daemon, tmp_path):
     (tmp_path / "results").mkdir()
     daemon = start_daemon("--results-root", str(tmp_path / "results"))
-    run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1"], timeout=200, text=True,
+    run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1"], timeout=200 * TIME_FACTOR, text=True,
                          env={**os.environ, "MBCOSIM_ADDRESS": daemon.address}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     assert run.returncode == 0, run.stdout
 
@@ -26,7 +26,7 @@ def test_a_silent_server_ends_every_call(falls_silent, tmp_path, test):
         wait_for(lambda: wanted.exists() or run.poll() is not None, 30 * TIME_FACTOR)
         silence()
         wanted.unlink(missing_ok=True)
-        output, _ = run.communicate(timeout=200)
+        output, _ = run.communicate(timeout=200 * TIME_FACTOR)
     finally:
         run.kill()
     assert run.returncode == 0, output
