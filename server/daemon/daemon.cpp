@@ -83,8 +83,28 @@ int worker_count(int wanted) {
   return wanted > 0 ? wanted : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
-Authenticator make_authenticator(const std::string& tokens_file) {
-  return tokens_file.empty() ? Authenticator() : Authenticator::from_file(tokens_file);
+/// Of "NAME=ROLE", by identity. Names may have `=` in them.
+std::map<std::string, Role> certificate_roles(const std::vector<std::string>& given) {
+  std::map<std::string, Role> roles;
+  for (const std::string& text : given) {
+    const auto equals = text.rfind('=');
+    const auto role =
+        equals == std::string::npos ? std::nullopt : role_named(text.substr(equals + 1));
+    if (!role || equals == 0)
+      throw std::runtime_error("--certificate-role \"" + text +
+                               "\": expected NAME=ROLE, ROLE being observe, control or admin");
+    if (!roles.emplace("cert:" + text.substr(0, equals), *role).second)
+      throw std::runtime_error("--certificate-role: \"" + text.substr(0, equals) +
+                               "\" has more than one role");
+  }
+  return roles;
+}
+
+Authenticator make_authenticator(const Config& config) {
+  Authenticator authenticator =
+      config.tokens_file.empty() ? Authenticator() : Authenticator::from_file(config.tokens_file);
+  authenticator.set_certificate_roles(certificate_roles(config.certificate_roles));
+  return authenticator;
 }
 
 /// Throws when options contradict each other. Fills in the share that one identity gets of what
@@ -99,6 +119,10 @@ Config checked(Config config) {
         "certificate is ever asked for");
   if (config.resume == "eager" && config.state_dir.empty())
     throw std::runtime_error("--resume eager needs --state-dir");
+  if (!config.certificate_roles.empty() &&
+      (config.tls_client_ca.empty() || !config.tokens_file.empty()))
+    throw std::runtime_error(
+        "--certificate-role needs --tls-client-ca, and no --tokens, which tell the roles");
   int& own = config.limits.identity_sessions;
   if (config.limits.memory_bytes == 0) config.limits.memory_bytes = MemoryBudget::default_bytes();
   const bool several = !config.tokens_file.empty() || !config.tls_client_ca.empty();
@@ -112,7 +136,7 @@ Config checked(Config config) {
 
 Daemon::Daemon(const Config& config)
     : config_(checked(config)),
-      authenticator_(make_authenticator(config.tokens_file)),
+      authenticator_(make_authenticator(config)),
       tokens_watch_(config.tokens_file),
       slots_(worker_count(config.workers)),
       lanes_(config.limits.sessions, worker_count(config.workers)),

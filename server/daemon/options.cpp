@@ -234,6 +234,13 @@ Invocation read_options(int argc, char** argv) {
                  "PEM file; clients need a certificate of this authority")
       ->group("Security")
       ->check(CLI::ExistingFile);
+  app.add_option(
+         "--certificate-role", config.certificate_roles,
+         "NAME=ROLE: who has a certificate of this name (its first URI, else its subject as "
+         "in \"CN=arm,O=Plant\") has the role observe, control or admin; default: control. "
+         "May be repeated")
+      ->group("Security")
+      ->allow_extra_args(false);
   app.add_option("--tokens", config.tokens_file,
                  "File of lines `TOKEN ROLE NAME [EXPIRY]`; tokens themselves or as --hash-token "
                  "prints them")

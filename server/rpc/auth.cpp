@@ -23,8 +23,7 @@ constexpr std::string_view kHash = "sha256:", kToken = "token:";
 }
 
 Role role_of(const std::string& name, int line) {
-  for (const Role role : {Role::observe, Role::control, Role::admin})
-    if (name == role_name(role)) return role;
+  if (const auto role = role_named(name)) return *role;
   refuse_line(line, "role \"" + name + "\" is none of observe, control, admin");
 }
 
@@ -79,6 +78,12 @@ std::string hash_of_token(const std::string& token) {
 const char* role_name(Role role) {
   constexpr const char* kNames[] = {"observe", "control", "admin"};
   return kNames[static_cast<int>(role)];
+}
+
+std::optional<Role> role_named(const std::string& name) {
+  for (const Role role : {Role::observe, Role::control, Role::admin})
+    if (name == role_name(role)) return role;
+  return std::nullopt;
 }
 
 // ------------------------------------------------------------------ the file
@@ -190,8 +195,12 @@ Caller Authenticator::check(const grpc::ServerContextBase& context, Role require
                                  : std::string(header->second.data(), header->second.size())),
                    required);
   }
-  if (auth && auth->IsPeerAuthenticated())
-    return require({identity_of(*auth), Role::control}, required);
+  if (auth && auth->IsPeerAuthenticated()) {
+    const std::string identity = identity_of(*auth);
+    const auto given = certificate_roles_.find(identity);
+    return require({identity, given == certificate_roles_.end() ? Role::control : given->second},
+                   required);
+  }
   return require({"local", Role::admin}, required);
 }
 

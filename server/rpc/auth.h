@@ -4,9 +4,11 @@
 #include <grpcpp/server_context.h>
 
 #include <ctime>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "threads/mutex.h"
@@ -15,6 +17,7 @@ namespace mbcosim::server {
 
 enum class Role { observe, control, admin };
 const char* role_name(Role role);
+std::optional<Role> role_named(const std::string& name);
 
 /// Whether two secrets are equal, in a time that does not tell where they differ.
 bool same_text(const std::string& a, const std::string& b);
@@ -42,6 +45,10 @@ class Authenticator {
   /// names the line, or tells that others may write the file.
   static Authenticator from_file(const std::string& path);
   Authenticator() = default;
+  /// Roles of client certificates by identity, "cert:…"; the others have control.
+  void set_certificate_roles(std::map<std::string, Role> roles) {
+    certificate_roles_ = std::move(roles);
+  }
   /// Takes the tokens of the file in the place of those before; calls at work go on. Throws as
   /// `from_file`, and nothing changes. Thread-safe, as all else.
   void reload(const std::string& path);
@@ -74,6 +81,7 @@ class Authenticator {
   std::shared_ptr<const Tokens> tokens() const;
 
   bool tokens_required_ = false;
+  std::map<std::string, Role> certificate_roles_;
   std::shared_ptr<Store> store_ = std::make_shared<Store>();
 };
 

@@ -175,13 +175,37 @@ def test_certificates_give_identities_of_one_form(start_daemon, tmp_path):
     certificate(tmp_path, "server", "/CN=localhost", "ca", ["-addext", "subjectAltName=DNS:localhost"])
     clients = {"cert:spiffe://plant/robot": certificate(tmp_path, "a", "/CN=robot", "ca", ["-addext", "subjectAltName=URI:spiffe://plant/robot"]),
                "cert:CN=arm,O=Plant": certificate(tmp_path, "b", "/O=Plant/CN=arm", "ca")}
-    daemon = start_daemon("--listen", "localhost:0", "--tls-certificate", str(tmp_path / "server.pem"), "--tls-key",
-                          str(tmp_path / "server.key"), "--tls-client-ca", str(tmp_path / "ca.pem"))
-    wait_for(lambda: "listening on localhost:" in daemon.log())
-    address = "localhost:" + daemon.log().split("listening on localhost:")[1].split()[0]
-    for identity, (pem, key) in clients.items():
-        with mbcosim.connect(address, credentials=grpc.ssl_channel_credentials(ca, key, pem)) as server:
-            info = server.info()
-            assert (info.identity, info.role) == (identity, "control")
+
+    def connected(*options):
+        """Function that connects with credentials to a daemon of its own."""
+        daemon = start_daemon("--listen", "localhost:0", "--tls-certificate", str(tmp_path / "server.pem"), "--tls-key",
+                              str(tmp_path / "server.key"), "--tls-client-ca", str(tmp_path / "ca.pem"), *options)
+        wait_for(lambda: "listening on localhost:" in daemon.log())
+        address = "localhost:" + daemon.log().split("listening on localhost:")[1].split()[0]
+        return lambda *secrets: mbcosim.connect(address, credentials=grpc.ssl_channel_credentials(ca, *secrets), timeout=10)
+
+    def told(connect):
+        for pem, key in clients.values():
+            with connect(key, pem) as server:
+                yield server.info().identity, server.info().role
+
+    plain = connected()
+    assert list(told(plain)) == [(identity, "control") for identity in clients]
     with pytest.raises(mbcosim.Error):
-        mbcosim.connect(address, credentials=grpc.ssl_channel_credentials(ca), timeout=3)
+        plain()
+    roles = connected("--certificate-role", "spiffe://plant/robot=admin", "--certificate-role", "CN=arm,O=Plant=observe")
+    assert list(told(roles)) == list(zip(clients, ("admin", "observe")))
+    pem, key = clients["cert:CN=arm,O=Plant"]
+    with roles(key, pem) as server, pytest.raises(mbcosim.NotAllowed) as caught:
+        server.load_text(decks.body())
+    assert caught.value.reason == "ROLE_TOO_LOW"
+
+
+def test_wrong_roles_of_certificates_are_refused_at_the_start(tmp_path):
+    certificate(tmp_path, "ca", "/CN=authority")
+    tls = ["--tls-certificate", str(tmp_path / "ca.pem"), "--tls-key", str(tmp_path / "ca.key")]
+    assert "needs --tls-client-ca" in refused("--certificate-role", "arm=observe", *tls)
+    tls += ["--tls-client-ca", str(tmp_path / "ca.pem")]
+    for wrong in ("arm", "arm=", "=observe", "arm=boss", ""):
+        assert f'"{wrong}": expected NAME=ROLE' in refused("--certificate-role", wrong, *tls)
+    assert "more than one role" in refused("--certificate-role", "arm=observe", "--certificate-role", "arm=admin", *tls)
