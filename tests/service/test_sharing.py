@@ -1,4 +1,7 @@
 """Sharing a simulation: method x right x role, and what a second identity may do with a grant."""
+import os
+import re
+
 import grpc
 import pytest
 
@@ -11,6 +14,7 @@ from test_geometry import CHAIN
 
 TOKENS = "ann-t control ann\nbob-t control bob\neve-t observe eve\nroot-t admin root\n"
 X = "node.structural.1.X"
+PROTO = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "proto", "mbcosim", "v1", "simulations.proto")
 
 # What each right allows: see (get, list), observe, couple, control, own (delete, change grants).
 ALLOWED = {None: "", "observe": "see observe", "couple": "see couple", "control": "see observe couple control"}
@@ -94,6 +98,20 @@ def test_the_table_has_every_method_on_a_simulation(shared):
     with shared("ann").load_text(decks.body(), ports=PORT) as simulation:
         tabled = {method.split()[0] for method, _, _ in calls(shared("ann"), simulation.name)}
     assert methods - {"ListSimulations"} == tabled - {"ListSimulations"}
+
+
+def promised():
+    """Method -> whether OBSERVE, COUPLE and CONTROL allow it, of the table above `Grant` in the protocol's file."""
+    with open(PROTO, encoding="utf-8") as file:
+        rows = re.findall(r"^// \| ([^|]*?) +\| (yes|no) +\| (yes|no|named ports) +\| (yes|no) +\|$", file.read(), re.M)
+    return {name.replace(" with `grants`", " grants"): tuple(word != "no" for word in allowed) for names, *allowed in rows for name in names.split(", ")}
+
+
+def test_the_table_in_the_protocol_is_that_of_this_test(shared):
+    with shared("ann").load_text(decks.body(), ports=PORT) as simulation:
+        table = {method: tuple(access in ALLOWED[right].split() for right in ("observe", "couple", "control"))
+                 for method, access, _ in calls(shared("ann"), simulation.name)}
+    assert promised() == {**table, "ListSimulations": (True, True, True)}
 
 
 def outcome(call):
