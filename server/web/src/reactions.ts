@@ -22,9 +22,11 @@ const REACTIONS: Record<string, { force?: Reaction; moment?: Reaction }> = {
   'cardano hinge': { force: { sign: 1 } },
   'cardano pin': { force: { sign: 1 } },
   'in line': { force: { frame: 0, sign: -1 } },
-  'total joint': { force: { frame: 0, sign: -1 } },  // its moments may be in other axes, which are not told
-  'total pin joint': { force: { frame: 1, sign: -1 } },
+  'total joint': { force: { frame: 0, sign: -1 }, moment: { frame: 0, sign: -1 } },
+  'total pin joint': { force: { frame: 1, sign: -1 }, moment: { frame: 1, sign: -1 } },
 };
+/** Axes of the moments of total joints, where they are not those of the forces. */
+const ROTATION = 'rotation';
 
 type HandleOf = (name: string) => number | undefined;
 
@@ -35,7 +37,7 @@ export function reactionOf(element: ElementShape, points: number[], handleOf: Ha
   if (!reaction || points.length === 0 || handles.some((handle) => handle === undefined)) return undefined;
   const known = handles as number[], local = [0, 0, 0];
   const onNode = element.points.map(({ node }) => node).lastIndexOf(element.points.reduce((last, { node }) => (node >= 0 ? node : last), -1));
-  const frame = reaction.frame === undefined ? undefined : element.frames[reaction.frame];
+  const frame = reaction.frame === undefined ? undefined : (kind === 'moment' && element.frames.find(({ name }) => name === ROTATION)) || element.frames[reaction.frame];
   if (reaction.frame !== undefined && !frame) return undefined;
   const node = frame ? element.points[frame.point].node : -1;
   return {

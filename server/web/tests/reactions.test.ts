@@ -55,11 +55,14 @@ describe('the moment of a joint', () => {
     expect(moment('drive hinge')).toEqual([-4, -5, -6]);
   });
 
-  test('is not there where the joint lets its nodes turn', () => {
-    expect(reactionOf(joint('spherical hinge'), [4, 5], (name) => handles[name], 'moment')).toBeUndefined();
+  test('of a total joint is in the axes of its rotations, where they are others', () => {
+    expect(moment('total joint')).toEqual([-4, -5, -6]);
+    const turned = { ...joint('total joint'), frames: [...joint('total joint').frames, { name: 'rotation', point: 0, orientation: turn }] };
+    expect(load(turned, 'moment')).toEqual([5, -4, -6]);
+    expect(load(turned, 'force')).toEqual([-1, -2, -3]);
   });
 
-  test('is not drawn where its axes are not told', () => {
-    expect(reactionOf(joint('total joint'), [4, 5], (name) => handles[name], 'moment')).toBeUndefined();
+  test('is not there where the joint lets its nodes turn', () => {
+    expect(reactionOf(joint('spherical hinge'), [4, 5], (name) => handles[name], 'moment')).toBeUndefined();
   });
 });

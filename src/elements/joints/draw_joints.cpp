@@ -27,10 +27,15 @@ auto line_between_points(const char* name) {
   };
 }
 
-/// The first joint's side fixed to a node, the other in space.
-void draw_pin(ElementGeometry& g, const Attachment& a, const Vec3& X, const Mat3& R) {
+/// The first joint's side fixed to a node, the other in space: its point.
+int draw_pin(ElementGeometry& g, const Attachment& a, const Vec3& X, const Mat3& R) {
   g.frame("hinge 1", a.node, a.f, a.Rh);
-  g.frame("ground", -1, X, R);
+  return g.frame("ground", -1, X, R);
+}
+
+/// The axes of a total joint's moments at a point, where they are not those of its forces.
+void draw_moment_axes(ElementGeometry& g, int point, const Mat3& moments, const Mat3& forces) {
+  if (moments != forces) g.frames.push_back({"rotation", point, moments});
 }
 
 void draw_pins(Drawings& d) {
@@ -47,7 +52,8 @@ void draw_pins(Drawings& d) {
     draw_pin(g, {e.node, Vec3::Zero(), Mat3::Identity()}, e.X0, e.R0);
   });
   d.add<TotalPinJoint>([](const TotalPinJoint& e, const EvalContext&, ElementGeometry& g) {
-    draw_pin(g, {e.node, e.f, e.Rh}, e.Xc, e.Rc);
+    const int ground = draw_pin(g, {e.node, e.f, e.Rh}, e.Xc, e.Rc);
+    draw_moment_axes(g, ground, e.Rcr, e.Rc);
   });
 }
 
@@ -66,8 +72,9 @@ void draw_joints(Drawings& d) {
     g.frame("hinge", e.a.node, e.a.f, e.a.Rh);
   });
   d.add<TotalJoint>([](const TotalJoint& e, const EvalContext&, ElementGeometry& g) {
-    g.frame("hinge 1", e.first, e.f1, e.R1h);
+    const int hinge = g.frame("hinge 1", e.first, e.f1, e.R1h);
     g.frame("hinge 2", e.second, e.f2, e.R2h);
+    draw_moment_axes(g, hinge, e.R1r, e.R1h);
   });
   draw_pins(d);
 }

@@ -118,6 +118,31 @@ TEST_F(Geometry, OfABeamIsTheParabolaThroughItsPoints) {
   EXPECT_NEAR((trace[4] - Vec3(2, 0, 0)).norm(), 0, 1e-15);
 }
 
+TEST(GeometryOfATotalJoint, HasTheAxesOfItsMomentsWhereTheyAreNotThoseOfItsForces) {
+  const std::string joint =
+      "joint: 1, total joint, 1, position, 1., 0., 0., position orientation, eye, rotation "
+      "orientation, 1, 0., 1., 0., 3, 0., 0., 1., 2, position, null, position constraint, active, "
+      "active, active, null, orientation constraint, active, active, active, null;\n"
+      "joint: 2, total pin joint, 2, position, null, position, 1., 0., 0., position orientation, "
+      "eye, rotation orientation, 1, 0., 0., 1., 2, 0., 1., 0., position constraint, active, "
+      "active, active, null;\n"
+      "joint: 3, total joint, 1, position, 1., 0., 0., 2, position, null, position constraint, "
+      "active, active, active, null;\n";
+  DeckRun run(deck(joint));
+  ASSERT_TRUE(run.ready());
+  GeometryView view(run.model(), run.simulation().state());
+  const ElementGeometry total = view.element(0), pin = view.element(1), same = view.element(2);
+  ASSERT_EQ(total.frames.size(), 3u);
+  EXPECT_EQ(total.frames[2].name, "rotation");
+  EXPECT_EQ(total.frames[2].point, total.frames[0].point);
+  EXPECT_NEAR((total.frames[2].R.col(0) - Vec3::UnitY()).norm(), 0, 1e-15);
+  ASSERT_EQ(pin.frames.size(), 3u);
+  EXPECT_EQ(pin.points[pin.frames[2].point].node, -1);
+  EXPECT_NEAR((pin.frames[2].R.col(0) - Vec3::UnitZ()).norm(), 0, 1e-15);
+  EXPECT_EQ(same.frames.size(), 2u);
+  EXPECT_EQ(total.points.size(), 2u);
+}
+
 TEST(GeometryOfAnActuator, IsItsTwoChambersWithTheirPressures) {
   DeckRun run(initial_value_block(0.1, 1) +
               "begin: control data; structural nodes: 2; hydraulic nodes: 2; joints: 2; genels: "
