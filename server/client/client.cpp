@@ -25,6 +25,8 @@ grpc::ChannelArguments channel_arguments() {
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 200);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
   arguments.SetMaxReceiveMessageSize(-1);
   return arguments;
 }
@@ -97,9 +99,15 @@ Server::Server(Server&&) noexcept = default;
 Server& Server::operator=(Server&&) noexcept = default;
 Server::~Server() = default;
 
-Server Server::connect(const std::string& address, double timeout, const Credentials& credentials) {
+Server Server::connect(const std::string& address, double timeout, const Credentials& credentials,
+                       double reconnect) {
+  if (!(reconnect >= 0 && reconnect <= 1e9))
+    throw Error(
+        "`reconnect` must be a number of seconds from 0 to 1e9, got " + std::to_string(reconnect),
+        static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT), "BAD_ARGUMENT", {}, "reconnect");
   auto impl = std::make_shared<Impl>();
   impl->address = address;
+  impl->reconnect = reconnect;
   if (!credentials.token.empty()) impl->authorization = "Bearer " + credentials.token;
   impl->channel =
       grpc::CreateCustomChannel(address, channel_credentials(credentials), channel_arguments());
@@ -115,9 +123,10 @@ Server Server::connect(const std::string& address, double timeout, const Credent
 }
 
 std::string Server::version(double timeout) const {
-  CallContext context(*impl_, timeout);
   v1::GetServerInfoReply info;
-  require(impl_->simulations->GetServerInfo(&context, {}, &info));
+  repeated(*impl_, timeout, "", [&](CallContext& context) {
+    return impl_->simulations->GetServerInfo(&context, {}, &info);
+  });
   return info.version();
 }
 
@@ -126,8 +135,9 @@ std::vector<SimulationInfo> Server::list(double timeout) const {
   v1::ListSimulationsRequest request;
   v1::ListSimulationsReply reply;
   do {
-    CallContext context(*impl_, timeout);
-    require(impl_->simulations->ListSimulations(&context, request, &reply));
+    repeated(*impl_, timeout, "", [&](CallContext& context) {
+      return impl_->simulations->ListSimulations(&context, request, &reply);
+    });
     for (const v1::SimulationInfo& info : reply.simulations()) all.push_back(to_info(info));
     request.set_page_token(reply.next_page_token());
   } while (!request.page_token().empty());
@@ -148,8 +158,10 @@ namespace {
 
 /// Header and files, as long as the server takes them.
 template <class Upload>
-void send(Upload& upload, v1::UploadRequest& message,
-          const std::map<std::string, std::string>& files) {
+grpc::Status send(Upload& upload, const v1::UploadHeader& header,
+                  const std::map<std::string, std::string>& files) {
+  v1::UploadRequest message;
+  *message.mutable_header() = header;
   bool open = upload.Write(message);
   for (const auto& [name, bytes] : files) {
     for (std::size_t at = 0; open && (at == 0 || at < bytes.size()); at += kChunkBytes) {
@@ -159,18 +171,16 @@ void send(Upload& upload, v1::UploadRequest& message,
     }
   }
   upload.WritesDone();
-  require(upload.Finish());
+  return upload.Finish();
 }
 
 Simulation create(const std::shared_ptr<Server::Impl>& server, v1::UploadHeader header,
                   const std::map<std::string, std::string>& files, const LoadOptions& options) {
-  CallContext context(*server, options.timeout);
   v1::CreateSimulationReply reply;
-  const auto upload = server->simulations->CreateSimulation(&context, &reply);
-  v1::UploadRequest message;
   fill(options, header.mutable_options());
-  *message.mutable_header() = std::move(header);
-  send(*upload, message, files);
+  repeated(*server, options.timeout, "", [&](CallContext& context) {
+    return send(*server->simulations->CreateSimulation(&context, &reply), header, files);
+  });
   return Simulation::Impl::make(server, reply.simulation(), /*owned=*/true,
                                 to_diagnostics(reply.diagnostics()));
 }
@@ -194,21 +204,23 @@ Simulation Server::load_from_root(const std::string& deck, const LoadOptions& op
 std::vector<Diagnostic> Server::validate(const std::string& path, double timeout) {
   const std::filesystem::path deck(path);
   const std::string main = deck.filename().string();
-  CallContext context(*impl_, timeout);
+  const auto files = collect_bundle(deck.parent_path().string(), main);
   v1::ValidateModelReply reply;
-  const auto upload = impl_->simulations->ValidateModel(&context, &reply);
-  v1::UploadRequest message;
-  message.mutable_header()->set_bundle_main_file(main);
-  send(*upload, message, collect_bundle(deck.parent_path().string(), main));
+  v1::UploadHeader header;
+  header.set_bundle_main_file(main);
+  repeated(*impl_, timeout, "", [&](CallContext& context) {
+    return send(*impl_->simulations->ValidateModel(&context, &reply), header, files);
+  });
   return to_diagnostics(reply.diagnostics());
 }
 
 Simulation Server::find(const std::string& name, double timeout) {
-  CallContext context(*impl_, timeout, name);
   v1::GetSimulationRequest request;
   request.set_simulation(name);
   v1::GetSimulationReply reply;
-  require(impl_->simulations->GetSimulation(&context, request, &reply));
+  repeated(*impl_, timeout, name, [&](CallContext& context) {
+    return impl_->simulations->GetSimulation(&context, request, &reply);
+  });
   return Simulation::Impl::make(impl_, reply.simulation(), /*owned=*/false, {});
 }
 

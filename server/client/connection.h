@@ -51,6 +51,7 @@ void upload(grpc::ClientWriter<Request>& stream, Request header, const std::stri
 
 struct Server::Impl {
   std::string address, authorization;  ///< "Bearer …", or empty
+  double reconnect = 0;                ///< [s]
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<v1::Simulations::Stub> simulations;
   std::unique_ptr<v1::Coupling::Stub> coupling;

@@ -5,11 +5,12 @@
 namespace mbcosim::client {
 
 std::map<std::string, std::int64_t> Simulation::result_files(double timeout) const {
-  CallContext context(*impl_->server, timeout, name());
   v1::ListResultsRequest request;
   request.set_simulation(name());
   v1::ListResultsReply reply;
-  require(v1::Results::NewStub(impl_->server->channel)->ListResults(&context, request, &reply));
+  const auto service = v1::Results::NewStub(impl_->server->channel);
+  repeated(*impl_->server, timeout, name(),
+           [&](CallContext& context) { return service->ListResults(&context, request, &reply); });
   std::map<std::string, std::int64_t> sizes;
   for (const v1::ResultFile& file : reply.files()) sizes[file.name()] = file.size_bytes();
   return sizes;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/connection.h"
+#include "client/attempts.h"
 
 namespace mbcosim::client {
 
@@ -36,16 +36,18 @@ struct Simulation::Impl {
   std::map<std::string, v1::Variable> variables;  ///< those that were asked for
 };
 
-/// Calls with a request that names the simulation; what they give. Throws Error.
+/// Calls with a request that names the simulation and may be repeated: it changes nothing, or has
+/// an id. What they give. Throws Error.
 template <class Request, class Reply>
 Reply ask(const Simulation::Impl& simulation,
           grpc::Status (v1::Simulations::Stub::*method)(grpc::ClientContext*, const Request&,
                                                         Reply*),
           Request request, double timeout) {
-  CallContext context(*simulation.server, timeout, simulation.info.name());
   request.set_simulation(simulation.info.name());
   Reply reply;
-  require((*simulation.server->simulations.*method)(&context, request, &reply));
+  repeated(*simulation.server, timeout, simulation.info.name(), [&](CallContext& context) {
+    return (*simulation.server->simulations.*method)(&context, request, &reply);
+  });
   return reply;
 }
 

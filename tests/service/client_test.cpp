@@ -850,6 +850,34 @@ TEST(Client, IsToldWhatHappens) {
   EXPECT_EQ(std::get<Event::Snapshot>(event.content).change, Event::Snapshot::restored);
 }
 
+TEST(AServerThatIsKilledAndComesBack, DoesEachCallOnce) {
+  const char* kill = std::getenv("MBCOSIM_KILL");  // while this file is there, it may be away
+  if (!kill) GTEST_SKIP() << "only with a daemon of its own";
+  Server server = Server::connect(std::getenv("MBCOSIM_ADDRESS"), 10, {}, 60 * time_factor());
+  Simulation simulation = server.load_text(body("1.e-6"), {.durability = Durability::journal});
+  std::int64_t taken = 0;
+  for (std::size_t kills = 1; kills <= 3; ++kills) {
+    std::ofstream(kill).close();
+    while (std::filesystem::exists(kill)) ASSERT_EQ(simulation.step().step, ++taken);
+    simulation.snapshot();
+    ASSERT_EQ(simulation.snapshots().size(), kills);
+  }
+  EXPECT_EQ(server.list().size(), 1u);
+  EXPECT_EQ(server.find(simulation.name()).step().step, taken + 1);
+}
+
+TEST(AServerThatIsKilledAndComesBack, IsNotWaitedForWithoutWish) {
+  const char* kill = std::getenv("MBCOSIM_KILL");
+  if (!kill) GTEST_SKIP() << "only with a daemon of its own";
+  Server server = connect();
+  Simulation simulation = server.load_text(body("1.e-6"), {.durability = Durability::journal});
+  std::ofstream(kill).close();
+  const auto steps = [&] {
+    while (std::filesystem::exists(kill)) simulation.step();
+  };
+  EXPECT_EQ(code_of(steps), 14);
+}
+
 TEST(ASilentServer, EndsEveryCallAtItsTimeout) {
   if (!std::getenv("MBCOSIM_SILENCE")) GTEST_SKIP() << "only with a daemon of its own";
   Server server = connect();

@@ -1,10 +1,11 @@
 """The C++ client library and its example against a real daemon."""
+import functools
 import os
 import subprocess
 
 import pytest
 
-from conftest import BIN, TIME_FACTOR, wait_for
+from conftest import BIN, Daemon, TIME_FACTOR, wait_for
 
 
 def test_the_library(start_daemon, tmp_path):
@@ -29,6 +30,29 @@ def test_a_silent_server_ends_every_call(falls_silent, tmp_path, test):
         output, _ = run.communicate(timeout=200 * TIME_FACTOR)
     finally:
         run.kill()
+    assert run.returncode == 0, output
+
+
+@pytest.mark.parametrize("test, kills", [("DoesEachCallOnce", 3), ("IsNotWaitedForWithoutWish", 1)])
+def test_calls_wait_for_a_daemon_that_comes_back(tmp_path, test, kills):
+    (tmp_path / "state").mkdir()
+    start = functools.partial(Daemon, str(tmp_path), "--state-dir", str(tmp_path / "state"))
+    wanted, daemon = tmp_path / "kill", start()
+    run = subprocess.Popen([os.path.join(BIN, "client_tests"), "--gtest_brief=1", f"--gtest_filter=AServerThatIsKilledAndComesBack.{test}"], text=True,
+                           env={**os.environ, "MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_KILL": str(wanted)},
+                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    try:
+        for _ in range(kills):
+            wait_for(lambda: wanted.exists() or run.poll() is not None, 60)
+            daemon.kill()
+            if kills == 1:
+                break
+            daemon = start()
+            wanted.unlink(missing_ok=True)
+        output, _ = run.communicate(timeout=200 * TIME_FACTOR)
+    finally:
+        run.kill()
+        daemon.stop()
     assert run.returncode == 0, output
 
 
