@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""One hostile client. usage: attacks.py KIND ADDRESS TCP TOKEN SEED SECONDS; prints the statuses it got as JSON.
+"""One hostile client. usage: attacks.py KIND ADDRESS TCP DOOR TOKEN SEED SECONDS; prints the statuses it got as JSON.
 
-All of them stay on this machine (ADDRESS is a Unix socket, TCP a loopback address) and within bounds of their own.
+All of them stay on this machine (ADDRESS is a Unix socket, TCP and DOOR, that of HTTP, are loopback addresses) and within bounds
+of their own.
 """
 import collections
 import json
 import os
 import random
+import re
 import socket
 import subprocess
 import sys
@@ -18,6 +20,7 @@ import grpc
 sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "service"))
 import decks
 from fuzzer import Fuzzer
+from requests_of_http import Requests
 from google.protobuf import descriptor_pool, message_factory
 from google.protobuf.duration_pb2 import Duration
 from mbcosim.v1 import (coupling_pb2, events_pb2, geometry_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb,
@@ -35,8 +38,8 @@ LOOP = 'set: real x = 0.; for: integer i = 1, 900000; set: x = sin(i) * cos(i); 
 
 
 class Attacker:
-    def __init__(self, address, tcp, token, seed, seconds):
-        self.address, self.tcp, self.seed = address, tcp, seed
+    def __init__(self, address, tcp, door, token, seed, seconds):
+        self.address, self.tcp, self.door, self.token, self.seed = address, tcp, door, token, seed
         self.metadata = [("authorization", f"Bearer {token}")]
         self.random = random.Random(seed)
         self.start, self.seconds = time.monotonic(), seconds
@@ -77,28 +80,58 @@ class Attacker:
 
     def fuzz(self):
         """Every method of the contract, with random messages, deadlines and cancellations."""
-        fuzzer = Fuzzer(self.random)
-        pool = descriptor_pool.Default()
-        methods = []
-        for file in (pb, telemetry_pb2, coupling_pb2, reduction_pb2, geometry_pb2, results_pb2, events_pb2):
-            for service in pool.FindFileByName(file.DESCRIPTOR.name).services_by_name.values():
-                methods += [(service, method) for method in service.methods]
-        get_class = getattr(message_factory, "GetMessageClass", None) or message_factory.MessageFactory().GetPrototype
+        fuzzer, methods = Fuzzer(self.random), all_methods()
         while self.going():
-            if self.random.random() < 0.05 or "simulation" not in fuzzer.known:
-                name = self.create(lease=Duration(seconds=self.random.choice([1, 20])),
-                                   record_ports=self.random.random() < 0.3,
-                                   ports=[{"name": "p", "kind": 4, "output_variables": ["time"]}] if self.random.random() < 0.3 else [])
-                if name:
-                    for field in ("simulation", "name"):
-                        fuzzer.learn(field, name)
-                    snapshot = self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
-                    if snapshot:
-                        fuzzer.learn("snapshot", snapshot.snapshot.name)
-                        fuzzer.learn("name", snapshot.snapshot.name)
-                fuzzer.learn("port", "p")
+            self.feed(fuzzer)
             service, method = self.random.choice(methods)
-            self.send(service, method, fuzzer, get_class)
+            self.send(service, method, fuzzer, message_class())
+
+    def feed(self, fuzzer):
+        """Now and then, and first of all: a simulation and a snapshot that exist."""
+        if self.random.random() > 0.05 and "simulation" in fuzzer.known:
+            return
+        name = self.create(lease=Duration(seconds=self.random.choice([1, 20])), record_ports=self.random.random() < 0.3,
+                           ports=[{"name": "p", "kind": 4, "output_variables": ["time"]}] if self.random.random() < 0.3 else [])
+        if name:
+            for field in ("simulation", "name"):
+                fuzzer.learn(field, name)
+            snapshot = self.call(self.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
+            if snapshot:
+                fuzzer.learn("snapshot", snapshot.snapshot.name)
+                fuzzer.learn("name", snapshot.snapshot.name)
+        fuzzer.learn("port", "p")
+
+    def http(self):
+        """Requests through the HTTP door, good ones and mangled ones, whole and in pieces; some wait for no answer."""
+        fuzzer = Fuzzer(self.random)
+        requests = Requests(self.random, fuzzer, self.door, self.token, all_methods(), message_class())
+        host, port = self.door.rsplit(":", 1)
+        while self.going():
+            self.feed(fuzzer)
+            try:
+                with socket.create_connection((host, int(port)), 2) as connection:
+                    for piece in requests.pieces():
+                        connection.sendall(piece)
+                    if self.random.random() < 0.5:
+                        connection.shutdown(socket.SHUT_WR)
+                    if self.random.random() < 0.7:
+                        self.count_answers(connection)
+            except OSError:
+                self.codes["DROPPED"] += 1
+
+    def count_answers(self, connection):
+        """Those of the first 64 KiB, until the door is silent for a moment or closes."""
+        answers = b""
+        connection.settimeout(1)
+        try:
+            while len(answers) < 1 << 16 and (piece := connection.recv(1 << 14)):
+                answers += piece
+        except OSError:
+            pass
+        for status in re.findall(rb"(?:^|\n|\})HTTP/1\.[01] (\d{3}) ", answers):
+            self.codes["HTTP " + status.decode()] += 1
+        if found := re.search(rb'"code": ?"(internal|unknown)"', answers):
+            self.internal.append(answers[found.start():found.start() + 300].decode(errors="replace"))
 
     def send(self, service, method, fuzzer, get_class):
         path = f"/{service.full_name}/{method.name}"
@@ -368,6 +401,19 @@ class Attacker:
                 connection.close()
 
 
+def all_methods():
+    """(service, method) of the whole contract."""
+    files = (pb, telemetry_pb2, coupling_pb2, reduction_pb2, geometry_pb2, results_pb2, events_pb2)
+    services = [service for file in files
+                for service in descriptor_pool.Default().FindFileByName(file.DESCRIPTOR.name).services_by_name.values()]
+    return [(service, method) for service in services for method in service.methods]
+
+
+def message_class():
+    """Function from a descriptor to the class of its messages."""
+    return getattr(message_factory, "GetMessageClass", None) or message_factory.MessageFactory().GetPrototype
+
+
 def is_open(connection):
     connection.setblocking(False)
     try:
@@ -381,14 +427,14 @@ def is_open(connection):
 # What each kind must have come to, or it attacks nothing.
 KINDS = {"fuzz": ["OK", "INVALID_ARGUMENT", "NOT_FOUND"], "cancel": ["CANCELLED"], "race": ["OK", "NOT_FOUND"], "slow": ["OK"],
          "silent": ["UNAUTHENTICATED"], "half_open": ["OK"], "greedy": ["OK"], "large": ["CANCELLED"],
-         "descriptors": ["OK", "DROPPED"]}
+         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"]}
 
 
 def main():
-    kind, address, tcp, token, seed, seconds = sys.argv[1:]
+    kind, address, tcp, door, token, seed, seconds = sys.argv[1:]
     os.nice(19)
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    attacker = Attacker(address, tcp, token, int(seed), float(seconds))
+    attacker = Attacker(address, tcp, door, token, int(seed), float(seconds))
     getattr(attacker, kind)()
     print(json.dumps({"codes": attacker.codes, "internal": attacker.internal[:20]}))
     sys.stdout.flush()

@@ -41,16 +41,17 @@ def start(program, folder):
     os.chmod(tokens, 0o600)
     address = f"unix:{folder}/mbcosim.sock"
     log = open(os.path.join(folder, "log"), "w")
+    page = open(os.path.join(folder, "page"), "w")
     daemon = subprocess.Popen([os.path.join(program, "mbcosimd"), "--listen", address, "--listen", "127.0.0.1:0",
-                               "--tokens", tokens, "--limit-memory", str(MEMORY), "--shutdown-grace", str(GRACE)],
-                              stderr=log, preexec_fn=lambda: limit_descriptors(512))
+                               "--http", "127.0.0.1:0", "--tokens", tokens, "--limit-memory", str(MEMORY), "--shutdown-grace", str(GRACE)],
+                              stdout=page, stderr=log, preexec_fn=lambda: limit_descriptors(512))
     for _ in range(int(200 * FACTOR)):
-        text = open(log.name).read()
-        if "listening on 127.0.0.1:" in text:
+        text, door = open(log.name).read(), re.search(r"^page: http://([^/]*)/.*\n", open(page.name).read())
+        if "listening on 127.0.0.1:" in text and door:
             break
         time.sleep(0.05)
     tcp = "127.0.0.1:" + text.split("listening on 127.0.0.1:")[1].split()[0]
-    return daemon, address, tcp, log.name
+    return daemon, address, tcp, door.group(1), log.name
 
 
 def limit_descriptors(most):
@@ -113,7 +114,7 @@ def watch_memory(pid, peak, stop):
     while not stop.wait(0.2):
         try:
             peak[0] = max(peak[0], memory_of(pid))
-        except OSError:
+        except (OSError, StopIteration):  # it has ended; a process that nobody has waited for has no memory
             return
 
 
@@ -145,9 +146,9 @@ def watch_both(bystander, attackers, seconds):
     return quiet, loud
 
 
-def attack(kinds, address, tcp, seed, seconds):
+def attack(kinds, address, tcp, door, seed, seconds):
     rng = random.Random(seed)
-    return {kind: subprocess.Popen([sys.executable, os.path.join(HERE, "attacks.py"), kind, address, tcp, f"{kind}-token",
+    return {kind: subprocess.Popen([sys.executable, os.path.join(HERE, "attacks.py"), kind, address, tcp, door, f"{kind}-token",
                                     str(rng.randrange(1 << 30)), str(seconds)], stdout=subprocess.PIPE, text=True,
                                    start_new_session=True)
             for kind in kinds}
@@ -164,7 +165,7 @@ def main():
     print(f"seed {options.seed}", flush=True)
     faults = []
     with tempfile.TemporaryDirectory() as folder:
-        daemon, address, tcp, log = start(options.bin, folder)
+        daemon, address, tcp, door, log = start(options.bin, folder)
         bystander = Bystander(address)
         bystander.watch(1)
         threads = threads_of(daemon.pid)
@@ -172,7 +173,7 @@ def main():
         threading.Thread(target=watch_memory, args=(daemon.pid, peak, stop), daemon=True).start()
         prober = threading.Thread(target=probe, args=(options.bin, address, faults, stop), daemon=True)
         prober.start()
-        attackers = attack(options.kinds.split(","), address, tcp, options.seed, options.seconds)
+        attackers = attack(options.kinds.split(","), address, tcp, door, options.seed, options.seconds)
         quiet, loud = watch_both(bystander, attackers, options.seconds)
         for kind, attacker in attackers.items():
             try:
