@@ -15,8 +15,10 @@ struct ExportOptions {
   std::string output;  ///< path of the FMU
   Standard standard = Standard::fmi3;
   Selection selection;
-  SymbolValues symbols;  ///< instead of what the deck gives them
-  std::string library;   ///< path of the shared library with the engine
+  SymbolValues symbols;        ///< instead of what the deck gives them
+  std::string remote;          ///< HTTP door of a daemon; empty: the engine inside
+  double remote_timeout = 60;  ///< [s]
+  std::string library;         ///< path of the shared library with the engine
 };
 
 struct ExportReport {

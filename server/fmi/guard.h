@@ -101,6 +101,7 @@ int set_symbols(void* handle, const char* function, ValueType type,
 inline Status save_state(Instance& instance, void** state) {
   if (!state) return instance.fail("no place for the state was given");
   auto saved = instance.save();
+  if (!saved) return Status::error;
   if (*state)
     *static_cast<SavedState*>(*state) = std::move(*saved);
   else

@@ -97,6 +97,7 @@ DeckReport Instance::read_with(const SymbolValues& symbols) {
 }
 
 void Instance::take(DeckReport report, const SymbolValues& symbols) {
+  remote_.reset();  // it has another model
   model_ = std::move(report.model);
   read_ = symbols;
   declared_.clear();
@@ -140,7 +141,8 @@ void Instance::set_start_values() {
   given_.clear();
   for (const FmuVariable& variable : manifest_.variables) given_.push_back(variable.start);
   simulation_ = Simulation::prepare(model_);
-  started_ = false;
+  started_ = ahead_ = false;
+  behind_ = true;
   ++revision_;
 }
 
@@ -214,13 +216,15 @@ mbcosim::Status Instance::ensure_started() {
     if (!given_[k].empty() && !write(variables_[k], given_[k]))
       return Error{ErrorKind::argument, "a start value was refused", {}, {}, {}};
   if (auto status = simulation_->start(); !status) return status;
-  started_ = true;
+  started_ = behind_ = true;
+  ahead_ = false;
   ++revision_;
   return ok();
 }
 
 Status Instance::exit_initialization() {
   if (const auto started = ensure_started(); !started) return fail(started.error().message);
+  if (const auto connected = ensure_connected(); !connected) return fail(connected.error().message);
   mode_ = Mode::step;
   return Status::ok;
 }
@@ -231,6 +235,7 @@ Status Instance::terminate() {
 }
 
 Status Instance::reset() {
+  remote_.reset();
   set_start_values();
   return Status::ok;
 }
@@ -255,6 +260,7 @@ void Instance::read(const Variable& variable, std::vector<double>& all,
 Status Instance::get(std::span<const std::uint32_t> references, std::span<double> values) {
   if (mode_ == Mode::initialization)
     if (const auto started = ensure_started(); !started) return fail(started.error().message);
+  if (const auto pulled = pull(); !pulled) return fail(pulled.error().message);
   std::vector<double> all, one;
   std::size_t at = 0;
   for (const std::uint32_t reference : references) {
@@ -291,6 +297,7 @@ bool Instance::write(const Variable& variable, std::span<const double> values) {
   const std::vector<double> before = all;
   for (std::size_t k = 0; k < values.size(); ++k) all[variable.of->elements[k]] = values[k];
   if (all == before) return true;
+  behind_ = true;
   return static_cast<bool>(simulation_->set(variable.handle, all));
 }
 
@@ -313,6 +320,7 @@ Status Instance::set(std::span<const std::uint32_t> references, std::span<const 
                 std::to_string(values.size()));
   if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
     return discard("a value is not finite; none was set");
+  if (const auto pulled = pull(); !pulled) return fail(pulled.error().message);
   for (const std::uint32_t reference : references) {
     const Variable* found = find(reference);
     if (!found) {
@@ -415,11 +423,9 @@ Status Instance::check_step(double time, double length) {
 mbcosim::Status Instance::advance(double length, double end) {
   double left = length;
   while (left > kRounding * length) {
-    const double h = simulation_->next_step_size();
+    const double h = next_step_size();
     const bool whole = h > 0 && h <= left * (1 + kRounding);
-    StepChoice choice;
-    if (!whole) choice.end = end;
-    const auto report = whole ? Result<StepReport>(simulation_->step()) : simulation_->step(choice);
+    const auto report = take_step(whole ? std::nullopt : std::optional(end));
     if (!report) return report.error();
     if (report->error) return *report->error;
     left = whole ? left - report->step_size : 0;
@@ -427,22 +433,95 @@ mbcosim::Status Instance::advance(double length, double end) {
   return ok();
 }
 
+double Instance::next_step_size() const {
+  return ahead_ ? remote_next_size_ : simulation_->next_step_size();
+}
+
+/// One step of the deck's length, or one that ends at `end`.
+Result<StepReport> Instance::take_step(std::optional<double> end) {
+  if (remote_) {
+    const auto step = remote_->step(end);
+    if (!step) return step.error();
+    ahead_ = true;
+    remote_next_size_ = step->next_size;
+    StepReport report;
+    report.step_size = step->size;
+    return report;
+  }
+  if (!end) return simulation_->step();
+  StepChoice choice;
+  choice.end = *end;
+  return simulation_->step(choice);
+}
+
 Status Instance::do_step(double time, double length) {
   if (const Status status = check_step(time, length); status != Status::ok) return status;
+  if (const auto pulled = pull(); !pulled) return fail(pulled.error().message);
+  if (const auto pushed = push(); !pushed) return fail(pushed.error().message);
   const State before = simulation_->snapshot();
   ++revision_;
-  if (const auto done = advance(length, time + length); !done) {
-    (void)simulation_->restore(before);
-    if (standard_ == Standard::fmi2) mode_ = Mode::step_failed;
-    return discard(done.error().message);
-  }
+  if (const auto done = advance(length, time + length); !done)
+    return failed_step(done.error(), before);
   communication_time_ = last_time_ = time + length;
   return Status::ok;
 }
 
+Status Instance::failed_step(const Error& error, const State& before) {
+  (void)simulation_->restore(before);
+  ahead_ = false;
+  behind_ = true;
+  if (error.kind == ErrorKind::peer) return fail(error.message);
+  if (standard_ == Standard::fmi2) mode_ = Mode::step_failed;
+  return discard(error.message);
+}
+
+// ------------------------------------------------------------------ with a daemon
+
+mbcosim::Status Instance::ensure_connected() {
+  if (manifest_.remote.empty() || remote_) return ok();
+  const double final_time = model_->initial_value.final_time;
+  if (stop_time_ && *stop_time_ > final_time + kRounding * std::max(1.0, std::abs(final_time)))
+    return make_error(ErrorKind::argument, "",
+                      "the stop time " + number(*stop_time_) +
+                          " s lies after the deck's final time " + number(final_time) +
+                          " s, at which the daemon's simulation ends");
+  auto remote = Remote::create(manifest_, files_, {name_, chosen_, model_->digest});
+  if (!remote) return remote.error();
+  remote_ = std::move(*remote);
+  behind_ = true;
+  log_.write(Status::ok, "the daemon at " + manifest_.remote + " takes the steps");
+  return ok();
+}
+
+/// The daemon's state becomes the simulation's.
+mbcosim::Status Instance::pull() {
+  if (!ahead_) return ok();
+  const auto bytes = remote_->state();
+  if (!bytes) return bytes.error();
+  const auto state = simulation_->state_of(*bytes);
+  if (!state) return state.error();
+  if (auto restored = simulation_->restore(*state); !restored) return restored;
+  ahead_ = false;
+  return ok();
+}
+
+/// The simulation's state becomes the daemon's.
+mbcosim::Status Instance::push() {
+  if (auto connected = ensure_connected(); !connected) return connected;
+  if (!remote_ || !behind_) return ok();
+  const auto gone = remote_->go_to(simulation_->export_state(), simulation_->step_number());
+  if (!gone) return gone;
+  behind_ = false;
+  return ok();
+}
+
 // ------------------------------------------------------------------ states
 
-std::unique_ptr<SavedState> Instance::save() const {
+std::unique_ptr<SavedState> Instance::save() {
+  if (const auto pulled = pull(); !pulled) {
+    fail(pulled.error().message);
+    return nullptr;
+  }
   auto saved = std::make_unique<SavedState>();
   saved->token = manifest_.token;
   saved->mode = mode_;
@@ -457,6 +536,8 @@ std::unique_ptr<SavedState> Instance::save() const {
 
 Status Instance::restore(const SavedState& saved) {
   if (saved.token != manifest_.token) return fail("the state belongs to another FMU");
+  ahead_ = false;
+  behind_ = true;
   given_ = saved.given;
   chosen_ = saved.symbols;
   if (chosen_ != read_) started_ = false;
@@ -557,6 +638,7 @@ Status Instance::derivative(std::span<const std::uint32_t> unknowns,
                             std::span<double> sensitivity, bool transposed) {
   if (mode_ == Mode::initialization)
     if (const auto started = ensure_started(); !started) return fail(started.error().message);
+  if (const auto pulled = pull(); !pulled) return fail(pulled.error().message);
   if (const auto computed = compute_derivative(unknowns, knowns); !computed)
     return computed.error().message.empty() ? Status::error : discard(computed.error().message);
   const MatX D = transposed ? MatX(derivative_->d.transpose()) : derivative_->d;

@@ -15,6 +15,7 @@
 #include "fmi/log.h"
 #include "fmi/manifest.h"
 #include "fmi/modes.h"
+#include "fmi/remote.h"
 #include "simulation/load.h"
 #include "simulation/point_motion.h"
 
@@ -65,7 +66,8 @@ class Instance {
   Status do_step(double time, double length);
   double last_time() const { return last_time_; }  ///< that the last step reached [s]
 
-  std::unique_ptr<SavedState> save() const;
+  /// null: the state cannot be had, which is logged.
+  std::unique_ptr<SavedState> save();
   Status restore(const SavedState& saved);
   std::string serialize(const SavedState& saved);
   /// null: the bytes are refused, which is logged.
@@ -117,6 +119,13 @@ class Instance {
   Status may_set(const Variable& variable);
   bool write(const Variable& variable, std::span<const double> values);
   mbcosim::Status advance(double length, double end);
+  Result<StepReport> take_step(std::optional<double> end);
+  double next_step_size() const;
+  Status failed_step(const Error& error, const State& before);
+  // --- with a daemon: the state here is brought up to date when somebody wants it
+  mbcosim::Status ensure_connected();
+  mbcosim::Status pull();
+  mbcosim::Status push();
   Status check_step(double time, double length);
   mbcosim::Status compute_derivative(std::span<const std::uint32_t> unknowns,
                                      std::span<const std::uint32_t> knowns);
@@ -136,6 +145,10 @@ class Instance {
   double initial_time_ = 0;  ///< of the deck as it was exported [s]
   ModelPtr model_;
   std::unique_ptr<Simulation> simulation_;
+  std::unique_ptr<Remote> remote_;  ///< takes the steps; null: the simulation does
+  bool ahead_ = false;              ///< the daemon's state is later than the simulation's
+  bool behind_ = true;              ///< the simulation's state is not the daemon's
+  double remote_next_size_ = 0;     ///< [s]; when the daemon is ahead
   std::vector<std::unique_ptr<PointMotion>> motions_;
   std::vector<Variable> variables_;
   std::unordered_map<std::uint32_t, int> index_;

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "fmi/exporter.h"
+#include "fmi/remote_address.h"
 #include "input/symbol_values.h"
 
 namespace mbcosim::fmi {
@@ -70,6 +71,16 @@ int main(int argc, char** argv) {
          },
          "Value of a symbol of the deck: NAME=VALUE; repeatable")
       ->take_all();
+  app.add_option("--remote", options.remote,
+                 "http://HOST:PORT of a daemon's HTTP door: it takes the steps, not the engine "
+                 "inside; not for decks with ports on which it would wait for a peer")
+      ->check([](const std::string& address) {
+        const auto parsed = parse_remote(address);
+        return parsed ? "" : parsed.error().message;
+      });
+  app.add_option("--remote-timeout", options.remote_timeout, "Longest wait for the daemon [s]")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1e6));
   app.footer("Exit codes: 0 done, 2 deck refused, 4 wrong usage, or the file cannot be written.");
   try {
     app.parse(argc, argv);

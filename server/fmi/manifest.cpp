@@ -36,7 +36,8 @@ NLOHMANN_JSON_SERIALIZE_ENUM(FmuVariable::Source,
                               {FmuVariable::Source::angular_velocities, "angular velocities"}})
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FmuVariable, reference, role, source, name, elements, start)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FmuSymbol, reference, name, start, given)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Manifest, token, deck, digest, files, variables, symbols)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Manifest, token, deck, digest, files, variables, symbols, remote,
+                                   remote_timeout)
 
 std::string to_json(const Manifest& manifest) { return json(manifest).dump(1); }
 

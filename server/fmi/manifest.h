@@ -46,6 +46,8 @@ struct Manifest {
   std::map<std::string, std::string> files;  ///< name that the deck uses -> path below resources
   std::vector<FmuVariable> variables;
   std::vector<FmuSymbol> symbols;
+  std::string remote;  ///< HTTP door of the daemon that takes the steps; empty: the engine inside
+  double remote_timeout = 60;  ///< longest wait for it [s]
 };
 
 std::string to_json(const Manifest& manifest);
