@@ -128,6 +128,12 @@ void add_check(CLI::App& app, HealthCheck& check) {
   key->needs(certificate);
   add("--check-name", check.name, "Name in the daemon's certificate, where ADDRESS is another")
       ->needs(address);
+  app.add_option("--check-timeout", check.timeout, "Seconds after which no answer is one")
+      ->configurable(false)
+      ->group("Health of a daemon")
+      ->capture_default_str()
+      ->check(CLI::Range(0.001, 3600.0))
+      ->needs(address);
 }
 
 int print_hash() {

@@ -1,5 +1,6 @@
 """Listeners, health, reflection, credentials, configuration."""
 import os
+import socket
 import stat
 import subprocess
 
@@ -8,7 +9,7 @@ import pytest
 
 import decks
 import mbcosim
-from conftest import BIN, Daemon, wait_for
+from conftest import BIN, TIME_FACTOR, Daemon, wait_for
 
 DAEMON = os.path.join(BIN, "mbcosimd")
 
@@ -67,6 +68,19 @@ def test_a_stale_socket_is_replaced(tmp_path):
     second = Daemon(str(tmp_path))
     second.connect().close()
     second.stop()
+
+
+def test_a_check_ends_in_its_time(tmp_path):
+    """Of a socket at which nobody answers."""
+    path = str(tmp_path / "silent.sock")
+    with socket.socket(socket.AF_UNIX) as silent:
+        silent.bind(path)
+        silent.listen()
+        asked = [DAEMON, "--check", f"unix:{path}", "--check-timeout", "0.2"]
+        assert subprocess.run(asked, timeout=30 * TIME_FACTOR, check=False).returncode == 1
+    for wrong in ("0", "-1", "nan", "1e9", "soon"):
+        run = subprocess.run([*asked[:-1], wrong], stderr=subprocess.PIPE, text=True, timeout=30 * TIME_FACTOR, check=False)
+        assert run.returncode == 4 and "--check-timeout" in run.stderr, wrong
 
 
 def test_a_public_address_needs_protection():
