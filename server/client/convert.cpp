@@ -177,9 +177,9 @@ void fill_durability(const LoadOptions& options, v1::CreateOptions* out) {
 
 google::protobuf::Duration to_duration(double seconds, const char* field) {
   constexpr double kLongest = 1e9;
-  if (!(std::abs(seconds) <= kLongest))
+  if (!(seconds >= 0 && seconds <= kLongest))
     throw Error("`" + std::string(field) +
-                    "` is no duration of at most 1e9 s: " + std::to_string(seconds) + " s",
+                    "` is no duration of 0 to 1e9 s: " + std::to_string(seconds) + " s",
                 /*code=*/3, "BAD_ARGUMENT", {}, field);
   return google::protobuf::util::TimeUtil::NanosecondsToDuration(std::llround(seconds * 1e9));
 }

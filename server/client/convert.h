@@ -28,8 +28,8 @@ Matrix to_matrix(const v1::Matrix& matrix);
 std::vector<Diagnostic> to_diagnostics(
     const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics);
 
-/// `seconds` [s] to the nanosecond. Throws Error (INVALID_ARGUMENT, `field`) for NaN, and beyond
-/// the 1e9 s that servers take.
+/// `seconds` [s] to the nanosecond. Throws Error (INVALID_ARGUMENT, `field`) for NaN, below
+/// zero, and beyond the 1e9 s that servers take.
 google::protobuf::Duration to_duration(double seconds, const char* field);
 
 /// A text that no other request has.

@@ -191,9 +191,9 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   v1::PeerPresence* presence = hello.mutable_presence();
   *presence->mutable_peer_timeout() = to_duration(options.peer_timeout, "peer_timeout");
   presence->set_policy(to_proto(options.policy));
-  if (options.heartbeat_timeout > 0)
-    *presence->mutable_heartbeat_timeout() =
-        to_duration(options.heartbeat_timeout, "heartbeat_timeout");
+  const auto beats = to_duration(options.heartbeat_timeout, "heartbeat_timeout");
+  if (options.heartbeat_timeout > 0) *presence->mutable_heartbeat_timeout() = beats;
+  (void)to_duration(options.server_timeout, "server_timeout");  // or it is refused
   if (options.server_timeout > 0) {
     double interval = options.server_timeout / 3;
     if (options.heartbeat_timeout > 0) interval = std::min(interval, options.heartbeat_timeout);

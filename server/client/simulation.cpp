@@ -197,7 +197,7 @@ SimulationInfo Simulation::update(const UpdateOptions& options) {
 
 Peer Simulation::attach(const std::string& port, const PeerOptions& wanted) {
   PeerOptions options = wanted;
-  if (options.transport == Transport::shared_memory && options.server_timeout <= 0)
+  if (options.transport == Transport::shared_memory && options.server_timeout == 0)
     options.server_timeout = 20;
   return Peer(attach_peer(impl_->server, make_hello(impl_->info, port, options), options));
 }

@@ -140,7 +140,7 @@ void add_snapshots(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("ImportSnapshot"),
            stream(Role::control, [&parts] { return std::make_unique<ImportHandler>(parts); }));
   gate.add(simulations_path("ImportSnapshotInline"),
-           on_session<v1::ImportSnapshotInlineRequest, v1::ImportSnapshotReply>(
+           on_session<v1::ImportSnapshotInlineRequest, v1::ImportSnapshotInlineReply>(
                parts, Role::control, Lane::work,
                [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
                  session.import_state(request.data(), request.display_name(), request.restore(),

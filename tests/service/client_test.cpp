@@ -785,7 +785,7 @@ TEST(Client, DurationsThatAreNoneAreRefusedByTheirField) {
     }
     return "nothing";
   };
-  for (const double none : {std::nan(""), HUGE_VAL, 1e300}) {
+  for (const double none : {std::nan(""), HUGE_VAL, 1e300, -1.0}) {
     LoadOptions options;
     options.lease = none;
     EXPECT_EQ(refused([&] { server.load_text(body(), options); }), "lease");
@@ -794,6 +794,13 @@ TEST(Client, DurationsThatAreNoneAreRefusedByTheirField) {
               "minimum_interval");
     EXPECT_EQ(refused([&] { simulation.attach("spring", {.peer_timeout = none}); }),
               "peer_timeout");
+    EXPECT_EQ(refused([&] { simulation.attach("spring", {.heartbeat_timeout = none}); }),
+              "heartbeat_timeout");
+    for (const Transport transport : {Transport::stream, Transport::shared_memory})
+      EXPECT_EQ(refused([&] {
+                  simulation.attach("spring", {.server_timeout = none, .transport = transport});
+                }),
+                "server_timeout");
   }
 }
 
