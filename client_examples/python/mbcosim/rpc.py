@@ -170,8 +170,9 @@ class Bound:
         self._begin = time.monotonic()
 
     def within(self, call: Call) -> Call:
-        if checked_timeout(call.timeout) is not None:
-            call.timeout = max(call.timeout - (time.monotonic() - self._begin), 1e-3)
+        timeout = checked_timeout(call.timeout)
+        if timeout is not None:
+            call.timeout = max(timeout - (time.monotonic() - self._begin), 1e-3)
         return call
 
 
