@@ -24,11 +24,12 @@ std::string deck(const std::string& elements) {
          "end: elements;\n";
 }
 
-const char* const kElements =
+const char* const kJoints =
     "joint: 1, clamp, 1, node, node;\n"
     "joint: 2, rod, 1, position, 0., 0.5, 0., 2, position, 0., 0.25, 0., 1., linear elastic, 1.;\n"
     "joint: 3, revolute hinge, 2, position, 0., -1., 0., hinge, eye, 3, position, null, hinge, "
-    "eye;\n"
+    "eye;\n";
+const char* const kOthers =
     "body: 4, 2, 2., 0.5, 0., 0., diag, 3., 2., 1.;\n"
     "force: 5, follower, 2, position, 0.1, 0., 0., 1., 0., 0., const, 7.;\n"
     "force: 6, absolute internal, 2, position, null, 3, position, 1., 0., 0., 0., 1., 0., const, "
@@ -38,7 +39,7 @@ const char* const kElements =
 
 class Geometry : public ::testing::Test {
  protected:
-  Geometry() : run_(deck(kElements)) {}
+  Geometry() : run_(deck(std::string(kJoints) + kOthers)) {}
   GeometryView view() { return GeometryView(run_.model(), run_.simulation().state()); }
   ElementGeometry element(int k) { return view().element(k); }
   Vec3 position(const ElementGeometry& g, int point) { return view().position(g.points[point]); }
@@ -119,7 +120,7 @@ TEST_F(Geometry, OfABeamIsTheParabolaThroughItsPoints) {
 }
 
 TEST(GeometryOfATotalJoint, HasTheAxesOfItsMomentsWhereTheyAreNotThoseOfItsForces) {
-  const std::string joint =
+  const std::string joints =
       "joint: 1, total joint, 1, position, 1., 0., 0., position orientation, eye, rotation "
       "orientation, 1, 0., 1., 0., 3, 0., 0., 1., 2, position, null, position constraint, active, "
       "active, active, null, orientation constraint, active, active, active, null;\n"
@@ -128,7 +129,7 @@ TEST(GeometryOfATotalJoint, HasTheAxesOfItsMomentsWhereTheyAreNotThoseOfItsForce
       "active, active, null;\n"
       "joint: 3, total joint, 1, position, 1., 0., 0., 2, position, null, position constraint, "
       "active, active, active, null;\n";
-  DeckRun run(deck(joint));
+  DeckRun run(deck(joints + kOthers));
   ASSERT_TRUE(run.ready());
   GeometryView view(run.model(), run.simulation().state());
   const ElementGeometry total = view.element(0), pin = view.element(1), same = view.element(2);
