@@ -77,7 +77,7 @@ void sum_products(const MatX& shapes, const VecX& masses, bool second_order, Mod
   for (int a = 0; a < 3; ++a)
     for (int b = a; b < 3; ++b) {
       p[a][b].noalias() = u[a].transpose() * masses.asDiagonal() * u[b];
-      p[b][a] = p[a][b].transpose();
+      if (b != a) p[b][a] = p[a][b].transpose();
     }
   for (int a = 0; a < 3; ++a) {
     const int b = (a + 1) % 3, c = (a + 2) % 3;
