@@ -123,12 +123,12 @@ TEST(GeometryOfATotalJoint, HasTheAxesOfItsMomentsWhereTheyAreNotThoseOfItsForce
   const std::string joints =
       "joint: 1, total joint, 1, position, 1., 0., 0., position orientation, eye, rotation "
       "orientation, 1, 0., 1., 0., 3, 0., 0., 1., 2, position, null, position constraint, active, "
-      "active, active, null, orientation constraint, active, active, active, null;\n"
-      "joint: 2, total pin joint, 2, position, null, position, 1., 0., 0., position orientation, "
+      "active, active, null;\n"
+      "joint: 2, total pin joint, 3, position, null, position, 2., 0., 0., position orientation, "
       "eye, rotation orientation, 1, 0., 0., 1., 2, 0., 1., 0., position constraint, active, "
       "active, active, null;\n"
-      "joint: 3, total joint, 1, position, 1., 0., 0., 2, position, null, position constraint, "
-      "active, active, active, null;\n";
+      "joint: 3, total pin joint, 1, position, null, position, null, position constraint, active, "
+      "active, active, null, orientation constraint, active, active, active, null;\n";
   DeckRun run(deck(joints + kOthers));
   ASSERT_TRUE(run.ready());
   GeometryView view(run.model(), run.simulation().state());
