@@ -9,7 +9,6 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -391,8 +390,7 @@ int check_health(const HealthCheck& check) {
   const auto stub = grpc::health::v1::Health::NewStub(
       grpc::CreateCustomChannel(check.address, credentials_of(check), arguments));
   grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() +
-                       std::chrono::milliseconds(std::llround(1000 * check.timeout)));
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(check.timeout));
   grpc::health::v1::HealthCheckResponse response;
   const grpc::Status status = stub->Check(&context, {}, &response);
   const bool asks_credentials = status.error_code() == grpc::StatusCode::UNAUTHENTICATED;

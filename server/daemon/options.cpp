@@ -132,7 +132,7 @@ void add_check(CLI::App& app, HealthCheck& check) {
       ->configurable(false)
       ->group("Health of a daemon")
       ->capture_default_str()
-      ->check(CLI::Range(0.001, 3600.0))
+      ->check(CLI::Range(1, 3600))
       ->needs(address);
 }
 

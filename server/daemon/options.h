@@ -15,7 +15,7 @@ struct HealthCheck {
   std::string ca;                ///< PEM file of who signed its certificate; empty: no TLS
   std::string certificate, key;  ///< PEM files of the client, or empty
   std::string name;              ///< expected in its certificate; empty: the address's
-  double timeout = 3;            ///< [s]
+  int timeout = 3;               ///< [s]
 };
 
 struct Invocation {

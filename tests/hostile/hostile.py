@@ -122,7 +122,7 @@ def probe(program, address, faults, stop):
     """What an orchestrator does: a new connection, by a process of its own, every two seconds; two failures in a row count."""
     failed = 0
     while not stop.wait(2):
-        command = [os.path.join(program, "mbcosimd"), "--check", address, "--check-timeout", str(3 * FACTOR)]
+        command = [os.path.join(program, "mbcosimd"), "--check", address, "--check-timeout", str(math.ceil(3 * FACTOR))]
         failed = failed + 1 if subprocess.run(command, timeout=60 * FACTOR).returncode != 0 else 0
         if failed == 2:
             faults.append("the probe finds no healthy daemon")
