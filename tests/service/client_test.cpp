@@ -977,7 +977,7 @@ TEST(ASilentServer, IsNoticedInAStepWithoutATimeoutAndByPeersThatWait) {
     std::this_thread::sleep_for(std::chrono::seconds(1));
     silence();
   });
-  const double bound = 1 + 25 + 2 * time_factor();
+  const double bound = 1 + 20 + 7 * time_factor();  // keepalive: 10 s and 10 s
   std::vector<std::thread> waiting;
   for (Peer& peer : peers)
     waiting.emplace_back([&] {
