@@ -1,4 +1,6 @@
-/// Calls over HTTP/1.1 to one host, on one connection that is kept. Every wait is bounded.
+/// Calls over HTTP/1.1 to one host, on one connection that is kept. Every wait is bounded. Of our
+/// own, as an FMU carries with it what it links: Debian's clients bring a TLS library and more, and
+/// cpp-httplib bounds single reads, not a call.
 #pragma once
 
 #include <chrono>

@@ -250,7 +250,9 @@ Result<Remote::Step> Remote::step(std::optional<double> end) {
                             ? "the daemon's simulation ends at the deck's final time"
                             : "the daemon took no step: " + outcome);
     const std::string number = reply->at("step");
-    std::from_chars(number.data(), number.data() + number.size(), number_);
+    const auto [rest, code] =
+        std::from_chars(number.data(), number.data() + number.size(), number_);
+    if (code != std::errc() || *rest != '\0') return is_no_daemon("its step is \"" + number + "\"");
     return Step{reply->at("stepSize"), reply->at("nextStepSize")};
   } catch (const json::exception& e) {
     return is_no_daemon(e.what());
