@@ -3,13 +3,12 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <utility>
 
 #include "client/mbcosim_client.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::client {
 
@@ -22,17 +21,11 @@ class Deadline {
  public:
   Deadline(double seconds, std::function<void()> cancel) {
     if (checked_timeout(seconds) == kEndless) return;
-    watch_ = std::thread([this, seconds, cancel = std::move(cancel)] {
-      std::unique_lock guard(mutex_);
-      const std::chrono::duration<double> bound(seconds);
-      if (left_.wait_for(guard, bound, [&] { return has_left_; })) return;
-      over_ = true;
-      cancel();
-    });
+    watch_ = std::thread([this, seconds, cancel = std::move(cancel)] { watch(seconds, cancel); });
   }
   ~Deadline() {
     {
-      const std::lock_guard guard(mutex_);
+      const server::Guard guard(mutex_);
       has_left_ = true;
     }
     left_.notify_one();
@@ -43,9 +36,20 @@ class Deadline {
   bool is_over() const { return over_; }
 
  private:
-  std::mutex mutex_;
-  std::condition_variable left_;
-  bool has_left_ = false;
+  using Clock = std::chrono::steady_clock;
+  void watch(double seconds, const std::function<void()>& cancel) {
+    const std::chrono::duration<double> bound(seconds);
+    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(bound);
+    const server::Guard guard(mutex_);
+    while (!has_left_ && Clock::now() < end) left_.wait_until(mutex_, end);
+    if (has_left_) return;
+    over_ = true;
+    cancel();
+  }
+
+  server::Mutex mutex_;
+  server::Condition left_;
+  bool has_left_ TS_GUARDED_BY(mutex_) = false;
   std::atomic<bool> over_{false};
   std::thread watch_;
 };

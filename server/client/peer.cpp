@@ -252,31 +252,40 @@ void Peer::Impl::answer(const Loads& loads) {
 }
 
 void Peer::Impl::write(const v1::PeerMessage& message) {
-  const std::lock_guard guard(write_mutex);
+  const server::Guard guard(write_mutex);
   wire->write(message);
 }
 
-// Sends the peer's signs of life, and looks whether the server gives some.
 void Peer::Impl::start_heart(const PeerOptions& options) {
   const double beats = options.heartbeat_timeout, limit = options.server_timeout;
   if (beats <= 0 && limit <= 0) return;
-  const double period =
-      (beats > 0 && limit > 0 ? std::min(beats, limit) : std::max(beats, limit)) / 3;
-  heart = std::thread([this, beats, limit, period] {
-    v1::PeerMessage beat;
-    std::unique_lock guard(heart_mutex);
-    while (!stop.wait_for(guard, std::chrono::duration<double>(period), [&] { return stopping; })) {
-      const std::int64_t since = reading_since.load();
-      if (limit > 0 && since > 0 && nanoseconds_now() - since > 1e9 * limit) {
-        blame(Error("the server was silent for " + std::to_string(limit) + " s",
-                    static_cast<int>(grpc::StatusCode::UNAVAILABLE), "", {}));
-        wire->cancel();
-      }
-      if (beats <= 0) continue;
-      beat.mutable_heartbeat()->set_count(beat.heartbeat().count() + 1);
-      write(beat);
+  heart = std::thread([this, beats, limit] { beat(beats, limit); });
+}
+
+// Sends the peer's signs of life, and looks whether the server gives some; bounds in seconds.
+void Peer::Impl::beat(double beats, double limit) {
+  const double shorter = beats > 0 && limit > 0 ? std::min(beats, limit) : std::max(beats, limit);
+  const auto period = std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+      std::chrono::duration<double>(shorter / 3));
+  v1::PeerMessage message;
+  const server::Guard guard(heart_mutex);
+  while (!stops_within(period)) {
+    const std::int64_t since = reading_since.load();
+    if (limit > 0 && since > 0 && nanoseconds_now() - since > 1e9 * limit) {
+      blame(Error("the server was silent for " + std::to_string(limit) + " s",
+                  static_cast<int>(grpc::StatusCode::UNAVAILABLE), "", {}));
+      wire->cancel();
     }
-  });
+    if (beats <= 0) continue;
+    message.mutable_heartbeat()->set_count(message.heartbeat().count() + 1);
+    write(message);
+  }
+}
+
+bool Peer::Impl::stops_within(std::chrono::steady_clock::duration time) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  while (!stopping && std::chrono::steady_clock::now() < end) stop.wait_until(heart_mutex, end);
+  return stopping;
 }
 
 bool Peer::Impl::read() {
@@ -300,18 +309,18 @@ void Peer::Impl::end() {
 }
 
 void Peer::Impl::blame(const Error& error) {
-  const std::lock_guard guard(blame_mutex);
+  const server::Guard guard(blame_mutex);
   if (!failure) failure = error;
 }
 
 std::optional<Error> Peer::Impl::error() const {
-  const std::lock_guard guard(blame_mutex);
+  const server::Guard guard(blame_mutex);
   return failure;
 }
 
 void Peer::Impl::stop_heart() {
   {
-    const std::lock_guard guard(heart_mutex);
+    const server::Guard guard(heart_mutex);
     stopping = true;
   }
   stop.notify_one();

@@ -2,15 +2,15 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
+#include <chrono>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 
 #include "client/connection.h"
 #include "client/wire.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::client {
 
@@ -20,22 +20,24 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
 struct Peer::Impl {
   ~Impl() { close(); }
   bool next(Motion& motion);
-  std::optional<Error> error() const;
+  std::optional<Error> error() const TS_EXCLUDES(blame_mutex);
   void answer(const Loads& loads);
   void fail(const std::string& why);
   void reject(const Reject& rejection);
   void serve(Answer answer);  ///< in a thread of its own
   void start_heart(const PeerOptions& options);
-  void stop_heart();
+  void beat(double beats, double limit);
+  bool stops_within(std::chrono::steady_clock::duration time) TS_REQUIRES(heart_mutex);
+  void stop_heart() TS_EXCLUDES(heart_mutex);
   bool read();
-  void end();                      ///< learns how the stream has ended
-  void blame(const Error& error);  ///< the first counts
-  void write(const v1::PeerMessage& message);
+  void end();                                               ///< learns how the stream has ended
+  void blame(const Error& error) TS_EXCLUDES(blame_mutex);  ///< the first counts
+  void write(const v1::PeerMessage& message) TS_EXCLUDES(write_mutex);
   void close();
 
   std::shared_ptr<Server::Impl> server;
   std::unique_ptr<Wire> wire;
-  std::mutex write_mutex;  ///< the heart writes, too
+  server::Mutex write_mutex;  ///< the heart writes to the wire, too
   Tangent tangent = Tangent::none;
   StepEnded step_ended;
   PortLayout layout;
@@ -43,13 +45,13 @@ struct Peer::Impl {
   v1::PeerMessage out;
   std::thread thread, heart;
   std::atomic<std::int64_t> reading_since{0};  ///< clock's count of nanoseconds; 0: nobody reads
-  std::mutex heart_mutex;
-  std::condition_variable stop;
-  bool stopping = false;
+  server::Mutex heart_mutex;
+  server::Condition stop;
+  bool stopping TS_GUARDED_BY(heart_mutex) = false;
   std::atomic<std::int64_t> exchanges{0};
   std::atomic<bool> ended{false};
-  mutable std::mutex blame_mutex;
-  std::optional<Error> failure;
+  mutable server::Mutex blame_mutex;
+  std::optional<Error> failure TS_GUARDED_BY(blame_mutex);
   bool open = true;
 };
 

@@ -1,8 +1,6 @@
-#include <condition_variable>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
-#include <mutex>
 #include <stdexcept>
 #include <thread>
 
@@ -10,6 +8,7 @@
 #include "mbdyn/socket_wire.h"
 #include "peer/fmu_peer.h"
 #include "peer/options.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::peer {
 namespace {
@@ -56,7 +55,7 @@ class SimulationWatch {
       : simulation_(server.find(name)), peer_(peer), thread_([this] { run(); }) {}
   ~SimulationWatch() {
     {
-      const std::lock_guard guard(mutex_);
+      const server::Guard guard(mutex_);
       stop_ = true;
     }
     changed_.notify_one();
@@ -67,22 +66,27 @@ class SimulationWatch {
 
  private:
   void run() {
-    constexpr std::chrono::seconds kBetween{1};
-    std::unique_lock guard(mutex_);
-    while (!changed_.wait_for(guard, kBetween, [this] { return stop_; })) {
+    const server::Guard guard(mutex_);
+    while (!stops_within(std::chrono::seconds(1))) {
       try {
         (void)simulation_.read("time");
-      } catch (const client::Error&) {
+      } catch (const std::exception&) {
         return peer_.interrupt();
       }
     }
   }
 
+  bool stops_within(std::chrono::steady_clock::duration time) TS_REQUIRES(mutex_) {
+    const auto end = std::chrono::steady_clock::now() + time;
+    while (!stop_ && std::chrono::steady_clock::now() < end) changed_.wait_until(mutex_, end);
+    return stop_;
+  }
+
   client::Simulation simulation_;
   client::Peer& peer_;
-  std::mutex mutex_;
-  bool stop_ = false;  ///< protected by mutex_
-  std::condition_variable changed_;
+  server::Mutex mutex_;
+  bool stop_ TS_GUARDED_BY(mutex_) = false;
+  server::Condition changed_;
   std::thread thread_;
 };
 

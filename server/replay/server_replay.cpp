@@ -18,7 +18,7 @@ RecordedCoupling::RecordedCoupling(const std::vector<v1::RecordEntry>& record, d
 }
 
 const RecordedCoupling::Entries* RecordedCoupling::next_session(const std::string& port) {
-  const std::lock_guard guard(mutex_);
+  const server::Guard guard(mutex_);
   const auto found = sessions_.find(port);
   if (found == sessions_.end() || played_[port] >= found->second.size()) return nullptr;
   return &found->second[played_[port]++];
@@ -35,7 +35,7 @@ grpc::Status RecordedCoupling::Attach(grpc::ServerContext*, Stream* stream) {
             "the record has no further session of port \"" + port.substr(0, 100) + "\""};
   play(port, *entries, stream);
   {
-    const std::lock_guard guard(mutex_);
+    const server::Guard guard(mutex_);
     --left_;
   }
   changed_.notify_all();
@@ -50,7 +50,7 @@ void RecordedCoupling::play(const std::string& port, const Entries& entries, Str
     if (!stream->Write(message)) return note(port, "the client left before the record did");
     if (!message.has_exchange()) continue;
     {
-      const std::lock_guard guard(mutex_);
+      const server::Guard guard(mutex_);
       step_ = message.exchange().step();
     }
     const v1::RecordEntry* answer =
@@ -68,7 +68,7 @@ void RecordedCoupling::play(const std::string& port, const Entries& entries, Str
 bool RecordedCoupling::compare(const std::string& port, const v1::RecordEntry* recorded,
                                const v1::PeerMessage& now) {
   {
-    const std::lock_guard guard(mutex_);
+    const server::Guard guard(mutex_);
     ++exchanges_;
   }
   const auto difference = first_difference(recorded->from_peer(), now, tolerance_);
@@ -78,7 +78,7 @@ bool RecordedCoupling::compare(const std::string& port, const v1::RecordEntry* r
 
 void RecordedCoupling::note(const std::string& port, const std::string& what) {
   {
-    const std::lock_guard guard(mutex_);
+    const server::Guard guard(mutex_);
     if (difference_.empty())
       difference_ = "step " + std::to_string(step_) + ", port \"" + port + "\": " + what;
   }
@@ -86,17 +86,17 @@ void RecordedCoupling::note(const std::string& port, const std::string& what) {
 }
 
 void RecordedCoupling::wait() {
-  std::unique_lock guard(mutex_);
-  changed_.wait(guard, [&] { return left_ == 0 || !difference_.empty(); });
+  const server::Guard guard(mutex_);
+  while (left_ > 0 && difference_.empty()) changed_.wait(mutex_);
 }
 
 std::string RecordedCoupling::difference() const {
-  const std::lock_guard guard(mutex_);
+  const server::Guard guard(mutex_);
   return difference_;
 }
 
 std::int64_t RecordedCoupling::exchanges() const {
-  const std::lock_guard guard(mutex_);
+  const server::Guard guard(mutex_);
   return exchanges_;
 }
 

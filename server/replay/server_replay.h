@@ -4,15 +4,14 @@
 
 #include <grpcpp/server_context.h>
 
-#include <condition_variable>
 #include <map>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "mbcosim/v1/coupling.grpc.pb.h"
 #include "mbcosim/v1/record.pb.h"
 #include "mbcosim/v1/simulations.grpc.pb.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::replay {
 
@@ -40,12 +39,12 @@ class RecordedCoupling final : public v1::Coupling::Service {
 
   const double tolerance_;
   std::map<std::string, std::vector<Entries>> sessions_;  ///< of each port, from welcome to the end
-  mutable std::mutex mutex_;                              // protects all below
-  std::condition_variable changed_;
-  std::map<std::string, std::size_t> played_;
-  std::size_t left_ = 0;
-  std::int64_t exchanges_ = 0, step_ = 0;
-  std::string difference_;
+  mutable server::Mutex mutex_;
+  server::Condition changed_;
+  std::map<std::string, std::size_t> played_ TS_GUARDED_BY(mutex_);
+  std::size_t left_ TS_GUARDED_BY(mutex_) = 0;
+  std::int64_t exchanges_ TS_GUARDED_BY(mutex_) = 0, step_ TS_GUARDED_BY(mutex_) = 0;
+  std::string difference_ TS_GUARDED_BY(mutex_);
 };
 
 /// Enough of a server for clients that look before they attach.

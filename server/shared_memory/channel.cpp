@@ -31,12 +31,14 @@ Channel::Channel(Descriptor socket, Segment segment, Side side, std::size_t long
       writer_(segment_.header(ring_of(side, true)), segment_.bytes(ring_of(side, true)),
               kRingBytes),
       reader_(segment_.header(ring_of(side, false)), segment_.bytes(ring_of(side, false)),
-              kRingBytes) {}
+              kRingBytes),
+      space_(writer_.bell()),
+      data_(reader_.bell()) {}
 
 void Channel::close() {
   closed_.store(true);
-  writer_.bell().ring_always();
-  reader_.bell().ring_always();
+  space_.ring_always();
+  data_.ring_always();
 }
 
 // The socket is silent until the other side ends; whatever comes then is the end.
@@ -48,7 +50,7 @@ bool Channel::other_is_gone() const {
 // ------------------------------------------------------------------ sending
 
 bool Channel::send(const google::protobuf::MessageLite& message, Clock::time_point deadline) {
-  const std::lock_guard guard(send_mutex_);
+  const server::Guard guard(send_mutex_);
   const std::size_t size = message.ByteSizeLong();
   if (closed() || size > longest_message_) return false;
   out_.resize(kLengthBytes + size);
@@ -72,8 +74,8 @@ bool Channel::write(const char* bytes, std::size_t count, Clock::time_point dead
     }
     const Clock::time_point now = Clock::now();
     if (closed() || now >= deadline) return false;
-    const bool room = wait_until(writer_.bell(), std::min(deadline, now + kLook), spin_,
-                                 [this] { return closed() || writer_.space() > 0; });
+    const auto ready = [this, writer = &writer_] { return closed() || writer->space() > 0; };
+    const bool room = wait_until(space_, std::min(deadline, now + kLook), spin_, ready);
     if (!room && other_is_gone()) return false;
   }
   return true;
@@ -110,22 +112,22 @@ bool Channel::parse(google::protobuf::MessageLite* message) {
 
 Channel::Received Channel::receive(google::protobuf::MessageLite* message,
                                    Clock::time_point deadline) {
-  const std::lock_guard guard(receive_mutex_);
+  const server::Guard guard(receive_mutex_);
   bool last_look = false;
   while (!parse(message)) {
     if (closed() || last_look) return Received::closed;
     const Clock::time_point now = Clock::now();
     if (now >= deadline) return Received::timeout;
-    const bool more = wait_until(reader_.bell(), std::min(deadline, now + kLook), spin_,
-                                 [this] { return closed() || reader_.available() > 0; });
+    const auto ready = [this, reader = &reader_] { return closed() || reader->available() > 0; };
+    const bool more = wait_until(data_, std::min(deadline, now + kLook), spin_, ready);
     last_look = !more && other_is_gone();  // what it sent before its end still counts
   }
   return Received::message;
 }
 
 Channel::Received Channel::try_receive(google::protobuf::MessageLite* message) {
-  const std::unique_lock guard(receive_mutex_, std::try_to_lock);
-  if (!guard) return Received::timeout;
+  if (!receive_mutex_.try_lock()) return Received::timeout;
+  const server::Guard guard(receive_mutex_, std::adopt_lock);
   if (parse(message)) return Received::message;
   return closed() ? Received::closed : Received::timeout;
 }

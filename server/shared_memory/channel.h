@@ -11,12 +11,12 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "shared_memory/ring.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::shm {
 
@@ -108,21 +108,23 @@ class Channel {
   bool closed() const { return closed_.load(std::memory_order_relaxed); }
 
  private:
-  bool write(const char* bytes, std::size_t count, Clock::time_point deadline);
-  bool advance();
-  bool parse(google::protobuf::MessageLite* message);
+  bool write(const char* bytes, std::size_t count, Clock::time_point deadline)
+      TS_REQUIRES(send_mutex_);
+  bool advance() TS_REQUIRES(receive_mutex_);
+  bool parse(google::protobuf::MessageLite* message) TS_REQUIRES(receive_mutex_);
   bool other_is_gone() const;
 
   Descriptor socket_;
   Segment segment_;
   const std::size_t longest_message_;
   const Clock::duration spin_;
-  std::mutex send_mutex_, receive_mutex_;
-  RingWriter writer_;
-  RingReader reader_;
-  std::string out_, in_;      ///< under way
-  std::size_t received_ = 0;  ///< bytes of `in_` that are there
-  bool has_length_ = false;   ///< `in_` has its final size
+  server::Mutex send_mutex_, receive_mutex_;
+  RingWriter writer_ TS_GUARDED_BY(send_mutex_);
+  RingReader reader_ TS_GUARDED_BY(receive_mutex_);
+  Bell &space_, &data_;  ///< of `writer_` and `reader_`
+  std::string out_ TS_GUARDED_BY(send_mutex_), in_ TS_GUARDED_BY(receive_mutex_);  ///< under way
+  std::size_t received_ TS_GUARDED_BY(receive_mutex_) = 0;  ///< bytes of `in_` that are there
+  bool has_length_ TS_GUARDED_BY(receive_mutex_) = false;   ///< `in_` has its final size
   std::atomic<bool> closed_{false};
 };
 

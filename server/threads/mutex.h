@@ -50,6 +50,8 @@ class TS_SCOPED_CAPABILITY Guard {
   explicit Guard(Lockable& lockable) TS_ACQUIRE(lockable) : lockable_(lockable) {
     lockable_.lock();
   }
+  /// Takes over what the caller holds.
+  Guard(Lockable& lockable, std::adopt_lock_t) TS_REQUIRES(lockable) : lockable_(lockable) {}
   ~Guard() TS_RELEASE() {
     if (held_) lockable_.unlock();
   }
@@ -70,6 +72,8 @@ class TS_SCOPED_CAPABILITY Guard {
 };
 template <class Lockable>
 Guard(Lockable&) -> Guard<Lockable>;
+template <class Lockable>
+Guard(Lockable&, std::adopt_lock_t) -> Guard<Lockable>;
 
 /// Waits may end early: test the condition in a loop.
 class Condition {

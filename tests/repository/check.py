@@ -30,7 +30,7 @@ ARROWS = {
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
     "server/fmi": {"math", "model", "solver", "input", "simulation"},
     "server/mbdyn": {"math", "model", "elements", "simulation"},
-    "server/peer": {"math", "model", "simulation", "client", "mbdyn", "fmi"},
+    "server/peer": {"math", "model", "simulation", "client", "mbdyn", "fmi", "threads"},
     "server/cli": {"mbdyn", "math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/wire": {"math", "model", "solver", "simulation", "mbcosim"},
     "server/threads": set(),
@@ -41,8 +41,8 @@ ARROWS = {
     "server/results": {"files", "output", "threads", "wire", "mbcosim"},
     "server/service": {"math", "model", "simulation", "input", "reduction", "coupling", "durable", "results", "rpc", "threads", "wire", "mbcosim",
                        "shared_memory", "mbdyn"},
-    "server/client": {"mbcosim", "shared_memory", "wire"},
-    "server/shared_memory": set(),
+    "server/client": {"mbcosim", "shared_memory", "threads", "wire"},
+    "server/shared_memory": {"threads"},
     "server/http": {"service", "rpc", "threads", "wire", "mbcosim"},
     "server/view": {"client"},
     "server/sessions": {"client"},
@@ -73,6 +73,15 @@ def arrows(root):
         for other in re.findall(r'^#include "elements/([a-z_]+)/', path.read_text(encoding="utf-8"), re.MULTILINE):
             if family != "elements" and other not in FAMILY_ARROWS.get(family, set()) | {family}:
                 yield f"{path.relative_to(root)} includes \"elements/{other}/…\": a family of elements knows no other"
+
+
+def locks(root):
+    """Of locks below server/ that clang's analysis (repository.thread_safety) does not see."""
+    plain = re.compile(r"std::(\w*mutex|condition_variable\w*)\b")
+    for path in sources(root / "server", ".h", ".cpp"):
+        found = plain.search(path.read_text(encoding="utf-8"))
+        if found and path != root / "server" / "threads" / "mutex.h":
+            yield f"{path.relative_to(root)} uses {found.group()}: take the annotated locks of threads/mutex.h"
 
 
 def leads_its_source(header):
@@ -128,6 +137,7 @@ def layout(root):
     yield from names(root)
     yield from references(root)
     yield from bounds_on_time(root)
+    yield from locks(root)
     if "-DMBCOSIM_" in (root / "client_examples" / "quickstart.sh").read_text():
         yield "quickstart.sh sets options of the build folder that tests/run.sh uses, too"
     if not shutil.which("git"):
