@@ -294,7 +294,9 @@ struct PeerOptions {
   /// The peer's units: the server converts all that crosses the port, times and derivatives too.
   /// The deck's must be declared. None: the deck's.
   std::optional<Units> units = {};
-  StepEnded step_ended = {};  ///< called by the thread that reads: `next`, or the peer's own
+  /// Called by the thread that reads: `next`, or the peer's own, which ends with Peer::error when
+  /// this throws.
+  StepEnded step_ended = {};
 };
 
 /// What crosses a port, as the server said at the handshake.

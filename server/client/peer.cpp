@@ -346,17 +346,33 @@ void Peer::Impl::reject(const Reject& rejection) {
 
 void Peer::Impl::serve(Answer function) {
   thread = std::thread([this, function = std::move(function)] {
-    Motion motion;
-    while (next(motion)) {
-      try {
-        answer(function(motion));
-      } catch (const Reject& rejection) {
-        reject(rejection);
-      } catch (const std::exception& error) {
-        fail(error.what());
-      }
+    try {
+      answer_all(function);
+    } catch (const std::exception& error) {
+      give_up(error.what());
+    } catch (...) {
+      give_up("something was thrown that is no exception");
     }
   });
+}
+
+void Peer::Impl::answer_all(const Answer& function) {
+  Motion motion;
+  while (next(motion)) {
+    try {
+      answer(function(motion));
+    } catch (const Reject& rejection) {
+      reject(rejection);
+    } catch (const std::exception& error) {
+      fail(error.what());
+    }
+  }
+}
+
+void Peer::Impl::give_up(const std::string& why) {
+  blame(Error("the peer's own code failed: " + why, static_cast<int>(grpc::StatusCode::ABORTED), "",
+              {}));
+  wire->cancel();
 }
 
 void Peer::Impl::close() {

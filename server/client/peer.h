@@ -25,6 +25,8 @@ struct Peer::Impl {
   void fail(const std::string& why);
   void reject(const Reject& rejection);
   void serve(Answer answer);  ///< in a thread of its own
+  void answer_all(const Answer& answer);
+  void give_up(const std::string& why);  ///< after an exception of the program's
   void start_heart(const PeerOptions& options);
   void beat(double beats, double limit);
   bool stops_within(std::chrono::steady_clock::duration time) TS_REQUIRES(heart_mutex);

@@ -199,6 +199,22 @@ TEST_P(Coupled, PeersHearHowImplicitStepsEnd) {
   EXPECT_GE(accepted.size(), 10u);
 }
 
+TEST_P(Coupled, AThrowingStepEndedEndsThePeerAndNotTheProgram) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body("1.e-2"), with_port());
+  PeerOptions options = this->options();
+  options.mode = Mode::tight;
+  options.step_ended = [](bool, std::int64_t, double) {
+    throw std::runtime_error("the log is full");
+  };
+  const Peer peer = simulation.couple("spring", spring, options);
+  EXPECT_FALSE(simulation.step(1000).ok());  // it takes part in one, or in few
+  for (int look = 0; look < 3000 && !peer.error(); ++look)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ASSERT_TRUE(peer.error());
+  EXPECT_STREQ(peer.error()->what(), "the peer's own code failed: the log is full");
+}
+
 TEST_P(Coupled, OptionsOfTheExchange) {
   Server server = connect();
   LoadOptions load;
