@@ -66,6 +66,7 @@ int main(int argc, char** argv) {
   mallopt(M_ARENA_MAX, static_cast<int>(std::max(2u, std::thread::hardware_concurrency())));
 
   signal(SIGXFSZ, SIG_IGN);  // a file that must not grow is an error of the write
+  signal(SIGPIPE, SIG_IGN);  // so is a reader of the log that has gone
 
   const sigset_t signals = blocked_signals();
   try {

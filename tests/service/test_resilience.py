@@ -80,6 +80,24 @@ def test_leases_that_end_while_simulations_are_deleted(start_daemon):
     assert "uncaught" not in daemon.log()
 
 
+def test_a_reader_of_the_log_that_leaves_ends_nobody(tmp_path):
+    address = f"unix:{tmp_path}/socket"
+    with subprocess.Popen([os.path.join(BIN, "mbcosimd"), "--listen", address], stderr=subprocess.PIPE) as daemon:
+        try:
+            assert b"listening" in daemon.stderr.readline()
+            daemon.stderr.close()
+            with mbcosim.connect(address, timeout=30 * TIME_FACTOR) as server:
+                for _ in range(3):  # each is a line of the log
+                    with pytest.raises(mbcosim.NotFound):
+                        server.attach("simulations/none")
+                with server.load_text(decks.body()) as simulation:
+                    assert simulation.step(10).step == 10
+            daemon.terminate()
+            assert daemon.wait(30 * TIME_FACTOR) == 0
+        finally:
+            daemon.kill()
+
+
 # ---------------------------------------------------------------- uploads
 
 def test_half_an_upload_makes_nothing(server, daemon):
