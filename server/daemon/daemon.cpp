@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <grpcpp/grpcpp.h>
+#include <grpcpp/resource_quota.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -9,6 +10,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -77,6 +79,17 @@ void add_channel_arguments(grpc::ServerBuilder& builder, const ServiceLimits& li
   // this bound, which holds for Unix sockets, too, where connections cannot be told apart.
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 10000);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, limits.connection_calls + 32);
+}
+
+/// What gRPC keeps of messages that have not come whole: they are counted only when they have, and
+/// a thousand of them may be under way over one connection. Beyond this it breaks streams off,
+/// anybody's: the last resort before the system ends the daemon.
+void bound_messages(grpc::ServerBuilder& builder, const ServiceLimits& limits) {
+  constexpr std::int64_t kPart = 2, kMessages = 4;
+  const std::int64_t least = kMessages * limits.message_bytes;
+  grpc::ResourceQuota quota("messages");
+  quota.Resize(static_cast<std::size_t>(std::max(limits.memory_bytes / kPart, least)));
+  builder.SetResourceQuota(quota);
 }
 
 int worker_count(int wanted) {
@@ -252,6 +265,7 @@ void Daemon::listen() {
   grpc::EnableDefaultHealthCheckService(false);
   grpc::ServerBuilder builder;
   add_channel_arguments(builder, config_.limits);
+  bound_messages(builder, config_.limits);
   for (const std::string& address : config_.listen) check_listener(address);
   std::vector<std::unique_ptr<Listener::Acceptor>> acceptors;
   for (const std::string& address : config_.listen) {

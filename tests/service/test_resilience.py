@@ -12,6 +12,7 @@ import pytest
 import decks
 import mbcosim
 from conftest import BIN, TIME_FACTOR, wait_for
+from half_messages import HalfMessages
 from mbcosim.v1 import coupling_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
 
 TOKENS = ("ann-token-0123456789 control ann\nbob-token-0123456789 control bob\n"
@@ -356,6 +357,29 @@ def test_a_daemon_without_file_descriptors_goes_on_serving_who_is_connected(star
         wait_for(lambda: is_found_healthy(daemon))
         with daemon.connect() as other:
             assert len(other.list()) == 2
+
+
+# ---------------------------------------------------------------- memory
+
+def resident(daemon):
+    """Bytes."""
+    with open(f"/proc/{daemon.process.pid}/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
+def test_messages_that_never_come_whole_take_bounded_memory(start_daemon):
+    """Health is open to anybody; 100 messages of 16 MB are begun there, of which nearly all comes."""
+    daemon = ready(start_daemon("--limit-memory", "128M"))
+    before = resident(daemon)
+    half = HalfMessages(daemon.address[len("unix:"):], "/grpc.health.v1.Health/Check", 100, claimed=(16 << 20) - 100, sent=15 << 20)
+    try:
+        left = half.push(20)
+        assert left < 100 and half.sent > 60 << 20
+        assert resident(daemon) - before < 250 << 20
+    finally:
+        half.close()
+    with daemon.connect() as server, server.load_text(decks.body()) as simulation:
+        assert simulation.step(10).step == 10
 
 
 # ---------------------------------------------------------------- everything ends in time
