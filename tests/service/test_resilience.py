@@ -374,8 +374,9 @@ def test_messages_that_never_come_whole_take_bounded_memory(start_daemon):
     half = HalfMessages(daemon.address[len("unix:"):], "/grpc.health.v1.Health/Check", 100, claimed=(16 << 20) - 100, sent=15 << 20)
     try:
         left = half.push(20)
-        assert left < 100 and half.sent > 60 << 20
-        assert resident(daemon) - before < 700 << 20  # 80 MB, and what a sanitizer keeps of freed memory
+        assert left <= 10 and half.sent > 60 << 20
+        most = (700 << 20) * max(1, TIME_FACTOR / 5)  # 80 MB, and what sanitizers keep of freed memory or beside it
+        assert resident(daemon) - before < most
     finally:
         half.close()
     with daemon.connect() as server, server.load_text(decks.body()) as simulation:
