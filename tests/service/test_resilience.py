@@ -461,6 +461,23 @@ def test_the_daemon_ends_within_its_grace_whatever_runs(start_daemon):
         assert all(call.exception(10) is not None for call in calls)
 
 
+def test_a_daemon_that_chooses_pivots_ends_within_its_grace_and_stores_the_others(start_daemon, tmp_path):
+    """A factorization of many seconds, which can be stopped only where it allocates; a durable simulation beside it."""
+    daemon = ready(start_daemon("--state-dir", str(tmp_path)))
+    with daemon.connect() as server, grpc.insecure_channel(daemon.address) as channel:
+        name = server.load_text(decks.body()).name
+        server.attach(name).step(100)
+        before = cpu_of(daemon)
+        call = simulations_pb2_grpc.SimulationsStub(channel).CreateSimulation.future(iter(upload(decks.cube(14), durability=1)))
+        wait_for(lambda: cpu_of(daemon) - before > 2, 60)
+        start = time.monotonic()
+        daemon.stop()
+        assert time.monotonic() - start < (1 + 2) * TIME_FACTOR  # the grace, and a second for what computes
+        assert call.exception(10) is not None
+    with ready(start_daemon("--state-dir", str(tmp_path))).connect() as server:
+        assert [(s.name, s.step) for s in server.list()] == [(name, 100)]
+
+
 def test_analyses_of_one_client_starve_no_small_simulation(guarded):
     daemon = guarded()
     with grpc.insecure_channel(daemon.address) as channel:
