@@ -294,6 +294,11 @@ struct PeerOptions {
   /// The peer's units: the server converts all that crosses the port, times and derivatives too.
   /// The deck's must be declared. None: the deck's.
   std::optional<Units> units = {};
+  /// Of a peer that comes back: the step at whose end it stands (`Peer::step`). A simulation that
+  /// stands at an earlier one refuses it (PEER_AHEAD), unless it can go back.
+  std::optional<std::int64_t> step = {};
+  /// The peer takes the state that it had at step `Peer::step` before it answers.
+  bool can_go_back = false;
   /// Called by the thread that reads: `next`, or the peer's own, which ends with Peer::error when
   /// this throws.
   StepEnded step_ended = {};
@@ -329,6 +334,10 @@ class Peer {
   /// The step must not be done; it ends with Outcome::rejected_by_peer.
   void reject(const Reject& rejection);
   std::int64_t exchanges() const;
+  /// Number of the step at whose end the peer stands: of the last exchange that it answered, in
+  /// implicit modes of the last step that was accepted; before that where it attached. To be told
+  /// when it attaches again.
+  std::int64_t step() const;
   const PortLayout& layout() const;
   /// Ends a `next` that waits, from any thread; the peer can only be closed then.
   void interrupt();

@@ -173,6 +173,8 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   hello.set_simulation(simulation.name());
   hello.set_port(port);
   hello.mutable_expected()->set_model_digest(simulation.model_digest());
+  if (options.step) hello.mutable_expected()->set_step(*options.step);
+  hello.mutable_expected()->set_can_go_back(options.can_go_back);
   if (options.units) *hello.mutable_units() = to_proto(*options.units);
   v1::ExchangeForm* form = hello.mutable_form();
   form->set_rotation_form(to_proto(options.rotation));
@@ -217,6 +219,8 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
   if (impl->wire->write(first) && impl->wire->read(&impl->in)) {
     impl->tangent = options.tangent;
     impl->layout = to_layout(impl->in.welcome().layout());
+    impl->step =
+        std::min(options.step.value_or(impl->in.welcome().step()), impl->in.welcome().step());
     impl->start_heart(options);
     return impl;
   }
@@ -236,11 +240,16 @@ bool Peer::Impl::next(Motion& motion) {
       ++exchanges;
       return true;
     }
-    const bool ended = in.has_accepted() || in.has_rejected();
-    const v1::StepNotice& notice = in.has_accepted() ? in.accepted() : in.rejected();
-    if (ended && step_ended) step_ended(in.has_accepted(), notice.step(), notice.time());
+    if (in.has_accepted()) note(in.accepted(), true);
+    if (in.has_rejected()) note(in.rejected(), false);
   }
   return false;
+}
+
+// Pieces of a step may have been accepted before it is rejected.
+void Peer::Impl::note(const v1::StepNotice& notice, bool accepted) {
+  step = accepted ? notice.step() : std::min(step.load(), notice.step());
+  if (step_ended) step_ended(accepted, notice.step(), notice.time());
 }
 
 void Peer::Impl::answer(const Loads& loads) {
@@ -248,6 +257,7 @@ void Peer::Impl::answer(const Loads& loads) {
   v1::PeerAnswer* answer = out.mutable_exchange()->mutable_answer();
   put(loads, answer);
   put_tangent(loads, tangent, answer);
+  if (in.exchange().iteration() == 0) step = in.exchange().step();
   write(out);
 }
 
@@ -395,6 +405,7 @@ void Peer::answer(const Loads& loads) { impl_->answer(loads); }
 void Peer::fail(const std::string& why) { impl_->fail(why); }
 void Peer::reject(const Reject& rejection) { impl_->reject(rejection); }
 std::int64_t Peer::exchanges() const { return impl_->exchanges; }
+std::int64_t Peer::step() const { return impl_->step; }
 const PortLayout& Peer::layout() const { return impl_->layout; }
 void Peer::interrupt() { impl_->wire->cancel(); }
 void Peer::close() { impl_->close(); }

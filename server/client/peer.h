@@ -32,6 +32,7 @@ struct Peer::Impl {
   bool stops_within(std::chrono::steady_clock::duration time) TS_REQUIRES(heart_mutex);
   void stop_heart() TS_EXCLUDES(heart_mutex);
   bool read();
+  void note(const v1::StepNotice& notice, bool accepted);
   void end();                                               ///< learns how the stream has ended
   void blame(const Error& error) TS_EXCLUDES(blame_mutex);  ///< the first counts
   void write(const v1::PeerMessage& message) TS_EXCLUDES(write_mutex);
@@ -51,6 +52,7 @@ struct Peer::Impl {
   server::Condition stop;
   bool stopping TS_GUARDED_BY(heart_mutex) = false;
   std::atomic<std::int64_t> exchanges{0};
+  std::atomic<std::int64_t> step{0};  ///< at whose end the peer stands
   std::atomic<bool> ended{false};
   mutable server::Mutex blame_mutex;
   std::optional<Error> failure TS_GUARDED_BY(blame_mutex);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "wire/convert.h"
 #include "wire/refusal.h"
@@ -18,8 +19,21 @@ class Mismatches {
   void expect(bool fits, const char* what, const std::string& text) {
     if (!fits) found_[what] = text;
   }
+  /// The peer stands at a later step than the simulation, and cannot go back.
+  void expect_no_later(std::int64_t peers, std::int64_t step, const std::string& port) {
+    if (peers <= step) return;
+    const std::string at = std::to_string(step), peers_at = std::to_string(peers);
+    const std::string text =
+        "the peer stands at step " + peers_at + ", the simulation at step " + at;
+    found_["step"] = text;
+    ahead_.emplace(v1::REASON_PEER_AHEAD,
+                   "port \"" + port + "\": " + text + ": take the peer back to step " + at +
+                       " and attach it with `can_go_back`, or attach one that begins there",
+                   std::map<std::string, std::string>{{"step", at}, {"peer_step", peers_at}});
+  }
   void refuse_if_any(const std::string& port) const {
     if (found_.empty()) return;
+    if (ahead_ && found_.size() == 1) throw Refusal(*ahead_);
     std::string text = "the handshake does not fit port \"" + port + "\":";
     for (const auto& [what, detail] : found_) text += " " + what + ": " + detail + ";";
     text.pop_back();
@@ -32,6 +46,7 @@ class Mismatches {
 
  private:
   std::map<std::string, std::string> found_;
+  std::optional<Refusal> ahead_;  ///< told when nothing else is wrong
 };
 
 Acceleration acceleration_of(v1::Acceleration wanted) {
@@ -63,11 +78,22 @@ bool agrees(const Wanted& wanted, const Have& have) {
   return wanted.empty() || std::equal(wanted.begin(), wanted.end(), have.begin(), have.end());
 }
 
-void check_expected(const v1::PeerExpectation& expected, const v1::PortLayout& layout,
-                    const std::string& digest, double step_size, Mismatches& mismatches) {
+void check_simulation(const v1::PeerExpectation& expected, const Expected& simulation,
+                      const std::string& port, Mismatches& mismatches) {
+  mismatches.expect(expected.model_digest().empty() || expected.model_digest() == simulation.digest,
+                    "model_digest",
+                    "the model has " + simulation.digest + ", the peer expects " +
+                        expected.model_digest().substr(0, 32));
   mismatches.expect(
-      expected.model_digest().empty() || expected.model_digest() == digest, "model_digest",
-      "the model has " + digest + ", the peer expects " + expected.model_digest().substr(0, 32));
+      !expected.has_step_size() ||
+          std::abs(expected.step_size() - simulation.step_size) <= 1e-9 * simulation.step_size,
+      "step_size", "the next step has " + std::to_string(simulation.step_size));
+  mismatches.expect(expected.step() >= 0, "step", "must not be negative");
+  if (!expected.can_go_back()) mismatches.expect_no_later(expected.step(), simulation.step, port);
+}
+
+void check_layout(const v1::PeerExpectation& expected, const v1::PortLayout& layout,
+                  Mismatches& mismatches) {
   mismatches.expect(
       expected.kind() == v1::PORT_KIND_UNSPECIFIED || expected.kind() == layout.kind(), "kind",
       "the port's is " + v1::PortKind_Name(layout.kind()));
@@ -83,9 +109,6 @@ void check_expected(const v1::PeerExpectation& expected, const v1::PortLayout& l
   mismatches.expect(!expected.has_input_size() || expected.input_size() == layout.input_size(),
                     "input_size",
                     "the port takes " + std::to_string(layout.input_size()) + " signals");
-  mismatches.expect(
-      !expected.has_step_size() || std::abs(expected.step_size() - step_size) <= 1e-9 * step_size,
-      "step_size", "the next step has " + std::to_string(step_size));
 }
 
 void check_form(const v1::ExchangeForm& form, const PortModel& port, Mismatches& mismatches) {
@@ -208,8 +231,7 @@ Agreement choose(const v1::Hello& hello, const PortModel& port) {
 
 }  // namespace
 
-Agreement agree(const v1::Hello& hello, const PortModel& port, const std::string& digest,
-                double step_size) {
+Agreement agree(const v1::Hello& hello, const PortModel& port, const Expected& simulation) {
   Mismatches mismatches;
   const v1::VersionRange& range = hello.protocol();
   const bool any = range.lowest() == 0 && range.highest() == 0;
@@ -217,8 +239,10 @@ Agreement agree(const v1::Hello& hello, const PortModel& port, const std::string
       any || (range.lowest() <= kProtocolVersion && range.highest() >= kProtocolVersion),
       "protocol", version_mismatch(range));
   const auto units = conversion_of(hello, port, mismatches);
-  const double peers_step = units ? step_size * units->time() : step_size;
-  check_expected(hello.expected(), port.layout(), digest, peers_step, mismatches);
+  Expected in_peers_units = simulation;
+  if (units) in_peers_units.step_size *= units->time();
+  check_simulation(hello.expected(), in_peers_units, hello.port(), mismatches);
+  check_layout(hello.expected(), port.layout(), mismatches);
   check_form(hello.form(), port, mismatches);
   check_schedule(hello.schedule(), mismatches);
   check_iteration(hello.iteration(), mismatches);

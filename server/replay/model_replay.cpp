@@ -162,8 +162,9 @@ class ModelReplay {
     Port& port = session_.port(entry.port());
     v1::Hello hello = entry.from_peer().hello();
     hello.mutable_expected()->clear_step_size();
+    hello.mutable_expected()->clear_step();
     Agreement agreement =
-        server::agree(hello, port.model(), digest_text(session_.model().digest), 0);
+        server::agree(hello, port.model(), {digest_text(session_.model().digest)});
     agreement.timeout = std::chrono::milliseconds(20);  // who did not answer then does not now
     if (agreement.policy == v1::PEER_POLICY_WAIT) agreement.policy = v1::PEER_POLICY_FAIL_STEP;
     auto& peer = peers_[entry.port()];

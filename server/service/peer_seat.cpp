@@ -42,7 +42,7 @@ PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& cal
   v1::SimulationInfo info;
   session_->fill(&info);
   const Agreement agreement =
-      agree(hello, port_.model(), info.model_digest(), info.next_step_size());
+      agree(hello, port_.model(), {info.model_digest(), info.step(), info.next_step_size()});
   heart_.emplace(link, port_, agreement);
   port_.reserve(agreement);
   v1::Welcome* welcome = welcome_.mutable_welcome();

@@ -144,6 +144,7 @@ grpc::StatusCode code_of(v1::Reason reason) {
     case v1::REASON_OUT_OF_TURN:
     case v1::REASON_PORT_TAKEN:
     case v1::REASON_PORT_MISMATCH:
+    case v1::REASON_PEER_AHEAD:
     case v1::REASON_NOT_RECORDING:
     case v1::REASON_NO_RESULTS:
     case v1::REASON_NOT_DURABLE:

@@ -50,7 +50,7 @@ class Bench:
         self.address, self.transport = address, transport
         self._channel = grpc.insecure_channel(address)
         self.stub = simulations_pb2_grpc.SimulationsStub(self._channel)
-        self._wires = []
+        self._wires, self.left = [], False
 
     def __enter__(self):
         header = simulations_pb2.UploadHeader(bundle_main_file="deck")
@@ -94,12 +94,26 @@ class Bench:
 
     def attach(self, **fields):
         """A wire after its handshake, and the welcome."""
-        wire = self.wire()
-        wire.send(self.hello(**fields))
-        message = wire.receive(WAIT)
+        wire, message = self.greet(**fields)
         require(message not in (None, END), f"a good `hello` is answered by {wire.status or 'nothing'}")
         require(message.WhichOneof("content") == "welcome", f"the first message is `{message.WhichOneof('content')}`")
         return wire, message.welcome
+
+    def greet(self, **fields):
+        """A wire and what answers its `hello`; again while a peer that has just gone is still taken for there."""
+        end = time.monotonic() + WAIT
+        while True:
+            wire = self.wire()
+            wire.send(self.hello(**fields))
+            message = wire.receive(WAIT)
+            if not self.left or message is not END or wire.status.reason != "PORT_TAKEN" or time.monotonic() > end:
+                return wire, message
+            time.sleep(0.02)
+
+    def leave(self, wire):
+        """The peer goes, and the next one may come before the server knows."""
+        wire.close()
+        self.left = True
 
     def refused(self, first, reasons, code):
         wire = self.wire()
@@ -370,6 +384,23 @@ def port_taken(bench):
     stepping.result("ACCEPTED")
 
 
+def where_it_stands(bench):
+    wire, _ = bench.attach(step=0)
+    stepping = bench.step(2)
+    for _ in range(2):
+        answer(wire, exchange(wire).index)
+    stepping.result("ACCEPTED")
+    bench.leave(wire)
+    ahead, message = bench.greet(step=7)
+    require(message is END and ahead.status.reason == "PEER_AHEAD" and ahead.status.code == grpc.StatusCode.FAILED_PRECONDITION.value[0],
+            f"a peer at step 7 of a simulation at step 2 is answered by {ahead.status or message}, expected PEER_AHEAD")
+    require(ahead.status.metadata.get("step") == "2", f"the refusal's `step` is {ahead.status.metadata.get('step')}, the simulation stands at 2")
+    for told in ({"step": 7, "can_go_back": True}, {"step": 2}, {"step": 1}):
+        wire, welcome = bench.attach(**told)
+        require(welcome.step == 2, f"`Welcome.step` is {welcome.step} at step 2")
+        bench.leave(wire)
+
+
 def late_peer(bench):
     wire, _ = bench.attach(timeout=0.3)
     start, stepping = time.monotonic(), bench.step()
@@ -396,6 +427,7 @@ CHECKS = {
     "answer in advance": wrong_answer(*TURN, offset=1), "answer without a number": wrong_answer(*TURN, offset=-1),
     "answer twice": wrong_answer(*TURN, repeat=2), "first message": not_hello_first, "hello twice": hello_twice,
     "versions": versions, "mismatches": mismatches, "unknown names": names, "port taken": port_taken, "late peer": late_peer,
+    "where a peer stands": where_it_stands,
 }
 
 

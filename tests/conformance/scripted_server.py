@@ -28,7 +28,7 @@ FAULTS = [
     "not a number is taken", "answers in advance are taken", "answers are taken twice", "waits for ever", "labels in another order",
     "negative quaternion", "refuses without a reason", "a second peer is let in", "first mismatch only", "heartbeats end the stream",
     "no notice of rejection", "any version is spoken", "accelerations unasked", "two exchanges at once", "rejections are ignored",
-    "preference untold", "estimate untold", "lengths are ignored",
+    "preference untold", "estimate untold", "lengths are ignored", "a peer ahead is let in", "a peer that goes back is refused",
 ]
 
 
@@ -317,6 +317,13 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
             told = dict([wrong.popitem()]) if self.fault == "first mismatch only" else wrong
             raise Refused(grpc.StatusCode.FAILED_PRECONDITION, "PORT_MISMATCH", "the handshake does not fit", told)
 
+    def _check_step(self, expected, session):
+        goes_back = expected.can_go_back and self.fault != "a peer that goes back is refused"
+        if expected.step <= session.k or goes_back or self.fault == "a peer ahead is let in":
+            return
+        raise Refused(grpc.StatusCode.FAILED_PRECONDITION, "PEER_AHEAD", f"the simulation stands at step {session.k}",
+                      {"step": str(session.k), "peer_step": str(expected.step)})
+
     def _attach(self, hello):
         session = self.sessions.get(hello.simulation)
         if session is None:
@@ -324,6 +331,7 @@ class ScriptedServer(simulations_pb2_grpc.SimulationsServicer, coupling_pb2_grpc
         if hello.port != "p":
             raise Refused(grpc.StatusCode.NOT_FOUND, "NO_SUCH_PORT", "no such port")
         self._welcome(hello)
+        self._check_step(hello.expected, session)
         if session.peer and not session.peer.gone and self.fault != "a second peer is let in":
             raise Refused(grpc.StatusCode.FAILED_PRECONDITION, "PORT_TAKEN", "a peer is attached already")
         session.peer, session.in_flight = Attached(hello), False

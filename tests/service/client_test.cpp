@@ -458,6 +458,41 @@ TEST_P(Coupled, RefusalsTellWhatIsWrong) {
   EXPECT_EQ(refused("spring", options()), "PORT_TAKEN");
 }
 
+TEST_P(Coupled, APeerThatIsAheadIsRefusedUnlessItCanGoBack) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  {
+    const Peer peer = simulation.couple("spring", spring, options());
+    EXPECT_EQ(peer.step(), 0);
+    EXPECT_TRUE(simulation.step(3).ok());
+    EXPECT_EQ(peer.step(), 2) << "the last exchange that it answered";
+  }
+  PeerOptions ahead = options();
+  ahead.step = 7;
+  try {
+    simulation.attach("spring", ahead);
+    ADD_FAILURE() << "it was let in";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.reason(), "PEER_AHEAD");
+    EXPECT_EQ(error.metadata().at("step"), "3");
+  }
+  ahead.can_go_back = true;
+  {
+    const Peer back = simulation.couple("spring", spring, ahead);
+    EXPECT_EQ(back.step(), 3);
+    EXPECT_TRUE(simulation.step().ok());
+  }
+  PeerOptions behind = options();
+  behind.step = 1;
+  behind.mode = Mode::tight;
+  const Peer late = simulation.couple("spring", spring, behind);
+  EXPECT_EQ(late.step(), 1);
+  EXPECT_TRUE(simulation.step(2).ok());
+  const auto end = std::chrono::steady_clock::now() + mbcosim::stretched(10);
+  while (late.step() != 6 && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+  EXPECT_EQ(late.step(), 6) << "the last step accepted";
+}
+
 TEST_P(Coupled, AnAnswerOfTheWrongLengthEndsThePeer) {
   Server server = connect();
   Simulation simulation = server.load_text(body(), with_port());

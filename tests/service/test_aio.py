@@ -70,6 +70,22 @@ def test_a_peer_that_is_iterated_over(daemon):
     assert run(daemon, body) == [0, 1, 2, 3, 4]
 
 
+def test_a_peer_tells_where_it_stands(daemon):
+    async def body(_, simulation):
+        async with await simulation.couple("spring", spring, step=0) as peer:
+            await simulation.step(3)
+            stands = peer.step
+        refused = None
+        try:
+            await simulation.couple("spring", spring, step=7)
+        except mbcosim.PreconditionFailed as error:
+            refused = error
+        async with await simulation.couple("spring", spring, step=7, can_go_back=True) as back:
+            return stands, refused.reason, dict(refused.metadata), back.step
+
+    assert run(daemon, body) == (2, "PEER_AHEAD", {"step": "3", "peer_step": "7"}, 3)
+
+
 def test_two_simulations_side_by_side(daemon):
     async def body(server, simulation):
         async with await server.load_text(decks.body(final_time="100.", spin="null"), ports=PORT) as other:

@@ -17,6 +17,7 @@ from test_coupling import PORT, spring
 HERE = os.path.dirname(os.path.abspath(__file__))
 CONTRACT, PROTO = os.path.join(HERE, "..", "contract"), os.path.join(HERE, "..", "..", "proto")
 SETTLED = os.path.join(CONTRACT, "version2.binpb")
+ADDED = os.path.join(CONTRACT, "additions.binpb")  # since then, settled as well
 sys.path.insert(0, CONTRACT)
 import additions  # noqa: E402
 import frozen  # noqa: E402
@@ -33,8 +34,9 @@ def descriptors(tmp_path, folder=PROTO):
 
 # ---------------------------------------------------------------- only additions
 
-def test_the_contract_has_only_grown(tmp_path):
-    assert additions.losses(additions.read(SETTLED), additions.read(descriptors(tmp_path))) == []
+@pytest.mark.parametrize("settled", [SETTLED, ADDED], ids=os.path.basename)
+def test_the_contract_has_only_grown(tmp_path, settled):
+    assert additions.losses(additions.read(settled), additions.read(descriptors(tmp_path))) == []
 
 
 @pytest.mark.parametrize("old, new", [
@@ -354,7 +356,7 @@ def test_a_wrong_choice_at_creation_is_refused_by_its_field(server, options, fie
 @pytest.mark.parametrize("group, field, value", [
     ("schedule", "every", 0), ("schedule", "every", -2), ("iteration", "relaxation", 0.0), ("iteration", "relaxation", 2.0),
     ("iteration", "relaxation", float("nan")), ("iteration", "tolerance", 0.0), ("iteration", "tolerance", float("nan")),
-    ("iteration", "maximum_passes", 0), ("expected", "step_size", 7.0)])
+    ("iteration", "maximum_passes", 0), ("expected", "step_size", 7.0), ("expected", "step", -1)])
 def test_a_wrong_choice_of_a_peer_is_refused_by_name(server, group, field, value):
     from mbcosim import exchange
     with server.load_text(decks.body(), ports=PORT) as simulation:

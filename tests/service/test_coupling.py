@@ -188,6 +188,69 @@ def test_a_second_peer_is_refused(server):
         assert caught.value.reason == "PORT_TAKEN"
 
 
+@pytest.mark.parametrize("mode", ["loose", "staggered", "tight", "window"])
+def test_a_peer_knows_the_step_that_it_stands_at(server, mode):
+    with oscillator(server) as simulation:
+        simulation.step(0)
+        with simulation.couple("spring", spring, mode=mode) as peer:
+            assert peer.step == 0
+            simulation.step(5)
+            wait_for(lambda: peer.step == (4 if mode == "loose" else 5))
+        wait_for(lambda: not simulation.describe().ports[0].has_peer)
+        with simulation.couple("spring", spring, mode=mode) as fresh:
+            assert fresh.step == 5
+
+
+def test_a_peer_that_rejects_a_step_stays_where_it_is(server):
+    def reluctant(motion):
+        if motion.step == 2:
+            raise mbcosim.Reject(1e-4)
+        return spring(motion)
+
+    with oscillator(server) as simulation, simulation.couple("spring", reluctant) as peer:
+        simulation.step(2)
+        with pytest.raises(mbcosim.StepFailed):
+            simulation.step()
+        assert peer.step == 1
+
+
+def _after(server, steps):
+    """A simulation that has done so many steps, its port free."""
+    simulation = oscillator(server)
+    with simulation.couple("spring", spring):
+        simulation.step(steps)
+    wait_for(lambda: not simulation.describe().ports[0].has_peer)
+    return simulation
+
+
+@pytest.mark.parametrize("mode", ["loose", "staggered", "tight", "window"])
+def test_a_peer_that_stands_later_than_the_simulation_is_refused(server, mode):
+    with _after(server, 3) as simulation:
+        with pytest.raises(mbcosim.PreconditionFailed) as caught:
+            simulation.couple("spring", spring, mode=mode, step=7)
+        assert caught.value.reason == "PEER_AHEAD" and caught.value.metadata == {"step": "3", "peer_step": "7"}
+        assert str(caught.value) == ('port "spring": the peer stands at step 7, the simulation at step 3: take the peer back to step 3 and attach '
+                                     'it with `can_go_back`, or attach one that begins there')
+        with simulation.couple("spring", spring, mode=mode):  # the port is free
+            assert simulation.step().step == 4
+
+
+@pytest.mark.parametrize("told, stands", [({"step": 0}, 0), ({"step": 2}, 2), ({"step": 3}, 3), ({}, 3), ({"step": 9, "can_go_back": True}, 3),
+                                          ({"step": 1, "can_go_back": True}, 1)], ids=str)
+def test_a_peer_that_stands_there_or_before_or_can_go_back_goes_on(server, told, stands):
+    with _after(server, 3) as simulation, simulation.couple("spring", spring, **told) as peer:
+        assert (peer.step, peer.welcome.step) == (stands, 3)
+        assert simulation.step().step == 4 and peer.step == 3
+
+
+def test_a_step_among_other_mismatches_is_told_with_them(server):
+    with _after(server, 1) as simulation:
+        with pytest.raises(mbcosim.PreconditionFailed) as caught:
+            simulation.couple("spring", spring, frame="reference", step=2)
+        assert caught.value.reason == "PORT_MISMATCH" and set(caught.value.metadata) == {"frame", "step"}
+        assert caught.value.metadata["step"] == "the peer stands at step 2, the simulation at step 1"
+
+
 def test_every_mismatch_is_told_at_once(server):
     with oscillator(server) as simulation:
         simulation.info.model_digest = "0" * 16

@@ -457,6 +457,55 @@ def test_a_peer_that_does_not_answer_holds_up_no_other_checkpoint(start, folder)
             assert waiting.refresh().step == 1
 
 
+def pull(motion):
+    return -30.0 * motion.x
+
+
+@pytest.mark.parametrize("mode", ["loose", "staggered", "tight", "window"])
+def test_a_peer_ahead_of_what_came_back_is_refused_and_one_that_goes_back_goes_on(start, folder, mode):
+    daemon, ports = start("--checkpoint-interval", "3600"), [mbcosim.structural_port("spring", nodes=[1])]
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), ports=ports, checkpoint_steps=10)
+        name = simulation.name
+        with simulation.couple("spring", pull, mode=mode) as peer:
+            simulation.step(10)
+            wait_for(lambda: on_disk(folder, name) == 10)
+            simulation.step(6)
+            wait_for(lambda: peer.step == (15 if mode == "loose" else 16))
+            kill(daemon)
+    with start().connect() as server:
+        again = server.attach(name)
+        with pytest.raises(mbcosim.PreconditionFailed, match=f"the peer stands at step {peer.step}, the simulation at step 10") as caught:
+            again.couple("spring", pull, mode=mode, step=peer.step)
+        assert caught.value.reason == "PEER_AHEAD" and again.refresh().step == 10
+        with again.couple("spring", pull, mode=mode, step=peer.step, can_go_back=True) as back:
+            assert back.step == back.welcome.step == 10
+            again.step(20)
+        with server.load_text(deck(), ports=ports, durability="none") as straight, straight.couple("spring", pull, mode=mode):
+            straight.step(30)
+            assert bits(straight) == bits(again)
+
+
+@pytest.mark.parametrize("mode", ["loose", "staggered", "tight", "window"])
+def test_a_peer_of_a_journaled_simulation_is_never_ahead(start, folder, mode):
+    daemon, ports = start("--checkpoint-interval", "3600"), [mbcosim.structural_port("spring", nodes=[1])]
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), ports=ports, durability="journal")
+        name = simulation.name
+        with simulation.couple("spring", pull, mode=mode) as peer:
+            simulation.step(6)
+            wait_for(lambda: peer.step == (5 if mode == "loose" else 6))
+            kill(daemon)
+    with start().connect() as server:
+        again = server.attach(name)
+        with again.couple("spring", pull, mode=mode, step=peer.step) as back:
+            assert (back.step, back.welcome.step) == (peer.step, 6)
+            assert again.step().step == 7
+        wait_for(lambda: not again.describe().ports[0].has_peer)
+        with again.couple("spring", pull, mode=mode, step=2):  # one that has missed some
+            assert again.step().step == 8
+
+
 def test_long_suspended_ones_are_removed(start, folder):
     daemon = start()
     with daemon.connect() as server:

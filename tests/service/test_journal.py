@@ -121,7 +121,7 @@ class Spring:
         return [-100.0 * np.asarray(motion.x[0]) * (1 + 1e-3 * motion.step)]
 
     def couple(self, simulation):
-        return simulation.couple("spring", self.answer, **self.options)
+        return simulation.couple("spring", self.answer, step=self.seen, **self.options)  # or it is refused
 
 
 COUPLINGS = [{"mode": "loose"}, {"mode": "loose", "every": 3, "hold": "quadratic"}, {"mode": "staggered"},
