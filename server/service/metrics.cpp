@@ -77,6 +77,8 @@ Metrics::Metrics()
       created_(counter(*registry_, "mbcosim_simulations_created_total", "Simulations created")),
       steps_(counter(*registry_, "mbcosim_steps_total", "Steps accepted")),
       iterations_(counter(*registry_, "mbcosim_iterations_total", "Linear solutions in steps")),
+      factorizations_(
+          counter(*registry_, "mbcosim_factorizations_total", "Matrices factored in steps")),
       dropped_(counter(*registry_, "mbcosim_samples_dropped_total",
                        "Samples that subscribers did not read in time")),
       checkpoint_bytes_(
@@ -139,11 +141,12 @@ std::string Metrics::text() const {
   return prometheus::TextSerializer().Serialize(families);
 }
 
-void Metrics::count_advance(std::int64_t steps, std::int64_t iterations, double solver_seconds) {
-  if (steps <= 0) return;
-  steps_->Increment(static_cast<double>(steps));
-  iterations_->Increment(static_cast<double>(iterations));
-  advance_seconds_->Observe(solver_seconds / static_cast<double>(steps));
+void Metrics::count_advance(const v1::StepReply& reply, std::int64_t factorizations) {
+  const auto steps = static_cast<double>(reply.steps_done());
+  steps_->Increment(steps);
+  iterations_->Increment(static_cast<double>(reply.total_iterations()));
+  factorizations_->Increment(static_cast<double>(factorizations));
+  if (steps > 0) advance_seconds_->Observe(reply.solver_seconds() / steps);
 }
 
 void Metrics::count_failure(v1::Reason reason) {

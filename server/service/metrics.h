@@ -14,6 +14,7 @@
 #include <string>
 
 #include "mbcosim/v1/common.pb.h"
+#include "mbcosim/v1/simulations.pb.h"
 #include "rpc/lanes.h"
 
 namespace mbcosim::server {
@@ -36,7 +37,7 @@ class Metrics {
   /// All of them in Prometheus' text format.
   std::string text() const;
 
-  void count_advance(std::int64_t steps, std::int64_t iterations, double solver_seconds);
+  void count_advance(const v1::StepReply& reply, std::int64_t factorizations);
   void count_failure(v1::Reason reason);
   void count_created() { created_->Increment(); }
   /// A coupled step waited so long for its peers [s], in so many exchanges for `exchange_seconds`.
@@ -58,8 +59,8 @@ class Metrics {
   std::unique_ptr<prometheus::Exposer> exposer_;
   prometheus::Family<prometheus::Counter>& failures_;
   std::array<prometheus::Histogram*, kLanes> queue_seconds_{};
-  prometheus::Counter *created_, *steps_, *iterations_, *dropped_, *checkpoint_bytes_,
-      *journal_bytes_;
+  prometheus::Counter *created_, *steps_, *iterations_, *factorizations_, *dropped_,
+      *checkpoint_bytes_, *journal_bytes_;
   prometheus::Histogram *advance_seconds_, *exchange_seconds_, *peer_seconds_, *slot_seconds_,
       *checkpoint_seconds_, *journal_seconds_;
 };

@@ -77,8 +77,7 @@ void Session::step(const v1::StepRequest& request, const Caller& caller, Call& c
     break_off(advance);
     throw;
   }
-  shared_.metrics.count_advance(reply->steps_done(), reply->total_iterations(),
-                                reply->solver_seconds());
+  shared_.metrics.count_advance(*reply, advance.factorizations);
   if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
 }
 
@@ -241,11 +240,13 @@ std::optional<StepReport> Session::attempt(Advance& advance) {
 std::optional<StepReport> Session::counted_step(Advance& advance) {
   MemoryScope scope(shared_.memory, &advance.token);
   std::optional<Result<StepReport>> report;
+  const std::int64_t factored = simulation_->factorizations();
   try {
     report = simulation_->step(advance.choice, &advance.token);
   } catch (const std::bad_alloc&) {  // `scope` knows why
   }
   scope.leave();
+  advance.factorizations += simulation_->factorizations() - factored;
   const auto factor_bytes = static_cast<std::int64_t>(simulation_->factor_bytes());
   memory_.change(factor_bytes - std::exchange(factor_bytes_, factor_bytes));
   if (report && !*report) throw Refusal(report->error());

@@ -21,6 +21,7 @@ struct Session::Advance {
   bool started = false, ended = false;
   bool goes_on = false;  ///< an earlier process, or call, has done some of it
   Clock::time_point start = Clock::now();
+  std::int64_t factorizations = 0;
 
   // --- JOURNAL
   bool unsettled = false;                      ///< something was done that is not on the disk

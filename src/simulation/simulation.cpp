@@ -540,4 +540,8 @@ std::unique_ptr<Simulation> Simulation::fork(const CancelToken* cancel) const tr
 
 std::size_t Simulation::factor_bytes() const { return impl_->stepper.factor_bytes(); }
 
+std::int64_t Simulation::factorizations() const {
+  return impl_->inverse ? impl_->inverse->factorizations() : impl_->stepper.factorizations();
+}
+
 }  // namespace mbcosim

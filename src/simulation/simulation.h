@@ -194,6 +194,8 @@ class Simulation {
   std::unique_ptr<Simulation> fork(const CancelToken* cancel = nullptr) const;
   /// Memory that factorizations take [bytes]; it may change with a step.
   std::size_t factor_bytes() const;
+  /// Matrices that iterations have factored since this object was made.
+  std::int64_t factorizations() const;
 
  private:
   struct Impl;

@@ -440,8 +440,9 @@ InverseDynamics::Sparse InverseDynamics::matrix(const State& state, Stage stage,
   return m;
 }
 
-VecX InverseDynamics::solved(const Sparse& matrix, const VecX& right, const char* stage) const {
+VecX InverseDynamics::solved(const Sparse& matrix, const VecX& right, const char* stage) {
   if (matrix.rows() == 0) return right;
+  ++factorizations_;
   Eigen::SparseLU<Sparse> lu(matrix);
   VecX z;
   if (lu.info() == Eigen::Success) z = lu.solve(right);

@@ -52,6 +52,7 @@ class InverseDynamics final : public StepSystem {
   double retry_step_size(State&, double) const override { return 0; }
   bool can_retry() const override { return false; }
   void explain(PhaseReport&, const State&) override {}
+  std::int64_t factorizations() const { return factorizations_; }  ///< so far
 
  private:
   enum Stage { kPosition, kVelocity, kAcceleration, kForces };  ///< the first three index weights
@@ -100,7 +101,7 @@ class InverseDynamics final : public StepSystem {
   void add_spring_matrix(const State& state, bool first, Triplets& out) const;
   VecX loads(const State& state) const;
   void add_body_loads(const State& state, VecX& f) const;
-  VecX solved(const Sparse& matrix, const VecX& right, const char* stage) const;
+  VecX solved(const Sparse& matrix, const VecX& right, const char* stage);
   VecX with_nodes(const std::vector<double>& residual) const;
   State reference(const State& state) const;
   VecX spring_force(const State& state, const Spring& spring) const;
@@ -116,6 +117,7 @@ class InverseDynamics final : public StepSystem {
   std::vector<ElementRef> bodies_, loads_;
   int n_ = 0, m_ = 0;  ///< node components, rows of all joints
   double speed_ = 0;   ///< Σ of squares of the last record's velocities
+  std::int64_t factorizations_ = 0;
 };
 
 }  // namespace mbcosim

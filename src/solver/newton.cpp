@@ -132,7 +132,7 @@ class Newton {
     system_.go_back();
     system_.compute_residual();
     build_matrix();
-    if (!system_.factor()) return false;
+    if (!factor_matrix()) return false;
     std::copy(scratch_.residual.begin(), scratch_.residual.end(), scratch_.delta.begin());
     system_.solve(scratch_.delta.data());
     return search_along(system_, *settings_.line_search);
@@ -193,6 +193,11 @@ class Newton {
     } else {
       return true;
     }
+    return factor_matrix();
+  }
+
+  bool factor_matrix() {
+    ++scratch_.factorizations;
     return system_.factor();
   }
 

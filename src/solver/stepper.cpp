@@ -161,6 +161,10 @@ std::size_t Stepper::factor_bytes() const {
          (two_stages_ ? two_stages_->bytes() : 0);
 }
 
+std::int64_t Stepper::factorizations() const {
+  return workspace_.factorizations + (two_stages_ ? two_stages_->scratch().factorizations : 0);
+}
+
 Status Stepper::assemble(State& state) {
   const std::size_t matrix = (two_stages_ ? 4 : 1) * model_.row_index.size();
   state.control = {};

@@ -53,7 +53,8 @@ class Stepper final : public StepSystem {
   void explain(PhaseReport& report, const State& state) override;
 
   Workspace& workspace() { return workspace_; }
-  std::size_t factor_bytes() const;  ///< memory of the factorizations
+  std::size_t factor_bytes() const;     ///< memory of the factorizations
+  std::int64_t factorizations() const;  ///< by iterations so far
 
  private:
   /// Pivots for all regular steps, from the matrix at the initial state: the same in every

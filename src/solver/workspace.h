@@ -2,6 +2,7 @@
 /// what it held before.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct NewtonScratch {
   std::vector<double> direction;         ///< along which a line is searched (m)
   std::vector<double> values;            ///< of the sparse matrix
   std::vector<double> residual_history;  ///< test values of the last solve
+  std::int64_t factorizations = 0;       ///< of the matrix, by iterations so far
 };
 
 /// Of the model's equations at one instant.

@@ -187,6 +187,27 @@ def test_metrics_tell_of_peers_queues_and_the_disk(start_daemon, tmp_path):
     assert 'mbcosim_step_seconds_bucket{le="300"}' in found
 
 
+TURNING = decks.body(spin="3., 5., 4.", tolerance="1.e-12")  # more than one iteration a step
+MODIFIED = TURNING.replace("tolerance:", "nonlinear solver: newton raphson, modified, 3; tolerance:", 1)
+THIRD_ORDER = TURNING.replace("method: ms, 0.6;", "method: third order, 0.6;")
+
+
+@pytest.mark.parametrize("text, every", [(TURNING, True), (MODIFIED, False), (THIRD_ORDER, True)], ids=["newton", "modified", "third order"])
+def test_factorizations_are_counted(start_daemon, text, every):
+    """Newton's method factors a matrix in each iteration, the modified one in some."""
+    daemon = start_daemon("--http", "127.0.0.1:0")
+    with daemon.connect() as server:
+        simulation = server.load_text(text)
+        assert metrics(daemon)["mbcosim_factorizations_total"] == 0
+        iterations = simulation.step(20).reply.total_iterations + simulation.step(3).reply.total_iterations
+        found = metrics(daemon)
+        assert found["mbcosim_iterations_total"] == iterations > 23
+        if every:
+            assert found["mbcosim_factorizations_total"] == iterations
+        else:
+            assert 23 <= found["mbcosim_factorizations_total"] < iterations
+
+
 def test_simulations_are_counted_by_state(start_daemon, tmp_path):
     """Those that come back are not created again."""
     def counts(daemon):
