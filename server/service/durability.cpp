@@ -54,14 +54,16 @@ Durability::~Durability() {
 void Durability::start(const Parts& parts) {
   parts_ = &parts;
   if (!folder_) return;
-  parts.store.set_keeper(
-      {[this](const auto& name, const Caller& caller, Call& call) {
-         return wake(name, caller, call);
-       },
-       [this](const auto& name, const Caller& caller) { return remove(name, caller); },
-       [this](Session& session) { return suspend(session); },
-       [this](const auto& name) { unsuspend(name); }, [this](Session& session) { forget(session); },
-       [this](Session& session) { store(session); }});
+  parts.store.set_keeper({[this](const auto& name, const Caller& caller, Call& call) {
+                            return wake(name, caller, call);
+                          },
+                          [this](const auto& name, const Caller& caller, const Call& call) {
+                            return remove(name, caller, call);
+                          },
+                          [this](Session& session) { return suspend(session); },
+                          [this](const auto& name) { unsuspend(name); },
+                          [this](Session& session) { forget(session); },
+                          [this](Session& session) { store(session); }});
   thread_ = std::thread([this] { loop(); });
 }
 

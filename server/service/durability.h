@@ -71,13 +71,15 @@ class Durability {
   std::vector<v1::SimulationInfo> list(const Caller& caller) const;
   /// Names and owners of all, those used last first.
   std::vector<std::pair<std::string, std::string>> by_last_use() const;
-  /// False: none of that name, or not the caller's.
-  bool remove(const std::string& simulation, const Caller& caller);
+  /// False: none of that name that the caller may see. Waits while it is being brought back. Throws
+  /// NOT_GRANTED, CANCELLED when the call ends first.
+  bool remove(const std::string& simulation, const Caller& caller, const Call& call);
   /// The simulation that the caller created with this request id; empty: none.
   std::string find_request(const std::string& owner, const std::string& request_id) const;
 
  private:
   bool wake(const std::string& simulation, const Caller& caller, Call& call) TS_EXCLUDES(mutex_);
+  void await_waking(const std::string& simulation, const Call& call) TS_REQUIRES(mutex_);
   bool suspend(Session& session);
   void unsuspend(const std::string& simulation) TS_EXCLUDES(mutex_);
   void forget(Session& session);

@@ -51,14 +51,14 @@ std::vector<std::pair<std::string, std::string>> Durability::by_last_use() const
   return result;
 }
 
-bool Durability::remove(const std::string& simulation, const Caller& caller) {
+bool Durability::remove(const std::string& simulation, const Caller& caller, const Call& call) {
   std::string owner;
   {
     Guard guard(mutex_);
+    await_waking(simulation, call);
     const auto found = suspended_.find(simulation);
-    if (found == suspended_.end() || waking_.count(simulation) > 0 ||
-        !may_see(found->second, caller, Access::own))
-      return false;
+    if (found == suspended_.end() || !may_see(found->second, caller, Access::see)) return false;
+    if (!may_see(found->second, caller, Access::own)) refuse_access(simulation, Access::own);
     owner = found->second.head.owner();
     suspended_.erase(found);
   }
@@ -103,15 +103,21 @@ void Durability::expire() {
 
 // ------------------------------------------------------------------ from disk to memory
 
+void Durability::await_waking(const std::string& simulation, const Call& call) {
+  constexpr std::chrono::milliseconds kLook(20);
+  while (waking_.count(simulation) > 0 && !call.cancelled()) {
+    if (stop_) throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down");
+    changed_.wait_for(mutex_, kLook);
+  }
+  if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+}
+
 // One at a time makes a session of it, others wait for that. True: it is in the store now.
 bool Durability::wake(const std::string& simulation, const Caller& caller, Call& call) {
-  constexpr std::chrono::milliseconds kLook(20);
   std::string owner;
   {
     Guard guard(mutex_);
-    while (waking_.count(simulation) > 0 && !stop_ && !call.cancelled())
-      changed_.wait_for(mutex_, kLook);
-    if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
+    await_waking(simulation, call);
     const auto found = suspended_.find(simulation);
     if (found == suspended_.end()) return parts_->store.has(simulation);
     if (!may_see(found->second, caller, Access::see)) return false;

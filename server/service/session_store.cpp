@@ -78,12 +78,14 @@ void SessionStore::add(SessionPtr session) {
   sessions_.emplace(id, std::move(session));
 }
 
-namespace {
+void refuse_unknown(const std::string& id) {
+  throw Refusal(v1::REASON_NO_SUCH_SIMULATION,
+                "no simulation is named \"" + id.substr(0, 100) + "\"");
+}
 
-constexpr const char* kAccessNames[] = {"see", "observe", "couple", "control", "own"};
-
-[[noreturn]] void refuse_access(const std::string& id, Access access, const std::string& port) {
-  const std::string name = kAccessNames[static_cast<int>(access)];
+void refuse_access(const std::string& id, Access access, const std::string& port) {
+  constexpr const char* kNames[] = {"see", "observe", "couple", "control", "own"};
+  const std::string name = kNames[static_cast<int>(access)];
   throw Refusal(v1::REASON_NOT_GRANTED,
                 "no grant of " + id + " lets the caller " + name +
                     (port.empty() ? "" : " at port \"" + port.substr(0, 100) + "\"") +
@@ -91,16 +93,21 @@ constexpr const char* kAccessNames[] = {"see", "observe", "couple", "control", "
                 {{"wanted", name}});
 }
 
-}  // namespace
-
 SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Call& call, Access access,
                              const std::string& port) const {
   if (!has(id) && keeper_.wake) (void)keeper_.wake(id, caller, call);
   Guard guard(mutex_);
+  SessionPtr session = find(id, caller, access, port);
+  if (!session) refuse_unknown(id);
+  return session;
+}
+
+// Null: it is not alive, or the caller may not see it.
+SessionPtr SessionStore::find(const std::string& id, const Caller& caller, Access access,
+                              const std::string& port) const {
   const auto found = sessions_.find(id);
   if (found == sessions_.end() || !found->second->grants().allow(caller, Access::see))
-    throw Refusal(v1::REASON_NO_SUCH_SIMULATION,
-                  "no simulation is named \"" + id.substr(0, 100) + "\"");
+    return nullptr;
   if (!found->second->grants().allow(caller, access, port)) refuse_access(id, access, port);
   return found->second;
 }
@@ -135,19 +142,35 @@ bool SessionStore::was_removed(const std::string& id, const Request& request) co
   refuse_other_request(request.second);
 }
 
-void SessionStore::remove(const std::string& id, const Caller& caller, Call& call,
-                          const std::string& request_id) {
+SessionStore::Removal SessionStore::begin_removal(const std::string& id, const Caller& caller,
+                                                  const std::string& request_id) {
   check_request_id(request_id);
   const Request request(caller.identity, request_id);
   {
     Guard guard(mutex_);
-    if (!request_id.empty() && was_removed(id, request)) return;
+    if (!request_id.empty() && was_removed(id, request)) return {nullptr, true};
+    if (!find(id, caller, Access::own, "")) return {};
   }
-  if (keeper_.remove && keeper_.remove(id, caller)) return note_removal(id, request);
-  const SessionPtr session = get(id, caller, call, Access::own);
-  session->discard_results();
+  const SessionPtr session = take_out(id);
+  if (!session) return {};  // another call was quicker
   note_removal(id, request);
-  drop(id);
+  session->close();
+  return {session};
+}
+
+// One that is not alive may become so while it is looked for on the disk, and the other way round.
+void SessionStore::end_removal(Removal removal, const std::string& id, const Caller& caller,
+                               const Call& call, const std::string& request_id) {
+  constexpr int kTries = 3;
+  for (int tries = 0; !removal.session && !removal.repeated; ++tries) {
+    if (keeper_.remove && keeper_.remove(id, caller, call))
+      return note_removal(id, Request(caller.identity, request_id));
+    removal = begin_removal(id, caller, request_id);
+    if (tries == kTries && !removal.session) refuse_unknown(id);
+  }
+  if (removal.repeated) return;
+  removal.session->discard_results();
+  bury(removal.session, v1::DELETION_CAUSE_ASKED);
 }
 
 void SessionStore::note_removal(const std::string& id, const Request& request) {
@@ -184,6 +207,11 @@ void SessionStore::drop(const std::string& id, v1::DeletionCause cause) {
   const SessionPtr session = take_out(id);
   if (!session) return;
   session->close();
+  bury(session, cause);
+}
+
+/// One that is closed and taken out.
+void SessionStore::bury(const SessionPtr& session, v1::DeletionCause cause) {
   if (session->keeping() && keeper_.forget) keeper_.forget(*session);
   log_.deleted(session->subject(), cause);
 }

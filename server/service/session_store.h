@@ -50,7 +50,8 @@ class SessionStore {
   /// Who keeps sessions on the disk. Called without any lock.
   struct Keeper {
     std::function<bool(const std::string& id, const Caller&, Call&)> wake;  ///< true: it is back
-    std::function<bool(const std::string& id, const Caller&)> remove;       ///< true: it was there
+    /// True: it was there. Waits for one that is being brought back.
+    std::function<bool(const std::string& id, const Caller&, const Call&)> remove;
     std::function<bool(Session&)> suspend;                 ///< false: it must live on
     std::function<void(const std::string& id)> unsuspend;  ///< it lives on after all
     std::function<void(Session&)> forget;
@@ -72,10 +73,18 @@ class SessionStore {
                  const std::string& port = "") const;
   /// What the caller may see, in the order of creation.
   std::vector<SessionPtr> list(const Caller& caller) const;
-  /// Also one that is on the disk. A repeat with the request's id does nothing more. Throws as
-  /// `get`, and BAD_ARGUMENT.
-  void remove(const std::string& id, const Caller& caller, Call& call,
-              const std::string& request_id);
+  /// Deletes in two parts. The first ends one that is alive, and with it all that waits for it; it
+  /// never waits. A repeat with the request's id does nothing more. Throws NO_SUCH_SIMULATION,
+  /// NOT_GRANTED, BAD_ARGUMENT.
+  struct Removal {
+    SessionPtr session;  ///< ended and taken out; null: it is not alive
+    bool repeated = false;
+  };
+  Removal begin_removal(const std::string& id, const Caller& caller, const std::string& request_id);
+  /// The second removes what is on the disk. Waits for a checkpoint that is under way, and for one
+  /// that is being brought back. Throws the same, and CANCELLED when the call ends first.
+  void end_removal(Removal removal, const std::string& id, const Caller& caller, const Call& call,
+                   const std::string& request_id);
   /// The same for a session that nobody has seen.
   void discard(const std::string& id);
   /// Ends a session; nothing when it is gone already.
@@ -88,7 +97,10 @@ class SessionStore {
   bool was_removed(const std::string& id, const Request& request) const TS_REQUIRES(mutex_);
   void note_removal(const std::string& id, const Request& request) TS_EXCLUDES(mutex_);
   void check_room(const std::string& owner) const TS_REQUIRES(mutex_);
+  SessionPtr find(const std::string& id, const Caller& caller, Access access,
+                  const std::string& port) const TS_REQUIRES(mutex_);
   SessionPtr take_out(const std::string& id);
+  void bury(const SessionPtr& session, v1::DeletionCause cause);
   void park(const SessionPtr& session);
   void watch_leases();
   void close_expired();
@@ -107,6 +119,11 @@ class SessionStore {
   Condition changed_;
   std::thread lease_thread_;
 };
+
+/// Throws NO_SUCH_SIMULATION.
+[[noreturn]] void refuse_unknown(const std::string& id);
+/// Throws NOT_GRANTED: the caller may see it and not do this. `port`: to be coupled to, or empty.
+[[noreturn]] void refuse_access(const std::string& id, Access access, const std::string& port = "");
 
 /// A session found and kept alive. Throws as SessionStore::get.
 class SessionHold {

@@ -95,6 +95,30 @@ void list(const Parts& parts, const Caller& caller, const v1::ListSimulationsReq
   }
 }
 
+/// Whoever waits for the simulation is told at once, even where all threads that may wait do so;
+/// its files may have to wait themselves.
+class DeleteHandler final : public OneRequest<v1::DeleteSimulationRequest> {
+ public:
+  explicit DeleteHandler(const Parts& parts) : OneRequest(Lane::quick), parts_(parts) {}
+
+ private:
+  void serve(Exchange& exchange, const v1::DeleteSimulationRequest& request) override {
+    removal_ =
+        parts_.store.begin_removal(request.simulation(), exchange.caller(), request.request_id());
+    exchange.post(Lane::work, [this, &exchange, &request] {
+      CallLabels labels = exchange.labels();
+      labels.request_id = request.request_id();
+      const CallScope scope(labels);
+      parts_.store.end_removal(std::move(removal_), request.simulation(), exchange.caller(),
+                               exchange.call(), request.request_id());
+      exchange.end(serialized(v1::DeleteSimulationReply()));
+    });
+  }
+
+  const Parts& parts_;
+  SessionStore::Removal removal_;
+};
+
 void add_life(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("GetServerInfo"),
            unary<v1::GetServerInfoRequest, v1::GetServerInfoReply>(
@@ -108,13 +132,9 @@ void add_life(Gate& gate, const Parts& parts) {
                [&parts](const CallFrame& frame, const auto& request, auto* reply) {
                  list(parts, frame.caller, request, reply);
                }));
-  gate.add(
-      simulations_path("DeleteSimulation"),
-      unary<v1::DeleteSimulationRequest, v1::DeleteSimulationReply>(
-          Role::control, Lane::quick, [&parts](const CallFrame& frame, const auto& request, auto*) {
-            parts.store.remove(request.simulation(), frame.caller, frame.call,
-                               request.request_id());
-          }));
+  gate.add(simulations_path("DeleteSimulation"), {Role::control, false, Counted::call, [&parts] {
+                                                    return std::make_unique<DeleteHandler>(parts);
+                                                  }});
   gate.add(simulations_path("GetSimulation"),
            unary<v1::GetSimulationRequest, v1::GetSimulationReply>(
                Role::observe, Lane::quick,

@@ -319,6 +319,73 @@ def test_deleted_ones_are_gone(start, folder):
             server.attach(name)
 
 
+def seconds_of_work(daemon):
+    """Processor time of the daemon so far."""
+    with open(f"/proc/{daemon.process.pid}/stat") as file:
+        ticks = file.read().rsplit(")", 1)[1].split()[11:13]
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
+
+
+def test_deletions_that_wait_for_one_that_comes_back_stop_no_quick_call(start, folder):
+    """There are fewer threads for quick calls than such deletions here."""
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(slow_deck()).name
+    daemon.stop()
+    daemon = start()
+    with daemon.connect() as server:
+        before = seconds_of_work(daemon)
+        waking = server.simulations.ReadVariables.future(pb.ReadVariablesRequest(simulation=name))
+        wait_for(lambda: seconds_of_work(daemon) > before + 0.05)
+        deletions = [server.simulations.DeleteSimulation.future(pb.DeleteSimulationRequest(simulation=name)) for _ in range(8)]
+        server.info()
+        assert not waking.done() and not any(deletion.done() for deletion in deletions), "it has waited for them"
+        done = [deletion.exception() is None for deletion in deletions]
+        assert done.count(True) == 1
+        assert all(d.code() in (grpc.StatusCode.OK, grpc.StatusCode.NOT_FOUND) for d in deletions)
+        waking.exception()
+        assert server.list() == [] and not (folder / name).exists()
+
+
+def test_who_may_not_delete_brings_nothing_back(start, tmp_path):
+    tokens = tmp_path / "tokens"
+    tokens.write_text("ann control ann\nbob control bob\ncarl control carl\n")
+    tokens.chmod(0o600)
+    daemon = start("--tokens", str(tokens))
+    with daemon.connect(token="ann") as ann:
+        name = ann.load_text(deck(), grants=[mbcosim.grant("token:bob", "observe")]).name
+    daemon.stop()
+    daemon = start("--tokens", str(tokens))
+    for token, reason in (("bob", "NOT_GRANTED"), ("carl", "NO_SUCH_SIMULATION")):
+        with daemon.connect(token=token) as other, pytest.raises(grpc.RpcError) as caught:
+            other.simulations.DeleteSimulation(pb.DeleteSimulationRequest(simulation=name), metadata=other.metadata)
+        assert mbcosim.errors.from_rpc_error(caught.value).reason == reason
+    with daemon.connect(token="ann") as ann:
+        assert state_of(ann, name) == pb.SIMULATION_STATE_SUSPENDED
+    daemon.stop()
+    assert "is READY" not in daemon.log()
+
+
+def test_a_deletion_frees_the_calls_that_wait_for_a_step(start):
+    """Even when they take all threads that may wait."""
+    silent = threading.Event()
+
+    def wait(motion):
+        silent.wait(60 * TIME_FACTOR)
+        return -motion.x
+
+    daemon = start()
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), ports=[mbcosim.structural_port("spring", nodes=[1])])
+        with simulation.couple("spring", wait, mode="tight", peer_timeout=100 * TIME_FACTOR):
+            step = server.simulations.Step.future(pb.StepRequest(simulation=simulation.name))
+            wait_for(lambda: "port spring since" in simulation.refresh().waiting_for)
+            readers = [server.simulations.ReadVariables.future(pb.ReadVariablesRequest(simulation=simulation.name)) for _ in range(100)]
+            simulation.delete()
+            assert [call.exception() is not None or call.code() == grpc.StatusCode.OK for call in [step, *readers]] == 101 * [True]
+            silent.set()
+
+
 def test_forks_outlive_too(start):
     daemon = start()
     with daemon.connect() as server:
