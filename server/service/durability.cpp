@@ -52,7 +52,11 @@ Durability::~Durability() {
 }
 
 void Durability::start(const Parts& parts) {
-  parts_ = &parts;
+  {
+    Guard guard(mutex_);
+    parts_ = &parts;
+    for (auto& [name, suspended] : suspended_) suspended.share = share_of(suspended);
+  }
   if (!folder_) return;
   parts.store.set_keeper({[this](const auto& name, const Caller& caller, Call& call) {
                             return wake(name, caller, call);
@@ -104,14 +108,26 @@ void Durability::read_folder() {
 }
 
 void Durability::read_one(const std::string& id) {
+  const v1::CheckpointHead head = folder_->read_head(id);
+  if (head.simulation() != kSimulations + id)
+    throw StorageError(id + "/model: it is of " + head.simulation());
   Suspended found;
-  found.head = folder_->read_head(id);
+  found.owner = head.owner();
+  found.request_id = head.options().request_id();
+  found.request_digest = head.request_digest();
   found.info = read_latest(id).point.info();
   found.since = folder_->written_at(id);
-  if (found.head.simulation() != kSimulations + id)
-    throw StorageError(id + "/model: it is of " + found.head.simulation());
   Guard guard(mutex_);
-  suspended_[found.head.simulation()] = std::move(found);
+  if (parts_) found.share = share_of(found);
+  suspended_[head.simulation()] = std::move(found);
+}
+
+// Of what is in the folder anyway: it is counted, and never refused.
+MemoryShare Durability::share_of(const Suspended& suspended) const {
+  constexpr std::int64_t kNode = 500;  // of the map, with its names
+  MemoryShare share(parts_->runtime.budgets.of(suspended.owner));
+  share.change(kNode + static_cast<std::int64_t>(suspended.info.SpaceUsedLong()));
+  return share;
 }
 
 namespace {
@@ -231,7 +247,9 @@ void Durability::write_held(Session& session, Keeping& keeping) {
   const std::string id = id_of(session.identity().id);
   if (keeping.over || session.has_failed()) return;
   CapturedPoint captured = session.capture();
-  const MemoryShare share(memory_of(session), 2 * size_of(captured.state));
+  const MemoryShare share(
+      memory_of(session),
+      2 * (size_of(captured.state) + static_cast<std::int64_t>(captured.point.ByteSizeLong())));
   write_snapshots(session, keeping, id, captured.point);
   session.sync_results();
   std::set<int> kept;

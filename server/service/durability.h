@@ -19,9 +19,11 @@ namespace mbcosim::server {
 
 /// A simulation that is in the state folder only.
 struct Suspended {
-  v1::CheckpointHead head;
-  v1::SimulationInfo info;  ///< of its last checkpoint
-  std::int64_t since = 0;   ///< [s since 1970]
+  std::string owner, request_id;     ///< of its creation
+  std::uint64_t request_digest = 0;  ///< of that request
+  v1::SimulationInfo info;           ///< of its last checkpoint
+  std::int64_t since = 0;            ///< [s since 1970]
+  MemoryShare share = {};            ///< of this
 };
 
 /// Thread-safe. Without a state folder nothing is durable.
@@ -83,7 +85,8 @@ class Durability {
   bool suspend(Session& session);
   void unsuspend(const std::string& simulation) TS_EXCLUDES(mutex_);
   void forget(Session& session);
-  SessionPtr revive(const std::string& simulation, Call& call);
+  StoredBundle read_stored(const std::string& id) const;
+  SessionPtr revive(const std::string& simulation, const std::string& owner, Call& call);
   SessionPtr session_of(StoredModel& model, const StoredPoint& point, MemoryBudget& memory);
   std::unique_ptr<Simulation> simulation_at(const ModelPtr& model, TimeKeeping time_keeping,
                                             const std::string& state, SessionResults* results,
@@ -92,10 +95,13 @@ class Durability {
   void put_in_folder(const std::string& simulation, const StoredBundle& bundle);
   void write_snapshots(Session& session, Keeping& keeping, const std::string& id,
                        v1::CheckpointPoint& point) TS_REQUIRES(keeping.mutex);
-  const Suspended* made_by(const std::string& owner, const std::string& request_id) const
-      TS_REQUIRES(mutex_);  ///< null: none
+  /// Null: none.
+  const std::pair<const std::string, Suspended>* made_by(const std::string& owner,
+                                                         const std::string& request_id) const
+      TS_REQUIRES(mutex_);
   bool imported(const std::string& request_id, std::uint64_t digest, const Caller& caller,
                 v1::SimulationInfo* out) const TS_EXCLUDES(mutex_);
+  MemoryShare share_of(const Suspended& suspended) const;
   bool may_see(const Suspended& suspended, const Caller& caller, Access access) const;
   std::unique_ptr<Keeping> make_keeping(const std::string& simulation,
                                         const v1::CreateOptions& options) const;

@@ -11,7 +11,7 @@
 namespace mbcosim::server {
 
 bool Durability::may_see(const Suspended& suspended, const Caller& caller, Access access) const {
-  return Grants(suspended.head.owner(), suspended.info.grants()).allow(caller, access);
+  return Grants(suspended.owner, suspended.info.grants()).allow(caller, access);
 }
 
 bool Durability::knows(const std::string& simulation, const Caller& caller) const {
@@ -45,7 +45,7 @@ std::vector<std::pair<std::string, std::string>> Durability::by_last_use() const
   std::multimap<std::int64_t, std::pair<std::string, std::string>, std::greater<>> found;
   Guard guard(mutex_);
   for (const auto& [name, suspended] : suspended_)
-    found.emplace(suspended.since, std::pair(name, suspended.head.owner()));
+    found.emplace(suspended.since, std::pair(name, suspended.owner));
   std::vector<std::pair<std::string, std::string>> result;
   for (auto& [since, simulation] : found) result.push_back(std::move(simulation));
   return result;
@@ -59,7 +59,7 @@ bool Durability::remove(const std::string& simulation, const Caller& caller, con
     const auto found = suspended_.find(simulation);
     if (found == suspended_.end() || !may_see(found->second, caller, Access::see)) return false;
     if (!may_see(found->second, caller, Access::own)) refuse_access(simulation, Access::own);
-    owner = found->second.head.owner();
+    owner = found->second.owner;
     suspended_.erase(found);
   }
   folder_->remove(id_of(simulation));
@@ -71,16 +71,15 @@ bool Durability::remove(const std::string& simulation, const Caller& caller, con
 std::string Durability::find_request(const std::string& owner,
                                      const std::string& request_id) const {
   Guard guard(mutex_);
-  const Suspended* found = made_by(owner, request_id);
-  return found ? found->head.simulation() : "";
+  const auto* found = made_by(owner, request_id);
+  return found ? found->first : "";
 }
 
-const Suspended* Durability::made_by(const std::string& owner,
-                                     const std::string& request_id) const {
+const std::pair<const std::string, Suspended>* Durability::made_by(
+    const std::string& owner, const std::string& request_id) const {
   if (request_id.empty()) return nullptr;
-  for (const auto& [name, suspended] : suspended_)
-    if (suspended.head.owner() == owner && suspended.head.options().request_id() == request_id)
-      return &suspended;
+  for (const auto& entry : suspended_)
+    if (entry.second.owner == owner && entry.second.request_id == request_id) return &entry;
   return nullptr;
 }
 
@@ -91,7 +90,7 @@ void Durability::expire() {
     Guard guard(mutex_);
     for (const auto& [name, suspended] : suspended_)
       if (now - suspended.since > longest && waking_.count(name) == 0 && !parts_->store.has(name))
-        over.emplace_back(name, suspended.head.owner());
+        over.emplace_back(name, suspended.owner);
     for (const auto& [name, owner] : over) suspended_.erase(name);
   }
   for (const auto& [name, owner] : over) {
@@ -121,7 +120,7 @@ bool Durability::wake(const std::string& simulation, const Caller& caller, Call&
     const auto found = suspended_.find(simulation);
     if (found == suspended_.end()) return parts_->store.has(simulation);
     if (!may_see(found->second, caller, Access::see)) return false;
-    owner = found->second.head.owner();
+    owner = found->second.owner;
     waking_.insert(simulation);
   }
   struct Done {
@@ -134,7 +133,7 @@ bool Durability::wake(const std::string& simulation, const Caller& caller, Call&
     }
   } const done{*this, simulation};
   const SessionStore::Place place(parts_->store, "", 0, {owner, Role::control}, call);
-  const SessionPtr session = revive(simulation, call);
+  const SessionPtr session = revive(simulation, owner, call);
   parts_->store.add(session);
   unsuspend(simulation);
   v1::SimulationInfo info;
@@ -174,24 +173,29 @@ LoadedDeck read_deck(StoredModel& model, const Config& config) {
 
 }  // namespace
 
-SessionPtr Durability::revive(const std::string& simulation, Call& call) try {
-  const std::string id = id_of(simulation);
-  StoredModel model = folder_->read_model(id);
-  const StoredPoint point = read_latest(id);
-  std::map<int, std::string> snapshots;
-  for (const v1::CheckpointSnapshot& snapshot : point.point.snapshots())
-    snapshots[snapshot.number()] = folder_->read_snapshot(id, snapshot.number());
+StoredBundle Durability::read_stored(const std::string& id) const {
+  StoredBundle stored{folder_->read_model(id), read_latest(id), {}};
+  for (const v1::CheckpointSnapshot& snapshot : stored.point.point.snapshots())
+    stored.snapshots[snapshot.number()] = folder_->read_snapshot(id, snapshot.number());
+  return stored;
+}
 
-  MemoryShare share;
-  MemoryBudget& memory = parts_->runtime.budgets.of(model.head.owner());
+SessionPtr Durability::revive(const std::string& simulation, const std::string& owner,
+                              Call& call) try {
   const CallToken token(call);
-  auto session = within(memory, &token, &share, [&] { return session_of(model, point, memory); });
+  MemoryBudget& memory = parts_->runtime.budgets.of(owner);
+  MemoryShare stored_share, share;
+  StoredBundle stored =
+      within(memory, &token, &stored_share, [&] { return read_stored(id_of(simulation)); });
+  auto session = within(memory, &token, &share,
+                        [&] { return session_of(stored.model, stored.point, memory); });
   session->set_memory(std::move(share));
-  session->take_over(point.point, snapshots);
-  session->set_keeping(make_keeping(simulation, model.head.options()));
+  session->take_over(stored.point.point, stored.snapshots);
+  session->set_keeping(make_keeping(simulation, stored.model.head.options()));
   {
     Guard guard(session->keeping()->mutex);
-    for (const auto& [number, state] : snapshots) session->keeping()->snapshots.insert(number);
+    for (const auto& [number, state] : stored.snapshots)
+      session->keeping()->snapshots.insert(number);
     session->keeping()->done(session->changes(), session->step_number());
   }
   return session;
@@ -297,10 +301,10 @@ v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheck
 bool Durability::imported(const std::string& request_id, std::uint64_t digest, const Caller& caller,
                           v1::SimulationInfo* out) const {
   Guard guard(mutex_);
-  const Suspended* found = made_by(caller.identity, request_id);
+  const auto* found = made_by(caller.identity, request_id);
   if (!found) return false;
-  if (found->head.request_digest() != digest) refuse_other_request(request_id);
-  *out = found->info;
+  if (found->second.request_digest != digest) refuse_other_request(request_id);
+  *out = found->second.info;
   return true;
 }
 

@@ -68,7 +68,7 @@ KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::stri
     if (Entry* still = kept_.find(identity_, id_)) still->awaited = false;
     throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
   }
-  kept_.entries_.push_back({identity_, id_, digest_, true, false, {}, false});
+  kept_.entries_.push_back({identity_, id_, digest_, true, false, {}, false, false});
 }
 
 KeptReplies::Turn::~Turn() {
@@ -79,13 +79,15 @@ KeptReplies::Turn::~Turn() {
   kept_.changed_.notify_all();
 }
 
-void KeptReplies::Turn::keep(const google::protobuf::MessageLite& reply) { put(reply, false); }
-
-void KeptReplies::Turn::break_off(const google::protobuf::MessageLite& reply) {
-  put(reply, /*begun=*/true);
+void KeptReplies::Turn::keep(const google::protobuf::MessageLite& reply, bool stored) {
+  put(reply, /*begun=*/false, stored);
 }
 
-void KeptReplies::Turn::put(const google::protobuf::MessageLite& reply, bool begun) {
+void KeptReplies::Turn::break_off(const google::protobuf::MessageLite& reply) {
+  put(reply, /*begun=*/true, /*stored=*/true);
+}
+
+void KeptReplies::Turn::put(const google::protobuf::MessageLite& reply, bool begun, bool stored) {
   if (id_.empty() || known_) return;
   std::string bytes = reply.SerializeAsString();
   Guard guard(kept_.mutex_);
@@ -97,6 +99,7 @@ void KeptReplies::Turn::put(const google::protobuf::MessageLite& reply, bool beg
   entry->reply = std::move(bytes);
   entry->at_work = false;
   entry->begun = begun;
+  entry->stored = stored;
 }
 
 v1::KeptReply KeptReplies::Turn::described(const google::protobuf::MessageLite& reply,
@@ -129,15 +132,28 @@ void KeptReplies::forget(const std::string& identity, const std::string& id) {
 
 void KeptReplies::describe(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const {
   Guard guard(mutex_);
-  for (const Entry& entry : entries_) {
-    if (entry.at_work) continue;
-    v1::KeptReply* kept = out->Add();
-    kept->set_identity(entry.identity);
-    kept->set_request_id(entry.id);
-    kept->set_request_digest(entry.digest);
-    kept->set_reply(entry.reply);
-    kept->set_begun(entry.begun);
-  }
+  for (const Entry& entry : entries_)
+    if (!entry.at_work) describe(entry, out->Add());
+}
+
+void KeptReplies::describe(const Entry& entry, v1::KeptReply* out) {
+  out->set_identity(entry.identity);
+  out->set_request_id(entry.id);
+  out->set_request_digest(entry.digest);
+  out->set_reply(entry.reply);
+  out->set_begun(entry.begun);
+}
+
+void KeptReplies::describe_unstored(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const {
+  Guard guard(mutex_);
+  for (const Entry& entry : entries_)
+    if (!entry.at_work && !entry.stored) describe(entry, out->Add());
+}
+
+void KeptReplies::all_stored() {
+  Guard guard(mutex_);
+  for (Entry& entry : entries_)
+    if (!entry.at_work) entry.stored = true;
 }
 
 void KeptReplies::take_over(const google::protobuf::RepeatedPtrField<v1::KeptReply>& kept) {
@@ -145,7 +161,7 @@ void KeptReplies::take_over(const google::protobuf::RepeatedPtrField<v1::KeptRep
   for (const v1::KeptReply& reply : kept)
     if (make_room(std::ssize(reply.reply())))
       entries_.push_back({reply.identity(), reply.request_id(), reply.request_digest(), false,
-                          false, reply.reply(), reply.begun()});
+                          false, reply.reply(), reply.begun(), /*stored=*/true});
 }
 
 bool KeptReplies::drop_oldest() {

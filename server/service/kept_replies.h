@@ -30,6 +30,10 @@ class KeptReplies {
   /// All that are kept, oldest first, and back.
   void describe(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const TS_EXCLUDES(mutex_);
   void take_over(const google::protobuf::RepeatedPtrField<v1::KeptReply>& kept) TS_EXCLUDES(mutex_);
+  /// JOURNAL: those that no entry has, oldest first; then they are in one.
+  void describe_unstored(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const
+      TS_EXCLUDES(mutex_);
+  void all_stored() TS_EXCLUDES(mutex_);
 
   /// One request at work. What went well is kept by `keep`; without it the request may be tried
   /// anew.
@@ -45,7 +49,8 @@ class KeptReplies {
     Turn& operator=(const Turn&) = delete;
     /// The reply of the first, serialized; null: this is the first.
     const std::string* known() const { return known_ ? &*known_ : nullptr; }
-    void keep(const google::protobuf::MessageLite& reply);
+    /// `stored`: it is on the disk already, or need not be.
+    void keep(const google::protobuf::MessageLite& reply, bool stored = true);
     /// What the request had done before it was broken off; null: nothing.
     const std::string* begun() const { return begun_ ? &*begun_ : nullptr; }
     /// It is broken off, and a repeat goes on from there.
@@ -55,7 +60,7 @@ class KeptReplies {
     v1::KeptReply described(const google::protobuf::MessageLite& reply, bool begun) const;
 
    private:
-    void put(const google::protobuf::MessageLite& reply, bool begun);
+    void put(const google::protobuf::MessageLite& reply, bool begun, bool stored);
     KeptReplies& kept_;
     const std::string identity_, id_;
     const std::uint64_t digest_;
@@ -68,10 +73,12 @@ class KeptReplies {
     std::uint64_t digest;
     bool at_work = true, awaited = false;
     std::string reply;
-    bool begun = false;  ///< and broken off
+    bool begun = false;   ///< and broken off
+    bool stored = false;  ///< in a journal, or need not be
   };
   using Entries = std::deque<Entry>;
 
+  static void describe(const Entry& entry, v1::KeptReply* out);
   Entry* find(const std::string& identity, const std::string& id) TS_REQUIRES(mutex_);
   void forget(const std::string& identity, const std::string& id) TS_REQUIRES(mutex_);
   std::size_t kept() const TS_REQUIRES(mutex_);

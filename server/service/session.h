@@ -282,7 +282,6 @@ class Session {
 
   Advance* at_work_ = nullptr;                                          ///< of a durable session
   google::protobuf::RepeatedPtrField<v1::CheckpointPort> peer_memory_;  ///< after the last step
-  google::protobuf::RepeatedPtrField<v1::KeptReply> unstored_;  ///< JOURNAL: for the next entry
 };
 
 }  // namespace mbcosim::server

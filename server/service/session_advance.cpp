@@ -149,7 +149,10 @@ void Session::begin(Advance& advance) {
   const v1::StepRequest& request = advance.request;
   if (request.has_expected_step() && !advance.goes_on) check_step(request.expected_step());
   check_choice(request, *simulation_);
-  if (journaled()) advance.before = simulation_->state();
+  if (journaled()) {
+    advance.before_share = MemoryShare(shared_.memory, size_of(simulation_->state()));
+    advance.before = simulation_->state();
+  }
   if (!advance.goes_on) take_inputs(advance);
   advance.started = true;
   if (keeping_) at_work_ = &advance;
@@ -345,11 +348,8 @@ void Session::conclude(Advance& advance) {
   at_work_ = nullptr;
   const bool stored = advance.unsettled;
   settle(advance, /*whole=*/true);
-  advance.turn.keep(advance.reply);
+  advance.turn.keep(advance.reply, stored || !journaled());
   if (advance.turn.has_id()) ++changes_;
-  if (!journaled() || stored || !advance.turn.has_id()) return;
-  *unstored_.Add() = advance.turn.described(advance.reply, /*begun=*/false);
-  if (unstored_.size() > static_cast<int>(KeptReplies::kReplies)) unstored_.DeleteSubrange(0, 1);
 }
 
 // ------------------------------------------------------------------ with ports

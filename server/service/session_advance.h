@@ -24,7 +24,8 @@ struct Session::Advance {
   std::int64_t factorizations = 0;
 
   // --- JOURNAL
-  bool unsettled = false;                      ///< something was done that is not on the disk
+  bool unsettled = false;  ///< something was done that is not on the disk
+  MemoryShare before_share = {};
   std::optional<State> before = std::nullopt;  ///< what is on the disk
   v1::StepReply told_before = {};              ///< the reply that goes with it
 };

@@ -101,14 +101,17 @@ void Session::go_back(Advance& advance) {
 
 // The state, and replies since the last time. Throws STORAGE_FULL, LIMIT_EXCEEDED.
 void Session::store(const std::optional<v1::KeptReply>& reply) {
+  constexpr std::int64_t kCopies = 4;  // the message, its bytes, those of the record twice
   const auto begin = std::chrono::steady_clock::now();
-  const MemoryShare share(shared_.memory, 2 * size_of(simulation_->state()));
   v1::JournalEntry entry;
   entry.set_changes(++changes_);
   fill_stored(entry.mutable_info());
   *entry.mutable_ports() = peer_memory_;
-  *entry.mutable_kept_replies() = unstored_;
+  kept_.describe_unstored(entry.mutable_kept_replies());
   if (reply) *entry.add_kept_replies() = *reply;
+  const MemoryShare share(
+      shared_.memory,
+      kCopies * (size_of(simulation_->state()) + static_cast<std::int64_t>(entry.ByteSizeLong())));
   if (results_) {
     results_->prepare();
     results_->sync();
@@ -121,7 +124,7 @@ void Session::store(const std::optional<v1::KeptReply>& reply) {
     throw Refusal(v1::REASON_STORAGE_FULL,
                   std::string("what was done cannot be stored: ") + error.what());
   }
-  unstored_.Clear();
+  kept_.all_stored();
   shared_.metrics.count_journal_entry(
       static_cast<std::int64_t>(message.size() + state.size()),
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());

@@ -227,6 +227,23 @@ def test_the_last_64_replies_are_kept(start):
         assert server.simulations.Step(requests[0]).step == 71  # forgotten: done anew
 
 
+def test_replies_that_no_entry_has_yet_are_few(start, folder):
+    """Requests that change nothing are stored with the next that does: no more of them than are kept at all, 8 MB."""
+    daemon = start("--checkpoint-interval", "3600")
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal")
+        requests = [pb.StepRequest(simulation=simulation.name, steps=0, request_id=str(k), outputs=[0] * 200_000) for k in range(12)]
+        replies = [server.simulations.Step(request) for request in requests]
+        assert sum(reply.ByteSize() for reply in replies) > 16 << 20
+        simulation.step()
+        path, = entries(folder, simulation.name)
+        assert replies[-1].ByteSize() < path.stat().st_size < 9 << 20
+    daemon.kill()
+    with start().connect() as server:
+        assert server.simulations.Step(requests[-1]) == replies[-1]
+        assert step_of(server, simulation.name) == 1
+
+
 def entries(folder, name):
     return sorted(path for path in (folder / name).iterdir() if path.name.startswith("journal-"))
 

@@ -235,6 +235,21 @@ def test_simulations_are_counted_by_state(start_daemon, tmp_path):
         assert metrics(daemon)["mbcosim_simulations_created_total"] == 0
 
 
+def test_suspended_simulations_are_counted_against_the_memory(start_daemon, tmp_path):
+    (tmp_path / "state").mkdir()
+    options = ("--state-dir", str(tmp_path / "state"), "--http", "127.0.0.1:0")
+    daemon = start_daemon(*options)
+    with daemon.connect() as server:
+        names = [server.load_text(decks.body()).name for _ in range(5)]
+    daemon.stop()
+    daemon = start_daemon(*options)
+    with daemon.connect() as server:
+        before = metrics(daemon)["mbcosim_memory_bytes"]
+        for name in names:
+            server.attach(name).delete()
+        assert before - metrics(daemon)["mbcosim_memory_bytes"] > 5 * 500
+
+
 def test_dropped_samples_are_counted(start_daemon):
     daemon = start_daemon("--http", "127.0.0.1:0")
     with daemon.connect() as server:
