@@ -416,6 +416,40 @@ def test_bad_values(ports, standard):
 
 
 @pytest.mark.parametrize("standard", STANDARDS)
+def test_inputs_that_nobody_sets_keep_their_start_values(ports, standard):
+    """As the standards say; no status but OK, and nothing in the log."""
+    fmu = ports(standard)
+    outputs, inputs = fmu.names("output"), fmu.names("input")
+    ends = []
+    for sets in (False, True):
+        with instance_of(fmu) as instance:
+            for name in inputs if sets else []:
+                instance[name] = fmu.start(name)
+            instance.initialize()
+            for k in range(10):
+                assert instance.do_step(0.01 * k, 0.01) == OK
+            ends.append(instance[outputs])
+            assert [entry for entry in instance.log if entry[0] != OK] == []
+    assert inputs and ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_values_that_are_missing_are_an_error_and_change_nothing(ports, standard):
+    """Fewer values than the variables have (FMI 3), and none at all for references that are none."""
+    fmu = ports(standard)
+    name = "port.wing.loads.force" if standard == "3" else [n for n in fmu.names("input") if n.startswith("stream.push")][0]
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        before = instance[name]
+        wrong = [([fmu.reference(name), 99999], [1.0] * (fmu.sizes[name] + 1))]
+        if standard == "3":
+            wrong += [([fmu.reference(name)], []), ([fmu.reference(name)], [1.0] * (fmu.sizes[name] - 1))]
+        for references, values in wrong:
+            assert instance.set_reals(references, values) == ERROR
+            assert instance.log[-1][0] == ERROR and instance[name] == before
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
 def test_instances_need_their_resources_and_token(ports, tmp_path, standard):
     fmu = ports(standard)
     for options, message in [({"resources": str(tmp_path)}, "cannot read"), ({"token": "{other}"}, "the token"),
