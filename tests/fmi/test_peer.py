@@ -156,6 +156,14 @@ def receive(peer, size):
     return data
 
 
+def send_what_is_taken(peer, data):
+    """The other side may close before all of it is sent."""
+    try:
+        peer.sendall(data)
+    except (BrokenPipeError, ConnectionResetError):
+        pass
+
+
 def connect(path):
     end = time.monotonic() + 20 * TIME_FACTOR
     while True:
@@ -214,3 +222,24 @@ def test_a_silent_code_fails_the_step_and_is_named(start_daemon, program, tmp_pa
             pendulum.step(1)
         assert gateway.finish() == 5
         assert "silent for 1 s" in gateway.errors
+
+
+@pytest.mark.parametrize("surplus", [1, 1 << 20])
+def test_answers_that_are_too_long_fail_the_next_step_and_are_named(start_daemon, program, tmp_path, surplus):  # noqa: F811
+    daemon, path = start_daemon(), str(tmp_path / "s")
+    with daemon.connect() as server, server.load(os.path.join(MODELS, "pendulum.mbd"),
+                                                 ports=[mbcosim.structural_port("tip", nodes=[2])]) as pendulum:
+        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", "loose", "--server", daemon.address,
+                          "--simulation", pendulum.name, "--port", "tip")
+        code = connect(path)
+        code.sendall(b"\7" + struct.pack("<II", 0x202, 1))
+        assert receive(code, 1) == b"\10"
+        sending = threading.Thread(target=send_what_is_taken, args=(code, b"\6" + bytes(48 + surplus)))
+        sending.start()
+        assert pendulum.step(1).outcome == "ACCEPTED"
+        with pytest.raises(mbcosim.errors.StepFailed, match="unknown command 0 from the peer"):
+            pendulum.step(1)
+        assert gateway.finish() == 5
+        assert "unknown command 0 from the peer" in gateway.errors
+        sending.join(60 * TIME_FACTOR)
+        assert not sending.is_alive()

@@ -270,6 +270,17 @@ def test_bad_codes_fail_the_step_and_nothing_else(server, folder, last, told):
     code.join(30 * TIME_FACTOR)
 
 
+def test_an_answer_that_is_too_long_fails_the_next_step(server, folder):
+    code = Code(str(folder / "s"), answers([b"\6" + LOADS, b"\6" + LOADS + bytes(100), b""]))
+    with server.load_text(PULL, deck_sockets=True) as simulation:
+        assert simulation.step().outcome == "ACCEPTED"
+        with pytest.raises(mbcosim.StepFailed, match=r"force 5 \(s\): unknown command 0 from the peer"):
+            simulation.step()
+        simulation.refresh()
+        assert simulation.info.step == 1
+    code.join(30 * TIME_FACTOR)
+
+
 def test_a_code_that_dies_is_named(server, folder):
     def work(peer):
         shake(peer, 0x202, 2)

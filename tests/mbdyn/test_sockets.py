@@ -124,6 +124,28 @@ def talk(peer, size, answers):
             peer.sendall(answer)
 
 
+def send_what_is_taken(peer, data):
+    """The other side may close before all of it is sent."""
+    try:
+        peer.sendall(data)
+    except (BrokenPipeError, ConnectionResetError):
+        pass
+
+
+def flood(peer, data):
+    """Sends `data` again and again until the other side closes."""
+    def send():
+        try:
+            while True:
+                peer.sendall(data)
+        except OSError:
+            pass
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    return thread
+
+
 # ------------------------------------------------------------------ sequences
 
 def test_loose_sequence(run):
@@ -532,6 +554,72 @@ def test_which_record_sees_which_message(run, every, options, expected):
     assert done.finish() == 0, done.errors
 
 
+ENDS = ["create", "connect"]
+
+
+def source_and_run(run, end):
+    """A source at either end of the file driver's socket, and the run."""
+    if end == "create":
+        done = run(stream_in(""))
+        return done.connect("i"), done
+    listener = socket.socket()
+    listener.bind(("127.0.0.1", 0))
+    listener.listen(1)
+    listener.settimeout(20 * TIME_FACTOR)
+    done = run(stream_in("", address=f'create, no, port, {listener.getsockname()[1]}, host, "localhost"'))
+    connected = []
+    accepting = threading.Thread(target=lambda: connected.append(listener.accept()[0]))
+    accepting.start()
+    return (accepting, connected), done
+
+
+def both(run, end):
+    """Source, sink and run. The run connects before it accepts."""
+    source, done = source_and_run(run, end)
+    sink = done.connect("o")
+    if end == "connect":
+        accepting, connected = source
+        accepting.join(60 * TIME_FACTOR)
+        source = connected[0]
+    return source, sink, done
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_of_a_message_that_is_too_long_the_rest_is_the_next(run, end):
+    """A stream has no lengths: 8 bytes are a message, however they come."""
+    source, sink, done = both(run, end)
+    source.sendall(np.arange(1.0, 1000.0).tobytes() + b"abc")
+    assert list(np.frombuffer(drain(sink))) == [1, 2, 3, 4, 5, 6]
+    assert done.finish() == 0, done.errors
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_a_flood_of_values_ends_with_the_run(run, end):
+    source, sink, done = both(run, end)
+    thread = flood(source, np.full(10000, 3.0).tobytes())
+    assert list(np.frombuffer(drain(sink))) == [3] * 6
+    assert done.finish() == 0, done.errors
+    thread.join(60 * TIME_FACTOR)
+    assert not thread.is_alive()
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_messages_out_of_step_are_named_when_they_are_no_numbers(run, end):
+    source, sink, done = both(run, end)
+    source.sendall(np.array([1.0]).tobytes() + b"\xff" * 4096)
+    drain(sink)
+    assert done.finish() == 5
+    assert 'error: stream drive "in" (' in done.errors and "value 1 is not finite" in done.errors
+
+
+def test_what_a_sink_sends_is_not_read(run):
+    done = run(stream_out(""))
+    thread = flood(done.connect("o"), bytes(100000))
+    assert done.finish() == 0, done.errors
+    thread.join(60 * TIME_FACTOR)
+    assert not thread.is_alive()
+
+
 def test_last_values_stay_when_the_source_closes(run):
     done = run(stream_in(""))
     source, sink = done.connect("i"), done.connect("o")
@@ -623,6 +711,40 @@ def test_peers_that_break_the_dialogue_are_named(run, answer, message):
     assert done.finish() == 5
     assert f"error: force 5 (s): {message}" in done.errors
     assert len(done.rows()) == 4  # results up to the step before
+
+
+@pytest.mark.parametrize("surplus", [1, 100, 1 << 20])
+def test_answers_longer_than_the_deck_has_points_are_named_at_the_next_exchange(run, surplus):
+    """The protocol has no lengths: what is too much stands where the next command should."""
+    done = run(force())
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    receive(peer, 1 + 288)
+    send_what_is_taken(peer, b"\6" + LOADS + bytes(surplus))
+    assert done.finish() == 5
+    assert "error: force 5 (s): unknown command 0 from the peer" in done.errors
+    assert len(done.rows()) == 2  # the exchange of the derivatives was in order
+
+
+@pytest.mark.parametrize("size", [8, 1 << 20])
+def test_oversized_requests_are_refused(run, size):
+    done = run(force())
+    peer = done.connect()
+    send_what_is_taken(peer, b"\7" + b"\xff" * size)
+    assert done.finish() == 5
+    assert "error: force 5 (s): the peer does not fit: " in done.errors and "the deck has 2, the peer 4294967295" in done.errors
+
+
+@pytest.mark.parametrize("what,code,message", [("answers", 0, ""), ("zeros", 5, "unknown command 0 from the peer")])
+def test_a_flood_of_answers_ends_with_the_run(run, what, code, message):
+    done = run(force())
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    thread = flood(peer, (b"\6" + LOADS) * 1000 if what == "answers" else bytes(100000))
+    assert done.finish() == code and message in done.errors
+    thread.join(60 * TIME_FACTOR)
+    assert not thread.is_alive()
+    assert code != 0 or len(done.rows()) == 6
 
 
 def test_a_wrong_label_is_named(run):
