@@ -82,6 +82,9 @@ class Peer(exchange.Course):
     server_timeout      the server gives signs of life; when none comes for so long [s], the peer ends with an error
     heartbeat_timeout   the peer shows signs of life at least that often [s], also while it computes; the library sends them
     timeout             seconds that attaching may take
+    step       of a peer that comes back: the step at whose end it stands, `step` of the peer that left. A simulation that was brought back from a
+               checkpoint and stands at an earlier one refuses it (PreconditionFailed, reason PEER_AHEAD)
+    can_go_back  it is let in all the same: before it answers it takes the state that it had at the end of step `peer.step`
     After the end `error` has what ended the stream, None when it ended in good order.
     """
 
@@ -97,7 +100,7 @@ class Peer(exchange.Course):
         connection = simulation._connection
         self._stream = open_stream(connection.channel)(iter(self._out.get, None), metadata=connection.about(simulation.name))
         with bounded(timeout, self._stream.cancel, "attaching the peer"), translated():
-            self.welcome = exchange.receive(next(self._stream))[1]
+            self._begin(exchange.receive(next(self._stream))[1], options.get("step"))
         self._closing = threading.Event()
         self._waiting_since: Optional[float] = None
         if heartbeat_timeout is not None or server_timeout is not None:

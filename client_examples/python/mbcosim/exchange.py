@@ -72,11 +72,11 @@ def hello(simulation: Any, port: str, *, mode: Optional[str] = None, rotation: s
           policy: str = "fail_step", acceleration: str = "none", relaxation: Optional[float] = None, tolerance: Optional[float] = None,
           maximum_passes: Optional[int] = None, check_model: bool = True, tangent: str = "none",
           heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None,
-          units: Optional[common_pb2.UnitSystem] = None) -> pb.PeerMessage:
+          units: Optional[common_pb2.UnitSystem] = None, step: Optional[int] = None, can_go_back: bool = False) -> pb.PeerMessage:
     """First message of a peer."""
     message = pb.Hello(
         protocol=protocol(), simulation=simulation.name, port=port, units=units,
-        expected=pb.PeerExpectation(model_digest=simulation.info.model_digest if check_model else ""),
+        expected=pb.PeerExpectation(model_digest=simulation.info.model_digest if check_model else "", step=step, can_go_back=can_go_back),
         form=pb.ExchangeForm(rotation_form=_enum(types.RotationForm, "ROTATION_FORM_", rotation),
                              frame=_enum(types.PortFrame, "PORT_FRAME_", frame), accelerations=accelerations),
         schedule=pb.ExchangeSchedule(mode=_enum(types.CouplingMode, "COUPLING_MODE_", mode), every=every,
@@ -218,6 +218,8 @@ class Course:
     """What a peer has seen and answered; what blocking and asynchronous peers share.
 
     error      what ended the stream; None when it ended in good order
+    step       the step at whose end the peer stands: of the last exchange that it answered, in implicit modes of the last step that was
+               accepted; before that where it attached. To be told when it attaches again
     exchanges  answers given
     accepted   (step, time) of the implicit steps that ended
     rejected   (step, time) to go back to, of those that failed
@@ -227,25 +229,38 @@ class Course:
 
     def __init__(self, rotation: str) -> None:
         self.error: Optional[Error] = None
+        self.step = 0
         self.exchanges = 0
         self.accepted: list[tuple[int, float]] = []
         self.rejected: list[tuple[int, float]] = []
         self._rotation, self._index = rotation, 0
+        self._asked: Optional[int] = None  # step of the last exchange, in explicit modes
+
+    def _begin(self, welcome: pb.Welcome, step: Optional[int]) -> None:
+        """The peer is attached; `step` is where it said that it stands."""
+        self.welcome = welcome
+        self.step = welcome.step if step is None else min(step, welcome.step)
 
     def _take(self, data: bytes) -> Optional[Motion]:
         """The Motion of a message; None when it tells something else, which is noted."""
         name, content = receive(data)
         if name == "exchange":
             self._index = index(content)
-            return motion(content, self._rotation)
+            seen = motion(content, self._rotation)
+            self._asked = seen.step if seen.iteration == 0 else None
+            return seen
         if name in ("accepted", "rejected"):
             getattr(self, name).append((content.step, content.time))
+            # Pieces of a step may have been accepted before it is rejected.
+            self.step = content.step if name == "accepted" else min(self.step, content.step)
         return None
 
     def _answer(self, value: Any) -> pb.PeerMessage:
         """The message that answers the last motion."""
         message = answer(self._index, value, self.welcome.layout.kind)
         self.exchanges += 1
+        if self._asked is not None and not isinstance(value, Reject):
+            self.step = self._asked
         return message
 
     def _failure(self, error: BaseException) -> pb.PeerMessage:
