@@ -3,12 +3,13 @@ import asyncio
 import json
 import threading
 
+import grpc
 import pytest
 
 import decks
 import mbcosim
 import mbcosim.aio
-from conftest import wait_for
+from conftest import TIME_FACTOR, wait_for
 from mbcosim.v1 import events_pb2, simulations_pb2 as pb
 
 PORT = [mbcosim.signal_port("port", outputs=["time"], inputs=["node.structural.1.load"])]
@@ -162,6 +163,18 @@ def test_lines_of_the_log_have_the_same_fields(start_daemon):
         "session": simulation.name, "method": "Simulations/Step", "identity": "local", "request_id": 'my "request"', "trace_id": trace}
     refused, = [line for line in lines if "refused to" in line["message"]]
     assert refused["reason"] == "NO_SUCH_SIMULATION" and refused["method"] == "Simulations/Step" and "trace_id" not in refused
+
+
+def test_what_libraries_say_goes_through_the_log(start_daemon):
+    daemon = start_daemon("--log-format", "json")
+    with grpc.insecure_channel(daemon.address) as channel:
+        step = channel.unary_unary("/mbcosim.v1.Simulations/Step", request_serializer=bytes, response_deserializer=bytes)
+        with pytest.raises(grpc.RpcError) as caught:
+            step(b"\x0a\x02\xff\xfe", timeout=30 * TIME_FACTOR)  # a name that is no UTF-8, of which protobuf complains
+        assert caught.value.code() == grpc.StatusCode.INVALID_ARGUMENT
+    wait_for(lambda: "protobuf: " in daemon.log())
+    lines = [json.loads(line) for line in daemon.log().splitlines()]
+    assert [line["level"] for line in lines if line["message"].startswith("protobuf: ")] == ["warning"]
 
 
 def test_lines_about_peers_name_port_and_identity(start_daemon):
