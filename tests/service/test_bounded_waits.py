@@ -12,7 +12,7 @@ import pytest
 import decks
 import mbcosim
 import mbcosim.aio
-from conftest import MODELS, TIME_FACTOR
+from conftest import MODELS, TIME_FACTOR, wait_for
 from mbcosim.calls import ServerCalls, SimulationCalls, SnapshotCalls
 from mbcosim.v1 import simulations_pb2 as pb
 from relay import BlackHole
@@ -151,6 +151,29 @@ def test_what_is_no_timeout_is_refused_by_its_name(daemon, client, seconds):
     else:
         with mbcosim.connect(daemon.address) as server:
             asyncio.run(main(server))
+
+
+def threads():
+    return {thread for thread in threading.enumerate() if thread.is_alive()}
+
+
+def test_streams_that_are_left_open_leave_no_thread(daemon):
+    """Neither in a connection that is closed nor when the server ends them."""
+    before = threads()
+    for ends in ("connection", "simulation"):
+        server = daemon.connect()
+        simulation = server.load_text(decks.body(), ports=PORT)
+        peer, samples = simulation.couple("spring", spring), simulation.subscribe(["time"])
+        for _ in range(5):
+            simulation.step()
+        stepper = simulation.stepper(["time"])
+        assert stepper.step().step == 6 and peer.exchanges == 6 and next(iter(samples))[0] == 1
+        if ends == "simulation":
+            with daemon.connect() as other:
+                other.attach(simulation.name).delete()
+            wait_for(lambda: not peer._thread.is_alive())
+        server.close()
+    wait_for(lambda: threads() <= before)
 
 
 def took(begin, bound, what="it"):

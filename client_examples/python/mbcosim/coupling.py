@@ -23,7 +23,7 @@ from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
 from . import exchange
 from .errors import Unavailable, from_rpc_error, translated
-from .rpc import PARTING, USUAL, bounded
+from .rpc import PARTING, USUAL, bounded, end_with
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -99,6 +99,7 @@ class Peer(exchange.Course):
             heartbeat_interval=None if server_timeout is None else server_timeout / 3, **options))
         connection = simulation._connection
         self._stream = open_stream(connection.channel)(iter(self._out.get, None), metadata=connection.about(simulation.name))
+        end_with(self._stream, self._out)
         with bounded(timeout, self._stream.cancel, "attaching the peer"), translated():
             self._begin(exchange.receive(next(self._stream))[1], options.get("step"))
         self._closing = threading.Event()

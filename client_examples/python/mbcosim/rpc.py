@@ -5,6 +5,7 @@ import contextlib
 import dataclasses
 import functools
 import math
+import queue
 import threading
 import time
 from collections.abc import Callable, Coroutine, Generator, Iterator
@@ -301,6 +302,12 @@ def bounded(seconds: Optional[float], cancel: Callable[[], object], what: str) -
         raise
     finally:
         timer.cancel()
+
+
+def end_with(stream: Any, requests: queue.SimpleQueue[Any]) -> None:
+    """The requests of a stream end when it does, also when nobody closes it here: gRPC's thread that waits for the next one would stay for ever."""
+    if not stream.add_callback(lambda: requests.put(None)):
+        requests.put(None)
 
 
 def until_cancelled(messages: Any) -> Iterator[Any]:

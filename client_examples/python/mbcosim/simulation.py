@@ -16,7 +16,7 @@ from .coupling import Answer, Peer
 from .errors import translated
 from .histories import Histories
 from .objects import ModelObjects
-from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, fill_duration, parting, runs_calls, until_cancelled
+from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, end_with, fill_duration, parting, runs_calls, until_cancelled
 from .stepping import StepLine
 from .words import pick
 
@@ -130,6 +130,7 @@ class Stepper:
         self._inputs = list(inputs)
         self._request.inputs.handles.extend(simulation.handles(self._inputs, timeout=timeout))
         self._replies = simulation._stub.StepStream(iter(self._requests.get, None), metadata=simulation._connection.about(simulation.name))
+        end_with(self._replies, self._requests)
 
     def __enter__(self: Self) -> Self:
         return self

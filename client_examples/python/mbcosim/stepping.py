@@ -11,6 +11,8 @@ import grpc
 
 from mbcosim.v1 import simulations_pb2 as pb
 
+from .rpc import end_with
+
 _SOON = 0.05  # seconds within which a step follows the one before in a loop
 _IDLE = 1.0   # seconds after which the stream is closed: an open one would keep the simulation alive
 
@@ -59,6 +61,7 @@ class StepLine:
             if self._replies is None and self._allowed and time.monotonic() - self._last < _SOON:
                 self._requests = queue.SimpleQueue()
                 self._replies = self._stub.StepStream(iter(self._requests.get, None), metadata=self._metadata)
+                end_with(self._replies, self._requests)
                 threading.Thread(target=self._close_when_idle, args=(self._replies,), daemon=True).start()
             return self._replies
 
