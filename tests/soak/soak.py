@@ -11,8 +11,10 @@ step too many, bits that differ after a restore, a refusal) is a fault, too. The
 (build/bin). The seed is printed.
 """
 import argparse
+import faulthandler
 import os
 import random
+import signal
 import subprocess
 import sys
 import tempfile
@@ -157,6 +159,7 @@ class User:
 
 def serve(address, name, coupled, seed):
     """In a process of its own: works as it is told to on its input."""
+    faulthandler.register(signal.SIGUSR1)
     user = User(address, name, coupled == "True", int(seed))
     for line in sys.stdin:
         print(user.work(int(line)), flush=True)
@@ -183,14 +186,42 @@ class Worker:
         return int(line)
 
     def end(self):
+        """Lets it go. What is wrong with that, or None."""
         self.process.stdin.close()
         self.process.stdout.close()
-        self.process.wait(30 * TIME_FACTOR)
+        try:
+            code = self.process.wait(30 * TIME_FACTOR)
+        except subprocess.TimeoutExpired:
+            return self.stuck()
+        return f"the client of {self.arguments[1]} ended with {code}" if code not in (0, -signal.SIGKILL) else None
+
+    def stuck(self):
+        """It does not end: where its threads stand goes to the standard error, by Python and by the kernel."""
+        pid = self.process.pid
+        print(f"threads of the client of {self.arguments[1]}:", *where(pid), sep="\n", file=sys.stderr, flush=True)
+        self.process.send_signal(signal.SIGUSR1)
+        time.sleep(1)
+        self.process.kill()
+        self.process.wait()
+        return f"the client of {self.arguments[1]} had done its work and did not end"
 
     def die(self, seed):
         self.process.kill()
         self.end()
         self.start(seed)
+
+
+def where(pid):
+    """Name, system call and place in the kernel of each thread."""
+    for task in os.listdir(f"/proc/{pid}/task"):
+        told = []
+        for file in ("comm", "syscall", "wchan"):
+            try:
+                with open(f"/proc/{pid}/task/{task}/{file}") as opened:
+                    told.append(opened.read().strip())
+            except OSError as error:  # it has ended, or this is not told here
+                told.append(str(error))
+        yield "  ".join([task, *told])
 
 
 def names_of_threads(pid):
@@ -260,10 +291,10 @@ def soak(daemon, options):
             memory, threads, descriptors = measures[-1]
             print(f"{time.monotonic() - start:7.0f} s {total:9} steps {memory >> 10:8} kB {threads:4} threads {descriptors:4} descriptors",
                   flush=True)
-        for worker in workers:
-            worker.end()
-        assert len(server.list()) == len(SESSIONS), "simulations are left over, or lost"
-    return list(faults_of(measures))
+        faults = [fault for fault in [worker.end() for worker in workers] if fault]
+        if len(server.list()) != len(SESSIONS):
+            faults.append("simulations are left over, or lost")
+    return faults + list(faults_of(measures))
 
 
 def main():
