@@ -9,8 +9,10 @@ import time
 import grpc
 import pytest
 
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "benchmarks"))
 import decks
 import mbcosim
+import reduce_scaling
 from conftest import BIN, TIME_FACTOR, wait_for
 from half_messages import HalfMessages
 from mbcosim.v1 import coupling_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
@@ -435,6 +437,12 @@ ANALYSES = {
 }
 
 
+def rests_within_a_second(daemon):
+    ended = time.monotonic()
+    wait_for(lambda: is_at_rest(daemon), 30)
+    return time.monotonic() - ended < (1 + 0.35) * TIME_FACTOR  # the look takes 0.3 s by itself
+
+
 @pytest.mark.parametrize("what", ANALYSES)
 @pytest.mark.parametrize("after", [0.02, 0.5, 2.0])
 def test_the_work_of_a_cancelled_analysis_ends_within_a_second(daemon, long_chain, what, after):
@@ -442,9 +450,32 @@ def test_the_work_of_a_cancelled_analysis_ends_within_a_second(daemon, long_chai
     call = ANALYSES[what](*long_chain)
     time.sleep(after)
     call.cancel()
-    cancelled = time.monotonic()
-    wait_for(lambda: is_at_rest(daemon), 30)
-    assert time.monotonic() - cancelled < (1 + 0.35) * TIME_FACTOR  # the look takes 0.3 s by itself
+    assert rests_within_a_second(daemon)
+
+
+LOOPS = "set: real x = 0.; " + "".join(f"for: integer i{n} = 1, 900000; set: x = sin(i{n}) * cos(i{n}); endfor; " for n in range(10))
+
+
+def test_a_deck_is_read_no_longer_than_a_second_after_its_deadline(daemon, server):
+    for seconds in (0.2, 0.6, 1.2):
+        wait_for(lambda: is_at_rest(daemon), 30)
+        with pytest.raises(mbcosim.TimedOut):
+            server.load_text(LOOPS + decks.body(), timeout=seconds)
+        assert rests_within_a_second(daemon)
+
+
+def test_a_reduction_goes_on_no_longer_than_a_second_after_its_deadline(daemon, server, tmp_path):
+    """Of a cube of 14 739 unknowns: in its matrices, its factorization, its shapes."""
+    shape = (16, 16, 16)
+    reduce_scaling.write_model(tmp_path, shape)
+    job = tmp_path / "cube.job"
+    job.write_text("mass = M.mtx\nstiffness = K.mtx\nnodes = nodes.csv\ndofs = dofs.csv\n")
+    for seconds in (0.5, 1, 2):
+        wait_for(lambda: is_at_rest(daemon), 30)
+        with pytest.raises(mbcosim.TimedOut):
+            server.reduce(job, basis="craig-bampton", interface=",".join(map(str, reduce_scaling.corner_labels(shape))), modes=300,
+                          inertia="rigid", expose="interface", timeout=seconds)
+        assert rests_within_a_second(daemon)
 
 
 def test_the_daemon_ends_within_its_grace_whatever_runs(start_daemon):
