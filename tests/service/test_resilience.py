@@ -14,7 +14,7 @@ import decks
 import mbcosim
 import reduce_scaling
 from conftest import BIN, TIME_FACTOR, wait_for
-from half_messages import HalfMessages
+from http2 import HalfMessages, reset_at_once
 from mbcosim.v1 import coupling_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
 
 TOKENS = ("ann-token-0123456789 control ann\nbob-token-0123456789 control bob\n"
@@ -383,6 +383,16 @@ def test_messages_that_never_come_whole_take_bounded_memory(start_daemon):
         half.close()
     with daemon.connect() as server, server.load_text(decks.body()) as simulation:
         assert simulation.step(10).step == 10
+
+
+def test_calls_that_are_reset_at_once_take_bounded_memory(start_daemon):
+    """Each is made before its reset is seen: of what the server reads at a time, not of all that a client can send."""
+    daemon = ready(start_daemon())
+    with daemon.connect() as server, server.load_text(decks.body()) as simulation:
+        before = resident(daemon)
+        reset_at_once(daemon.address[len("unix:"):], "/mbcosim.v1.Simulations/Step", 30_000)
+        assert simulation.step(10).step == 10
+        assert resident(daemon) - before < (150 << 20) * max(1, TIME_FACTOR / 5)  # 400 MB when all are made at once
 
 
 # ---------------------------------------------------------------- everything ends in time

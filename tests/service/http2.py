@@ -1,12 +1,14 @@
-"""A client that begins large messages on many streams of one connection, and completes none: HTTP/2 by hand."""
+"""HTTP/2 by hand, for what no gRPC client does: messages that are begun and not completed, calls that are reset at once."""
 import contextlib
 import select
 import socket
 import struct
+import threading
 import time
 
 DATA, HEADERS, RESET, SETTINGS, PING, WINDOW = 0, 1, 3, 4, 6, 8
 FRAME, WINDOW_BYTES = 16384, 65535  # HTTP/2's defaults
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 
 
 def frame(kind, flags, stream, payload=b""):
@@ -18,6 +20,32 @@ def header(name, value):
     return b"\0" + bytes([len(name)]) + name + bytes([len(value)]) + value
 
 
+def headers_of(method):
+    """Of a call, as they are sent."""
+    fields = [(b":method", b"POST"), (b":scheme", b"http"), (b":path", method.encode()), (b":authority", b"localhost"),
+              (b"content-type", b"application/grpc"), (b"te", b"trailers")]
+    return b"".join(header(*field) for field in fields)
+
+
+def reset_at_once(path, method, count):
+    """Makes so many calls over one connection and resets each at once; the server need not take them all."""
+    block, at_once = headers_of(method), 100
+    with socket.socket(socket.AF_UNIX) as connection, contextlib.suppress(ConnectionError):
+        connection.connect(path)
+        threading.Thread(target=read_to_the_end, args=[connection.dup()], daemon=True).start()
+        connection.sendall(PREFACE + frame(SETTINGS, 0, 0) + frame(SETTINGS, 1, 0))
+        for first in range(0, count, at_once):
+            connection.sendall(b"".join(frame(HEADERS, 4, 2 * k + 1, block) + frame(RESET, 0, 2 * k + 1, b"\0\0\0\x08")
+                                        for k in range(first, first + at_once)))
+        connection.shutdown(socket.SHUT_WR)
+
+
+def read_to_the_end(connection):
+    with connection, contextlib.suppress(OSError):
+        while connection.recv(1 << 20):
+            pass
+
+
 class HalfMessages:
     """`claimed` bytes are announced on each stream, `sent` of them come."""
 
@@ -25,10 +53,8 @@ class HalfMessages:
         self._socket = socket.socket(socket.AF_UNIX)
         self._socket.connect(path)
         self._socket.setblocking(False)
-        fields = [(b":method", b"POST"), (b":scheme", b"http"), (b":path", method.encode()), (b":authority", b"localhost"),
-                  (b"content-type", b"application/grpc"), (b"te", b"trailers")]
-        block = b"".join(header(*field) for field in fields)
-        self._out = bytearray(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(SETTINGS, 0, 0))
+        block = headers_of(method)
+        self._out = bytearray(PREFACE + frame(SETTINGS, 0, 0))
         self._in = bytearray()
         self._window, self._first_window = WINDOW_BYTES, WINDOW_BYTES
         self._windows = {1 + 2 * k: WINDOW_BYTES for k in range(streams)}
