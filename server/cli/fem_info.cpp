@@ -1,5 +1,4 @@
 #include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -8,6 +7,7 @@
 #include "cli/fem_file.h"
 #include "elements/modal/modal_body.h"
 #include "input/sources.h"
+#include "math/decompositions.h"
 #include "reduction/error.h"
 
 namespace mbcosim::cli {

@@ -1,1 +1,1 @@
-set(SOURCES rotation.cpp)
+set(SOURCES decompositions.cpp rotation.cpp sparse_lu.cpp)

@@ -1,9 +1,10 @@
 #include "reduction/basis.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "math/decompositions.h"
 
 namespace mbcosim {
 
@@ -242,8 +243,8 @@ VecX BasisBuilder::condensed_flexibility(Structure& omitted, const MatX& shapes)
   const MatX loads = s.embedded(s.balanced(unit_loads(s))), at_shapes = shapes.transpose() * loads;
   const MatX stiffness = shapes.transpose() * (model_.stiffness * shapes);
   const VecX scale = stiffness.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<MatX> solver(scale.asDiagonal() * stiffness *
-                                                   scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<MatX> solver(
+      MatX(scale.asDiagonal() * stiffness * scale.asDiagonal()));
   const auto elastic = stiffness.rows() - s.rigid_count();
   if (solver.info() != Eigen::Success || elastic < 0) return {};
   const VecX values = solver.eigenvalues().tail(elastic);

@@ -1,7 +1,6 @@
 #include "reduction/reduce.h"
 
 #include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +9,7 @@
 #include <numbers>
 #include <optional>
 
+#include "math/decompositions.h"
 #include "reduction/basis.h"
 #include "reduction/inertia.h"
 

@@ -1,9 +1,10 @@
 #include "reduction/structure.h"
 
 #include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
+
+#include "math/decompositions.h"
 
 namespace mbcosim {
 

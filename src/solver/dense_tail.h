@@ -13,6 +13,7 @@
 #include <memory>
 #include <vector>
 
+#include "math/decompositions.h"
 #include "math/types.h"
 #include "solver/watch.h"
 

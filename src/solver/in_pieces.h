@@ -2,9 +2,9 @@
 /// token is looked at.
 #pragma once
 
-#include <Eigen/LU>
 #include <optional>
 
+#include "math/decompositions.h"
 #include "math/types.h"
 #include "solver/watch.h"
 

@@ -1,9 +1,9 @@
 #include "solver/initial_assembly.h"
 
 #include <Eigen/Sparse>
-#include <Eigen/SparseLU>
 #include <map>
 
+#include "math/sparse_lu.h"
 #include "model/model_part.h"
 #include "model/user_elements.h"
 #include "solver/newton.h"

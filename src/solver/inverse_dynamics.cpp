@@ -1,11 +1,11 @@
 #include "solver/inverse_dynamics.h"
 
-#include <Eigen/SparseLU>
 #include <cmath>
 
 #include "elements/beams/inverse_beam.h"
 #include "elements/joints/deformable.h"
 #include "elements/joints/tikhonov.h"
+#include "math/sparse_lu.h"
 #include "solver/advance_time.h"
 #include "solver/newton.h"
 #include "solver/stages.h"

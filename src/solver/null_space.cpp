@@ -1,8 +1,9 @@
 #include "solver/null_space.h"
 
 #include <Eigen/LU>
-#include <Eigen/SparseLU>
 #include <cmath>
+
+#include "math/sparse_lu.h"
 
 namespace mbcosim {
 

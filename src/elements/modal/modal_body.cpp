@@ -1,7 +1,8 @@
 #include "elements/modal/modal_body.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+
+#include "math/decompositions.h"
 
 namespace mbcosim {
 

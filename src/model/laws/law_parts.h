@@ -11,34 +11,19 @@
 
 namespace mbcosim {
 
+// Readers for N = 1, 3 and 6.
+
 /// A scalar, Vec3 or Vec6 argument.
 template <int N>
-VecN<N> read_law_vector(Card& card, std::string_view what) {
-  if constexpr (N == 1)
-    return VecN<1>(card.real(what));
-  else if constexpr (N == 3)
-    return card.vec3(what);
-  else
-    return card.vec6(what);
-}
+VecN<N> read_law_vector(Card& card, std::string_view what);
 
 /// A scalar, 3×3 or 6×6 argument.
 template <int N>
-MatN<N> read_law_matrix(Card& card, std::string_view what) {
-  if constexpr (N == 1)
-    return MatN<1>(card.real(what));
-  else if constexpr (N == 3)
-    return card.mat3(what);
-  else
-    return card.mat6(what);
-}
+MatN<N> read_law_matrix(Card& card, std::string_view what);
 
 /// `C | proportional, q`: a damping matrix, in the second form q K.
 template <int N>
-MatN<N> read_damping(Card& card, const MatN<N>& stiffness) {
-  if (card.keyword("proportional")) return card.real("proportionality factor") * stiffness;
-  return read_law_matrix<N>(card, "damping");
-}
+MatN<N> read_damping(Card& card, const MatN<N>& stiffness);
 double read_scalar_damping(Card& card, double stiffness);
 
 /// Prestress σ₀ and prestrain ε₀(t): e = ε − ε₀(t), f = σ₀ + law(e, ε̇). The rate of the prestrain
@@ -61,21 +46,7 @@ struct Prestress {
 
 /// `[, prestress, σ₀] [, prestrain, ε₀]`, in this order.
 template <int N>
-Prestress<N> read_prestress(Card& card) {
-  Prestress<N> p;
-  if (card.keyword("prestress")) p.stress = read_law_vector<N>(card, "prestress");
-  if (card.keyword("prestrain")) {
-    if constexpr (N == 1)
-      p.strain = card.drive("prestrain");
-    else if constexpr (N == 3)
-      p.strain = card.vec3_drive("prestrain");
-    else
-      p.strain = card.vec6_drive("prestrain");
-    if (card.keyword("prestress"))
-      card.fail("`prestress` must precede `prestrain`", "swap the two");
-  }
-  return p;
-}
+Prestress<N> read_prestress(Card& card);
 
 /// Registers a reader of N-dimensional laws.
 template <int N>

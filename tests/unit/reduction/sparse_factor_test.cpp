@@ -1,10 +1,10 @@
 #include "reduction/sparse_factor.h"
+#include "math/decompositions.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <numeric>
 #include <random>
 

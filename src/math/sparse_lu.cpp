@@ -1,0 +1,3 @@
+#include "math/sparse_lu.h"
+
+template class Eigen::SparseLU<Eigen::SparseMatrix<double>>;
