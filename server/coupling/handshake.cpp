@@ -234,10 +234,8 @@ Agreement choose(const v1::Hello& hello, const PortModel& port) {
 Agreement agree(const v1::Hello& hello, const PortModel& port, const Expected& simulation) {
   Mismatches mismatches;
   const v1::VersionRange& range = hello.protocol();
-  const bool any = range.lowest() == 0 && range.highest() == 0;
-  mismatches.expect(
-      any || (range.lowest() <= kProtocolVersion && range.highest() >= kProtocolVersion),
-      "protocol", version_mismatch(range));
+  if (!is_range(range)) throw Refusal(v1::REASON_BAD_ARGUMENT, kNoRange);
+  mismatches.expect(includes_ours(range), "protocol", version_mismatch(range));
   const auto units = conversion_of(hello, port, mismatches);
   Expected in_peers_units = simulation;
   if (units) in_peers_units.step_size *= units->time();

@@ -23,6 +23,22 @@ inline void fill_protocol(v1::VersionRange* out) {
   for (const char* feature : kFeatures) out->add_features(feature);
 }
 
+/// A client that says nothing speaks any version.
+inline bool is_any(const v1::VersionRange& theirs) {
+  return theirs.lowest() == 0 && theirs.highest() == 0;
+}
+
+constexpr const char* kNoRange =
+    "`protocol` must have a `lowest` of at least 1 and a `highest` not below it";
+inline bool is_range(const v1::VersionRange& theirs) {
+  return is_any(theirs) || (theirs.lowest() >= 1 && theirs.lowest() <= theirs.highest());
+}
+
+inline bool includes_ours(const v1::VersionRange& theirs) {
+  return is_any(theirs) ||
+         (theirs.lowest() <= kProtocolVersion && kProtocolVersion <= theirs.highest());
+}
+
 /// What is wrong with versions that do not meet.
 inline std::string version_mismatch(const v1::VersionRange& theirs) {
   const bool older = theirs.highest() < kProtocolVersion;

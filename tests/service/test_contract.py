@@ -369,6 +369,15 @@ def test_a_wrong_choice_of_a_peer_is_refused_by_name(server, group, field, value
         assert simulation.step(0).step == 0
 
 
+@pytest.mark.parametrize("lowest, highest", [(-1, 2), (3, 2), (0, 2)])
+def test_versions_of_a_peer_that_are_no_range_are_refused_by_their_field(server, lowest, highest):
+    from mbcosim import exchange
+    with server.load_text(decks.body(), ports=PORT) as simulation:
+        message = exchange.hello(simulation, "spring")
+        message.hello.protocol.lowest, message.hello.protocol.highest = lowest, highest
+        refused("protocol", lambda: next(server.coupling.Attach(iter([message]), metadata=server.metadata)))
+
+
 def test_an_exchange_without_content_ends_the_peer(server):
     with server.load_text(decks.body(), ports=PORT) as simulation:
         from mbcosim import exchange
