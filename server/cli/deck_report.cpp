@@ -47,9 +47,7 @@ bool shows_colours(std::FILE* out) {
 /// The first line bold with its severity in colour, carets green.
 std::string coloured(const Diagnostic& diagnostic) {
   std::string text = diagnostic.text();
-  const std::string severity = diagnostic.severity == Severity::error     ? "error:"
-                               : diagnostic.severity == Severity::warning ? "warning:"
-                                                                          : "note:";
+  const std::string severity = severity_name(diagnostic.severity) + std::string(":");
   const char* colour = diagnostic.severity == Severity::error     ? "\x1b[1;31m"
                        : diagnostic.severity == Severity::warning ? "\x1b[1;35m"
                                                                   : "\x1b[1;36m";
