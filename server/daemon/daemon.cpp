@@ -308,7 +308,7 @@ void Daemon::open_http() {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);  // replies of this very process
   door_ = std::make_unique<http::Door>(
-      options, http::DoorParts{server_->InProcessChannel(arguments), authenticator_,
+      options, http::DoorParts{server_->InProcessChannel(arguments), authenticator_, budgets_,
                                [this] { return metrics_.text(); },
                                [this] { return !draining_.load() && !gate_.closing(); }});
   spdlog::info("serving HTTP on {}", door_->address());

@@ -71,8 +71,9 @@ struct Door::Impl {
 
 Door::Impl::Impl(const DoorOptions& options, DoorParts given)
     : parts(std::move(given)),
-      rpc(parts.channel, {options.message_bytes, options.streams_per_identity,
-                          std::max(1, options.connections * 3 / 4)}) {
+      rpc(parts.channel, parts.budgets,
+          {options.message_bytes, options.streams_per_identity,
+           std::max(1, options.connections * 3 / 4)}) {
   const std::string wanted = numeric(options.address);
   if (!is_loopback(wanted) && !options.insecure)
     throw std::runtime_error("refused to serve HTTP on " + options.address +

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "rpc/auth.h"
+#include "rpc/budgets.h"
 
 struct mg_connection;
 struct mg_context;
@@ -28,6 +29,7 @@ struct DoorOptions {
 struct DoorParts {
   std::shared_ptr<grpc::Channel> channel;  ///< to the gRPC server of this process
   const Authenticator& authenticator;
+  MemoryBudgets& budgets;
   std::function<std::string()> metrics;  ///< in Prometheus' text format
   std::function<bool()> ready;
 };

@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "http/rpc_error.h"
+#include "wire/memory.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server::http {
@@ -110,6 +111,8 @@ struct RpcHandler::Call {
   Connection& connection;
   const MethodDescriptor& method;
   Framing framing;
+  MemoryBudget& memory;    ///< of the caller
+  MemoryShare share = {};  ///< what the request takes
 
   /// A whole answer that says why the call failed before it began.
   void refuse(const grpc::Status& status) const {
@@ -175,6 +178,15 @@ const MethodDescriptor* RpcHandler::find(std::string_view path) {
   return service ? service->FindMethodByName(std::string(path.substr(slash + 1))) : nullptr;
 }
 
+// A message may take hundreds of times the bytes of its body.
+grpc::Status RpcHandler::read_counted(Call& call, std::string* request) const {
+  try {
+    return within(call.memory, nullptr, &call.share, [&] { return read_request(call, request); });
+  } catch (const Refusal& refusal) {
+    return refusal.status();
+  }
+}
+
 grpc::Status RpcHandler::read_request(Call& call, std::string* request) const {
   std::string body;
   switch (call.connection.read_body(limits_.body_bytes, &body)) {
@@ -214,8 +226,11 @@ void RpcHandler::answer_whole(Call& call, GenericCall& rpc) const {
   const auto reply = rpc.receive();
   const grpc::Status status = rpc.finish();
   if (!status.ok() || !reply) return call.refuse(status);
-  call.connection.respond(200, content_type_of(call.framing),
-                          transcode(call.framing.encoding, call.method.output_type(), *reply),
+  MemoryShare share;
+  const std::string body = within(call.memory, nullptr, &share, [&] {
+    return transcode(call.framing.encoding, call.method.output_type(), std::move(*reply));
+  });
+  call.connection.respond(200, content_type_of(call.framing), body,
                           {{"Cache-Control", "no-store"}});
 }
 
@@ -245,7 +260,7 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
                                            : method.name() +
                                                  " has one answer: send "
                                                  "application/json or application/proto");
-  Call call{connection, method, *framing};
+  Call call{connection, method, *framing, budgets_.of(identity)};
   if (method.client_streaming())
     return call.refuse(
         not_served(method.name() + " takes a stream of requests, which plain HTTP cannot carry"));
@@ -254,7 +269,7 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
     return call.refuse(not_served("bodies cannot be compressed"));
 
   std::string request;
-  const grpc::Status readable = read_request(call, &request);
+  const grpc::Status readable = read_counted(call, &request);
   if (!readable.ok()) return call.refuse(readable);
   std::optional<StreamPlace> place;
   if (streams && !place.emplace(*this, identity).held())

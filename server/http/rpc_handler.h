@@ -12,6 +12,7 @@
 #include "http/codec.h"
 #include "http/connection.h"
 #include "http/generic_call.h"
+#include "rpc/budgets.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::server::http {
@@ -37,8 +38,8 @@ class RpcHandler {
     int streams;  ///< of all identities
   };
 
-  RpcHandler(std::shared_ptr<grpc::Channel> channel, const Limits& limits)
-      : channel_(std::move(channel)), limits_(limits) {}
+  RpcHandler(std::shared_ptr<grpc::Channel> channel, MemoryBudgets& budgets, const Limits& limits)
+      : channel_(std::move(channel)), budgets_(budgets), limits_(limits) {}
 
   /// The method that "/mbcosim.v1.Simulations/Step" names; null: none.
   static const google::protobuf::MethodDescriptor* find(std::string_view path);
@@ -53,10 +54,12 @@ class RpcHandler {
   class StreamPlace;
 
   grpc::Status read_request(Call& call, std::string* request) const;
+  grpc::Status read_counted(Call& call, std::string* request) const;
   void answer_whole(Call& call, GenericCall& rpc) const;
   void answer_pieces(Call& call, GenericCall& rpc) const;
 
   std::shared_ptr<grpc::Channel> channel_;
+  MemoryBudgets& budgets_;
   const Limits limits_;
   std::atomic<bool> closing_{false};
   Mutex mutex_;

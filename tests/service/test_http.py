@@ -3,13 +3,15 @@ import base64
 import http.client
 import json
 import math
+import os
 import socket
 import struct
+import subprocess
 import time
 import urllib.parse
 
 import pytest
-from conftest import TIME_FACTOR, wait_for
+from conftest import BIN, TIME_FACTOR, wait_for
 from google.protobuf import json_format
 
 from mbcosim.v1 import common_pb2, coupling_pb2, reduction_pb2, simulations_pb2, telemetry_pb2
@@ -260,6 +262,38 @@ def test_a_body_over_the_limit_is_refused_with_its_name(door):
     status, error = door.call("Simulations/ListSimulations", {"pageToken": "x" * 1_000_001})
     assert (status, error["code"]) == (429, "resource_exhausted")
     assert error["details"][0]["debug"]["metadata"] == {"limit": "message_bytes", "maximum": "1000000"}
+
+
+def is_sanitized():
+    """A sanitizer has an allocator of its own, which counts nothing."""
+    listed = subprocess.run(["ldd", os.path.join(BIN, "mbcosimd")], stdout=subprocess.PIPE, text=True, check=True).stdout
+    return "libasan" in listed or "libtsan" in listed
+
+
+def field(number, content):
+    """Of bytes, as protobuf writes it."""
+    length, digits = len(content), b""
+    while length > 127:
+        digits, length = digits + bytes([length & 127 | 128]), length >> 7
+    return bytes([number << 3 | 2]) + digits + bytes([length]) + content
+
+
+@pytest.mark.skipif(is_sanitized(), reason="memory is counted by the daemon's own allocator")
+@pytest.mark.parametrize("kind, body", [
+    ("application/proto", field(1, field(3, b"\x32\x00" * (15 << 19)))),
+    ("application/json", b'{"header":{"options":{"ports":[' + b"{}," * (5 << 20) + b"{}]}}}")], ids=["binary", "json"])
+def test_a_body_that_would_take_much_memory_is_refused_before_it_does(start_daemon, kind, body):
+    """15 MB of empty ports, which would be gigabytes of messages."""
+    daemon = start_daemon("--http", "127.0.0.1:0", "--limit-memory", "200M")
+    door = Door(daemon.page())
+    status, _, answer = door.request("POST", "/mbcosim.v1.Simulations/CreateSimulationInline", body, Content_Type=kind)
+    error = json.loads(answer)
+    assert (status, error["code"]) == (429, "resource_exhausted")
+    assert error["details"][0]["debug"]["metadata"]["limit"] == "memory_bytes"
+    with open(f"/proc/{daemon.process.pid}/status") as file:
+        peak = int(next(line for line in file if line.startswith("VmHWM")).split()[1]) << 10
+    assert peak < 500 << 20
+    assert door.call("Simulations/ListSimulations")[0] == 200
 
 
 @pytest.mark.parametrize("path", ["/mbcosim.v1.Simulations/Nothing", "/mbcosim.v1.Nothing/Step", "/grpc.health.v1.Health/Check", "/etc/passwd",
