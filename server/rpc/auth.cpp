@@ -109,8 +109,12 @@ Authenticator::Tokens Authenticator::read(const std::string& path) {
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     line = line.substr(0, line.find('#'));
-    if (line.find_first_not_of(" \t\r") != std::string::npos)
-      result.push_back(read_token(line, number));
+    if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+    Token token = read_token(line, number);
+    if (std::any_of(result.begin(), result.end(),
+                    [&](const Token& other) { return other.hash == token.hash; }))
+      refuse_line(number, "the token stands in an earlier line already");
+    result.push_back(std::move(token));
   }
   return result;
 }

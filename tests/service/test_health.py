@@ -115,7 +115,8 @@ def test_what_is_wrong_is_an_error_at_the_start(tmp_path):
     for line, error in (("t control ann next-year", "line 1: \"next-year\" is no date"),
                         ("t control ann 2026-02-31", "is no date"), ("t control ann 1 more", "nothing is expected after"),
                         ("t boss ann", "none of observe, control, admin"), ("sha256:12 control ann", "64 hexadecimal digits"),
-                        ("t control", "expected TOKEN ROLE NAME")):
+                        ("t control", "expected TOKEN ROLE NAME"),
+                        ("t control ann\nt admin root", "line 2: the token stands in an earlier line")):
         tokens.write_text(line + "\n")
         assert error in refused("--tokens", str(tokens))
     tokens.write_text("t control ann\n")
