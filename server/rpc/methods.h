@@ -49,10 +49,11 @@ struct CallFrame {
   const Caller& caller;
   Call& call;
   MemoryBudget& memory;
+  MemoryShare& share;  ///< what the call takes until it is over
 };
 
-inline CallFrame frame_of(Exchange& exchange) {
-  return {exchange.caller(), exchange.call(), exchange.memory()};
+inline CallFrame frame_of(Exchange& exchange, MemoryShare& share) {
+  return {exchange.caller(), exchange.call(), exchange.memory(), share};
 }
 
 /// One message in.
@@ -62,6 +63,7 @@ class OneRequest : public Handler {
   explicit OneRequest(Lane lane) : lane_(lane) {}
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
     exchange.post(lane_, [this, &exchange, bytes = std::move(message)]() mutable {
+      share_ = MemoryShare(exchange.memory());
       parse(exchange.memory(), bytes, &request_, &share_);
       bytes.Clear();
       CallLabels labels = exchange.labels();
@@ -77,10 +79,11 @@ class OneRequest : public Handler {
  protected:
   virtual void serve(Exchange& exchange, const Request& request) = 0;
   Lane lane() const { return lane_; }
+  MemoryShare& share() { return share_; }
 
  private:
   const Lane lane_;
-  MemoryShare share_;  ///< of the request
+  MemoryShare share_;  ///< of the request, and of what is made for it
   Request request_;
 };
 
@@ -94,7 +97,7 @@ class Unary final : public OneRequest<Request> {
  private:
   void serve(Exchange& exchange, const Request& request) override {
     Reply reply;
-    body_(frame_of(exchange), request, &reply);
+    body_(frame_of(exchange, this->share()), request, &reply);
     exchange.end(serialized(reply));
   }
   const Body body_;
@@ -111,7 +114,7 @@ class Series final : public OneRequest<Request> {
 
  private:
   void serve(Exchange& exchange, const Request& request) override {
-    source_ = body_(frame_of(exchange), request);
+    source_ = body_(frame_of(exchange, this->share()), request);
     go_on(exchange);
   }
   void on_written(Exchange& exchange) override {

@@ -27,9 +27,8 @@ RowTable::RowTable(const v1::TableRequest& request, const VariableAccess& variab
   variables.check(handles_);
   std::int64_t values = 2;
   for (const int handle : handles_) values += variables.variables()[handle].size;
-  constexpr std::int64_t kCopies = 4;  // this one, its message, its bytes, and their room to grow
   const std::int64_t block = std::max<std::int64_t>(kBlockValues, values) + values;
-  share_.grow(kCopies * block * static_cast<std::int64_t>(sizeof(double)));
+  share_.grow(VariableAccess::kBytesOfValue * block);
 }
 
 void RowTable::put(const Simulation& simulation) {

@@ -171,6 +171,7 @@ void add_variables(Gate& gate, const Parts& parts) {
            on_session<v1::ReadVariablesRequest, v1::ReadVariablesReply>(
                parts, Role::observe, Lane::work,
                [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+                 frame.share.grow(session.variable_access().bytes_of(request.handles()));
                  session.read(request, frame.call, reply);
                }));
   gate.add(

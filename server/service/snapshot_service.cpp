@@ -41,7 +41,7 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
       session.import_state(bytes_, header_.display_name(), header_.restore(), frame.call,
                            out->mutable_snapshot());
     };
-    once_stored(parts_.store, **session_, frame_of(exchange), question(), &reply, import);
+    once_stored(parts_.store, **session_, frame_of(exchange, share_), question(), &reply, import);
     exchange.end(serialized(reply));
   }
 

@@ -42,6 +42,8 @@ class StepStreamHandler final : public Handler {
     request_.set_simulation(
         name_);  // a repeat in another message of the stream is the same request
     reply_.Clear();
+    outputs_share_ =
+        MemoryShare(exchange.memory(), (*session_)->variable_access().bytes_of(request_.outputs()));
     (*session_)->step(request_, exchange.caller(), exchange.call(), reply_.mutable_step());
     const bool taken = exchange.all_written();  // the last reply, by the client
     wants_next_.store(true);
@@ -57,7 +59,7 @@ class StepStreamHandler final : public Handler {
   const Parts& parts_;
   std::string name_;
   std::optional<SessionHold> session_;
-  MemoryShare share_;  ///< of the request
+  MemoryShare share_, outputs_share_;  ///< of the request and of the reply
   v1::StepRequest request_;
   v1::StepStreamReply reply_;
   std::atomic<bool> wants_next_{false};
@@ -154,6 +156,7 @@ class RunHandler final : public OneRequest<v1::RunRequest> {
                               exchange.call(), Access::control);
     Progress progress(*session, request);
     Rows rows(*session, request, exchange.memory());
+    share().grow(session->variable_access().bytes_of(request.step().outputs()));
     v1::RunReply done;
     const auto send = [&] {
       rows.send(exchange);
@@ -171,12 +174,14 @@ class RunHandler final : public OneRequest<v1::RunRequest> {
 }  // namespace
 
 void add_stepping(Gate& gate, const Parts& parts) {
-  gate.add(simulations_path("Step"), on_session<v1::StepRequest, v1::StepReply>(
-                                         parts, Role::control, Lane::advance,
-                                         [](Session& session, const v1::StepRequest& request,
-                                            v1::StepReply* reply, const CallFrame& frame) {
-                                           session.step(request, frame.caller, frame.call, reply);
-                                         }));
+  gate.add(simulations_path("Step"),
+           on_session<v1::StepRequest, v1::StepReply>(
+               parts, Role::control, Lane::advance,
+               [](Session& session, const v1::StepRequest& request, v1::StepReply* reply,
+                  const CallFrame& frame) {
+                 frame.share.grow(session.variable_access().bytes_of(request.outputs()));
+                 session.step(request, frame.caller, frame.call, reply);
+               }));
   gate.add(simulations_path("StepStream"),
            stream(Role::control, [&parts] { return std::make_unique<StepStreamHandler>(parts); }));
   gate.add(simulations_path("Run"),

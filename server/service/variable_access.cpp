@@ -34,6 +34,15 @@ void VariableAccess::check(int handle) const {
                                                  std::to_string(variables_.size()));
 }
 
+std::int64_t VariableAccess::bytes_of(const google::protobuf::RepeatedField<int>& handles) const {
+  std::int64_t count = 0;
+  for (const int handle : handles) {
+    check(handle);
+    count += variables_[handle].size;
+  }
+  return kBytesOfValue * count;
+}
+
 void VariableAccess::check_inputs(const v1::Values& inputs, const std::string& field) const {
   std::int64_t size = 0;
   for (const int handle : inputs.handles()) {
@@ -83,10 +92,12 @@ void VariableAccess::write(const v1::Values& inputs, Simulation& simulation) con
 void VariableAccess::read(const Simulation& simulation,
                           const google::protobuf::RepeatedField<int>& handles,
                           google::protobuf::RepeatedField<double>* out) const {
+  constexpr std::size_t kKept = 1 << 16;
   thread_local std::vector<double> values;
   values.clear();
   for (const int handle : handles) simulation.get(handle, values);
   out->Add(values.begin(), values.end());
+  if (values.size() > kKept) std::vector<double>().swap(values);
 }
 
 bool VariableAccess::holds(const v1::Condition& condition, const Simulation& simulation) const {

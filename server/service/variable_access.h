@@ -1,6 +1,7 @@
 /// Reading and writing a simulation's variables as clients ask: by handles, checked first.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,10 @@ class VariableAccess {
   void check(const google::protobuf::RepeatedField<int>& handles) const {
     for (const int handle : handles) check(handle);
   }
+  /// Memory of a message with their values: here, in the message, as its bytes, and room to grow.
+  /// Throws NO_SUCH_VARIABLE.
+  std::int64_t bytes_of(const google::protobuf::RepeatedField<int>& handles) const;
+  static constexpr std::int64_t kBytesOfValue = 4 * sizeof(double);
   /// Throws NO_SUCH_VARIABLE, NOT_WRITABLE or BAD_ARGUMENT, which names the request's `field`.
   void check_inputs(const v1::Values& inputs, const std::string& field) const;
   /// Throws BAD_ARGUMENT when the condition makes no sense.

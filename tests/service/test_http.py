@@ -289,7 +289,7 @@ def test_a_body_that_would_take_much_memory_is_refused_before_it_does(start_daem
     status, _, answer = door.request("POST", "/mbcosim.v1.Simulations/CreateSimulationInline", body, Content_Type=kind)
     error = json.loads(answer)
     assert (status, error["code"]) == (429, "resource_exhausted")
-    assert error["details"][0]["debug"]["metadata"]["limit"] == "memory_bytes"
+    assert error["details"][0]["debug"]["metadata"]["limit"].endswith("memory_bytes")
     with open(f"/proc/{daemon.process.pid}/status") as file:
         peak = int(next(line for line in file if line.startswith("VmHWM")).split()[1]) << 10
     assert peak < 500 << 20

@@ -385,6 +385,24 @@ def test_messages_that_never_come_whole_take_bounded_memory(start_daemon):
         assert simulation.step(10).step == 10
 
 
+def test_values_that_are_asked_for_a_million_times_are_counted_first(start_daemon):
+    """A few megabytes of handles are gigabytes of values."""
+    daemon = ready(start_daemon("--limit-memory", "256M"))
+    with daemon.connect() as server, server.load_text(decks.body()) as simulation, grpc.insecure_channel(daemon.address) as channel:
+        stub = simulations_pb2_grpc.SimulationsStub(channel)
+        handles = simulation.handles(["node.structural.1.R"]) * 3_000_000
+        step = pb.StepRequest(simulation=simulation.name, outputs=handles)
+        before = resident(daemon)
+        for ask in (lambda: stub.ReadVariables(pb.ReadVariablesRequest(simulation=simulation.name, handles=handles)), lambda: stub.Step(step),
+                    lambda: next(stub.StepStream(iter([step]))), lambda: list(stub.Run(pb.RunRequest(step=step)))):
+            with pytest.raises(grpc.RpcError) as caught:
+                ask()
+            error = mbcosim.errors.from_rpc_error(caught.value)
+            assert error.reason == "LIMIT_EXCEEDED" and error.metadata["limit"].endswith("memory_bytes")
+        assert resident(daemon) - before < 400 << 20
+        assert simulation.step(10).step == 10
+
+
 def test_calls_that_are_reset_at_once_take_bounded_memory(start_daemon):
     """Each is made before its reset is seen: of what the server reads at a time, not of all that a client can send."""
     daemon = ready(start_daemon())
