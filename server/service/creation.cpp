@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "service/display_name.h"
 #include "service/durability.h"
 #include "service/protocol.h"
 #include "service/simulations_service.h"
@@ -41,6 +42,7 @@ namespace {
 Session::Identity make_identity(std::string name, const v1::CreateOptions& options,
                                 std::uint64_t digest, const Caller& caller,
                                 const ServiceLimits& limits) {
+  check_display_name(options.display_name());
   Session::Identity identity;
   identity.id = std::move(name);
   identity.display_name = options.display_name();

@@ -4,6 +4,7 @@
 #include <ctime>
 #include <functional>
 
+#include "service/display_name.h"
 #include "service/durability.h"
 #include "service/storing.h"
 #include "wire/convert.h"
@@ -288,6 +289,7 @@ v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheck
   point.mutable_info()->set_owner(caller.identity);
   point.mutable_info()->clear_grants();
   if (header.has_display_name()) point.mutable_info()->set_display_name(header.display_name());
+  check_display_name(point.info().display_name());
   point.clear_kept_replies();  // of others' requests
   const auto longest = google::protobuf::util::TimeUtil::SecondsToDuration(
       std::chrono::duration_cast<std::chrono::seconds>(config_.limits.lease).count());

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "model/model_part.h"
+#include "service/display_name.h"
 #include "service/session_advance.h"
 #include "wire/convert.h"
 #include "wire/protocol.h"
@@ -142,7 +143,8 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
   if (request.has_grants() && !grants_.allow(caller, Access::own))
     throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
                   {{"wanted", "own"}});
-  if (request.has_grants()) check_grants(request.grants().grants());  // before anything changes
+  check_display_name(request.display_name());  // before anything changes
+  if (request.has_grants()) check_grants(request.grants().grants());
   const CallGuard lock(lock_, call);
   ++changes_;
   const StepPolicy now = simulation_->policy();

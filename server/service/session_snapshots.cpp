@@ -1,4 +1,5 @@
 /// The part of Session that saves and restores.
+#include "service/display_name.h"
 #include "service/session.h"
 #include "wire/refusal.h"
 
@@ -6,6 +7,7 @@ namespace mbcosim::server {
 
 void Session::save(const std::string& display_name, const Call& call, v1::Snapshot* out) {
   require_usable();
+  check_display_name(display_name);
   const CallGuard lock(lock_, call);
   snapshots_.check_room(size_of(simulation_->state()));
   snapshots_.add(simulation_->snapshot(), display_name, out);
@@ -90,6 +92,7 @@ std::string Session::export_state(int snapshot, const Call& call) {
 void Session::import_state(const std::string& bytes, const std::string& display_name,
                            bool also_restore, const Call& call, v1::Snapshot* out) {
   if (also_restore) require_way_back();
+  check_display_name(display_name);
   std::int64_t results_end = 0;  // an imported state is taken for one of this history so far
   Result<State> state = [&] {
     const CallGuard lock(lock_, call);

@@ -241,6 +241,9 @@ def test_a_stream_and_a_call_share_their_ids(server):
 
 # ---------------------------------------------------------------- presence
 
+LONG = 1001 * "x"  # longer than a name for people may be
+
+
 @pytest.mark.parametrize("method, request_, field", [
     ("ListSimulations", pb.ListSimulationsRequest(page_size=0), "page_size"), ("ListSimulations", pb.ListSimulationsRequest(page_size=-1), "page_size"),
     ("DescribeSimulation", pb.DescribeSimulationRequest(page_size=0), "page_size"), ("Linearize", pb.LinearizeRequest(page_size=0), "page_size"),
@@ -249,6 +252,9 @@ def test_a_stream_and_a_call_share_their_ids(server):
     ("ComputeEigenvalues", pb.ComputeEigenvaluesRequest(shift=float("nan")), "shift"),
     ("UpdateSimulation", pb.UpdateSimulationRequest(minimum_step_size=0.0), "minimum_step_size"),
     ("UpdateSimulation", pb.UpdateSimulationRequest(minimum_step_size=float("nan")), "minimum_step_size"),
+    ("UpdateSimulation", pb.UpdateSimulationRequest(display_name=LONG), "display_name"),
+    ("CreateSnapshot", pb.CreateSnapshotRequest(display_name=LONG), "display_name"),
+    ("ForkSimulation", pb.ForkSimulationRequest(options=pb.CreateOptions(display_name=LONG)), "display_name"),
     ("Step", pb.StepRequest(step_size=0.0), "step_size"), ("Step", pb.StepRequest(step_size=-1.0), "step_size"),
     ("Step", pb.StepRequest(step_size=float("nan")), "step_size"), ("Step", pb.StepRequest(step_size=1e-20), "step_size"),
     ("Step", pb.StepRequest(steps=-1), "steps"), ("Step", pb.StepRequest(until_time=float("nan")), "until_time"),
@@ -334,7 +340,7 @@ def port(**wrong):
 
 
 @pytest.mark.parametrize("options, field", [
-    (pb.CreateOptions(lease=DURATION()), "lease"), (pb.CreateOptions(minimum_step_size=NAN), "minimum_step_size"),
+    (pb.CreateOptions(display_name=LONG), "display_name"), (pb.CreateOptions(lease=DURATION()), "lease"), (pb.CreateOptions(minimum_step_size=NAN), "minimum_step_size"),
     (pb.CreateOptions(pace=pb.Pace(rate=NAN)), "pace.rate"), (pb.CreateOptions(pace=pb.Pace()), "pace.rate"),
     (pb.CreateOptions(durability=77), "durability"), (pb.CreateOptions(non_convergence_policy=77), "non_convergence_policy"),
     (pb.CreateOptions(request_id="x" * 129), "request_id"), (pb.CreateOptions(symbols={"x": pb.SymbolValue()}), "symbols"),
