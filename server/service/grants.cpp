@@ -8,7 +8,7 @@
 namespace mbcosim::server {
 namespace {
 
-constexpr int kMostGrants = 1000;
+constexpr int kMostGrants = 1000, kMostPorts = 1000;  // ports of all grants together
 constexpr std::size_t kLongestIdentity = 1000;
 
 /// "*", "local", "token:NAME" or "cert:…".
@@ -46,7 +46,13 @@ void Grants::check(const List& grants) {
   if (grants.size() > kMostGrants)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "`grants` must not have more than " + std::to_string(kMostGrants) + " entries");
+  int ports = 0;
   for (const v1::Grant& grant : grants) {
+    ports += grant.ports_size();
+    if (ports > kMostPorts)
+      throw Refusal(v1::REASON_BAD_ARGUMENT, "`grants.ports` must not have more than " +
+                                                 std::to_string(kMostPorts) +
+                                                 " entries in all grants");
     if (!is_identity(grant.identity()))
       throw Refusal(
           v1::REASON_BAD_ARGUMENT,

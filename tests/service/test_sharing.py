@@ -195,6 +195,7 @@ def test_grants_change_while_the_simulation_lives(shared):
     (pb.Grant(identity="token:bob ", right=pb.RIGHT_OBSERVE), "grants.identity"),
     (pb.Grant(identity="token:bob"), "grants.right"),
     (pb.Grant(identity="token:bob", right=17), "grants.right"),
+    (pb.Grant(identity="token:bob", right=pb.RIGHT_COUPLE, ports=1001 * ["wing"]), "grants.ports"),
     (pb.Grant(identity="token:bob", right=pb.RIGHT_OBSERVE, ports=["wing"]), "grants.ports")])
 def test_wrong_grants_are_refused_by_field_and_change_nothing(shared, wrong, field):
     server = shared("ann")
