@@ -57,7 +57,7 @@ void Journal::rotate() {
 
 void Journal::open() {
   const std::string path = folder_.journal_path(id_, next_);
-  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0600);
+  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | kOpenOwn, 0600);
   if (file_ < 0) fail("the journal cannot be opened");
   ++next_;
   good_ = 0;

@@ -1,6 +1,6 @@
 #include "durable/record_file.h"
 
-#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -118,8 +118,48 @@ void RecordReader::finish() const {
 
 // ------------------------------------------------------------------ files
 
+namespace {
+
+/// Of a regular file.
+class ReadFile {
+ public:
+  explicit ReadFile(const std::string& path) : file_(::open(path.c_str(), O_RDONLY | kOpenOwn)) {
+    if (file_ < 0) fail("it cannot be opened");
+    struct stat info {};
+    regular_ = ::fstat(file_, &info) == 0 && S_ISREG(info.st_mode);
+  }
+  ~ReadFile() { ::close(file_); }
+  ReadFile(const ReadFile&) = delete;
+  ReadFile& operator=(const ReadFile&) = delete;
+
+  bool is_regular() const { return regular_; }
+  /// 0: at its end.
+  std::size_t read(char* bytes, std::size_t most) const {
+    while (true) {
+      const ssize_t count = ::read(file_, bytes, most);
+      if (count >= 0) return static_cast<std::size_t>(count);
+      if (errno != EINTR) fail("it cannot be read");
+    }
+  }
+
+ private:
+  const int file_;
+  bool regular_ = false;
+};
+
+}  // namespace
+
+void read_pieces(const std::string& path, const ByteSink& sink) {
+  constexpr std::size_t kPiece = 1 << 20;
+  const ReadFile file(path);
+  if (!file.is_regular()) throw StorageError("it is no regular file");
+  std::string piece(kPiece, '\0');
+  while (const std::size_t count = file.read(piece.data(), kPiece))
+    sink(std::string_view(piece).substr(0, count));
+}
+
 AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
-  file_ = ::open((path_ + ".new").c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  file_ = ::open((path_ + ".new").c_str(), O_WRONLY | O_CREAT | O_TRUNC | kOpenOwn, 0600);
   if (file_ < 0) fail("a file cannot be made");
 }
 
@@ -148,7 +188,7 @@ void AtomicFile::commit() {
 }
 
 void sync_path(const std::string& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int file = ::open(path.c_str(), O_RDONLY | kOpenOwn);
   if (file < 0) fail("what was written cannot be opened");
   const bool done = ::fsync(file) == 0;
   const int error = errno;

@@ -5,6 +5,8 @@
 /// `begin`, whose content is "mbcosim 2 " and the file's name, and ends with one of kind `end`.
 #pragma once
 
+#include <fcntl.h>
+
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -88,6 +90,13 @@ class RecordReader {
   std::int64_t at_ = 0, number_ = 0;  ///< of the next record
   bool open_ = false;
 };
+
+/// What files here are opened with: a pipe in the place of one makes nobody wait.
+constexpr int kOpenOwn = O_CLOEXEC | O_NONBLOCK;
+
+/// Hands over the bytes of a file in pieces. Throws StorageError when there is none, it cannot be
+/// read, or it is a pipe, a device or a folder.
+void read_pieces(const std::string& path, const ByteSink& sink);
 
 /// A file that is there whole or not at all: under another name until `commit`.
 class AtomicFile {

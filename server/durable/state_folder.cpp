@@ -11,7 +11,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <random>
 
@@ -23,13 +22,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kLongestRecord = 1LL << 40;
-constexpr std::size_t kPiece = 1 << 20;
+constexpr std::size_t kPiece = 1 << 20;  // of a file of the model in one record
 const std::string kSnapshot = "snapshot-", kJournal = "journal-";
 const std::string kDamaged = ".damaged";
 
 int take_lock(const std::string& path) {
   const std::string name = path + "/lock";
-  const int file = ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  const int file = ::open(name.c_str(), O_RDWR | O_CREAT | kOpenOwn, 0600);
   if (file < 0)
     throw std::runtime_error("the state folder " + path +
                              " cannot be used: " + std::strerror(errno));
@@ -137,8 +136,12 @@ void StateFolder::give_back(std::int64_t bytes) {
 
 std::string StateFolder::name() try {
   const std::string path = path_ + "/name";
-  std::string name;
-  if (std::getline(std::ifstream(path), name) && !name.empty()) return name;
+  if (fs::exists(path)) {
+    std::string name;
+    read_pieces(path, [&](std::string_view piece) { name += piece; });
+    name = name.substr(0, name.find('\n'));
+    if (!name.empty()) return name;
+  }
   char made[16];
   std::snprintf(made, sizeof made, "%08x", std::random_device()());
   AtomicFile file(path);
@@ -240,14 +243,8 @@ std::string StateFolder::put_aside(const std::string& id) {
 
 void StateFolder::read_file(const std::string& id, const std::string& name,
                             const RecordReader::Handler& handler) const try {
-  std::ifstream file(folder(id) + "/" + name, std::ios::binary);
-  if (!file) throw StorageError("there is no such file, or it cannot be read");
   RecordReader reader(kLongestRecord, handler);
-  std::string piece(kPiece, '\0');
-  while (file) {
-    file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
-    reader.take(std::string_view(piece).substr(0, static_cast<std::size_t>(file.gcount())));
-  }
+  read_pieces(folder(id) + "/" + name, [&](std::string_view piece) { reader.take(piece); });
   reader.finish();
   if (reader.file() != name) throw StorageError("it is the file \"" + reader.file() + "\"");
 } catch (const StorageError& error) {
@@ -328,10 +325,9 @@ std::vector<int> StateFolder::journals(const std::string& id) const {
 void StateFolder::read_journals(const std::string& id, const EntryHandler& handler) {
   for (const int number : journals(id)) {
     const std::string name = journal_name(number), path = journal_path(id, number);
-    std::ifstream file(path, std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-    if (!file) throw StorageError(id + "/" + name + ": it cannot be read");
     try {
+      std::string bytes;
+      read_pieces(path, [&](std::string_view piece) { bytes += piece; });
       const std::size_t whole = read_journal(bytes, name, handler);
       if (whole == bytes.size()) continue;
       if (::truncate(path.c_str(), static_cast<off_t>(whole)) != 0)

@@ -88,13 +88,15 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 class SharedMemoryWire:
     """Over the rings that a daemon at unix:PATH offers at PATH.shm. Looks for messages instead of sleeping in the kernel."""
 
-    def __init__(self, address):
+    def __init__(self, address, authorization="", seconds=10 * float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))):
+        self._seconds = seconds  # for a message to be taken
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.settimeout(5)
         self._socket.connect(address[len("unix:"):] + ".shm")
-        self._socket.send(_MAGIC)
+        self._socket.send(_MAGIC + authorization.encode())
         _, fds, _, _ = socket.recv_fds(self._socket, 1 << 16, 1)
         self._memory = mmap.mmap(fds[0], _HEADERS + 2 * _RING)
+        os.close(fds[0])
         self._base = ctypes.addressof(ctypes.c_char.from_buffer(self._memory))
         self._read = self._written = 0
         self._buffer = bytearray()
@@ -115,8 +117,11 @@ class SharedMemoryWire:
 
     def send(self, message):
         data = message.SerializeToString()
-        data = struct.pack("<I", len(data)) + data
-        end = time.monotonic() + 10 * float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
+        self.write(struct.pack("<I", len(data)) + data)
+
+    def write(self, data):
+        """Any bytes, as far as they are taken in time."""
+        end = time.monotonic() + self._seconds
         while data and time.monotonic() < end:
             at = self._written % _RING
             part = data[:min(_RING - at, _RING - (self._written - self._word(1, _READ)))]
@@ -125,6 +130,12 @@ class SharedMemoryWire:
             self._word(1, _WRITTEN, self._written)
             self._ring_bell(1, _DATA_BELL)
             data = data[len(part):]
+
+    def overwrite(self, ring, at, value):
+        """A word of the header of a ring."""
+        self._word(ring, at, value)
+        self._ring_bell(1, _DATA_BELL)
+        self._ring_bell(0, _SPACE_BELL)
 
     def _take(self):
         count = self._word(0, _WRITTEN) - self._read

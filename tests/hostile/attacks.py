@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""One hostile client. usage: attacks.py KIND ADDRESS TCP DOOR TOKEN SEED SECONDS; prints the statuses it got as JSON.
+"""One hostile client. usage: attacks.py KIND ADDRESS TCP DOOR STATE TOKEN SEED SECONDS; prints the statuses it got as JSON.
 
-All of them stay on this machine (ADDRESS is a Unix socket, TCP and DOOR, that of HTTP, are loopback addresses) and within bounds
-of their own.
+All of them stay on this machine (ADDRESS is a Unix socket, TCP and DOOR, that of HTTP, are loopback addresses, STATE is the daemon's
+state folder) and within bounds of their own.
 """
 import collections
 import json
@@ -19,6 +19,7 @@ import grpc
 
 sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "service"))
 import decks
+import local_attacks
 from fuzzer import Fuzzer
 from requests_of_http import Requests
 from google.protobuf import descriptor_pool, message_factory
@@ -38,8 +39,8 @@ LOOP = 'set: real x = 0.; for: integer i = 1, 900000; set: x = sin(i) * cos(i); 
 
 
 class Attacker:
-    def __init__(self, address, tcp, door, token, seed, seconds):
-        self.address, self.tcp, self.door, self.token, self.seed = address, tcp, door, token, seed
+    def __init__(self, address, tcp, door, state, token, seed, seconds):
+        self.address, self.tcp, self.door, self.state, self.token, self.seed = address, tcp, door, state, token, seed
         self.metadata = [("authorization", f"Bearer {token}")]
         self.random = random.Random(seed)
         self.start, self.seconds = time.monotonic(), seconds
@@ -71,6 +72,7 @@ class Attacker:
             return None
 
     def create(self, deck=BODY, **options):
+        options.setdefault("durability", self.random.choice([pb.DURABILITY_NONE, pb.DURABILITY_CHECKPOINT, pb.DURABILITY_JOURNAL]))
         reply = self.call(self.stub.CreateSimulation, iter([
             pb.UploadRequest(header=pb.UploadHeader(bundle_main_file="deck", options=pb.CreateOptions(**options))),
             pb.UploadRequest(chunk={"path": "deck", "data": deck.encode()})]))
@@ -100,6 +102,18 @@ class Attacker:
                 fuzzer.learn("snapshot", snapshot.snapshot.name)
                 fuzzer.learn("name", snapshot.snapshot.name)
         fuzzer.learn("port", "p")
+
+    def shared_memory(self):
+        """Peers over shared memory that talk nonsense."""
+        attack = local_attacks.SharedMemory(self, Fuzzer(self.random))
+        while self.going():
+            attack.once()
+
+    def folder(self):
+        """Files of the state folder that change under the daemon."""
+        attack = local_attacks.Folder(self, self.state)
+        while self.going():
+            attack.once()
 
     def http(self):
         """Requests through the HTTP door, good ones and mangled ones, whole and in pieces; some wait for no answer."""
@@ -427,14 +441,14 @@ def is_open(connection):
 # What each kind must have come to, or it attacks nothing.
 KINDS = {"fuzz": ["OK", "INVALID_ARGUMENT", "NOT_FOUND"], "cancel": ["CANCELLED"], "race": ["OK", "NOT_FOUND"], "slow": ["OK"],
          "silent": ["UNAUTHENTICATED"], "half_open": ["OK"], "greedy": ["OK"], "large": ["CANCELLED"],
-         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"]}
+         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"], "shared_memory": ["OK"], "folder": ["OK", "DATA_LOSS"]}
 
 
 def main():
-    kind, address, tcp, door, token, seed, seconds = sys.argv[1:]
+    kind, address, tcp, door, state, token, seed, seconds = sys.argv[1:]
     os.nice(19)
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    attacker = Attacker(address, tcp, door, token, int(seed), float(seconds))
+    attacker = Attacker(address, tcp, door, state, token, int(seed), float(seconds))
     getattr(attacker, kind)()
     print(json.dumps({"codes": attacker.codes, "internal": attacker.internal[:20]}))
     sys.stdout.flush()

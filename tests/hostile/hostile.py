@@ -30,6 +30,7 @@ from mbcosim.v1 import simulations_pb2 as pb, simulations_pb2_grpc
 HERE = os.path.dirname(os.path.abspath(__file__))
 FACTOR = float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
 MEMORY = 400 << 20  # the daemon's budget
+STATE = 1 << 30  # the state folder's
 GRACE = 2
 
 
@@ -39,11 +40,15 @@ def start(program, folder):
         file.write("bob-token control bob\n")
         file.writelines(f"{kind}-token control mallory-{kind}\n" for kind in attacks.KINDS)
     os.chmod(tokens, 0o600)
+    state = os.path.join(folder, "state")
+    os.mkdir(state, 0o700)
     address = f"unix:{folder}/mbcosim.sock"
     log = open(os.path.join(folder, "log"), "w")
     page = open(os.path.join(folder, "page"), "w")
     daemon = subprocess.Popen([os.path.join(program, "mbcosimd"), "--listen", address, "--listen", "127.0.0.1:0",
-                               "--http", "127.0.0.1:0", "--tokens", tokens, "--limit-memory", str(MEMORY), "--shutdown-grace", str(GRACE)],
+                               "--http", "127.0.0.1:0", "--tokens", tokens, "--limit-memory", str(MEMORY), "--shutdown-grace", str(GRACE),
+                               "--shared-memory", "--state-dir", state, "--checkpoint-interval", "0.2", "--suspended-expiry", "5",
+                               "--limit-state-bytes", str(STATE)],
                               stdout=page, stderr=log, preexec_fn=lambda: limit_descriptors(512))
     for _ in range(int(200 * FACTOR)):
         text, door = open(log.name).read(), re.search(r"^page: http://([^/]*)/.*\n", open(page.name).read())
@@ -51,7 +56,7 @@ def start(program, folder):
             break
         time.sleep(0.05)
     tcp = "127.0.0.1:" + text.split("listening on 127.0.0.1:")[1].split()[0]
-    return daemon, address, tcp, door.group(1), log.name
+    return daemon, (address, tcp, door.group(1), state), log.name
 
 
 def limit_descriptors(most):
@@ -146,9 +151,9 @@ def watch_both(bystander, attackers, seconds):
     return quiet, loud
 
 
-def attack(kinds, address, tcp, door, seed, seconds):
+def attack(kinds, places, seed, seconds):
     rng = random.Random(seed)
-    return {kind: subprocess.Popen([sys.executable, os.path.join(HERE, "attacks.py"), kind, address, tcp, door, f"{kind}-token",
+    return {kind: subprocess.Popen([sys.executable, os.path.join(HERE, "attacks.py"), kind, *places, f"{kind}-token",
                                     str(rng.randrange(1 << 30)), str(seconds)], stdout=subprocess.PIPE, text=True,
                                    start_new_session=True)
             for kind in kinds}
@@ -165,7 +170,8 @@ def main():
     print(f"seed {options.seed}", flush=True)
     faults = []
     with tempfile.TemporaryDirectory() as folder:
-        daemon, address, tcp, door, log = start(options.bin, folder)
+        daemon, places, log = start(options.bin, folder)
+        address = places[0]
         bystander = Bystander(address)
         bystander.watch(1)
         threads = threads_of(daemon.pid)
@@ -173,7 +179,7 @@ def main():
         threading.Thread(target=watch_memory, args=(daemon.pid, peak, stop), daemon=True).start()
         prober = threading.Thread(target=probe, args=(options.bin, address, faults, stop), daemon=True)
         prober.start()
-        attackers = attack(options.kinds.split(","), address, tcp, door, options.seed, options.seconds)
+        attackers = attack(options.kinds.split(","), places, options.seed, options.seconds)
         quiet, loud = watch_both(bystander, attackers, options.seconds)
         for kind, attacker in attackers.items():
             try:

@@ -1,6 +1,7 @@
 #include "durable/record_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -115,6 +116,28 @@ TEST_F(Atomic, AFileIsThereWholeOrNotAtAll) {
   { AtomicFile(folder_ + "/file").write("given up"); }
   EXPECT_EQ(text(), "first");
   EXPECT_FALSE(fs::exists(folder_ + "/file.new"));
+}
+
+TEST_F(Atomic, WhatIsNoFileIsToldAndNotWaitedFor) {
+  const std::string path = folder_ + "/file";
+  const auto reason = [&] {
+    try {
+      read_pieces(path, [](std::string_view) { FAIL(); });
+      return std::string();
+    } catch (const StorageError& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_EQ(reason(), "it cannot be opened: No such file or directory");
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  EXPECT_EQ(reason(), "it is no regular file");
+  fs::rename(path, path + ".new");
+  EXPECT_THROW(AtomicFile{path}, StorageError);  // nobody reads the pipe
+  fs::create_symlink("/dev/zero", path);
+  EXPECT_EQ(reason(), "it is no regular file");
+  fs::remove(path);
+  fs::create_directory(path);
+  EXPECT_EQ(reason(), "it is no regular file");
 }
 
 TEST_F(Atomic, AFullDiskIsTold) {

@@ -119,7 +119,7 @@ class StepResult:
     residual_error: float
     solver_seconds: float
     values: dict[str, Any]  # outputs by name, numpy arrays or floats
-    reply: pb.StepReply     # all the server said
+    reply: pb.StepReply = dataclasses.field(repr=False)  # all the server said
 
 
 @dataclasses.dataclass
