@@ -118,44 +118,29 @@ void RecordReader::finish() const {
 
 // ------------------------------------------------------------------ files
 
-namespace {
+ReadFile::ReadFile(const std::string& path) : file_(::open(path.c_str(), O_RDONLY | kOpenOwn)) {
+  if (file_ < 0) fail("it cannot be opened");
+  struct stat info {};
+  if (::fstat(file_, &info) == 0 && S_ISREG(info.st_mode)) return;
+  ::close(file_);
+  throw StorageError("it is no regular file");
+}
 
-/// Of a regular file.
-class ReadFile {
- public:
-  explicit ReadFile(const std::string& path) : file_(::open(path.c_str(), O_RDONLY | kOpenOwn)) {
-    if (file_ < 0) fail("it cannot be opened");
-    struct stat info {};
-    regular_ = ::fstat(file_, &info) == 0 && S_ISREG(info.st_mode);
+ReadFile::~ReadFile() { ::close(file_); }
+
+std::string_view ReadFile::read(std::string* bytes) const {
+  while (true) {
+    const ssize_t count = ::read(file_, bytes->data(), bytes->size());
+    if (count >= 0) return std::string_view(*bytes).substr(0, static_cast<std::size_t>(count));
+    if (errno != EINTR) fail("it cannot be read");
   }
-  ~ReadFile() { ::close(file_); }
-  ReadFile(const ReadFile&) = delete;
-  ReadFile& operator=(const ReadFile&) = delete;
-
-  bool is_regular() const { return regular_; }
-  /// 0: at its end.
-  std::size_t read(char* bytes, std::size_t most) const {
-    while (true) {
-      const ssize_t count = ::read(file_, bytes, most);
-      if (count >= 0) return static_cast<std::size_t>(count);
-      if (errno != EINTR) fail("it cannot be read");
-    }
-  }
-
- private:
-  const int file_;
-  bool regular_ = false;
-};
-
-}  // namespace
+}
 
 void read_pieces(const std::string& path, const ByteSink& sink) {
-  constexpr std::size_t kPiece = 1 << 20;
   const ReadFile file(path);
-  if (!file.is_regular()) throw StorageError("it is no regular file");
-  std::string piece(kPiece, '\0');
-  while (const std::size_t count = file.read(piece.data(), kPiece))
-    sink(std::string_view(piece).substr(0, count));
+  std::string bytes(1 << 20, '\0');
+  for (std::string_view piece = file.read(&bytes); !piece.empty(); piece = file.read(&bytes))
+    sink(piece);
 }
 
 AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {

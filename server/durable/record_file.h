@@ -94,8 +94,22 @@ class RecordReader {
 /// What files here are opened with: a pipe in the place of one makes nobody wait.
 constexpr int kOpenOwn = O_CLOEXEC | O_NONBLOCK;
 
-/// Hands over the bytes of a file in pieces. Throws StorageError when there is none, it cannot be
-/// read, or it is a pipe, a device or a folder.
+/// A regular file that is read from its start on.
+class ReadFile {
+ public:
+  /// Throws StorageError when there is none, or it is a pipe, a device or a folder.
+  explicit ReadFile(const std::string& path);
+  ~ReadFile();
+  ReadFile(const ReadFile&) = delete;
+  ReadFile& operator=(const ReadFile&) = delete;
+  /// The next bytes, put into `bytes` as far as they have room; none: its end. Throws StorageError.
+  std::string_view read(std::string* bytes) const;
+
+ private:
+  const int file_;
+};
+
+/// Hands over the bytes of a regular file in pieces. Throws StorageError.
 void read_pieces(const std::string& path, const ByteSink& sink);
 
 /// A file that is there whole or not at all: under another name until `commit`.

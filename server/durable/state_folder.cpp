@@ -84,17 +84,15 @@ void StoredBundle::add(const std::string& file, RecordKind kind, std::string con
 }
 
 OpenFiles::OpenFiles(const std::vector<std::string>& paths) {
-  for (const std::string& path : paths)
-    if (!files_.emplace_back(path, std::ios::binary)) throw StorageError("a file cannot be opened");
+  for (const std::string& path : paths) files_.emplace_back(path);
 }
 
 std::string OpenFiles::read(std::size_t most) {
   std::string piece(most, '\0');
   for (; !files_.empty(); files_.pop_front()) {
-    files_.front().read(piece.data(), static_cast<std::streamsize>(most));
-    if (files_.front().bad()) throw StorageError("a file cannot be read");
-    if (files_.front().gcount() == 0) continue;
-    piece.resize(static_cast<std::size_t>(files_.front().gcount()));
+    const std::size_t count = files_.front().read(&piece).size();
+    if (count == 0) continue;
+    piece.resize(count);
     return piece;
   }
   return {};

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
@@ -43,7 +42,7 @@ class OpenFiles {
   std::string read(std::size_t most);
 
  private:
-  std::deque<std::ifstream> files_;
+  std::deque<ReadFile> files_;
 };
 
 /// DIR/lock, which one daemon holds; DIR/name; DIR/simulations/ID with the files "model" (written

@@ -14,13 +14,24 @@ namespace {
 
 using ExportReplies = Series<v1::ExportCheckpointRequest, v1::ExportCheckpointReply>;
 
+/// What `read` returns; what it finds damaged is refused.
+template <class Read>
+auto readable(Read&& read) {
+  try {
+    return read();
+  } catch (const StorageError& error) {
+    throw Refusal(v1::REASON_DAMAGED_STATE,
+                  std::string("the checkpoint cannot be read: ") + error.what());
+  }
+}
+
 ExportReplies::Source exported(const Parts& parts, const CallFrame& frame,
                                const v1::ExportCheckpointRequest& request) {
   const SessionHold session(parts.store, request.simulation(), frame.caller, frame.call,
                             Access::control);
   auto files = std::make_shared<OpenFiles>(parts.durability.open_files(*session));
   return [files](auto* reply) {
-    std::string piece = files->read(kChunkBytes);
+    std::string piece = readable([&] { return files->read(kChunkBytes); });
     const bool some = !piece.empty();
     reply->set_data(std::move(piece));
     return some;
@@ -49,25 +60,16 @@ class ImportHandler final : public Upload<v1::ImportCheckpointRequest> {
       throw Refusal(v1::REASON_OUT_OF_TURN, "after `header` an import has only `data` messages");
     share_.grow(2 * static_cast<std::int64_t>(request.data().size()));
     digest_ = fnv1a(request.data(), digest_);
-    read([&] { reader_.take(request.data()); });
+    readable([&] { reader_.take(request.data()); });
   }
   void complete(Exchange& exchange) override {
     if (!header_)
       throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
-    read([&] { reader_.finish(); });
+    readable([&] { reader_.finish(); });
     v1::ImportCheckpointReply reply;
     *reply.mutable_simulation() = parts_.durability.import(std::move(bundle_), *header_, digest_,
                                                            exchange.caller(), exchange.call());
     exchange.end(serialized(reply));
-  }
-  template <class Read>
-  void read(Read&& read) {
-    try {
-      read();
-    } catch (const StorageError& error) {
-      throw Refusal(v1::REASON_DAMAGED_STATE,
-                    std::string("the checkpoint cannot be read: ") + error.what());
-    }
   }
 
   const Parts& parts_;

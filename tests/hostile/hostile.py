@@ -184,7 +184,7 @@ def main():
         for kind, attacker in attackers.items():
             try:
                 text, _ = attacker.communicate(timeout=60 * FACTOR)
-                result = json.loads(text) if text else {"codes": {}, "internal": ["the attacker itself failed"]}
+                result = json.loads(text) if text else {"codes": {}, "internal": [f"the attacker itself ended with {attacker.returncode}"]}
             except subprocess.TimeoutExpired:
                 os.killpg(attacker.pid, signal.SIGKILL)
                 result = {"codes": {}, "internal": [f"{kind} hangs"]}

@@ -52,13 +52,17 @@ class SharedMemory:
             for _ in range(self.random.randrange(6)):
                 self.disturb(wire)
                 wire.receive(0.02)
+            if self.random.random() < 0.3:  # last: nothing can be received with counters that cannot be
+                wire.overwrite(self.random.randrange(2), 8 * self.random.randrange(32),
+                               self.random.choice([0, 1, 2**20 + 1, 2**63, 2**64 - 1]))
+                time.sleep(0.05)
             running.cancel()
             self.attacker.codes["OK" if wire.status is None else f"ENDED {wire.status.code}"] += 1
         finally:
             wire.close()
 
     def disturb(self, wire):
-        what = self.random.randrange(6)
+        what = self.random.randrange(5)
         message = self.fuzzer.message(coupling_pb2.PeerMessage).SerializeToString()
         if what <= 1:
             wire.write(struct.pack("<I", len(message)) + message)
@@ -66,8 +70,6 @@ class SharedMemory:
             wire.write(struct.pack("<I", self.random.choice([0, 1, 2**24, 2**31, 2**32 - 1])) + message)
         elif what == 3:
             wire.write(self.random.randbytes(self.random.choice([1, 100, 100_000])))
-        elif what == 4:  # counters that cannot be, of either ring
-            wire.overwrite(self.random.randrange(2), 8 * self.random.randrange(32), self.random.choice([0, 1, 2**20 + 1, 2**63, 2**64 - 1]))
         else:  # half a message, and silence
             wire.write(struct.pack("<I", len(message) + 1000) + message)
             time.sleep(0.05)
