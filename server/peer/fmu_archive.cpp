@@ -46,6 +46,13 @@ std::uint64_t copy(zip_file_t* from, std::ofstream& to, std::uint64_t room) {
   }
 }
 
+/// FMI 2 has the type in a child, FMI 3 texts in children.
+std::optional<std::string> start_of(const pugi::xml_node& variable, bool fmi3) {
+  if (fmi3 && variable.child("Start")) return variable.child("Start").attribute("value").value();
+  const pugi::xml_attribute start = (fmi3 ? variable : variable.first_child()).attribute("start");
+  return start ? std::optional<std::string>(start.value()) : std::nullopt;
+}
+
 }  // namespace
 
 FmuArchive::FmuArchive(const std::string& path) : name_(fs::path(path).filename().string()) {
@@ -107,12 +114,13 @@ void FmuArchive::read_description() {
   token_ = root.attribute(fmi3_ ? "instantiationToken" : "guid").value();
   keeps_states_ = kind.attribute(fmi3_ ? "canGetAndSetFMUState" : "canGetAndSetFMUstate").as_bool();
   for (const pugi::xml_node node : root.child("ModelVariables")) {
-    const bool real = fmi3_ ? std::string_view(node.name()) == "Float64" && !node.child("Dimension")
-                            : static_cast<bool>(node.child("Real"));
-    if (!real) continue;
+    const std::string_view type = fmi3_ ? node.name() : node.first_child().name();
+    if (type == "Clock" || type == "Binary") continue;  // they need no start values
+    const bool real = fmi3_ ? type == "Float64" && !node.child("Dimension") : type == "Real";
     const std::string_view causality = node.attribute("causality").value();
     variables_[node.attribute("name").value()] = {node.attribute("valueReference").as_uint(),
-                                                  causality == "input", causality == "output"};
+                                                  causality == "input", causality == "output", real,
+                                                  start_of(node, fmi3_)};
   }
 }
 

@@ -3,17 +3,20 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
 namespace mbcosim::peer {
 
-/// Version, kind and the real variables of a co-simulation FMU. Throws std::runtime_error with what
+/// Version, kind and the variables of a co-simulation FMU. Throws std::runtime_error with what
 /// is wrong.
 class FmuArchive {
  public:
   struct Variable {
     std::uint32_t reference = 0;
     bool input = false, output = false;
+    bool real = false;                 ///< one number of type Float64 (FMI 2: Real)
+    std::optional<std::string> start;  ///< as the description has it
   };
 
   /// Unpacks to a folder of its own, which is removed at the end. Entries that lead out of it are

@@ -20,13 +20,24 @@ int place(const std::vector<std::string>& names, const std::string& name) {
   return found == names.end() ? -1 : static_cast<int>(found - names.begin());
 }
 
+std::string start_of_unset(const std::string& name, const FmuArchive::Variable& input) {
+  if (!input.start)
+    throw std::runtime_error(
+        "the FMU's input \"" + name +
+        "\" has neither a signal nor a start value, which FMI wants of inputs; "
+        "name a signal: --map " +
+        name + "=SIGNAL");
+  return *input.start;
+}
+
 }  // namespace
 
 SignalMap map_signals(const FmuArchive& archive, const PortSignals& signals,
                       const std::map<std::string, std::string>& map) {
   for (const auto& [name, signal] : map) {
     const auto known = archive.variables().find(name);
-    if (known == archive.variables().end() || (!known->second.input && !known->second.output))
+    if (known == archive.variables().end() || !known->second.real ||
+        (!known->second.input && !known->second.output))
       throw std::runtime_error("--map: the FMU has no real input or output \"" + name + "\"");
     if (place(known->second.input ? signals.outputs : signals.inputs, signal) < 0)
       throw std::runtime_error("--map: the port has no signal \"" + signal + "\"; it sends " +
@@ -38,11 +49,15 @@ SignalMap map_signals(const FmuArchive& archive, const PortSignals& signals,
   for (const auto& [name, variable] : archive.variables()) {
     const auto mapped = map.find(name);
     const std::string& signal = mapped == map.end() ? name : mapped->second;
-    if (const int source = place(signals.outputs, signal); variable.input && source >= 0) {
+    const int source = variable.real ? place(signals.outputs, signal) : -1;
+    if (variable.input && source >= 0) {
       result.inputs.push_back(variable.reference);
       result.sources.push_back(source);
+    } else if (variable.input) {
+      result.unset[name] = start_of_unset(name, variable);
     }
-    if (const int target = place(signals.inputs, signal); variable.output && target >= 0) {
+    const int target = variable.real ? place(signals.inputs, signal) : -1;
+    if (variable.output && target >= 0) {
       result.outputs[target] = variable.reference;
       given[target] = true;
     }

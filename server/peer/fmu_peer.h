@@ -21,10 +21,13 @@ struct SignalMap {
   std::vector<std::uint32_t> inputs;   ///< of the FMU, that are set
   std::vector<int> sources;            ///< their places among the signals sent
   std::vector<std::uint32_t> outputs;  ///< of the FMU, in the order of the signals taken
+  /// Inputs of the FMU that nothing sets, with the start values that they keep.
+  std::map<std::string, std::string> unset;
 };
 
 /// By equal names, or as `map` says (name in the FMU -> name of the signal). Throws
-/// std::runtime_error when a name is unknown, or a signal that the simulation takes has no source.
+/// std::runtime_error when a name is unknown, a signal that the simulation takes has no source, or
+/// an input of the FMU has neither a signal nor a start value.
 SignalMap map_signals(const FmuArchive& archive, const PortSignals& signals,
                       const std::map<std::string, std::string>& map);
 

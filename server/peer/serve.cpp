@@ -232,6 +232,9 @@ void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
   const PortSignals signals{expanded(simulation, peer.layout().outputs),
                             expanded(simulation, peer.layout().inputs)};
   SignalMap map = map_signals(archive, signals, fmu.map);
+  for (const auto& [name, start] : map.unset)
+    std::fprintf(stderr, "note: nothing sets the FMU's input \"%s\"; it keeps its start value %s\n",
+                 name.c_str(), start.c_str());
   const auto controller = make_controller(archive);
   FmuPeer host(*controller, std::move(map), archive.keeps_states(), simulation.read("time").at(0));
   running = &host;

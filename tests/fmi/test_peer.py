@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import zipfile
+import zlib
 
 import numpy as np
 import pytest
@@ -23,25 +24,25 @@ SENT = "node.structural.1.XP"
 DESCRIPTION = {
     2: """<fmiModelDescription fmiVersion="2.0" modelName="c" guid="{{1}}"><CoSimulation modelIdentifier="c" canGetAndSetFMUstate="{state}"/>
 <ModelVariables><ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
-<ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable></ModelVariables><ModelStructure/></fmiModelDescription>""",
+<ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>{extra}</ModelVariables><ModelStructure/></fmiModelDescription>""",
     3: """<fmiModelDescription fmiVersion="3.0" modelName="c" instantiationToken="{{1}}"><CoSimulation modelIdentifier="c" canGetAndSetFMUState="{state}"/>
 <ModelVariables><Float64 name="u" valueReference="0" causality="input" start="0"/><Float64 name="y" valueReference="1" causality="output"/>
-</ModelVariables><ModelStructure/></fmiModelDescription>"""}
+{extra}</ModelVariables><ModelStructure/></fmiModelDescription>"""}
 
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
-    """fmus(version, state): path of the small FMU."""
+    """fmus(version, state, extra): path of the small FMU, with more variables."""
     folder, compiler = tmp_path_factory.mktemp("fmus"), shutil.which("cc") or shutil.which("gcc")
 
-    def make(version, state="true"):
-        path = folder / f"c{version}{state}.fmu"
+    def make(version, state="true", extra=""):
+        path = folder / f"c{version}{state}{zlib.crc32(extra.encode())}.fmu"
         if not path.exists():
             library = str(folder / f"c{version}.so")
             subprocess.run([compiler, "-shared", "-fPIC", "-O1", f"-DFMI={version}", os.path.join(HERE, "controller.c"), "-o", library],
                            check=True)
             with zipfile.ZipFile(path, "w") as archive:
-                archive.writestr("modelDescription.xml", DESCRIPTION[version].format(state=state))
+                archive.writestr("modelDescription.xml", DESCRIPTION[version].format(state=state, extra=extra))
                 archive.write(library, "binaries/" + ("linux64" if version == 2 else "x86_64-linux") + "/c.so")
         return str(path)
 
@@ -80,7 +81,8 @@ def signal_port():
     return mbcosim.signal_port("control", outputs=[SENT], inputs=["stream.force"])
 
 
-def run_fmu(daemon, program, path, mode, steps=20):
+def run_fmu(daemon, program, path, mode, steps=20, notes=None):
+    """Time, speed and force after each step; what the peer notes is added to `notes`."""
     with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
         peer = program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode, "--map",
                        f"u={SENT}[1]", "--map", "y=stream.force")
@@ -91,6 +93,8 @@ def run_fmu(daemon, program, path, mode, steps=20):
             assert result.outcome == "ACCEPTED", result
             values.append((result.time, result.values[SENT][0], float(np.atleast_1d(result.values["stream.force"])[0])))
     assert peer.finish() == 0, peer.errors
+    if notes is not None:
+        notes += peer.errors.splitlines()
     return values
 
 
@@ -129,6 +133,32 @@ def test_what_does_not_fit_is_refused(start_daemon, program, fmus, tmp_path):  #
         archive.writestr("../outside", "")
     assert "leads out of it" in refused(daemon, program, "fmu", str(tmp_path / "y.fmu"))
     assert not (tmp_path / "outside").exists()
+
+
+# An input that sets the factor of y, an input of another type, and what needs no start value.
+MORE = {2: """<ScalarVariable name="gain" valueReference="2" causality="input"><Real{start}/></ScalarVariable>
+<ScalarVariable name="n" valueReference="7" causality="input"><Integer start="5"/></ScalarVariable>""",
+        3: """<Float64 name="gain" valueReference="2" causality="input"{start}/><Int32 name="n" valueReference="7" causality="input" start="5"/>
+<Clock name="tick" valueReference="8" causality="input" intervalVariability="triggered"/>"""}
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_inputs_of_an_fmu_that_nothing_sets_keep_their_start_values_and_are_named(start_daemon, program, fmus, version):  # noqa: F811
+    daemon, notes = start_daemon(), []
+    more = run_fmu(daemon, program, fmus(version, extra=MORE[version].format(start=' start="1"')), "tight", notes=notes)
+    assert notes == ['note: nothing sets the FMU\'s input "gain"; it keeps its start value 1',
+                     'note: nothing sets the FMU\'s input "n"; it keeps its start value 5']
+    assert more == run_fmu(daemon, program, fmus(version), "tight", notes=notes)
+    assert len(notes) == 2
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_an_input_with_neither_a_signal_nor_a_start_value_is_refused(start_daemon, program, fmus, version):  # noqa: F811
+    daemon, path = start_daemon(), fmus(version, extra=MORE[version].format(start=""))
+    told = refused(daemon, program, "fmu", path, "--map", f"u={SENT}[1]", "--map", "y=stream.force")
+    assert 'the FMU\'s input "gain" has neither a signal nor a start value' in told and "--map gain=SIGNAL" in told
+    told = refused(daemon, program, "fmu", path, "--map", f"n={SENT}[1]", "--map", "y=stream.force")
+    assert 'the FMU has no real input or output "n"' in told
 
 
 def test_an_fmu_that_discards_a_step_fails_it(start_daemon, program, fmus):  # noqa: F811
