@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
-#include <iterator>
 #include <sstream>
 #include <thread>
 
@@ -51,6 +50,21 @@ void put_modal(const ForceForm& form, const ForceState& state, std::ostream& out
   }
   for (std::size_t k = 0; k < state.q.size(); ++k) out << state.q[k] << ' ' << state.qp[k] << '\n';
 }
+
+/// Numbers of an answer: with labels one more for each point and the reference node.
+struct Counts {
+  explicit Counts(const ForceForm& form)
+      : with_moment(form.kind == ForceForm::Kind::modal || form.rotation != Rotation::none),
+        per_point((form.kind == ForceForm::Kind::nodal && form.rotation != Rotation::none ? 6 : 3) +
+                  (form.labels ? 1 : 0)),
+        per_reference((with_moment ? 6 : 3) + (form.labels ? 1 : 0)),
+        all((form.reference ? per_reference : 0) + form.modes +
+            static_cast<std::size_t>(form.points()) * per_point) {}
+
+  bool with_moment;
+  int per_point, per_reference;
+  std::size_t all;
+};
 
 }  // namespace
 
@@ -123,18 +137,13 @@ ForceLoads FileWire::parse(const std::string& text) const {
     }
   }
   // Brought into the form of a socket's message: labels first, then forces, then moments.
-  const bool nodal = form_.kind == ForceForm::Kind::nodal;
-  const int per_point =
-      (nodal && form_.rotation != Rotation::none ? 6 : 3) + (form_.labels ? 1 : 0);
-  const bool with_moment = form_.kind == ForceForm::Kind::modal || form_.rotation != Rotation::none;
-  const int per_reference = (with_moment ? 6 : 3) + (form_.labels ? 1 : 0);
-  const std::size_t expected = (form_.reference ? per_reference : 0) + form_.modes +
-                               static_cast<std::size_t>(form_.points()) * per_point;
-  if (numbers.size() < expected)  // what stands behind them is not ours
+  const Counts counts(form_);
+  const int per_point = counts.per_point;
+  if (numbers.size() < counts.all)  // what stands behind them is not ours
     throw ChannelLost(name_ + ": \"" + address_.in + "\" has " + std::to_string(numbers.size()) +
-                      " numbers, not " + std::to_string(expected) + ": " +
+                      " numbers, not " + std::to_string(counts.all) + ": " +
                       (form_.labels ? "a label, " : "") + "a force" +
-                      (with_moment ? " and a moment" : "") + " for each " +
+                      (counts.with_moment ? " and a moment" : "") + " for each " +
                       (form_.modes ? "reference node, and a number for each mode" : "point"));
   std::string bytes;
   const auto number = [&](double value) {
@@ -150,7 +159,7 @@ ForceLoads FileWire::parse(const std::string& text) const {
       label(numbers[at++]);
       label(0);
     }
-    for (int i = 0; i < (with_moment ? 6 : 3); ++i) number(numbers[at++]);
+    for (int i = 0; i < (counts.with_moment ? 6 : 3); ++i) number(numbers[at++]);
   }
   for (int k = 0; k < form_.modes; ++k) number(numbers[at++]);
   const int skip = form_.labels ? 1 : 0;
@@ -162,12 +171,25 @@ ForceLoads FileWire::parse(const std::string& text) const {
   return decode_loads(form_, bytes);
 }
 
+std::string FileWire::read() const {
+  constexpr std::size_t kComments = 1 << 20, kNumber = 64;  // [bytes]
+  std::string text(kComments + kNumber * Counts(form_).all, '\0');
+  std::ifstream in(address_.in, std::ios::binary);
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  const auto size = static_cast<std::size_t>(in.gcount());
+  if (in.bad() || !in.is_open()) throw ChannelLost(name_ + ": cannot read \"" + address_.in + "\"");
+  if (size == text.size())
+    throw ChannelLost(name_ + ": \"" + address_.in +
+                      "\" is too long: " + std::to_string(Counts(form_).all) +
+                      " numbers are expected, and no more than " + std::to_string(size - 1) +
+                      " bytes with their comments");
+  text.resize(size);
+  return text;
+}
+
 Command FileWire::receive(ForceLoads& loads) {
   wait_until(true, address_.in);
-  std::ifstream in(address_.in, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(in), {});
-  if (!in) throw ChannelLost(name_ + ": cannot read \"" + address_.in + "\"");
-  loads = parse(text);
+  loads = parse(read());
   std::error_code error;
   if (address_.unlink) std::filesystem::remove(address_.in, error);
   return kLastData;

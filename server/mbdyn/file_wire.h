@@ -19,6 +19,7 @@ class FileWire : public ForceWire {
 
  private:
   void wait_until(bool exists, const std::string& path) const;
+  std::string read() const;  ///< at most what the numbers and some comments may take
   ForceLoads parse(const std::string& text) const;
 
   const ChannelAddress address_;

@@ -19,8 +19,11 @@ SocketWire::SocketWire(std::unique_ptr<Link> link, ForceForm form, bool listened
 
 void SocketWire::answer_request() {
   const auto refuse = [this](const std::string& why) {
-    link_->send(std::string(1, kEnd));
-    link_->finish(kFarewell);
+    try {
+      link_->send(std::string(1, kEnd));
+      link_->finish(kFarewell);
+    } catch (const ChannelLost&) {  // who has gone need not hear it
+    }
     throw ChannelLost(link_->name() + ": " + why);
   };
   const char command = link_->receive(1)[0];

@@ -390,6 +390,18 @@ def test_a_file_without_its_labels_ends_the_run_with_what_is_expected(run, tmp_p
     assert '"in.dat" has 6 numbers, not 7: a label, a force and a moment for each point' in done.errors
 
 
+@pytest.mark.parametrize("before,after,message", [("", "7. " * 100, ""), ("# a comment\n" * 50000, "", ""),
+                                                  ("", "7. " * 400000, "6 numbers are expected, and no more than"),
+                                                  ("#" * (1 << 21), "", "6 numbers are expected, and no more than")],
+                         ids=["more numbers", "comments", "far too many numbers", "an endless line"])
+def test_long_files(run, tmp_path, before, after, message):
+    """What stands behind the numbers is not read, and comments have their place, up to a size that is no answer any more."""
+    (tmp_path / "in.dat").write_text(before + "1. 0. .5 0. .1 0. " + after)
+    done = run(deck('force: 5, external structural, "in.dat", "out.dat", sleep time, .01, 1, 2;'))
+    assert done.finish() == (5 if message else 0), done.errors
+    assert message in done.errors and ('force 5: "in.dat" is too long' in done.errors) == bool(message)
+
+
 # ------------------------------------------------------------------ mapping
 
 def test_mapping(run, tmp_path):
@@ -727,10 +739,10 @@ def test_answers_longer_than_the_deck_has_points_are_named_at_the_next_exchange(
 
 
 @pytest.mark.parametrize("size", [8, 1 << 20])
-def test_oversized_requests_are_refused(run, size):
+def test_oversized_requests_are_refused_also_when_the_peer_has_gone(run, size):
     done = run(force())
-    peer = done.connect()
-    send_what_is_taken(peer, b"\7" + b"\xff" * size)
+    with done.connect() as peer:
+        send_what_is_taken(peer, b"\7" + b"\xff" * size)
     assert done.finish() == 5
     assert "error: force 5 (s): the peer does not fit: " in done.errors and "the deck has 2, the peer 4294967295" in done.errors
 
