@@ -252,6 +252,18 @@ void Durability::require() const {
                   "the server keeps no checkpoints: it was started without --state-dir");
 }
 
+namespace {
+
+OpenFiles open_stored(const StateFolder& folder, const std::string& simulation) {
+  try {
+    return OpenFiles(folder.files_of(id_of(simulation)));
+  } catch (const StorageError& error) {
+    throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be read: " + error.what());
+  }
+}
+
+}  // namespace
+
 OpenFiles Durability::open_files(Session& session) try {
   Keeping* keeping = session.keeping();
   if (!keeping)
@@ -259,7 +271,7 @@ OpenFiles Durability::open_files(Session& session) try {
                   session.identity().id + " has durability NONE: its deck is not kept");
   Guard guard(keeping->mutex);
   write_held(session, *keeping);
-  return OpenFiles(folder_->files_of(id_of(session.identity().id)));
+  return open_stored(*folder_, session.identity().id);
 } catch (const StorageError& error) {
   refuse_storage("the checkpoint cannot be written", error);
 }

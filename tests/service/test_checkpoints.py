@@ -123,3 +123,14 @@ def test_commands_say_what_is_wrong(start, tmp_path):
         assert not os.path.exists(missing)
     code, _, errors = run("sessions", "--address", f"unix:{missing}", "--timeout", "0.3")
     assert code == 4 and missing in errors
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)], ids=["pipe", "folder", "device"])
+def test_what_is_no_file_in_the_state_folder_makes_nobody_wait(start, folder, make):
+    with start().connect() as server, server.load_text(deck(100)) as simulation:
+        model = os.path.join(folder, simulation.info.name, "model")
+        os.unlink(model)
+        make(model)
+        with pytest.raises(mbcosim.Error, match="it is no regular file"):
+            simulation.export_checkpoint()
+        assert simulation.step(10).step == 10  # it lives on
