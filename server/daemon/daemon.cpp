@@ -404,6 +404,7 @@ int check_health(const HealthCheck& check) {
   const auto stub = grpc::health::v1::Health::NewStub(
       grpc::CreateCustomChannel(check.address, credentials_of(check), arguments));
   grpc::ClientContext context;
+  context.set_wait_for_ready(true);  // a connection that is dropped is tried again
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(check.timeout));
   grpc::health::v1::HealthCheckResponse response;
   const grpc::Status status = stub->Check(&context, {}, &response);

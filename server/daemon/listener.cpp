@@ -189,21 +189,24 @@ void Listener::accept_from(int listener) {
 }
 
 bool Listener::may_stay(int fd) {
-  constexpr std::int64_t kShare = 3;  // of one source: one in so many
-  const std::int64_t most = most_descriptors();
-  if (fd + kKeptDescriptors >= most) return false;
+  const std::int64_t free =
+      most_descriptors() - kKeptDescriptors - fd;  // numbers are given in order
   const Peer fresh{source_of(fd), inode_of(fd)};
-  std::int64_t alike = 0;
-  for (const auto& [known, peer] : peers_) alike += peer.source == fresh.source ? 1 : 0;
-  if (alike >= most / kShare) {  // some of them may have gone
+  if (!has_room(fresh.source, free)) {  // some of them may have gone
     std::erase_if(peers_,
                   [](const auto& entry) { return inode_of(entry.first) != entry.second.inode; });
-    alike = std::count_if(peers_.begin(), peers_.end(),
-                          [&](const auto& entry) { return entry.second.source == fresh.source; });
+    if (!has_room(fresh.source, free)) return false;
   }
-  if (alike >= most / kShare) return false;
   peers_[fd] = fresh;
   return true;
+}
+
+bool Listener::has_room(const std::string& source, std::int64_t free) const {
+  constexpr std::int64_t kShare = 3;
+  const auto alike = std::count_if(peers_.begin(), peers_.end(), [&](const auto& entry) {
+    return entry.second.source == source;
+  });
+  return kShare * alike < free;
 }
 
 // Without this the client would wait, and this thread would spin.

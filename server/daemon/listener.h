@@ -18,8 +18,8 @@ namespace mbcosim::server {
 
 /// Accepts connections on one address and hands them to gRPC, whose own listener ends for good when
 /// the process has no file descriptor left. Here the connection is dropped then, the last few
-/// descriptors are kept for files, and one source (an address, a process of this host) gets a third
-/// of them at most, so that a probe still comes in.
+/// descriptors are kept for files, and one source (an address, a process of this host) has at most
+/// a third as many as are free: also while several take what they can, a probe still comes in.
 class Listener {
  public:
   using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
@@ -40,6 +40,8 @@ class Listener {
   void loop();
   void accept_from(int listener);
   bool may_stay(int fd);
+  /// For one more of it, with so many descriptors `free`?
+  bool has_room(const std::string& source, std::int64_t free) const;
   void drop_one(int listener);
   void tell_dropped();
 

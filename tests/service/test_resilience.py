@@ -333,11 +333,13 @@ def is_found_healthy(daemon):
     return subprocess.run([os.path.join(BIN, "mbcosimd"), "--check", daemon.address], timeout=30 * TIME_FACTOR).returncode == 0
 
 
-def test_one_process_cannot_take_all_file_descriptors(start_daemon, start_crowd):
+@pytest.mark.parametrize("crowds", [1, 4])
+def test_a_few_processes_cannot_take_all_file_descriptors(start_daemon, start_crowd, crowds):
     daemon = ready(start_daemon())
     resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (150, 150))
     with daemon.connect() as server, server.load_text(decks.body()) as simulation:
-        start_crowd(daemon, 300)
+        for _ in range(crowds):
+            start_crowd(daemon, 300)
         wait_for(lambda: "connections are dropped" in daemon.log())
         assert simulation.step().step == 1
         for _ in range(3):
