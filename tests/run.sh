@@ -44,7 +44,9 @@ folder=build
 jobs=$(nproc)
 
 docker/install-dependencies.sh all
-cmake --preset $preset -DMBCOSIM_SERVER=ON -DMBCOSIM_TESTS=ON  # also where a build without them stands
+groups=ON
+[ -z $tidy ] || groups=OFF  # clang-tidy asks how each source is compiled
+cmake --preset $preset -DMBCOSIM_SERVER=ON -DMBCOSIM_TESTS=ON -DMBCOSIM_UNITY=$groups  # also where a build without them stands
 cmake --build $folder --parallel "$jobs"
 [ -z $tidy ] || exec tests/repository/tidy.py . $folder "${arguments[@]}"
 case $preset in  # what bounds on time are multiplied by

@@ -58,7 +58,7 @@ class PhaseBar {
   int filled_ = -1;
 };
 
-ExitCode complain(const Error& error) {
+ExitCode tell(const Error& error) {
   std::fprintf(stderr, "error: %s\n", error.message.c_str());
   switch (error.kind) {
     case ErrorKind::argument:
@@ -93,7 +93,7 @@ int reduce_model(const ReduceCommand& command) {
           return !interrupt.token()->cancelled();
         });
     bar.clear();
-    if (!reduction) return complain(reduction.error());
+    if (!reduction) return tell(reduction.error());
     write_fem_file(command.output, reduction->data, reduction->comments);
     write_file(command.output + ".json", report_json(*reduction) + "\n");
     if (!command.quiet) std::fputs(report_text(*reduction).c_str(), stdout);
@@ -102,7 +102,7 @@ int reduce_model(const ReduceCommand& command) {
     error.kind = e.kind;
     error.message = e.what();
   }
-  return complain(error);
+  return tell(error);
 }
 
 }  // namespace mbcosim::cli

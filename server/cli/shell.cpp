@@ -41,7 +41,7 @@ std::string command_words(const CLI::App& app) {
 }
 
 /// Between single quotes of a shell.
-std::string quoted(const std::string& text) {
+std::string shell_quoted(const std::string& text) {
   std::string result;
   for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return "'" + result + "'";
@@ -51,10 +51,11 @@ std::string bash_script(const CLI::App& app) {
   std::string text =
       "_mbcosim() {\n  local word=\"${COMP_WORDS[COMP_CWORD]}\" words=\n"
       "  if [ \"$COMP_CWORD\" -eq 1 ]; then words=" +
-      quoted(command_words(app) + " --help --version") +
+      shell_quoted(command_words(app) + " --help --version") +
       "\n  elif [ \"${word#-}\" != \"$word\" ]; then\n    case \"${COMP_WORDS[1]}\" in\n";
   for (const CLI::App* command : commands_of(app))
-    text += "      " + command->get_name() + ") words=" + quoted(flag_words(*command)) + " ;;\n";
+    text +=
+        "      " + command->get_name() + ") words=" + shell_quoted(flag_words(*command)) + " ;;\n";
   return text +
          "    esac\n  fi\n  COMPREPLY=($(compgen -W \"$words\" -- \"$word\"))\n}\n"
          "complete -o default -o bashdefault -F _mbcosim mbcosim\n";
@@ -73,12 +74,12 @@ std::string fish_script(const CLI::App& app) {
   std::string text;
   for (const CLI::App* command : commands_of(app)) {
     text += "complete -c mbcosim -n __fish_use_subcommand -a " + command->get_name() + " -d " +
-            quoted(command->get_description()) + "\n";
+            shell_quoted(command->get_description()) + "\n";
     for (const CLI::Option* option : flags_of(*command)) {
       text += "complete -c mbcosim -n '__fish_seen_subcommand_from " + command->get_name() + "'";
       for (const std::string& name : option->get_snames()) text += " -s " + name;
       for (const std::string& name : option->get_lnames()) text += " -l " + name;
-      text += " -d " + quoted(option->get_description()) + "\n";
+      text += " -d " + shell_quoted(option->get_description()) + "\n";
     }
   }
   return text;

@@ -30,8 +30,6 @@
 namespace mbcosim::server {
 namespace {
 
-constexpr std::string_view kUnix = "unix:";
-
 bool is_unix(const std::string& address) { return address.compare(0, kUnix.size(), kUnix) == 0; }
 
 bool is_loopback(const std::string& address) {

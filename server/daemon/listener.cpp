@@ -21,7 +21,6 @@
 namespace mbcosim::server {
 namespace {
 
-constexpr std::string_view kUnix = "unix:";
 constexpr int kWaiting = 1024;        ///< connections not yet accepted
 constexpr int kLookMs = 100;          ///< how soon the end is noticed
 constexpr int kKeptDescriptors = 32;  ///< for files, while connections come and go

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -15,6 +16,8 @@
 #include "shared_memory/channel.h"
 
 namespace mbcosim::server {
+
+constexpr std::string_view kUnix = "unix:";  ///< begins the address of a socket in a file
 
 /// Accepts connections on one address and hands them to gRPC, whose own listener ends for good when
 /// the process has no file descriptor left. Here the connection is dropped then, the last few

@@ -15,10 +15,6 @@ namespace {
 
 constexpr std::size_t kNumber = 8;  // bytes of a length within an entry
 
-[[noreturn]] void fail(const std::string& what) {
-  throw StorageError(what + ": " + std::strerror(errno));
-}
-
 /// Length of what follows, again after the record's own: a damaged length cannot pass for a record
 /// that was not written to its end.
 std::string packed(std::string_view message, std::string_view state) {
@@ -58,7 +54,7 @@ void Journal::rotate() {
 void Journal::open() {
   const std::string path = folder_.journal_path(id_, next_);
   file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | kOpenOwn, 0600);
-  if (file_ < 0) fail("the journal cannot be opened");
+  if (file_ < 0) fail_storage("the journal cannot be opened");
   ++next_;
   good_ = 0;
   torn_ = true;  // until its first record is there
@@ -67,7 +63,7 @@ void Journal::open() {
 
 void Journal::mend() {
   if (!torn_) return;
-  if (::ftruncate(file_, good_) != 0) fail("the journal cannot be cut back");
+  if (::ftruncate(file_, good_) != 0) fail_storage("the journal cannot be cut back");
   if (good_ == 0) {
     std::string first;
     RecordWriter([&](std::string_view bytes) {
@@ -100,10 +96,10 @@ void Journal::write(std::string_view bytes) {
     for (std::string_view rest = bytes; !rest.empty();) {
       const ssize_t count = ::write(file_, rest.data(), rest.size());
       if (count < 0 && errno == EINTR) continue;
-      if (count < 0) fail("the journal cannot be written");
+      if (count < 0) fail_storage("the journal cannot be written");
       rest.remove_prefix(static_cast<std::size_t>(count));
     }
-    if (::fdatasync(file_) != 0) fail("the journal does not get to the disk");
+    if (::fdatasync(file_) != 0) fail_storage("the journal does not get to the disk");
     torn_ = false;
   } catch (const StorageError&) {
     folder_.give_back(size);

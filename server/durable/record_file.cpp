@@ -20,13 +20,13 @@ std::uint32_t checksum(std::string_view first, std::string_view second) {
   return static_cast<std::uint32_t>(add(add(0, first), second));
 }
 
-[[noreturn]] void fail(const std::string& what) {
-  throw StorageError(what + ": " + std::strerror(errno));
-}
-
 std::string folder_of(const std::string& path) { return path.substr(0, path.rfind('/')); }
 
 }  // namespace
+
+void fail_storage(const std::string& what) {
+  throw StorageError(what + ": " + std::strerror(errno));
+}
 
 std::string number_bytes(std::uint64_t value, std::size_t count) {
   std::string bytes;
@@ -119,7 +119,7 @@ void RecordReader::finish() const {
 // ------------------------------------------------------------------ files
 
 ReadFile::ReadFile(const std::string& path) : file_(::open(path.c_str(), O_RDONLY | kOpenOwn)) {
-  if (file_ < 0) fail("it cannot be opened");
+  if (file_ < 0) fail_storage("it cannot be opened");
   struct stat info {};
   if (::fstat(file_, &info) == 0 && S_ISREG(info.st_mode)) return;
   ::close(file_);
@@ -132,7 +132,7 @@ std::string_view ReadFile::read(std::string* bytes) const {
   while (true) {
     const ssize_t count = ::read(file_, bytes->data(), bytes->size());
     if (count >= 0) return std::string_view(*bytes).substr(0, static_cast<std::size_t>(count));
-    if (errno != EINTR) fail("it cannot be read");
+    if (errno != EINTR) fail_storage("it cannot be read");
   }
 }
 
@@ -145,7 +145,7 @@ void read_pieces(const std::string& path, const ByteSink& sink) {
 
 AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
   file_ = ::open((path_ + ".new").c_str(), O_WRONLY | O_CREAT | O_TRUNC | kOpenOwn, 0600);
-  if (file_ < 0) fail("a file cannot be made");
+  if (file_ < 0) fail_storage("a file cannot be made");
 }
 
 AtomicFile::~AtomicFile() {
@@ -158,15 +158,16 @@ void AtomicFile::write(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t count = ::write(file_, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail("a file cannot be written");
+    if (count < 0) fail_storage("a file cannot be written");
     bytes.remove_prefix(static_cast<std::size_t>(count));
     size_ += count;
   }
 }
 
 void AtomicFile::commit() {
-  if (::fsync(file_) != 0) fail("a file cannot be written");
-  if (::rename((path_ + ".new").c_str(), path_.c_str()) != 0) fail("a file cannot get its name");
+  if (::fsync(file_) != 0) fail_storage("a file cannot be written");
+  if (::rename((path_ + ".new").c_str(), path_.c_str()) != 0)
+    fail_storage("a file cannot get its name");
   ::close(file_);
   file_ = -1;
   sync_path(folder_of(path_));
@@ -174,12 +175,12 @@ void AtomicFile::commit() {
 
 void sync_path(const std::string& path) {
   const int file = ::open(path.c_str(), O_RDONLY | kOpenOwn);
-  if (file < 0) fail("what was written cannot be opened");
+  if (file < 0) fail_storage("what was written cannot be opened");
   const bool done = ::fsync(file) == 0;
   const int error = errno;
   ::close(file);
   errno = error;
-  if (!done) fail("what was written does not get to the disk");
+  if (!done) fail_storage("what was written does not get to the disk");
 }
 
 }  // namespace mbcosim::server

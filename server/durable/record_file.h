@@ -32,6 +32,9 @@ class StorageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Throws StorageError with `what` and what the system says (errno).
+[[noreturn]] void fail_storage(const std::string& what);
+
 constexpr std::size_t kRecordHeader = 16;  ///< bytes before a record's content
 
 /// Whole numbers as records have them: the lowest byte first.

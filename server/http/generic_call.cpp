@@ -3,7 +3,7 @@
 namespace mbcosim::server::http {
 namespace {
 
-constexpr std::chrono::milliseconds kLook{200};  // how soon a client that hung up is noticed
+constexpr std::chrono::milliseconds kHangUpLook{200};  // how soon a client that hung up is noticed
 
 void* tag() {  // one operation at a time: any tag will do
   static char mark;
@@ -36,7 +36,7 @@ bool GenericCall::done() {
   void* tag = nullptr;
   bool ok = false;
   for (;;) {
-    const auto status = queue_.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + kLook);
+    const auto status = queue_.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + kHangUpLook);
     if (status == grpc::CompletionQueue::GOT_EVENT) return ok;
     if (status == grpc::CompletionQueue::SHUTDOWN) return false;
     if (gone_()) context_.TryCancel();

@@ -7,7 +7,7 @@
 namespace mbcosim::server::http {
 namespace {
 
-constexpr std::chrono::milliseconds kLook{100};  // how late a socket may be ended
+constexpr std::chrono::milliseconds kEndLook{100};  // how late a socket may be ended
 
 }  // namespace
 
@@ -47,7 +47,7 @@ void Reaper::loop() {
       if (late) ::shutdown(entry->first, SHUT_RDWR);
       entry = late ? deadlines_.erase(entry) : std::next(entry);
     }
-    changed_.wait_for(mutex_, kLook);
+    changed_.wait_for(mutex_, kEndLook);
   }
 }
 

@@ -10,7 +10,7 @@
 namespace mbcosim::mbdyn {
 namespace {
 
-using Kind = ForceForm::Kind;
+using FormKind = ForceForm::Kind;
 using Rotation = ForceForm::Rotation;
 
 enum Flag : std::uint32_t {
@@ -42,13 +42,13 @@ std::uint32_t rotation_flag(Rotation rotation) {
 
 /// The bits that a listening side expects.
 std::uint32_t flags_of(const ForceForm& form) {
-  std::uint32_t flags = form.kind == Kind::modal ? kModal : kNodal;
+  std::uint32_t flags = form.kind == FormKind::modal ? kModal : kNodal;
   if (form.reference) flags |= kReference;
-  if (form.kind == Kind::modal) return flags;
+  if (form.kind == FormKind::modal) return flags;
   if (form.accelerations) flags |= kAccelerations;
   if (form.labels) flags |= kLabels;
   const std::uint32_t rotation = rotation_flag(form.rotation);
-  return flags | (form.kind == Kind::nodal ? rotation : rotation << kReferenceShift);
+  return flags | (form.kind == FormKind::nodal ? rotation : rotation << kReferenceShift);
 }
 
 template <class T>
@@ -89,7 +89,9 @@ Vec3 take_vector(const std::string& bytes, std::size_t& at) {
 
 bool has_padding(const ForceForm& form) { return form.padded && form.points() % 2 != 0; }
 bool has_rotations(const ForceForm& form) { return form.rotation != Rotation::none; }
-bool has_moments(const ForceForm& form) { return form.kind == Kind::nodal && has_rotations(form); }
+bool has_moments(const ForceForm& form) {
+  return form.kind == FormKind::nodal && has_rotations(form);
+}
 
 /// Of a mapping's reference node the rotation always travels.
 void put_reference(const ForceForm& form, const PointState& r, std::string& out) {
@@ -113,7 +115,7 @@ void put_labels(const ForceForm& form, std::string& out) {
 }
 
 void put_points(const ForceForm& form, const std::vector<PointState>& points, std::string& out) {
-  const bool rotations = form.kind == Kind::nodal && has_rotations(form);
+  const bool rotations = form.kind == FormKind::nodal && has_rotations(form);
   for (const PointState& p : points) put(p.x, out);
   if (rotations)
     for (const PointState& p : points) put_rotation(p.R, form.rotation, out);
@@ -174,7 +176,7 @@ void take_reference(const ForceForm& form, const std::string& bytes, std::size_t
                         std::to_string(form.reference_label));
   }
   loads.f0 = take_vector(bytes, at);
-  if (form.kind == Kind::modal || has_rotations(form)) loads.m0 = take_vector(bytes, at);
+  if (form.kind == FormKind::modal || has_rotations(form)) loads.m0 = take_vector(bytes, at);
 }
 
 std::string hexadecimal(std::uint32_t number) {
@@ -203,25 +205,25 @@ std::string check_request(const std::string& request, ForceForm& form) {
                     ", the peer " + hexadecimal(flags & mask);
   };
   compare("kind (1 modal, 2 nodal)", kModal | kNodal);
-  compare(form.kind == Kind::modal ? "rigid part" : "reference node", kReference);
-  if (form.kind != Kind::modal) {
+  compare(form.kind == FormKind::modal ? "rigid part" : "reference node", kReference);
+  if (form.kind != FormKind::modal) {
     compare("accelerations", kAccelerations);
     compare("labels", kLabels);
     compare("rotations (0x100 vector, 0x200 matrix, 0x400 Euler angles)", kRotations);
   }
-  if (form.kind == Kind::mapped && form.reference)
+  if (form.kind == FormKind::mapped && form.reference)
     compare("rotation of the reference node", kReferenceRotations);
   if (count != form.count)
-    mismatches += "; number of " + std::string(form.kind == Kind::modal ? "modes" : "points") +
+    mismatches += "; number of " + std::string(form.kind == FormKind::modal ? "modes" : "points") +
                   ": the deck has " + std::to_string(form.count) + ", the peer " +
                   std::to_string(count);
   // MBDyn's client library announces itself by these bits; it does not pad labels.
-  if (form.kind == Kind::nodal && (flags & kReferenceRotations) != 0) form.padded = false;
+  if (form.kind == FormKind::nodal && (flags & kReferenceRotations) != 0) form.padded = false;
   return mismatches.empty() ? "" : mismatches.substr(2);
 }
 
 std::string encode_state(const ForceForm& form, const ForceState& state) {
-  if (form.kind == Kind::modal) return encode_modal(form, state);
+  if (form.kind == FormKind::modal) return encode_modal(form, state);
   std::string out;
   if (form.reference) put_reference(form, state.reference, out);
   put_labels(form, out);
@@ -231,7 +233,7 @@ std::string encode_state(const ForceForm& form, const ForceState& state) {
 
 std::size_t loads_size(const ForceForm& form) {
   constexpr std::size_t kVector = 3 * sizeof(double), kLabel = sizeof(std::uint32_t);
-  if (form.kind == Kind::modal)
+  if (form.kind == FormKind::modal)
     return (form.reference ? 2 * kVector : 0) + form.modes * sizeof(double);
   std::size_t size = 0;
   if (form.reference) size += kVector + (has_rotations(form) ? kVector : 0);

@@ -16,7 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 using Kind = ChannelAddress::Kind;
 
-constexpr int kMostWaiting = 2;  ///< creations that wait for codes: others need their threads
+constexpr int kMostWaitingCreations =
+    2;  ///< creations that wait for codes: others need their threads
 constexpr std::chrono::milliseconds kFarewell{200}, kUsualTimeout{60000};
 
 [[noreturn]] void refuse(const std::string& message) {
@@ -65,9 +66,9 @@ class DeckSocketFolder::Share {
 class DeckSocketFolder::Waiting {
  public:
   explicit Waiting(DeckSocketFolder& folder) : folder_(folder) {
-    if (++folder_.waiting_ <= kMostWaiting) return;
+    if (++folder_.waiting_ <= kMostWaitingCreations) return;
     --folder_.waiting_;
-    throw limit_refusal("deck_sockets_waiting", kMostWaiting,
+    throw limit_refusal("deck_sockets_waiting", kMostWaitingCreations,
                         "other simulations wait for the codes of their decks; try again");
   }
   ~Waiting() { --folder_.waiting_; }

@@ -9,9 +9,9 @@
 namespace mbcosim::server {
 namespace {
 
-class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
+class SnapshotImport final : public Upload<v1::ImportSnapshotRequest> {
  public:
-  explicit ImportHandler(const Parts& parts) : parts_(parts) {}
+  explicit SnapshotImport(const Parts& parts) : parts_(parts) {}
 
  private:
   void add(Exchange& exchange, v1::ImportSnapshotRequest& request, MemoryShare) override {
@@ -59,10 +59,10 @@ class ImportHandler final : public Upload<v1::ImportSnapshotRequest> {
   std::string bytes_;
 };
 
-using ExportReplies = Series<v1::ExportSnapshotRequest, v1::ExportSnapshotReply>;
+using SnapshotReplies = Series<v1::ExportSnapshotRequest, v1::ExportSnapshotReply>;
 
-ExportReplies::Source exported(const Parts& parts, const CallFrame& frame,
-                               const v1::ExportSnapshotRequest& request) {
+SnapshotReplies::Source exported_snapshot(const Parts& parts, const CallFrame& frame,
+                                          const v1::ExportSnapshotRequest& request) {
   const SessionHold session(parts.store, request.simulation(), frame.caller, frame.call,
                             Access::observe);
   const int number = request.has_snapshot() ? snapshot_in(request) : -1;
@@ -135,10 +135,10 @@ void add_snapshots(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("ExportSnapshot"),
            series<v1::ExportSnapshotRequest, v1::ExportSnapshotReply>(
                Role::observe, Lane::work, [&parts](const CallFrame& frame, const auto& request) {
-                 return exported(parts, frame, request);
+                 return exported_snapshot(parts, frame, request);
                }));
   gate.add(simulations_path("ImportSnapshot"),
-           stream(Role::control, [&parts] { return std::make_unique<ImportHandler>(parts); }));
+           stream(Role::control, [&parts] { return std::make_unique<SnapshotImport>(parts); }));
   gate.add(simulations_path("ImportSnapshotInline"),
            on_session<v1::ImportSnapshotInlineRequest, v1::ImportSnapshotInlineReply>(
                parts, Role::control, Lane::work,

@@ -155,7 +155,7 @@ void read_output_frequency(DeckCard& card) {
   control(card).output_frequency = card.integer_at_least("output frequency", 1);
 }
 
-void read_output_meter(DeckCard& card) {
+void read_meter_of_all(DeckCard& card) {
   Deck& deck = card.deck();
   if (deck.output_rate_set)
     card.fail_at(card.head(), "output frequency or output meter is given twice");
@@ -353,7 +353,7 @@ const std::vector<std::pair<const char*, Reader>>& control_cards() {
       {"solver", read_linear_solver},
       {"default output", read_default_output},
       {"output frequency", read_output_frequency},
-      {"output meter", read_output_meter},
+      {"output meter", read_meter_of_all},
       {"output precision", read_output_precision},
       {"default orientation", read_default_orientation},
       {"default beam output", read_default_beam_output},

@@ -300,7 +300,7 @@ void read_bind(DeckCard& card) {
 // ------------------------------------------------------------------------------------------------
 // output
 
-void read_output_card(DeckCard& card) {
+void read_elements_output(DeckCard& card) {
   const Family family = card.element_family("element type");
   const Model& model = card.model();
   read_output_labels(card, [&](int first, int last) {
@@ -329,7 +329,7 @@ void read_element_card(DeckCard& card) {
   else if (word == "bind")
     read_bind(card);
   else if (word == "output")
-    read_output_card(card);
+    read_elements_output(card);
   else
     read_element(card);
 }

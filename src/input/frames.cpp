@@ -13,7 +13,7 @@
 namespace mbcosim {
 
 namespace {
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon();
 }
 
 DeckCard::Frame DeckCard::node_frame(int node) const {
@@ -151,8 +151,8 @@ Vec3 DeckCard::free_vector(std::string_view what, int context, bool relative) {
 
 Vec3 DeckCard::unit(std::string_view what, const Vec3& v) {
   const double norm = v.norm();
-  if (!(norm * norm > kEpsilon)) fail(std::string(what) + ": direction is null");
-  if (std::abs(norm - 1) > kEpsilon * 4)
+  if (!(norm * norm > kUnitRoundoff)) fail(std::string(what) + ": direction is null");
+  if (std::abs(norm - 1) > kUnitRoundoff * 4)
     warn(std::string(what) + ": not a unit vector, normalised");
   return v / norm;
 }

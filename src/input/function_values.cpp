@@ -10,7 +10,7 @@ namespace mbcosim {
 
 namespace {
 
-constexpr double kEpsilon = 2.2e-16;
+constexpr double kRoundoff = 2.2e-16;
 constexpr double kPi = std::numbers::pi;
 
 [[noreturn]] void fail(const char* function, double x, const char* what) {
@@ -36,7 +36,8 @@ double reduced_angle(double x) { return x - std::floor(x / kPi) * kPi; }
 template <class T>
 T tangent(const T& x) {
   const double v = value_of(x);
-  if (std::abs(reduced_angle(v) - kPi / 2) < kEpsilon) fail("tan", v, "is an odd multiple of pi/2");
+  if (std::abs(reduced_angle(v) - kPi / 2) < kRoundoff)
+    fail("tan", v, "is an odd multiple of pi/2");
   const double t = std::tan(v);
   return chain(x, t, [&] { return 1 + t * t; });
 }
@@ -44,7 +45,7 @@ T tangent(const T& x) {
 template <class T>
 T cotangent(const T& x) {
   const double v = value_of(x);
-  if (std::abs(reduced_angle(v)) < kEpsilon) fail("ctan", v, "is a multiple of pi");
+  if (std::abs(reduced_angle(v)) < kRoundoff) fail("ctan", v, "is a multiple of pi");
   const double t = 1 / std::tan(v);
   return chain(x, t, [&] { return -1 - t * t; });
 }
@@ -81,7 +82,7 @@ T root(const T& x) {
 template <class T>
 T hyperbolic_cotangent(const T& x) {
   const double v = value_of(x);
-  if (std::abs(v) < kEpsilon) fail("ctanh", v, "is zero");
+  if (std::abs(v) < kRoundoff) fail("ctanh", v, "is zero");
   const double t = 1 / std::tanh(v);
   return chain(x, t, [&] { return 1 - t * t; });
 }

@@ -11,11 +11,11 @@ namespace mbcosim {
 
 namespace {
 
-InverseProblem& settings(DeckCard& card) { return part<InverseProblem>(card.builder()); }
+InverseProblem& problem_of(DeckCard& card) { return part<InverseProblem>(card.builder()); }
 
 /// `weights`, w₁ and w₂ of the position, velocity and acceleration stages.
 void read_weights(DeckCard& card) {
-  InverseProblem& s = settings(card);
+  InverseProblem& s = problem_of(card);
   if (!card.keyword("weights")) return;
   for (int stage = 0; stage < 3; ++stage) {
     s.change_weight[stage] = card.real_above("weight of the change", 0, true);
@@ -24,7 +24,7 @@ void read_weights(DeckCard& card) {
 }
 
 void read_problem_type(DeckCard& card) {
-  InverseProblem& s = settings(card);
+  InverseProblem& s = problem_of(card);
   const int type =
       card.required("problem type",
                     {"fully actuated collocated", "underdetermined fully actuated",
@@ -38,8 +38,8 @@ void read_problem_type(DeckCard& card) {
 }
 
 void read_full_residual_test(DeckCard& card) {
-  settings(card).full_residual_test = !card.more() || card.yes_no("full residual test");
-  if (settings(card).full_residual_test)
+  problem_of(card).full_residual_test = !card.more() || card.yes_no("full residual test");
+  if (problem_of(card).full_residual_test)
     card.warn(
         "the rows of the nodes are balanced by multipliers that are thrown away: their "
         "residual stays large",
@@ -184,7 +184,7 @@ void set_inverse_role(DeckCard& card, std::size_t before) {
       card.fail_at(card.head(), "it cannot take part in inverse dynamics",
                    "accepted are clamp, total joint, total pin joint, rods, deformable joints, "
                    "viscous body, body, beam2, forces and couples");
-    settings(card).roles[info.order] = *role;
+    problem_of(card).roles[info.order] = *role;
   }
 }
 
@@ -196,7 +196,7 @@ void read_inverse_role(DeckCard& card, std::size_t before) {
   const ElementInfo& info = model.elements[before].set->info(model.elements[before].index);
   const InverseRole* role = role_of(info);
   const InverseRole read = read_clause(card, info, role ? *role : InverseRole{});
-  if (card.deck().inverse_dynamics) settings(card).roles[info.order] = read;
+  if (card.deck().inverse_dynamics) problem_of(card).roles[info.order] = read;
 }
 
 std::vector<std::string> inverse_dynamics_words() {

@@ -239,9 +239,9 @@ class DofValue : public Drive {
   bool previous_;
 };
 
-class ElementDatum : public Drive {
+class ElementValue : public Drive {
  public:
-  ElementDatum(ElementRef element, int datum) : element_(element), datum_(datum) {}
+  ElementValue(ElementRef element, int datum) : element_(element), datum_(datum) {}
   using Drive::value;
   double value(const EvalContext& context, double) const override {
     return element_.set->private_value(context, element_.index, datum_);
@@ -334,7 +334,7 @@ DrivePtr element_datum(const Model& model, Family family, bool has_label, int la
   const std::string name = choose_datum(names, datum, index, owner);
   const int k = element.set->private_datum(element.index, name);
   if (k < 0) fail_datum(owner, name, names);
-  return std::make_shared<ElementDatum>(element, k);
+  return std::make_shared<ElementValue>(element, k);
 }
 
 DrivePtr dof_value(const Model& model, int type, int label, int component, int order,

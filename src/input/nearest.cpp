@@ -32,12 +32,12 @@ int edit_distance(const std::string& a, const std::string& b) {
   return last[m];
 }
 
-constexpr std::size_t kLongestWord = 60;
+constexpr std::size_t kLongestCompared = 60;
 
 }  // namespace
 
 Nearest::Nearest(std::string_view word)
-    : word_(word.substr(0, kLongestWord)),
+    : word_(word.substr(0, kLongestCompared)),
       lower_(lower_case(word_)),
       distance_(static_cast<int>(word_.size()) / 3 + 1) {}
 

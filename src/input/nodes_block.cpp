@@ -67,7 +67,7 @@ Sampling read_parameter(DeckCard& card, ScalarNode& node) {
   return sampling;
 }
 
-void read_output_card(DeckCard& card) {
+void read_nodes_output(DeckCard& card) {
   const int type = card.required(
       "node type", {"structural", "abstract", "electric", "hydraulic", "thermal", "parameter"});
   Model& model = card.model();
@@ -180,7 +180,7 @@ void read_node_card(DeckCard& card) {
   } else if (word == "parameter") {
     read_scalar_card<ScalarKind::parameter>(card);
   } else if (word == "output") {
-    read_output_card(card);
+    read_nodes_output(card);
   } else {
     fail_unknown_card(card, {"structural", "abstract", "electric", "hydraulic", "thermal",
                              "parameter", "output"});

@@ -11,10 +11,10 @@ namespace mbcosim {
 
 namespace {
 
-constexpr int kSmallest = 64;         ///< order of a tail that pays
-constexpr double kFull = 0.8;         ///< share of entries in a column that is nearly full
-constexpr double kShare = 0.5;        ///< of all operations that the tail must have
-constexpr double kSuspicious = 1e-3;  ///< pivot ratio over that of the reference: the head is poor
+constexpr int kSmallest = 64;       ///< order of a tail that pays
+constexpr double kFull = 0.8;       ///< share of entries in a column that is nearly full
+constexpr double kShare = 0.5;      ///< of all operations that the tail must have
+constexpr double kPoorHead = 1e-3;  ///< pivot ratio over that of the reference: the head is poor
 
 }  // namespace
 
@@ -174,7 +174,7 @@ bool DenseTail::factor(const double* values, const Watch& watch) {
     return false;
   }
   if (reference_ratio_ == 0 && head_ > 0) reference_ratio_ = smallest_ / largest_;
-  if (head_ > 0 && smallest_ / largest_ < kSuspicious * reference_ratio_) return false;
+  if (head_ > 0 && smallest_ / largest_ < kPoorHead * reference_ratio_) return false;
   watch.look();
   tail_factor_.compute(tail_);
   const auto diagonal = tail_factor_.matrixLU().diagonal().cwiseAbs();

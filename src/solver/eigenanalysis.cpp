@@ -12,7 +12,7 @@ namespace mbcosim {
 
 namespace {
 
-constexpr int kLargestDense = 4000;  ///< unknowns; beyond, the matrices alone take gigabytes
+constexpr int kLargestWhole = 4000;  ///< unknowns; beyond, the matrices alone take gigabytes
 
 /// α, β = 1 and right vectors of the eigenvalues nearest to 1/κ: those with the largest |Λ + 1|.
 Result<GeneralizedEigen> iterative(const Model& model, const State& state,
@@ -60,11 +60,11 @@ Result<EigenReport> analyse_modes(const Model& model, const State& state,
   report.step = state.step;
   report.pencil = bilinear_pencil(model, state, settings.parameter / 2);
   const bool lapack = settings.solver == EigenSettings::Solver::lapack;
-  if (lapack && model.unknowns > kLargestDense)
+  if (lapack && model.unknowns > kLargestWhole)
     return make_error(ErrorKind::limit, "EIGENANALYSIS_SIZE",
                       "eigenanalysis: " + std::to_string(model.unknowns) +
                           " unknowns are too many for a dense solver (at most " +
-                          std::to_string(kLargestDense) +
+                          std::to_string(kLargestWhole) +
                           "); use `use arpack, <number>, <basis>, <tolerance>`");
   auto solution =
       lapack ? generalized_eigen(model.dense(report.pencil.minus), model.dense(report.pencil.plus),

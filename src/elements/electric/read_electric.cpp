@@ -3,19 +3,12 @@
 
 #include "elements/electric/electric.h"
 #include "elements/families.h"
+#include "elements/read_number.h"
 #include "model/card.h"
 
 namespace mbcosim {
 
 namespace {
-
-double read_positive(Card& card, const char* what) {
-  const double value = card.real(what);
-  if (!(value > 0) || !std::isfinite(value))
-    card.fail(std::string("accelerometer: the ") + what + " must be positive, got " +
-              std::to_string(value));
-  return value;
-}
 
 /// <node>, <abstract node>, <direction>, ω, τ, ζ, κ
 void read_filtered_accelerometer(Card& card, ElementInfo& info) {

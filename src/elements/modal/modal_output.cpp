@@ -26,7 +26,7 @@ bool read_integer(std::string_view text, int& value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-std::string_view trimmed(std::string_view s) {
+std::string_view without_spaces(std::string_view s) {
   while (!s.empty() && s.front() == ' ') s.remove_prefix(1);
   while (!s.empty() && s.back() == ' ') s.remove_suffix(1);
   return s;
@@ -44,10 +44,10 @@ int node_component(const ModalBody& body, std::string_view argument) {
   const std::size_t comma = argument.rfind(',');
   if (comma == std::string_view::npos) return -1;
   int component = 0;
-  if (!read_integer(trimmed(argument.substr(comma + 1)), component) || component < 1 ||
+  if (!read_integer(without_spaces(argument.substr(comma + 1)), component) || component < 1 ||
       component > 3)
     return -1;
-  const int node = body.find_node(trimmed(argument.substr(0, comma)));
+  const int node = body.find_node(without_spaces(argument.substr(0, comma)));
   return node < 0 ? -1 : 3 * node + component - 1;
 }
 
@@ -113,7 +113,7 @@ int ModalJointSet::private_datum(int i, std::string_view name) const {
   const std::size_t open = name.find('[');
   if (open == std::string_view::npos || name.back() != ']') return -1;
   const std::string_view kind = name.substr(0, open),
-                         argument = trimmed(name.substr(open + 1, name.size() - open - 2));
+                         argument = without_spaces(name.substr(open + 1, name.size() - open - 2));
   for (int what = 0; what < kDatumCount; ++what) {
     if (kind != kDatumNames[what].name) continue;
     const int index = what <= kQPP ? mode_index(b, argument) : node_component(b, argument);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "elements/families.h"
+#include "elements/read_number.h"
 #include "model/card.h"
 
 namespace mbcosim {
@@ -12,13 +13,6 @@ namespace {
 std::string line(const char* type, const Model& model, int label, int node) {
   return std::string(type) + ": " + std::to_string(label) + " " +
          std::to_string(model.scalars[node].label);
-}
-
-double read_positive(Card& card, const char* what) {
-  const double value = card.real(what);
-  if (!(value > 0) || !std::isfinite(value))
-    card.fail(std::string("the ") + what + " must be positive, got " + std::to_string(value));
-  return value;
 }
 
 void read_capacitance(Card& card, ElementInfo& info) {

@@ -1,10 +1,12 @@
 #include "elements/user/asynchronous_machine.h"
 
+#include "elements/read_number.h"
+
 namespace mbcosim {
 
 namespace {
 
-constexpr const char* kGrammar =
+constexpr const char* kMachineGrammar =
     "asynchronous_machine, rotor, <node>, stator, <node>, MK, <breakdown torque>, sK, <breakdown "
     "slip>, OmegaS, <synchronous speed> [, motor on, <drive>] [, M0, <torque>] [, MP0, <rate>]";
 
@@ -15,7 +17,7 @@ void expect(Card& card, const char* word) {
 }  // namespace
 
 void read_asynchronous_machine(Card& card, ElementInfo& info) {
-  read_help(card, kGrammar);
+  read_help(card, kMachineGrammar);
   AsynchronousMachine e;
   expect(card, "rotor");
   e.rotor = card.structural_node();

@@ -7,7 +7,7 @@ namespace mbcosim {
 
 namespace {
 
-void read_spring_support(Card& card, ElementInfo& info) {
+void read_bulk_spring_support(Card& card, ElementInfo& info) {
   BulkSpringSupport e;
   const SourceSpan where = card.next();
   e.dof = card.node_dof(false);
@@ -23,7 +23,7 @@ void read_spring_support(Card& card, ElementInfo& info) {
 }  // namespace
 
 void register_bulk(Registry& registry) {
-  registry.typed("bulk", Family::bulk, {"spring support"}, read_spring_support);
+  registry.typed("bulk", Family::bulk, {"spring support"}, read_bulk_spring_support);
 }
 
 }  // namespace mbcosim

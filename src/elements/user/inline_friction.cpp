@@ -1,10 +1,12 @@
 #include "elements/user/inline_friction.h"
 
+#include "elements/read_number.h"
+
 namespace mbcosim {
 
 namespace {
 
-constexpr const char* kGrammar =
+constexpr const char* kFrictionGrammar =
     "inline friction, node1, <node> [, offset, <position>] [, hinge, <orientation>], node2, <node> "
     "[, offset, <position>], [coulomb friction coefficient, <muc> [, static friction coefficient, "
     "<mus>] [, sliding velocity coefficient, <vs>] [, sliding velocity exponent, <i>], micro slip "
@@ -90,7 +92,7 @@ double InlineFriction::private_value(const Local<double>& u, int datum) const {
 }
 
 void read_inline_friction(Card& card, ElementInfo& info) {
-  read_help(card, kGrammar);
+  read_help(card, kFrictionGrammar);
   InlineFriction e;
   if (!card.keyword("node1")) card.fail_expected("`node1` expected");
   e.a = read_attachment(card);

@@ -8,7 +8,6 @@ namespace mbcosim {
 
 /// `[ help , ]`: the element's grammar, as a warning.
 void read_help(Card& card, const char* grammar);
-double read_positive(Card& card, const char* what);
 
 void read_wheel(Card& card, ElementInfo& info);
 void read_inline_friction(Card& card, ElementInfo& info);

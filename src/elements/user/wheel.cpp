@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "elements/read_number.h"
+
 namespace mbcosim {
 
 namespace {
@@ -17,7 +19,7 @@ T length_of(const Vec<T>& v) {
   return value_of(square) > 0 ? T(sqrt(square)) : T(0.0);
 }
 
-constexpr const char* kGrammar =
+constexpr const char* kWheelGrammar =
     "wheel2, <wheel node>, <axle>, <ground node>, <point>, <normal>, <radius>, <tyre radius>, "
     "<volume coefficient>, <pressure>, <exponent>, <hysteresis velocity> [, slip, <mu_x0>, "
     "<mu_y0>, <mu_y1> [, threshold, <velocity>, <velocity>]]";
@@ -119,7 +121,7 @@ template Wheel::Patch<double> Wheel::patch(const Local<double>&) const;
 template Wheel::Patch<Dual<12>> Wheel::patch(const Local<Dual<12>>&) const;
 
 void read_wheel(Card& card, ElementInfo& info) {
-  read_help(card, kGrammar);
+  read_help(card, kWheelGrammar);
   Wheel e;
   e.wheel = card.structural_node();
   e.axle = card.relative_vector("axle", e.wheel);

@@ -84,7 +84,7 @@ FluidPtr read_super(Card& card) {
   return std::make_shared<SuperFluid>(c.rho0, mu, c.beta);
 }
 
-FluidPtr read_exponential(Card& card) {
+FluidPtr read_exponential_fluid(Card& card) {
   const Compressible c = read_compressible(card);
   const double mu = read_property(card, "viscosity", "fluid viscosity");
   read_unused_temperature(card);
@@ -99,7 +99,7 @@ void register_fluids(Registry& registry) {
   registry.fluid({"linear compressible"}, read_linear_compressible);
   registry.fluid({"linear thermal compressible"}, read_linear_thermal_compressible);
   registry.fluid({"super"}, read_super);
-  registry.fluid({"exponential"}, read_exponential);
+  registry.fluid({"exponential"}, read_exponential_fluid);
 }
 
 }  // namespace mbcosim

@@ -88,7 +88,7 @@ LawPtr<N> read_linear_bistop(Card& card) {
 }
 
 template <int N>
-LawPtr<N> read_bistop(Card& card) {
+LawPtr<N> read_bistop_law(Card& card) {
   Switches s = read_switches(card);
   LawPtr<N> law = card.template law<N>();
   return std::make_shared<Bistop<N>>(card.builder(), std::move(s), std::move(law));
@@ -98,7 +98,7 @@ template <int N>
 void register_bistop(Registry& r) {
   add_law<N>(r, {"linear elastic bistop"}, read_linear_bistop<N, LawType::elastic>);
   add_law<N>(r, {"linear viscoelastic bistop"}, read_linear_bistop<N, LawType::viscoelastic>);
-  add_law<N>(r, {"bistop"}, read_bistop<N>);
+  add_law<N>(r, {"bistop"}, read_bistop_law<N>);
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ class LawArray : public Law<N> {
 };
 
 template <int N>
-LawPtr<N> read_array(Card& card) {
+LawPtr<N> read_law_array(Card& card) {
   const int n = card.integer("number of laws");
   if (n < 1) card.fail("array: the number of laws must be at least 1, got " + std::to_string(n));
   std::vector<LawPtr<N>> laws;
@@ -209,7 +209,7 @@ LawPtr<3> read_invariant_angular(Card& card) {
 
 template <int N>
 void register_composite(Registry& r) {
-  add_law<N>(r, {"array"}, read_array<N>);
+  add_law<N>(r, {"array"}, read_law_array<N>);
   add_law<N>(r, {"drive caller wrapper"}, read_driven_law<N>);
 }
 
