@@ -88,7 +88,7 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 class SharedMemoryWire:
     """Over the rings that a daemon at unix:PATH offers at PATH.shm. Looks for messages instead of sleeping in the kernel."""
 
-    def __init__(self, address, authorization="", seconds=10 * float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))):
+    def __init__(self, address, authorization="", seconds=10):
         self._seconds = seconds  # for a message to be taken
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.settimeout(5)
@@ -121,7 +121,7 @@ class SharedMemoryWire:
 
     def write(self, data):
         """Any bytes, as far as they are taken in time."""
-        end = time.monotonic() + self._seconds
+        end = time.monotonic() + self._seconds * float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
         while data and time.monotonic() < end:
             at = self._written % _RING
             part = data[:min(_RING - at, _RING - (self._written - self._word(1, _READ)))]

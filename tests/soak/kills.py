@@ -105,6 +105,8 @@ class Candidate:
             self.faults.append(f"{self.kind}: it stands at step {step}, must be in {least} to {self.due}")
         if self.durability == "checkpoint":  # what came later is lost, and nobody asks for it again
             self.due, self.unanswered = step, None
+            if self.peer:
+                self.peer.seen = step  # it goes back, too, or it is refused
         self.twin.step(step - self.twin.refresh().step)
         if bits(again) != bits(self.twin):
             self.faults.append(f"{self.kind}: other bits at step {step}")
