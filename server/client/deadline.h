@@ -24,32 +24,24 @@ class Deadline {
     watch_ = std::thread([this, seconds, cancel = std::move(cancel)] { watch(seconds, cancel); });
   }
   ~Deadline() {
-    {
-      const server::Guard guard(mutex_);
-      has_left_ = true;
-    }
-    left_.notify_one();
+    left_.stop();
     if (watch_.joinable()) watch_.join();
   }
   Deadline(const Deadline&) = delete;
   Deadline& operator=(const Deadline&) = delete;
+
   bool is_over() const { return over_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
   void watch(double seconds, const std::function<void()>& cancel) {
+    using Clock = std::chrono::steady_clock;
     const std::chrono::duration<double> bound(seconds);
-    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(bound);
-    const server::Guard guard(mutex_);
-    while (!has_left_ && Clock::now() < end) left_.wait_until(mutex_, end);
-    if (has_left_) return;
+    if (left_.stopped_within(std::chrono::duration_cast<Clock::duration>(bound))) return;
     over_ = true;
     cancel();
   }
 
-  server::Mutex mutex_;
-  server::Condition left_;
-  bool has_left_ TS_GUARDED_BY(mutex_) = false;
+  server::StopSignal left_;
   std::atomic<bool> over_{false};
   std::thread watch_;
 };

@@ -278,8 +278,7 @@ void Peer::Impl::beat(double beats, double limit) {
   const auto period = std::chrono::duration_cast<std::chrono::steady_clock::duration>(
       std::chrono::duration<double>(shorter / 3));
   v1::PeerMessage message;
-  const server::Guard guard(heart_mutex);
-  while (!stops_within(period)) {
+  while (!stop.stopped_within(period)) {
     const std::int64_t since = reading_since.load();
     if (limit > 0 && since > 0 && nanoseconds_now() - since > 1e9 * limit) {
       blame(Error("the server was silent for " + std::to_string(limit) + " s",
@@ -290,12 +289,6 @@ void Peer::Impl::beat(double beats, double limit) {
     message.mutable_heartbeat()->set_count(message.heartbeat().count() + 1);
     write(message);
   }
-}
-
-bool Peer::Impl::stops_within(std::chrono::steady_clock::duration time) {
-  const auto end = std::chrono::steady_clock::now() + time;
-  while (!stopping && std::chrono::steady_clock::now() < end) stop.wait_until(heart_mutex, end);
-  return stopping;
 }
 
 bool Peer::Impl::read() {
@@ -329,11 +322,7 @@ std::optional<Error> Peer::Impl::error() const {
 }
 
 void Peer::Impl::stop_heart() {
-  {
-    const server::Guard guard(heart_mutex);
-    stopping = true;
-  }
-  stop.notify_one();
+  stop.stop();
   if (heart.joinable()) heart.join();
 }
 

@@ -29,8 +29,7 @@ struct Peer::Impl {
   void give_up(const std::string& why);  ///< after an exception of the program's
   void start_heart(const PeerOptions& options);
   void beat(double beats, double limit);
-  bool stops_within(std::chrono::steady_clock::duration time) TS_REQUIRES(heart_mutex);
-  void stop_heart() TS_EXCLUDES(heart_mutex);
+  void stop_heart();
   bool read();
   void note(const v1::StepNotice& notice, bool accepted);
   void end();                                               ///< learns how the stream has ended
@@ -48,9 +47,7 @@ struct Peer::Impl {
   v1::PeerMessage out;
   std::thread thread, heart;
   std::atomic<std::int64_t> reading_since{0};  ///< clock's count of nanoseconds; 0: nobody reads
-  server::Mutex heart_mutex;
-  server::Condition stop;
-  bool stopping TS_GUARDED_BY(heart_mutex) = false;
+  server::StopSignal stop;                     ///< of the heart
   std::atomic<std::int64_t> exchanges{0};
   std::atomic<std::int64_t> step{0};  ///< at whose end the peer stands
   std::atomic<bool> ended{false};

@@ -54,11 +54,7 @@ class SimulationWatch {
   SimulationWatch(client::Server& server, const std::string& name, client::Peer& peer)
       : simulation_(server.find(name)), peer_(peer), thread_([this] { run(); }) {}
   ~SimulationWatch() {
-    {
-      const server::Guard guard(mutex_);
-      stop_ = true;
-    }
-    changed_.notify_one();
+    stop_.stop();
     thread_.join();
   }
   SimulationWatch(const SimulationWatch&) = delete;
@@ -66,8 +62,7 @@ class SimulationWatch {
 
  private:
   void run() {
-    const server::Guard guard(mutex_);
-    while (!stops_within(std::chrono::seconds(1))) {
+    while (!stop_.stopped_within(std::chrono::seconds(1))) {
       try {
         (void)simulation_.read("time");
       } catch (const std::exception&) {
@@ -76,17 +71,9 @@ class SimulationWatch {
     }
   }
 
-  bool stops_within(std::chrono::steady_clock::duration time) TS_REQUIRES(mutex_) {
-    const auto end = std::chrono::steady_clock::now() + time;
-    while (!stop_ && std::chrono::steady_clock::now() < end) changed_.wait_until(mutex_, end);
-    return stop_;
-  }
-
   client::Simulation simulation_;
   client::Peer& peer_;
-  server::Mutex mutex_;
-  bool stop_ TS_GUARDED_BY(mutex_) = false;
-  server::Condition changed_;
+  server::StopSignal stop_;
   std::thread thread_;
 };
 

@@ -98,4 +98,28 @@ class Condition {
   std::condition_variable condition_;
 };
 
+/// Ends the waits of a thread.
+class StopSignal {
+ public:
+  void stop() TS_EXCLUDES(mutex_) {
+    {
+      Guard guard(mutex_);
+      stopped_ = true;
+    }
+    condition_.notify_all();
+  }
+  /// Waits so long at most. True: it has been told to stop.
+  bool stopped_within(std::chrono::steady_clock::duration time) TS_EXCLUDES(mutex_) {
+    const auto end = std::chrono::steady_clock::now() + time;
+    Guard guard(mutex_);
+    while (!stopped_ && std::chrono::steady_clock::now() < end) condition_.wait_until(mutex_, end);
+    return stopped_;
+  }
+
+ private:
+  Mutex mutex_;
+  Condition condition_;
+  bool stopped_ TS_GUARDED_BY(mutex_) = false;
+};
+
 }  // namespace mbcosim::server
