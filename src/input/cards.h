@@ -41,6 +41,8 @@ void read_scalar_node(DeckCard& card, ScalarKind kind, ScalarNode node);
 void warn_old_name(DeckCard& card, SourceSpan where, std::string_view present);
 /// Skips the rest of a statement that is accepted and has no effect here.
 void ignore_rest(DeckCard& card, const std::string& why);
+/// A card that is accepted and has no effect.
+inline void ignore_card(DeckCard& card) { ignore_rest(card, "this card has no effect"); }
 /// `output, { yes | no | default | <bool> }`, when it is there.
 void read_output_option(DeckCard& card, bool default_value, bool& output);
 /// The labels of an `output` card: calls `mark(first, last)` for each range; first = last for a

@@ -316,7 +316,6 @@ void read_restart(DeckCard& card) {
   card.warn_at(card.head(), "restart files are not written",
                "snapshots of the service (`CreateSnapshot`) keep a run, and its checkpoints");
 }
-void ignored(DeckCard& card) { ignore_rest(card, "this card has no effect"); }
 void read_automatic_differentiation(DeckCard& card) {
   card.note("derivatives are exact with and without this card");
 }
@@ -366,16 +365,16 @@ const std::vector<std::pair<const char*, Reader>>& control_cards() {
       {"default scale", read_default_scale},
       {"model", read_model},
       {"rigid body kinematics", read_frame_motion},
-      {"loadable path", ignored},
-      {"finite difference jacobian meter", ignored},
+      {"loadable path", ignore_card},
+      {"finite difference jacobian meter", ignore_card},
       {"use automatic differentiation", read_automatic_differentiation},
-      {"output units", ignored},
+      {"output units", ignore_card},
       {"units", read_units},
       {"read solution array", read_solution_array},
       {"output file name", read_output_file_name},
       {"gravity", read_gravity_flag},
       {"air properties", read_air_flag},
-      {"automatic structural elements", ignored},
+      {"automatic structural elements", ignore_card},
       {"driven elements", read_refused_count},
       {"electric bulk elements", read_refused_count},
   };

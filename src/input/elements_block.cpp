@@ -2,6 +2,7 @@
 #include "input/cards.h"
 #include "input/deck.h"
 #include "input/grammar/grammar.h"
+#include "input/model_functions.h"
 #include "input/suggest.h"
 #include "model/family.h"
 
@@ -203,19 +204,6 @@ void read_driven(DeckCard& card) {
 // ------------------------------------------------------------------------------------------------
 // bind
 
-/// A private datum of an element as a drive.
-class ElementDatum final : public Drive {
- public:
-  ElementDatum(ElementRef element, int datum) : element_(element), datum_(datum) {}
-  double value(const EvalContext& context, double) const override {
-    return element_.set->private_value(context, element_.index, datum_);
-  }
-
- private:
-  ElementRef element_;
-  int datum_;
-};
-
 /// Strain of a gage on a beam section: ε₁ + z κ₂ − y κ₃.
 class BeamGage final : public Drive {
  public:
@@ -257,7 +245,7 @@ DrivePtr read_datum(DeckCard& card, ElementRef e, const ScalarNode& node) {
     if (datum < 0)
       card.fail(element_name(card, e) + " has no private datum \"" + name + "\"",
                 suggestion(name, e.set->data_names(e.index)));
-    return std::make_shared<ElementDatum>(e, datum);
+    return element_datum(e, datum);
   }
   card.keyword("index");
   const int n = card.integer("index of the private datum");
@@ -270,7 +258,7 @@ DrivePtr read_datum(DeckCard& card, ElementRef e, const ScalarNode& node) {
   if (n < 1 || n > static_cast<int>(names.size()))
     card.fail(element_name(card, e) + " has " + std::to_string(names.size()) +
               " private data; index " + std::to_string(n));
-  return std::make_shared<ElementDatum>(e, e.set->private_datum(e.index, names[n - 1]));
+  return element_datum(e, e.set->private_datum(e.index, names[n - 1]));
 }
 
 void read_bind(DeckCard& card) {

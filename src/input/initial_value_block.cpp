@@ -290,7 +290,6 @@ void read_threads(DeckCard& card) {
   card.one_of({"assembly", "solver"});
   card.integer_at_least("number of threads", 1);
 }
-void without_effect(DeckCard& card) { ignore_rest(card, "this card has no effect"); }
 void read_real_time(DeckCard& card) {
   ignore_rest(card, "a deck sets no pace; `mbcosim run --real-time` holds a run to the clock");
 }
@@ -333,9 +332,9 @@ const std::vector<std::pair<const char*, Reader>>& initial_value_cards() {
       {"eigenanalysis", read_eigenanalysis},
       {"threads", read_threads},
       {"real time", read_real_time},
-      {"interface linear solver", without_effect},
-      {"interface solver", without_effect},
-      {"pod", without_effect},
+      {"interface linear solver", ignore_card},
+      {"interface solver", ignore_card},
+      {"pod", ignore_card},
   };
   return kCards;
 }

@@ -239,9 +239,9 @@ class DofValue : public Drive {
   bool previous_;
 };
 
-class ElementValue : public Drive {
+class ElementDatum final : public Drive {
  public:
-  ElementValue(ElementRef element, int datum) : element_(element), datum_(datum) {}
+  ElementDatum(ElementRef element, int datum) : element_(element), datum_(datum) {}
   using Drive::value;
   double value(const EvalContext& context, double) const override {
     return element_.set->private_value(context, element_.index, datum_);
@@ -318,6 +318,10 @@ DrivePtr node_datum(const Model& model, int type, int label, std::string_view da
   return std::make_shared<DofValue>(dof, false);
 }
 
+DrivePtr element_datum(ElementRef element, int datum) {
+  return std::make_shared<ElementDatum>(element, datum);
+}
+
 DrivePtr element_datum(const Model& model, Family family, bool has_label, int label,
                        std::string_view datum, int index) {
   ElementRef element;
@@ -334,7 +338,7 @@ DrivePtr element_datum(const Model& model, Family family, bool has_label, int la
   const std::string name = choose_datum(names, datum, index, owner);
   const int k = element.set->private_datum(element.index, name);
   if (k < 0) fail_datum(owner, name, names);
-  return std::make_shared<ElementValue>(element, k);
+  return element_datum(element, k);
 }
 
 DrivePtr dof_value(const Model& model, int type, int label, int component, int order,

@@ -51,6 +51,8 @@ int node_type(std::string_view word);
 /// exactly one, or its number
 /// (`index` ≥ 1) may be given instead. Throws EvaluationError when entity or datum do not exist.
 DrivePtr node_datum(const Model& model, int type, int label, std::string_view datum, int index = 0);
+/// `datum`: its number as `ElementSet::private_datum` gives it.
+DrivePtr element_datum(ElementRef element, int datum);
 DrivePtr element_datum(const Model& model, Family family, bool has_label, int label,
                        std::string_view datum, int index = 0);
 /// Value (order 0) or rate (1) of a degree of freedom; `component` counts from 1, 0: the only one.

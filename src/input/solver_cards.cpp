@@ -8,11 +8,9 @@ namespace mbcosim {
 
 namespace {
 
-InitialValueSettings& solver_settings(DeckCard& card) { return card.model().initial_value; }
-
 /// `true | modified, n, ...`; `default_every`: n when it may be left out, else 0.
 void read_newton(DeckCard& card, int default_every) {
-  InitialValueSettings& s = solver_settings(card);
+  InitialValueSettings& s = card.model().initial_value;
   s.modified_newton = s.keep_jacobian = false;
   s.jacobian_every = 1;
   if (!card.more()) return;
@@ -98,7 +96,7 @@ bool read_line_search_option(DeckCard& card, LineSearchSettings& l) {
 }
 
 void read_line_search(DeckCard& card) {
-  InitialValueSettings& s = solver_settings(card);
+  InitialValueSettings& s = card.model().initial_value;
   if (card.peek_word() == "true" || card.peek_word() == "modified") read_newton(card, 0);
   LineSearchSettings l;
   while (read_line_search_option(card, l)) {
@@ -130,12 +128,12 @@ void read_matrix_free(DeckCard& card) {
 }  // namespace
 
 void read_legacy_newton(DeckCard& card) {
-  solver_settings(card).line_search.reset();
+  card.model().initial_value.line_search.reset();
   read_newton(card, 2);
 }
 
 void read_nonlinear_solver(DeckCard& card) {
-  solver_settings(card).line_search.reset();
+  card.model().initial_value.line_search.reset();
   switch (card.required("nonlinear solver",
                         {"newton raphson", "line search", "matrix free", "default"})) {
     case 0:
