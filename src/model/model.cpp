@@ -7,8 +7,6 @@ namespace mbcosim {
 
 namespace {
 
-Vec3 at(const std::vector<double>& y, int i) { return Vec3(y[i], y[i + 1], y[i + 2]); }
-
 /// Position and motion of a `relative frame` dummy: `n` seen from frame (r, f, H)
 /// (MBDyn input manual, "structural node", dummy nodes).
 NodeState relative_state(const NodeState& n, const NodeState& r, const Vec3& f, const Mat3& h) {
@@ -85,8 +83,8 @@ NodeState Model::node_state(const EvalContext& context, int node) const {
   if (context.phase == Phase::input) return {n.x, n.R, n.v, n.w};
   const State& state = *context.state;
   NodeState s;
-  s.x = at(state.y, n.first);
-  s.v = at(state.yp, n.first);
+  s.x = vector_at(state.y, n.first);
+  s.v = vector_at(state.yp, n.first);
   if (n.has_rotation()) {
     s.R = state.rotation[node].R;
     s.w = state.rotation[node].w;
@@ -100,7 +98,8 @@ NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) 
   NodeAcceleration r;
   if (context.phase == Phase::input) return r;
   const std::vector<double>& yp = context.state->yp;
-  if (n.kind == StructuralKind::modal) return {at(yp, n.first + 6), at(yp, n.first + 9)};
+  if (n.kind == StructuralKind::modal)
+    return {vector_at(yp, n.first + 6), vector_at(yp, n.first + 9)};
   if (!n.has_momentum()) {
     if (const InverseProblem* inverse = inverse_problem(*this)) {
       const double* a = &context.state->memory[inverse->memory + 6 * node];
@@ -114,12 +113,13 @@ NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) 
       body.set->add_inertia(context, body.index, node, inertia);
   if (inertia.m <= 0) return r;
   if (n.is_displacement()) {
-    r.a = at(yp, n.first + 3) / inertia.m;
+    r.a = vector_at(yp, n.first + 3) / inertia.m;
     return r;
   }
   const NodeState s = node_state(context, node);
-  const Vec3 b = at(context.state->y, n.first + 6), bp = at(yp, n.first + 6) - inertia.b_rate,
-             gp = at(yp, n.first + 9) - inertia.g_rate;
+  const Vec3 b = vector_at(context.state->y, n.first + 6),
+             bp = vector_at(yp, n.first + 6) - inertia.b_rate,
+             gp = vector_at(yp, n.first + 9) - inertia.g_rate;
   const Vec3 x = inertia.S / inertia.m;
   const Mat3 jc = inertia.J + cross<double>(x) * cross<double>(inertia.S);
   const Vec3 torque = gp - x.cross(bp) - s.w.cross(jc * s.w) + s.v.cross(b);

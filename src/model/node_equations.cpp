@@ -5,12 +5,6 @@
 
 namespace mbcosim {
 
-namespace {
-
-Vec3 part_at(const std::vector<double>& y, int i) { return Vec3(y[i], y[i + 1], y[i + 2]); }
-
-}  // namespace
-
 void NodeEquations::bind(const std::vector<StructuralNode>& nodes) {
   rows_.clear();
   for (const StructuralNode& node : nodes)
@@ -62,7 +56,7 @@ void NodeEquations::residual(const EvalContext& context, double* r, ElementRange
       r[row.first + n + i] -= yp[row.first + n + i];
     }
     if (!row.rotation) continue;
-    const Vec3 vxb = part_at(yp, row.first).cross(part_at(y, row.first + 6));
+    const Vec3 vxb = vector_at(yp, row.first).cross(vector_at(y, row.first + 6));
     for (int i = 0; i < 3; ++i) r[row.first + 9 + i] -= vxb(i);
   }
 }
@@ -78,8 +72,8 @@ void NodeEquations::jacobian(const EvalContext& context, double* values, Element
       values[*p++] += 1;
     }
     if (!row.rotation) continue;
-    const Mat3 by_x = -cross<double>(part_at(y, row.first + 6));
-    const Mat3 by_b = context.seed * cross<double>(part_at(yp, row.first));
+    const Mat3 by_x = -cross<double>(vector_at(y, row.first + 6));
+    const Mat3 by_b = context.seed * cross<double>(vector_at(yp, row.first));
     for (int k = 0; k < 9; ++k) values[*p++] += by_x(k);
     for (int k = 0; k < 9; ++k) values[*p++] += by_b(k);
   }

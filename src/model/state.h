@@ -29,6 +29,9 @@ struct NodeRotationHistory {
       : R_ref(q.R), R1(q.R), R2(q.R), w_ref(q.w), w1(q.w), w2(q.w) {}
 };
 
+/// Three consecutive entries of a vector of unknowns or rates, from entry `i`.
+inline Vec3 vector_at(const std::vector<double>& y, int i) { return {y[i], y[i + 1], y[i + 2]}; }
+
 struct State {
   double time =
       0;  ///< time of the last accepted step, or of the step's end while it is being solved [s]
