@@ -16,8 +16,6 @@ constexpr double kPoorResidual = 1e4;  ///< times the tolerance
 constexpr double kPoorRounding = 1e3;
 constexpr double kNoStiffness = 1e-12;  ///< relative
 
-double hertz(double square) { return std::sqrt(square) / (2 * std::numbers::pi); }
-
 std::vector<char> with_rows_held(std::vector<char> held, const std::vector<int>& rows) {
   for (const int row : rows) held[row] = 1;
   return held;

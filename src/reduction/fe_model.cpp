@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "model/text.h"
 #include "reduction/error.h"
 
 namespace mbcosim {
@@ -11,11 +12,7 @@ namespace {
 
 constexpr const char* kComponents[] = {"ux", "uy", "uz", "rx", "ry", "rz"};
 
-std::string trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r\"");
-  if (first == std::string_view::npos) return "";
-  return std::string(text.substr(first, text.find_last_not_of(" \t\r\"") - first + 1));
-}
+constexpr std::string_view kBlanks = " \t\r\"";
 
 /// Rows of comma-separated cells; comments (`#`), empty lines and a heading `label,...` are
 /// skipped.
@@ -55,7 +52,7 @@ class Table {
     row.clear();
     for (std::size_t at = 0; at <= line.size();) {
       const std::size_t end = std::min(line.find(',', at), line.size());
-      row.push_back(trimmed(line.substr(at, end - at)));
+      row.emplace_back(trimmed(line.substr(at, end - at), kBlanks));
       at = end + 1;
     }
   }

@@ -3,22 +3,18 @@
 #include <charconv>
 #include <cmath>
 
+#include "model/text.h"
+
 namespace mbcosim {
 
 namespace {
-
-std::string without_blanks(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return "";
-  return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
-}
 
 std::vector<std::string> list(std::string_view text, char separator = ',') {
   std::vector<std::string> items;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find(separator), text.size());
-    if (const std::string item = without_blanks(text.substr(0, end)); !item.empty())
-      items.push_back(item);
+    if (const std::string_view item = trimmed(text.substr(0, end)); !item.empty())
+      items.emplace_back(item);
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   return items;
@@ -51,8 +47,8 @@ void set_components(const std::string& value, ReductionOptions& options) {
     const std::size_t colon = item.find(':');
     if (colon == std::string::npos)
       refuse_reduction("components: `label:digits` expected, got `" + item + "`");
-    const std::string label = without_blanks(item.substr(0, colon)),
-                      digits = without_blanks(item.substr(colon + 1));
+    const std::string label(trimmed(item.substr(0, colon))),
+        digits(trimmed(item.substr(colon + 1)));
     parse_components(digits);
     options.interface_components[label] = digits;
   }
@@ -66,7 +62,7 @@ void set_frame(const std::string& value, ReductionOptions& options) {
     options.frame = ReductionFrame::mean_axes;
   } else if (value.starts_with("node:")) {
     options.frame = ReductionFrame::node;
-    options.frame_node = without_blanks(value.substr(5));
+    options.frame_node = trimmed(value.substr(5));
   } else if (value.starts_with("point:")) {
     const std::vector<std::string> numbers = list(value.substr(6));
     if (numbers.size() != 3) refuse_reduction("frame: three coordinates expected after `point:`");
@@ -189,15 +185,16 @@ void read_job(const std::string& name, std::string_view text, ReductionJob& job)
   int number = 0;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string line = without_blanks(text.substr(0, std::min(end, text.find('#'))));
+    const std::string_view line = trimmed(text.substr(0, std::min(end, text.find('#'))));
     text.remove_prefix(std::min(end + 1, text.size()));
     ++number;
     if (line.empty()) continue;
     const std::size_t equal = line.find('=');
     const std::string place = name + ":" + std::to_string(number) + ": ";
-    if (equal == std::string::npos) refuse_reduction(place + "`name = value` expected");
+    if (equal == std::string_view::npos) refuse_reduction(place + "`name = value` expected");
     try {
-      job.set(without_blanks(line.substr(0, equal)), without_blanks(line.substr(equal + 1)));
+      job.set(std::string(trimmed(line.substr(0, equal))),
+              std::string(trimmed(line.substr(equal + 1))));
     } catch (const ReductionError& error) {
       throw ReductionError(error.kind, place + error.what());
     }

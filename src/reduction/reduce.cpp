@@ -21,10 +21,6 @@ constexpr double kRigidShare = 1e-6;  ///< of the first elastic ω², accepted i
 constexpr double kTiny = 1e-14;       ///< entries below, relative, become zero
 constexpr double kLumpingChange = 0.01;
 
-double hertz_or_zero(double square) {
-  return std::sqrt(std::max(0.0, square)) / (2 * std::numbers::pi);
-}
-
 MatX symmetric(const MatX& m) { return 0.5 * (m + m.transpose()); }
 
 MatX without_dust(MatX m) {
@@ -219,7 +215,7 @@ class Reducer {
   }
 
   void measure() {
-    for (const double square : squares_) report_.frequencies.push_back(hertz_or_zero(square));
+    for (const double square : squares_) report_.frequencies.push_back(hertz(square));
     measure_effective_masses();
     report_.static_error = -1;
     if (!builder_->interface_rows().empty()) measure_static_error();

@@ -11,7 +11,10 @@
 /// statically determinate set of rows; the choice adds rigid motion only, which Pᵀ removes.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -20,6 +23,11 @@
 #include "reduction/sparse_factor.h"
 
 namespace mbcosim {
+
+/// Frequency [Hz] of ω² [1/s²]; 0 of what rounding has made negative.
+inline double hertz(double square) {
+  return std::sqrt(std::max(0.0, square)) / (2 * std::numbers::pi);
+}
 
 /// Normal modes: rows of the structure.
 struct NormalModes {

@@ -6,18 +6,13 @@
 #include <cstdio>
 
 #include "elements/modal/fem_data.h"
+#include "model/text.h"
 
 namespace mbcosim {
 
 namespace {
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
-
-std::string_view trimmed(std::string_view s) {
-  while (!s.empty() && is_blank(s.front())) s.remove_prefix(1);
-  while (!s.empty() && is_blank(s.back())) s.remove_suffix(1);
-  return s;
-}
 
 bool is_comment(std::string_view line) { return trimmed(line).substr(0, 2) == "**"; }
 

@@ -9,6 +9,7 @@
 #include "model/diagnostic.h"
 #include "model/end_of_run.h"
 #include "model/state.h"
+#include "model/text.h"
 
 namespace mbcosim {
 
@@ -49,25 +50,19 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t\r,";
 
-std::string_view trimmed(std::string_view s) {
-  const std::size_t first = s.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return s.substr(first, s.find_last_not_of(kBlanks) - first + 1);
-}
-
 /// Text after `key` and a colon in a comment line; empty when it is another comment.
 std::string header_value(std::string_view comment, std::string_view key) {
-  comment = trimmed(comment.substr(1));
+  comment = trimmed(comment.substr(1), kBlanks);
   if (comment.substr(0, key.size()) != key) return {};
-  comment = trimmed(comment.substr(key.size()));
+  comment = trimmed(comment.substr(key.size()), kBlanks);
   return comment.empty() || comment[0] != ':' ? std::string()
-                                              : std::string(trimmed(comment.substr(1)));
+                                              : std::string(trimmed(comment.substr(1), kBlanks));
 }
 
 /// Appends the first `columns` numbers of a line; false when there are fewer.
 bool append_row(std::string_view line, int columns, std::vector<double>& values) {
   for (int k = 0; k < columns; ++k) {
-    line = trimmed(line);
+    line = trimmed(line, kBlanks);
     if (!line.empty() && line[0] == '+') line.remove_prefix(1);
     double v = 0;
     const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), v);
@@ -85,7 +80,7 @@ SampleText parse_samples(const std::string& text, int columns) {
   std::string_view rest = text;
   for (int number = 1; !rest.empty(); ++number) {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const std::string_view line = trimmed(rest.substr(0, end));
+    const std::string_view line = trimmed(rest.substr(0, end), kBlanks);
     rest.remove_prefix(std::min(end + 1, rest.size()));
     if (line.empty()) continue;
     if (line[0] == '#') {
