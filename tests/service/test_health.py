@@ -3,6 +3,7 @@ import os
 import socket
 import stat
 import subprocess
+import time
 
 import grpc
 import pytest
@@ -81,6 +82,18 @@ def test_a_check_ends_in_its_time(tmp_path):
     for wrong in ("0", "-1", "0.5", "nan", "1000000", "soon"):
         run = subprocess.run([*asked[:-1], wrong], stderr=subprocess.PIPE, text=True, timeout=30 * TIME_FACTOR, check=False)
         assert run.returncode == 4 and "--check-timeout" in run.stderr, wrong
+
+
+def test_a_check_waits_for_a_daemon_that_comes_within_its_time(tmp_path):
+    address = f"unix:{tmp_path}/mbcosim.sock"
+    with subprocess.Popen([DAEMON, "--check", address, "--check-timeout", "60"]) as check:
+        time.sleep(0.5)  # the check finds nobody first
+        assert check.poll() is None
+        daemon = Daemon(str(tmp_path))
+        try:
+            assert check.wait(timeout=60 * TIME_FACTOR) == 0
+        finally:
+            daemon.stop()
 
 
 def test_a_public_address_needs_protection():
