@@ -147,7 +147,7 @@ std::string StateFolder::name() try {
   file.commit();
   return made;
 } catch (const StorageError& error) {
-  throw std::runtime_error("the state folder " + path_ + " cannot be written: " + error.what());
+  throw std::runtime_error("the state folder " + path_ + " cannot be used: " + error.what());
 }
 
 std::vector<std::string> StateFolder::list() const {
