@@ -18,6 +18,7 @@
 #include <cstdlib>
 #include <memory>
 #include <precice/precice.hpp>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -83,6 +84,14 @@ class Fluid {
   State now_;
 };
 
+double number(const char* text) {
+  char* end = nullptr;
+  const double value = std::strtod(text, &end);
+  if (end == text || *end != '\0' || !std::isfinite(value))
+    throw std::invalid_argument(std::string("a number expected, got \"") + text + '"');
+  return value;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -91,11 +100,11 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: added_mass CONFIGURATION STEP M C K X Y Z [X Y Z ...]\n");
     return 4;
   }
-  std::vector<double> points;
-  for (int i = kBefore; i < argc; ++i) points.push_back(std::atof(argv[i]));
-  const Law law{std::atof(argv[2]), std::atof(argv[3]), std::atof(argv[4]), std::atof(argv[5])};
   std::unique_ptr<Fluid> fluid;  // outlives a failure: see participant.cpp
   try {
+    std::vector<double> points;
+    for (int i = kBefore; i < argc; ++i) points.push_back(number(argv[i]));
+    const Law law{number(argv[2]), number(argv[3]), number(argv[4]), number(argv[5])};
     fluid = std::make_unique<Fluid>(argv[1], law, points);
     fluid->run();
     return 0;
