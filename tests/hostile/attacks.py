@@ -93,7 +93,7 @@ class Attacker:
         if self.random.random() > 0.05 and "simulation" in fuzzer.known:
             return
         name = self.create(lease=Duration(seconds=self.random.choice([1, 20])), record_ports=self.random.random() < 0.3,
-                           ports=[{"name": "p", "kind": 4, "output_variables": ["time"]}] if self.random.random() < 0.3 else [])
+                           ports=[local_attacks.PORT] if self.random.random() < 0.3 else [])
         if name:
             for field in ("simulation", "name"):
                 fuzzer.learn(field, name)
@@ -180,7 +180,7 @@ class Attacker:
         """Uploads, steps, runs and analyses broken off at every point."""
         name = None
         while self.going():
-            name = name or self.create(ports=[{"name": "p", "kind": 4, "output_variables": ["time"]}]
+            name = name or self.create(ports=[local_attacks.PORT]
                                        if self.random.random() < 0.3 else [])
             if not name:
                 time.sleep(0.05)
