@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "http/rpc_error.h"
+#include "wire/convert.h"
 #include "wire/memory.h"
 #include "wire/refusal.h"
 
@@ -58,27 +59,45 @@ grpc::Status not_served(const std::string& message) {
   return Refusal(v1::REASON_NOT_SERVED, message).status();
 }
 
-// "250" in milliseconds, or "250m" with a unit of gRPC's.
-std::optional<std::chrono::milliseconds> timeout_of(const Connection& connection, bool grpc) {
-  const std::string_view text = connection.header(grpc ? "grpc-timeout" : "Connect-Timeout-Ms");
-  long long count = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-  if (error != std::errc() || count < 0 || text.size() > 12) return std::nullopt;
-  const char unit = grpc && end != text.data() + text.size() ? *end : 'm';
+/// One unit of `grpc-timeout` [ms]; 0: there is no such unit.
+double milliseconds_in(char unit) {
   switch (unit) {
     case 'H':
-      return std::chrono::hours(count);
+      return 3.6e6;
     case 'M':
-      return std::chrono::minutes(count);
+      return 6e4;
     case 'S':
-      return std::chrono::seconds(count);
+      return 1e3;
+    case 'm':
+      return 1;
     case 'u':
-      return std::chrono::milliseconds(count / 1000);
+      return 1e-3;
     case 'n':
-      return std::chrono::milliseconds(count / 1000000);
+      return 1e-6;
     default:
-      return std::chrono::milliseconds(count);
+      return 0;
   }
+}
+
+/// `Connect-Timeout-Ms: 250`, of ten digits at most, or `grpc-timeout: 250m`, of eight and a unit,
+/// as their protocols say. None: the header is not there, or asks for more than any clock can
+/// count. Throws Refusal.
+std::optional<std::chrono::milliseconds> timeout_of(const Connection& connection, bool grpc) {
+  constexpr double kLongest = 3.6e6 * 24 * 36525;  // [ms], a hundred years
+  const std::string name = grpc ? "grpc-timeout" : "Connect-Timeout-Ms";
+  if (!connection.has_header(name.c_str())) return std::nullopt;
+  const std::string_view text = connection.header(name.c_str());
+  const std::string_view digits = text.substr(0, text.find_first_not_of("0123456789"));
+  const std::string_view unit = text.substr(digits.size());
+  const double scale = grpc ? (unit.size() == 1 ? milliseconds_in(unit[0]) : 0) : unit.empty();
+  if (digits.empty() || digits.size() > (grpc ? 8 : 10) || scale == 0)
+    throw Refusal(v1::REASON_BAD_ARGUMENT,
+                  "the header " + name + " is no time: \"" + utf8(std::string(text)) + '"');
+  std::int64_t count = 0;
+  std::from_chars(digits.data(), digits.data() + digits.size(), count);
+  const double time = scale * static_cast<double>(count);
+  if (time > kLongest) return std::nullopt;
+  return std::chrono::milliseconds(static_cast<std::int64_t>(time));
 }
 
 void refuse_type(Connection& connection, const std::string& message) {
@@ -268,6 +287,12 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
   if (!packed.empty() && packed != "identity")
     return call.refuse(not_served("bodies cannot be compressed"));
 
+  std::optional<std::chrono::milliseconds> timeout;
+  try {
+    timeout = timeout_of(connection, framing->grpc());
+  } catch (const Refusal& refusal) {
+    return call.refuse(refusal.status());
+  }
   std::string request;
   const grpc::Status readable = read_counted(call, &request);
   if (!readable.ok()) return call.refuse(readable);
@@ -281,8 +306,7 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
   for (const char* name : kMetadata)
     if (connection.has_header(name)) metadata.emplace_back(name, connection.header(name));
   GenericCall rpc(channel_, "/" + method.service()->full_name() + "/" + method.name(), metadata,
-                  timeout_of(connection, framing->grpc()),
-                  [&] { return closing_.load() || connection.gone(); });
+                  timeout, [&] { return closing_.load() || connection.gone(); });
   rpc.send(request);
   framing->kind == Kind::unary ? answer_whole(call, rpc) : answer_pieces(call, rpc);
 }

@@ -216,6 +216,20 @@ def test_every_method_is_reached_or_says_that_it_takes_a_stream(door, service):
             assert status == 200 or reply["code"] in ("not_found", "invalid_argument"), (name, reply)
 
 
+@pytest.mark.parametrize("header, content_type, wrong, right", [
+    ("Connect_Timeout_Ms", "application/json", ["-1", "soon", "", "5m", "1.5", "1e3", "99999999999"], ["20000", "9999999999"]),
+    ("Grpc_Timeout", "application/grpc-web+proto", ["-1S", "20", "S", "", "20s", "20SS", "999999999n"], ["20S", "20000m", "99999999H", "99999999M"])])
+def test_times_of_calls_are_read_as_the_protocols_write_them(door, header, content_type, wrong, right):
+    body = b"{}" if content_type.endswith("json") else envelope(b"")
+    for value in wrong:
+        _, headers, answer = door.request("POST", "/mbcosim.v1.Simulations/GetServerInfo", body, Content_Type=content_type, **{header: value})
+        said = answer.decode("utf-8", "replace") + str(headers)
+        assert f"{header.lower().replace('_', '-')} is no time" in said.lower(), (value, said)
+    for value in right:
+        status, headers, answer = door.request("POST", "/mbcosim.v1.Simulations/GetServerInfo", body, Content_Type=content_type, **{header: value})
+        assert status == 200 and (b'"protocol"' in answer or b"grpc-status:0" in answer.replace(b" ", b"").lower()), (value, answer)
+
+
 def test_a_deadline_of_the_client_holds(door, server, endless):
     with server.load_text(endless) as simulation:
         started = time.monotonic()
