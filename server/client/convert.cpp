@@ -204,6 +204,7 @@ void fill(const LoadOptions& options, v1::CreateOptions* out) {
     *out->mutable_deck_sockets()->mutable_peer_timeout() =
         to_duration(*options.deck_sockets, "deck_sockets.peer_timeout");
   if (options.units) *out->mutable_units() = to_proto(*options.units);
+  out->set_optional_ports(options.optional_ports);
 }
 
 StepResult to_result(const v1::StepReply& reply) {

@@ -133,6 +133,7 @@ struct LoadOptions {
   std::optional<double> deck_sockets = {};
   std::optional<double> pace = {};  ///< seconds of the model in one of the clock; none: all speed
   std::optional<Units> units = {};  ///< that the deck is written in; none: as its card `units` says
+  bool optional_ports = false;      ///< steps wait for no peer of a port that has had none
 };
 
 /// `unknown`: the server tells one that this library does not know; never a success.

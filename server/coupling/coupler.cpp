@@ -26,8 +26,8 @@ class Stopwatch {
 
 Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
                  const Simulation& simulation, std::chrono::milliseconds longest_wait,
-                 Recorder* recorder, const std::set<std::string>& served)
-    : longest_wait_(longest_wait), recorder_(recorder) {
+                 Recorder* recorder, const std::set<std::string>& served, bool optional)
+    : longest_wait_(longest_wait), recorder_(recorder), optional_(optional) {
   const auto add_own = [&](PortModel model) {
     if (served.count(model.name()) > 0)
       claim(model, simulation);
@@ -57,6 +57,7 @@ void Coupler::add(PortModel model, const Simulation& simulation) {
   if (find(model.name()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "two ports are named \"" + model.name() + "\"");
   claim(model, simulation);
+  if (optional_) model.make_optional();
   ports_.push_back(std::make_unique<Port>(std::move(model), longest_wait_, recorder_));
   lines_.emplace_back().port = ports_.back().get();
 }

@@ -25,10 +25,12 @@ namespace mbcosim::server {
 class Coupler {
  public:
   /// `longest_wait`: for peers with policy WAIT. `recorder`: keeps what crosses the ports; may be
-  /// null. `served`: names of ports of the deck that belong to somebody else.
+  /// null. `served`: names of ports of the deck that belong to somebody else. `optional`: all ports
+  /// are, as those of streams.
   Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
           const Simulation& simulation, std::chrono::milliseconds longest_wait,
-          Recorder* recorder = nullptr, const std::set<std::string>& served = {});
+          Recorder* recorder = nullptr, const std::set<std::string>& served = {},
+          bool optional = false);
 
   Port* find(const std::string& name) const;
   const std::vector<std::unique_ptr<Port>>& ports() const { return ports_; }
@@ -107,6 +109,7 @@ class Coupler {
 
   const std::chrono::milliseconds longest_wait_;
   Recorder* const recorder_;
+  const bool optional_;
   std::vector<std::unique_ptr<Port>> ports_;
   std::set<int> written_;  ///< handles that ports write
   std::vector<Line> lines_;

@@ -39,6 +39,8 @@ class PortModel {
 
   const std::string& name() const { return layout_.name(); }
   const v1::PortLayout& layout() const { return layout_; }
+  /// Without a peer it holds its inputs, as long as none has attached.
+  void make_optional() { layout_.set_optional(true); }
   bool offers_accelerations() const;
   /// Does the deck want accelerations sent whatever the peer says?
   bool needs_accelerations() const { return needs_accelerations_; }

@@ -59,20 +59,6 @@ std::optional<Error> unfit(const Model& model) {
   return std::nullopt;
 }
 
-/// A daemon does not step without a peer on a port that has inputs; an FMU sets variables and is
-/// no peer.
-std::optional<Error> unfit_for_daemon(const Simulation& simulation) {
-  constexpr std::string_view kOwner = "port ";
-  for (const Variable& variable : simulation.variables())
-    if (variable.causality == Causality::input && variable.owner.rfind(kOwner, 0) == 0)
-      return refused(ErrorKind::argument,
-                     "--remote: on port \"" + variable.owner.substr(kOwner.size()) +
-                         "\" of the deck a daemon waits for a peer, which an FMU is not; export "
-                         "without --remote, or a deck without the port and put loads on nodes, as "
-                         "in --inputs 'node.structural.*.load'");
-  return std::nullopt;
-}
-
 Result<std::string> read_whole(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return refused(ErrorKind::io, "cannot read \"" + path + "\"");
@@ -142,8 +128,6 @@ mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
   const Model& model = *loaded.model;
   if (const auto error = unfit(model)) return *error;
   const auto simulation = Simulation::prepare(loaded.model);
-  if (const auto error = options.remote.empty() ? std::nullopt : unfit_for_daemon(*simulation))
-    return *error;
   auto entries = make_catalogue(*simulation, options.selection);
   if (!entries) return entries.error();
   const bool arrays = options.standard == Standard::fmi3;

@@ -205,6 +205,7 @@ Result<std::unique_ptr<Remote>> Remote::create(const Manifest& manifest,
   options["requestId"] = new_request_id();
   options["displayName"] = choice.display_name;
   options["summedTime"] = true;
+  options["optionalPorts"] = true;  // the importer sets their inputs
   options["durability"] = "DURABILITY_NONE";
   options["symbols"] = to_json(choice.symbols);
   request["files"] = json::array();

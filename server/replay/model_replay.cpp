@@ -1,5 +1,6 @@
 #include "replay/model_replay.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <stdexcept>
@@ -114,6 +115,9 @@ v1::CreateOptions options_of(const v1::RecordHeader& header) {
   *options.mutable_symbols() = header.symbols();
   if (header.has_units()) *options.mutable_units() = header.units();
   options.set_summed_time(header.summed_time());
+  const auto& layouts = header.layouts();
+  options.set_optional_ports(std::all_of(layouts.begin(), layouts.end(),
+                                         [](const auto& port) { return port.optional(); }));
   return options;
 }
 

@@ -86,7 +86,8 @@ Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> s
                     ? std::make_unique<Recorder>(shared.limits.record_bytes, shared.memory)
                     : nullptr),
       coupler_(options.ports(), *simulation_, identity_.lease, recorder_.get(),
-               deck_sockets_ ? DeckSockets::ports(*model_) : std::set<std::string>{}) {
+               deck_sockets_ ? DeckSockets::ports(*model_) : std::set<std::string>{},
+               options.optional_ports()) {
   check_grants(options.grants());
   status_.set_display_name(identity_.display_name);
   set_policy(options.non_convergence_policy(), minimum_in(options));

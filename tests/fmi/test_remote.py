@@ -17,9 +17,6 @@ from conftest import TIME_FACTOR, Daemon, start_daemon, stop  # noqa: E402,F401
 from importer import DISCARD, ERROR, OK, Failed, instance_of  # noqa: E402
 from test_fmu import BIN, MODELS, PORTS, STANDARDS, exported, fails, positions, symbols  # noqa: E402,F401
 
-# A body with a stream drive, a parameter node and a drive that fails below x = -0.4; no port on which a daemon waits.
-PUSHED = PORTS.replace("forces: 3;", "forces: 2;").replace(
-    'force: 1, external structural, grpc, port, "wing", coupling, loose, 2, 1, offset, 0.,.5,0., 1;\n', "")
 INPUTS = ("--inputs", "stream.push,node.structural.1.load,node.parameter.*")
 
 
@@ -52,9 +49,8 @@ def mortal(start_daemon, monkeypatch):  # noqa: F811
 
 @pytest.fixture(scope="module")
 def pushed(exported, tmp_path_factory):  # noqa: F811
-    assert "external" not in PUSHED
     path = tmp_path_factory.mktemp("deck") / "pushed.mbd"
-    path.write_text(PUSHED)
+    path.write_text(PORTS)
     return lambda standard, *options: exported(str(path), standard, *INPUTS, *options)
 
 
@@ -441,6 +437,49 @@ def test_more_instances_in_threads_than_the_daemon_serves_streams(exported, daem
     assert results[0] and all(result == results[0] for result in results)
 
 
+@pytest.fixture(scope="module")
+def with_port(exported, tmp_path_factory):  # noqa: F811
+    """The modal body with one port more."""
+    with open(os.path.join(MODELS, "modal_body.mbd")) as file:
+        text = file.read().replace("forces: 2;", "forces: 3;")
+    assert "forces: 3;" in text
+    folder = tmp_path_factory.mktemp("ports")
+    for file in ("modal_body_static.fem", "modal_body_dynamic.fem"):
+        os.symlink(os.path.join(MODELS, file), folder / file)
+
+    def make(card, standard, *options):
+        deck = folder / f"{re.sub('[^a-z]+', '_', card)}.mbd"
+        deck.write_text(text.replace("end: elements;", f"force: 99, {card};\nend: elements;"))
+        return exported(str(deck), standard, *options)
+
+    return make
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("card", ['external structural, grpc, port, "p", coupling, loose, 1, 12',
+                                  'external structural, grpc, port, "p", coupling, tight, reference node, 12, 1, 11',
+                                  'external structural mapping, grpc, port, "p", points number, 2, 12, offset, null, offset, 0., .1, 0.',
+                                  'external modal, grpc, port, "p", 10'])
+def test_inputs_of_ports_have_the_bits_of_the_engine_inside(with_port, daemon, standard, card):
+    """The daemon waits for no peer of theirs."""
+    rng = random.Random(3)
+    fmus = both(with_port, daemon, card, standard)
+    inputs, outputs = fmus[0].names("input"), fmus[0].names("output")
+    assert inputs and all(name.startswith("port.p.") for name in inputs)
+    start, _, step = fmus[0].experiment()
+    values = [[[rng.uniform(-1, 1) for _ in range(fmus[0].sizes[name])] for name in inputs] for _ in range(12)]
+    with instance_of(fmus[0]) as inside, instance_of(fmus[1]) as remote, instance_of(fmus[0]) as unloaded:
+        for instance in (inside, remote, unloaded):
+            instance.initialize()
+        for k, now in enumerate(values):
+            for instance in (inside, remote):
+                for name, numbers in zip(inputs, now):
+                    instance[name] = numbers
+            for instance in (inside, remote, unloaded):
+                assert instance.do_step(start + k * step, step) == OK, instance.log
+        assert remote[outputs] == inside[outputs] != unloaded[outputs]
+
+
 def refused(tmp_path, deck, *options):
     """What `mbcosim fmu` says."""
     path = tmp_path / "x.fmu"
@@ -458,18 +497,3 @@ def test_wrong_addresses_are_refused_at_the_export(tmp_path, address):
 
 def test_tls_is_refused_at_the_export(tmp_path):
     assert "it speaks no TLS" in refused(tmp_path, os.path.join(MODELS, "pendulum.mbd"), "--remote", "https://host:1")
-
-
-@pytest.mark.parametrize("name, card", [("wing", 'external structural, grpc, port, "wing", coupling, loose, 1, 1'),
-                                        ("modes", 'external modal, grpc, port, "modes", 10')])
-def test_ports_on_which_a_daemon_waits_are_refused_at_the_export(tmp_path, name, card):
-    """With the engine inside they are inputs."""
-    with open(os.path.join(MODELS, "modal_body.mbd")) as file:
-        text = file.read().replace("forces: 2;", "forces: 3;")
-    assert "forces: 3;" in text
-    for file in ("modal_body_static.fem", "modal_body_dynamic.fem"):
-        os.symlink(os.path.join(MODELS, file), tmp_path / file)
-    deck = tmp_path / "deck.mbd"
-    deck.write_text(text.replace("end: elements;", f"force: 99, {card.replace('1, 1', '1, 12')};\nend: elements;"))
-    assert f'--remote: on port "{name}" of the deck a daemon waits for a peer' in refused(tmp_path, str(deck), "--remote", "http://host:1")
-    assert subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", str(deck), "-o", str(tmp_path / "x.fmu")], timeout=60 * TIME_FACTOR).returncode == 0

@@ -387,6 +387,28 @@ def test_bad_cards_are_refused(server, card, counts, match):
     assert match in str(caught.value) or any(match in d.message + d.hint for d in caught.value.diagnostics)
 
 
+def test_optional_ports_hold_their_inputs_until_a_peer_has_come(server):
+    card = 'force: 99, external modal, grpc, port, "modes", DYNAMIC, type, modal;'
+    push = np.linspace(-1.0, 1.0, len(server_inputs(server, card)))
+    with server.load_bundle("deck", modal_deck(card), optional_ports=True) as alone, server.load_bundle("deck", modal_deck(card)) as coupled:
+        assert [port.optional for port in alone.describe().ports] == [True]
+        alone["port.modes.loads"] = push
+        with coupled.couple("modes", lambda m: push):
+            coupled.step(20), alone.step(20)
+        assert alone["node.structural.22.X"] == pytest.approx(coupled["node.structural.22.X"], abs=1e-12) and alone["node.structural.22.X"][2] != 0
+        with alone.fork(optional_ports=True) as fork:
+            fork.step(1)
+        with alone.couple("modes", lambda m: push):
+            alone.step(1)
+        with pytest.raises(mbcosim.TimedOut):  # from now on it is like any other
+            alone.step(1, timeout=0.5)
+
+
+def server_inputs(server, card):
+    with server.load_bundle("deck", modal_deck(card)) as simulation:
+        return simulation["port.modes.loads"]
+
+
 def test_a_rigid_external_modal_port(server):
     card = 'force: 1, external modal, grpc, port, "a", reference node, 1;'
     with server.load_text(cards(card, "forces: 1;")) as simulation:

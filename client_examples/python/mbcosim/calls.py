@@ -180,6 +180,8 @@ class ServerCalls(Generic[SimulationKind]):
                       wait for a code [s]; the call ends when they have come
         units         that the deck is written in, mbcosim.units(...), where it does not tell by a card: descriptions name them, and ports
                       convert them for peers that count in others; no value changes
+        optional_ports
+                      steps wait for no peer of a port that has had none: its inputs are what `write` says, zero at first
         pace          seconds of the model in a second of the wall clock, 1: real time; None: as fast as it can. Late steps are counted in the replies
         timeout       seconds that the call may take; None: as long as the server lives
         """
@@ -195,7 +197,7 @@ class ServerCalls(Generic[SimulationKind]):
                 record: bool = False, summed_time: bool = False, symbols: Optional[Mapping[str, Symbol]] = None,
                 grants: Iterable[pb.Grant] = (), results: Results = False, results_quota: Optional[int] = None,
                 durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None, pace: Optional[float] = None,
-                deck_sockets: Union[bool, float] = False, units: Optional[common_pb2.UnitSystem] = None,
+                deck_sockets: Union[bool, float] = False, units: Optional[common_pb2.UnitSystem] = None, optional_ports: bool = False,
                 timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = _new_id()
         header.options.protocol.CopyFrom(protocol())
@@ -206,6 +208,7 @@ class ServerCalls(Generic[SimulationKind]):
             header.options.minimum_step_size = minimum_step
         header.options.record_ports = record
         header.options.summed_time = summed_time
+        header.options.optional_ports = optional_ports
         if results:
             header.options.results.CopyFrom(_result_options(results, results_quota))
         header.options.grants.extend(grants)
@@ -580,9 +583,10 @@ class SimulationCalls(Generic[SnapshotKind]):
     @call
     def fork(self, snapshot: Optional[SnapshotCalls] = None, *, name: str = "",
              ports: Iterable[coupling_types_pb2.PortDefinition] = (), results: Results = False, results_quota: Optional[int] = None,
-             timeout: Optional[float] = None) -> Calls[Any]:
-        """A new simulation at a saved state or the current one, sharing the model. `results` as in Server.load_bundle: files of its own."""
-        options = pb.CreateOptions(display_name=name, ports=ports, request_id=_new_id(), protocol=protocol())
+             optional_ports: bool = False, timeout: Optional[float] = None) -> Calls[Any]:
+        """A new simulation at a saved state or the current one, sharing the model. `results`, `optional_ports` as in Server.load_bundle; files of
+        its own."""
+        options = pb.CreateOptions(display_name=name, ports=ports, optional_ports=optional_ports, request_id=_new_id(), protocol=protocol())
         if results:
             options.results.CopyFrom(_result_options(results, results_quota))
         request = pb.ForkSimulationRequest(simulation=self.name, snapshot=snapshot.name if snapshot else None, options=options)
