@@ -3,15 +3,19 @@
 
 * The files that the Dockerfile copies, less what .dockerignore holds back, suffice to configure the build.
 * Every library that the daemon needs is in a package of the list for the final stage, or one that such a package pulls in.
+* The daemon knows the options and variables that the Dockerfile, the compose files, the Kubernetes manifests and the systemd unit give it.
 """
 import fnmatch
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
+
+import yaml
 
 BASE = {"libc6", "libstdc++6", "libgcc-s1"}  # of debian:bookworm-slim or of everything written in C++
 
@@ -72,6 +76,54 @@ def libraries(root, daemon):
             sys.exit(f"{name} is in {', '.join(sorted(owners))}, which docker/dependencies.txt does not list for `run`")
 
 
+def invocations(root):
+    """(where, arguments, variables) of each start of the daemon in the files of docker/."""
+    docker = root / "docker"
+    image = (docker / "Dockerfile").read_text()
+    defaults = dict(re.findall(r"\b(MBCOSIMD_\w+)=(\S+)", image))
+    yield "Dockerfile", [], defaults
+    yield "Dockerfile, HEALTHCHECK", re.findall(r'"([^"]*)"', re.search(r"^HEALTHCHECK .*CMD (\[.*\])$", image, re.MULTILINE).group(1))[1:], {}
+    for file in sorted(docker.glob("compose*.yaml")):
+        for name, service in yaml.safe_load(file.read_text())["services"].items():
+            if service["image"] == "mbcosim":
+                yield f"{file.name}, {name}", service.get("command", []), {**defaults, **service.get("environment", {})}
+    for part in yaml.safe_load_all((docker / "kubernetes.yaml").read_text()):
+        for container in part["spec"].get("template", {}).get("spec", {}).get("containers", []):
+            yield "kubernetes.yaml", container["args"], defaults
+            yield "kubernetes.yaml, command", ["--daemon-id=mbcosimd0"] * ("--daemon-id" in container["command"][-2]), {}
+            for probe in ("startupProbe", "readinessProbe", "livenessProbe"):
+                yield f"kubernetes.yaml, {probe}", container[probe]["exec"]["command"][1:], {}
+    for line in re.findall(r"^#? *ExecStart=(/.*)$", (docker / "mbcosimd.service").read_text(), re.MULTILINE):
+        yield "mbcosimd.service", shlex.split(line.replace("...", "/secrets/any"))[1:], {}
+
+
+def there(value, folder):
+    """A path of the container, as one that exists in `folder`; a name without an ending is a folder's."""
+    if not value.startswith("/"):
+        return value
+    path = pathlib.Path(folder + value)
+    if path.suffix or "secrets" in value:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    else:
+        path.mkdir(parents=True, exist_ok=True)
+    return str(path)
+
+
+def options(root, daemon):
+    known = set(re.findall(r"\(Env:(\w+)\)", output(daemon, "--help")))
+    with tempfile.TemporaryDirectory() as folder:
+        for where, arguments, variables in invocations(root):
+            if strange := set(variables) - known:
+                sys.exit(f"{where}: the daemon has no variable {', '.join(sorted(strange))}")
+            arguments = ["=".join(there(part, folder) for part in argument.split("=", 1)) for argument in arguments]
+            environment = {name: there(str(value), folder) for name, value in variables.items()}
+            done = subprocess.run([daemon, "--print-config", *arguments], env={**os.environ, **environment}, capture_output=True, text=True)
+            if done.returncode:
+                sys.exit(f"{where}: mbcosimd {' '.join(arguments)} is refused: {done.stderr}")
+
+
 if __name__ == "__main__":
+    options(pathlib.Path(sys.argv[1]), sys.argv[2])
     libraries(pathlib.Path(sys.argv[1]), sys.argv[2])
     configure(pathlib.Path(sys.argv[1]))
