@@ -31,7 +31,8 @@ def connect(address: Optional[str] = None, *, token: Optional[str] = None, tls: 
     certificate  PEM file of the client's own certificate, `key` that of its key; default: $MBCOSIM_TLS_CERTIFICATE, $MBCOSIM_TLS_KEY
     credentials  grpc.ChannelCredentials instead of the four before
     timeout      seconds to wait for a server that is starting; without, Unavailable is raised as soon as nobody listens there
-    reconnect    seconds for which calls that may be repeated are tried again when the server cannot be reached
+    reconnect    seconds for which calls that may be repeated are tried again when the server cannot be reached. Streams (peers, steppers,
+                 subscriptions, events) end with it: a peer comes back by `couple(..., step=peer.step)`, see coupling.Peer
     """
     secured = credentials or access.credentials(tls, ca, certificate, key)
     server = Server(address or default_address(), token or access.default_token(), secured, reconnect)
