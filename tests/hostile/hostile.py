@@ -3,11 +3,11 @@
 
 Starts a daemon with tokens, lets hostile clients do their worst from one core at nice 19 (attacks.py), and watches a
 bystander with a token of its own. Every few seconds they are stopped for a moment: the bystander's quiet times are taken then,
-so that what else the machine does counts on both sides. Fails on: the daemon's death or hang, INTERNAL from its code, a thread or
-memory that stays, a probe that finds no healthy daemon, attacks that come to nothing, a bystander's p99 above 5 times its quiet
-value (and above 50 ms: below, the scheduler decides), a SIGTERM that does not end it in time. The seed is printed; the same one
-gives the same requests, though not the same interleaving. A sanitizer's report is a fault, too; its build takes memory of its
-own, which --sanitized does not judge.
+so that what else the machine does counts on both sides. Fails on: the daemon's death or hang, INTERNAL from its code, a thread, a
+descriptor or memory that stays, a probe that finds no healthy daemon, attacks that come to nothing, a bystander's p99 above 5 times its quiet
+value (and above 50 ms: below, the scheduler decides), a SIGTERM that does not end it in time. Then other daemons are started on its state
+folder and killed, and files are damaged in between (crashes.py). The seed is printed; the same one gives the same requests, though not
+the same interleaving. A sanitizer's report is a fault, too; its build takes memory of its own, which --sanitized does not judge.
 """
 import argparse
 import json
@@ -25,6 +25,7 @@ import time
 import grpc
 
 import attacks
+from crashes import METADATA as ROOT, Crashes
 from mbcosim.v1 import simulations_pb2 as pb, simulations_pb2_grpc
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -34,16 +35,20 @@ STATE = 1 << 30  # the state folder's
 GRACE = 2
 
 
-def start(program, folder):
+def prepare(folder):
+    """The tokens and the state folder of all daemons."""
     tokens = os.path.join(folder, "tokens")
     with open(tokens, "w") as file:
-        file.write("bob-token control bob\n")
+        file.write("bob-token control bob\nroot-token admin root\n")
         file.writelines(f"{kind}-token control mallory-{kind}\n" for kind in attacks.KINDS)
     os.chmod(tokens, 0o600)
-    state = os.path.join(folder, "state")
-    os.mkdir(state, 0o700)
+    os.mkdir(os.path.join(folder, "state"), 0o700)
+
+
+def start(program, folder, log_name="log"):
+    tokens, state = os.path.join(folder, "tokens"), os.path.join(folder, "state")
     address = f"unix:{folder}/mbcosim.sock"
-    log = open(os.path.join(folder, "log"), "w")
+    log = open(os.path.join(folder, log_name), "w")
     page = open(os.path.join(folder, "page"), "w")
     daemon = subprocess.Popen([os.path.join(program, "mbcosimd"), "--listen", address, "--listen", "127.0.0.1:0",
                                "--http", "127.0.0.1:0", "--tokens", tokens, "--limit-memory", str(MEMORY), "--shutdown-grace", str(GRACE),
@@ -52,9 +57,12 @@ def start(program, folder):
                               stdout=page, stderr=log, preexec_fn=lambda: limit_descriptors(512))
     for _ in range(int(200 * FACTOR)):
         text, door = open(log.name).read(), re.search(r"^page: http://([^/]*)/.*\n", open(page.name).read())
-        if "listening on 127.0.0.1:" in text and door:
+        if "listening on 127.0.0.1:" in text and door or daemon.poll() is not None:
             break
         time.sleep(0.05)
+    if not door:
+        daemon.kill()
+        raise RuntimeError(f"no daemon comes: {text[-2000:]}")
     tcp = "127.0.0.1:" + text.split("listening on 127.0.0.1:")[1].split()[0]
     return daemon, (address, tcp, door.group(1), state), log.name
 
@@ -115,6 +123,10 @@ def threads_of(pid):
     return len(os.listdir(f"/proc/{pid}/task"))
 
 
+def descriptors_of(pid):
+    return len(os.listdir(f"/proc/{pid}/fd"))
+
+
 def watch_memory(pid, peak, stop):
     while not stop.wait(0.2):
         try:
@@ -170,11 +182,12 @@ def main():
     print(f"seed {options.seed}", flush=True)
     faults = []
     with tempfile.TemporaryDirectory() as folder:
+        prepare(folder)
         daemon, places, log = start(options.bin, folder)
         address = places[0]
         bystander = Bystander(address)
         bystander.watch(1)
-        threads = threads_of(daemon.pid)
+        before = threads_of(daemon.pid), descriptors_of(daemon.pid)
         peak, stop = [0], threading.Event()
         threading.Thread(target=watch_memory, args=(daemon.pid, peak, stop), daemon=True).start()
         prober = threading.Thread(target=probe, args=(options.bin, address, faults, stop), daemon=True)
@@ -196,13 +209,40 @@ def main():
         stop.set()
         prober.join()
         most = math.inf if options.sanitized else MEMORY + (300 << 20)  # besides the budget: program, gRPC's buffers, allocator
-        faults += judge(daemon, bystander, p99(quiet), p99(loud), threads, peak[0], most, log)
+        faults += judge(daemon, bystander, p99(quiet), p99(loud), before, peak[0], most, log)
+        bystander.channel.close()
+        crashes = Crashes(lambda name: start_again(options.bin, folder, name), places[3], options.seed)
+        for log in crashes.run():
+            faults += reports(log)
+        faults += crashes.faults
     for fault in faults:
         print("FAULT", fault)
     sys.exit(1 if faults else 0)
 
 
-def judge(daemon, bystander, quiet, loud, threads, peak, most, log):
+def start_again(program, folder, log_name):
+    daemon, places, log = start(program, folder, log_name)
+    return daemon, places[0], log
+
+
+def remaining(bystander, pid, before):
+    """What is left of threads and descriptors when all but the bystander's simulation are gone: a journal has a descriptor."""
+    for info in bystander.stub.ListSimulations(pb.ListSimulationsRequest(), metadata=ROOT, timeout=30 * FACTOR).simulations:
+        if info.name != bystander.name and info.state != pb.SIMULATION_STATE_SUSPENDED:
+            try:
+                bystander.stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=info.name), metadata=ROOT, timeout=30 * FACTOR)
+            except grpc.RpcError as error:
+                if error.code() is not grpc.StatusCode.NOT_FOUND:  # its lease was over
+                    yield f"a simulation cannot be deleted: {error.code()} {error.details()}"
+    timeout = time.monotonic() + 30 * FACTOR
+    for what, count, then in zip(("threads", "descriptors"), (threads_of, descriptors_of), before):
+        while count(pid) > then + 4 and time.monotonic() < timeout:
+            time.sleep(0.2)
+        if count(pid) > then + 4:
+            yield f"{count(pid)} {what} are left, {then} were there before"
+
+
+def judge(daemon, bystander, quiet, loud, before, peak, most, log):
     print(f"bystander p99: quiet {1e3 * quiet:.1f} ms, under attack {1e3 * loud:.1f} ms; memory at most {peak >> 20} MB", flush=True)
     if daemon.poll() is not None:
         yield f"the daemon ended with {daemon.returncode}: {open(log).read()[-2000:]}"
@@ -212,19 +252,13 @@ def judge(daemon, bystander, quiet, loud, threads, peak, most, log):
         yield "the bystander was slowed down more than 5 times"
     if peak > most:
         yield f"memory of {peak >> 20} MB, with a budget of {MEMORY >> 20} MB"
-    timeout = time.monotonic() + 30 * FACTOR
-    while threads_of(daemon.pid) > threads + 4 and time.monotonic() < timeout:
-        time.sleep(0.2)
-    if threads_of(daemon.pid) > threads + 4:
-        yield f"{threads_of(daemon.pid)} threads are left, {threads} were there before"
+    yield from remaining(bystander, daemon.pid, before)
     with grpc.insecure_channel(bystander_address(bystander), options=[("grpc.use_local_subchannel_pool", 1)]) as fresh:
         try:
             simulations_pb2_grpc.SimulationsStub(fresh).GetServerInfo(pb.GetServerInfoRequest(), metadata=bystander.metadata,
                                                                       timeout=10 * FACTOR, wait_for_ready=True)
         except grpc.RpcError as error:
             yield f"a new connection is not served: {error.code()}"
-    if "uncaught" in open(log).read():
-        yield "an exception came to the top of a thread: " + open(log).read().split("uncaught")[1][:200]
     daemon.send_signal(signal.SIGTERM)
     try:
         code = daemon.wait((GRACE + 3) * FACTOR)
@@ -232,9 +266,17 @@ def judge(daemon, bystander, quiet, loud, threads, peak, most, log):
             yield f"the daemon ended with {code}"
     except subprocess.TimeoutExpired:
         daemon.kill()
+        daemon.wait()
         yield "SIGTERM did not end the daemon within its grace"
-    found = re.search(r"runtime error: |(ERROR|WARNING): \w+Sanitizer", text := open(log).read())
-    if found:
+    yield from reports(log)
+
+
+def reports(log):
+    """What a daemon says itself of its faults."""
+    text = open(log).read()
+    if "uncaught" in text:
+        yield "an exception came to the top of a thread: " + text.split("uncaught")[1][:200]
+    if found := re.search(r"runtime error: |(ERROR|WARNING): \w+Sanitizer", text):
         yield "a sanitizer reports: " + text[text.rfind("\n", 0, found.start()) + 1:][:3000]
 
 

@@ -75,34 +75,21 @@ class SharedMemory:
             time.sleep(0.05)
 
 
-class Folder:
-    """Files of the attacker's own suspended simulations, changed at random places; then they are asked for."""
+class Damage:
+    """Files of a simulation's folder, changed at random places."""
 
-    def __init__(self, attacker, folder):
-        self.attacker, self.random, self.folder = attacker, attacker.random, folder
-
-    def once(self):
-        durability = self.random.choice([pb.DURABILITY_CHECKPOINT, pb.DURABILITY_JOURNAL])
-        name = self.attacker.create(lease=Duration(nanos=300_000_000), durability=durability)
-        if not name:
-            time.sleep(0.1)
-            return
-        for _ in range(self.random.randrange(4)):
-            self.attacker.call(self.attacker.stub.Step, pb.StepRequest(simulation=name, steps=self.random.choice([1, 20])))
-        self.attacker.call(self.attacker.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
-        time.sleep(self.random.choice([0, 0.3, 1]))  # alive, about to be suspended, suspended
-        for _ in range(self.random.choice([1, 1, 5])):
-            self.damage(os.path.join(self.folder, name))
-        self.ask(name)
-        self.attacker.call(self.attacker.stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))
+    def __init__(self, rolls):
+        self.random = rolls
 
     def damage(self, folder):
+        """One of its files. False: there is none any more."""
         try:
             paths = [os.path.join(folder, entry) for entry in os.listdir(folder)]
             path = self.random.choice(paths)
             self.random.choice([self.flip, self.flip, self.cut, self.lengthen, os.unlink, self.replace, self.exchange_with(paths)])(path)
         except (OSError, IndexError, shutil.Error):  # the daemon was quicker
-            self.attacker.codes["GONE"] += 1
+            return False
+        return True
 
     def flip(self, path):
         with open(path, "r+b") as file:
@@ -126,6 +113,29 @@ class Folder:
 
     def exchange_with(self, paths):
         return lambda path: shutil.copyfile(path, self.random.choice(paths))
+
+
+class Folder:
+    """Files of the attacker's own suspended simulations, damaged; then they are asked for."""
+
+    def __init__(self, attacker, folder):
+        self.attacker, self.random, self.folder, self.files = attacker, attacker.random, folder, Damage(attacker.random)
+
+    def once(self):
+        durability = self.random.choice([pb.DURABILITY_CHECKPOINT, pb.DURABILITY_JOURNAL])
+        name = self.attacker.create(lease=Duration(nanos=300_000_000), durability=durability)
+        if not name:
+            time.sleep(0.1)
+            return
+        for _ in range(self.random.randrange(4)):
+            self.attacker.call(self.attacker.stub.Step, pb.StepRequest(simulation=name, steps=self.random.choice([1, 20])))
+        self.attacker.call(self.attacker.stub.CreateSnapshot, pb.CreateSnapshotRequest(simulation=name))
+        time.sleep(self.random.choice([0, 0.3, 1]))  # alive, about to be suspended, suspended
+        for _ in range(self.random.choice([1, 1, 5])):
+            if not self.files.damage(os.path.join(self.folder, name)):
+                self.attacker.codes["GONE"] += 1
+        self.ask(name)
+        self.attacker.call(self.attacker.stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))
 
     def ask(self, name):
         stub, random = self.attacker.stub, self.random
