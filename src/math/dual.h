@@ -13,12 +13,13 @@ namespace mbcosim {
 template <int N>
 struct Dual {
   static constexpr int directions = N;
-  double v = 0;      ///< value
-  double d[N] = {};  ///< derivatives (N)
+  double v;     ///< value
+  double d[N];  ///< derivatives (N)
 
-  Dual() = default;
-  Dual(double value) : v(value) {}  // NOLINT(google-explicit-constructor): constants mix freely
-  explicit Dual(int value) : v(value) {}
+  Dual() = default;  ///< as a double: no value; `Dual{}` is zero
+  Dual(double value)
+      : v(value), d{} {}  // NOLINT(google-explicit-constructor): constants mix freely
+  explicit Dual(int value) : v(value), d{} {}
   static Dual variable(double value, int direction, double seed = 1) {
     Dual x(value);
     x.d[direction] = seed;
@@ -27,7 +28,8 @@ struct Dual {
 
   /// f(x) with derivative f'(x) known: the chain rule.
   Dual chain(double f, double df) const {
-    Dual r(f);
+    Dual r;
+    r.v = f;
     for (int i = 0; i < N; ++i) r.d[i] = df * d[i];
     return r;
   }
@@ -50,7 +52,8 @@ struct Dual {
   Dual& operator/=(const Dual& b) { return *this = *this / b; }
 
   friend Dual operator-(const Dual& a) {
-    Dual r(-a.v);
+    Dual r;
+    r.v = -a.v;
     for (int i = 0; i < N; ++i) r.d[i] = -a.d[i];
     return r;
   }
@@ -60,7 +63,8 @@ struct Dual {
   friend Dual operator*(Dual a, const Dual& b) { return a *= b; }
   friend Dual operator/(const Dual& a, const Dual& b) {
     const double inv = 1 / b.v;
-    Dual r(a.v * inv);
+    Dual r;
+    r.v = a.v * inv;
     for (int i = 0; i < N; ++i) r.d[i] = (a.d[i] - r.v * b.d[i]) * inv;
     return r;
   }
@@ -107,7 +111,8 @@ struct Dual {
   friend Dual asin(const Dual& a) { return a.chain(std::asin(a.v), 1 / std::sqrt(1 - a.v * a.v)); }
   friend Dual atan2(const Dual& y, const Dual& x) {
     const double n = 1 / (x.v * x.v + y.v * y.v);
-    Dual r(std::atan2(y.v, x.v));
+    Dual r;
+    r.v = std::atan2(y.v, x.v);
     for (int i = 0; i < N; ++i) r.d[i] = (x.v * y.d[i] - y.v * x.d[i]) * n;
     return r;
   }
