@@ -24,6 +24,10 @@ Error make_error(ErrorKind kind, std::string reason, std::string message) {
   return e;
 }
 
+Error cancelled_error(std::string message) {
+  return make_error(ErrorKind::cancelled, "CANCELLED", std::move(message));
+}
+
 namespace {
 
 /// Bytes of the UTF-8 sequence at `text[i]`; 0 when it is none that a terminal can show.

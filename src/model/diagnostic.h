@@ -80,6 +80,8 @@ struct Error {
 
 /// `reason` may be empty.
 Error make_error(ErrorKind kind, std::string reason, std::string message);
+/// Of work that somebody has stopped.
+Error cancelled_error(std::string message);
 
 /// A value or an `Error`.
 template <class T>

@@ -54,8 +54,7 @@ BasisBuilder::BasisBuilder(const FeModel& model, const ReductionOptions& options
 }
 
 void BasisBuilder::report(const std::string& phase, double fraction) const {
-  if (progress_ && !progress_(phase, fraction))
-    throw ReductionError(ErrorKind::cancelled, "the reduction was stopped");
+  if (progress_ && !progress_(phase, fraction)) stop_reduction();
 }
 
 void BasisBuilder::choose_frame() {

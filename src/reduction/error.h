@@ -23,6 +23,11 @@ class ReductionError : public std::runtime_error {
   throw ReductionError(ErrorKind::argument, message, hint);
 }
 
+/// Somebody asked to stop.
+[[noreturn]] inline void stop_reduction() {
+  throw ReductionError(ErrorKind::cancelled, "the reduction was stopped");
+}
+
 /// Tells what is being done and how much of it is done, 0 to 1; false asks to stop.
 using ReductionProgress = std::function<bool(const std::string& phase, double fraction)>;
 

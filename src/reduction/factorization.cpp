@@ -56,8 +56,7 @@ void Factorization::find_order() {
 }
 
 void Factorization::tell(double share) const {
-  if (settings_.progress && !settings_.progress("factorization", share))
-    throw ReductionError(ErrorKind::cancelled, "the reduction was stopped");
+  if (settings_.progress && !settings_.progress("factorization", share)) stop_reduction();
 }
 
 void Factorization::run() {

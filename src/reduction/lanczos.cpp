@@ -35,7 +35,7 @@ class Flexibility {
         structure_.without_rigid(shifted_ ? shifted_->solve(load) : structure_.solve(load));
     ++*done_;
     if (progress_ && !progress_("normal modes", std::min(0.99, double(*done_) / expected_)))
-      throw ReductionError(ErrorKind::cancelled, "the reduction was stopped");
+      stop_reduction();
   }
 
  private:

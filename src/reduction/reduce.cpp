@@ -241,8 +241,7 @@ class Reducer {
 
   /// Flexibility at the interface: of the basis against that of the model.
   void measure_static_error() {
-    if (progress_ && !progress_("static error", 0))
-      throw ReductionError(ErrorKind::cancelled, "the reduction was stopped");
+    if (progress_ && !progress_("static error", 0)) stop_reduction();
     const std::vector<int>& rows = builder_->interface_rows();
     const VecX& exact = builder_->interface_flexibility();
     MatX at(rows.size(), shapes_.cols());

@@ -58,7 +58,7 @@ class Differences {
   Phase phase_;
 };
 
-Error stopped() { return make_error(ErrorKind::cancelled, "CANCELLED", "linearization: stopped"); }
+Error stopped() { return cancelled_error("linearization: stopped"); }
 
 double step_at(double value) { return 1e-6 * std::max(1.0, std::abs(value)); }
 

@@ -54,8 +54,7 @@ class Assembly {
 
   bool is_cancelled() const { return cancel_ && cancel_->cancelled(); }
   Error stopped(const AssemblyReport& report) const {
-    Error e = make_error(ErrorKind::cancelled, "CANCELLED",
-                         "initial assembly: interrupted between iterations");
+    Error e = cancelled_error("initial assembly: interrupted between iterations");
     e.failure.time = state_.time;
     e.failure.iteration = report.iterations;
     return e;

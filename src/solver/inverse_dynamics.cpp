@@ -17,9 +17,7 @@ namespace {
 
 /// A stage that has no solution.
 struct StageFailure {
-  ErrorKind kind;
-  const char* reason;
-  std::string message;
+  Error error;
 };
 
 const ElementSetOf<Beam2>* beams_of(const ElementRef& e) {
@@ -94,11 +92,11 @@ void InverseDynamics::begin(State& state) const {
 
 PhaseReport InverseDynamics::attempt(State& state, const StepAttempt& attempt) {
   PhaseReport report;
-  const auto fail = [&](ErrorKind kind, const char* reason, const std::string& message) {
+  const auto fail = [&](Error e) {
     char where[96];
     std::snprintf(where, sizeof where, "inverse dynamics at t = %.9g (record %lld): ", state.time,
                   static_cast<long long>(state.step));
-    Error e = make_error(kind, reason, where + message);
+    e.message = where + e.message;
     e.failure.time = state.time;
     e.failure.step = static_cast<long>(state.step);
     e.failure.iteration = report.newton.iterations;
@@ -108,7 +106,7 @@ PhaseReport InverseDynamics::attempt(State& state, const StepAttempt& attempt) {
     prepare(state, attempt);
     solve(state, report);
   } catch (const StageFailure& f) {
-    fail(f.kind, f.reason, f.message);
+    fail(f.error);
   } catch (const EvaluationError& e) {
     report.error = evaluation_failure(state, e);
   }
@@ -167,7 +165,7 @@ void InverseDynamics::solve_position(State& state, PhaseReport& report) {
   double correction = HUGE_VAL, first_error = 0;
   for (int iteration = 0;; ++iteration) {
     if (cancel_ && cancel_->cancelled())
-      throw StageFailure{ErrorKind::cancelled, "CANCELLED", "interrupted between iterations"};
+      throw StageFailure{cancelled_error("interrupted between iterations")};
     const VecX right = right_side(state, kPosition, iteration == 0);
     newton.iterations = iteration;
     newton.residual_error = residual_error(right);
@@ -181,8 +179,8 @@ void InverseDynamics::solve_position(State& state, PhaseReport& report) {
           text, sizeof text,
           "no convergence of the positions in %d iterations, residual %.6g, tolerance %.6g",
           iteration, newton.residual_error, s.tolerance);
-      throw StageFailure{ErrorKind::not_converged, "NOT_CONVERGED",
-                         text + obstacle(right, newton.residual_error < first_error)};
+      throw StageFailure{make_error(ErrorKind::not_converged, "NOT_CONVERGED",
+                                    text + obstacle(right, newton.residual_error < first_error))};
     }
     const VecX delta = solved(matrix(state, kPosition, iteration == 0), right, "position");
     correct_position(delta, state);
@@ -449,13 +447,13 @@ VecX InverseDynamics::solved(const Sparse& matrix, const VecX& right, const char
   constexpr double kLost = 1e-6;  // of the right hand side: nothing of the solution is left
   if (z.size() == 0 || !z.allFinite() || (matrix * z - right).norm() > kLost * (1 + right.norm()))
     throw StageFailure{
-        ErrorKind::singular, "SINGULAR_MATRIX",
-        std::string("the matrix of the ") + stage + " stage is singular\n  hint: " +
-            (stage[0] == 'f'
-                 ? "the joints with `torque` must determine all forces, once; redundant "
-                   "ones share them with `joint regularization`"
-                 : "prescribed motions contradict or repeat each other, or, without "
-                   "weights and ergonomy, leave something free")};
+        make_error(ErrorKind::singular, "SINGULAR_MATRIX",
+                   std::string("the matrix of the ") + stage + " stage is singular\n  hint: " +
+                       (stage[0] == 'f'
+                            ? "the joints with `torque` must determine all forces, once; redundant "
+                              "ones share them with `joint regularization`"
+                            : "prescribed motions contradict or repeat each other, or, without "
+                              "weights and ergonomy, leave something free"))};
   return z;
 }
 

@@ -93,9 +93,8 @@ Error evaluation_failure(const State& state, const EvaluationError& cause) {
 }
 
 Error stopped_while_factoring(const State& state) {
-  Error error =
-      make_error(ErrorKind::cancelled, "CANCELLED",
-                 "t = " + std::to_string(state.time) + ": interrupted while a matrix was factored");
+  Error error = cancelled_error("t = " + std::to_string(state.time) +
+                                ": interrupted while a matrix was factored");
   error.failure.time = state.time;
   error.failure.step = static_cast<long>(state.step);
   return error;

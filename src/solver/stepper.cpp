@@ -534,11 +534,11 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
   std::snprintf(where, sizeof where, "%s at t = %.9g (step %lld)", phase, state.time,
                 static_cast<long long>(state.step));
   switch (report.outcome) {
-    case NewtonOutcome::cancelled:
-      e.kind = ErrorKind::cancelled;
-      e.reason = "CANCELLED";
-      e.message = std::string(where) + ": interrupted between iterations";
-      return e;
+    case NewtonOutcome::cancelled: {
+      Error stopped = cancelled_error(std::string(where) + ": interrupted between iterations");
+      stopped.failure = e.failure;
+      return stopped;
+    }
     case NewtonOutcome::singular:
       e.kind = ErrorKind::singular;
       e.reason = "SINGULAR_MATRIX";

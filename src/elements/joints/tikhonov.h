@@ -1,6 +1,6 @@
 #pragma once
 
-#include "model/element_set.h"
+#include "model/plain_element_set.h"
 #include "model/registry.h"
 
 namespace mbcosim {
@@ -13,7 +13,7 @@ namespace mbcosim {
 ///
 /// The word `dynamic` of the reference solver takes λₖ of the residual evaluated before: where the
 /// iteration has converged both are equal, so that it is served by the same equations.
-class TikhonovSet final : public ElementSet {
+class TikhonovSet final : public PlainElementSet {
  public:
   /// `matrix_only`: the constraints stay exact, Newton's matrix is regularized.
   void add(ElementInfo info, ElementRef joint, std::vector<double> coefficients, bool matrix_only);
@@ -23,35 +23,19 @@ class TikhonovSet final : public ElementSet {
   int size() const override { return static_cast<int>(slots_.size()); }
   const ElementInfo& info(int i) const override { return slots_[i].info; }
   ElementInfo& info(int i) override { return slots_[i].info; }
-  int unknowns(int) const override { return 0; }
-  bool is_differential(int, int) const override { return false; }
-  std::string row_name(int, int) const override { return {}; }
-  std::vector<int> nodes(int) const override { return {}; }
-  int first_own(int) const override { return -1; }
   void bind(const Model& model, int i, int first_own) override;
   void collect_pattern(PatternSink& sink) const override;
   void set_positions(const PositionSource& positions) override;
 
-  void start(const EvalContext&, State&, int) const override {}
   void residual(const EvalContext& context, double* r, ElementRange range) const override;
   void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
                 ElementRange range) const override;
-  void after_predict(const EvalContext&, State&, ElementRange) const override {}
-  void after_convergence(const EvalContext&, State&, ElementRange) const override {}
 
   AssemblyRole assembly_role(int) const override { return AssemblyRole::custom; }
   void assembly_residual(const EvalContext& context, int i, double* r,
                          double* r_rate) const override;
   void assembly_jacobian(const EvalContext& context, int i, int n,
                          std::vector<Triplet>& out) const override;
-
-  void output(const EvalContext&, int, OutputRow&) const override {}
-  std::string log_line(const Model&, int) const override { return {}; }
-  int private_datum(int, std::string_view) const override { return -1; }
-  std::vector<Datum> private_data(int) const override { return {}; }
-  double private_value(const EvalContext&, int, int) const override { return 0; }
-  void add_inertia(const EvalContext&, int, int, Inertia&) const override {}
-  void add_momentum(const EvalContext&, int, State&) const override {}
 
  private:
   struct Slot {

@@ -11,7 +11,7 @@
 
 #include "elements/modal/modal_joint.h"
 #include "model/drive.h"
-#include "model/element_set.h"
+#include "model/plain_element_set.h"
 
 namespace mbcosim {
 
@@ -30,7 +30,7 @@ struct ModalForce {
   VecN<6> resultant(const EvalContext& context) const;
 };
 
-class ModalForceSet final : public ElementSet {
+class ModalForceSet final : public PlainElementSet {
  public:
   void add(ElementInfo info, ModalForce force) {
     slots_.push_back({std::move(force), std::move(info), {}});
@@ -39,30 +39,14 @@ class ModalForceSet final : public ElementSet {
   int size() const override { return static_cast<int>(slots_.size()); }
   const ElementInfo& info(int i) const override { return slots_[i].info; }
   ElementInfo& info(int i) override { return slots_[i].info; }
-  int unknowns(int) const override { return 0; }
-  bool is_differential(int, int) const override { return false; }
-  std::string row_name(int, int) const override { return ""; }
   std::vector<int> nodes(int i) const override;
-  int first_own(int) const override { return -1; }
   void bind(const Model& model, int, int) override { structural_ = &model.structural; }
   void collect_pattern(PatternSink& sink) const override;
   void set_positions(const PositionSource& positions) override;
-  void start(const EvalContext&, State&, int) const override {}
   void residual(const EvalContext& context, double* r, ElementRange range) const override;
   void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
                 ElementRange range) const override;
-  void after_predict(const EvalContext&, State&, ElementRange) const override {}
-  void after_convergence(const EvalContext&, State&, ElementRange) const override {}
-  AssemblyRole assembly_role(int) const override { return AssemblyRole::none; }
-  void assembly_residual(const EvalContext&, int, double*, double*) const override {}
-  void assembly_jacobian(const EvalContext&, int, int, std::vector<Triplet>&) const override {}
   void output(const EvalContext& context, int i, OutputRow& row) const override;
-  std::string log_line(const Model&, int) const override { return ""; }
-  int private_datum(int, std::string_view) const override { return -1; }
-  std::vector<Datum> private_data(int) const override { return {}; }
-  double private_value(const EvalContext&, int, int) const override { return 0; }
-  void add_inertia(const EvalContext&, int, int, Inertia&) const override {}
-  void add_momentum(const EvalContext&, int, State&) const override {}
 
  private:
   struct Slot {
