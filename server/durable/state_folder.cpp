@@ -24,7 +24,8 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kLongestRecord = 1LL << 40;
 constexpr std::size_t kPiece = 1 << 20;  // of a file of the model in one record
 const std::string kSnapshot = "snapshot-", kJournal = "journal-";
-const std::string kDamaged = ".damaged";
+const std::string kUnfinished = "/unfinished";
+const std::string kDamaged = ".damaged", kGone = ".gone";
 
 int take_lock(const std::string& path) {
   const std::string name = path + "/lock";
@@ -35,6 +36,21 @@ int take_lock(const std::string& path) {
   if (::flock(file, LOCK_EX | LOCK_NB) == 0) return file;
   ::close(file);
   throw std::runtime_error("another daemon uses the state folder " + path);
+}
+
+void make_folder(const std::string& path) {
+  if (::mkdir(path.c_str(), 0700) != 0 && errno != EEXIST)
+    throw StorageError(std::string("a folder cannot be made: ") + std::strerror(errno));
+}
+
+/// What a daemon that was killed had begun to remove.
+void remove_gone(const std::string& path) {
+  std::error_code error, none;
+  std::vector<fs::path> gone;
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end;
+       entry.increment(error))
+    if (entry->path().extension() == kGone) gone.push_back(entry->path());
+  for (const fs::path& each : gone) fs::remove_all(each, none);
 }
 
 template <class Message>
@@ -109,6 +125,7 @@ StateFolder::StateFolder(const std::string& path, std::int64_t most) : path_(pat
   if (error)
     throw std::runtime_error("the state folder " + path_ +
                              " cannot be written: " + error.message());
+  remove_gone(path_ + "/simulations");
   used_ = bytes_in(path_ + "/simulations");
 }
 
@@ -187,9 +204,27 @@ void StateFolder::write_file(const std::string& id, const std::string& name, Wri
   give_back(before);
 }
 
+void StateFolder::start(const std::string& id) {
+  make_folder(folder(id));
+  AtomicFile mark(folder(id) + kUnfinished);
+  mark.commit();
+  sync_path(path_ + "/simulations");
+}
+
+void StateFolder::finish(const std::string& id) {
+  const std::string mark = folder(id) + kUnfinished;
+  if (::unlink(mark.c_str()) != 0)
+    throw StorageError(std::string("a file cannot be removed: ") + std::strerror(errno));
+  sync_path(folder(id));
+}
+
+bool StateFolder::is_unfinished(const std::string& id) const {
+  std::error_code none;
+  return fs::exists(folder(id) + kUnfinished, none);
+}
+
 void StateFolder::write_model(const std::string& id, const StoredModel& model) {
-  if (::mkdir(folder(id).c_str(), 0700) != 0 && errno != EEXIST)
-    throw StorageError(std::string("a folder cannot be made: ") + std::strerror(errno));
+  make_folder(folder(id));
   sync_path(path_ + "/simulations");
   write_file(id, "model", [&](RecordWriter& records) {
     records.add(RecordKind::head, model.head.SerializeAsString());
@@ -224,10 +259,10 @@ void StateFolder::remove_snapshot(const std::string& id, int number) {
 
 void StateFolder::remove(const std::string& id) {
   const std::int64_t size = bytes_in(folder(id));
-  std::error_code none;
-  // Without its model it is no simulation, whatever else is left when the daemon is killed now.
-  fs::remove(folder(id) + "/model", none);
-  fs::remove_all(folder(id), none);
+  const std::string gone = folder(id) + kGone;
+  std::error_code failed, none;
+  fs::rename(folder(id), gone, failed);  // at once, should the daemon be killed now
+  fs::remove_all(failed ? folder(id) : gone, none);
   give_back(size);
 }
 

@@ -46,8 +46,9 @@ class OpenFiles {
 };
 
 /// DIR/lock, which one daemon holds; DIR/name; DIR/simulations/ID with the files "model" (written
-/// once), "point" (replaced by each checkpoint), "snapshot-N" and "journal-N". Thread-safe, as long
-/// as each simulation is written by one thread at a time.
+/// once), "point" (replaced by each checkpoint), "snapshot-N" and "journal-N", and "unfinished"
+/// while it is made; ID.gone while it is removed, ID.damaged when it cannot be read. Thread-safe,
+/// as long as each simulation is written by one thread at a time.
 class StateFolder {
  public:
   /// `most`: bytes of all that is in it. Throws std::runtime_error when the folder cannot be used
@@ -64,6 +65,10 @@ class StateFolder {
   std::vector<std::string> list() const;
 
   // --- of one simulation. All throw StorageError; what is written is on the disk then.
+  /// Until `finish` it is no simulation yet, should the daemon be killed.
+  void start(const std::string& id);
+  void finish(const std::string& id);
+  bool is_unfinished(const std::string& id) const;
   void write_model(const std::string& id, const StoredModel& model);
   void write_point(const std::string& id, const StoredPoint& point);
   void write_snapshot(const std::string& id, int number, const std::string& state);

@@ -97,6 +97,11 @@ std::string Durability::new_name() const {
 void Durability::read_folder() {
   for (const std::string& id : folder_->list()) {
     try {
+      if (folder_->is_unfinished(id)) {
+        spdlog::info("state folder: {} was not yet made when the daemon ended; it is removed", id);
+        folder_->remove(id);
+        continue;
+      }
       read_one(id);
     } catch (const StorageError& error) {
       spdlog::error("state folder: {}; put aside as {}", error.what(), folder_->put_aside(id));

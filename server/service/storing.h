@@ -24,7 +24,9 @@ inline std::string id_of(const std::string& simulation) {
 template <class Write>
 void store_new(StateFolder& folder, const std::string& id, Write write) {
   try {
+    folder.start(id);
     write();
+    folder.finish(id);
   } catch (const StorageError& error) {
     folder.remove(id);
     refuse_storage("the simulation cannot be stored", error);

@@ -427,6 +427,27 @@ def test_what_is_damaged_is_named_and_stops_nobody_else(start, folder, file, dam
     assert (folder / (bad + ".damaged") / file).exists()
 
 
+def test_what_was_being_made_or_removed_when_the_daemon_was_killed_is_removed(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        half, other = server.load_text(deck()), server.load_text(deck())
+        names = half.name, other.name
+        half.step(3), other.step(3)
+    daemon.stop()
+    stored = folder / names[0]
+    (stored / "model").unlink()  # as it is before its last file is there
+    (stored / "unfinished").touch()
+    gone = stored.with_name("0123456789abcdef.gone")
+    gone.mkdir()
+    (gone / "point").write_bytes(b"half of it")
+    daemon = start()
+    with daemon.connect() as server:
+        assert [found.name for found in server.list()] == [names[1]]
+        assert server.attach(names[1]).step().step == 4
+    assert "was not yet made when the daemon ended" in daemon.log() and "put aside" not in daemon.log()
+    assert os.listdir(stored.parent) == [os.path.basename(names[1])]
+
+
 def test_a_damaged_snapshot_is_named_when_it_is_needed(start, folder):
     daemon = start()
     with daemon.connect() as server:
