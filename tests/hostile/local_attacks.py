@@ -103,7 +103,8 @@ class Damage:
         os.truncate(path, self.random.randrange(os.path.getsize(path) + 1))
 
     def lengthen(self, path):
-        with open(path, "ab") as file:
+        descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_NONBLOCK)  # of a pipe that nobody reads: an error, no wait
+        with open(descriptor, "ab") as file:
             file.write(self.random.randbytes(self.random.choice([1, 16, 5000])))
 
     def replace(self, path):
