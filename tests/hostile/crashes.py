@@ -63,9 +63,9 @@ class Crashes:
     def ask_all(self, stub):
         """All are brought back, one after the other, for a while; most are deleted then, that there is room for the others."""
         listed = self.call(stub.ListSimulations, pb.ListSimulationsRequest())
-        over = time.monotonic() + 3 * FACTOR
+        start = time.monotonic()
         for info in listed.simulations if listed else []:
-            if time.monotonic() > over or len(self.faults) > 5:
+            if time.monotonic() - start > 3 * FACTOR or len(self.faults) > 5:
                 break
             self.asked += 1
             self.call(stub.ReadVariables, pb.ReadVariablesRequest(simulation=info.name))
