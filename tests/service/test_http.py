@@ -484,6 +484,22 @@ def test_slow_senders_disturb_nobody_and_are_cut_off(door, server, pendulum):
         link.close()
 
 
+def test_more_slow_senders_than_connections_delay_http_by_their_turns_and_grpc_not_at_all(door, server, pendulum):
+    """64 are served at once and get 5 s for a head: a caller behind 150 waits two such times at most, and what its own call takes."""
+    slow = [door.raw() for _ in range(150)]
+    for link in slow:
+        link.sendall(b"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\n")
+    started = time.monotonic()
+    with server.load(pendulum) as simulation:
+        for _ in range(20):
+            simulation.step(10)
+        assert time.monotonic() - started < 2 * TIME_FACTOR
+        assert door.call("Simulations/GetSimulation", {"simulation": simulation.name})[0] == 200
+        assert time.monotonic() - started < (150 // 64 * 5 + 2) * TIME_FACTOR
+    for link in slow:
+        link.close()
+
+
 def test_a_body_that_dribbles_without_a_token_is_cut_off(door):
     link = door.raw()
     link.sendall(f"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nContent-Type: application/json\r\n"
