@@ -3,6 +3,8 @@
 
 A free body that takes two iterations a step, on one host. Every line is the median and the 99 % quantile over STEPS steps, 2000 by default, after
 some that do not count, as the program on the other side of the door sees them. Doors that cannot be tried here are left out and named.
+With MBCOSIM_MBDYN=/path/to/mbdyn that program runs the decks with sockets as well, with the same code on the other side, by turns with `mbcosim run`:
+medians of TURNS turns.
 """
 import asyncio
 import http.client
@@ -10,17 +12,20 @@ import json
 import os
 import re
 import shutil
+import statistics
 import struct
 import subprocess
 import sys
 import tempfile
 import time
+import zipfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 BUILD = os.path.abspath(sys.argv[1])
 STEPS = int(sys.argv[2]) if len(sys.argv) > 2 else 2000
 WARM_UP = STEPS // 10
+TURNS = 5
 BIN = os.path.join(BUILD, "bin")
 sys.path[:0] = [os.path.join(BUILD, "python"), os.path.join(ROOT, "tests", "fmi")]
 
@@ -170,13 +175,16 @@ def grpc_web_body(simulation):
     return struct.pack(">BI", 0, len(message)) + message
 
 
-def fmu(standard):
+def fmu(standard, remote=False):
+    """With `remote` the daemon takes the steps."""
     def measure(daemon, folder):
         from importer import OK, Archive, instance_of
         deck, path = os.path.join(folder, "body.mbd"), os.path.join(folder, f"body{standard}.fmu")
         with open(deck, "w") as file:
             file.write(BODY.replace("forever", "1e6"))
-        subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", deck, "-o", path, "--fmi", standard], check=True, stdout=subprocess.DEVNULL)
+        options = ["--remote", f"http://{daemon.http}"] if remote else []
+        os.environ["MBCOSIM_TOKEN"] = daemon.token  # of the door; the FMU looks there
+        subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", deck, "-o", path, "--fmi", standard, *options], check=True, stdout=subprocess.DEVNULL)
         clock = [0.0]
         with instance_of(Archive(path)) as instance:
             instance.initialize()
@@ -199,18 +207,39 @@ def build_code(folder):
     return path
 
 
-def mbdyn_run(coupling, per_step):
-    def measure(daemon, folder):
-        code, deck = build_code(folder), os.path.join(folder, "socket.mbd")
-        with open(deck, "w") as file:
-            file.write(coupled(f'socket, create, yes, path, "{folder}/s"', 1e-3 * (WARM_UP + STEPS), coupling))
-        run = subprocess.Popen([os.path.join(BIN, "mbcosim"), "run", deck, "-o", os.path.join(folder, "out"), "-q"])
-        try:
-            return printed([code, os.path.join(folder, "s"), "2", str(per_step)])
-        finally:
-            run.wait(60)
+def run_with_code(command, coupling, per_step, folder):
+    """`command(deck, output)` runs a deck; what the code on the other side of its socket sees."""
+    code, deck, path = build_code(folder), os.path.join(folder, "socket.mbd"), os.path.join(folder, "s")
+    with open(deck, "w") as file:
+        file.write(coupled(f'socket, create, yes, path, "{path}"', 1e-3 * (WARM_UP + STEPS), coupling))
+    run = subprocess.Popen(command(deck, os.path.join(folder, "out")), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        return printed([code, path, "2", str(per_step)])
+    finally:
+        run.wait(60)
+        if os.path.exists(path):
+            os.unlink(path)
 
-    return measure
+
+def ours(deck, output):
+    return [os.path.join(BIN, "mbcosim"), "run", deck, "-o", output, "-q"]
+
+
+def mbdyns(deck, output):
+    return [os.environ["MBCOSIM_MBDYN"], "-s", "-f", deck, "-o", output]
+
+
+def mbdyn_run(coupling, per_step):
+    return lambda daemon, folder: run_with_code(ours, coupling, per_step, folder)
+
+
+def by_turns(coupling, per_step, folder):
+    """(median, 99 %) of `mbcosim run` and of MBDyn."""
+    samples = {ours: [], mbdyns: []}
+    for _ in range(TURNS):
+        for command, found in samples.items():
+            found.append(run_with_code(command, coupling, per_step, folder))
+    return [tuple(map(statistics.median, zip(*found))) for found in samples.values()]
 
 
 def mbdyn_daemon(daemon, folder):
@@ -221,11 +250,73 @@ def mbdyn_daemon(daemon, folder):
     return tuple(float(word) for word in code.communicate(timeout=60)[0].split())
 
 
+def ends(program):
+    """A program that ends with its simulation."""
+    if program.wait(60) != 0:
+        raise RuntimeError(program.stderr.read().strip())
+
+
+def peer_program(*arguments):
+    return subprocess.Popen([os.path.join(BIN, "mbcosim"), "peer", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def mbdyn_gateway(daemon, folder):
+    path = os.path.join(folder, "s")
+    with mbcosim.connect(daemon.address) as server:
+        with server.load_text(POINTS) as body:
+            gateway = peer_program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", "tight", "--server", daemon.address,
+                                   "--simulation", body.name, "--port", "points")
+            code = subprocess.Popen([build_code(folder), path, "2", "2"], stdout=subprocess.PIPE, text=True)
+            await_peer(body)
+            body.step(WARM_UP + STEPS)
+    ends(gateway)
+    return tuple(float(word) for word in code.communicate(timeout=60)[0].split())
+
+
+def await_peer(simulation):
+    """Until a peer sits at its port."""
+    while not simulation.describe().ports[0].has_peer:
+        time.sleep(0.01)
+
+
+def fmu_peer(daemon, folder):
+    """A pendulum on a cart and the controller of the tests: what a step costs who asks for it on a stream."""
+    sys.path.insert(0, os.path.join(ROOT, "tests", "fmi"))
+    from test_peer import DESCRIPTION
+    library, path, speed = os.path.join(folder, "c.so"), os.path.join(folder, "c.fmu"), "node.structural.1.XP"
+    subprocess.run(["cc", "-shared", "-fPIC", "-O2", "-DFMI=3", os.path.join(ROOT, "tests", "fmi", "controller.c"), "-o", library], check=True)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", DESCRIPTION[3].format(state="true", extra=""))
+        archive.write(library, "binaries/x86_64-linux/c.so")
+    with open(os.path.join(ROOT, "client_examples", "models", "pendulum_cart.mbd")) as file:
+        deck = re.sub(r"final time: *[^;]*;", "final time: forever;", file.read())
+    ports = [mbcosim.signal_port("control", outputs=[speed], inputs=["stream.force"])]
+    with mbcosim.connect(daemon.address) as server:
+        with server.load_text(deck, ports=ports) as cart:
+            peer = peer_program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", "loose",
+                                "--map", f"u={speed}[1]", "--map", "y=stream.force")
+            if "attached" not in peer.stdout.readline():
+                raise RuntimeError(peer.stderr.read().strip())
+            with cart.stepper() as stepper:
+                found = quantiles(stepper.step)
+    ends(peer)
+    return found
+
+
+def python_peer(daemon, folder):
+    push = [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    with mbcosim.connect(daemon.address) as server, server.load_text(POINTS) as body:
+        answer = lambda motion: mbcosim.Loads(forces=push, unfinished=motion.iteration == 1)  # noqa: E731
+        with body.couple("points", answer, mode="tight"), body.stepper() as stepper:
+            return quantiles(stepper.step)
+
+
 POINTS = coupled('grpc, port, "points"')
 DOORS = [
     ("asks for steps", [
         ("FMU, FMI 3, `fmi3DoStep` (from Python)", fmu("3")),
         ("FMU, FMI 2, `fmi2DoStep` (from Python)", fmu("2")),
+        ("FMU with `--remote`, `fmi3DoStep` (from Python)", fmu("3", remote=True)),
         ("C++, `stepper`", cpp("stream")),
         ("C++, `step`", cpp("call")),
         ("Python, `stepper`", python_stream),
@@ -238,11 +329,14 @@ DOORS = [
     ("takes part in steps, two exchanges in each", [
         ("MBDyn's protocol, tight, `mbcosim run`", mbdyn_run("tight", 2)),
         ("MBDyn's protocol, tight, `mbcosimd --deck-sockets`", mbdyn_daemon),
+        ("MBDyn's protocol, tight, `mbcosim peer socket`", mbdyn_gateway),
         ("C++ over shared memory, tight", cpp("shared_memory", POINTS)),
         ("C++ over gRPC, tight", cpp("peer", POINTS)),
+        ("Python over gRPC, tight", python_peer),
     ]),
     ("takes part in steps, one exchange in each", [
         ("MBDyn's protocol, loose, `mbcosim run`", mbdyn_run("loose", 1)),
+        ("FMU, loose, `mbcosim peer fmu` (a pendulum on a cart)", fmu_peer),
     ]),
 ]
 
@@ -260,6 +354,16 @@ def main():
                 finally:
                     daemon.stop()
         print()
+    if "MBCOSIM_MBDYN" in os.environ:
+        beside_mbdyn()
+
+
+def beside_mbdyn():
+    print(f"| The same deck and code, {TURNS} turns each | median [µs] | 99 % [µs] |\n|---|---:|---:|")
+    for coupling, per_step in (("tight", 2), ("loose", 1)):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, found in zip(("`mbcosim run`", "MBDyn"), by_turns(coupling, per_step, folder)):
+                print("| {}, {} | {:.0f} | {:.0f} |".format(name, coupling, *found), flush=True)
 
 
 if __name__ == "__main__":
