@@ -45,13 +45,24 @@ void add_bad_request(const std::string& message, v1::ErrorStatus* details) {
   any->set_value(message_of(message_of(message.substr(open + 1, close - open - 1), message)));
 }
 
+/// After how long a refused call may be made again [ms]; 0: there is no telling.
+int retry_after(v1::Reason reason) {
+  switch (reason) {
+    case v1::REASON_SIMULATION_BUSY:
+      return 100;  // an advance looks whether it is to end this often, at least
+    case v1::REASON_SHUTTING_DOWN:
+      return 1000;  // the next daemon needs about as long to start
+    default:
+      return 0;
+  }
+}
+
 /// google.rpc.RetryInfo: `retry_delay`.
-void add_retry_info(v1::ErrorStatus* details) {
-  constexpr int kMilliseconds = 100;  // an advance looks whether it is to end this often, at least
+void add_retry_info(int milliseconds, v1::ErrorStatus* details) {
   google::protobuf::Any* any = details->add_details();
   any->set_type_url("type.googleapis.com/google.rpc.RetryInfo");
   any->set_value(message_of(
-      google::protobuf::util::TimeUtil::MillisecondsToDuration(kMilliseconds).SerializeAsString()));
+      google::protobuf::util::TimeUtil::MillisecondsToDuration(milliseconds).SerializeAsString()));
 }
 
 /// Bytes of details, so that with the message all fits into the 8 KiB of metadata that clients
@@ -247,7 +258,7 @@ grpc::Status Refusal::status() const {
   any->set_type_url(kErrorInfoUrl);
   info.SerializeToString(any->mutable_value());
   if (reason_ == v1::REASON_BAD_ARGUMENT) add_bad_request(message_, &details);
-  if (reason_ == v1::REASON_SIMULATION_BUSY) add_retry_info(&details);
+  if (const int after = retry_after(reason_)) add_retry_info(after, &details);
   if (failure_) details.add_details()->PackFrom(fitting(*failure_));
   const std::size_t taken = details.ByteSizeLong() + message_.size();  // which is sent beside them
   if (diagnostics_)

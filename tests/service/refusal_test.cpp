@@ -1,5 +1,6 @@
 #include "wire/refusal.h"
 
+#include <google/protobuf/duration.pb.h>
 #include <gtest/gtest.h>
 
 #include "wire/convert.h"
@@ -33,6 +34,27 @@ TEST(Refusal, CarriesItsParticulars) {
   EXPECT_EQ(info.reason(), "WRONG_STEP");
   EXPECT_EQ(info.domain(), "mbcosim.dev");
   EXPECT_EQ(info.metadata().at("step"), "5");
+}
+
+/// google.rpc.RetryInfo's delay [ms]; -1: there is none.
+std::int64_t retry_delay(v1::Reason reason) {
+  v1::ErrorStatus details;
+  EXPECT_TRUE(details.ParseFromString(Refusal(reason, "later").status().error_details()));
+  for (const google::protobuf::Any& any : details.details()) {
+    if (any.type_url() != "type.googleapis.com/google.rpc.RetryInfo") continue;
+    google::protobuf::Duration delay;  // behind the tag and the length of field 1
+    EXPECT_EQ(any.value()[0], 1 << 3 | 2);
+    EXPECT_EQ(any.value()[1], static_cast<char>(any.value().size() - 2));
+    EXPECT_TRUE(delay.ParseFromString(any.value().substr(2)));
+    return delay.seconds() * 1000 + delay.nanos() / 1'000'000;
+  }
+  return -1;
+}
+
+TEST(Refusal, TellsWhenToComeAgainWhereThatIsKnown) {
+  EXPECT_EQ(retry_delay(v1::REASON_SHUTTING_DOWN), 1000);
+  EXPECT_EQ(retry_delay(v1::REASON_SIMULATION_BUSY), 100);
+  EXPECT_EQ(retry_delay(v1::REASON_LIMIT_EXCEEDED), -1);
 }
 
 TEST(Refusal, TellsWhatTheSolverKnew) {
