@@ -65,7 +65,7 @@ void once(Session& session, const CallFrame& frame, const Request& request, Repl
 }
 
 /// The same for what changes a durable session: no checkpoint is taken between the change and its
-/// reply, and with JOURNAL both are on the disk before the caller is told.
+/// reply, and with JOURNAL both are on the disk before the caller, or who watches events, is told.
 template <class Request, class Reply, class Body>
 void once_stored(const SessionStore& store, Session& session, const CallFrame& frame,
                  const Request& request, Reply* reply, Body& body) {
@@ -76,9 +76,12 @@ void once_stored(const SessionStore& store, Session& session, const CallFrame& f
       id.empty() ? 0 : digest_of(Request::descriptor()->name().c_str(), request);
   KeptReplies::Turn turn(session.kept(), frame.caller, id, digest, frame.call);
   if (turn.known()) {
+    if (!stores && session.keeping() && session.keeping()->stale(session.changes()))
+      store.put_on_disk(session);  // which may have failed for the first one
     reply->ParseFromString(*turn.known());
     return;
   }
+  HeldEvents events;
   {
     std::unique_lock<Mutex> no_checkpoint;
     if (session.keeping()) no_checkpoint = std::unique_lock(session.keeping()->mutex);
@@ -92,7 +95,13 @@ void once_stored(const SessionStore& store, Session& session, const CallFrame& f
     turn.keep(*reply);
     session.note_change();
   }
-  if (!stores) store.put_on_disk(session);
+  if (stores) return;
+  try {
+    store.put_on_disk(session);
+  } catch (...) {
+    events.drop();
+    throw;
+  }
 }
 
 /// A method that works on one simulation, which is found and kept alive meanwhile; a request with

@@ -12,7 +12,7 @@ import pytest
 import decks
 import mbcosim
 from conftest import wait_for
-from mbcosim.v1 import simulations_pb2 as pb
+from mbcosim.v1 import events_pb2, simulations_pb2 as pb
 from test_durable import X, bits, deck, folder, start, state_of  # noqa: F401 (fixtures)
 
 KILLS = int(os.environ.get("MBCOSIM_KILLS", "6"))  # 1000 for the long form
@@ -24,11 +24,11 @@ def step_of(server, name):
 
 
 class Watcher:
-    """Everybody who may learn of a step: one who asks, one who reads, one who subscribes."""
+    """Everybody who may learn of a step: one who asks, one who reads, one who watches events, one who subscribes."""
 
     def __init__(self, daemon, name, *, subscribes=False):
         self.seen, self._over = 0, False
-        jobs = [self._ask, self._read] + ([self._subscribe] if subscribes else [])
+        jobs = [self._ask, self._read, self._watch] + ([self._subscribe] if subscribes else [])
         self._threads = [threading.Thread(target=self._run, args=(job, daemon.connect(), name)) for job in jobs]
         for thread in self._threads:
             thread.start()
@@ -51,6 +51,13 @@ class Watcher:
         while not self._over:
             self._note(server.simulations.ReadVariables(pb.ReadVariablesRequest(simulation=name)).step)
             time.sleep(0.01)
+
+    def _watch(self, server, name):
+        with server.events(name) as events:
+            for event in events:
+                self._note(event.state_changed.step)  # 0 in other events
+                if event.snapshot.change == events_pb2.SNAPSHOT_CHANGE_SAVED:
+                    self._note(event.snapshot.step)
 
     def _subscribe(self, server, name):
         with server.attach(name).subscribe(["time"]) as samples:
@@ -173,6 +180,49 @@ def test_kills_with_a_peer_lose_nothing_that_it_was_told(start, options):
         assert due > 5 and bits(straight) == bits(again)
 
 
+def is_finished(event):
+    return event.state_changed.state == pb.SIMULATION_STATE_FINISHED
+
+
+def is_saved(event):
+    return event.snapshot.change == events_pb2.SNAPSHOT_CHANGE_SAVED
+
+
+@pytest.mark.parametrize("told, act", [(is_finished, lambda simulation: simulation.run_until(1e9)),
+                                       (is_saved, lambda simulation: simulation.snapshot("kept"))], ids=["finished", "saved"])
+def test_kills_at_an_event_lose_nothing_that_it_tells(start, told, act):
+    """At the very event, while the call that made it may still be open."""
+    rolls = random.Random(22)
+    daemon = start("--checkpoint-interval", "3600")
+    for _ in range(max(3, KILLS // 2)):
+        steps = rolls.randrange(2, 200)
+        with daemon.connect() as server:
+            simulation = server.load_text(deck(steps), durability="journal")
+            simulation.step(rolls.randrange(1, steps))
+            acting = threading.Thread(target=swallowing, args=(act, simulation))
+            with server.events(simulation.name) as events:
+                acting.start()
+                event = next(event for event in events if told(event))
+                daemon.kill()
+            acting.join(60)
+        daemon = start("--checkpoint-interval", "3600")
+        with daemon.connect() as server:
+            again = server.attach(simulation.name)
+            if told is is_finished:
+                again.read(["step"])
+                info = again.refresh()
+                assert (info.state, info.step) == (pb.SIMULATION_STATE_FINISHED, event.state_changed.step)
+            else:
+                assert [(saved.name, saved.step) for saved in again.snapshots()] == [(event.snapshot.name, event.snapshot.step)]
+
+
+def swallowing(act, simulation):
+    try:
+        act(simulation)
+    except LOST:
+        pass  # the daemon was killed
+
+
 def test_changes_of_every_kind_outlive_a_kill(start):
     daemon = start("--checkpoint-interval", "3600")
     with daemon.connect() as server:
@@ -290,6 +340,29 @@ def test_a_full_disk_takes_steps_back_and_loses_nothing(start):
     daemon.kill()
     with start().connect() as server:
         assert bits(server.attach(name)) == after
+
+
+def test_a_change_that_could_not_be_stored_is_no_success_when_it_is_asked_for_again(start):
+    daemon = start("--checkpoint-interval", "3600")
+    limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal")
+        simulation.step(10)
+        request = pb.CreateSnapshotRequest(simulation=simulation.name, request_id="once")
+        with server.events(simulation.name) as events:
+            resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (100, limits[1]))
+            for _ in range(2):
+                with pytest.raises(grpc.RpcError) as caught:
+                    server.simulations.CreateSnapshot(request)
+                assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+            resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, limits)
+            saved = server.simulations.CreateSnapshot(request).snapshot
+            simulation.snapshot("another")
+            told = next(event.snapshot.name for event in events if is_saved(event))
+            assert told != saved.name  # nobody was told of what was not on the disk
+    daemon.kill()
+    with start().connect() as server:
+        assert [s.name for s in server.attach(simulation.name).snapshots()] == [saved.name, told]
 
 
 def test_checkpoints_take_the_journals_place(start, folder):
