@@ -10,6 +10,7 @@
 #include <optional>
 #include <random>
 
+#include "durable/build.h"
 #include "service/protocol.h"
 #include "service/storing.h"
 #include "service/upload.h"
@@ -202,6 +203,7 @@ void Durability::begin(Session& session, const KeptDeck& deck, const v1::CreateO
   model.head.set_simulation(session.identity().id);
   model.head.set_owner(session.identity().owner);
   model.head.set_program(MBCOSIM_VERSION);
+  model.head.set_build(this_build());
   model.head.set_model_digest(digest_text(session.model().digest));
   model.head.set_main_file(deck.main_file);
   model.head.set_request_digest(session.identity().request_digest);

@@ -1,9 +1,11 @@
 /// Durability: simulations that are on the disk only, and how they come there and back.
 #include <google/protobuf/util/time_util.h>
+#include <spdlog/spdlog.h>
 
 #include <ctime>
 #include <functional>
 
+#include "durable/build.h"
 #include "service/display_name.h"
 #include "service/durability.h"
 #include "service/storing.h"
@@ -172,6 +174,15 @@ LoadedDeck read_deck(StoredModel& model, const Config& config) {
   return deck;
 }
 
+void warn_of_another_build(const v1::CheckpointHead& head) {
+  if (head.program() == MBCOSIM_VERSION && head.build() == this_build()) return;
+  spdlog::warn(
+      "{} began with mbcosim {} ({}), this is {} ({}): from here on it need not have the bits that "
+      "it would have had there",
+      head.simulation(), head.program(), head.build().empty() ? "unknown build" : head.build(),
+      MBCOSIM_VERSION, this_build());
+}
+
 }  // namespace
 
 StoredBundle Durability::read_stored(const std::string& id) const {
@@ -199,6 +210,7 @@ SessionPtr Durability::revive(const std::string& simulation, const std::string& 
       session->keeping()->snapshots.insert(number);
     session->keeping()->done(session->changes(), session->step_number());
   }
+  warn_of_another_build(stored.model.head);
   return session;
 } catch (const StorageError& error) {
   throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be brought back: " + error.what());

@@ -69,13 +69,15 @@ def test_goes_on_after_an_orderly_end(start):
         simulation.step(900)
         last = simulation.info.name
     daemon.stop()
-    with start().connect() as server:
+    resumed = start()
+    with resumed.connect() as server:
         assert state_of(server, last) == pb.SIMULATION_STATE_SUSPENDED
         again = server.attach(last)
         assert (again.info.display_name, again.info.step, again.info.minimum_step_size) == ("body", 1000, 1e-5)
         assert state_of(server, last) == pb.SIMULATION_STATE_SUSPENDED  # asking does not wake it
         assert again.read(["step"])["step"] == 1000
         assert state_of(server, last) == pb.SIMULATION_STATE_READY
+        assert "began with" not in resumed.log()  # the same build
         assert [(s.name, s.display_name, s.step) for s in again.snapshots()] == [(saved.name, "here", 100)]
         again.run_until(1e9)
         assert bits(again) == expected

@@ -17,10 +17,15 @@ CHECKPOINTS, JOURNAL = "simulations/old-2afca1773e4f039d", "simulations/old-d923
 
 
 @pytest.fixture
-def server(start_daemon, tmp_path):
-    """On a copy of the folder."""
+def on_copy(start_daemon, tmp_path):
+    """A daemon on a copy of the folder."""
     shutil.copytree(STORED, tmp_path / "state", copy_function=shutil.copyfile)
-    with start_daemon("--state-dir", str(tmp_path / "state")).connect() as connection:
+    return start_daemon("--state-dir", str(tmp_path / "state"))
+
+
+@pytest.fixture
+def server(on_copy):
+    with on_copy.connect() as connection:
         yield connection
 
 
@@ -31,6 +36,14 @@ def positions(simulation):
 def test_both_are_known(server):
     assert {info.name: (info.display_name, info.step, info.state) for info in server.list()} == {
         CHECKPOINTS: ("with checkpoints", 1007, pb.SIMULATION_STATE_SUSPENDED), JOURNAL: ("with a journal", 5, pb.SIMULATION_STATE_SUSPENDED)}
+
+
+def test_the_log_warns_that_they_began_with_another_build(on_copy, server):
+    for name in (CHECKPOINTS, JOURNAL):
+        assert f"{name} began with mbcosim" not in on_copy.log()
+        server.attach(name).read([X])
+        line, = [line for line in on_copy.log().splitlines() if f"{name} began with mbcosim 0.1.0 (unknown build), this is " in line]
+        assert "warning" in line and "need not have the bits" in line
 
 
 def test_the_one_with_checkpoints_goes_on_with_its_snapshot_grants_and_replies(server):
