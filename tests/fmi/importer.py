@@ -4,6 +4,7 @@ Both have the same methods. A call returns its status (OK ... FATAL) unless it h
 WARNING raises `Failed`. Nothing is checked before a call: tests make wrong ones on purpose.
 """
 import ctypes as c
+import functools
 import os
 import tempfile
 import xml.etree.ElementTree
@@ -36,8 +37,12 @@ class Archive:
         self.sizes = {name: self._size(v) for name, v in self.variables.items()}
         self.resources = os.path.join(self.folder, "resources")
         platform = "linux64" if self.version.startswith("2") else "x86_64-linux"
-        self.library_path = os.path.join(self.folder, "binaries", platform, self.identifier + ".so")
-        self.library = c.CDLL(self.library_path)
+        self.binaries = os.path.join(self.folder, "binaries", platform)
+        self.library_path = os.path.join(self.binaries, self.identifier + ".so")
+
+    @functools.cached_property
+    def library(self):
+        return c.CDLL(self.library_path)
 
     @staticmethod
     def _size(variable):

@@ -737,6 +737,20 @@ def test_only_functions_of_fmi_are_visible(ports):
     assert all(name.startswith(("fmi2", "fmi3")) for name in visible)
 
 
+C_LIBRARY = re.compile(r"lib(c|m|pthread|dl|rt|mvec)\.so\.\d+|ld-linux-x86-64\.so\.2|linux-vdso\.so\.1")
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_all_libraries_but_those_of_the_c_library_travel_with_the_fmu(ports, standard):
+    """As the system's loader finds them with an empty environment; nothing lies beside the engine that it does not need."""
+    fmu = ports(standard)
+    listed = subprocess.run(["/lib64/ld-linux-x86-64.so.2", "--list", fmu.library_path], capture_output=True, text=True, check=True, env={})
+    paths = [line.split("=>")[-1].split(" (")[0].strip() for line in listed.stdout.splitlines()]
+    others = [path for path in paths if not C_LIBRARY.fullmatch(os.path.basename(path))]
+    assert {os.path.realpath(path) for path in others} | {os.path.realpath(fmu.library_path)} == {
+        os.path.realpath(os.path.join(fmu.binaries, name)) for name in os.listdir(fmu.binaries)}
+
+
 def test_equal_decks_make_equal_files(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
