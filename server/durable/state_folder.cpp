@@ -205,9 +205,12 @@ void StateFolder::write_file(const std::string& id, const std::string& name, Wri
 }
 
 void StateFolder::start(const std::string& id) {
-  make_folder(folder(id));
-  AtomicFile mark(folder(id) + kUnfinished);
+  const std::string begun = folder(id) + kGone;  // it gets its name with the mark in it
+  make_folder(begun);
+  AtomicFile mark(begun + kUnfinished);
   mark.commit();
+  if (::rename(begun.c_str(), folder(id).c_str()) != 0)
+    throw StorageError(std::string("a folder cannot get its name: ") + std::strerror(errno));
   sync_path(path_ + "/simulations");
 }
 
@@ -262,7 +265,8 @@ void StateFolder::remove(const std::string& id) {
   const std::string gone = folder(id) + kGone;
   std::error_code failed, none;
   fs::rename(folder(id), gone, failed);  // at once, should the daemon be killed now
-  fs::remove_all(failed ? folder(id) : gone, none);
+  if (failed) fs::remove_all(folder(id), none);
+  fs::remove_all(gone, none);
   give_back(size);
 }
 

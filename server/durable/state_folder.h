@@ -47,8 +47,8 @@ class OpenFiles {
 
 /// DIR/lock, which one daemon holds; DIR/name; DIR/simulations/ID with the files "model" (written
 /// once), "point" (replaced by each checkpoint), "snapshot-N" and "journal-N", and "unfinished"
-/// while it is made; ID.gone while it is removed, ID.damaged when it cannot be read. Thread-safe,
-/// as long as each simulation is written by one thread at a time.
+/// while it is made; ID.gone before that and while it is removed, ID.damaged when it cannot be
+/// read. Thread-safe, as long as each simulation is written by one thread at a time.
 class StateFolder {
  public:
   /// `most`: bytes of all that is in it. Throws std::runtime_error when the folder cannot be used

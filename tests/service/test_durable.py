@@ -442,6 +442,9 @@ def test_what_was_being_made_or_removed_when_the_daemon_was_killed_is_removed(st
     gone = stored.with_name("0123456789abcdef.gone")
     gone.mkdir()
     (gone / "point").write_bytes(b"half of it")
+    begun = stored.with_name("123456789abcdef0.gone")
+    begun.mkdir()
+    (begun / "unfinished.new").touch()
     daemon = start()
     with daemon.connect() as server:
         assert [found.name for found in server.list()] == [names[1]]
