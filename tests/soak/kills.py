@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
 """A daemon that is killed again and again: simulations of all durabilities go on bit for bit, and nothing is lost that was promised.
 
-usage: kills.py [--kills N | --minutes M] [--seed N] [--damage-every N]
+usage: kills.py [--kills N | --minutes M] [--seed N] [--damage-every N] [--again-every N]
 
 On one state folder live simulations with journals (plain, with loose, staggered, tight and window peers), with checkpoints only (plain and
 with a peer), and with durability NONE. All are stepped at once, by requests of random length that are repeated until they are answered;
-somebody polls, reads and subscribes; checkpoints are written every 50 ms. At a random moment comes SIGKILL, and the next daemon starts. Then
+somebody polls, reads, watches events and subscribes; checkpoints are written every 50 ms. Beside them others come and go (restless.py). At a
+random moment comes SIGKILL, and the next daemon starts; every few rounds it is killed as well, within its first 100 ms or while all are being
+woken. Then
 
 * one with a journal stands where anybody was told, or later, and no request is done twice,
 * one with checkpoints stands at the last one that is on the disk, or later,
-* those of durability NONE are gone,
+* those of durability NONE are gone, and so is what was deleted, while what was made or saved is there,
+* no folder was put aside as damaged,
 * and each has the bits of its twin, which was stepped straight to there on a daemon that nobody kills.
 
 Every few kills files are damaged as well: a journal's last entry torn anywhere, or a random bit flipped in any file. A torn entry takes its
@@ -21,6 +24,7 @@ import argparse
 import os
 import random
 import shutil
+import subprocess
 import sys
 import tempfile
 import threading
@@ -28,9 +32,10 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "service"))
-from conftest import Daemon  # noqa: E402
+from conftest import BIN, Daemon  # noqa: E402
 from mbcosim.v1 import checkpoints_pb2, simulations_pb2 as pb  # noqa: E402
 from test_durable import bits, deck, on_disk  # noqa: E402
+from restless import Restless, Twin  # noqa: E402
 from soak import pull  # noqa: E402
 from test_journal import LOST, Spring, Watcher, coupled  # noqa: E402
 
@@ -130,7 +135,9 @@ class Ordeal:
         self.calm = self._daemon()
         self.calm_server = self.calm.connect()
         self.all = list(candidates())
+        self.restless, self.restless_twin = [Restless("journal"), Restless("checkpoint")], Twin(self.calm_server)
         self.damages = {"torn": 0, "flipped": 0}
+        self.again = 0
         self.daemon = self.start()
         self.create(self.all)
 
@@ -146,23 +153,50 @@ class Ordeal:
         return Daemon(str(own), *options)
 
     def start(self):
-        return self._daemon("--state-dir", str(self.state), "--checkpoint-interval", "0.05")
+        return self._daemon(*self._options())
+
+    def _options(self):
+        return "--state-dir", str(self.state), "--checkpoint-interval", "0.05"
 
     def restart(self):
+        self._end()
+        self.daemon = self.start()
+
+    def _end(self):
         self.daemon.kill()
         self.daemon.stop()
         shutil.rmtree(os.path.dirname(self.daemon.log_path))
-        self.daemon = self.start()
+
+    def kill_again(self):
+        """The next daemon comes no further than its beginning, or to where all are being woken."""
+        if self.rolls.random() < 0.5:
+            self._end()
+            address = f"unix:{self.folder}/again.sock"
+            process = subprocess.Popen([os.path.join(BIN, "mbcosimd"), "--listen", address, *self._options()], stderr=subprocess.DEVNULL)
+            time.sleep(self.rolls.uniform(0, 0.1))
+            process.kill()
+            process.wait()
+            self.daemon = self.start()
+        else:
+            self.restart()
+            with self.daemon.connect() as server:
+                waking = [server.simulations.ReadVariables.future(pb.ReadVariablesRequest(simulation=info.name)) for info in server.list()]
+                time.sleep(self.rolls.uniform(0, 0.1))
+                self.daemon.kill()
+                for call in waking:
+                    call.exception()
+            self.restart()
+        self.again += 1
 
     def stored(self, candidate):
         return on_disk(self.state, candidate.name) if candidate.durability == "checkpoint" else 0
 
-    def round(self):
-        """All step until the kill; then all are looked at."""
+    def round(self, again):
+        """All step until the kill, or two kills (`again`); then all are looked at."""
         self.create(candidate for candidate in self.all if candidate.durability == "none")
         killed = threading.Event()
         threads = [threading.Thread(target=candidate.run, args=(self.daemon.connect(), killed, random.Random(self.rolls.random())))
-                   for candidate in self.all]
+                   for candidate in self.all + self.restless]
         watched = self.rolls.choice([candidate for candidate in self.all if candidate.durability == "journal"])
         watcher = Watcher(self.daemon, watched.name, subscribes=self.rolls.random() < 0.3)
         for thread in threads:
@@ -174,7 +208,12 @@ class Ordeal:
         for thread in threads:
             thread.join(60)
         seen = watcher.end()
-        self.restart()
+        if again:
+            self.kill_again()
+        else:
+            self.restart()
+        said = [line for line in self.daemon.log().splitlines() if "put aside" in line]
+        self.faults += [f"{path.name} was put aside: {said}" for path in self.state.glob("simulations/*.damaged")]
         with self.daemon.connect() as server:
             there = {info.name for info in server.list()}
             for candidate in self.all:
@@ -182,6 +221,8 @@ class Ordeal:
                     self.faults.append(f"{candidate.kind}: it is {'still' if candidate.name in there else 'no longer'} there")
                 elif candidate.durability != "none":
                     candidate.check(server, stored[candidate], seen if candidate is watched else 0)
+            for owner in self.restless:
+                owner.check(server, self.restless_twin)
 
     def damage(self):
         """Files are damaged, a daemon is asked what it says to that, and the files are put back."""
@@ -239,7 +280,7 @@ class Ordeal:
         self.damages["flipped"] += 1
 
     def collect(self):
-        for candidate in self.all:
+        for candidate in self.all + self.restless:
             self.faults += candidate.faults
             candidate.faults = []
         return self.faults
@@ -276,14 +317,15 @@ def main():
     parser.add_argument("--minutes", type=float, default=0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--damage-every", type=int, default=5)
+    parser.add_argument("--again-every", type=int, default=5)
     options = parser.parse_args()
     print(f"seed {options.seed}", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         ordeal, start, kills = Ordeal(folder, options), time.monotonic(), 0
         try:
             while (time.monotonic() - start - 60 * options.minutes < 0 if options.minutes else kills < options.kills) and not ordeal.faults:
-                ordeal.round()
                 kills += 1
+                ordeal.round(again=kills % options.again_every == 0)
                 if kills % options.damage_every == 0:
                     ordeal.damage()
                 ordeal.collect()
@@ -299,8 +341,9 @@ def main():
 
 def report(ordeal, kills, start):
     steps = sum(candidate.due for candidate in ordeal.all)
-    print(f"{time.monotonic() - start:6.0f} s {kills:5} kills while they stepped, {ordeal.damages['torn']} torn entries, "
-          f"{ordeal.damages['flipped']} flipped bits, {steps} steps", flush=True)
+    turns = sum(owner.turns for owner in ordeal.restless)
+    print(f"{time.monotonic() - start:6.0f} s {kills:5} kills while they stepped, {ordeal.again} soon after, {ordeal.damages['torn']} torn entries, "
+          f"{ordeal.damages['flipped']} flipped bits, {steps} steps, {turns} turns of what comes and goes", flush=True)
 
 
 if __name__ == "__main__":
