@@ -12,7 +12,7 @@ from local_attacks import Damage
 from mbcosim.v1 import simulations_pb2 as pb, simulations_pb2_grpc
 
 ROUNDS = 4  # daemons
-MADE = 6  # simulations that each of them makes
+MADE = 8  # simulations that each of them makes
 FACTOR = float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
 METADATA = [("authorization", "Bearer root-token")]
 
@@ -44,7 +44,7 @@ class Crashes:
             else:
                 self.end(daemon)
         print(f"  {ROUNDS} daemons on damaged files: {self.damaged} files damaged, {self.asked} simulations asked, {self.codes}", flush=True)
-        if self.codes.get("OK", 0) < ROUNDS * MADE or self.damaged < ROUNDS:
+        if self.codes.get("OK", 0) < ROUNDS * MADE or self.asked < ROUNDS or self.damaged < ROUNDS:
             self.faults.append("hardly anything was damaged, or asked")
         return logs
 
@@ -90,7 +90,7 @@ class Crashes:
         return names
 
     def damage(self, names):
-        """A journal at least, and files of some others."""
+        """A journal at least, and files of half of all simulations: the others must come back beside them."""
         files = Damage(self.random)
         folders = [os.path.join(self.state, name.split("/")[1]) for name in names]
         journals = [os.path.join(folder, entry) for folder in folders for entry in os.listdir(folder) if entry.startswith("journal-")]
@@ -100,7 +100,7 @@ class Crashes:
         self.random.choice([files.flip, files.cut, files.lengthen, files.replace])(self.random.choice(journals))
         self.damaged += 1
         others = [entry.path for entry in os.scandir(self.state) if entry.is_dir()]
-        for folder in self.random.sample(others, min(len(others), 8)):
+        for folder in self.random.sample(others, len(others) // 2):
             self.damaged += files.damage(folder)
 
     def end(self, daemon):
