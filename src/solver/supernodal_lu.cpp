@@ -51,7 +51,6 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
       column_of_(factors.column_of),
       block_start_(factors.block_start),
       inverse_scale_(n_),
-      pivots_(n_),
       work_(n_, 0.0) {
   std::vector<double> largest(n_, 0.0);
   for (std::size_t p = 0; p < row_index.size(); ++p)
@@ -60,6 +59,13 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
   find_supernodes(factors);
   find_segments(factors);
   place_matrix(column_start, row_index);
+  const std::ptrdiff_t panels = panel_start_.back();
+  numbers_.resize(static_cast<std::size_t>(panels) + upper_row_.size() + n_ + above_row_.size());
+  panels_ = numbers_.data();
+  upper_ = panels_ + panels;
+  pivots_ = upper_ + upper_row_.size();
+  above_ = pivots_ + n_;
+  make_program();
 }
 
 void SupernodalLu::find_supernodes(const FactorPattern& factors) {
@@ -86,7 +92,6 @@ void SupernodalLu::find_supernodes(const FactorPattern& factors) {
     k = end;
   }
   first_.push_back(n_);
-  panels_.resize(static_cast<std::size_t>(panel_start_.back()));
 }
 
 /// A row of U within a supernode implies all later ones of it, as they are in its column of L.
@@ -106,7 +111,6 @@ void SupernodalLu::find_segments(const FactorPattern& factors) {
                       factors.upper_row.begin() + factors.upper_start[k + 1] - 1);
     upper_start_.push_back(static_cast<int>(upper_row_.size()));
   }
-  upper_.resize(upper_row_.size());
 }
 
 void SupernodalLu::place_matrix(const std::vector<int>& column_start,
@@ -128,7 +132,66 @@ void SupernodalLu::place_matrix(const std::vector<int>& column_start,
     entry_start_.push_back(static_cast<int>(entry_row_.size()));
     above_start_.push_back(static_cast<int>(above_row_.size()));
   }
-  above_.resize(above_row_.size());
+}
+
+std::ptrdiff_t SupernodalLu::below_diagonal(int k) const {
+  const int s = supernode_of_[k], first = first_[s];
+  const std::ptrdiff_t stride = first_[s + 1] - first + rows_start_[s + 1] - rows_start_[s];
+  return panel_start_[s] + (k - first) * (stride + 1) + 1;
+}
+
+/// Calls with the row and the place of each number of L in column k.
+template <class Use>
+void SupernodalLu::for_column_below(int k, Use use) const {
+  const int s = supernode_of_[k];
+  std::ptrdiff_t at = below_diagonal(k);
+  for (int i = k + 1; i < first_[s + 1]; ++i) use(i, at++);
+  for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) use(rows_[p], at++);
+}
+
+/// Where the list is short.
+void SupernodalLu::make_program() {
+  constexpr std::size_t kMost = 4096;  // operations; beyond, panels are as fast
+  if (numbers_.size() > EliminationProgram::kMostNumbers) return;
+  EliminationProgram elimination(numbers_.size());
+  std::vector<std::size_t> place(n_);  // of the numbers of one column, by row
+  std::size_t operations = 0;
+  for (int k = 0; k < n_; ++k) {
+    for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
+      place[upper_row_[p]] = place_of(upper_ + p);
+    place[k] = place_of(pivots_ + k);
+    for_column_below(k, [&](int row, std::ptrdiff_t at) { place[row] = at; });
+    set_column(k, place, elimination);
+    for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
+      for_column_below(upper_row_[p], [&](int row, std::ptrdiff_t at) {
+        elimination.subtract_product(place[row], at, place_of(upper_ + p));
+        ++operations;
+      });
+    for_column_below(
+        k, [&](int, std::ptrdiff_t at) { elimination.divide(at, place_of(pivots_ + k)); });
+    if (operations > kMost) return;
+  }
+  elimination.finish();
+  elimination_ = std::move(elimination);
+}
+
+/// The matrix's entries, among the numbers of the column or above its diagonal block.
+void SupernodalLu::set_column(int k, const std::vector<std::size_t>& place,
+                              EliminationProgram& program) const {
+  int above = above_start_[k];
+  for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p) {
+    const int row = entry_row_[p];
+    const bool is_above = above < above_start_[k + 1] && above_row_[above] == row;
+    program.set(is_above ? place_of(above_ + above++) : place[row],
+                value_start_[k] + p - entry_start_[k], inverse_scale_[row]);
+  }
+}
+
+bool SupernodalLu::eliminate(const double* values) {
+  std::fill(panels_, above_, 0.0);
+  elimination_->run(values, numbers_.data());
+  return std::all_of(pivots_, pivots_ + n_,
+                     [](double pivot) { return std::isfinite(pivot) && pivot != 0; });
 }
 
 /// Eliminates the rows of a segment from the column in work_.
@@ -136,7 +199,7 @@ void SupernodalLu::update(const Segment& segment) {
   const int s = segment.supernode, first = first_[s], below = rows_start_[s + 1] - rows_start_[s];
   const std::ptrdiff_t stride = first_[s + 1] - first + below;
   const int end = segment.end, skipped = segment.first - first, width = end - segment.first;
-  const double* panel = panels_.data() + panel_start_[s] + skipped * (stride + 1);
+  const double* panel = panels_ + panel_start_[s] + skipped * (stride + 1);
   double* const u = work_.data() + segment.first;
   if (width > 1) solve_triangle(panel, stride, u, width);
   if (end < first_[s + 1])
@@ -156,10 +219,9 @@ bool SupernodalLu::finish_column(int k, int supernode) {
   const double pivot = x[k];
   x[k] = 0;
   pivots_[k] = pivot;
-  const int first = first_[supernode], end = first_[supernode + 1];
+  const int end = first_[supernode + 1];
   const int below = rows_start_[supernode + 1] - rows_start_[supernode];
-  double* column = panels_.data() + panel_start_[supernode] +
-                   static_cast<std::ptrdiff_t>(k - first) * (end - first + below) + (k - first) + 1;
+  double* column = panels_ + below_diagonal(k);
   for (int i = k + 1; i < end; ++i, ++column) {
     *column = x[i] / pivot;
     x[i] = 0;
@@ -173,6 +235,10 @@ bool SupernodalLu::finish_column(int k, int supernode) {
 }
 
 bool SupernodalLu::factor(const double* values, const Watch& watch) {
+  if (elimination_) {
+    watch.look();
+    return eliminate(values);
+  }
   constexpr int kLook = 16;  // columns between two looks at the watch
   double* const x = work_.data();
   bool fine = true;
@@ -214,7 +280,7 @@ void SupernodalLu::solve(double* b) {
 }
 
 std::size_t SupernodalLu::bytes() const {
-  return sizeof(double) * (panels_.size() + upper_.size() + above_.size()) +
+  return sizeof(double) * numbers_.size() + (elimination_ ? elimination_->bytes() : 0) +
          sizeof(int) * (rows_.size() + upper_row_.size() + entry_row_.size() + above_row_.size()) +
          sizeof(Segment) * segments_.size();
 }

@@ -11,12 +11,15 @@
 /// to arithmetic operations", SIAM J. Sci. Stat. Comput. 9(5), 1988; supernodes: Demmel et al., "A
 /// supernodal approach to sparse partial pivoting", SIAM J. Matrix Anal. Appl. 20(3), 1999). L and
 /// U lie apart, each in the order in which it is read: large factors do not fit into the caches,
-/// and a solution costs what reading them costs.
+/// and a solution costs what reading them costs. Small matrices are factored by a list of
+/// operations, with the same bits.
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
+#include "solver/elimination_program.h"
 #include "solver/watch.h"
 
 namespace mbcosim {
@@ -34,6 +37,8 @@ class SupernodalLu {
   /// The matrix's pattern in compressed columns; `values`: those of the reference matrix.
   SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
                const double* values, const FactorPattern& factors);
+  SupernodalLu(const SupernodalLu&) = delete;
+  SupernodalLu& operator=(const SupernodalLu&) = delete;
 
   /// False when a pivot vanishes or is not a number: there are no factors then. Throws Stopped, and
   /// there are none, either.
@@ -58,6 +63,13 @@ class SupernodalLu {
   void place_matrix(const std::vector<int>& column_start, const std::vector<int>& row_index);
   void update(const Segment& segment);
   bool finish_column(int k, int supernode);
+  template <class Use>
+  void for_column_below(int k, Use use) const;
+  std::size_t place_of(const double* number) const { return number - numbers_.data(); }
+  void make_program();
+  void set_column(int k, const std::vector<std::size_t>& place, EliminationProgram& program) const;
+  bool eliminate(const double* values);
+  std::ptrdiff_t below_diagonal(int k) const;  ///< of column k, its first number in panels_
 
   int n_;
   std::vector<int> row_of_, column_of_, block_start_;
@@ -68,22 +80,24 @@ class SupernodalLu {
   std::vector<int> supernode_of_;       ///< by column (n)
   std::vector<int> rows_start_, rows_;  ///< rows below the square of each panel, by position
   std::vector<std::ptrdiff_t> panel_start_;
-  std::vector<double> panels_;
+  double* panels_ = nullptr;
 
   // U by columns, without the pivots
   std::vector<int> segment_start_;  ///< (n + 1)
   std::vector<Segment> segments_;
   std::vector<int> upper_start_, upper_row_;
-  std::vector<double> upper_;
-  std::vector<double> pivots_;  ///< (n)
+  double* upper_ = nullptr;
+  double* pivots_ = nullptr;  ///< (n)
 
   // the matrix: rows of the entries of each column, and entries above its diagonal block
   std::vector<int> value_start_;              ///< of each column among the matrix's values (n)
   std::vector<int> entry_start_, entry_row_;  ///< by position
   std::vector<int> above_start_, above_row_;  ///< by position
-  std::vector<double> above_;
+  double* above_ = nullptr;
 
-  std::vector<double> work_;  ///< by position; zero between calls
+  std::vector<double> numbers_;                    ///< panels, U, pivots, above
+  std::optional<EliminationProgram> elimination_;  ///< of small matrices
+  std::vector<double> work_;                       ///< by position; zero between calls
 };
 
 }  // namespace mbcosim

@@ -157,7 +157,7 @@ TEST(SupernodalLu, RefusesAVanishingPivotAndGoesOn) {
   const Sparse sparse(a);
   const FactorPattern pattern = factor_pattern(a, {0, 1, 2}, {0, 1, 2}, {0, 3});
   SupernodalLu fresh(sparse.column_start, sparse.row_index, sparse.values.data(), pattern);
-  SupernodalLu used = fresh;
+  SupernodalLu used(sparse.column_start, sparse.row_index, sparse.values.data(), pattern);
   Dense singular = a, invalid = a;
   singular(1, 1) = 8;  // second pivot 8 − 4·2
   invalid(0, 0) = NAN;

@@ -1,0 +1,55 @@
+/// Lists of operations by level: the bits of one operation after the other.
+#include "solver/elimination_program.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+namespace mbcosim {
+namespace {
+
+/// Any operations on a few numbers, so that nearly all depend on each other.
+TEST(EliminationProgram, GivesTheBitsOfOneOperationAfterTheOther) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    std::mt19937 generator(seed);
+    const std::size_t size = 3 + seed % 12;
+    const auto any = [&] {
+      return std::uniform_int_distribution<std::size_t>(0, size - 1)(generator);
+    };
+    const auto number = [&] { return std::uniform_real_distribution<double>(.5, 2)(generator); };
+    std::vector<double> values(size), expected(size), found(size, 0.0);
+    EliminationProgram program(size);
+    for (std::size_t k = 0; k < size; ++k) {
+      const double scale = number();
+      values[k] = number();
+      expected[k] = values[k] * scale;
+      program.set(k, static_cast<int>(k), scale);
+    }
+    for (int k = 0; k < 40; ++k) {
+      const std::size_t target = any(), other = any(), factor = any();
+      if (target == other || target == factor) continue;
+      if (generator() % 3 == 0) {
+        expected[target] /= expected[other];
+        program.divide(target, other);
+      } else {
+        expected[target] -= expected[factor] * expected[other];
+        program.subtract_product(target, factor, other);
+      }
+    }
+    program.finish();
+    program.run(values.data(), found.data());
+    EXPECT_EQ(found, expected) << seed;
+  }
+}
+
+TEST(EliminationProgram, OfNothingDoesNothing) {
+  EliminationProgram program(2);
+  program.finish();
+  std::vector<double> numbers{3, 4};
+  program.run(nullptr, numbers.data());
+  EXPECT_EQ(numbers, (std::vector<double>{3, 4}));
+}
+
+}  // namespace
+}  // namespace mbcosim
