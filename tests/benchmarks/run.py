@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """What mbcosim costs, beside another solver where one is given, in one table.
 
-usage: run.sh [--build FOLDER] [--peer "REF -s -f {deck} -o {prefix}"] [--small] [--json FILE] [--compare OLD.json]
+usage: run.sh [--build FOLDER] [--peer "REF -s -f {deck} -o {prefix}"] [--decks DECK...] [--small] [--json FILE] [--compare OLD.json]
 
-  tutorials   whole processes on MBDyn's tutorials with their text files, and without output (`none`)
+  tutorials   whole processes on MBDyn's tutorials with their text files, and without output (`none`); those of this project use `for:`,
+              which other solvers do not read: --decks names others
   start, read of a process; the rest of the rigid body's time is its 1000 steps and its text
   beams       cantilevers of three-node beams and grids of two-node beams: one Newton iteration of a process, and its memory;
               of the cantilevers also the parts of an iteration, by the engine alone
@@ -21,6 +22,7 @@ import os
 import pathlib
 import re
 import shlex
+import shutil
 import statistics
 import subprocess
 import sys
@@ -103,13 +105,13 @@ def geometric_mean(values):
     return math.exp(statistics.fmean(math.log(value) for value in values))
 
 
-def tutorials(table, solvers, folder, repeat):
+def tutorials(table, solvers, decks, folder, repeat):
     silent = pathlib.Path(folder) / "silent"
-    silent.mkdir()
-    for output, models in (("text", MODELS), ("none", without_output(silent))):
+    for output in ("text", "none"):
         cpu, wall = [], []
-        for name in TUTORIALS:
-            times, _ = solvers.run(models / f"{name}.mbd", folder, repeat)
+        for deck in decks:
+            name = deck.stem
+            times, _ = solvers.run(deck if output == "text" else without_output(deck, silent / name), folder, repeat)
             peer = times[1][0] * 1e3 if len(times) > 1 else None
             table.add(f"{name}, {output}", "ms", times[0][0] * 1e3, peer, wall=times[0][1] * 1e3)
             if peer:
@@ -119,14 +121,13 @@ def tutorials(table, solvers, folder, repeat):
             print(f"{f'geometric mean, {output}':38} processor {geometric_mean(cpu):.2f}, wall {geometric_mean(wall):.2f}, lowest {min(cpu):.2f}")
 
 
-def without_output(folder):
-    """Copies of all models with `default output: none`."""
-    for model in MODELS.iterdir():
-        if model.suffix in (".mbd", ".inc"):
-            (folder / model.name).write_text(re.sub(r"(begin *: *control data *;)", r"\1 default output: none;", model.read_text()))
-        else:
-            (folder / model.name).symlink_to(model)
-    return folder
+def without_output(deck, folder):
+    """A copy of the deck with `default output: none`, beside all that lies beside it."""
+    shutil.copytree(deck.parent, folder)
+    for file in folder.iterdir():
+        if file.name == deck.name or file.suffix in (".mbd", ".inc"):
+            file.write_text(re.sub(r"(begin *: *control data *;)", r"\1 default output: none;", file.read_text()))
+    return folder / deck.name
 
 
 def parts_of_a_process(table, binary, folder, repeat):
@@ -187,6 +188,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, default=HERE.parent.parent / "build")
     parser.add_argument("--peer", default="")
+    parser.add_argument("--decks", type=pathlib.Path, nargs="+", default=[MODELS / f"{name}.mbd" for name in TUTORIALS])
     parser.add_argument("--small", action="store_true")
     parser.add_argument("--repeat", type=int, default=0)
     parser.add_argument("--only", default="", help="some of tutorials,process,beams,engine,remote,reduce")
@@ -199,7 +201,7 @@ def main():
     table = Table(json.loads(options.compare.read_text()) if options.compare else {})
     solvers = Solvers(binary, options.peer)
     with tempfile.TemporaryDirectory() as folder:
-        sections = {"tutorials": lambda: tutorials(table, solvers, folder, repeat),
+        sections = {"tutorials": lambda: tutorials(table, solvers, [deck.resolve() for deck in options.decks], folder, repeat),
                     "process": lambda: parts_of_a_process(table, binary, folder, repeat),
                     "beams": lambda: beams(table, solvers, folder, 1 if options.small else 3, options.small),
                     "engine": lambda: engine_parts(table, build, options.small),
