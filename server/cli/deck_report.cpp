@@ -4,10 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
 #include <string_view>
-
-#include "model/output_row.h"
 
 namespace mbcosim::cli {
 
@@ -26,15 +23,6 @@ class NotedFiles : public FolderSource {
  private:
   std::vector<std::string>* read_;
 };
-
-/// The names that a run may write.
-std::vector<std::string> result_names(const std::string& prefix) {
-  std::vector<std::string> names;
-  for (const char* end : {"out", "log", "nc"}) names.push_back(prefix + "." + end);
-  for (int k = 0; k < static_cast<int>(OutputFile::count); ++k)
-    names.push_back(prefix + "." + extension(static_cast<OutputFile>(k)));
-  return names;
-}
 
 /// On terminals, unless NO_COLOR is set (no-color.org).
 bool shows_colours(std::FILE* out) {
@@ -70,14 +58,6 @@ std::string coloured(const Diagnostic& diagnostic) {
 DeckReport load_path(const std::string& deck, const SymbolValues& symbols,
                      std::vector<std::string>* read) {
   return read_deck(NotedFiles(read), deck, {.symbols = symbols});
-}
-
-std::string input_to_overwrite(const std::string& prefix, const std::vector<std::string>& read) {
-  std::error_code unknown;  // of a path that does not exist
-  for (const std::string& name : result_names(prefix))
-    for (const std::string& input : read)
-      if (std::filesystem::equivalent(name, input, unknown)) return input;
-  return {};
 }
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out) {

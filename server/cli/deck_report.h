@@ -15,9 +15,6 @@ namespace mbcosim::cli {
 DeckReport load_path(const std::string& deck, const SymbolValues& symbols = {},
                      std::vector<std::string>* read = nullptr);
 
-/// One of the files `read` that results with this prefix would overwrite; empty: none.
-std::string input_to_overwrite(const std::string& prefix, const std::vector<std::string>& read);
-
 /// Diagnostics as text, one after another.
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out);
 

@@ -6,6 +6,7 @@
 #include "cli/interrupt.h"
 #include "cli/pace.h"
 #include "cli/progress.h"
+#include "input/sources.h"
 #include "mbdyn/channels.h"
 #include "output/result_files.h"
 
@@ -107,6 +108,23 @@ std::vector<ResultFormat> formats_of(const RunOptions& options, const Model& mod
   return formats;
 }
 
+/// ErrorKind::argument when the run would write over, or remove, one of the files `read`.
+Status check_inputs(const std::vector<std::string>& read, const std::vector<std::string>& results,
+                    const std::vector<const DeckChannel*>& channels) {
+  if (const std::string input = file_in_both(read, results); !input.empty())
+    return make_error(ErrorKind::argument, "",
+                      "the results would overwrite \"" + input +
+                          "\", which the deck consists of\n"
+                          "  hint: choose other names with `-o PREFIX`");
+  for (const DeckChannel* channel : channels)
+    if (const auto input = file_in_both(read, mbdyn::files_changed_by(*channel)); !input.empty())
+      return make_error(ErrorKind::argument, "",
+                        channel->card + " would overwrite or remove \"" + input +
+                            "\", which the deck consists of\n"
+                            "  hint: give the files that this card names other names");
+  return ok();
+}
+
 }  // namespace
 
 int run(const RunOptions& options) {
@@ -128,14 +146,10 @@ int run(const RunOptions& options) {
                    port.name.c_str());
 
   const std::string prefix = options.prefix.empty() ? options.deck : options.prefix;
-  if (const std::string input = input_to_overwrite(prefix, read); !input.empty()) {
-    std::fprintf(stderr,
-                 "error: the results would overwrite \"%s\", which the deck consists of\n"
-                 "  hint: choose other names with `-o PREFIX`\n",
-                 input.c_str());
-    return kRefused;
-  }
   const auto writer = make_result_writer(formats_of(options, *report.model), prefix, nullptr);
+  const auto kept = check_inputs(read, writer->paths(*report.model),
+                                 coupled ? channels : std::vector<const DeckChannel*>{});
+  if (!kept) return complain(kept.error());
   const ExitCode exit_code = coupled ? simulate_coupled(report.model, writer, interrupt, options)
                                      : simulate(report.model, writer, interrupt.token(), options);
   const bool said = !writer->status();

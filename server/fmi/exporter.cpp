@@ -35,6 +35,18 @@ class RecordingSource : public FileSource {
   mutable std::map<std::string, std::string> files_;
 };
 
+/// ErrorKind::argument when the FMU would take the place of a file that the deck consists of.
+mbcosim::Status check_inputs(const std::map<std::string, std::string>& read, const fs::path& folder,
+                             const std::string& output) {
+  std::vector<std::string> inputs;
+  for (const auto& [name, content] : read) inputs.push_back((folder / name).string());
+  const std::string input = file_in_both(inputs, {output});
+  if (input.empty()) return ok();
+  return refused(ErrorKind::argument,
+                 "the FMU would overwrite \"" + input +
+                     "\", which the deck consists of\n  hint: choose another name with `-o`");
+}
+
 /// A name that a C compiler would take: letters, digits and underscores.
 std::string identifier_of(const std::string& stem) {
   std::string name;
@@ -125,6 +137,8 @@ mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
   const DeckReport loaded = read_deck(source, main_file, {.symbols = options.symbols});
   report.diagnostics = loaded.diagnostics;
   if (!loaded.ok()) return refused(ErrorKind::deck, "the deck is refused");
+  const auto kept = check_inputs(source.files(), path.parent_path(), options.output);
+  if (!kept) return kept.error();
   const Model& model = *loaded.model;
   if (const auto error = unfit(model)) return *error;
   const auto simulation = Simulation::prepare(loaded.model);

@@ -37,6 +37,12 @@ void write_layout(const DeckChannel& channel, const ForcePort& port, const Simul
 
 }  // namespace
 
+std::vector<std::string> files_changed_by(const DeckChannel& channel) {
+  std::vector<std::string> files = files_changed_at(channel.address);
+  if (!channel.echo.empty()) files.push_back(channel.echo);
+  return files;
+}
+
 Channels::Channels(const std::vector<const DeckChannel*>& channels, Simulation& simulation,
                    const Patience& patience)
     : simulation_(simulation), patience_(patience) {

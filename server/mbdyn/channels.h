@@ -13,6 +13,9 @@
 
 namespace mbcosim::mbdyn {
 
+/// The files that carrying out this channel writes, replaces or removes.
+std::vector<std::string> files_changed_by(const DeckChannel& channel);
+
 /// Channels of a prepared simulation. Every wait ends within the patience; what goes wrong is
 /// thrown as ChannelLost, out of `Simulation::step` and `start`, too, and names the channel.
 class Channels {

@@ -51,6 +51,8 @@ void put_modal(const ForceForm& form, const ForceState& state, std::ostream& out
   for (std::size_t k = 0; k < state.q.size(); ++k) out << state.q[k] << ' ' << state.qp[k] << '\n';
 }
 
+std::string temporary_of(const ChannelAddress& address) { return address.out + ".tmp"; }
+
 /// Numbers of an answer: with labels one more for each point and the reference node.
 struct Counts {
   explicit Counts(const ForceForm& form)
@@ -89,6 +91,13 @@ std::string state_text(const ForceForm& form, const ForceState& state, int preci
   return out.str();
 }
 
+std::vector<std::string> files_changed_at(const ChannelAddress& address) {
+  if (address.kind != ChannelAddress::Kind::files) return {};
+  std::vector<std::string> files{address.out, temporary_of(address)};
+  if (address.unlink) files.push_back(address.in);
+  return files;
+}
+
 FileWire::FileWire(const ChannelAddress& address, std::string name, ForceForm form,
                    Patience patience)
     : address_(address),
@@ -113,7 +122,7 @@ void FileWire::wait_until(bool exists, const std::string& path) const {
 
 void FileWire::send(Command, const ForceState& state) {
   if (address_.no_clobber) wait_until(false, address_.out);
-  const std::string temporary = address_.out + ".tmp";
+  const std::string temporary = temporary_of(address_);
   std::ofstream out(temporary, std::ios::trunc);
   out << state_text(form_, state, address_.precision);
   out.close();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "mbdyn/force_dialogue.h"
 #include "mbdyn/link.h"
@@ -27,6 +28,9 @@ class FileWire : public ForceWire {
   const ForceForm form_;
   const Patience patience_;
 };
+
+/// What a FileWire of this address writes, replaces or removes.
+std::vector<std::string> files_changed_at(const ChannelAddress& address);
 
 /// The state as MBDyn writes it, with `precision` digits after the point.
 std::string state_text(const ForceForm& form, const ForceState& state, int precision,

@@ -68,6 +68,15 @@ Result<std::string> FolderSource::read(const std::string& name) const {
   return text;
 }
 
+std::string file_in_both(const std::vector<std::string>& inputs,
+                         const std::vector<std::string>& outputs) {
+  std::error_code unknown;  // of a path that does not exist
+  for (const std::string& output : outputs)
+    for (const std::string& input : inputs)
+      if (fs::equivalent(output, input, unknown)) return input;
+  return {};
+}
+
 Result<std::string> BundleSource::read(const std::string& name) const {
   const auto it = files_.find(name);
   if (it != files_.end()) return it->second;

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "model/diagnostic.h"
 
@@ -39,5 +40,10 @@ class BundleSource : public FileSource {
  private:
   std::map<std::string, std::string> files_;
 };
+
+/// The first of `inputs` that is one of the files `outputs`, by whatever name; empty: none. Files
+/// that do not exist are none.
+std::string file_in_both(const std::vector<std::string>& inputs,
+                         const std::vector<std::string>& outputs);
 
 }  // namespace mbcosim

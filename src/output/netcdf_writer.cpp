@@ -47,12 +47,13 @@ struct Field {
 class NetcdfWriter : public ResultWriter, public OutputRow {
  public:
   NetcdfWriter(const std::string& prefix, ResultBudget* budget)
-      : prefix_(prefix), budget_(budget) {}
+      : path_(prefix + ".nc"), budget_(budget) {}
 
   bool has_named_fields() const override { return true; }
 
+  std::vector<std::string> paths(const Model&) const override { return {path_}; }
   void begin(const Model& model) override {
-    file_.create(prefix_ + ".nc", budget_);
+    file_.create(path_, budget_);
     file_.attribute(-1, "title", model.title);
     define_all(model);
   }
@@ -75,7 +76,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
 
   // What a later eigenanalysis left stays defined, until it is done again.
   void resume(const Model& model) override {
-    file_.reopen(prefix_ + ".nc", budget_);
+    file_.reopen(path_, budget_);
     define_all(model);
   }
   void positions(std::vector<std::int64_t>& out) const override {
@@ -207,7 +208,7 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   }
   void end() override {}
 
-  const std::string prefix_;
+  const std::string path_;
   ResultBudget* const budget_;  ///< may be null
   const Model* model_ = nullptr;
   bool sync_ = false;

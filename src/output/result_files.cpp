@@ -14,6 +14,11 @@ class BothWriters : public ResultWriter {
  public:
   BothWriters(std::shared_ptr<ResultWriter> first, std::shared_ptr<ResultWriter> second)
       : first_(std::move(first)), second_(std::move(second)) {}
+  std::vector<std::string> paths(const Model& model) const override {
+    std::vector<std::string> all = first_->paths(model), more = second_->paths(model);
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
   void begin(const Model& model) override {
     each([&](ResultWriter& w) { w.begin(model); });
   }

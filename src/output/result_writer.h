@@ -25,6 +25,8 @@ struct StepLine {
 class ResultWriter {
  public:
   virtual ~ResultWriter() = default;
+  /// Paths of all files that a run of `model` may write.
+  virtual std::vector<std::string> paths(const Model&) const { return {}; }
   /// Before anything else.
   virtual void begin(const Model& model) = 0;
   virtual void derivatives(double time, int iterations, double error) = 0;

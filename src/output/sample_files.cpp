@@ -4,16 +4,36 @@
 
 namespace mbcosim {
 
-void SampleFiles::open(const Model& model, const std::string& prefix, ResultBudget* budget) {
+namespace {
+
+std::vector<SampledTable> tables_of(const Model& model) {
+  std::vector<SampledTable> all;
   for (const auto& set : model.sets) {
     const auto* source = dynamic_cast<const SampledTableSource*>(set.get());
     if (!source) continue;
-    for (SampledTable& table : source->sampled_tables()) {
-      auto t = std::make_unique<Table>();
-      t->file.open(prefix + "." + table.file, budget);
-      t->source = std::move(table);
-      tables_.push_back(std::move(t));
-    }
+    for (SampledTable& table : source->sampled_tables()) all.push_back(std::move(table));
+  }
+  return all;
+}
+
+std::string path_of(const SampledTable& table, const std::string& prefix) {
+  return prefix + "." + table.file;
+}
+
+}  // namespace
+
+std::vector<std::string> sample_paths(const Model& model, const std::string& prefix) {
+  std::vector<std::string> paths;
+  for (const SampledTable& table : tables_of(model)) paths.push_back(path_of(table, prefix));
+  return paths;
+}
+
+void SampleFiles::open(const Model& model, const std::string& prefix, ResultBudget* budget) {
+  for (SampledTable& table : tables_of(model)) {
+    auto t = std::make_unique<Table>();
+    t->file.open(path_of(table, prefix), budget);
+    t->source = std::move(table);
+    tables_.push_back(std::move(t));
   }
 }
 

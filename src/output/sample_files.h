@@ -11,6 +11,9 @@
 
 namespace mbcosim {
 
+/// Of the files of `SampleFiles`.
+std::vector<std::string> sample_paths(const Model& model, const std::string& prefix);
+
 /// PREFIX.<file> for each table of the model: a row for each sample, six digits in fields of 16
 /// columns (MBDyn's format of identified models).
 class SampleFiles {

@@ -44,6 +44,7 @@ class TextFile {
     std::memcpy(p, s.data(), s.size());
     commit(p + s.size());
   }
+  const std::string& path() const { return path_; }
   bool flush();
   void create();
   bool finish();

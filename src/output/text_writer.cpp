@@ -34,6 +34,14 @@ class TextWriter : public ResultWriter, private OutputRow {
     log_.open(prefix + ".log", budget);
   }
 
+  std::vector<std::string> paths(const Model& model) const override {
+    std::vector<std::string> all = sample_paths(model, prefix_);
+    for (const TextFile& file : files_) all.push_back(file.path());
+    all.insert(all.end(), {out_.path(), log_.path()});
+    each_eigenanalysis(model, [&](const std::string& path, double) { all.push_back(path); });
+    return all;
+  }
+
   void begin(const Model& model) override {
     know(model);
     out_.create();
@@ -106,7 +114,7 @@ class TextWriter : public ResultWriter, private OutputRow {
   void resume(const Model& model) override {
     know(model);
     each([](TextFile& file) { file.reopen(); });
-    each_eigenanalysis([&](const std::string& path, double) {
+    each_eigenanalysis(*model_, [&](const std::string& path, double) {
       if (budget_) (void)budget_->take(size_of(path));
     });
   }
@@ -162,17 +170,17 @@ class TextWriter : public ResultWriter, private OutputRow {
   }
   /// Calls `action` with the path and the time of each eigenanalysis of the deck.
   template <class Action>
-  void each_eigenanalysis(Action&& action) const {
+  void each_eigenanalysis(const Model& model, Action&& action) const {
     int index = 0, count = 0;
-    for (const EigenSettings& s : model_->initial_value.eigenanalyses)
+    for (const EigenSettings& s : model.initial_value.eigenanalyses)
       count += static_cast<int>(s.times.size());
-    for (const EigenSettings& s : model_->initial_value.eigenanalyses)
+    for (const EigenSettings& s : model.initial_value.eigenanalyses)
       for (const double time : s.times)
         action(prefix_ + eigen_suffix(s, index++, count) + ".m", time);
   }
   /// Their files are none of this history any more.
   void forget_eigenanalyses_after(double now) {
-    each_eigenanalysis([&](const std::string& path, double time) {
+    each_eigenanalysis(*model_, [&](const std::string& path, double time) {
       const std::int64_t size = size_of(path);
       if (size == 0 || time <= now) return;
       std::error_code none;

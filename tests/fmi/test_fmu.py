@@ -718,6 +718,19 @@ def test_wrong_selections_and_decks_are_refused(tmp_path):
     assert export(pendulum, "-D", "L")[0] == 4
 
 
+def test_an_fmu_never_takes_the_place_of_its_deck(tmp_path):
+    (tmp_path / "part.mbd").write_text("set: const real unused = 1.;\n")
+    with open(os.path.join(MODELS, "pendulum.mbd")) as file:
+        (tmp_path / "p.mbd").write_text('include: "part.mbd";\n' + file.read())
+    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    for output in ("p.mbd", "part.mbd", f"../{tmp_path.name}/part.mbd"):
+        done = subprocess.run([os.path.join(BIN, "mbcosim"), "fmu", "p.mbd", "-o", output], cwd=tmp_path, capture_output=True, text=True,
+                              timeout=60)
+        assert done.returncode == 4 and f'the FMU would overwrite "{os.path.basename(output)}"' in done.stderr, done.stderr
+        assert "hint: choose another name with `-o`" in done.stderr
+        assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
+
+
 @pytest.mark.parametrize("standard", STANDARDS)
 def test_declared_units_have_their_names_and_factors(tmp_path, standard):
     deck, fmu = tmp_path / "deck.mbd", tmp_path / "deck.fmu"

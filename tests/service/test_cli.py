@@ -118,6 +118,44 @@ def test_results_never_overwrite_the_deck(tmp_path):
     assert (tmp_path / "x.log").read_text() == decks.body()
     os.link(tmp_path / "x.log", tmp_path / "y.mov")
     assert mbcosim("run", "x.log", "-o", "y", cwd=tmp_path).returncode == 4
+    # An eigenanalysis writes PREFIX_0.m.
+    (tmp_path / "eig_0.m").write_text(PART)
+    modes = decks.body().replace("end: initial value;", "eigenanalysis: 0., parameter, .1, output full matrices; end: initial value;")
+    (tmp_path / "modes").write_text('include: "eig_0.m";\n' + modes)
+    run = mbcosim("run", "modes", "-o", "eig", cwd=tmp_path)
+    assert run.returncode == 4 and 'would overwrite "eig_0.m"' in run.stderr
+    assert (tmp_path / "eig_0.m").read_text() == PART
+
+
+PART = "set: const real unused = 1.;\n"
+
+
+@pytest.mark.parametrize("part, address", [
+    ("a.mbd", '"in.dat", "a.mbd"'), ("a.tmp", '"in.dat", "a"'), ("a.mbd", '"a.mbd", unlink, "out.dat"'),
+    ("a.mbd", '"in.dat", "out.dat", sleep time, .01, 1, 1, echo, "a.mbd"')])
+def test_files_for_external_codes_never_take_the_place_of_the_deck(tmp_path, part, address):
+    (tmp_path / part).write_text(PART)
+    (tmp_path / "in.dat").write_text("1. 0. 0. 0. 0. 0.\n")
+    card = f"force: 5, external structural, {address}" + ("" if "echo" in address else ", sleep time, .01, 1, 1")
+    deck = decks.body().replace("rigid bodies: 1;", "rigid bodies: 1; forces: 1;").replace("end: elements;", card + "; end: elements;")
+    (tmp_path / "main").write_text(f'include: "{part}";\n' + deck)
+    run = mbcosim("run", "main", "-o", "out", "--peer-timeout", "1", cwd=tmp_path)
+    assert run.returncode == 4 and f'force 5 would overwrite or remove "{part}"' in run.stderr, run.stderr
+    assert "hint: give the files that this card names other names" in run.stderr
+    assert (tmp_path / part).read_text() == PART
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([part, "in.dat", "main"])
+    assert mbcosim("run", "main", "-o", "out", "--no-deck-sockets", cwd=tmp_path).returncode == 0
+
+
+def test_the_echo_of_a_stream_never_takes_the_place_of_the_deck(tmp_path):
+    (tmp_path / "a.mbd").write_text(PART)
+    driver = 'begin: drivers; file: 1, stream, stream drive name, "push", create, yes, path, "s", echo, "a.mbd", 1; end: drivers;'
+    deck = decks.body().replace("rigid bodies: 1;", "rigid bodies: 1; file drivers: 1;")
+    deck = deck.replace("begin: elements;", driver + " begin: elements;")
+    (tmp_path / "main").write_text('include: "a.mbd";\n' + deck)
+    run = mbcosim("run", "main", "-o", "out", "--peer-timeout", "1", cwd=tmp_path)
+    assert run.returncode == 4 and 'would overwrite or remove "a.mbd"' in run.stderr, run.stderr
+    assert (tmp_path / "a.mbd").read_text() == PART
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full device")

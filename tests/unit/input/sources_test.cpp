@@ -61,6 +61,13 @@ TEST_F(FolderSourceTest, UnrestrictedReadsTheUsersOwnFiles) {
   EXPECT_EQ(read((root_ / "secret").string(), true), "secret");
 }
 
+TEST_F(FolderSourceTest, OneFileIsKnownByAllItsNames) {
+  const std::string a = (root_ / "inside/a.mbd").string(), link = (root_ / "inside/good").string();
+  EXPECT_EQ(file_in_both({(root_ / "secret").string(), a}, {link}), a);
+  EXPECT_EQ(file_in_both({a}, {(root_ / "none").string(), (root_ / "secret").string()}), "");
+  EXPECT_EQ(file_in_both({(root_ / "none").string()}, {(root_ / "none").string()}), "");
+}
+
 TEST(BundleSource, KnowsItsFilesOnly) {
   const BundleSource bundle(std::map<std::string, std::string>{{"a/b", "text"}});
   EXPECT_EQ(*bundle.read("a/b"), "text");

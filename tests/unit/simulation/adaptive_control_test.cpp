@@ -1,5 +1,6 @@
 /// `electric: …, discrete control, …, adaptive control` in decks: closed forms of generalized
 /// predictive and deadbeat control, disturbances, changing processes.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "control_decks.h"
+#include "output/text_writer.h"
 #include "simulation/restored_runs.h"
 
 namespace mbcosim {
@@ -37,6 +39,13 @@ DeckRun oscillator(const std::string& law, const std::string& options,
                    const std::string& force = "0.", const std::string& orders = "1, 1, 2, 1") {
   return DeckRun(deck_of(with_forces(kOscillator, {force}),
                          adaptive(orders, law, kLearnAndObey + options) + kOutput, kCrankNicolson));
+}
+
+/// What the run may write is known before, the table of the identified model too.
+TEST(AdaptiveControl, ResultsNameTheTable) {
+  DeckRun run = oscillator("deadbeat, 5, 3", ", file, \"model.dat\"");
+  ASSERT_TRUE(run.ready());
+  EXPECT_THAT(make_text_writer("out")->paths(run.model()), testing::Contains("out.model.dat"));
 }
 
 // ---------------------------------------------------------------- deadbeat
