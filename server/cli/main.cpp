@@ -280,7 +280,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? kDone : kRefused;
+    return finished(app.exit(e) == 0 ? kDone : kRefused);
   } catch (const std::bad_alloc&) {
     std::fputs("error: out of memory\n", stderr);
     return kRefused;

@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <mutex>
 
 #include "output/netcdf_library.h"
@@ -42,7 +43,19 @@ bool NetcdfFile::take(std::size_t bytes) {
   return !over_budget_;
 }
 
-NetcdfFile::~NetcdfFile() { close(); }
+NetcdfFile::~NetcdfFile() {
+  close();
+  remove_rest();
+}
+
+void NetcdfFile::remove_rest() {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  if (created_ && !whole_ && !problem_.empty() &&
+      fs::is_regular_file(fs::symlink_status(path_, none)))
+    fs::remove(path_, none);
+  created_ = false;
+}
 
 void NetcdfFile::close() {
   if (id_ >= 0) check(locked(nc().close, id_));
@@ -56,7 +69,7 @@ void NetcdfFile::create(const std::string& path, ResultBudget* budget) {
   problem_ = nc().problem;
   if (!works()) return;
   check(locked(nc().create, path.c_str(), NC_CLOBBER | NC_64BIT_OFFSET, &id_));
-  defining_ = problem_.empty();
+  created_ = defining_ = problem_.empty();
 }
 
 void NetcdfFile::open() {
@@ -94,6 +107,9 @@ void NetcdfFile::write() {
   if (!defining_ || !works()) return;
   check(locked(nc().enddef, id_));
   defining_ = false;
+  if (!created_ || whole_ || !works()) return;
+  check(locked(nc().sync, id_));
+  whole_ = problem_.empty();
 }
 
 int NetcdfFile::dimension(const std::string& name, std::size_t length) {
@@ -164,6 +180,7 @@ Status NetcdfFile::flush(bool to_disk) {
 Status NetcdfFile::finish() {
   write();
   close();
+  remove_rest();
   return status();
 }
 

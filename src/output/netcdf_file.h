@@ -52,6 +52,8 @@ class NetcdfFile {
  private:
   void open();
   void close();
+  /// A file without its whole header cannot be read.
+  void remove_rest();
   void define();
   void write();
   void check(int code);
@@ -63,7 +65,8 @@ class NetcdfFile {
   std::int64_t bytes_ = 0;
   int id_ = -1;
   bool defining_ = false;
-  bool looks_up_ = false;  ///< the file may have definitions already
+  bool created_ = false, whole_ = false;  ///< `whole_`: its first header is in the file
+  bool looks_up_ = false;                 ///< the file may have definitions already
   bool over_budget_ = false;
 };
 

@@ -66,4 +66,7 @@ class ResultWriter {
   virtual Status finish() = 0;
 };
 
+/// ErrorKind::io for the first of these files that exists and cannot be written; creates nothing.
+Status check_writable(const std::vector<std::string>& paths);
+
 }  // namespace mbcosim

@@ -122,6 +122,7 @@ Status Simulation::Impl::start() {
   const InitialValueSettings& s = model->initial_value;
   using AbortAfter = InitialValueSettings::AbortAfter;
   if (writer) {
+    if (auto writable = check_writable(writer->paths(*model)); !writable) return writable;
     writer->begin(*model);
     if (auto status = writer->status(); !status) return status;
   }

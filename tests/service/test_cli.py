@@ -158,9 +158,36 @@ def test_the_echo_of_a_stream_never_takes_the_place_of_the_deck(tmp_path):
     assert (tmp_path / "a.mbd").read_text() == PART
 
 
+def test_outputs_that_exist_and_cannot_be_written_are_found_before_anything_is_created(tmp_path):
+    (tmp_path / "deck").write_text(decks.body(final_time=1e9))
+    for folder, option in (("x.mov", "text"), ("x.ine", "text"), ("x.nc", "netcdf")):
+        (tmp_path / folder).mkdir()
+        run = mbcosim("run", "deck", "-o", "x", "--format", option, cwd=tmp_path)
+        assert run.returncode == 4 and f'cannot write "{folder}": Is a directory' in run.stderr
+        assert sorted(p.name for p in tmp_path.iterdir()) == sorted(["deck", folder])
+        (tmp_path / folder).rmdir()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everything")
+def test_outputs_without_permission_are_found_before_anything_is_created(tmp_path):
+    (tmp_path / "deck").write_text(decks.body(final_time=1e9))
+    (tmp_path / "x.mov").touch(mode=0o400)
+    run = mbcosim("run", "deck", "-o", "x", cwd=tmp_path)
+    assert run.returncode == 4 and 'cannot write "x.mov": Permission denied' in run.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["deck", "x.mov"]
+
+
+def test_a_netcdf_file_without_its_header_is_removed(tmp_path):
+    (tmp_path / "deck").write_text(decks.body())
+    run = subprocess.run([MBCOSIM, "run", "deck", "-o", "x", "--format", "netcdf"], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+                         timeout=60, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (512, 512)))
+    assert run.returncode == 4 and "cannot write x.nc" in run.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["deck"]
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full device")
 def test_a_full_standard_output_is_an_error(deck):
-    for arguments in (["describe", str(deck)], ["describe", str(deck), "--json"], ["keywords"]):
+    for arguments in (["describe", str(deck)], ["describe", str(deck), "--json"], ["keywords"], ["--help"], ["--version"]):
         with open("/dev/full", "w", encoding="utf-8") as full:
             run = subprocess.run([MBCOSIM, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
         assert run.returncode == 4 and "cannot write to the standard output" in run.stderr

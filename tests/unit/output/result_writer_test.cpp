@@ -59,5 +59,18 @@ TEST_F(ResultFilesTest, EveryFileOfARunIsAmongThePaths) {
   EXPECT_THAT(told, testing::IsSupersetOf(written));
 }
 
+TEST_F(ResultFilesTest, AFolderInTheWayIsToldBeforeAnythingIsCreated) {
+  fs::create_directory(path("x_1.m"));
+  std::ofstream(path("x.mov")) << "of an earlier run";
+  const LoadReport report = load_deck(BundleSource({{"deck.mbd", std::string(kDeck)}}), "deck.mbd");
+  ASSERT_TRUE(report.ok());
+  const auto simulation =
+      Simulation::create(report.model, nullptr, make_result_writer(*report.model, path("x")));
+  ASSERT_FALSE(simulation);
+  EXPECT_EQ(simulation.error().message, "cannot write \"" + path("x_1.m") + "\": Is a directory");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 2);
+  EXPECT_EQ(fs::file_size(path("x.mov")), 17u);
+}
+
 }  // namespace
 }  // namespace mbcosim
