@@ -1,5 +1,6 @@
 #include "solver/divergence.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,38 +19,15 @@ std::string number(double value) {
   return text;
 }
 
-/// Diagonal of the box around all structural nodes [m].
+/// Diagonal of the box around all structural nodes, at the start or now, whichever is larger [m].
 double size_of(const Model& model, const State& state) {
-  Vec3 low = Vec3::Constant(HUGE_VAL), high = -low;
+  Eigen::AlignedBox3d start, now;
   for (const StructuralNode& node : model.structural) {
     if (node.is_dummy()) continue;
-    const Vec3 x(&state.y[node.first]);
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
+    start.extend(node.x);
+    now.extend(Vec3(&state.y[node.first]));
   }
-  return (high - low).norm();
-}
-
-/// A body's radius of gyration is of the order of the model's size, unless its inertia is in other
-/// units than its mass and the nodes' positions.
-std::string strange_inertia(const Model& model, const State& state) {
-  // kg mm² for kg m², or the reverse, changes the radius a thousandfold; small bodies are common.
-  constexpr double kLarge = 30, kSmall = 1.0 / 3000;
-  const double size = size_of(model, state);
-  if (!(size > 0)) return {};
-  for (const auto& set : model.sets) {
-    const auto* bodies = dynamic_cast<const ElementSetOf<Body>*>(set.get());
-    for (int i = 0; bodies && i < bodies->size(); ++i) {
-      const Body& body = bodies->element(i);
-      if (!(body.m > 0) || !(body.J0.trace() > 0)) continue;
-      const double radius = std::sqrt(body.J0.trace() / (2 * body.m));
-      if (radius < kLarge * size && radius > kSmall * size) continue;
-      return "body " + std::to_string(bodies->info(i).label) + " has a radius of gyration of " +
-             number(radius) + ", in a model that measures " + number(size) +
-             ": check the units of its mass and inertia, and those of positions and loads";
-    }
-  }
-  return {};
+  return start.isEmpty() ? 0 : std::max(start.diagonal().norm(), now.diagonal().norm());
 }
 
 VecX residual_at(const Model& model, State state, double time) {
@@ -100,14 +78,46 @@ std::string far_turn(const Model& model, const State& before, double h) {
 
 }  // namespace
 
+std::string remedy_by_units(const Model& model, const State& state) {
+  // kg mm² for kg m², or the reverse, changes the radius a thousandfold; small bodies are common.
+  constexpr double kLarge = 30, kSmall = 1.0 / 3000;
+  const double size = size_of(model, state);
+  if (!(size > 0)) return {};
+  for (const auto& set : model.sets) {
+    const auto* bodies = dynamic_cast<const ElementSetOf<Body>*>(set.get());
+    for (int i = 0; bodies && i < bodies->size(); ++i) {
+      const Body& body = bodies->element(i);
+      if (!(body.m > 0) || !(body.J0.trace() > 0)) continue;
+      const double radius = std::sqrt(body.J0.trace() / (2 * body.m));
+      if (radius < kLarge * size && radius > kSmall * size) continue;
+      return "body " + std::to_string(bodies->info(i).label) + " has a radius of gyration of " +
+             number(radius) + ", in a model that measures " + number(size) +
+             ": check the units of its mass and inertia, and those of positions and loads";
+    }
+  }
+  return {};
+}
+
 std::string remedy_by_cause(const Model& model, const State& before, double h) {
-  std::string text = strange_inertia(model, before);
-  if (text.empty()) text = jump_of_loads(model, before, h);
+  const std::string text = jump_of_loads(model, before, h);
   return text.empty() ? far_turn(model, before, h) : text;
 }
 
+bool goes_to_and_fro(const std::vector<double>& history) {
+  constexpr double kNear = 0.1, kBounded = 10;
+  const auto near = [&](double a, double b) { return std::abs(a - b) <= kNear * b; };
+  int returns = 0;
+  for (std::size_t k = 1; k < history.size(); ++k) {
+    if (!(history[k] <= kBounded * history[0])) return false;
+    const bool back =
+        near(history[k], history[k - 1]) || (k > 1 && near(history[k], history[k - 2]));
+    returns += back ? 1 : 0;
+  }
+  return returns >= 4;
+}
+
 std::string remedy_by_course(const std::vector<double>& history,
-                             const std::vector<WorstEquation>& worst) {
+                             const std::vector<WorstEquation>& worst, bool in_step) {
   int rises = 0, falls = 0, stays = 0, last_falls = 0;
   for (std::size_t k = 1; k < history.size(); ++k) {
     const double ratio = history[k] / history[k - 1];
@@ -118,17 +128,20 @@ std::string remedy_by_course(const std::vector<double>& history,
   }
   constexpr double kRounding = 1e-14;  // of the largest residual
   const auto [least, most] = std::minmax_element(history.begin(), history.end());
+  const std::string phase = in_step ? "`" : "`derivatives ";
   if (!history.empty() && *least < kRounding * *most && last_falls < 2)
     return "the residual has reached what rounding leaves of it: the tolerance is too small for "
-           "loads of this size; write a larger `tolerance`";
-  if ((rises >= 2 && falls >= 2) || stays >= 4)
+           "loads of this size; write a larger " +
+           phase + "tolerance`";
+  if (in_step && ((rises >= 2 && falls >= 2) || stays >= 4))
     return "the iteration goes to and fro" + (worst.empty() ? "" : " at " + worst[0].owner) +
            ": a contact, a stop, friction or the corner of a law or drive opens and closes; "
            "shorten "
            "the time step there (`strategy: factor`), smooth the law, or search along lines "
            "(`nonlinear solver: line search`)";
   if (last_falls >= 2)
-    return "the residual was still falling: allow more `max iterations`, or shorten the time step";
+    return "the residual was still falling: allow more " + phase + "max iterations`" +
+           (in_step ? ", or shorten the time step" : "");
   return {};
 }
 

@@ -77,6 +77,20 @@ bool has_diverged(const std::vector<double>& errors) {
   return !errors.empty() && !(errors.back() <= kFar * errors.front());
 }
 
+/// When nothing is known of the cause. `far`: the iteration diverged.
+std::string usual_remedy(bool in_step, bool far) {
+  if (!in_step)
+    return "look for loads and velocities too large at the start and for units that do not go "
+           "together (lengths, masses, inertia, forces), or change `derivatives coefficient`, "
+           "`derivatives tolerance` or `derivatives max iterations`";
+  if (far)
+    return "the iteration diverged from a sound state: shorten the time step (`strategy: factor` "
+           "does it when needed), apply loads more slowly, or search along lines (`nonlinear "
+           "solver: line search`)";
+  return "shorten the time step (`strategy: factor` does it when needed), or allow more `max "
+         "iterations`";
+}
+
 bool is_third_order(const MethodSettings& m) {
   return m.method == Method::third_order || m.method == Method::third_order_ad_hoc;
 }
@@ -223,10 +237,6 @@ PhaseReport Stepper::solve_derivatives(State& state) {
   if (!done) {
     report.error = failure(report.newton, state, "derivatives phase");
     explain(report, start);
-    if (report.newton.outcome == NewtonOutcome::not_converged)
-      report.error->message +=
-          "\n  hint: change `derivatives coefficient`, `derivatives tolerance` or `derivatives max "
-          "iterations`";
     return report;
   }
   choose_pivots(state);
@@ -580,26 +590,20 @@ void Stepper::explain(PhaseReport& report, const State& state) {
     e.message += cause.details();
     return;
   }
+  const std::vector<double>& history = e.failure.residual_history;
   const bool in_step = e.failure.time > state.time;
-  std::string remedy =
-      in_step ? remedy_by_cause(model_, state, e.failure.time - state.time) : std::string();
+  std::string remedy;
+  if (!in_step || !goes_to_and_fro(history)) remedy = remedy_by_units(model_, state);
+  if (remedy.empty() && in_step)
+    remedy = remedy_by_cause(model_, state, e.failure.time - state.time);
   if (remedy.empty()) cause = find_near_singularity(model_, workspace_.values);
   if (cause.rank_loss > 0) {
     e.message += "\n  " + cause.text();
     return;
   }
-  if (remedy.empty() && !far)
-    remedy = remedy_by_course(e.failure.residual_history, e.failure.worst);
-  if (remedy.empty() && far)
-    remedy =
-        "the iteration diverged from a sound state: shorten the time step (`strategy: factor` does "
-        "it when needed), apply loads more slowly, or search along lines (`nonlinear solver: line "
-        "search`)";
-  if (remedy.empty() && in_step)
-    remedy =
-        "shorten the time step (`strategy: factor` does it when needed), or allow more `max "
-        "iterations`";
-  if (!remedy.empty()) e.message += "\n  hint: " + remedy;
+  if (remedy.empty() && !far) remedy = remedy_by_course(history, e.failure.worst, in_step);
+  if (remedy.empty()) remedy = usual_remedy(in_step, far);
+  e.message += "\n  hint: " + remedy;
 }
 
 /// The matrix at an accepted state; false when it has no value there.
