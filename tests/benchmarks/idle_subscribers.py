@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""What subscribers that do not read cost a run. usage: idle_subscribers.py BIN [--subscribers N] [--seconds S] [--rounds R] [--distinct]
+"""What subscribers that do not read cost a run. usage: idle_subscribers.py BIN [--subscribers N] [--seconds S] [--rounds R] [--distinct] [--most-loss L]
 
 Starts a daemon, and measures the steps per second of one free body, by turns without subscribers and with N idle ones, whose
-flow-control windows are full by then. Prints each round and the medians. --distinct: no two subscriptions are equal.
+flow-control windows are full by then. Prints each round and the medians. --distinct: no two subscriptions are equal. --most-loss 0.10: the exit code is 1 when the
+medians differ by more than a tenth.
 """
 import argparse
 import os
@@ -62,6 +63,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=3)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--distinct", action="store_true")
+    parser.add_argument("--most-loss", type=float, default=1, help="largest part of the steps per second that may be lost")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         address = f"unix:{folder}/s"
@@ -84,6 +86,7 @@ def main():
                 watchers.wait(30)
             loss = 1 - statistics.median(watched) / statistics.median(alone)
             print(f"median {statistics.median(alone):.0f} -> {statistics.median(watched):.0f}: {100 * loss:.1f} % less")
+            return 0 if loss <= options.most_loss else 1
         finally:
             daemon.terminate()
             daemon.wait(30)
@@ -92,4 +95,4 @@ def main():
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--subscribe"]:
         subscribe(sys.argv[2], sys.argv[3], int(sys.argv[4]), sys.argv[5] == "1")
-    main()
+    sys.exit(main())
