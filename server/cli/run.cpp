@@ -56,7 +56,8 @@ ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& wr
   if ((*simulation)->finished()) {
     std::fprintf(stderr,
                  "note: no step was made: the final time, %g s (0 without the card `final time`), "
-                 "is not after the initial one\n",
+                 "is not after the initial one\n"
+                 "  hint: write a later `final time`, or `final time: forever`\n",
                  model->initial_value.final_time);
     return kDone;
   }

@@ -289,7 +289,7 @@ class Binder : CallBinder {
   void check_assignable(ValueType to, const SyntaxItem& item) {
     if (is_text(top_type()) && !is_text(to))
       throw ExpressionError(item.value_where, item.value_length,
-                            std::string("cannot convert string to ") + type_name(to));
+                            std::string("cannot convert string to ") + type_name(to), kNoQuotes);
   }
 
   void declare_local(const SyntaxItem& item) {

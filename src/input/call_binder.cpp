@@ -3,6 +3,7 @@
 #include "input/model_functions.h"
 #include "input/nearest.h"
 #include "input/reading.h"
+#include "input/suggest.h"
 #include "model/drive.h"
 #include "model/family.h"
 #include "model/model.h"
@@ -125,7 +126,9 @@ void CallBinder::call_current(const SyntaxItem& item) {
 void CallBinder::call_scalar_function(const SyntaxItem& item, std::string_view name) {
   check_count(item, item.name, 1, 2);
   const auto f = reading_.functions.find(name);
-  if (f == reading_.functions.end()) fail("scalar function " + in_quotes(name) + " is not defined");
+  if (f == reading_.functions.end())
+    fail("scalar function " + in_quotes(name) + " is not defined",
+         suggested_function(name, reading_.functions));
   convert_argument(item.name, 0, item.count, 'R');
   if (item.count == 2) convert_argument(item.name, 1, 2, 'I');
   reduce_model(item.count, Op::function_value).index =

@@ -211,7 +211,7 @@ int DeckCard::label(std::string_view what) {
 
 int DeckCard::count(std::string_view what) {
   const int n = integer(what);
-  if (n < 0) fail("count must not be negative, got " + std::to_string(n));
+  if (n < 0) fail("count must not be negative, got " + std::to_string(n), "write how many follow");
   return n;
 }
 

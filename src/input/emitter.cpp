@@ -33,7 +33,7 @@ void Emitter::push_value(const Value& v) {
 void Emitter::convert(int depth, ValueType to, Loss loss) {
   Entry& e = stack_[stack_.size() - 1 - depth];
   if (e.type == to) return;
-  if (is_text(e.type)) fail(std::string("cannot convert string to ") + type_name(to));
+  if (is_text(e.type)) fail(std::string("cannot convert string to ") + type_name(to), kNoQuotes);
   if (to == ValueType::integer && e.type == ValueType::boolean) {
     e.type = to;
     return;

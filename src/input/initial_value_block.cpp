@@ -25,7 +25,7 @@ void read_final_time(DeckCard& card) {
 
 void read_time_step(DeckCard& card) {
   double h = card.real("time step");
-  if (h == 0) card.fail("time step must not be zero");
+  if (h == 0) card.fail("time step must not be zero", "write a positive length");
   if (h < 0) {
     card.warn("time step is negative, its modulus is used", "write a positive length");
     h = -h;

@@ -168,7 +168,8 @@ TplDrivePtr<R, C> DeckCard::template_drive(std::string_view what, ReadEntity rea
     const SourceSpan where = more() ? next() : last();
     const typename Sum::Value entity = read();
     if (entity.isZero(0))
-      warn_at(where, std::string(what) + ": the direction is null, whatever the drive gives");
+      warn_at(where, std::string(what) + ": the direction is null, whatever the drive gives",
+              "give a direction, or leave the card out");
     terms.push_back({entity, drive(std::string(what) + ": drive")});
   };
   switch (one_of({"null", "component", "array", "reference", "zero", "single"})) {
@@ -342,10 +343,8 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
   if (known != deck_.reading.functions.end()) return known->second;
   if (deck_.damaged_kinds.count("scalar function \"" + name + "\""))
     deck_.reading.set_damaged(true);
-  std::vector<std::string> names;
-  for (const auto& f : deck_.reading.functions) names.push_back(f.first);
-  fail_at(where, "scalar function \"" + name + "\" is not defined", suggestion(name, names),
-          "undefined");
+  fail_at(where, "scalar function \"" + name + "\" is not defined",
+          suggested_function(name, deck_.reading.functions), "undefined");
 }
 
 FluidPtr DeckCard::fluid() {

@@ -1,5 +1,7 @@
 #include "input/sources.h"
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
@@ -51,15 +53,18 @@ Result<std::string> FolderSource::read(const std::string& name) const {
   if (!unrestricted_ && leads_out(name))
     return io_error(quote(name) + " is outside the allowed folder");
   std::error_code ec;
+  const auto closed = [&](const std::string& reason) {
+    return io_error("cannot open " + quote(name) + (unrestricted_ ? ": " + reason : ""));
+  };
   const fs::path folder = fs::canonical(folder_.empty() ? "." : folder_, ec);
-  if (ec) return io_error("cannot open " + quote(name));
+  if (ec) return closed(ec.message());
   const fs::path path = fs::canonical(folder / name, ec);
-  if (ec) return io_error("cannot open " + quote(name));
+  if (ec) return closed(ec.message());
   if (!unrestricted_ && !is_below(path, folder))
     return io_error(quote(name) + " is outside the allowed folder");
   if (!fs::is_regular_file(path, ec)) return io_error(quote(name) + " is not a regular file");
   std::ifstream in(path, std::ios::binary);
-  if (!in) return io_error("cannot open " + quote(name));
+  if (!in) return closed(std::strerror(errno));
   std::string text;
   const auto size = fs::file_size(path, ec);
   if (!ec) text.resize(size);

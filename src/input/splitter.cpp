@@ -27,8 +27,35 @@ Splitter::Splitter(Reading& reading, int file)
 
 void Splitter::report(std::size_t at, std::size_t length, const std::string& message,
                       const char* code, const std::string& hint) {
+  if (const std::size_t zero = text_.find('\0'); zero != std::string_view::npos) {
+    binary_ = true;
+    reading_.report(reading_.diagnostic(
+        Severity::error, "syntax", reading_.span(file_, zero, 1),
+        "this file is no text: it has bytes that are zero",
+        "a deck is text in ASCII or UTF-8: check the name of the file, or save it as such"));
+    return;
+  }
   reading_.report(
       reading_.diagnostic(Severity::error, code, reading_.span(file_, at, length), message, hint));
+}
+
+/// Of an unterminated string in the statement from `begin` on: the first string that does not end
+/// on its line. Quotes pair up wrongly from there on. None: the last one, at `last`.
+std::size_t Splitter::open_string(std::size_t begin, std::size_t last) {
+  for (std::size_t at = begin; at < last;) {
+    if (text_[at] == '#') {
+      at = skip_line_comment(text_, at);
+    } else if (text_[at] == '/' && char_at(text_, at + 1) == '*') {
+      at = skip_block_comment(text_, at);
+    } else if (text_[at] == '"') {
+      const std::size_t end = skip_string(text_, at);
+      if (text_.substr(at, end - at).find('\n') != std::string_view::npos) return at;
+      at = end;
+    } else {
+      ++at;
+    }
+  }
+  return last;
 }
 
 /// Past the comment at `at`, or npos.
@@ -110,7 +137,8 @@ void Splitter::recover(std::size_t begin, const End& end) {
       at_ = text_.size();
       return;
     case Trouble::text:
-      report(end.at, 1, "unterminated string", "syntax", "end it with a double quote");
+      report(open_string(begin, end.at), 1, "unterminated string", "syntax",
+             "end it with a double quote");
       break;
     case Trouble::comment:
       report(end.at, 2, "unterminated comment", "syntax", "end it with `*/`");
@@ -170,7 +198,7 @@ bool Splitter::finish_statement(std::size_t begin, Statement* s) {
 }
 
 std::optional<Statement> Splitter::next() {
-  while (!reading_.full() && skip_to_statement()) {
+  while (!binary_ && !reading_.full() && skip_to_statement()) {
     const std::size_t begin = at_;
     const char c = text_[begin];
     if (is_word_start(c)) {

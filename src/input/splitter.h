@@ -26,6 +26,7 @@ class Splitter {
 
   bool skip_to_statement();
   std::size_t skip_comment(std::size_t at);
+  std::size_t open_string(std::size_t begin, std::size_t last);
   bool finish_statement(std::size_t begin, Statement* statement);
   End find_end(std::size_t begin, bool brackets);
   void recover(std::size_t begin, const End& end);
@@ -37,6 +38,7 @@ class Splitter {
   int file_;
   std::string_view text_;
   std::size_t at_ = 0;
+  bool binary_ = false;  ///< it is no text: nothing more is read
 };
 
 }  // namespace mbcosim

@@ -211,7 +211,8 @@ Mat3 DeckCard::two_vectors(std::string_view what) {
   const Vec3 ca = a.normalized();
   const bool follows = ib == (ia + 1) % 3;
   const Vec3 normal = follows ? Vec3(ca.cross(b.normalized())) : Vec3(b.normalized().cross(ca));
-  if (!(normal.squaredNorm() > kEpsilon)) fail(name + ": vectors are parallel");
+  if (!(normal.squaredNorm() > kEpsilon))
+    fail(name + ": vectors are parallel", "give two axes with different directions");
   const int ic = 3 - ia - ib;
   Mat3 r;
   r.col(ia) = ca;

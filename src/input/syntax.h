@@ -28,6 +28,9 @@ class ExpressionError : public EvaluationError {
   std::string hint, code;
 };
 
+/// What to do about a string where a number is wanted.
+inline constexpr const char* kNoQuotes = "write a value of this type, without quotes";
+
 /// A piece of an expression as messages show it.
 inline std::string in_quotes(std::string_view s) { return '"' + std::string(s) + '"'; }
 

@@ -161,6 +161,7 @@ DeckReport read_deck(const FileSource& files, const std::string& main_file,
       report.diagnostics.push_back(
           plain_error(limit ? "limit-deck-bytes" : "no-file", main_file,
                       opened.error().message + (limit ? " (limit `deck-bytes`)" : "")));
+      if (!limit) report.diagnostics.back().hint = "check the name of the deck's main file";
       return report;
     }
     std::vector<Diagnostic> extra;

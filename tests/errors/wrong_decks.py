@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""Twenty-two wrong decks, scored. usage: wrong_decks.py BIN
+"""Twice twenty-two wrong decks, scored. usage: wrong_decks.py BIN
 
-Each deck of decks/ has one fault. `mbcosim run` must tell place and cause (one point) and a remedy (one point): what it prints is
-searched for the patterns below. Prints the score and what lacks; the exit code is 0 when nothing does.
+Each deck of decks/, and each of changed_decks.py, has one fault. `mbcosim run` must tell place and cause (one point) and a remedy
+(one point): what it prints is searched for the patterns below. Prints the score and what lacks; the exit code is 0 when nothing does.
 """
 import os
 import re
 import subprocess
 import sys
 import tempfile
+
+import changed_decks
 
 DECKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "decks")
 CARD = r"{deck}\.mbd:%s: %s: .*"
@@ -44,29 +46,44 @@ FAULTS = {
 
 
 def run(program, deck, folder):
-    command = [os.path.join(program, "mbcosim"), "run", os.path.join(DECKS, deck + ".mbd"), "-o", os.path.join(folder, "out")]
+    command = [os.path.join(program, "mbcosim"), "run", deck, "-o", os.path.join(folder, "out")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     return done.returncode, done.stdout + done.stderr
 
 
-def score(code, printed, deck, fault):
+def score(code, printed, fault):
     wanted, place_and_cause, remedy = fault
-    found = [bool(re.search(pattern.replace("{deck}", deck), printed)) for pattern in (place_and_cause, remedy)]
+    found = [bool(re.search(pattern, printed)) for pattern in (place_and_cause, remedy)]
     return [code == wanted and found[0], found[1]]
+
+
+def decks(folder):
+    """Name, path and fault of each deck."""
+    for name, (code, place_and_cause, remedy) in FAULTS.items():
+        yield name, os.path.join(DECKS, name + ".mbd"), (code, place_and_cause.replace("{deck}", name), remedy)
+    for name, text in changed_decks.PARTS.items():
+        with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+            file.write(text)
+    for name, (text, *fault) in changed_decks.FAULTS.items():
+        path = os.path.join(folder, "deck.mbd")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        yield name, path, fault
 
 
 def main():
     assert {name[:-len(".mbd")] for name in os.listdir(DECKS)} == set(FAULTS)
-    points = 0
+    points = most = 0
     with tempfile.TemporaryDirectory() as folder:
-        for deck, fault in FAULTS.items():
-            code, printed = run(sys.argv[1], deck, folder)
-            got = score(code, printed, deck, fault)
+        for name, path, fault in decks(folder):
+            code, printed = run(sys.argv[1], path, folder)
+            got = score(code, printed, fault)
             points += sum(got)
+            most += 2
             if sum(got) < 2:
-                print(f"{deck}: place and cause {'+' if got[0] else '-'}, remedy {'+' if got[1] else '-'}; exit code {code}\n{printed}")
-    print(f"{points} of {2 * len(FAULTS)}")
-    sys.exit(0 if points == 2 * len(FAULTS) else 1)
+                print(f"{name}: place and cause {'+' if got[0] else '-'}, remedy {'+' if got[1] else '-'}; exit code {code}\n{printed}")
+    print(f"{points} of {most}")
+    sys.exit(0 if points == most else 1)
 
 
 if __name__ == "__main__":

@@ -210,6 +210,22 @@ def test_a_run_without_a_final_time_tells_that_it_made_no_step(tmp_path):
     run = mbcosim("run", str(tmp_path / "deck"))
     assert run.returncode == 0
     assert "note: no step was made: the final time, 0 s (0 without the card `final time`)" in run.stderr
+    assert "hint: write a later `final time`" in run.stderr
+
+
+def test_a_deck_that_is_not_there_is_told_with_the_reason(tmp_path):
+    run = mbcosim("run", "nothing.mbd", cwd=tmp_path)
+    assert run.returncode == 2 and 'nothing.mbd: error: cannot open "nothing.mbd": No such file or directory' in run.stderr
+    assert "hint: check the name of the deck's main file" in run.stderr
+
+
+@pytest.mark.parametrize("content", [b"\x7fELF\x02\x01\x01\0\0\0", b"PK\x03\x04\x14\0\0\0", "begin: data;\n".encode("utf-16")])
+def test_a_file_that_is_no_text_is_told_so(tmp_path, content):
+    (tmp_path / "binary").write_bytes(content)
+    run = mbcosim("run", "binary", cwd=tmp_path)
+    assert run.returncode == 2 and run.stderr.count("error:") == 1
+    assert "error: this file is no text: it has bytes that are zero" in run.stderr
+    assert "hint: a deck is text in ASCII or UTF-8" in run.stderr
 
 
 def test_a_run_in_real_time_lasts_as_long_as_the_model(tmp_path):

@@ -61,8 +61,10 @@ void read_body(Card& card, ElementInfo& info) {
   if (n.kind == StructuralKind::static_displacement ||
       (n.kind == StructuralKind::static_ && !card.model().control.is_static &&
        !inverse_problem(card.model())))
-    card.fail("structural node " + std::to_string(n.label) +
-              " is static; a body needs a dynamic node");
+    card.fail(
+        "structural node " + std::to_string(n.label) + " is static; a body needs a dynamic node",
+        n.is_displacement() ? "make the node `dynamic displacement`, or remove the body"
+                            : "make the node `dynamic`, or remove the body");
   if (n.is_displacement()) {
     const double m = card.real("mass");
     if (!(m > 0)) card.fail("mass must be positive");

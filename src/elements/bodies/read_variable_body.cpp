@@ -11,10 +11,10 @@ void check_node(Card& card, const StructuralNode& node) {
   const bool is_static = card.model().control.is_static;
   if (node.kind == StructuralKind::dynamic || (node.kind == StructuralKind::static_ && is_static))
     return;
-  card.fail(
-      "structural node " + std::to_string(node.label) + " is " + kind_name(node.kind) +
-          "; a body of variable mass needs a dynamic node",
-      node.is_displacement() ? "only nodes with an orientation have a body of variable mass" : "");
+  card.fail("structural node " + std::to_string(node.label) + " is " + kind_name(node.kind) +
+                "; a body of variable mass needs a dynamic node",
+            node.is_displacement() ? "only nodes with an orientation have a body of variable mass"
+                                   : "make the node `dynamic`, or remove the body");
 }
 
 /// A drive with a time derivative, which `read` reads.

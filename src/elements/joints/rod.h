@@ -32,7 +32,9 @@ struct Rod : TwoAttachments, LawUser<Rod, 1> {
     const Vec<T> lp = u.v(1) + u.w(1).cross(k.f2) - u.v(0) - u.w(0).cross(k.f1);
     const T square = k.l.dot(k.l);
     if (!(value_of(square) > 0))
-      throw EvaluationError("rod " + std::to_string(u.label()) + " has no length any more");
+      throw EvaluationError(
+          "rod " + std::to_string(u.label()) +
+          " has no length any more; use a shorter step, or check the loads on its nodes");
     k.length = sqrt(square);
     k.rate = k.l.dot(lp) / k.length;
     return k;

@@ -61,7 +61,9 @@ struct Contact {
     using std::pow;
     if ((N == 3 && i < 2) || e >= T(0.0)) return T(0.0);
     if (!(e > T(-1.0)))
-      throw EvaluationError("contact elastic: the strain reached -1, full compression");
+      throw EvaluationError(
+          "contact elastic: the strain reached -1, full compression; use a shorter step or a "
+          "stiffer contact");
     return (T(1.0) - pow(e + 1.0, -gamma)) * k;
   }
 };

@@ -61,6 +61,10 @@ TEST_F(FolderSourceTest, UnrestrictedReadsTheUsersOwnFiles) {
   EXPECT_EQ(read((root_ / "secret").string(), true), "secret");
 }
 
+TEST_F(FolderSourceTest, UnrestrictedTellsTheReason) {
+  EXPECT_EQ(read("missing", true), "error: cannot open \"missing\": No such file or directory");
+}
+
 TEST_F(FolderSourceTest, OneFileIsKnownByAllItsNames) {
   const std::string a = (root_ / "inside/a.mbd").string(), link = (root_ / "inside/good").string();
   EXPECT_EQ(file_in_both({(root_ / "secret").string(), a}, {link}), a);
