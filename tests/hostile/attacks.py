@@ -20,6 +20,7 @@ import grpc
 sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "service"))
 import decks
 import local_attacks
+from broken_off import BrokenOff
 from fuzzer import Fuzzer
 from requests_of_http import Requests
 from google.protobuf import descriptor_pool, message_factory
@@ -177,54 +178,10 @@ class Attacker:
             self.codes["CANCELLED"] += 1
 
     def cancel(self):
-        """Uploads, steps, runs and analyses broken off at every point."""
-        name = None
+        """Uploads, steps, runs, analyses, reductions, exports and imports, broken off at every point."""
+        attack = BrokenOff(self, BODY, local_attacks.PORT)
         while self.going():
-            name = name or self.create(ports=[local_attacks.PORT]
-                                       if self.random.random() < 0.3 else [])
-            if not name:
-                time.sleep(0.05)
-                continue
-            stop = threading.Event()
-
-            def half():
-                yield pb.UploadRequest(header=pb.UploadHeader(bundle_main_file="deck"))
-                yield pb.UploadRequest(chunk={"path": "deck", "data": BODY.encode()})
-                stop.wait(5)
-
-            what = self.random.randrange(10)
-            options = dict(metadata=self.metadata, timeout=5)
-            if what == 0:
-                future = self.stub.CreateSimulation.future(half(), **options)
-            elif what == 1:
-                future = self.stub.Step.future(pb.StepRequest(simulation=name, steps=100000), **options)
-            elif what == 2:
-                future = self.stub.ComputeEigenvalues.future(pb.ComputeEigenvaluesRequest(simulation=name), **options)
-            elif what == 3:
-                future = self.stub.Linearize.future(pb.LinearizeRequest(simulation=name), **options)
-            elif what == 4:
-                future = self.stub.Run(pb.RunRequest(step=pb.StepRequest(simulation=name, steps=100000)), **options)
-            elif what == 5:
-                future = self.stub.StepStream((pb.StepRequest(simulation=name, steps=50) for _ in range(20)), **options)
-            elif what == 6:
-                future = self.stub.ExportSnapshot(pb.ExportSnapshotRequest(simulation=name), **options)
-            elif what == 7:
-                future = self.stub.ValidateModel.future(half(), **options)
-            elif what == 8:
-                hello = coupling_pb2.PeerMessage(hello=coupling_pb2.Hello(simulation=name, port="p"))
-                future = self.channel.stream_stream(
-                    "/mbcosim.v1.Coupling/Attach", request_serializer=coupling_pb2.PeerMessage.SerializeToString,
-                    response_deserializer=coupling_pb2.ServerMessage.FromString)(iter([hello]), **options)
-            else:
-                future = self.stub.ForkSimulation.future(pb.ForkSimulationRequest(
-                    simulation=name, options=pb.CreateOptions(lease=Duration(seconds=1))), **options)
-            time.sleep(self.random.choice([0, 0.0005, 0.002, 0.01, 0.05]))
-            future.cancel()
-            stop.set()
-            self.codes["CANCELLED"] += 1
-            if self.random.random() < 0.02:
-                self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))
-                name = None
+            attack.once()
 
     def race(self):
         """Create, fork with short leases, delete, restore, step: from four threads on the same simulations."""
