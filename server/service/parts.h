@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -10,7 +9,9 @@
 #include "rpc/methods.h"
 #include "service/config.h"
 #include "service/event_log.h"
+#include "service/keeping.h"
 #include "service/session_store.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::server {
 
@@ -82,9 +83,7 @@ void once_stored(const SessionStore& store, Session& session, const CallFrame& f
     return;
   }
   HeldEvents events;
-  {
-    std::unique_lock<Mutex> no_checkpoint;
-    if (session.keeping()) no_checkpoint = std::unique_lock(session.keeping()->mutex);
+  const auto act = [&] {
     if constexpr (stores)
       body(session, request, reply, frame, &turn);
     else if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*,
@@ -94,6 +93,12 @@ void once_stored(const SessionStore& store, Session& session, const CallFrame& f
       body(session, request, reply);
     turn.keep(*reply);
     session.note_change();
+  };
+  if (Keeping* const keeping = session.keeping()) {
+    const Guard no_checkpoint(keeping->mutex);
+    act();
+  } else {
+    act();
   }
   if (stores) return;
   try {

@@ -77,7 +77,7 @@ def arrows(root):
 
 def locks(root):
     """Of locks below server/ that clang's analysis (repository.thread_safety) does not see."""
-    plain = re.compile(r"std::(\w*mutex|condition_variable\w*)\b")
+    plain = re.compile(r"std::(\w*mutex|condition_variable\w*|unique_lock|lock_guard|scoped_lock)\b")
     for path in sources(root / "server", ".h", ".cpp"):
         found = plain.search(path.read_text(encoding="utf-8"))
         if found and path != root / "server" / "threads" / "mutex.h":
