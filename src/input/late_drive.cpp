@@ -272,8 +272,9 @@ class RepeatingCard final : public DriveCard {
   std::size_t position_ = 0;
 };
 
-/// What is made from the sampled numbers, kept until they change. The value depends on the numbers
-/// alone; what is kept only saves time.
+/// What is made from the sampled numbers, kept until they change: the exception to the rule that
+/// nothing in a model changes. Safe, because the value depends on the numbers alone, so that what
+/// is kept only saves time, and because threads replace an immutable entry by one atomic pointer.
 template <class Ptr>
 class Made {
  public:

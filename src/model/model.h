@@ -1,5 +1,7 @@
 /// Model: everything that is fixed once a deck is read. Immutable and shared between sessions and
-/// threads: what is const is so to the last element.
+/// threads: what is const is so to the last element. One part of it keeps what it has computed,
+/// behind an atomic pointer and without a trace in any result: drives in the hints of `driven`
+/// (input/late_drive.cpp).
 #pragma once
 
 #include <array>
