@@ -65,9 +65,6 @@ class ArxIdentifier {
   const double* y(const double* memory, int i) const { return memory + y_ + i * model_.outputs; }
   const double* u(const double* memory, int i) const { return memory + u_ + i * model_.inputs; }
   const double* e(const double* memory, int i) const { return memory + e_ + i * model_.outputs; }
-  int y_samples() const { return y_samples_; }
-  int u_samples() const { return u_samples_; }
-  int e_samples() const { return e_samples_; }
 
  private:
   void gather(double* memory) const;
