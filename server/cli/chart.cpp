@@ -173,12 +173,11 @@ Status picture(const std::vector<Curve>& curves, const std::string& x_name,
       !std::filesystem::exists(path))
     feed({"python3", "-"}, python_script(curves, x_name, title, path));
   if (std::filesystem::exists(path)) return ok();
-  Error error;
-  error.kind = ErrorKind::io;
-  error.message = "cannot draw \"" + path +
-                  "\": that is done by gnuplot, or by Python's matplotlib (Debian: gnuplot-nox or "
-                  "python3-matplotlib); without --png the curves are drawn on the terminal";
-  return error;
+  return make_error(
+      ErrorKind::io, "",
+      "cannot draw \"" + path +
+          "\": that is done by gnuplot, or by Python's matplotlib (Debian: gnuplot-nox or "
+          "python3-matplotlib); without --png the curves are drawn on the terminal");
 }
 
 }  // namespace mbcosim::cli

@@ -85,12 +85,12 @@ bool has_nothing_to_run(const LoadReport& report) {
          report.printed.empty();
 }
 
-void print_nothing_to_run(const std::string& deck, const char* severity, std::FILE* out) {
+void print_nothing_to_run(const std::string& deck, Severity severity, std::FILE* out) {
   std::fprintf(out,
                "%s: %s: there is nothing to run: the deck has no nodes and no elements\n"
                "  hint: a deck consists of the blocks data, initial value, control data, nodes "
                "and elements\n",
-               deck.c_str(), severity);
+               deck.c_str(), severity_name(severity));
 }
 
 ExitCode exit_code_of(const Error& error) {

@@ -24,8 +24,8 @@ ExitCode exit_code_of(const Error& error);
 
 /// Is there neither a node nor an element, and was nothing printed, as a calculation would?
 bool has_nothing_to_run(const LoadReport& report);
-/// Says so; `severity`: "error" or "warning".
-void print_nothing_to_run(const std::string& deck, const char* severity, std::FILE* out);
+/// Says so.
+void print_nothing_to_run(const std::string& deck, Severity severity, std::FILE* out);
 
 /// An error of the solver: message, residual history, worst equations.
 void print_error(const Error& error, std::FILE* out);

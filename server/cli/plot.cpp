@@ -35,10 +35,7 @@ const Words& joint_words() {
 }
 
 Error plot_error(std::string message) {
-  Error error;
-  error.kind = ErrorKind::argument;
-  error.message = std::move(message);
-  return error;
+  return make_error(ErrorKind::argument, "", std::move(message));
 }
 
 /// Columns by a word, or by a number.

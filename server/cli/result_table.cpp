@@ -14,10 +14,7 @@ namespace {
 constexpr const char* kNoTables[] = {"log", "m", "mbd", "nc", "out", "pmm", "png", "usr"};
 
 Error table_error(ErrorKind kind, std::string message) {
-  Error error;
-  error.kind = kind;
-  error.message = std::move(message);
-  return error;
+  return make_error(kind, "", std::move(message));
 }
 
 Error cannot_read(const std::string& path, const std::string& prefix) {

@@ -136,7 +136,7 @@ int run(const RunOptions& options) {
   print_diagnostics(report.diagnostics, stderr);
   if (!report.ok()) return exit_code_of(report);
   if (has_nothing_to_run(report)) {
-    print_nothing_to_run(options.deck, "error", stderr);
+    print_nothing_to_run(options.deck, Severity::error, stderr);
     return kDeckRefused;
   }
   const std::vector<const DeckChannel*> channels = deck_channels(*report.model);

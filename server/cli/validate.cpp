@@ -11,7 +11,7 @@ int validate(const std::string& deck, const SymbolValues& symbols, bool json) {
     return exit_code_of(report);
   }
   print_diagnostics(report.diagnostics, stdout);
-  if (has_nothing_to_run(report)) print_nothing_to_run(deck, "warning", stdout);
+  if (has_nothing_to_run(report)) print_nothing_to_run(deck, Severity::warning, stdout);
   if (report.ok()) {
     std::printf("%s: ok, %zu structural nodes, %zu scalar nodes, %zu elements, %d unknowns\n",
                 deck.c_str(), report.model->structural.size(), report.model->scalars.size(),

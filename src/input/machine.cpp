@@ -6,6 +6,7 @@
 #include "input/program.h"
 #include "input/reading.h"
 #include "input/syntax.h"
+#include "math/hash.h"
 #include "model/drive.h"
 #include "model/scalar_function.h"
 #include "model/state.h"
@@ -479,7 +480,7 @@ class Machine {
   std::int32_t random() {
     if (frame_.reading) return frame_.reading->random();
     const std::uint64_t step = static_cast<std::uint64_t>(state().step);
-    return hashed_random(frame_.random_key * 0x100000001b3u + step * 1048573u + ++random_calls_);
+    return hashed_random(frame_.random_key * kFnvPrime + step * 1048573u + ++random_calls_);
   }
 
   void seed(std::uint32_t value) {
