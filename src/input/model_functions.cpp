@@ -1,5 +1,6 @@
 #include "input/model_functions.h"
 
+#include <algorithm>
 #include <vector>
 
 #include "input/nearest.h"
@@ -193,12 +194,8 @@ double evaluate_drive(const EvalContext& context, int label, double argument, bo
 // private data
 
 int node_type(std::string_view word) {
-  const std::string w = normalized(word);
-  constexpr const char* words[] = {"structural", "abstract", "electric",
-                                   "hydraulic",  "thermal",  "parameter"};
-  for (int k = 0; k < 6; ++k)
-    if (w == words[k]) return k;
-  return -1;
+  const auto found = std::ranges::find(kNodeWords, normalized(word));
+  return found == kNodeWords.end() ? -1 : static_cast<int>(found - kNodeWords.begin());
 }
 
 namespace {
@@ -252,19 +249,15 @@ class ElementDatum final : public Drive {
   int datum_;
 };
 
-constexpr const char* kNodeWords[] = {"structural", "abstract", "electric",
-                                      "hydraulic",  "thermal",  "parameter"};
-constexpr ScalarKind kScalarKinds[] = {ScalarKind::abstract, ScalarKind::electric,
-                                       ScalarKind::hydraulic, ScalarKind::thermal,
-                                       ScalarKind::parameter};
-
-std::string entity(const char* kind, int label) {
-  return std::string(kind) + " node " + std::to_string(label);
+/// `type`: as `node_type` counts.
+ScalarKind scalar_kind(int type) { return static_cast<ScalarKind>(type - 1); }
+std::string entity(int type, int label) {
+  return std::string(kNodeWords.begin()[type]) + " node " + std::to_string(label);
 }
 
 int scalar_index(const Model& model, int type, int label) {
-  const int index = model.find_scalar(kScalarKinds[type - 1], label);
-  if (index < 0) fail(entity(kNodeWords[type], label) + " is not defined");
+  const int index = model.find_scalar(scalar_kind(type), label);
+  if (index < 0) fail(entity(type, label) + " is not defined");
   return index;
 }
 
@@ -294,7 +287,7 @@ std::string choose_datum(const std::vector<std::string>& names, std::string_view
 }  // namespace
 
 DrivePtr node_datum(const Model& model, int type, int label, std::string_view datum, int index) {
-  const std::string owner = entity(kNodeWords[type], label);
+  const std::string owner = entity(type, label);
   if (type == 0) {
     const int node = structural_index(model, label);
     const std::vector<std::string> names = Model::structural_data_names(model.structural[node]);
@@ -305,7 +298,7 @@ DrivePtr node_datum(const Model& model, int type, int label, std::string_view da
   }
   const int node = scalar_index(model, type, label);
   const bool has_rate =
-      model.scalars[node].differential && kScalarKinds[type - 1] != ScalarKind::parameter;
+      model.scalars[node].differential && scalar_kind(type) != ScalarKind::parameter;
   std::vector<std::string> names = {"x"};
   if (has_rate) names.push_back("xP");
   const std::string name =
@@ -349,18 +342,16 @@ DrivePtr dof_value(const Model& model, int type, int label, int component, int o
   if (type > 0) {
     dof.node = scalar_index(model, type, label);
     dof.differential = model.scalars[dof.node].differential;
-    if (order > 0 && !dof.differential)
-      fail(entity(kNodeWords[type], label) + " is algebraic and has no rate");
+    if (order > 0 && !dof.differential) fail(entity(type, label) + " is algebraic and has no rate");
     if (component > 1)
-      fail(entity(kNodeWords[type], label) + " has 1 degree of freedom; index " +
-           std::to_string(component));
+      fail(entity(type, label) + " has 1 degree of freedom; index " + std::to_string(component));
     return std::make_shared<DofValue>(dof, previous);
   }
   dof.node = structural_index(model, label);
   const int count = model.structural[dof.node].position_unknowns();
   if (component < 1 || component > count)
-    fail(entity("structural", label) + " has " + std::to_string(count) +
-         " degrees of freedom; index " + std::to_string(component));
+    fail(entity(type, label) + " has " + std::to_string(count) + " degrees of freedom; index " +
+         std::to_string(component));
   dof.component = component - 1;
   return std::make_shared<DofValue>(dof, previous);
 }

@@ -73,8 +73,7 @@ NodeDof DeckCard::structural_dof(int l, SourceSpan where) {
 NodeDof DeckCard::node_dof(bool with_order) {
   const int l = label("node label");
   const SourceSpan where = last();
-  const int type = required(
-      "node type", {"structural", "abstract", "electric", "hydraulic", "thermal", "parameter"});
+  const int type = required("node type", kNodeWords);
   if (type == 0) {
     NodeDof dof = structural_dof(l, where);
     const StructuralNode& n = deck_.builder.model().structural[dof.node];

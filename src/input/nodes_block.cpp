@@ -3,6 +3,7 @@
 
 #include "input/cards.h"
 #include "input/deck.h"
+#include "input/model_functions.h"
 
 namespace mbcosim {
 
@@ -68,8 +69,7 @@ Sampling read_parameter(DeckCard& card, ScalarNode& node) {
 }
 
 void read_nodes_output(DeckCard& card) {
-  const int type = card.required(
-      "node type", {"structural", "abstract", "electric", "hydraulic", "thermal", "parameter"});
+  const int type = card.required("node type", kNodeWords);
   Model& model = card.model();
   const bool accelerations = type == 0 && card.keyword("accelerations");
   const auto mark_structural = [&](StructuralNode& node) {
@@ -105,8 +105,8 @@ void read_nodes_output(DeckCard& card) {
   card.expect_end();
 }
 
-template <class Node>
-int begin_node(DeckCard& card, Kind kind, Node& node, int existing(const Model&, int),
+template <class Node, class Existing>
+int begin_node(DeckCard& card, Kind kind, Node& node, Existing existing,
                SourceSpan where(const Model&, int)) {
   const char* name = kind_names(kind).singular;
   card.set_defining(name);
@@ -123,12 +123,11 @@ int begin_node(DeckCard& card, Kind kind, Node& node, int existing(const Model&,
   return label;
 }
 
-template <ScalarKind kind>
-void read_scalar_card(DeckCard& card) {
+void read_scalar_card(DeckCard& card, ScalarKind kind) {
   ScalarNode node;
   node.kind = kind;
   node.label = begin_node(
-      card, kind_of(kind), node, [](const Model& m, int l) { return m.find_scalar(kind, l); },
+      card, kind_of(kind), node, [kind](const Model& m, int l) { return m.find_scalar(kind, l); },
       [](const Model& m, int i) { return m.scalars[i].where; });
   read_scalar_node(card, kind, std::move(node));
 }
@@ -169,21 +168,14 @@ void read_node_card(DeckCard& card) {
         [](const Model& m, int l) { return m.find_structural(l); },
         [](const Model& m, int i) { return m.structural[i].where; });
     read_structural_node(card, label, std::move(node));
-  } else if (word == "abstract") {
-    read_scalar_card<ScalarKind::abstract>(card);
-  } else if (word == "electric") {
-    read_scalar_card<ScalarKind::electric>(card);
-  } else if (word == "hydraulic") {
-    read_scalar_card<ScalarKind::hydraulic>(card);
-  } else if (word == "thermal") {
-    read_scalar_card<ScalarKind::thermal>(card);
-  } else if (word == "parameter") {
-    read_scalar_card<ScalarKind::parameter>(card);
+  } else if (const int type = node_type(word); type > 0) {
+    read_scalar_card(card, static_cast<ScalarKind>(type - 1));
   } else if (word == "output") {
     read_nodes_output(card);
   } else {
-    fail_unknown_card(card, {"structural", "abstract", "electric", "hydraulic", "thermal",
-                             "parameter", "output"});
+    std::vector<std::string> accepted(kNodeWords.begin(), kNodeWords.end());
+    accepted.emplace_back("output");
+    fail_unknown_card(card, accepted);
   }
 }
 

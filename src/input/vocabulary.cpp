@@ -7,6 +7,7 @@
 #include "input/grammar/grammar.h"
 #include "input/refusals.h"
 #include "input/symbols.h"
+#include "model/node.h"
 
 namespace mbcosim {
 
@@ -152,8 +153,7 @@ void add_blocks(Collector& c) {
   c.plain("initial value card", "Cards of `initial value`", initial_value_words());
   c.plain("inverse dynamics card", "Cards of `inverse dynamics`", inverse_dynamics_words());
   c.plain("control card", "Cards of `control data`", control_words());
-  c.plain("node", "Nodes",
-          {"structural", "abstract", "electric", "hydraulic", "thermal", "parameter"});
+  c.plain("node", "Nodes", {kNodeWords.begin(), kNodeWords.end()});
 }
 
 void add_elements(Collector& c, const Registry& registry) {

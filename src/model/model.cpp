@@ -238,12 +238,9 @@ std::pair<std::string, std::string> Model::row_text(int row) const {
     }
     return {node_text(static_cast<int>(k)), (j < 3 ? "force balance " : "moment balance ") + axis};
   }
-  static constexpr const char* kScalar[] = {"abstract", "electric", "hydraulic", "thermal",
-                                            "parameter"};
   for (const ScalarNode& n : scalars)
     if (n.unknown == row)
-      return {std::string(kScalar[static_cast<int>(n.kind)]) + " node " + std::to_string(n.label),
-              "balance"};
+      return {std::string(kind_name(n.kind)) + " node " + std::to_string(n.label), "balance"};
   for (const ElementRef& e : elements) {
     const int first = e.set->first_own(e.index);
     if (first >= 0 && row >= first && row < first + e.set->unknowns(e.index))

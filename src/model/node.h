@@ -1,7 +1,10 @@
 /// Nodes as read from the deck: fixed data only.
 #pragma once
 
+#include <initializer_list>
+#include <iterator>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "math/rotation.h"
@@ -96,11 +99,25 @@ struct NodePlace {
 
 enum class ScalarKind { abstract, electric, hydraulic, thermal, parameter };
 
-/// As the deck writes it: "abstract", "hydraulic", ...
+struct ScalarKindFacts {
+  const char* name;  ///< as decks and variables write it
+  const char* unit;  ///< of the value; empty: what the deck makes of it
+};
+inline constexpr ScalarKindFacts kScalarKinds[] = {
+    {"abstract", ""}, {"electric", "V"}, {"hydraulic", "Pa"}, {"thermal", "K"}, {"parameter", ""}};
+
 constexpr const char* kind_name(ScalarKind kind) {
-  constexpr const char* kNames[] = {"abstract", "electric", "hydraulic", "thermal", "parameter"};
-  return kNames[static_cast<int>(kind)];
+  return kScalarKinds[static_cast<int>(kind)].name;
 }
+constexpr const char* kind_unit(ScalarKind kind) {
+  return kScalarKinds[static_cast<int>(kind)].unit;
+}
+
+/// The words for all nodes: structural, then the kinds of scalar nodes in their order.
+static_assert(std::size(kScalarKinds) == 5, "as many words");
+inline const std::initializer_list<std::string_view> kNodeWords = {
+    "structural",         kScalarKinds[0].name, kScalarKinds[1].name,
+    kScalarKinds[2].name, kScalarKinds[3].name, kScalarKinds[4].name};
 
 /// Node with one scalar degree of freedom. Parameter nodes have a value (in State::memory) but no
 /// unknown.

@@ -45,12 +45,10 @@ void write_inertia(const EvalContext& context, int index, OutputRow& row) {
 void write_scalar(const EvalContext& context, const ScalarNode& node, OutputRow& row) {
   static constexpr OutputFile kFile[] = {OutputFile::abs, OutputFile::ele, OutputFile::prs,
                                          OutputFile::thn, OutputFile::prm};
-  static constexpr const char* kUnit[] = {"", "V", "Pa", "K", ""};
-  const int kind = static_cast<int>(node.kind);
-  row.begin(kFile[kind], node.label);
+  row.begin(kFile[static_cast<int>(node.kind)], node.label);
   NodeDof dof;
   dof.node = static_cast<int>(&node - context.model->scalars.data());
-  row.scalar("x", kUnit[kind], context.model->dof_value(context, dof));
+  row.scalar("x", kind_unit(node.kind), context.model->dof_value(context, dof));
   if (node.kind != ScalarKind::parameter && node.kind != ScalarKind::hydraulic &&
       node.differential) {
     dof.order = 1;

@@ -9,9 +9,6 @@ namespace mbcosim {
 
 namespace {
 
-constexpr const char* kScalarName[] = {"abstract", "electric", "hydraulic", "thermal", "parameter"};
-constexpr const char* kScalarUnit[] = {"", "V", "Pa", "K", ""};
-
 Error not_writable(const Variable& v) {
   return make_error(
       ErrorKind::argument, "VARIABLE_NOT_WRITABLE",
@@ -148,10 +145,9 @@ void Variables::add_structural(const Model& model, int node) {
 
 void Variables::add_scalar(const Model& model, int node) {
   const ScalarNode& n = model.scalars[node];
-  const int kind = static_cast<int>(n.kind);
-  const std::string prefix =
-      "node." + std::string(kScalarName[kind]) + "." + std::to_string(n.label) + ".";
-  const std::string owner = std::string(kScalarName[kind]) + " node " + std::to_string(n.label);
+  const std::string kind = kind_name(n.kind);
+  const std::string prefix = "node." + kind + "." + std::to_string(n.label) + ".";
+  const std::string owner = kind + " node " + std::to_string(n.label);
   if (n.kind == ScalarKind::parameter) {
     add({prefix + "x",
          1,
@@ -164,7 +160,7 @@ void Variables::add_scalar(const Model& model, int node) {
         {Source::parameter, node, 0});
     return;
   }
-  add({prefix + "x", 1, {}, kScalarUnit[kind], "", Causality::state, "value", owner},
+  add({prefix + "x", 1, {}, kind_unit(n.kind), "", Causality::state, "value", owner},
       {Source::scalar_value, node, 0});
   if (n.differential)
     add({prefix + "xP", 1, {}, "", "", Causality::state, "time derivative", owner},

@@ -111,8 +111,7 @@ DrivePtr read_scalar_node_drive(Card& card, ScalarKind kind, int label, SourceSp
 DrivePtr read_node(Card& card) {
   const int label = card.label("node");
   const SourceSpan where = card.last();
-  const int type = card.required(
-      "node type", {"structural", "abstract", "electric", "hydraulic", "thermal", "parameter"});
+  const int type = card.required("node type", kNodeWords);
   if (type > 0)
     return read_scalar_node_drive(card, static_cast<ScalarKind>(type - 1), label, where);
   const Model& model = card.model();
