@@ -7,6 +7,7 @@
 #include "input/grammar/grammar.h"
 #include "input/refusals.h"
 #include "input/symbols.h"
+#include "model/family.h"
 #include "model/node.h"
 
 namespace mbcosim {
@@ -161,21 +162,12 @@ void add_elements(Collector& c, const Registry& registry) {
   for (const char* word : {"bind", "driven", "output"}) heads[word].word = word;
   c.group("element", "Elements and statements of the block `elements`", std::move(heads),
           "elements");
-  const std::pair<const char*, const char*> families[] = {
-      {"joint", "Joints"},
-      {"force", "Forces"},
-      {"couple", "Couples"},
-      {"genel", "Genels"},
-      {"electric", "Electric elements"},
-      {"thermal", "Thermal elements"},
-      {"bulk", "Bulk elements"},
-      {"userdefined", "User defined elements"},
-      {"jointregularization", "Joint regularizations"},
-      {"hydraulic", "Hydraulic elements"}};
-  for (const auto& [head, title] : families) {
-    const auto found = registry.heads.find(head);
-    c.group(head, title, found == registry.heads.end() ? Words{} : c.of(found->second.types), head);
-  }
+  for (const FamilyFacts& family : all_families())
+    for (const TypedHead& typed : family.typed) {
+      const auto found = registry.heads.find(typed.head);
+      c.group(typed.head, typed.title,
+              found == registry.heads.end() ? Words{} : c.of(found->second.types), typed.head);
+    }
 }
 
 }  // namespace

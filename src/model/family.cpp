@@ -33,6 +33,17 @@ constexpr std::string_view kBulk[] = {"bulk"};
 constexpr std::string_view kOutputHeads[] = {"outputelement", "streamoutput", "streammotionoutput",
                                              "rtaioutput"};
 
+constexpr TypedHead kJointTypes[] = {{"joint", "Joints"}};
+constexpr TypedHead kJointRegularizationTypes[] = {
+    {"jointregularization", "Joint regularizations"}};
+constexpr TypedHead kGenelTypes[] = {{"genel", "Genels"}};
+constexpr TypedHead kElectricTypes[] = {{"electric", "Electric elements"}};
+constexpr TypedHead kThermalTypes[] = {{"thermal", "Thermal elements"}};
+constexpr TypedHead kHydraulicTypes[] = {{"hydraulic", "Hydraulic elements"}};
+constexpr TypedHead kLoadableTypes[] = {{"userdefined", "User defined elements"}};
+constexpr TypedHead kForceTypes[] = {{"force", "Forces"}, {"couple", "Couples"}};
+constexpr TypedHead kBulkTypes[] = {{"bulk", "Bulk elements"}};
+
 constexpr std::string_view kJointFiles[] = {"jnt", "mod"};
 constexpr std::string_view kGenelFiles[] = {"gen"};
 constexpr std::string_view kHydraulicFiles[] = {"hyd"};
@@ -42,11 +53,14 @@ constexpr std::string_view kForceFiles[] = {"frc"};
 constexpr std::string_view kGravityFiles[] = {"grv"};
 
 constexpr FamilyFacts kFamilyTable[] = {
-    {Family::joint, "joint", "joints", "joints", "", kJoint, kJoint, kJointFiles, "joint"},
+    {Family::joint, "joint", "joints", "joints", "", kJoint, kJoint, kJointTypes, kJointFiles,
+     "joint"},
     {Family::joint_regularization, "joint regularization", "joint regularizations",
-     "joint regularizations", "", kJointRegularization, kJointRegularization},
+     "joint regularizations", "", kJointRegularization, kJointRegularization,
+     kJointRegularizationTypes},
     {Family::plate, "plate", "plates", "plates", "", kPlateHeads, kPlateFunctions},
-    {Family::genel, "genel", "genels", "genels", "", kGenel, kGenel, kGenelFiles, "genel"},
+    {Family::genel, "genel", "genels", "genels", "", kGenel, kGenel, kGenelTypes, kGenelFiles,
+     "genel"},
     {.family = Family::induced_velocity,
      .name = "induced velocity element",
      .plural = "induced velocity elements",
@@ -59,18 +73,34 @@ constexpr FamilyFacts kFamilyTable[] = {
      kAerodynamicHeads, kAerodynamicFunctions},
     {Family::aeromodal, "aeromodal", "aeromodals", "aeromodals", "", kAeromodal, kAeromodal},
     {Family::electric, "electric element", "electric elements", "electric elements", "", kElectric,
-     kElectric, kElectricFiles, "electric"},
+     kElectric, kElectricTypes, kElectricFiles, "electric"},
     {Family::thermal, "thermal element", "thermal elements", "thermal elements", "", kThermal,
-     kThermal},
+     kThermal, kThermalTypes},
     {Family::hydraulic, "hydraulic element", "hydraulic elements", "hydraulic elements", "",
-     kHydraulic, kHydraulic, kHydraulicFiles, "hydraulic"},
+     kHydraulic, kHydraulic, kHydraulicTypes, kHydraulicFiles, "hydraulic"},
     {Family::loadable, "user defined element", "loadable elements", "loadable elements", "",
-     kLoadable, kLoadable},
+     kLoadable, kLoadable, kLoadableTypes},
     {Family::body, "body", "rigid bodies", "rigid bodies", "", kBody, kBody},
-    {Family::beam, "beam", "beams", "beams", "", kBeamHeads, kBeamFunctions, kBeamFiles, "beam"},
-    {Family::force, "force", "forces", "forces", "", kForce, kForce, kForceFiles, "force"},
-    {Family::gravity, "gravity", "gravity", "gravity", "", kGravity, kGravity, kGravityFiles,
-     "gravity"},
+    {.family = Family::beam,
+     .name = "beam",
+     .plural = "beams",
+     .count_card = "beams",
+     .old_count_card = "",
+     .heads = kBeamHeads,
+     .functions = kBeamFunctions,
+     .files = kBeamFiles,
+     .owner = "beam"},
+    {Family::force, "force", "forces", "forces", "", kForce, kForce, kForceTypes, kForceFiles,
+     "force"},
+    {.family = Family::gravity,
+     .name = "gravity",
+     .plural = "gravity",
+     .count_card = "gravity",
+     .old_count_card = "",
+     .heads = kGravity,
+     .functions = kGravity,
+     .files = kGravityFiles,
+     .owner = "gravity"},
     {.family = Family::inertia,
      .name = "inertia",
      .plural = "inertia elements",
@@ -102,6 +132,7 @@ constexpr FamilyFacts kFamilyTable[] = {
      .old_count_card = "",
      .heads = kBulk,
      .functions = kBulk,
+     .typed = kBulkTypes,
      .has_default_output = false},
     {.family = Family::output_element,
      .name = "output element",

@@ -40,6 +40,12 @@ inline constexpr int kFamilies = static_cast<int>(Family::count);
 /// Within one rank elements keep the order of their sets.
 enum class StageRank { contributor, collector };
 
+/// A head of the elements block whose elements are of types: `joint: <label>, <type>, ...`.
+struct TypedHead {
+  const char* head;   ///< normalized
+  const char* title;  ///< of the table of its types: "Joints"
+};
+
 struct FamilyFacts {
   Family family;
   const char* name;            ///< in messages and private data: "joint"
@@ -50,6 +56,7 @@ struct FamilyFacts {
   std::span<const std::string_view> heads;
   /// Normalized words of model functions: `model::joint(…)`.
   std::span<const std::string_view> functions;
+  std::span<const TypedHead> typed = {};
   /// Extensions of the family's result files, and what their variables in NetCDF begin with:
   /// "elem.<owner>.<label>.". Empty for families that write none.
   std::span<const std::string_view> files = {};

@@ -35,6 +35,14 @@ TEST(Vocabulary, HasAWordForEveryGrammar) {
       EXPECT_TRUE(find(groups, name, word)) << name << ": no word " << word;
 }
 
+TEST(Vocabulary, HasATableOfTheTypesOfEveryHead) {
+  const Registry registry = full_registry();
+  const std::vector<VocabularyGroup> groups = vocabulary(registry);
+  for (const auto& [head, facts] : registry.heads)
+    for (const auto& type : facts.types)
+      EXPECT_TRUE(find(groups, head, type.first)) << head << ", " << type.first;
+}
+
 /// Outside aerodynamics, plates and solids nothing waits.
 TEST(Vocabulary, WaitsForAerodynamicsPlatesAndSolidsOnly) {
   for (const VocabularyGroup& group : vocabulary(full_registry()))
