@@ -8,6 +8,7 @@
 
 #include "model/end_of_run.h"
 #include "solver/advance_time.h"
+#include "solver/failure.h"
 #include "solver/watch.h"
 
 namespace mbcosim {
@@ -73,31 +74,22 @@ class Bracket {
 };
 
 Error not_agreed(const State& end, int passes) {
-  Error error =
-      make_error(ErrorKind::not_converged, "",
-                 "the interface did not converge in " + std::to_string(passes) + " passes");
-  error.failure.time = end.time;
-  error.failure.step = static_cast<long>(end.step);
-  return error;
+  return error_at(
+      end, make_error(ErrorKind::not_converged, "",
+                      "the interface did not converge in " + std::to_string(passes) + " passes"));
 }
 
 }  // namespace
 
 Error evaluation_failure(const State& state, const EvaluationError& cause) {
   const bool ends = dynamic_cast<const EndOfRun*>(&cause);
-  Error error = make_error(ErrorKind::evaluation, ends ? kEndOfRun : "EVALUATION_FAILED",
-                           "t = " + std::to_string(state.time) + ": " + cause.what());
-  error.failure.time = state.time;
-  error.failure.step = static_cast<long>(state.step);
-  return error;
+  return error_at(state, make_error(ErrorKind::evaluation, ends ? kEndOfRun : "EVALUATION_FAILED",
+                                    "t = " + std::to_string(state.time) + ": " + cause.what()));
 }
 
 Error stopped_while_factoring(const State& state) {
-  Error error = cancelled_error("t = " + std::to_string(state.time) +
-                                ": interrupted while a matrix was factored");
-  error.failure.time = state.time;
-  error.failure.step = static_cast<long>(state.step);
-  return error;
+  return error_at(state, cancelled_error("t = " + std::to_string(state.time) +
+                                         ": interrupted while a matrix was factored"));
 }
 
 PhaseReport StepController::advance(State& state, const StepChoice& choice) {

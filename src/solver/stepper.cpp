@@ -5,6 +5,7 @@
 
 #include "solver/advance_time.h"
 #include "solver/divergence.h"
+#include "solver/failure.h"
 #include "solver/initial_assembly.h"
 #include "solver/instant.h"
 #include "solver/singularity.h"
@@ -535,42 +536,32 @@ double Stepper::retry_step_size(State& state, double h) const {
 }
 
 Error Stepper::failure(const NewtonReport& report, const State& state, const char* phase) const {
-  Error e;
-  e.failure.time = state.time;
-  e.failure.step = static_cast<long>(state.step);
-  e.failure.iteration = report.iterations;
-  e.failure.residual_history = workspace_.residual_history;
   char where[96];
-  std::snprintf(where, sizeof where, "%s at t = %.9g (step %lld)", phase, state.time,
+  std::snprintf(where, sizeof where, "%s at t = %.9g (step %lld): ", phase, state.time,
                 static_cast<long long>(state.step));
-  switch (report.outcome) {
-    case NewtonOutcome::cancelled: {
-      Error stopped = cancelled_error(std::string(where) + ": interrupted between iterations");
-      stopped.failure = e.failure;
-      return stopped;
-    }
-    case NewtonOutcome::singular:
-      e.kind = ErrorKind::singular;
-      e.reason = "SINGULAR_MATRIX";
-      e.message = std::string(where) + ": the matrix is singular";
-      return e;
-    default:
-      break;
-  }
-  e.kind = ErrorKind::not_converged;
-  e.reason = "NOT_CONVERGED";
+  const auto error = [&](Error e) {
+    e.message = where + e.message;
+    e.failure.iteration = report.iterations;
+    e.failure.residual_history = workspace_.residual_history;
+    return error_at(state, std::move(e));
+  };
+  if (report.outcome == NewtonOutcome::cancelled)
+    return error(cancelled_error("interrupted between iterations"));
+  if (report.outcome == NewtonOutcome::singular)
+    return error(make_error(ErrorKind::singular, "SINGULAR_MATRIX", "the matrix is singular"));
+  const auto not_converged = [&](const char* text) {
+    return error(make_error(ErrorKind::not_converged, "NOT_CONVERGED", text));
+  };
   char text[160];
   if (!std::isfinite(report.residual_error)) {
-    std::snprintf(text, sizeof text, ": the residual has no value after %d iterations",
+    std::snprintf(text, sizeof text, "the residual has no value after %d iterations",
                   report.iterations);
-    e.message = where + std::string(text);
-    return e;
+    return not_converged(text);
   }
-  e.failure.worst = worst_equations(model_, workspace_.residual);
-  std::snprintf(text, sizeof text,
-                ": no convergence in %d iterations, residual %.6g, tolerance %.6g",
+  std::snprintf(text, sizeof text, "no convergence in %d iterations, residual %.6g, tolerance %.6g",
                 report.iterations, report.residual_error, report.tolerance);
-  e.message = where + std::string(text);
+  Error e = not_converged(text);
+  e.failure.worst = worst_equations(model_, workspace_.residual);
   for (const WorstEquation& w : e.failure.worst) {
     std::snprintf(text, sizeof text, "%.6g", w.residual);
     e.message += "\n  " + w.owner + ", " + w.equation + ": residual " + text;
