@@ -6,6 +6,7 @@
 #include "math/sparse_lu.h"
 #include "model/model_part.h"
 #include "model/user_elements.h"
+#include "solver/failure.h"
 #include "solver/newton.h"
 #include "solver/null_space.h"
 #include "solver/singularity.h"
@@ -30,14 +31,17 @@ class Assembly {
   bool needed() const { return !elements_.empty(); }
 
   Result<AssemblyReport> run() {
+    NewtonSettings test;
+    test.tolerance = model_.control.assembly_tolerance;
+    test.max_iterations = model_.control.assembly_max_iterations;
     AssemblyReport report;
     for (;; ++report.iterations) {
       compute_residual();
       report.error = error();
-      if (report.error <= model_.control.assembly_tolerance) return polish(report);
-      if (report.iterations >= model_.control.assembly_max_iterations ||
-          !std::isfinite(report.error))
-        return failure(ErrorKind::not_converged, report);
+      errors_.push_back(report.error);
+      if (const auto verdict = judge(test, errors_, report.iterations))
+        return *verdict == NewtonOutcome::converged ? polish(report)
+                                                    : failure(ErrorKind::not_converged, report);
       if (is_cancelled()) return stopped(report);
       if (!correct()) return failure(ErrorKind::singular, report);
       report.moved = true;
@@ -54,10 +58,13 @@ class Assembly {
 
   bool is_cancelled() const { return cancel_ && cancel_->cancelled(); }
   Error stopped(const AssemblyReport& report) const {
-    Error e = cancelled_error("initial assembly: interrupted between iterations");
-    e.failure.time = state_.time;
-    e.failure.iteration = report.iterations;
-    return e;
+    return at_iteration(cancelled_error("initial assembly: interrupted between iterations"),
+                        report);
+  }
+  Error at_iteration(Error error, const AssemblyReport& report) const {
+    error.failure.iteration = report.iterations;
+    error.failure.residual_history = errors_;
+    return error_at(state_, std::move(error));
   }
 
   bool is_assembled(const ElementRef& e) const {
@@ -218,20 +225,18 @@ class Assembly {
   }
 
   Error failure(ErrorKind kind, const AssemblyReport& report) {
-    Error e;
-    e.kind = kind;
-    e.reason = kind == ErrorKind::singular ? "ASSEMBLY_SINGULAR" : "ASSEMBLY_NOT_CONVERGED";
+    const bool singular = kind == ErrorKind::singular;
     std::vector<double> worst(n_);
     for (int i = 0; i < n_; ++i) worst[i] = std::max(std::abs(r_[i]), std::abs(r_rate_[i]));
-    e.failure.time = state_.time;
-    e.failure.iteration = report.iterations;
-    e.failure.residual_history = {report.error};
-    e.failure.worst = worst_equations(model_, worst);
     char text[160];
     std::snprintf(text, sizeof text,
                   "initial assembly: error %.6g after %d iterations, tolerance %.6g", report.error,
                   report.iterations, model_.control.assembly_tolerance);
-    e.message = kind == ErrorKind::singular ? "initial assembly: the matrix is singular" : text;
+    Error e =
+        at_iteration(make_error(kind, singular ? "ASSEMBLY_SINGULAR" : "ASSEMBLY_NOT_CONVERGED",
+                                singular ? "initial assembly: the matrix is singular" : text),
+                     report);
+    e.failure.worst = worst_equations(model_, worst);
     const std::string reason = diagnosis();
     if (!reason.empty()) {
       e.message += "\n  " + reason;
@@ -316,6 +321,7 @@ class Assembly {
   std::vector<int> rows_, columns_;     ///< local index -> model row, column
   std::vector<int> to_local_, row_of_;  ///< model column, row (rate level: + n) -> local index
   std::vector<double> r_, r_rate_;      ///< by model row (n)
+  std::vector<double> errors_;          ///< by iterations
 };
 
 }  // namespace

@@ -6,6 +6,11 @@
 ///   node        kp (x₀ − x) + loads,        −kp g(R R₀ᵀ) + moments
 ///               kv (v₀ − v) + load rates,   kv (w₀ − w) + moment rates
 ///   constraint  φ = 0,  dφ/dt = 0
+///
+/// It iterates on its own, not by solver/newton.h: positions and velocities are unknowns side by
+/// side, and only some of the elements take part, in a matrix of their own pattern; when it fails
+/// it is repeated with compliant constraints, to find the cause. The test of convergence is that of
+/// newton.h.
 #pragma once
 
 #include "model/model.h"

@@ -7,6 +7,7 @@
 #include "elements/joints/tikhonov.h"
 #include "math/sparse_lu.h"
 #include "solver/advance_time.h"
+#include "solver/failure.h"
 #include "solver/newton.h"
 #include "solver/stages.h"
 #include "solver/system.h"
@@ -59,7 +60,8 @@ InverseDynamics::InverseDynamics(const Model& model)
     : model_(model),
       settings_(*inverse_problem(model)),
       scratch_(std::make_unique<Scratch>(model.scratch)),
-      first_(model.structural.size(), -1) {
+      first_(model.structural.size(), -1),
+      newton_(newton_settings(model.initial_value)) {
   for (std::size_t k = 0; k < model.structural.size(); ++k) {
     if (model.structural[k].is_dummy()) continue;
     first_[k] = n_;
@@ -92,21 +94,19 @@ void InverseDynamics::begin(State& state) const {
 
 PhaseReport InverseDynamics::attempt(State& state, const StepAttempt& attempt) {
   PhaseReport report;
-  const auto fail = [&](Error e) {
-    char where[96];
-    std::snprintf(where, sizeof where, "inverse dynamics at t = %.9g (record %lld): ", state.time,
-                  static_cast<long long>(state.step));
-    e.message = where + e.message;
-    e.failure.time = state.time;
-    e.failure.step = static_cast<long>(state.step);
-    e.failure.iteration = report.newton.iterations;
-    report.error = std::move(e);
-  };
+  errors_.clear();
   try {
     prepare(state, attempt);
     solve(state, report);
   } catch (const StageFailure& f) {
-    fail(f.error);
+    char where[96];
+    std::snprintf(where, sizeof where, "inverse dynamics at t = %.9g (record %lld): ", state.time,
+                  static_cast<long long>(state.step));
+    Error e = error_at(state, f.error);
+    e.message = where + e.message;
+    e.failure.iteration = report.newton.iterations;
+    e.failure.residual_history = errors_;
+    report.error = std::move(e);
   } catch (const EvaluationError& e) {
     report.error = evaluation_failure(state, e);
   }
@@ -159,10 +159,9 @@ void InverseDynamics::solve(State& state, PhaseReport& report) {
 // stages
 
 void InverseDynamics::solve_position(State& state, PhaseReport& report) {
-  const InitialValueSettings& s = model_.initial_value;
   NewtonReport& newton = report.newton;
-  newton.tolerance = s.tolerance;
-  double correction = HUGE_VAL, first_error = 0;
+  newton.tolerance = newton_.tolerance;
+  double correction = HUGE_VAL;
   for (int iteration = 0;; ++iteration) {
     if (cancel_ && cancel_->cancelled())
       throw StageFailure{cancelled_error("interrupted between iterations")};
@@ -170,22 +169,25 @@ void InverseDynamics::solve_position(State& state, PhaseReport& report) {
     newton.iterations = iteration;
     newton.residual_error = residual_error(right);
     newton.solution_error = std::isfinite(correction) ? correction : 0;
-    if (iteration == 0) first_error = newton.residual_error;
-    if (has_converged(correction, newton)) return;
-    if (iteration >= s.max_iterations || !std::isfinite(newton.residual_error)) {
-      if (s.at_most && newton.residual_error < first_error) return;
+    errors_.push_back(newton.residual_error);
+    newton.by_solution = !meets_tolerance(newton_, newton.residual_error) && is_settled(correction);
+    if (newton.by_solution) return;
+    if (const auto verdict = judge(newton_, errors_, iteration)) {
+      if (*verdict == NewtonOutcome::converged) return;
       char text[120];
       std::snprintf(
           text, sizeof text,
           "no convergence of the positions in %d iterations, residual %.6g, tolerance %.6g",
-          iteration, newton.residual_error, s.tolerance);
-      throw StageFailure{make_error(ErrorKind::not_converged, "NOT_CONVERGED",
-                                    text + obstacle(right, newton.residual_error < first_error))};
+          iteration, newton.residual_error, newton_.tolerance);
+      throw StageFailure{
+          make_error(ErrorKind::not_converged, "NOT_CONVERGED",
+                     text + obstacle(right, newton.residual_error < errors_.front()))};
     }
     const VecX delta = solved(matrix(state, kPosition, iteration == 0), right, "position");
     correct_position(delta, state);
-    correction = s.solution_test == ResidualTest::minmax ? delta.head(n_).cwiseAbs().maxCoeff()
-                                                         : delta.head(n_).norm();
+    correction = newton_.solution_test == ResidualTest::minmax
+                     ? delta.head(n_).cwiseAbs().maxCoeff()
+                     : delta.head(n_).norm();
   }
 }
 
@@ -216,11 +218,8 @@ double InverseDynamics::residual_error(const VecX& right) const {
   return error;
 }
 
-bool InverseDynamics::has_converged(double correction, NewtonReport& r) const {
-  const InitialValueSettings& s = model_.initial_value;
-  if (s.residual_test != ResidualTest::none && r.residual_error <= s.tolerance) return true;
-  r.by_solution = s.solution_test != ResidualTest::none && correction <= s.solution_tolerance;
-  return r.by_solution;
+bool InverseDynamics::is_settled(double correction) const {
+  return newton_.solution_test != ResidualTest::none && correction <= newton_.solution_tolerance;
 }
 
 /// The rotation parameters of a record start from those of the record before.

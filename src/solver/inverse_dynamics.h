@@ -36,7 +36,11 @@ namespace mbcosim {
 /// NodeRotationHistory is R_previous; y1, yp1, w1 are those of the record before; accelerations lie
 /// in the memory at InverseProblem::memory. There, too, is the sum of each row's multipliers of all
 /// position stages: while a row takes no part in them, its equation takes the sum back to zero (as
-/// in the reference solver, whose count of iterations depends on it). Source: MBDyn input manual;
+/// in the reference solver, whose count of iterations depends on it).
+///
+/// The position stage iterates on its own, not by solver/newton.h: its unknowns are positions and
+/// multipliers of a minimum, which no integrator follows, in a matrix of its own pattern. The test
+/// of convergence is that of newton.h. Source: MBDyn input manual;
 /// P. Masarati et al., "Efficient inverse kinematics and dynamics of redundant manipulators", 2011.
 class InverseDynamics final : public StepSystem {
  public:
@@ -80,7 +84,8 @@ class InverseDynamics final : public StepSystem {
   void prepare(State& state, const StepAttempt& attempt);
   void solve(State& state, PhaseReport& report);
   void solve_position(State& state, PhaseReport& report);
-  bool has_converged(double correction, NewtonReport& report) const;
+  /// Has the last correction met the solution test?
+  bool is_settled(double correction) const;
   double residual_error(const VecX& right) const;
   /// The joint with the largest residual in the position stage, and what to do.
   std::string obstacle(const VecX& right, bool improved) const;
@@ -118,6 +123,8 @@ class InverseDynamics final : public StepSystem {
   int n_ = 0, m_ = 0;  ///< node components, rows of all joints
   double speed_ = 0;   ///< Σ of squares of the last record's velocities
   std::int64_t factorizations_ = 0;
+  const NewtonSettings newton_;
+  std::vector<double> errors_;  ///< of the position stage, by iterations
 };
 
 }  // namespace mbcosim

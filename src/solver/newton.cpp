@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 
 #include "solver/line_search.h"
 
@@ -45,20 +44,6 @@ double root_near(Function&& f, double at_zero, double tolerance) {
   return std::isfinite(fb) ? b : NAN;
 }
 
-/// What the last residual error says after `iterations` solves: an outcome, or nothing to go on.
-/// Nothing converges before loads from outside have `settled`.
-std::optional<NewtonOutcome> judge_residual(const NewtonSettings& settings,
-                                            const std::vector<double>& errors, int iterations,
-                                            bool settled) {
-  const double error = errors.back();
-  if (!std::isfinite(error)) return NewtonOutcome::not_converged;
-  const bool tested = settings.residual_test != ResidualTest::none && settings.tolerance > 0;
-  if (tested && settled && error < settings.tolerance) return NewtonOutcome::converged;
-  if (iterations < settings.max_iterations) return std::nullopt;
-  return settled && settings.at_most && error < errors.front() ? NewtonOutcome::converged
-                                                               : NewtonOutcome::not_converged;
-}
-
 class Newton {
  public:
   Newton(NewtonSystem& system, const NewtonSettings& settings, const NewtonHooks& hooks)
@@ -74,7 +59,7 @@ class Newton {
       report.residual_error = system_.error(settings_);
       scratch_.residual_history.push_back(report.residual_error);
       if (const auto verdict =
-              judge_residual(settings_, scratch_.residual_history, report.iterations, settled))
+              judge(settings_, scratch_.residual_history, report.iterations, settled))
         return finish(report, *verdict);
       if (system_.exceeds_limits(settings_)) return finish(report, NewtonOutcome::not_converged);
       if (hooks_.cancelled()) return finish(report, NewtonOutcome::cancelled);
@@ -227,6 +212,40 @@ class Newton {
 };
 
 }  // namespace
+
+NewtonSettings newton_settings(const InitialValueSettings& s) {
+  NewtonSettings n;
+  n.tolerance = s.tolerance;
+  n.solution_tolerance = s.solution_tolerance;
+  n.residual_test = s.residual_test;
+  n.solution_test = s.solution_test;
+  n.scale = s.scale_residual;
+  n.modify_residual_test = s.modify_residual_test;
+  n.max_iterations = s.max_iterations;
+  n.at_most = s.at_most;
+  n.jacobian_every = s.modified_newton ? std::max(1, s.jacobian_every) : 1;
+  n.keep_jacobian = s.modified_newton && s.keep_jacobian;
+  n.line_search = s.line_search ? &*s.line_search : nullptr;
+  n.max_residual = s.max_residual;
+  n.max_residual_differential = s.max_residual_differential;
+  return n;
+}
+
+bool meets_tolerance(const NewtonSettings& settings, double error) {
+  return settings.residual_test != ResidualTest::none && settings.tolerance > 0 &&
+         error < settings.tolerance;
+}
+
+std::optional<NewtonOutcome> judge(const NewtonSettings& settings,
+                                   const std::vector<double>& errors, int iterations,
+                                   bool settled) {
+  const double error = errors.back();
+  if (!std::isfinite(error)) return NewtonOutcome::not_converged;
+  if (settled && meets_tolerance(settings, error)) return NewtonOutcome::converged;
+  if (iterations < settings.max_iterations) return std::nullopt;
+  return settled && settings.at_most && error < errors.front() ? NewtonOutcome::converged
+                                                               : NewtonOutcome::not_converged;
+}
 
 double test_value(ResidualTest test, const std::vector<double>& v) {
   double value = 0;

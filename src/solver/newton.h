@@ -1,7 +1,12 @@
-/// Newton iteration, the one of all phases and integrators (MBDyn input manual, "tolerance",
-/// "nonlinear solver").
+/// Newton iteration of the derivatives phase and of the steps of all integrators (MBDyn input
+/// manual, "tolerance", "nonlinear solver").
+///
+/// Two phases iterate on their own, since they solve other equations: initial assembly
+/// (solver/initial_assembly.h), and the positions of inverse dynamics (solver/inverse_dynamics.h).
+/// They share the test of convergence, `judge`.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "model/model.h"
@@ -24,6 +29,9 @@ struct NewtonSettings {
   double constraint_factor = 1;  ///< `enforce constraint equations: constraint violations`
 };
 
+/// Of regular steps.
+NewtonSettings newton_settings(const InitialValueSettings& settings);
+
 /// `not_converged` also covers divergence and a line search without success.
 enum class NewtonOutcome { converged, not_converged, singular, cancelled };
 
@@ -36,6 +44,14 @@ struct NewtonReport {
   bool by_solution = false;  ///< accepted by the solution test
   int singular_column = -1;
 };
+
+/// Does a residual's test value meet the tolerance? Never where residuals are not tested.
+bool meets_tolerance(const NewtonSettings& settings, double error);
+/// What the test values of all residuals so far say after `iterations` linear solves: an outcome,
+/// or nothing to go on. Nothing converges before loads from outside have `settled`.
+std::optional<NewtonOutcome> judge(const NewtonSettings& settings,
+                                   const std::vector<double>& errors, int iterations,
+                                   bool settled = true);
 
 /// norm: sqrt(Σ v²); minmax: max |v|, NaN if any is.
 double test_value(ResidualTest test, const std::vector<double>& v);

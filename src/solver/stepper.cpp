@@ -21,28 +21,10 @@ void put(std::vector<double>& y, int i, const Vec3& v) {
   for (int k = 0; k < 3; ++k) y[i + k] = v(k);
 }
 
-NewtonSettings regular_settings(const InitialValueSettings& s) {
-  NewtonSettings n;
-  n.tolerance = s.tolerance;
-  n.solution_tolerance = s.solution_tolerance;
-  n.residual_test = s.residual_test;
-  n.solution_test = s.solution_test;
-  n.scale = s.scale_residual;
-  n.modify_residual_test = s.modify_residual_test;
-  n.max_iterations = s.max_iterations;
-  n.at_most = s.at_most;
-  n.jacobian_every = s.modified_newton ? std::max(1, s.jacobian_every) : 1;
-  n.keep_jacobian = s.modified_newton && s.keep_jacobian;
-  n.line_search = s.line_search ? &*s.line_search : nullptr;
-  n.max_residual = s.max_residual;
-  n.max_residual_differential = s.max_residual_differential;
-  return n;
-}
-
 /// The phases before the first step: residual test of the deck's kind, their own tolerance and
 /// limit.
 NewtonSettings start_settings(const InitialValueSettings& s, double tolerance, int max_iterations) {
-  NewtonSettings n = regular_settings(s);
+  NewtonSettings n = newton_settings(s);
   n.tolerance = tolerance;
   n.solution_tolerance = 0;
   n.solution_test = ResidualTest::none;
@@ -147,7 +129,7 @@ class Stepper::DerivativesHooks : public NewtonHooks {
 Stepper::Stepper(const Model& model)
     : model_(model),
       workspace_(model),
-      regular_(regular_settings(model.initial_value)),
+      regular_(newton_settings(model.initial_value)),
       derivatives_(derivatives_settings(model.initial_value)),
       dummy_(start_settings(model.initial_value, model.initial_value.dummy_tolerance,
                             model.initial_value.dummy_max_iterations)),

@@ -249,6 +249,7 @@ TEST(InverseDynamics, NamesTheJointAndTheRemedyWhenItDoesNotConverge) {
                               "  joint 2 \\(total joint\\), equation .: farthest from its "
                               "prescribed motion\n  hint: the iteration comes nearer: allow more "
                               "`max iterations` \\(1 when the card is missing\\)"));
+  EXPECT_EQ(simulation.error().failure.residual_history.size(), 2u);
 }
 
 TEST(InverseDynamics, HasNothingToLinearize) {
