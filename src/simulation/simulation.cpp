@@ -99,6 +99,7 @@ struct Simulation::Impl {
     if (start_observer) start_observer(event);
   }
   Status start_inverse();
+  PhaseReport run_dummy_steps();
   /// The deck's eigenanalyses with times in (after, until].
   Status analyse_modes(double after, double until);
   StepReport step(const CancelToken* cancel, const StepChoice& choice = {});
@@ -116,6 +117,20 @@ struct Simulation::Impl {
   /// What an accepted step writes: its line and record, and the deck's eigenanalyses.
   Status write(const NewtonReport& newton, double previous_time);
 };
+
+/// The report is that of the last one.
+PhaseReport Simulation::Impl::run_dummy_steps() {
+  PhaseReport report;
+  for (int k = 0; k < model->initial_value.dummy_steps; ++k) {
+    tell(StartEvent::dummy_step_begins);
+    report = controller.advance_by(state,
+                                   [&](State& s) { return stepper.attempt_dummy_step(s, k == 0); });
+    if (report.error) return report;
+    tell(StartEvent::dummy_step_ended);
+  }
+  stepper.end_dummy_steps(state);
+  return report;
+}
 
 /// Phases before the first step: assembly, derivatives, dummy steps, record of step 0.
 Status Simulation::Impl::start() {
@@ -150,9 +165,7 @@ Status Simulation::Impl::start() {
     writer->derivatives(state.time, report.newton.iterations, report.newton.residual_error);
   NewtonReport last = report.newton;
   if (s.dummy_steps > 0 && s.abort_after != AbortAfter::derivatives) {
-    report = stepper.run_dummy_steps(state, [this](bool ended) {
-      tell(ended ? StartEvent::dummy_step_ended : StartEvent::dummy_step_begins);
-    });
+    report = run_dummy_steps();
     if (report.error) return *report.error;
     if (writer)
       writer->dummy_steps(state.time, report.newton.iterations, report.newton.residual_error);

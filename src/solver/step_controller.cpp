@@ -92,10 +92,11 @@ Error stopped_while_factoring(const State& state) {
                                          ": interrupted while a matrix was factored"));
 }
 
-PhaseReport StepController::advance(State& state, const StepChoice& choice) {
+template <class Make>
+PhaseReport StepController::whole_or_not(State& state, const Make& make) {
   start_ = state;
   try {
-    return choice.event ? locate(state, choice) : try_step(state, choice);
+    return make();
   } catch (const Stopped&) {
     state = start_;
     PhaseReport phase;
@@ -105,6 +106,25 @@ PhaseReport StepController::advance(State& state, const StepChoice& choice) {
     state = start_;
     throw;
   }
+}
+
+PhaseReport StepController::advance(State& state, const StepChoice& choice) {
+  return whole_or_not(
+      state, [&] { return choice.event ? locate(state, choice) : try_step(state, choice); });
+}
+
+PhaseReport StepController::advance_by(State& state,
+                                       const std::function<PhaseReport(State&)>& attempt) {
+  return whole_or_not(state, [&] {
+    PhaseReport phase = attempt(state);
+    if (phase.error) take_back(phase, state, start_);
+    return phase;
+  });
+}
+
+void StepController::take_back(PhaseReport& phase, State& state, const State& start) {
+  state = start;
+  system_.explain(phase, state);
 }
 
 PhaseReport StepController::locate(State& state, const StepChoice& choice) {
@@ -162,9 +182,7 @@ PhaseReport StepController::solve(State& state, const State& start, const StepCh
   } catch (const EvaluationError& e) {  // from a drive of the deck's strategy
     phase.error = evaluation_failure(start, e);
   }
-  if (!phase.error) return phase;
-  state = start;
-  system_.explain(phase, state);
+  if (phase.error) take_back(phase, state, start);
   return phase;
 }
 

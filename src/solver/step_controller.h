@@ -77,8 +77,16 @@ class StepController {
 
   /// One step. What a callback throws leaves it, and the state is as it was.
   PhaseReport advance(State& state, const StepChoice& choice = {});
+  /// One step that `attempt` makes of the accepted state, whole or not at all like the others:
+  /// without passes, policy and shorter steps.
+  PhaseReport advance_by(State& state, const std::function<PhaseReport(State&)>& attempt);
 
  private:
+  /// Makes a step by `make`; the state is as it was when that is stopped or throws.
+  template <class Make>
+  PhaseReport whole_or_not(State& state, const Make& make);
+  /// Takes a failed step back and has it explained.
+  void take_back(PhaseReport& phase, State& state, const State& start);
   PhaseReport locate(State& state, const StepChoice& choice);
   /// From `start_`, at which the state stands.
   PhaseReport try_step(State& state, const StepChoice& choice);

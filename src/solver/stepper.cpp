@@ -265,25 +265,14 @@ void Stepper::select_pivots(const State& state) {
   workspace_.solver.add_kind(activity_, values);
 }
 
-PhaseReport Stepper::run_dummy_steps(State& state, const std::function<void(bool)>& between) {
-  PhaseReport report;
+PhaseReport Stepper::attempt_dummy_step(State& state, bool first) {
   const InitialValueSettings& s = model_.initial_value;
-  MethodSettings method;
-  if (s.dummy_method) method = *s.dummy_method;
-  for (int k = 0; k < s.dummy_steps; ++k) {
-    if (between) between(false);
-    const State start = state;
-    report = attempt(state, {s.dummy_ratio * s.time_step}, method, k == 0, dummy_);
-    if (report.error) {
-      state = start;
-      explain(report, state);
-      return report;
-    }
-    if (between) between(true);
-  }
-  state.h = s.time_step;
-  state.h_previous = s.time_step;
-  return report;
+  return attempt(state, {s.dummy_ratio * s.time_step}, s.dummy_method.value_or(MethodSettings{}),
+                 first, dummy_);
+}
+
+void Stepper::end_dummy_steps(State& state) const {
+  state.h = state.h_previous = model_.initial_value.time_step;
 }
 
 StepFormula Stepper::formula(State& state, double h, const MethodSettings& method,

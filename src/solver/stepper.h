@@ -41,9 +41,11 @@ class Stepper final : public StepSystem {
   Status assemble(State& state);
   /// Accelerations and multipliers at the initial time.
   PhaseReport solve_derivatives(State& state);
-  /// `dummy steps`: short steps before the first regular one. `between` is called before each one
-  /// (false) and after it (true); may be empty.
-  PhaseReport run_dummy_steps(State& state, const std::function<void(bool)>& between = {});
+  /// One of the `dummy steps`: short steps before the first regular one. On failure the state is
+  /// anywhere.
+  PhaseReport attempt_dummy_step(State& state, bool first);
+  /// After the last one: the first regular step has the deck's length.
+  void end_dummy_steps(State& state) const;
 
   double next_step_size(State& state) const override;
   double peek_step_size(const State& state) const override;

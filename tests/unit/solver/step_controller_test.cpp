@@ -209,6 +209,24 @@ TEST_F(StepControllerTest, TakesAStepBackWhoseFactorizationWasStopped) {
   expect_untouched();
 }
 
+TEST_F(StepControllerTest, TakesAStepOfAnotherKindBackLikeItsOwn) {
+  const auto attempt = [&](State& state) { return system_.attempt(state, {.h = 0.25}); };
+  EXPECT_FALSE(controller_.advance_by(state_, attempt).error);
+  EXPECT_EQ(state_.y[0], 0.25);
+  state_ = State();
+  state_.y = {0};
+  state_.memory = {7};
+  system_.longest = 0;
+  EXPECT_TRUE(controller_.advance_by(state_, attempt).error);
+  EXPECT_EQ(system_.explained, 1);
+  expect_untouched();
+  system_.stops = true;
+  const PhaseReport report = controller_.advance_by(state_, attempt);
+  ASSERT_TRUE(report.error);
+  EXPECT_EQ(report.error->kind, ErrorKind::cancelled);
+  expect_untouched();
+}
+
 // ------------------------------------------------------------------ lengths of the caller
 
 TEST_F(StepControllerTest, TakesALengthWithoutAskingTheStrategy) {
