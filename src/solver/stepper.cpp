@@ -405,7 +405,7 @@ PhaseReport Stepper::attempt(State& state, const StepAttempt& attempt, const Met
     update_activity(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, true);
     run_after_prediction(model_.context(state, Phase::step, f.c(), f.c_algebraic()),
                          workspace_.scratch, state);
-    select_pivots(state);
+    if (first || !is_third_order(method)) select_pivots(state);
     report.newton = iterate(state, f, method, first, settings);
     report.flagged = attempt.accept_unconverged &&
                      report.newton.outcome == NewtonOutcome::not_converged && is_finite(state);

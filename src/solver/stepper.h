@@ -63,7 +63,7 @@ class Stepper final : public StepSystem {
   /// simulation of a model.
   void choose_pivots(const State& state);
   /// Activity of `driven` elements makes matrices of different kinds: each has pivots from the
-  /// matrix at the initial state with these elements active.
+  /// matrix at the initial state with these elements active. Not for third-order steps, see there.
   void select_pivots(const State& state);
   class StepHooks;
   class DerivativesHooks;

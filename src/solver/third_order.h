@@ -37,7 +37,10 @@ class TwoStageSystem final : public NewtonSystem {
  public:
   TwoStageSystem(const Model& model, Workspace& workspace);
 
-  /// Pivots of the doubled matrix, chosen at a reference state with the model's time step.
+  /// Pivots of the doubled matrix, chosen at a reference state with the model's time step. They
+  /// serve whatever `driven` elements are active: a matrix for which they are poor is factored with
+  /// pivots of its own. Pivots for each activity would save that time, at the price of four
+  /// Jacobians and a doubled factorization for each.
   void choose_pivots(const State& state, const ThirdOrderFormula& f);
   /// The workspace has other load tangents.
   void tangents_changed() { tangent_solver_.reset(); }
