@@ -2,6 +2,7 @@
 
 #include <Eigen/Sparse>
 #include <map>
+#include <memory>
 
 #include "math/sparse_lu.h"
 #include "model/model_part.h"
@@ -10,6 +11,7 @@
 #include "solver/newton.h"
 #include "solver/null_space.h"
 #include "solver/singularity.h"
+#include "solver/stages.h"
 
 namespace mbcosim {
 
@@ -22,6 +24,7 @@ class Assembly {
         state_(state),
         start_(state),
         cancel_(cancel),
+        scratch_(std::make_unique<Scratch>(model.scratch)),
         n_(model.unknowns),
         to_local_(2 * n_, -1) {
     for (const ElementRef& e : model.elements)
@@ -110,7 +113,13 @@ class Assembly {
     r_rate_.assign(n_, 0);
   }
 
-  EvalContext context() const { return model_.context(state_, Phase::assembly); }
+  /// With the sums over elements at the state.
+  EvalContext context() const {
+    EvalContext c = model_.context(state_, Phase::assembly);
+    c.scratch = scratch_.get();
+    accumulate(c);
+    return c;
+  }
 
   Vec3 rotation_parameters(std::size_t k) const {
     return cgr_parameters<double>(state_.rotation[k].R * start_.rotation[k].R.transpose());
@@ -315,6 +324,7 @@ class Assembly {
   State& state_;
   const State start_;
   const CancelToken* const cancel_;
+  const std::unique_ptr<Scratch> scratch_;  ///< of elements
   int n_;
   int size_ = 0, node_rows_ = 0;  ///< local rows of one level, those of nodes among them
   std::vector<ElementRef> elements_;
@@ -342,7 +352,9 @@ Result<AssemblyReport> assemble_initially(const Model& model, State& state,
   for (const StructuralNode& node : model.structural)
     if (node.has_rotation())
       for (int i = 0; i < 3; ++i) state.y[node.first + 3 + i] = 0;
-  const EvalContext context = model.context(state, Phase::assembly);
+  Scratch scratch(model.scratch);
+  EvalContext context = model.context(state, Phase::assembly);
+  context.scratch = &scratch;
   for (const ElementRef& e : model.elements) e.set->after_assembly(context, state, e.index);
   return report;
 }

@@ -20,9 +20,11 @@ namespace {
 constexpr double kSpring = 40;    ///< of a blade's own load [N/m]
 constexpr double kInflow = 0.05;  ///< κ: inflow by the blades' loads [m/N]
 
-/// Inflow w = κ Σ T over the blades. Sums: Σ T [N], w [m].
+/// Inflow w = κ Σ T over the blades. Sums: Σ T [N], w [m]. Loads its hub with L w along axis 1, in
+/// the initial assembly, too.
 struct TestRotor {
   int hub = -1;
+  double load = 0;  ///< L [N/m]; 0: it takes no part in the assembly
   static constexpr int width = 6;
   void connect(Connector& c) {
     c.node(hub);
@@ -31,8 +33,13 @@ struct TestRotor {
   void accumulate(const Local<double>& u, Sums& sums) const {
     sums[u.sums_offset() + 1] = kInflow * sums[u.sums_offset()];
   }
+  AssemblyRole assembly_role() const {
+    return load != 0 ? AssemblyRole::elastic : AssemblyRole::none;
+  }
   template <class T>
-  void residual(const Local<T>&, Residual<T>&) const {}
+  void residual(const Local<T>& u, Residual<T>& r) const {
+    r.force(0, Vec<T>(T(load * u.sum(1)), T(0.0), T(0.0)));
+  }
 };
 
 /// Thrust T = −k x₁ of a node, known to its rotor; load T − k w along axis 1, and a steady one.
@@ -72,6 +79,7 @@ Registry test_registry() {
   registry.element("rotor", Family::induced_velocity, [](Card& card, ElementInfo& info) {
     TestRotor e;
     e.hub = card.structural_node();
+    if (card.more()) e.load = card.real("load by inflow");
     add_element(card.builder(), info, e);
   });
   registry.element("aerodynamic body", Family::aerodynamic, [](Card& card, ElementInfo& info) {
@@ -85,14 +93,15 @@ Registry test_registry() {
 }
 
 /// Three unit masses; the blade on the first one belongs to no rotor. `rotor_first`: so does its
-/// set.
-ModelPtr make_model(bool rotor_first) {
-  const std::string rotor = "rotor: 1, 1;", alone = "aerodynamic body: 1, 1, 3.;";
+/// set. `load`: on the hub, by the inflow [N/m].
+ModelPtr make_model(bool rotor_first, const std::string& load = "0.") {
+  const std::string rotor = "rotor: 1, 1, " + load + ";", alone = "aerodynamic body: 1, 1, 3.;";
   std::string deck =
       "begin: data; problem: initial value; end: data;"
       "begin: initial value; initial time: 0.; final time: 1.; time step: .01; tolerance: 1e-11;"
       "max iterations: 60; derivatives tolerance: 1e-6; derivatives max iterations: 60;"
-      "end: initial value; begin: control data; structural nodes: 3; end: control data;"
+      "end: initial value; begin: control data; structural nodes: 3; max initial iterations: 5;"
+      "end: control data;"
       "begin: nodes;";
   for (const char* label : {"1", "2", "3"})
     deck += std::string("structural: ") + label + ", dynamic, 0.1, 0., 0., eye, null, null;";
@@ -153,6 +162,20 @@ TEST(Stages, BladesUseTheInflowThatTheirRotorSumsInTheSameEvaluation) {
                           2 - kSpring * x[2] - kSpring * w};
   for (int k = 0; k < 3; ++k)
     EXPECT_NEAR(r[model->places[k].equilibrium], loads[k], 1e-13) << "node " << k + 1;
+}
+
+/// The hub is held by a spring of stiffness 1; the blades are where they were.
+TEST(Stages, InitialAssemblySumsBeforeItsResidualAndItsMatrix) {
+  for (const bool rotor_first : {true, false}) {
+    const ModelPtr model = make_model(rotor_first, "0.5");
+    State state = make_initial_state(*model);
+    Stepper stepper(*model);
+    const Status assembled = stepper.assemble(state);
+    ASSERT_TRUE(assembled) << assembled.error().message;
+    const double w = kInflow * -kSpring * (.1 + .1);
+    EXPECT_NEAR(state.y[model->places[0].first], .1 + .5 * w, 1e-12);
+    for (const int blade : {1, 2}) EXPECT_EQ(state.y[model->places[blade].first], .1);
+  }
 }
 
 TEST(Stages, TheOrderOfTheCardsDoesNotMatter) {
