@@ -21,33 +21,25 @@ ControlSettings& control(DeckCard& card) { return card.model().control; }
 
 void read_skip_assembly(DeckCard& card) { control(card).skip_assembly = true; }
 
+/// What a deck may call into the initial assembly. Elastic joints and beams take part anyhow.
 void read_use(DeckCard& card) {
-  ControlSettings& c = control(card);
   bool closed = false;
   while (card.more() && !closed) {
+    const SourceSpan where = card.next();
     switch (card.required("kind of element",
-                          {"rigid bodies", "gravity", "forces", "beams", "plates",
-                           "aerodynamic elements", "loadable elements", "in assembly"})) {
+                          {"beams", "loadable elements", "in assembly", "rigid bodies", "gravity",
+                           "forces", "plates", "aerodynamic elements"})) {
       case 0:
-        c.assemble_bodies = true;
         break;
       case 1:
-        c.assemble_gravity = true;
-        break;
-      case 2:
-        c.assemble_forces = true;
-        break;
-      case 3:
-        c.assemble_beams = true;
-        break;
-      case 6:
         part<UserElementsInAssembly>(card.builder());
         break;
-      case 7:
+      case 2:
         closed = true;
         break;
       default:
-        break;
+        card.warn_at(where, "without effect: these elements take no part in the initial assembly",
+                     "constraints and what is elastic place the nodes");
     }
   }
   if (!closed) card.fail("\"in assembly\" missing at the end of the card");

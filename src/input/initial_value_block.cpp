@@ -40,7 +40,9 @@ void read_min_time_step(DeckCard& card) {
 void read_max_time_step(DeckCard& card) {
   InitialValueSettings& s = settings(card);
   s.max_time_step = card.keyword("unlimited") ? nullptr : card.drive("max time step");
-  if (card.keyword("hard limit")) s.max_time_step_hard = card.yes_no("hard limit");
+  if (!card.keyword("hard limit")) return;
+  card.yes_no("hard limit");
+  card.note("`hard limit` has no effect: the strategy treats the limit in one way");
 }
 
 void read_strategy(DeckCard& card) {
@@ -222,7 +224,6 @@ void read_condition_number_options(DeckCard& card) {
 }
 
 void read_output(DeckCard& card) {
-  InitialValueSettings& s = settings(card);
   static const std::vector<std::string> kItems = {"none",
                                                   "iterations",
                                                   "residual",
@@ -236,29 +237,18 @@ void read_output(DeckCard& card) {
                                                   "matrix condition number",
                                                   "solver condition number",
                                                   "solver condition number statistics"};
+  bool asks = false;
   while (card.more()) {
     switch (card.one_of({"none", "iterations", "residual", "solution", "jacobian",
                          "jacobian matrix", "bailout", "messages", "counter", "cpu time",
                          "matrix condition number", "solver condition number"})) {
       case 0:
-        s.output_iterations = s.output_residual = s.output_solution = s.output_jacobian = false;
-        break;
-      case 1:
-        s.output_iterations = true;
-        break;
-      case 2:
-        s.output_residual = true;
-        break;
-      case 3:
-        s.output_solution = true;
-        break;
-      case 4:
-      case 5:
-        s.output_jacobian = true;
+        asks = false;
         break;
       case 10:
       case 11:
         read_condition_number_options(card);
+        asks = true;
         break;
       case -1: {
         const std::string word = card.word("output item");
@@ -266,9 +256,14 @@ void read_output(DeckCard& card) {
         break;
       }
       default:
+        asks = true;
         break;
     }
   }
+  if (asks)
+    card.note(
+        "nothing is printed during the iterations; `.out` has their number and the residual "
+        "of each step");
 }
 
 void read_abort_after(DeckCard& card) {

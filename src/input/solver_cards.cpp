@@ -88,7 +88,10 @@ bool read_line_search_option(DeckCard& card, LineSearchSettings& l) {
       l.abort_at_lambda_min = card.yes_no("abort at lambda min");
       return true;
     case 14:
-      l.non_negative_slope_continue = card.yes_no("non negative slope continue");
+      card.yes_no("non negative slope continue");
+      card.note(
+          "`non negative slope continue` has no effect: along a correction the slope of the "
+          "squared residual is taken as negative");
       return true;
     default:
       return false;

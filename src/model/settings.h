@@ -26,8 +26,7 @@ struct LineSearchSettings {
          lambda_factor_min = 0.1, max_step = 100, divergence_factor = 1, min_scale = 1e-3;
   int max_iterations = 200;
   bool lambda_min_relative = true, zero_gradient_continue = false, divergence_check = true,
-       cubic = true, scale_newton_step = true, abort_at_lambda_min = true,
-       non_negative_slope_continue = false;
+       cubic = true, scale_newton_step = true, abort_at_lambda_min = true;
 };
 
 struct EigenSettings {
@@ -50,7 +49,6 @@ struct InitialValueSettings {
   double time_step = 1;      ///< [s]
   double min_time_step = 0;  ///< 0: none
   DrivePtr max_time_step;    ///< null: unlimited
-  bool max_time_step_hard = true;
   StepStrategy strategy = StepStrategy::no_change;
   DrivePtr strategy_change;
   double reduction = 0.5, raise = 1;
@@ -92,14 +90,10 @@ struct InitialValueSettings {
     dummy_steps
   } abort_after = AbortAfter::never;
   std::vector<EigenSettings> eigenanalyses;
-  bool output_iterations = false, output_residual = false, output_solution = false,
-       output_jacobian = false;
 };
 
 struct ControlSettings {
   bool skip_assembly = false;
-  bool assemble_bodies = false, assemble_gravity = false, assemble_forces = false,
-       assemble_beams = true;
   double assembly_tolerance = 1e-6;
   int assembly_max_iterations = 1;
   double assembly_epsilon = 1;

@@ -73,18 +73,8 @@ class Assembly {
   bool is_assembled(const ElementRef& e) const {
     if (e.set->assembly_role(e.index) == AssemblyRole::none || !e.set->is_active(state_, e.index))
       return false;
-    switch (e.set->info(e.index).family) {
-      case Family::body:
-        return model_.control.assemble_bodies;
-      case Family::force:
-        return model_.control.assemble_forces;
-      case Family::loadable:
-        return find_part<UserElementsInAssembly>(model_) != nullptr;
-      case Family::beam:
-        return model_.control.assemble_beams;
-      default:
-        return true;
-    }
+    return e.set->info(e.index).family != Family::loadable ||
+           find_part<UserElementsInAssembly>(model_) != nullptr;
   }
 
   /// Local numbering: position level first, then the rate level. Node rows are the equilibrium

@@ -75,6 +75,7 @@ min time step
   = <h [s]>
 max time step
   = { unlimited | <drive> } [ , hard limit , <yes or no> ]
+  ! yes: `hard limit` is checked and has no effect
 strategy
   = { no change | factor , <reduction> , <n steps before reduction> , <raise> , <n steps before raise> , <n min iterations> [ , <n max iterations> ] | change , <drive> }
 tolerance
@@ -116,7 +117,7 @@ method
   = <method>
 nonlinear solver
   = { default | newton raphson [ , { true | modified , <n iterations> [ , keep jacobian matrix ] [ , honor element requests ] } ] | line search [ , modified , <n iterations> [ , keep jacobian matrix ] ] [ , tolerance x , <tolerance> ] [ , tolerance min , <tolerance> ] [ , max iterations , <n iterations> ] [ , alpha , <alpha> ] [ , lambda min , <lambda> [ , relative , <yes or no> ] ] [ , lambda factor min , <fraction> ] [ , max step , <step> ] [ , zero gradient , continue , <yes or no> ] [ , divergence check , <yes or no> [ , factor , <factor> ] ] [ , algorithm , { cubic | factor } ] [ , scale newton step , <yes or no> [ , min scale , <fraction> ] ] [ , print convergence info , <yes or no> ] [ , verbose , <yes or no> ] [ , abort at lambda min , <yes or no> ] [ , non negative slope continue , <yes or no> ] | matrix free , { default | bicgstab | gmres } [ , tolerance , <tolerance> ] [ , steps , <n steps> ] [ , tau , <tau> ] [ , eta , <eta> ] [ , preconditioner , full jacobian matrix [ , steps , <n steps> ] [ , honor element requests ] ] }
-  ! partly: `newton raphson` and `line search`; `matrix free` is checked and solved by Newton-Raphson
+  ! partly: `newton raphson` and `line search`, whose `non negative slope continue` is checked and has no effect; `matrix free` is checked and solved by Newton-Raphson
 newton raphson
   = { true | modified [ , <n iterations> ] }
 linear solver
@@ -127,6 +128,7 @@ solver
   ! ignored: checked
 output
   = { none | iterations | residual | solution | jacobian | jacobian matrix | bailout | messages | counter | cpu time | matrix condition number [ , norm , { inf | 1 } ] | solver condition number [ , stat , <yes or no> ] }
+  ! ignored: nothing is printed during the iterations; `.out` has their number and the residual of each step
 output meter
   = <drive>
   ! ignored: of this block
@@ -194,6 +196,7 @@ threads
   ! ignored
 output
   = { none | iterations | residual | solution | jacobian | jacobian matrix | bailout | messages }
+  ! ignored: nothing is printed during the iterations; `.out` has their number and the residual of each record
 output meter
   = <drive>
   ! ignored
@@ -209,6 +212,7 @@ const char* const kControl = R"(
 skip initial joint assembly
 use
   = { rigid bodies | gravity | forces | beams | plates | aerodynamic elements | loadable elements } , in assembly
+  ! partly: `beams`, which take part anyhow, and `loadable elements`; the others have no effect (with a warning)
 initial stiffness
   = <position stiffness> [ , <velocity stiffness> ]
 stiffness

@@ -45,7 +45,6 @@ TEST(InitialValue, ReadsTimes) {
   EXPECT_EQ(s.min_time_step, 1e-6);
   ASSERT_TRUE(s.max_time_step);
   EXPECT_EQ(s.max_time_step->value(EvalContext{}), 1e-2);
-  EXPECT_FALSE(s.max_time_step_hard);
   EXPECT_EQ(s.strategy, StepStrategy::factor);
   EXPECT_EQ(s.reduction, .5);
   EXPECT_EQ(s.steps_before_reduction, 2);
@@ -158,8 +157,6 @@ TEST(InitialValue, ReadsOutputAndEigenanalysis) {
       " upper frequency limit, 50., suffix width, 3, suffix format, \"%03d\", use lapack, balance, "
       "permute;"
       "eigenanalysis: 2., use arpack, 10, 20, 1e-3;");
-  EXPECT_TRUE(s.output_iterations && s.output_residual && s.output_jacobian);
-  EXPECT_FALSE(s.output_solution);
   EXPECT_EQ(s.abort_after, InitialValueSettings::AbortAfter::derivatives);
   ASSERT_EQ(s.eigenanalyses.size(), 2u);
   const EigenSettings& e = s.eigenanalyses[0];
@@ -174,7 +171,7 @@ TEST(InitialValue, ReadsOutputAndEigenanalysis) {
 
 TEST(ControlData, ReadsAssemblyAndOutput) {
   const ModelPtr model = control(
-      "skip initial joint assembly; use: rigid bodies, gravity, in assembly; initial tolerance: "
+      "skip initial joint assembly; use: beams, in assembly; initial tolerance: "
       "1e-3; max initial iterations: 9;"
       "initial stiffness: 2., 3.; omega rotates: yes; epsilon: .5; output frequency: 4; output "
       "precision: 12;"
@@ -184,8 +181,7 @@ TEST(ControlData, ReadsAssemblyAndOutput) {
       "output: position;");
   ASSERT_TRUE(model);
   const ControlSettings& c = model->control;
-  EXPECT_TRUE(c.skip_assembly && c.assemble_bodies && c.assemble_gravity && c.assemble_beams);
-  EXPECT_FALSE(c.assemble_forces);
+  EXPECT_TRUE(c.skip_assembly);
   EXPECT_EQ(c.assembly_tolerance, 1e-3);
   EXPECT_EQ(c.assembly_max_iterations, 9);
   EXPECT_EQ(c.position_stiffness, 2);
@@ -218,6 +214,34 @@ TEST(NewerWords, AreReadWithANote) {
     notes += d.severity == Severity::note;
   }
   EXPECT_EQ(notes, 3);
+}
+
+TEST(WordsWithoutEffect, AreNamed) {
+  const auto finding = [](const std::string& initial_value, const std::string& control) {
+    DeckText d;
+    d.initial_value = initial_value;
+    d.control = control;
+    std::string found;
+    for (const Diagnostic& x : load(d.text()).diagnostics)
+      found += std::string(severity_name(x.severity)) + ": " + x.message;
+    return found;
+  };
+  const std::string printed =
+      "note: output: nothing is printed during the iterations; `.out` has their number and the "
+      "residual of each step";
+  EXPECT_EQ(finding("output: iterations, matrix condition number, norm, inf;", ""), printed);
+  EXPECT_EQ(finding("output: cpu time;", ""), printed);
+  EXPECT_EQ(finding("output: residual, none;", ""), "");
+  EXPECT_EQ(finding("max time step: 1e-2, hard limit, no;", ""),
+            "note: max time step: `hard limit` has no effect: the strategy treats the limit in one "
+            "way");
+  EXPECT_EQ(finding("nonlinear solver: line search, non negative slope continue, yes;", ""),
+            "note: nonlinear solver: `non negative slope continue` has no effect: along a "
+            "correction the slope of the squared residual is taken as negative");
+  EXPECT_EQ(finding("", "use: beams, loadable elements, in assembly;"), "");
+  for (const char* word : {"rigid bodies", "gravity", "forces", "plates", "aerodynamic elements"})
+    EXPECT_EQ(finding("", std::string("use: ") + word + ", in assembly;"),
+              "warning: without effect: these elements take no part in the initial assembly");
 }
 
 TEST(ControlData, ReadsTheMotionOfTheFrame) {
