@@ -40,7 +40,7 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   app.add_option(
          "--limit-memory", limits.memory_bytes,
          "Bytes of models, states, matrices, snapshots, records, buffers and uploads; 0: 60 % "
-         "of the machine's or the container's")
+         "of the machine's, or of what systemd or a container allows")
       ->group("Limits")
       ->capture_default_str()
       ->transform(CLI::AsSizeValue(false))

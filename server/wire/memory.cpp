@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
-#include <fstream>
 #include <new>
-#include <string>
 
+#include "wire/control_group.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -19,13 +18,6 @@ constexpr std::int64_t kSlab = 1 << 20;  ///< taken from the budget at a time
 constexpr int kLook = 1024;              ///< allocations between two looks at the token
 
 thread_local MemoryScope* scope_of_thread = nullptr;
-
-/// First number of a file; negative: none ("max", or no such file).
-std::int64_t number_in(const char* path) {
-  std::ifstream file(path);
-  std::int64_t number = -1;
-  return file >> number ? number : -1;
-}
 
 }  // namespace
 
@@ -38,13 +30,9 @@ void MemoryBudget::refuse() const {
 
 std::int64_t MemoryBudget::default_bytes() {
   constexpr double kShare = 0.6;  // the rest is for gRPC, factorizations and the system
-  std::int64_t bytes = static_cast<std::int64_t>(::sysconf(_SC_PHYS_PAGES)) *
-                       static_cast<std::int64_t>(::sysconf(_SC_PAGE_SIZE));
-  for (const char* path :
-       {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
-    const std::int64_t limit = number_in(path);
-    if (limit > 0) bytes = std::min(bytes, limit);
-  }
+  const std::int64_t machine = static_cast<std::int64_t>(::sysconf(_SC_PHYS_PAGES)) *
+                               static_cast<std::int64_t>(::sysconf(_SC_PAGE_SIZE));
+  const std::int64_t bytes = std::min(machine, control_group_memory());
   return static_cast<std::int64_t>(kShare * static_cast<double>(bytes));
 }
 

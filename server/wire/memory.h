@@ -34,7 +34,7 @@ class MemoryBudget {
 
   /// Throws LIMIT_EXCEEDED, limit "memory_bytes", or "identity_memory_bytes" for a part.
   [[noreturn]] void refuse() const;
-  /// A share of what the machine, or its container, has.
+  /// A share of what the machine has, or of what systemd or a container leaves to this process.
   static std::int64_t default_bytes();
 
  private:

@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "wire/control_group.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -101,6 +105,56 @@ TEST(Memory, WhatIsThereAlreadyIsNeverRefused) {
     EXPECT_EQ(share.bytes(), 0);
   }
   EXPECT_EQ(budget.used(), 0);
+}
+
+/// A folder with what the system tells a process about its control groups.
+class ControlGroups : public testing::Test {
+ protected:
+  ~ControlGroups() override { std::filesystem::remove_all(root_); }
+  void write(const std::string& path, const std::string& text) const {
+    std::filesystem::create_directories((root_ / path).parent_path());
+    std::ofstream(root_ / path) << text << '\n';
+  }
+  std::int64_t limit() const { return control_group_memory(root_.string()); }
+  static constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::max();
+
+ private:
+  static std::filesystem::path fresh_folder() {
+    std::string name = testing::TempDir() + "/control_groups_XXXXXX";
+    return ::mkdtemp(name.data());
+  }
+  const std::filesystem::path root_ = fresh_folder();
+};
+
+TEST_F(ControlGroups, WithoutAnyNothingIsLimited) {
+  EXPECT_EQ(limit(), kNone);
+  write("proc/self/cgroup", "0::/");
+  EXPECT_EQ(limit(), kNone);
+}
+
+TEST_F(ControlGroups, OfAServiceTheSmallestLimitUpToTheRootHolds) {
+  write("proc/self/cgroup", "0::/system.slice/mbcosimd.service");
+  write("sys/fs/cgroup/system.slice/mbcosimd.service/memory.max", "max");
+  write("sys/fs/cgroup/system.slice/other.service/memory.max", "1000");
+  EXPECT_EQ(limit(), kNone);
+  write("sys/fs/cgroup/system.slice/memory.max", "8000000000");
+  EXPECT_EQ(limit(), 8000000000);
+  write("sys/fs/cgroup/system.slice/mbcosimd.service/memory.max", "2000000000");
+  EXPECT_EQ(limit(), 2000000000);
+}
+
+TEST_F(ControlGroups, OfAContainerThatSeesItsHostsPathItsOwnRootHolds) {
+  write("proc/self/cgroup", "0::/../../kubepods/pod7");
+  write("sys/fs/cgroup/memory.max", "3000000000");
+  EXPECT_EQ(limit(), 3000000000);
+}
+
+TEST_F(ControlGroups, OfTheOlderVersionTheGroupOfMemoryHolds) {
+  write("proc/self/cgroup", "9:cpu,cpuacct:/wrong\n4:memory:/service/one\n0::/unified");
+  write("sys/fs/cgroup/memory/wrong/memory.limit_in_bytes", "1000");
+  write("sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712");
+  write("sys/fs/cgroup/memory/service/one/memory.limit_in_bytes", "5000000000");
+  EXPECT_EQ(limit(), 5000000000);
 }
 
 }  // namespace
