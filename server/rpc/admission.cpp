@@ -22,20 +22,21 @@ Admission::Ticket Admission::admit(const std::string& identity, const std::strin
   Guard guard(mutex_);
   if (all_ >= limits_.calls)
     throw limit_refusal("open_calls", limits_.calls, "the server has as many calls as are allowed");
-  Count& own = identities_[identity];
-  if (stream && own.streams >= limits_.identity_streams)
+  const auto known = identities_.find(identity);
+  const Count before = known == identities_.end() ? Count{} : known->second;
+  if (stream && before.streams >= limits_.identity_streams)
     throw limit_refusal("identity_streams", limits_.identity_streams,
                         identity + " has as many streams as one identity may have");
-  if (!stream && own.calls >= limits_.identity_calls)
+  if (!stream && before.calls >= limits_.identity_calls)
     throw limit_refusal("identity_calls", limits_.identity_calls,
                         identity + " has as many calls under way as one identity may have");
-  if (!connection.empty()) {
-    int& over = connections_[connection];
-    if (over >= limits_.connection_calls)
-      throw limit_refusal("connection_calls", limits_.connection_calls,
-                          "the connection carries as many calls as are allowed");
-    ++over;
-  }
+  const auto over = connections_.find(connection);
+  if (over != connections_.end() && over->second >= limits_.connection_calls)
+    throw limit_refusal("connection_calls", limits_.connection_calls,
+                        "the connection carries as many calls as are allowed");
+  // Nothing is kept of a call that was refused.
+  Count& own = identities_[identity];
+  if (!connection.empty()) ++connections_[connection];
   ++(stream ? own.streams : own.calls);
   ++all_;
   return Ticket(this, identity, connection, stream);

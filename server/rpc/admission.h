@@ -51,6 +51,12 @@ class Admission {
     return all_;
   }
 
+  /// Identities and connections that have any.
+  std::size_t known() const TS_EXCLUDES(mutex_) {
+    Guard guard(mutex_);
+    return identities_.size() + connections_.size();
+  }
+
  private:
   struct Count {
     int calls = 0, streams = 0;

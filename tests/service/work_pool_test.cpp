@@ -107,5 +107,14 @@ TEST(Admission, LimitsHoldForEachIdentityEachConnectionAndAll) {
   EXPECT_FALSE(refused("ann", "1", true));
 }
 
+TEST(Admission, NothingIsKeptOfARefusedCall) {
+  Admission admission({5, 2, 2, 1});
+  const Admission::Ticket ticket = admission.admit("ann", "1", true);
+  EXPECT_EQ(admission.known(), 2U);
+  EXPECT_THROW(admission.admit("bob", "1", true), Refusal);
+  EXPECT_THROW(admission.admit("eve", "1", false), Refusal);
+  EXPECT_EQ(admission.known(), 2U);
+}
+
 }  // namespace
 }  // namespace mbcosim::server
