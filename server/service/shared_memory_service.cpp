@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <cstring>
+#include <map>
 #include <optional>
 #include <system_error>
+#include <vector>
 
 #include "service/peer_seat.h"
 #include "threads/mutex.h"
@@ -19,9 +21,11 @@ namespace mbcosim::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr int kLookMs = 50;       // how soon the end of the service is noticed
-constexpr int kRequestMs = 5000;  // longest wait for a new client's first packet
-constexpr int kMostWaiting = 64;  // clients not yet accepted
+constexpr int kLookMs = 50;  // how soon the end of the service is noticed
+constexpr auto kRequestWait = std::chrono::seconds(5);  // for a new client's first packet
+constexpr int kMostWaiting = 64;                        // clients not yet accepted
+constexpr std::size_t kMostSilent = 64;                 // clients that have not asked yet
+constexpr std::size_t kMostAsking = 64;                 // clients whose tokens are looked at
 constexpr auto kHelloWait = std::chrono::seconds(10);
 constexpr auto kHandshake = std::chrono::seconds(10);  // for the peer to take its welcome
 constexpr auto kLongestBeat = std::chrono::milliseconds(500);
@@ -62,12 +66,13 @@ bool readable(int socket, int milliseconds) {
   return ::poll(&look, 1, milliseconds) != 0;
 }
 
-/// The socket's mode keeps others out; this holds even when someone changes the mode.
-bool same_user(int socket) {
+/// The process at the other end; none when it is another user's. The socket's mode keeps others
+/// out; this holds even when someone changes the mode.
+std::optional<pid_t> process_of(int socket) {
   ucred other{};
   socklen_t size = sizeof other;
-  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &other, &size) != 0) return false;
-  return other.uid == ::geteuid() || other.uid == 0;
+  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &other, &size) != 0) return std::nullopt;
+  return other.uid == ::geteuid() || other.uid == 0 ? std::optional(other.pid) : std::nullopt;
 }
 
 /// The session's thread fetches answers itself; between exchanges the connection's thread looks.
@@ -163,7 +168,11 @@ class SharedMemoryStream : public PeerLink {
 }  // namespace
 
 SharedMemoryService::SharedMemoryService(const std::string& path, const Parts& parts)
-    : path_(path), parts_(parts), listener_(listen_on(path)), thread_([this] { accept_loop(); }) {}
+    : path_(path),
+      parts_(parts),
+      listener_(listen_on(path)),
+      places_(parts.config.limits.shared_memory_peers, parts.runtime.authenticator.needs_token()),
+      thread_([this] { accept_loop(); }) {}
 
 SharedMemoryService::~SharedMemoryService() {
   stop_.store(true);
@@ -176,10 +185,28 @@ SharedMemoryService::~SharedMemoryService() {
 void SharedMemoryService::accept_loop() {
   while (!stop_.load()) {
     run_caught("shared memory", [this] {
-      if (readable(listener_.get(), kLookMs)) accept_one();
+      look();
       join_ended();
     });
   }
+}
+
+/// Waits a moment for new clients, and for those that have not asked yet.
+void SharedMemoryService::look() {
+  std::vector<pollfd> looks{{listener_.get(), POLLIN, 0}};
+  for (const Silent& client : silent_)
+    looks.push_back({client.socket.get(), POLLIN | POLLRDHUP, 0});
+  if (::poll(looks.data(), looks.size(), kLookMs) < 0) return;
+  const Clock::time_point now = Clock::now();
+  auto seen = looks.begin() + 1;
+  for (auto next = silent_.begin(); next != silent_.end(); ++seen) {
+    const auto client = next++;
+    if (seen->revents == 0 && now < client->until) continue;
+    shm::Descriptor socket = std::move(client->socket);
+    silent_.erase(client);
+    if (seen->revents != 0) begin(std::move(socket));
+  }
+  if (looks.front().revents != 0) accept_one();
 }
 
 void SharedMemoryService::accept_one() {
@@ -188,12 +215,27 @@ void SharedMemoryService::accept_one() {
     std::this_thread::sleep_for(std::chrono::milliseconds(kLookMs));
     return;
   }
-  if (!same_user(socket.get())) return;
-  const std::size_t most = static_cast<std::size_t>(parts_.config.limits.shared_memory_peers);
-  if (connections_.size() >= most) {
+  const std::optional<pid_t> process = process_of(socket.get());
+  if (!process) return;
+  silent_.push_back({std::move(socket), *process, Clock::now() + kRequestWait});
+  if (silent_.size() > kMostSilent) drop_silent();
+}
+
+/// The oldest of the process that has most.
+void SharedMemoryService::drop_silent() {
+  std::map<pid_t, int> counts;
+  int most = 0;
+  for (const Silent& client : silent_) most = std::max(most, ++counts[client.process]);
+  silent_.erase(std::find_if(silent_.begin(), silent_.end(),
+                             [&](const Silent& client) { return counts[client.process] == most; }));
+}
+
+/// For a client that asks, or has gone.
+void SharedMemoryService::begin(shm::Descriptor socket) {
+  const int peers = parts_.config.limits.shared_memory_peers;
+  if (connections_.size() >= static_cast<std::size_t>(peers) + kMostAsking) {
     const grpc::Status status =
-        limit_refusal("shared_memory_peers", static_cast<long long>(most), "too many peers")
-            .status();
+        limit_refusal("shared_memory_peers", peers, "too many peers over shared memory").status();
     shm::send_status(socket.get(), {status.error_code(), status.error_details()});
     return;
   }
@@ -219,12 +261,13 @@ void SharedMemoryService::join_ended() {
 
 void SharedMemoryService::serve(shm::Descriptor socket, Call& call) {
   shm::Request request;
-  if (!readable(socket.get(), kRequestMs) || !shm::read_request(socket.get(), &request)) return;
+  if (!shm::read_request(socket.get(), &request)) return;
   std::optional<shm::Channel> channel;
   grpc::Status status;
   Caller caller;
   try {
     caller = parts_.runtime.authenticator.check_local(request.authorization, Role::control);
+    const PeerPlaces::Place place(places_, caller.identity);
     const Admission::Ticket ticket = parts_.runtime.admission.admit(caller.identity, "", true);
     shm::Segment segment = shm::Segment::create();
     if (!shm::send_segment(socket.get(), segment)) return;

@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <list>
+#include <string>
+
 #include "service/lease.h"
+#include "service/peer_places.h"
 #include "service/snapshot_shelf.h"
 #include "service/variable_access.h"
 #include "wire/refusal.h"
@@ -101,6 +105,38 @@ TEST(VariableAccess, RefusesHandlesWrongSizesAndWhatIsNoInput) {
   EXPECT_EQ(refused({0}, {1, 2, 3}), v1::REASON_NOT_WRITABLE);
   EXPECT_EQ(refused({1}, {1}), v1::REASON_BAD_ARGUMENT);
   EXPECT_EQ(refused({1}, {1, std::numeric_limits<double>::quiet_NaN()}), v1::REASON_BAD_ARGUMENT);
+}
+
+std::string limit_met(PeerPlaces& places, const char* identity) {
+  try {
+    const PeerPlaces::Place place(places, identity);
+    return "";
+  } catch (const Refusal& refusal) {
+    return refusal.limit();
+  }
+}
+
+TEST(PeerPlaces, OneCallerHasNoMoreThanAreFreeForOthers) {
+  PeerPlaces places(8, true);
+  std::list<PeerPlaces::Place> taken;
+  for (int i = 0; i < 4; ++i) taken.emplace_back(places, "ann");
+  EXPECT_EQ(limit_met(places, "ann"), "identity_shared_memory_peers");
+  for (int i = 0; i < 2; ++i) taken.emplace_back(places, "bob");
+  EXPECT_EQ(limit_met(places, "bob"), "identity_shared_memory_peers");
+  EXPECT_EQ(limit_met(places, "eve"), "");
+  taken.pop_front();
+  EXPECT_EQ(limit_met(places, "bob"), "");
+  taken.clear();
+  EXPECT_EQ(limit_met(places, "ann"), "");
+}
+
+TEST(PeerPlaces, WhoIsAloneHasAllOfThem) {
+  PeerPlaces places(3, false);
+  std::list<PeerPlaces::Place> taken;
+  for (int i = 0; i < 3; ++i) taken.emplace_back(places, "local");
+  EXPECT_EQ(limit_met(places, "local"), "shared_memory_peers");
+  taken.pop_back();
+  EXPECT_EQ(limit_met(places, "local"), "");
 }
 
 }  // namespace

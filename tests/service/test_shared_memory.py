@@ -1,4 +1,5 @@
 """Peers over shared memory: who may come, and what happens when one side is killed, stopped or leaves."""
+import contextlib
 import os
 import signal
 import socket
@@ -173,24 +174,108 @@ def test_it_can_be_off(start_daemon):
             assert simulation.step().step == 1
 
 
-def test_tokens_are_asked_for(start_daemon, tmp_path):
+def ask(connection, word):
+    """The answer to a request: the memory, or nothing and the status of the refusal."""
+    connection.send(b"mbcosim1" + word)
+    answer, fds, _, _ = socket.recv_fds(connection, 1 << 16, 1)
+    for fd in fds:
+        os.close(fd)
+    return (True, None) if fds else (False, wires.Status(answer[8], answer[9:]))
+
+
+def knock(daemon):
+    """A connection that has not asked yet."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    connection.connect(daemon.address[len("unix:"):] + ".shm")
+    connection.settimeout(10 * TIME_FACTOR)
+    return connection
+
+
+@pytest.fixture
+def guarded(start_daemon, tmp_path):
+    """Function that starts a daemon with the tokens of ann and bob."""
     tokens = tmp_path / "tokens"
-    tokens.write_text("s3cret control ann\n")
-    daemon = start_daemon("--tokens", str(tokens))
-    daemon.connect(token="s3cret").close()
-    path = daemon.address[len("unix:"):] + ".shm"
+    tokens.write_text("s3cret control ann\nother control bob\n")
+
+    def start(*options):
+        daemon = start_daemon("--tokens", str(tokens), *options)
+        daemon.connect(token="s3cret").close()
+        return daemon
+
+    return start
+
+
+def test_tokens_are_asked_for(guarded):
+    daemon = guarded()
     for word, refused in [(b"", True), (b"Bearer wrong", True), (b"Bearer s3cret", False)]:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as peer:
-            peer.connect(path)
-            peer.settimeout(5)
-            peer.send(b"mbcosim1" + word)
-            answer, fds, _, _ = socket.recv_fds(peer, 1 << 16, 1)
-            assert (not fds) == refused
+        with knock(daemon) as peer:
+            memory, status = ask(peer, word)
+            assert memory != refused
             if refused:
-                status = wires.Status(answer[8], answer[9:])
                 assert (status.code, status.reason) == (grpc.StatusCode.UNAUTHENTICATED.value[0], "UNAUTHENTICATED")
-            for fd in fds:
-                os.close(fd)
+
+
+def test_one_identity_leaves_places_to_others(guarded):
+    """Of peers that have their memory and say nothing more, for ten seconds."""
+    daemon = guarded("--limit-shared-memory-peers", "4")
+    with contextlib.ExitStack() as stack:
+        def limit(word):
+            memory, status = ask(stack.enter_context(knock(daemon)), word)
+            return None if memory else status.metadata["limit"]
+
+        own = "identity_shared_memory_peers"
+        assert [limit(b"Bearer s3cret") for _ in range(3)] == [None, None, own]
+        assert [limit(b"Bearer other") for _ in range(2)] == [None, own]
+    wait_for(lambda: ask_again(daemon))
+
+
+def ask_again(daemon):
+    with knock(daemon) as peer:
+        return ask(peer, b"Bearer s3cret")[0]
+
+
+def is_open(connection):
+    connection.setblocking(False)
+    try:
+        return connection.recv(1) != b""
+    except BlockingIOError:
+        return True
+
+
+def test_silent_clients_take_no_places_and_no_threads(daemon, server):
+    threads = len(os.listdir(f"/proc/{daemon.process.pid}/task"))
+    with contextlib.ExitStack() as stack:
+        silent = [stack.enter_context(knock(daemon)) for _ in range(300)]
+        assert ask(stack.enter_context(knock(daemon)), b"")[0]
+        assert len(os.listdir(f"/proc/{daemon.process.pid}/task")) <= threads + 10
+        wait_for(lambda: sum(map(is_open, silent)) <= 64)
+        wait_for(lambda: not any(map(is_open, silent)), 20)  # the last ones after five seconds
+
+
+SILENT = """
+import socket, sys, time
+connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+connection.connect(sys.argv[1])
+start = time.monotonic()
+print("silent", flush=True)
+sys.stdin.readline()
+connection.send(b"mbcosim1")
+print(len(connection.recv(100)) > 0, time.monotonic() - start)
+"""
+
+
+def test_a_process_with_many_silent_clients_loses_its_own(daemon, server):
+    seconds = 5.0
+    while seconds > 4:  # later the client would have been silent for too long itself
+        with contextlib.ExitStack() as stack:
+            modest = stack.enter_context(subprocess.Popen([sys.executable, "-c", SILENT, daemon.address[len("unix:"):] + ".shm"],
+                                                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
+            assert modest.stdout.readline() == "silent\n"
+            for _ in range(200):
+                stack.enter_context(knock(daemon))
+            output, _ = modest.communicate("\n", timeout=30 * TIME_FACTOR)
+            served, seconds = output.split()[0] == "True", float(output.split()[1])
+    assert served
 
 
 @pytest.mark.parametrize("packet", [b"", b"x", b"mbcosim2", b"GET / HTTP/1.1\r\n"])
