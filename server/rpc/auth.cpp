@@ -3,7 +3,6 @@
 #include <grpc/grpc_security_constants.h>
 #include <openssl/crypto.h>
 #include <openssl/sha.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <charconv>
@@ -11,6 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "rpc/trusted_file.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -47,14 +47,6 @@ bool is_hash(const std::string& text) {
   return text.compare(0, kHash.size(), kHash) == 0 &&
          text.size() == kHash.size() + 2 * SHA256_DIGEST_LENGTH &&
          text.find_first_not_of("0123456789abcdef", kHash.size()) == std::string::npos;
-}
-
-/// Who may write the file may let anybody in.
-void check_writers(const std::string& path) {
-  struct stat info {};
-  if (::stat(path.c_str(), &info) != 0) throw std::runtime_error("cannot read the tokens file");
-  if ((info.st_mode & (S_IWGRP | S_IWOTH)) != 0)
-    throw std::runtime_error("others than its owner may write the tokens file: chmod go-w " + path);
 }
 
 }  // namespace
@@ -102,7 +94,7 @@ void Authenticator::reload(const std::string& path) {
 }
 
 Authenticator::Tokens Authenticator::read(const std::string& path) {
-  check_writers(path);
+  check_trusted("the tokens file", path);
   std::ifstream file(path);
   if (!file) throw std::runtime_error("cannot read the tokens file");
   Tokens result;

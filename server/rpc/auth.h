@@ -42,7 +42,7 @@ class Authenticator {
  public:
   /// Reads lines `TOKEN ROLE NAME [EXPIRY]`, the token itself or its hash; `#` starts a comment.
   /// EXPIRY: "2027-01-31", the last day in UTC, or Unix seconds. Throws std::runtime_error that
-  /// names the line, or tells that others may write the file.
+  /// names the line, or tells that others may write the file or replace it (check_trusted).
   static Authenticator from_file(const std::string& path);
   Authenticator() = default;
   /// Roles of client certificates by identity, "cert:…"; the others have control.

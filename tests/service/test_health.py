@@ -137,6 +137,37 @@ def test_what_is_wrong_is_an_error_at_the_start(tmp_path):
     assert "chmod go-w" in refused("--tokens", str(tokens))
 
 
+def test_a_tokens_file_that_others_could_replace_is_refused(start_daemon, tmp_path):
+    folder, link = tmp_path / "open", tmp_path / "link"
+    folder.mkdir()
+    tokens = folder / "tokens"
+    tokens.write_text("t control ann\n")
+    link.symlink_to(tokens)
+    folder.chmod(0o777)
+    for path in (tokens, link):
+        assert f"they may write the folder {folder}: chmod go-w {folder}" in refused("--tokens", str(path))
+    folder.chmod(0o1777)  # as /tmp, where others cannot rename what is not theirs
+    start_daemon("--tokens", str(link)).connect(token="t").close()
+    folder.chmod(0o755)
+    (folder / "deep").mkdir()
+    tokens = tokens.rename(folder / "deep" / "tokens")
+    folder.chmod(0o775)
+    assert f"they may write the folder {folder}:" in refused("--tokens", str(tokens))
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
+def test_a_tokens_file_of_another_user_is_refused(tmp_path):
+    folder = tmp_path / "theirs"
+    folder.mkdir()
+    tokens = folder / "tokens"
+    tokens.write_text("t control ann\n")
+    os.chown(tokens, 12345, -1)
+    assert "belongs to user 12345, neither root nor the daemon's own (0)" in refused("--tokens", str(tokens))
+    os.chown(tokens, 0, -1)
+    os.chown(folder, 12345, -1)
+    assert f"the folder {folder} belongs to user 12345" in refused("--tokens", str(tokens))
+
+
 def test_tokens_may_stand_hashed_in_their_file(start_daemon, tmp_path):
     run = subprocess.run([DAEMON, "--hash-token"], input="s3cret\n", stdout=subprocess.PIPE, text=True, check=True)
     assert run.stdout.startswith("sha256:") and "s3cret" not in run.stdout
