@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <iostream>
 
+#include "daemon/environment.h"
 #include "rpc/auth.h"
 
 namespace mbcosim::server {
@@ -89,11 +90,19 @@ void add_environment_names(CLI::App& app) {
     if (name == "help" || name == "version" || name == "print-config" || name == "hash-token" ||
         (name.compare(0, 5, "check") == 0 && name != "checkpoint-interval"))
       continue;
-    std::string variable = "MBCOSIMD_";
-    for (const char c : name)
-      variable += c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    option->envname(variable);
+    option->envname(variable_of(name));
   }
+}
+
+/// Complains about variables that look like options and are none.
+bool is_environment_good(const CLI::App& app) {
+  std::vector<std::string> options;
+  for (const CLI::Option* option : app.get_options())
+    if (!option->get_envname().empty()) options.push_back(option->get_lnames().front());
+  const std::vector<std::string> complaints = stray_variables(options, environ);
+  for (const std::string& complaint : complaints)
+    std::fprintf(stderr, "mbcosimd: error: %s\n", complaint.c_str());
+  return complaints.empty();
 }
 
 const CLI::Validator is_daemon_id(
@@ -269,6 +278,10 @@ Invocation read_options(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     invocation.exit_code = app.exit(error) == 0 ? 0 : 4;
+    return invocation;
+  }
+  if (!is_environment_good(app)) {
+    invocation.exit_code = 4;
     return invocation;
   }
   if (hash_token) {

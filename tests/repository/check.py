@@ -46,7 +46,7 @@ ARROWS = {
     "server/http": {"service", "rpc", "threads", "wire", "mbcosim"},
     "server/view": {"client"},
     "server/sessions": {"client"},
-    "server/daemon": {"service", "rpc", "http", "shared_memory", "threads", "wire", "mbcosim", "grpc"},
+    "server/daemon": {"input", "service", "rpc", "http", "shared_memory", "threads", "wire", "mbcosim", "grpc"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",
              "tests"}

@@ -219,6 +219,19 @@ def test_print_config_and_environment():
     assert subprocess.run([DAEMON, "--no-such-option"], stderr=subprocess.DEVNULL).returncode == 4
 
 
+def test_a_variable_that_is_no_option_is_an_error_at_the_start():
+    assert ("MBCOSIMD_LIMIT_SESSION is no option; did you mean MBCOSIMD_LIMIT_SESSIONS (--limit-sessions)?"
+            in refused(MBCOSIMD_LIMIT_SESSION="7"))
+    assert "MBCOSIMD_NO_TOKENS is no option" in refused(MBCOSIMD_NO_TOKENS="")
+    given = {"MBCOSIMD_SERVICE_HOST": "10.0.0.7", "MBCOSIMD_SERVICE_PORT_GRPC": "1", "MBCOSIMD_PORT": "tcp://10.0.0.7:1",
+             "MBCOSIMD_0_PORT_50051_TCP_ADDR": "10.0.0.7"}
+    for name in given:
+        assert f"{name} is no option" in refused(**given)
+    pod = dict(os.environ, **given, KUBERNETES_SERVICE_HOST="10.0.0.1")
+    assert subprocess.run([DAEMON, "--print-config"], stdout=subprocess.DEVNULL, env=pod).returncode == 0
+    assert "MBCOSIMD_WORKER is no option" in refused(**given, KUBERNETES_SERVICE_HOST="10.0.0.1", MBCOSIMD_WORKER="1")
+
+
 def certificate(folder, name, subject, signer=None, extra=()):
     """Files NAME.key and NAME.pem; self-signed without a signer."""
     key, pem = folder / f"{name}.key", folder / f"{name}.pem"
