@@ -11,6 +11,7 @@
 
 #include "rpc/call_scope.h"
 #include "service/event_log.h"
+#include "service/library_log.h"
 
 namespace mbcosim::server {
 namespace {
@@ -62,29 +63,22 @@ class Fields : public spdlog::custom_flag_formatter {
   const bool json_;
 };
 
-/// Are there not too many of them? What clients send makes libraries talk.
-bool may_talk() {
-  static Rate rate(20);
-  std::int64_t missed = 0;
-  return rate.pass(Rate::Clock::now(), &missed);
-}
-
 /// gRPC's own lines, without the place in its sources.
 void log_grpc(gpr_log_func_args* args) {
-  if (!may_talk()) return;
-  const auto level = args->severity == GPR_LOG_SEVERITY_ERROR  ? spdlog::level::warn
-                     : args->severity == GPR_LOG_SEVERITY_INFO ? spdlog::level::info
-                                                               : spdlog::level::debug;
-  spdlog::log(level, "gRPC: {}", printable(args->message));
+  static LibraryLog log("gRPC");
+  log.tell(args->severity == GPR_LOG_SEVERITY_ERROR  ? spdlog::level::warn
+           : args->severity == GPR_LOG_SEVERITY_INFO ? spdlog::level::info
+                                                     : spdlog::level::debug,
+           args->message);
 }
 
 void log_protobuf(google::protobuf::LogLevel severity, const char*, int,
                   const std::string& message) {
-  if (!may_talk()) return;
-  const auto level = severity >= google::protobuf::LOGLEVEL_ERROR     ? spdlog::level::warn
-                     : severity == google::protobuf::LOGLEVEL_WARNING ? spdlog::level::info
-                                                                      : spdlog::level::debug;
-  spdlog::log(level, "protobuf: {}", printable(message.substr(0, 500)));
+  static LibraryLog log("protobuf");
+  log.tell(severity >= google::protobuf::LOGLEVEL_ERROR     ? spdlog::level::warn
+           : severity == google::protobuf::LOGLEVEL_WARNING ? spdlog::level::info
+                                                            : spdlog::level::debug,
+           message);
 }
 
 }  // namespace

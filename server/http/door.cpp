@@ -13,6 +13,7 @@
 #include "http/reaper.h"
 #include "http/rpc_error.h"
 #include "http/rpc_handler.h"
+#include "service/library_log.h"
 #include "threads/top_frame.h"
 #include "wire/refusal.h"
 
@@ -37,8 +38,10 @@ bool is_loopback(const std::string& address) {
   return address.compare(0, 4, "127.") == 0 || address.compare(0, 6, "[::1]:") == 0;
 }
 
+/// civetweb's own lines: what clients send that is no request.
 int log_message(const mg_connection*, const char* message) {
-  spdlog::debug("http: {}", message);
+  static LibraryLog log("http");
+  log.tell(spdlog::level::debug, message);
   return 1;
 }
 
@@ -150,7 +153,7 @@ int Door::Impl::serve(mg_connection* raw) {
     } catch (const Refusal& refusal) {
       fail(connection, refusal.reason(), refusal.what());
     } catch (const std::exception& error) {
-      spdlog::error("http {}: {}", connection.path(), error.what());
+      spdlog::error("http {}: {}", printable(std::string(connection.path())), error.what());
       fail(connection, v1::REASON_INTERNAL, "internal error");
     }
     status = connection.status();

@@ -1,6 +1,13 @@
 #include "service/event_log.h"
 
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <memory>
+#include <sstream>
+
+#include "service/library_log.h"
 
 namespace mbcosim::server {
 namespace {
@@ -51,6 +58,50 @@ TEST(Events, OfWhatCouldNotBeStoredAreNotTold) {
     held.drop();
   }
   EXPECT_EQ(log.journal().last(), 0);
+}
+
+/// Takes the place of the daemon's log.
+class LogOfLibraries : public testing::Test {
+ protected:
+  LogOfLibraries() {
+    auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(out_);
+    auto logger = std::make_shared<spdlog::logger>("test", std::move(sink));
+    logger->set_pattern("%v");
+    spdlog::set_default_logger(std::move(logger));
+  }
+  ~LogOfLibraries() override { spdlog::set_default_logger(before_); }
+  std::vector<std::string> lines() const {
+    std::vector<std::string> lines;
+    std::istringstream in(out_.str());
+    for (std::string line; std::getline(in, line);) lines.push_back(line);
+    return lines;
+  }
+
+ private:
+  std::ostringstream out_;
+  const std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
+};
+
+TEST_F(LogOfLibraries, HasFewLinesOfEachHoweverOftenItTalks) {
+  LibraryLog one("one"), other("other");
+  for (int i = 0; i < 1000; ++i) one.tell(spdlog::level::warn, "again");
+  EXPECT_GE(lines().size(), 20U);
+  EXPECT_LT(lines().size(), 1000U);
+  other.tell(spdlog::level::info, "once");
+  EXPECT_EQ(lines().back(), "other: once");
+}
+
+TEST_F(LogOfLibraries, HasNothingThatColoursBeginsOrFillsALine) {
+  LibraryLog("lib").tell(spdlog::level::warn, "a\n\x1b" + std::string(10000, 'x'));
+  ASSERT_EQ(lines().size(), 1U);
+  EXPECT_EQ(lines()[0], "lib: a??" + std::string(497, 'x'));
+}
+
+TEST_F(LogOfLibraries, OfWhatNobodySeesHoldsNothingBack) {
+  LibraryLog log("lib");
+  for (int i = 0; i < 100; ++i) log.tell(spdlog::level::debug, "unseen");
+  log.tell(spdlog::level::warn, "seen");
+  EXPECT_EQ(lines(), std::vector<std::string>{"lib: seen"});
 }
 
 }  // namespace

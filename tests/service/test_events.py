@@ -1,7 +1,10 @@
 """Events: everything that happens to a simulation is told in order, to those who may see it, and stands in the log with its fields."""
 import asyncio
+import contextlib
 import json
+import socket
 import threading
+import time
 
 import grpc
 import pytest
@@ -11,6 +14,7 @@ import mbcosim
 import mbcosim.aio
 from conftest import TIME_FACTOR, wait_for
 from mbcosim.v1 import events_pb2, simulations_pb2 as pb
+from test_health import certificate
 
 PORT = [mbcosim.signal_port("port", outputs=["time"], inputs=["node.structural.1.load"])]
 
@@ -175,6 +179,27 @@ def test_what_libraries_say_goes_through_the_log(start_daemon):
     wait_for(lambda: "protobuf: " in daemon.log())
     lines = [json.loads(line) for line in daemon.log().splitlines()]
     assert [line["level"] for line in lines if line["message"].startswith("protobuf: ")] == ["warning"]
+
+
+def test_what_grpc_says_goes_through_the_log_and_is_no_flood(start_daemon, tmp_path):
+    """Of clients that speak no TLS where it is spoken."""
+    certificate(tmp_path, "server", "/CN=localhost")
+    pem, key = (str(tmp_path / f"server.{ending}") for ending in ("pem", "key"))
+    daemon = start_daemon("--log-format", "json", "--listen", "localhost:0", "--tls-certificate", pem, "--tls-key", key,
+                          "--tls-client-ca", pem)
+    wait_for(lambda: "listening on localhost:" in daemon.log())
+    port = int(daemon.log().split("listening on localhost:")[1].split('"')[0])
+    begin, strangers = time.monotonic(), 200
+    for _ in range(strangers):
+        with socket.create_connection(("localhost", port), 30 * TIME_FACTOR) as stranger:
+            with contextlib.suppress(ConnectionError):
+                stranger.sendall(b"GET /\n\x1b[31m HTTP/1.0\r\n\r\n")
+                stranger.recv(100)
+    wait_for(lambda: '"gRPC: ' in daemon.log())
+    lines = [json.loads(line) for line in daemon.log().splitlines()]
+    told = [line for line in lines if line["message"].startswith("gRPC: ")]
+    assert {line["level"] for line in told} == {"warning"}
+    assert len(told) <= 20 * (time.monotonic() - begin + 1)
 
 
 def test_lines_about_peers_name_port_and_identity(start_daemon):
