@@ -1,6 +1,7 @@
 #include "daemon/daemon.h"
 
 #include <arpa/inet.h>
+#include <grpc/grpc.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/resource_quota.h>
 #include <spdlog/spdlog.h>
@@ -14,6 +15,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <future>
 #include <thread>
 
 #include "daemon/tls.h"
@@ -260,6 +262,7 @@ void Daemon::add_methods() {
 
 void Daemon::listen() {
   raise_descriptor_limit();
+  grpc_init();  // the daemon's share, see `let_go_of_grpc`
   grpc::EnableDefaultHealthCheckService(false);
   grpc::ServerBuilder builder;
   add_channel_arguments(builder, config_.limits);
@@ -362,6 +365,22 @@ bool Daemon::drain() {
   return true;
 }
 
+namespace {
+
+/// Gives the daemon's share of gRPC back, the last one. gRPC then joins its threads, of which one
+/// may look for ten seconds after a client that did not read. False: it takes longer than `wait`.
+bool let_go_of_grpc(std::chrono::seconds wait) {
+  const auto done = std::make_shared<std::promise<void>>();
+  const std::future<void> end = done->get_future();
+  std::thread([done] {
+    grpc_shutdown();
+    done->set_value();
+  }).detach();
+  return end.wait_for(wait) == std::future_status::ready;
+}
+
+}  // namespace
+
 bool Daemon::shut_down() {
   constexpr std::chrono::seconds kLastJobs(1);
   spdlog::info("shutting down");
@@ -378,7 +397,7 @@ bool Daemon::shut_down() {
   const bool ended = lanes_.stop(kLastJobs);
   durability_.stop(!ended);
   spdlog::info(ended ? "stopped" : "stopped; work that went on is dropped");
-  return ended;
+  return ended && let_go_of_grpc(kLastJobs);
 }
 
 namespace {

@@ -33,7 +33,8 @@ class Daemon {
   /// Health says NOT_SERVING from now on, and all is served. False: there is no time for that.
   bool drain();
   /// Stops accepting, interrupts running steps at an iteration boundary, ends streams. False: some
-  /// work goes on after the grace is over; the process must end without the daemon's destructor.
+  /// work, or a thread of gRPC's, goes on after the grace is over; the process must end without the
+  /// daemon's destructor.
   bool shut_down();
 
  private:
