@@ -68,7 +68,8 @@ SnapshotReplies::Source exported_snapshot(const Parts& parts, const CallFrame& f
   const int number = request.has_snapshot() ? snapshot_in(request) : -1;
   auto bytes = std::make_shared<std::string>();
   auto share = std::make_shared<MemoryShare>();
-  *bytes = within(parts.runtime.budgets.of(frame.caller.identity), nullptr, share.get(),
+  const CallToken token(frame.call);
+  *bytes = within(parts.runtime.budgets.of(frame.caller.identity), &token, share.get(),
                   [&] { return session->export_state(number, frame.call); });
   return [bytes, share, at = std::size_t{0}](auto* reply) mutable {
     if (at >= bytes->size()) return false;

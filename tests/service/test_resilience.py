@@ -1,4 +1,5 @@
 """Malice that once took the daemon down or locked others out: it goes on, and so do they."""
+import contextlib
 import os
 import resource
 import subprocess
@@ -15,7 +16,9 @@ import mbcosim
 import reduce_scaling
 from conftest import BIN, TIME_FACTOR, wait_for
 from http2 import HalfMessages, reset_at_once
-from mbcosim.v1 import coupling_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
+from mbcosim import bundle
+from mbcosim.v1 import (coupling_pb2_grpc, reduction_pb2, reduction_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2,
+                        telemetry_pb2_grpc)
 
 TOKENS = ("ann-token-0123456789 control ann\nbob-token-0123456789 control bob\n"
           "eve-token-0123456789 observe eve\nroot-token-0123456789 admin root\n")
@@ -500,32 +503,120 @@ def test_a_deck_is_read_no_longer_than_a_second_after_its_deadline(daemon, serve
         assert rests_within_a_second(daemon)
 
 
-def test_a_reduction_goes_on_no_longer_than_a_second_after_its_deadline(daemon, server, tmp_path):
-    """Of a cube of 14 739 unknowns: in its matrices, its factorization, its shapes."""
-    shape = (16, 16, 16)
-    reduce_scaling.write_model(tmp_path, shape)
-    job = tmp_path / "cube.job"
+@pytest.mark.parametrize("ask", ["CreateSimulation", "ValidateModel"])
+def test_a_deck_is_read_no_longer_than_a_second_after_its_call_is_cancelled(daemon, ask):
+    with grpc.insecure_channel(daemon.address) as channel:
+        for after in (0.05, 0.6, 1.2):
+            wait_for(lambda: is_at_rest(daemon), 30)
+            before = cpu_of(daemon)
+            call = getattr(simulations_pb2_grpc.SimulationsStub(channel), ask).future(iter(upload(LOOPS + decks.body())))
+            wait_for(lambda: cpu_of(daemon) - before >= after, 30)
+            assert call.cancel()
+            assert rests_within_a_second(daemon)
+
+
+SHAPE = (16, 16, 16)
+LONG = {"basis": "craig-bampton", "interface": ",".join(map(str, reduce_scaling.corner_labels(SHAPE))), "modes": 300,
+        "inertia": "rigid", "expose": "interface"}
+
+
+@pytest.fixture(scope="module")
+def cube(tmp_path_factory):
+    """Job of a reduction of 14 739 unknowns, which takes seconds in its matrices, its factorization and its shapes."""
+    folder = tmp_path_factory.mktemp("cube")
+    reduce_scaling.write_model(folder, SHAPE)
+    job = folder / "cube.job"
     job.write_text("mass = M.mtx\nstiffness = K.mtx\nnodes = nodes.csv\ndofs = dofs.csv\n")
+    return job
+
+
+def reduce(channel, job):
+    """The call."""
+    main, files = bundle.collect_job(job)
+    header = reduction_pb2.ReduceHeader(main_file=main)
+    header.options.update({name: str(value) for name, value in LONG.items()})
+    return reduction_pb2_grpc.ReductionStub(channel).Reduce(bundle.reduce_requests(header, files))
+
+
+def test_a_reduction_goes_on_no_longer_than_a_second_after_its_deadline(daemon, server, cube):
     for seconds in (0.5, 1, 2):
         wait_for(lambda: is_at_rest(daemon), 30)
         with pytest.raises(mbcosim.TimedOut):
-            server.reduce(job, basis="craig-bampton", interface=",".join(map(str, reduce_scaling.corner_labels(shape))), modes=300,
-                          inertia="rigid", expose="interface", timeout=seconds)
+            server.reduce(cube, timeout=seconds, **LONG)
         assert rests_within_a_second(daemon)
 
 
-def test_the_daemon_ends_within_its_grace_whatever_runs(start_daemon):
+def test_a_reduction_goes_on_no_longer_than_a_second_after_it_is_cancelled(daemon, cube):
+    with grpc.insecure_channel(daemon.address) as channel:
+        for after in (0.2, 1, 2, 4):
+            wait_for(lambda: is_at_rest(daemon), 30)
+            before = cpu_of(daemon)
+            call = reduce(channel, cube)
+            wait_for(lambda: cpu_of(daemon) - before >= after, 60)
+            call.cancel()
+            assert call.cancelled()
+            assert rests_within_a_second(daemon)
+
+
+EXPORTS = {
+    "snapshot": lambda stub, name: stub.ExportSnapshot(pb.ExportSnapshotRequest(simulation=name)),
+    "checkpoint": lambda stub, name: stub.ExportCheckpoint(pb.ExportCheckpointRequest(simulation=name)),
+}
+
+
+def weighty(stub):
+    """Name of a stored simulation of 2200 unknowns with a deck of 48 MB."""
+    remarks = [pb.UploadRequest(chunk={"path": "deck", "data": b"# " + os.urandom(4 << 20).hex().encode() + b"\n"}) for _ in range(6)]
+    return stub.CreateSimulation(iter(upload(chain(145), durability=pb.DURABILITY_CHECKPOINT) + remarks)).simulation.name
+
+
+@pytest.mark.parametrize("what", EXPORTS)
+def test_the_work_of_a_cancelled_export_ends_within_a_second_and_holds_up_no_end(start_daemon, tmp_path, what):
+    daemon = ready(start_daemon("--state-dir", str(tmp_path)))
+    with grpc.insecure_channel(daemon.address) as channel:
+        stub = simulations_pb2_grpc.SimulationsStub(channel)
+        name = weighty(stub)
+        for pieces in (0, 1, 3):
+            wait_for(lambda: is_at_rest(daemon), 30)
+            call = EXPORTS[what](stub, name)
+            for _ in range(pieces):
+                next(call, None)
+            call.cancel()
+            assert rests_within_a_second(daemon)
+    start = time.monotonic()
+    daemon.stop()
+    assert time.monotonic() - start < (1 + 2) * TIME_FACTOR
+
+
+def test_the_daemon_ends_within_its_grace_whatever_runs(start_daemon, cube):
     daemon = ready(start_daemon())
     with grpc.insecure_channel(daemon.address) as channel:
         stub = simulations_pb2_grpc.SimulationsStub(channel)
         name = stub.CreateSimulation(iter(upload(chain(145)))).simulation.name
         calls = [start(stub, name) for start in ANALYSES.values()]
-        calls += [stub.CreateSimulation.future(iter(upload(chain(2000)))) for _ in range(3)]
+        calls += [stub.CreateSimulation.future(iter(upload(deck))) for deck in (chain(2000), chain(2000), LOOPS + decks.body())]
+        calls += [stub.ValidateModel.future(iter(upload(LOOPS + decks.body()))), reduce(channel, cube)]
         time.sleep(0.5)
         start = time.monotonic()
         daemon.stop()
         assert time.monotonic() - start < (1 + 2) * TIME_FACTOR  # the grace, and a second for what computes
         assert all(call.exception(10) is not None for call in calls)
+
+
+def test_a_daemon_ends_within_its_grace_while_nobody_reads_its_exports(start_daemon, tmp_path):
+    daemon = ready(start_daemon("--state-dir", str(tmp_path)))
+    with grpc.insecure_channel(daemon.address) as channel:
+        stub = simulations_pb2_grpc.SimulationsStub(channel)
+        name = weighty(stub)
+        assert sum(len(reply.data) for reply in EXPORTS["checkpoint"](stub, name)) > 48 << 20
+        calls = [EXPORTS[what](stub, name) for what in EXPORTS for _ in range(10)]
+        assert all(next(call).data for call in calls)
+        start = time.monotonic()
+        daemon.stop()
+        assert time.monotonic() - start < (1 + 2) * TIME_FACTOR
+        for call in calls:  # what has come, and the end
+            with contextlib.suppress(grpc.RpcError):
+                list(call)
 
 
 def test_a_daemon_that_chooses_pivots_ends_within_its_grace_and_stores_the_others(start_daemon, tmp_path):
