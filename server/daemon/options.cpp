@@ -171,7 +171,10 @@ Invocation read_options(int argc, char** argv) {
   Config& config = invocation.config;
   CLI::App app{"Multibody co-simulation server.", "mbcosimd"};
   app.set_version_flag("--version", std::string("mbcosimd ") + MBCOSIM_VERSION);
-  app.set_config("--config", "", "File of options, one `name=value` a line");
+  // Here, as CLI11 reads the file before it looks at the environment.
+  const char* file = std::getenv(variable_of("config").c_str());
+  app.set_config("--config", file ? file : "", "File of options, one `name=value` a line",
+                 file && *file);
   app.allow_config_extras(CLI::config_extras_mode::error);
   bool print_config = false, hash_token = false;
   std::int64_t lease = config.limits.lease.count(), grace = config.shutdown_grace.count(),

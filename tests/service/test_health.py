@@ -212,10 +212,20 @@ def test_tokens_roles_and_owners(start_daemon, tmp_path):
     assert "a-token" not in daemon.log()
 
 
-def test_print_config_and_environment():
-    environment = dict(os.environ, MBCOSIMD_LIMIT_SESSIONS="7")
-    run = subprocess.run([DAEMON, "--print-config"], stdout=subprocess.PIPE, text=True, env=environment)
-    assert run.returncode == 0 and "limit-sessions=7" in run.stdout
+def test_print_config_and_environment(tmp_path):
+    def printed(*options, **environment):
+        run = subprocess.run([DAEMON, "--print-config", *options], stdout=subprocess.PIPE, text=True, env=dict(os.environ, **environment))
+        assert run.returncode == 0
+        return run.stdout
+
+    assert "limit-sessions=7" in printed(MBCOSIMD_LIMIT_SESSIONS="7")
+    files = tmp_path / "one", tmp_path / "two"
+    for file, sessions in zip(files, (8, 9)):
+        file.write_text(f"limit-sessions={sessions}\n")
+    assert "limit-sessions=8" in printed(MBCOSIMD_CONFIG=str(files[0]))
+    assert "limit-sessions=9" in printed("--config", str(files[1]), MBCOSIMD_CONFIG=str(files[0]))
+    assert "limit-sessions=64" in printed(MBCOSIMD_CONFIG="")
+    assert "/none" in refused(MBCOSIMD_CONFIG="/none")
     assert subprocess.run([DAEMON, "--no-such-option"], stderr=subprocess.DEVNULL).returncode == 4
 
 
