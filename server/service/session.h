@@ -221,6 +221,7 @@ class Session {
   void lose_peer(Advance& advance, const std::string& why);
   void reject_step(Advance& advance, const PeerRejected& rejected);
   void end_unsolved(Advance& advance, v1::StepOutcome outcome) TS_REQUIRES(lock_);
+  void tell_unsolved() TS_REQUIRES(lock_);
   void tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason reason,
                     const std::string& why) TS_REQUIRES(lock_);
   std::optional<StepReport> attempt(Advance& advance) TS_REQUIRES(lock_);
@@ -232,10 +233,7 @@ class Session {
   void start_record(const v1::CreateOptions& options) TS_REQUIRES(lock_);
   void check_grants(const Grants::List& grants) const;
   void account(Advance& advance, const StepReport& report) TS_REQUIRES(lock_);
-  void account_pieces(v1::StepReply& reply, const StepReport& report);
-  void account_delay(Advance& advance) TS_REQUIRES(lock_);
   void tell(Advance& advance, const StepReport& report) TS_REQUIRES(lock_);
-  void finish(Advance& advance) TS_REQUIRES(lock_);
   void conclude(Advance& advance) TS_REQUIRES(lock_);
   bool journaled() const { return keeping_ && keeping_->journal; }
   bool is_told_at_once(const StepReport& report) const;

@@ -19,10 +19,6 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kSlice =
     std::chrono::milliseconds(5);  // longest hold of lock and slot by many short steps
 constexpr auto kJournalSlice = std::chrono::milliseconds(50);  // a write to the disk follows
-bool is_accepted(StepOutcome outcome) {
-  return outcome == StepOutcome::accepted || outcome == StepOutcome::finished ||
-         outcome == StepOutcome::not_written;
-}
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -65,10 +61,7 @@ void Session::step(const v1::StepRequest& request, const Caller& caller, Call& c
   }
   require_usable();
   check(request);
-  Advance advance{request, *reply, turn, {}, 1, {}, StepPace(pace_), table};
-  if (request.has_steps()) advance.steps_left = request.steps();
-  if (request.has_until_time() || (request.has_until() && !request.has_steps()))
-    advance.steps_left = INT64_MAX;
+  Advance advance{request, StepAccount(request, *reply), turn, {}, {}, StepPace(pace_), table};
   if (turn.begun()) go_on(advance);
   const SteppingClaim claim(*this, call, advance.token);
   try {
@@ -94,9 +87,7 @@ void Session::run(Advance& advance, const Progress& progress) {
 
 // The request was begun before: only the rest is done.
 void Session::go_on(Advance& advance) {
-  advance.reply.ParseFromString(*advance.turn.begun());
-  advance.steps_left -= advance.reply.steps_done();
-  advance.ended = advance.reply.condition_met();
+  advance.account.go_on_from(*advance.turn.begun());
   advance.goes_on = true;
 }
 
@@ -104,8 +95,8 @@ void Session::go_on(Advance& advance) {
 void Session::break_off(Advance& advance) {
   const Guard lock(lock_);
   at_work_ = nullptr;
-  if (advance.reply.steps_done() > 0 && advance.turn.has_id())
-    advance.turn.break_off(advance.reply);
+  const v1::StepReply& reply = advance.account.reply();
+  if (reply.steps_done() > 0 && advance.turn.has_id()) advance.turn.break_off(reply);
 }
 
 // Does a subscriber keep the session waiting?
@@ -120,15 +111,15 @@ void Session::wait_for_subscribers() {
 }
 
 bool Session::wants_more(const Advance& advance) const {
-  return !advance.ended && advance.steps_left > 0 && !simulation_->finished() &&
+  return advance.account.wants_more() && !simulation_->finished() &&
          goes_on(advance.request, *simulation_);
 }
 
 // Is there a next step? Its choice is made then.
 bool Session::choose(Advance& advance) {
   if (!wants_more(advance) || !may_write(advance)) return false;
-  advance.choice =
-      next_choice(advance.request, advance.reply.steps_done() == 0, variables_, *simulation_);
+  const bool first = advance.account.reply().steps_done() == 0;
+  advance.choice = next_choice(advance.request, first, variables_, *simulation_);
   return true;
 }
 
@@ -157,10 +148,8 @@ void Session::begin(Advance& advance) {
   advance.started = true;
   if (keeping_) at_work_ = &advance;
   advance.pace.start(simulation_->time());
-  advance.reply.set_request_id(request.request_id());
-  advance.reply.set_outcome(simulation_->finished() ? v1::STEP_OUTCOME_FINISHED
-                                                    : v1::STEP_OUTCOME_ACCEPTED);
-  advance.told_before = advance.reply;
+  advance.account.begin(simulation_->finished());
+  advance.told_before = advance.account.reply();
   if (advance.table) advance.table->start(*simulation_);
 }
 
@@ -198,7 +187,7 @@ bool Session::step_for_a_while(Advance& advance) {
   const Clock::time_point slice_end = Clock::now() + (journaled() ? kJournalSlice : kSlice);
   while (choose(advance)) {
     if (!*slot || advance.token.cancelled()) {
-      advance.reply.set_outcome(v1::STEP_OUTCOME_INTERRUPTED);
+      advance.account.end(v1::STEP_OUTCOME_INTERRUPTED);
       return true;
     }
     const std::optional<StepReport> report = attempt(advance);
@@ -269,31 +258,17 @@ void Session::end_without_memory(Advance& advance, const MemoryScope& scope) {
   tell_failure(advance, v1::STEP_OUTCOME_LIMIT, v1::REASON_LIMIT_EXCEEDED, why);
 }
 
-// Enters one step, or its failure, into the reply.
 void Session::account(Advance& advance, const StepReport& report) {
-  v1::StepReply& reply = advance.reply;
-  reply.set_outcome(to_proto(report.outcome));
-  reply.set_steps_done(reply.steps_done() + report.steps_done);
-  reply.set_step_size(report.step_size);
-  reply.set_iterations(report.iterations);
-  reply.set_total_iterations(reply.total_iterations() + report.iterations);
-  reply.set_residual_error(report.residual_error);
-  if (report.solution_error != 0) reply.set_solution_error(report.solution_error);
-  reply.set_solver_seconds(reply.solver_seconds() + report.solver_seconds);
-  advance.ended = report.error || !is_accepted(report.outcome);
-  if (report.error && report.outcome != StepOutcome::interrupted)
-    to_proto(*report.error, reply.mutable_failure());
+  advance.account.enter(report);
   if (!is_accepted(report.outcome)) return;
   ++changes_;
   advance.unsettled = true;
-  account_pieces(reply, report);
-  account_delay(advance);
-  if (report.restarted) reply.set_restarted_steps(reply.restarted_steps() + 1);
-  --advance.steps_left;
-  if (advance.request.has_until() && variables_.holds(advance.request.until(), *simulation_)) {
-    reply.set_condition_met(true);
-    advance.ended = true;
+  const double delay = advance.pace.ended(simulation_->time());
+  if (delay > 0) {
+    advance.account.enter_delay(delay);
+    status_.count_late_step(delay);
   }
+  advance.account.test_condition(variables_, *simulation_);
 }
 
 // Tells of one step, or of its failure. With JOURNAL the step may be kept from all but the reply
@@ -305,7 +280,7 @@ void Session::tell(Advance& advance, const StepReport& report) {
     recorder_->stepped(is_accepted(report.outcome), simulation_->step_number(),
                        simulation_->time());
   status_.publish(*simulation_);
-  const v1::StepReply& reply = advance.reply;
+  const v1::StepReply& reply = advance.account.reply();
   if (report.error && report.outcome != StepOutcome::interrupted) {
     status_.remember_failure(reply.failure().message());
     shared_.log.step_failed(subject(), reply.outcome(), reply.failure());
@@ -315,40 +290,14 @@ void Session::tell(Advance& advance, const StepReport& report) {
   if (is_accepted(report.outcome) && !telemetry_->empty()) telemetry_->publish(*simulation_);
 }
 
-void Session::account_pieces(v1::StepReply& reply, const StepReport& report) {
-  reply.set_flagged(report.flagged);
-  reply.set_pieces(report.pieces);
-  if (report.flagged) reply.set_flagged_steps(reply.flagged_steps() + 1);
-  if (report.pieces > 1) reply.set_cut_steps(reply.cut_steps() + 1);
-}
-
-void Session::account_delay(Advance& advance) {
-  const double delay = advance.pace.ended(simulation_->time());
-  if (!(delay > 0)) return;
-  v1::StepReply& reply = advance.reply;
-  reply.set_late_steps(reply.late_steps() + 1);
-  reply.set_worst_delay_seconds(std::max(reply.worst_delay_seconds(), delay));
-  status_.count_late_step(delay);
-}
-
-void Session::finish(Advance& advance) {
-  v1::StepReply& reply = advance.reply;
-  if (advance.table) advance.table->finish(*simulation_);
-  reply.set_next_step_size(simulation_->next_step_size());
-  reply.set_largest_step_size(simulation_->largest_step_size());
-  reply.set_step(simulation_->step_number());
-  reply.set_time(simulation_->time());
-  variables_.read(*simulation_, advance.request.outputs(), reply.mutable_outputs());
-}
-
 // The reply is complete.
 void Session::conclude(Advance& advance) {
-  finish(advance);
-  advance.reply.set_total_seconds(seconds_since(advance.start));
+  if (advance.table) advance.table->finish(*simulation_);
+  advance.account.finish(variables_, *simulation_);
   at_work_ = nullptr;
   const bool stored = advance.unsettled;
   settle(advance, /*whole=*/true);
-  advance.turn.keep(advance.reply, stored || !journaled());
+  advance.turn.keep(advance.account.reply(), stored || !journaled());
   if (advance.turn.has_id()) ++changes_;
 }
 
@@ -386,7 +335,7 @@ bool Session::run_coupled_step(Advance& advance) {
     reject_step(advance, rejected);
   }
   const Guard lock(lock_);
-  advance.reply.set_peer_wait_seconds(advance.reply.peer_wait_seconds() + waited_seconds());
+  advance.account.enter_wait(waited_seconds());
   shared_.metrics.count_coupled_step(waited_seconds(), coupler_.exchanges(),
                                      coupler_.exchange_seconds());
   if (wants_more(advance)) return false;
@@ -527,26 +476,27 @@ void Session::reject_step(Advance& advance, const PeerRejected& rejected) {
   const Guard lock(lock_);
   tell_failure(advance, v1::STEP_OUTCOME_REJECTED_BY_PEER, v1::REASON_REJECTED_BY_PEER,
                rejected.text);
-  if (rejected.preferred) advance.reply.set_preferred_step_size(*rejected.preferred);
+  if (rejected.preferred) advance.account.prefer(*rejected.preferred);
 }
 
 void Session::end_unsolved(Advance& advance, v1::StepOutcome outcome) {
-  advance.ended = true;
-  if (recorder_) recorder_->stepped(false, simulation_->step_number(), simulation_->time());
-  status_.publish(*simulation_);
-  advance.reply.set_outcome(outcome);
+  tell_unsolved();
+  advance.account.end(outcome);
 }
 
 void Session::tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason reason,
                            const std::string& why) {
-  end_unsolved(advance, outcome);
-  v1::SolverFailure* failure = advance.reply.mutable_failure();
-  failure->set_reason(reason);
-  failure->set_message(utf8(why));
-  failure->set_step(simulation_->step_number() + 1);
-  failure->set_time(simulation_->time() + length_of(advance.choice, *simulation_));
-  status_.remember_failure(failure->message());
-  shared_.log.step_failed(subject(), outcome, *failure);
+  tell_unsolved();
+  advance.account.fail(outcome, reason, why, simulation_->step_number() + 1,
+                       simulation_->time() + length_of(advance.choice, *simulation_));
+  const v1::SolverFailure& failure = advance.account.reply().failure();
+  status_.remember_failure(failure.message());
+  shared_.log.step_failed(subject(), outcome, failure);
+}
+
+void Session::tell_unsolved() {
+  if (recorder_) recorder_->stepped(false, simulation_->step_number(), simulation_->time());
+  status_.publish(*simulation_);
 }
 
 }  // namespace mbcosim::server

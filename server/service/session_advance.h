@@ -3,24 +3,22 @@
 
 #include "service/row_table.h"
 #include "service/session.h"
+#include "service/step_account.h"
 #include "service/step_pace.h"
 
 namespace mbcosim::server {
 
 /// Goal and progress of one call of `step`.
 struct Session::Advance {
-  using Clock = std::chrono::steady_clock;
   const v1::StepRequest& request;
-  v1::StepReply& reply;
+  StepAccount account;
   KeptReplies::Turn& turn;
   CancelToken token;
-  std::int64_t steps_left = 1;
   StepChoice choice;  ///< of the next step
   StepPace pace;
   RowTable* table = nullptr;  ///< of rows on the way; null: none are wanted
-  bool started = false, ended = false;
+  bool started = false;
   bool goes_on = false;  ///< an earlier process, or call, has done some of it
-  Clock::time_point start = Clock::now();
   std::int64_t factorizations = 0;
 
   // --- JOURNAL

@@ -25,8 +25,9 @@ CapturedPoint Session::capture() {
   captured.point.set_changes(captured.changes);
   fill_stored(captured.point.mutable_info());
   kept_.describe(captured.point.mutable_kept_replies());
-  if (at_work_ && at_work_->turn.has_id() && at_work_->reply.steps_done() > 0)
-    *captured.point.add_kept_replies() = at_work_->turn.described(at_work_->reply, /*begun=*/true);
+  if (at_work_ && at_work_->turn.has_id() && at_work_->account.reply().steps_done() > 0)
+    *captured.point.add_kept_replies() =
+        at_work_->turn.described(at_work_->account.reply(), /*begun=*/true);
   snapshots_.describe(&captured.point);
   *captured.point.mutable_ports() = peer_memory_;
   captured.state = simulation_->snapshot();
@@ -75,7 +76,7 @@ bool Session::is_told_at_once(const StepReport& report) const {
 void Session::settle(Advance& advance, bool whole) {
   if (!journaled() || !advance.unsettled) return;
   std::optional<v1::KeptReply> reply;
-  if (advance.turn.has_id()) reply = advance.turn.described(advance.reply, !whole);
+  if (advance.turn.has_id()) reply = advance.turn.described(advance.account.reply(), !whole);
   try {
     store(reply);
   } catch (...) {
@@ -86,7 +87,7 @@ void Session::settle(Advance& advance, bool whole) {
   status_.publish(*simulation_);
   if (whole) return;
   advance.before = simulation_->state();
-  advance.told_before = advance.reply;
+  advance.told_before = advance.account.reply();
 }
 
 void Session::go_back(Advance& advance) {
@@ -94,7 +95,7 @@ void Session::go_back(Advance& advance) {
   const Status status = simulation_->restore(*advance.before);
   if (results_) results_->restored();
   if (!status) status_.fail(status.error().message);
-  advance.reply = advance.told_before;
+  advance.account.go_back(advance.told_before);
   advance.unsettled = false;
   status_.publish(*simulation_);
 }
