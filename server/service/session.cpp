@@ -2,14 +2,12 @@
 
 #include <google/protobuf/util/time_util.h>
 
-#include <charconv>
 #include <cmath>
-#include <string_view>
-#include <unordered_map>
 
 #include "model/model_part.h"
 #include "service/display_name.h"
-#include "service/session_advance.h"
+#include "service/model_description.h"
+#include "service/step_choice.h"
 #include "wire/convert.h"
 #include "wire/protocol.h"
 #include "wire/refusal.h"
@@ -17,33 +15,6 @@
 namespace mbcosim::server {
 
 namespace {
-
-/// Which entries of a list belong to a page: those after the number that its token tells.
-class Page {
- public:
-  explicit Page(const v1::DescribeSimulationRequest& request)
-      : size_(page_size_of(request, kUsual)) {
-    const std::string& token = request.page_token();
-    const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), first_);
-    if (!token.empty() &&
-        (error != std::errc() || end != token.data() + token.size() || first_ <= 0))
-      throw Refusal(v1::REASON_BAD_ARGUMENT, "`page_token` is not one of the server's");
-  }
-  /// Whether the next entry belongs to the page.
-  bool takes() {
-    const bool inside = at_ >= first_ && at_ - first_ < size_;
-    ++at_;
-    return inside;
-  }
-  void close(v1::DescribeSimulationReply* out) const {
-    if (at_ - first_ > size_) out->set_next_page_token(std::to_string(first_ + size_));
-  }
-
- private:
-  static constexpr std::int64_t kUsual = 5000;
-  const std::int64_t size_;
-  std::int64_t first_ = 0, at_ = 0;
-};
 
 double rate_of(const v1::CreateOptions& options) {
   if (!options.has_pace()) return 0;
@@ -71,7 +42,7 @@ Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> s
       model_(&simulation->model()),
       variables_(simulation->variables()),
       pace_(rate_of(options)),
-      factor_bytes_(static_cast<std::int64_t>(simulation->factor_bytes())),
+      memory_(*simulation),
       origin_(std::move(origin)),
       grants_(identity_.owner, options.grants()),
       lease_(identity_.lease),
@@ -79,7 +50,10 @@ Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> s
       kept_(shared.memory),
       telemetry_(std::make_shared<TelemetryHub>(shared.memory, shared.lanes, shared.timer,
                                                 &shared.metrics)),
+      analysis_(*model_, variables_, shared.memory),
       results_(std::move(results)),
+      storage_({results_.get(), kept_, shared.memory, shared.metrics},
+               [this](const Simulation& now, v1::SimulationInfo* out) { fill_stored(now, out); }),
       simulation_(std::move(simulation)),
       deck_sockets_(std::move(deck_sockets)),
       recorder_(options.record_ports()
@@ -147,7 +121,7 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
   check_display_name(request.display_name());  // before anything changes
   if (request.has_grants()) check_grants(request.grants().grants());
   const CallGuard lock(lock_, call);
-  ++changes_;
+  storage_.note_change();
   const StepPolicy now = simulation_->policy();
   std::optional<double> minimum = minimum_in(request);
   if (!minimum && now.minimum > 0) minimum = now.minimum;
@@ -158,7 +132,7 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
   if (request.has_grants()) grants_.replace(request.grants().grants());
   if (request.has_display_name()) status_.set_display_name(request.display_name());
   fill(reply->mutable_simulation(), caller);
-  store_change(turn, *reply);
+  storage_.store_change(*simulation_, turn, *reply);
 }
 
 void Session::check_grants(const Grants::List& grants) const {
@@ -208,9 +182,9 @@ void Session::fill(v1::SimulationInfo* out) const {
   out->set_late_steps(p.late_steps);
   out->set_worst_delay_seconds(p.worst_delay);
   out->set_owner(identity_.owner);
-  out->set_durability(!keeping_     ? v1::DURABILITY_NONE
-                      : journaled() ? v1::DURABILITY_JOURNAL
-                                    : v1::DURABILITY_CHECKPOINT);
+  out->set_durability(!storage_.keeping()      ? v1::DURABILITY_NONE
+                      : storage_.has_journal() ? v1::DURABILITY_JOURNAL
+                                               : v1::DURABILITY_CHECKPOINT);
   out->set_state(phase_of(p));
   out->set_step(p.step);
   out->set_time(p.time);
@@ -234,42 +208,8 @@ void Session::fill(v1::SimulationInfo* out) const {
 
 void Session::describe(const v1::DescribeSimulationRequest& request,
                        v1::DescribeSimulationReply* reply) const {
-  v1::ModelDescription* out = reply->mutable_model();
-  to_proto(*model_, out);
-  if (request.variable_names_size() > 0) return describe_variables(request, out);
-  const bool first = request.page_token().empty();
-  Page page(request);
-  for (int k = 0; k < node_count(*model_); ++k)
-    if (page.takes()) to_proto(*model_, k, out->add_nodes());
-  for (const ElementRef& e : model_->elements)
-    if (page.takes()) to_proto(*model_, e, out->add_elements());
-  const std::string& prefix = request.variable_prefix();
-  const UnitSystem* units = find_part<UnitSystem>(*model_);
-  for (std::size_t i = 0; i < variables().size(); ++i)
-    if (variables()[i].name.compare(0, prefix.size(), prefix) == 0 && page.takes())
-      to_proto(variables()[i], static_cast<int>(i), units, out->add_variables());
-  page.close(reply);
-  if (!first) return;
-  for (const DeckSymbol& symbol : origin_.symbols) to_proto(symbol, out->add_symbols());
-  for (const auto& port : coupler_.ports()) port->fill(out->add_ports());
-}
-
-void Session::describe_variables(const v1::DescribeSimulationRequest& request,
-                                 v1::ModelDescription* out) const {
-  std::unordered_map<std::string_view, int> handles;
-  for (const std::string& name : request.variable_names()) handles.emplace(name, -1);
-  for (std::size_t i = 0; i < variables().size(); ++i)
-    if (const auto wanted = handles.find(variables()[i].name); wanted != handles.end())
-      wanted->second = static_cast<int>(i);
-  const UnitSystem* units = find_part<UnitSystem>(*model_);
-  for (const std::string& name : request.variable_names()) {
-    const int handle = handles.at(name);
-    const std::string shown = utf8(name.substr(0, 100));
-    if (handle < 0)
-      throw Refusal(v1::REASON_NO_SUCH_VARIABLE, "no variable is named \"" + shown + "\"",
-                    {{"name", shown}});
-    to_proto(variables()[handle], handle, units, out->add_variables());
-  }
+  mbcosim::server::describe({*model_, variables(), origin_.symbols, coupler_.ports()}, request,
+                            reply);
 }
 
 Port& Session::port(const std::string& name) const {
@@ -316,13 +256,68 @@ void Session::check(const v1::StepRequest& request) const {
   variables_.check_inputs(request.inputs(), "inputs");
 }
 
-void Session::check_step(std::int64_t expected) const {
-  const std::int64_t step = simulation_->step_number();
-  if (expected == step) return;
-  throw Refusal(v1::REASON_WRONG_STEP,
-                "expected step " + std::to_string(expected) + ", the simulation is at step " +
-                    std::to_string(step),
-                {{"step", std::to_string(step)}});
+// ------------------------------------------------------------------ advancing
+
+namespace {
+
+/// Marks the session as advancing while it lives, and connects a token with whoever may interrupt.
+class SteppingClaim {
+ public:
+  SteppingClaim(SessionStatus& status, const Lease& lease, Call& call, CancelToken& token)
+      : status_(status), call_(call) {
+    if (!status_.claim(&token))
+      throw Refusal(v1::REASON_SIMULATION_BUSY,
+                    "another call advances the simulation at the moment");
+    if (lease.ended()) token.cancel();
+    call_.attach(&token);
+  }
+  ~SteppingClaim() {
+    call_.attach(nullptr);
+    status_.release();
+  }
+  SteppingClaim(const SteppingClaim&) = delete;
+  SteppingClaim& operator=(const SteppingClaim&) = delete;
+
+ private:
+  SessionStatus& status_;
+  Call& call_;
+};
+
+}  // namespace
+
+// Names them alone; the lock is taken by who uses them.
+Advance::Parts Session::advance_parts() {
+  return {.subject = subject(),
+          .shared = shared_,
+          .lock = lock_,
+          .simulation = *simulation_,
+          .memory = memory_,
+          .variables = variables_,
+          .status = status_,
+          .telemetry = *telemetry_,
+          .storage = storage_,
+          .coupler = coupler_,
+          .results = results_.get(),
+          .deck_sockets = deck_sockets_.get(),
+          .recorder = recorder_.get(),
+          .pace = pace_};
+}
+
+void Session::step(const v1::StepRequest& request, const Caller& caller, Call& call,
+                   v1::StepReply* reply, const Progress& progress, RowTable* table) {
+  KeptReplies::Turn turn(kept_, caller, request.request_id(),
+                         request.request_id().empty() ? 0 : digest_of("Step", request), call);
+  if (turn.known()) {
+    reply->ParseFromString(*turn.known());
+    return;
+  }
+  require_usable();
+  check(request);
+  Advance advance(advance_parts(), request, *reply, turn, table);
+  const SteppingClaim claim(status_, lease_, call, advance.token());
+  advance.run(progress);
+  shared_.metrics.count_advance(*reply, advance.factorizations());
+  if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
 }
 
 bool Session::interrupt() { return status_.interrupt(); }
@@ -347,14 +342,14 @@ void Session::write(const v1::WriteVariablesRequest& request, const Call& call,
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; inputs are written between advances");
   const CallGuard lock(lock_, call);
-  if (request.has_expected_step()) check_step(request.expected_step());
+  if (request.has_expected_step()) check_step(request.expected_step(), *simulation_);
   std::optional<State> before;
-  if (journaled()) before = simulation_->state();
+  if (storage_.has_journal()) before = simulation_->state();
   variables_.write(request.values(), *simulation_);
-  ++changes_;
+  storage_.note_change();
   reply->set_step(simulation_->step_number());
   try {
-    store_change(turn, *reply);
+    storage_.store_change(*simulation_, turn, *reply);
   } catch (const Refusal&) {
     if (const Status status = simulation_->restore(*before); !status)
       status_.fail(status.error().message);

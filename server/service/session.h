@@ -1,36 +1,23 @@
 /// One simulation on the server: who owns it, who advances it, what is saved of it.
 #pragma once
 
-#include <atomic>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "coupling/coupler.h"
 #include "mbcosim/v1/checkpoints.pb.h"
 #include "mbcosim/v1/simulations.pb.h"
-#include "results/session_results.h"
 #include "rpc/call.h"
+#include "service/advance.h"
+#include "service/analysis.h"
 #include "service/attached_files.h"
-#include "service/config.h"
-#include "service/deck_sockets.h"
-#include "service/event_log.h"
-#include "service/fair_mutex.h"
 #include "service/grants.h"
-#include "service/keeping.h"
-#include "service/kept_replies.h"
 #include "service/lease.h"
-#include "service/metrics.h"
-#include "service/reply_pages.h"
-#include "service/session_status.h"
 #include "service/snapshot_shelf.h"
 #include "service/telemetry_hub.h"
-#include "service/variable_access.h"
 #include "simulation/load.h"
-#include "wire/memory.h"
 
 namespace mbcosim::server {
 
@@ -54,16 +41,7 @@ class Session {
     std::uint64_t request_digest = 0;  ///< of the request that created it
     std::chrono::milliseconds lease{3600 * 1000};
   };
-  /// What all sessions of a daemon share; outlives them.
-  struct Shared {
-    SolverSlots& slots;
-    const ServiceLimits& limits;
-    Metrics& metrics;
-    EventLog& log;
-    MemoryBudget& memory;
-    Lanes& lanes;
-    Timer& timer;
-  };
+  using Shared = SessionShared;
   /// What the simulation was made of.
   struct Origin {
     ModelPtr model;
@@ -74,7 +52,7 @@ class Session {
     DeckFiles files = {};  ///< the deck and what it includes
     std::shared_ptr<const AttachedFiles> attached = {};  ///< for viewers
   };
-  using Progress = std::function<void()>;  ///< called between slices of a long advance
+  using Progress = Advance::Progress;
 
   Session(Identity identity, Origin origin, std::unique_ptr<Simulation> simulation, Shared shared,
           const v1::CreateOptions& options = {}, std::unique_ptr<SessionResults> results = nullptr,
@@ -83,7 +61,7 @@ class Session {
   /// What the model and the state take, held until the end.
   void set_memory(MemoryShare share) TS_EXCLUDES(lock_) {
     const Guard lock(lock_);
-    memory_ = std::move(share);
+    memory_.hold(std::move(share));
   }
   const Identity& identity() const { return identity_; }
   EventLog::Subject subject() const { return {identity_.id, identity_.owner}; }
@@ -155,11 +133,12 @@ class Session {
 
   // --- outliving the daemon
   /// Before others know the session.
-  void set_keeping(std::unique_ptr<Keeping> keeping) { keeping_ = std::move(keeping); }
-  Keeping* keeping() const { return keeping_.get(); }  ///< null: it does not outlive the daemon
+  void set_keeping(std::unique_ptr<Keeping> keeping) { storage_.set_keeping(std::move(keeping)); }
+  /// Null: it does not outlive the daemon.
+  Keeping* keeping() const { return storage_.keeping(); }
   /// Grows with everything that a checkpoint holds.
-  std::int64_t changes() const { return changes_.load(); }
-  void note_change() { ++changes_; }
+  std::int64_t changes() const { return storage_.changes(); }
+  void note_change() { storage_.note_change(); }
   std::int64_t step_number() const { return status_.view().step; }
   bool has_failed() const { return status_.failed(); }
   /// Nobody works on it.
@@ -195,56 +174,13 @@ class Session {
   Lease& lease() { return lease_; }
 
  private:
-  struct Advance;  ///< one call of `step` in progress
-  class SteppingClaim;
-  class ExchangeInStep;
-
-  void run(Advance& advance, const Progress& progress);
-  void go_on(Advance& advance);
-  void break_off(Advance& advance);
+  Advance::Parts advance_parts() TS_NO_THREAD_SAFETY_ANALYSIS;
   void go_to(const State& state, const Call& call, std::int64_t results_until);
   void check(const v1::StepRequest& request) const;
-  void check_step(std::int64_t expected) const TS_REQUIRES(lock_);
-  bool must_wait(const Advance& advance) const;
-  void wait_for_subscribers();
-  bool wants_more(const Advance& advance) const TS_REQUIRES(lock_);
-  bool choose(Advance& advance) TS_REQUIRES(lock_);
-  bool may_write(Advance& advance) TS_REQUIRES(lock_);
-  void begin(Advance& advance) TS_REQUIRES(lock_);
-  void take_inputs(Advance& advance) TS_REQUIRES(lock_);
-  bool run_slice(Advance& advance);
-  bool step_for_a_while(Advance& advance) TS_REQUIRES(lock_);
-  SolverSlots::Slot take_slot(const Advance& advance);
-  bool run_coupled_step(Advance& advance);
-  void step_coupled(Advance& advance) TS_REQUIRES(lock_);
-  void settle_coupled(Advance& advance, bool accepted) TS_REQUIRES(lock_);
-  void lose_peer(Advance& advance, const std::string& why);
-  void reject_step(Advance& advance, const PeerRejected& rejected);
-  void end_unsolved(Advance& advance, v1::StepOutcome outcome) TS_REQUIRES(lock_);
-  void tell_unsolved() TS_REQUIRES(lock_);
-  void tell_failure(Advance& advance, v1::StepOutcome outcome, v1::Reason reason,
-                    const std::string& why) TS_REQUIRES(lock_);
-  std::optional<StepReport> attempt(Advance& advance) TS_REQUIRES(lock_);
-  std::optional<StepReport> counted_step(Advance& advance) TS_REQUIRES(lock_);
-  void end_without_memory(Advance& advance, const MemoryScope& scope) TS_REQUIRES(lock_);
-  double waited_seconds() const;
-  std::optional<StepReport> attempt_in_slot(Advance& advance) TS_REQUIRES(lock_);
   void set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum) TS_REQUIRES(lock_);
   void start_record(const v1::CreateOptions& options) TS_REQUIRES(lock_);
   void check_grants(const Grants::List& grants) const;
-  void account(Advance& advance, const StepReport& report) TS_REQUIRES(lock_);
-  void tell(Advance& advance, const StepReport& report) TS_REQUIRES(lock_);
-  void conclude(Advance& advance) TS_REQUIRES(lock_);
-  bool journaled() const { return keeping_ && keeping_->journal; }
-  bool is_told_at_once(const StepReport& report) const;
-  void settle(Advance& advance, bool whole = false) TS_REQUIRES(lock_);
-  void go_back(Advance& advance) TS_REQUIRES(lock_);
-  void store(const std::optional<v1::KeptReply>& reply) TS_REQUIRES(lock_);
-  void store_change(const KeptReplies::Turn* turn, const google::protobuf::MessageLite& reply)
-      TS_REQUIRES(lock_);
-  void fill_stored(v1::SimulationInfo* out) const TS_REQUIRES(lock_);
-  void describe_variables(const v1::DescribeSimulationRequest& request,
-                          v1::ModelDescription* out) const;
+  void fill_stored(const Simulation& simulation, v1::SimulationInfo* out) const;
   void require_usable() const;
   void require_way_back() const;
   State state_at_rest(const Call& call, std::int64_t* step);
@@ -255,11 +191,8 @@ class Session {
   const VariableAccess variables_;
   const double pace_;  ///< seconds of the model in a second of the wall clock; 0: not held back
 
-  MemoryShare memory_ TS_GUARDED_BY(lock_);
-  std::int64_t factor_bytes_ TS_GUARDED_BY(lock_);  ///< the part that factorizations take
+  SimulationMemory memory_ TS_GUARDED_BY(lock_);
   const Origin origin_;
-  std::unique_ptr<Keeping> keeping_;
-  std::atomic<std::int64_t> changes_{0};
 
   // Thread-safe by themselves.
   Grants grants_;
@@ -267,19 +200,16 @@ class Session {
   SessionStatus status_;
   SnapshotShelf snapshots_;
   KeptReplies kept_;
-  ReplyPages<v1::LinearizeReply> linearization_;
-  ReplyPages<v1::ComputeEigenvaluesReply> spectrum_;
   const std::shared_ptr<TelemetryHub> telemetry_;
+  Analysis analysis_;
 
   FairMutex lock_;                                 // protects all below
   const std::unique_ptr<SessionResults> results_;  // null: none are written; outlives its writer
+  SessionStorage storage_;
   const std::unique_ptr<Simulation> simulation_ TS_PT_GUARDED_BY(lock_);
   const std::unique_ptr<DeckSockets> deck_sockets_;  // null: none are served
   const std::unique_ptr<Recorder> recorder_;         // thread-safe; null: nothing is recorded
   Coupler coupler_;                                  // its ports are thread-safe by themselves
-
-  Advance* at_work_ = nullptr;                                          ///< of a durable session
-  google::protobuf::RepeatedPtrField<v1::CheckpointPort> peer_memory_;  ///< after the last step
 };
 
 }  // namespace mbcosim::server

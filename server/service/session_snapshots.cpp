@@ -1,4 +1,5 @@
-/// The part of Session that saves and restores.
+/// The part of Session that saves, restores and copies its state.
+#include "model/inverse_problem.h"
 #include "service/display_name.h"
 #include "service/session.h"
 #include "wire/refusal.h"
@@ -11,7 +12,7 @@ void Session::save(const std::string& display_name, const Call& call, v1::Snapsh
   const CallGuard lock(lock_, call);
   snapshots_.check_room(size_of(simulation_->state()));
   snapshots_.add(simulation_->snapshot(), display_name, out);
-  ++changes_;
+  storage_.note_change();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
 }
 
@@ -52,7 +53,7 @@ void Session::go_to(const State& state, const Call& call, std::int64_t results_u
   if (results_) snapshots_.results_end_at(results_->end());
   coupler_.reset();
   if (recorder_) recorder_->restored(simulation_->step_number(), simulation_->time());
-  ++changes_;
+  storage_.note_change();
   const SessionStatus::View before = status_.view();
   status_.recover();
   status_.publish(*simulation_);
@@ -62,7 +63,7 @@ void Session::go_to(const State& state, const Call& call, std::int64_t results_u
 
 void Session::forget(int snapshot) {
   const std::int64_t step = snapshots_.remove(snapshot);
-  ++changes_;
+  storage_.note_change();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_DELETED, snapshots_.name_of(snapshot), step);
 }
 
@@ -85,6 +86,33 @@ State Session::state(const Call& call) {
   return simulation_->snapshot();
 }
 
+// A copy: the analysis of a large model takes long, and the simulation is free meanwhile.
+State Session::state_at_rest(const Call& call, std::int64_t* step) {
+  require_usable();
+  if (inverse_problem(*model_))
+    throw Refusal(
+        v1::REASON_BAD_ARGUMENT,
+        "an inverse dynamics problem prescribes the motion: there is nothing to linearize");
+  if (status_.stepping())
+    throw Refusal(v1::REASON_SIMULATION_BUSY,
+                  "a call advances the simulation; it is analysed between advances");
+  const CallGuard lock(lock_, call);
+  *step = simulation_->step_number();
+  return simulation_->snapshot();
+}
+
+void Session::linearize(const v1::LinearizeRequest& request, Call& call,
+                        v1::LinearizeReply* reply) {
+  const auto state = [&](std::int64_t* step) { return state_at_rest(call, step); };
+  analysis_.linearize(request, state, call, reply);
+}
+
+void Session::eigenvalues(const v1::ComputeEigenvaluesRequest& request, Call& call,
+                          v1::ComputeEigenvaluesReply* reply) {
+  const auto state = [&](std::int64_t* step) { return state_at_rest(call, step); };
+  analysis_.eigenvalues(request, state, call, reply);
+}
+
 std::string Session::export_state(int snapshot, const Call& call) {
   return bytes_of(snapshot >= 0 ? snapshots_.get(snapshot) : state(call));
 }
@@ -101,7 +129,7 @@ void Session::import_state(const std::string& bytes, const std::string& display_
   }();
   if (!state) throw Refusal(state.error());
   const int number = snapshots_.add(std::move(*state), display_name, out, results_end);
-  ++changes_;
+  storage_.note_change();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
   if (also_restore) restore(number, call);
 }

@@ -30,6 +30,15 @@ void check_choice(const v1::StepRequest& request, const Simulation& simulation) 
   }
 }
 
+void check_step(std::int64_t expected, const Simulation& simulation) {
+  const std::int64_t step = simulation.step_number();
+  if (expected == step) return;
+  throw Refusal(v1::REASON_WRONG_STEP,
+                "expected step " + std::to_string(expected) + ", the simulation is at step " +
+                    std::to_string(step),
+                {{"step", std::to_string(step)}});
+}
+
 bool goes_on(const v1::StepRequest& request, const Simulation& simulation) {
   if (!request.has_until_time()) return true;
   const double end = request.until_time();

@@ -8,6 +8,9 @@ namespace mbcosim::server {
 /// Throws BAD_ARGUMENT with the field's name when no step can be as asked.
 void check_choice(const v1::StepRequest& request, const Simulation& simulation);
 
+/// Throws WRONG_STEP when the simulation is at another step.
+void check_step(std::int64_t expected, const Simulation& simulation);
+
 /// Is the end that the request names still ahead?
 bool goes_on(const v1::StepRequest& request, const Simulation& simulation);
 

@@ -5,6 +5,7 @@
 #include "elements/general_element.h"
 #include "model/check.h"
 #include "service/session.h"
+#include "shared_parts.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -66,16 +67,9 @@ class TwoSessions : public testing::Test {
     return v1::REASON_UNSPECIFIED;
   }
 
-  SolverSlots slots_{2};
-  ServiceLimits limits_;
-  Metrics metrics_;
-  EventLog log_;
-  MemoryBudget memory_{1 << 30};
-  Lanes lanes_{1, 1};
-  Timer timer_;
-  Session::Shared shared_{slots_, limits_, metrics_, log_, memory_, lanes_, timer_};
-  Session mistaken_{named("simulations/a"), {}, simulation_that_fails_at(.25), shared_};
-  Session other_{named("simulations/b"), {}, simulation_that_fails_at(1e9), shared_};
+  SharedParts daemon_{2};
+  Session mistaken_{named("simulations/a"), {}, simulation_that_fails_at(.25), daemon_.shared};
+  Session other_{named("simulations/b"), {}, simulation_that_fails_at(1e9), daemon_.shared};
 };
 
 TEST_F(TwoSessions, AnInternalErrorFailsOneSessionAndNoOther) {

@@ -1,10 +1,8 @@
-/// Linearization and eigenvalues of a session's current state. They take no slot of the steps: the
-/// lane of heavy work bounds them, at a lower priority, so that a few of them starve no step.
+#include "service/analysis.h"
+
 #include <complex>
 
-#include "model/inverse_problem.h"
 #include "service/kept_replies.h"
-#include "service/session.h"
 #include "simulation/linearize.h"
 #include "wire/refusal.h"
 
@@ -132,32 +130,17 @@ void tell_pages(ReplyPages<Reply>& kept, const Request& request, MemoryBudget& m
 
 }  // namespace
 
-// A copy: the analysis of a large model takes long, and the simulation is free meanwhile.
-State Session::state_at_rest(const Call& call, std::int64_t* step) {
-  require_usable();
-  if (inverse_problem(*model_))
-    throw Refusal(
-        v1::REASON_BAD_ARGUMENT,
-        "an inverse dynamics problem prescribes the motion: there is nothing to linearize");
-  if (status_.stepping())
-    throw Refusal(v1::REASON_SIMULATION_BUSY,
-                  "a call advances the simulation; it is analysed between advances");
-  const CallGuard lock(lock_, call);
-  *step = simulation_->step_number();
-  return simulation_->snapshot();
-}
-
-void Session::linearize(const v1::LinearizeRequest& request, Call& call,
-                        v1::LinearizeReply* reply) {
+void Analysis::linearize(const v1::LinearizeRequest& request, const TakeState& take_state,
+                         Call& call, v1::LinearizeReply* reply) {
   variables_.check(request.inputs());
   variables_.check(request.outputs());
-  tell_pages(linearization_, request, shared_.memory, call, reply,
+  tell_pages(linearization_, request, memory_, call, reply,
              [&](const CancelToken& token, LinearizePages& pages) {
                std::int64_t step = 0;
-               const State state = state_at_rest(call, &step);
-               const Linearization system = mbcosim::linearize(*model_, state);
+               const State state = take_state(&step);
+               const Linearization system = mbcosim::linearize(model_, state);
                const auto io = linearize_inputs_outputs(
-                   *model_, state, Variables(*model_),
+                   model_, state, Variables(model_),
                    std::vector<int>(request.inputs().begin(), request.inputs().end()),
                    std::vector<int>(request.outputs().begin(), request.outputs().end()), &token);
                if (!io) throw Refusal(io.error());
@@ -169,24 +152,24 @@ void Session::linearize(const v1::LinearizeRequest& request, Call& call,
              });
 }
 
-void Session::eigenvalues(const v1::ComputeEigenvaluesRequest& request, Call& call,
-                          v1::ComputeEigenvaluesReply* reply) {
+void Analysis::eigenvalues(const v1::ComputeEigenvaluesRequest& request,
+                           const TakeState& take_state, Call& call,
+                           v1::ComputeEigenvaluesReply* reply) {
   if (request.has_count() && request.count() <= 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "`count` must be positive, got " + std::to_string(request.count()));
   if (!std::isfinite(request.shift()))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`shift` must be finite");
-  tell_pages(spectrum_, request, shared_.memory, call, reply,
-             [&](const CancelToken& token, auto& pages) {
-               std::int64_t step = 0;
-               const State state = state_at_rest(call, &step);
-               const auto spectrum = eigen(mbcosim::linearize(*model_, state), request.count(),
-                                           std::complex<double>(0, 2 * M_PI * request.shift()),
-                                           {request.eigenvectors(), &token});
-               if (!spectrum) throw Refusal(spectrum.error());
-               fill_spectrum(*spectrum, request.eigenvectors(), pages);
-               return step;
-             });
+  tell_pages(spectrum_, request, memory_, call, reply, [&](const CancelToken& token, auto& pages) {
+    std::int64_t step = 0;
+    const State state = take_state(&step);
+    const auto spectrum = eigen(mbcosim::linearize(model_, state), request.count(),
+                                std::complex<double>(0, 2 * M_PI * request.shift()),
+                                {request.eigenvectors(), &token});
+    if (!spectrum) throw Refusal(spectrum.error());
+    fill_spectrum(*spectrum, request.eigenvectors(), pages);
+    return step;
+  });
 }
 
 }  // namespace mbcosim::server
