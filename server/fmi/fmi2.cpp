@@ -34,21 +34,14 @@ Code fmi2SetDebugLogging(Component component, Boolean on, std::size_t count,
 }
 
 Component fmi2Instantiate(String name, Type type, String guid, String resources,
-                          const Callbacks* callbacks, Boolean, Boolean logging) try {
-  const std::string title = name ? name : "";
-  Log log = make_log(title, callbacks, logging != 0);
-  if (type != kCoSimulation) {
-    log.write(Status::error, "this FMU is for co-simulation");
-    return nullptr;
-  }
-  return Instance::create(Standard::fmi2, title, guid ? guid : "", folder_of(resources),
-                          std::move(log))
-      .release();
-} catch (const std::exception&) {  // out of memory, or a damaged location of the resources
+                          const Callbacks* callbacks, Boolean, Boolean logging) {
+  const Log log = make_log(name ? name : "", callbacks, logging != 0);
+  if (type == kCoSimulation) return instantiate(Standard::fmi2, name, guid, resources, log);
+  log.write(Status::error, "this FMU is for co-simulation");
   return nullptr;
 }
 
-void fmi2FreeInstance(Component component) { delete static_cast<Instance*>(component); }
+void fmi2FreeInstance(Component component) { free_instance(component, "fmi2FreeInstance"); }
 
 Code fmi2SetupExperiment(Component component, Boolean, Real, Real start, Boolean stop_defined,
                          Real stop) {

@@ -17,16 +17,8 @@ Log make_log(LogMessage message, Environment environment, bool on) {
           on};
 }
 
-void* instantiate(String name, String token, String resources, const std::string& refusal,
-                  Log log) try {
-  if (!refusal.empty()) {
-    log.write(Status::error, refusal);
-    return nullptr;
-  }
-  return Instance::create(Standard::fmi3, name ? name : "", token ? token : "",
-                          folder_of(resources), std::move(log))
-      .release();
-} catch (const std::exception&) {  // out of memory
+Handle refuse(const char* why, const Log& log) {
+  log.write(Status::error, why);
   return nullptr;
 }
 
@@ -46,26 +38,24 @@ Handle fmi3InstantiateCoSimulation(String name, String token, String resources, 
                                    Boolean logging, Boolean event_mode, Boolean, const Reference[],
                                    std::size_t intermediate, Environment environment,
                                    LogMessage message, IntermediateUpdate) {
-  std::string refusal;
-  if (event_mode) refusal = "there is no event mode; modelDescription.xml says so";
-  if (intermediate > 0) refusal = "no variable takes part in intermediate updates";
-  return instantiate(name, token, resources, refusal, make_log(message, environment, logging));
+  const Log log = make_log(message, environment, logging);
+  if (event_mode) return refuse("there is no event mode; modelDescription.xml says so", log);
+  if (intermediate > 0) return refuse("no variable takes part in intermediate updates", log);
+  return instantiate(Standard::fmi3, name, token, resources, log);
 }
 
 Handle fmi3InstantiateModelExchange(String, String, String, Boolean, Boolean logging,
                                     Environment environment, LogMessage message) {
-  return instantiate("", "", "", "this FMU is for co-simulation",
-                     make_log(message, environment, logging));
+  return refuse("this FMU is for co-simulation", make_log(message, environment, logging));
 }
 
 Handle fmi3InstantiateScheduledExecution(String, String, String, Boolean, Boolean logging,
                                          Environment environment, LogMessage message, ClockUpdate,
                                          Preemption, Preemption) {
-  return instantiate("", "", "", "this FMU is for co-simulation",
-                     make_log(message, environment, logging));
+  return refuse("this FMU is for co-simulation", make_log(message, environment, logging));
 }
 
-void fmi3FreeInstance(Handle instance) { delete static_cast<Instance*>(instance); }
+void fmi3FreeInstance(Handle instance) { free_instance(instance, "fmi3FreeInstance"); }
 
 Code fmi3EnterInitializationMode(Handle instance, Boolean, Float64, Float64 start,
                                  Boolean stop_defined, Float64 stop) {

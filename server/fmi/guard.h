@@ -5,29 +5,81 @@
 #include <span>
 
 #include "fmi/instance.h"
+#include "fmi/location.h"
 
 namespace mbcosim::fmi {
+
+inline constexpr int kError = static_cast<int>(Status::error);
+
+/// One call's hold on an instance; false: another call has it, which is logged. An instance that
+/// was freed meanwhile ends with the hold.
+class Hold {
+ public:
+  Hold(Instance& instance, const char* function) : instance_(instance) {
+    auto use = Instance::Use::idle;
+    held_ = instance.use.compare_exchange_strong(use, Instance::Use::busy);
+    if (held_) return;
+    instance.log().write(Status::error,
+                         std::string(function) + ": another call runs on this instance");
+  }
+  ~Hold() {
+    auto use = Instance::Use::busy;
+    if (held_ && !instance_.use.compare_exchange_strong(use, Instance::Use::idle))
+      delete &instance_;
+  }
+  Hold(const Hold&) = delete;
+  Hold& operator=(const Hold&) = delete;
+
+  explicit operator bool() const { return held_; }
+
+ private:
+  Instance& instance_;
+  bool held_ = false;
+};
 
 /// Runs work(instance) when the call is allowed. Nothing is thrown through the C interface, and a
 /// call while another one runs on the instance is refused without touching it.
 template <class Work>
 int guarded(void* handle, Call call, const char* function, Work&& work) {
-  constexpr int kError = static_cast<int>(Status::error);
   if (!handle) return kError;
   Instance& instance = *static_cast<Instance*>(handle);
-  if (instance.busy.exchange(true)) {
-    instance.log().write(Status::error,
-                         std::string(function) + ": another call runs on this instance");
-    return kError;
-  }
-  int status = kError;
+  const Hold hold(instance, function);
+  if (!hold) return kError;
   try {
-    if (instance.admit(call, function)) status = static_cast<int>(work(instance));
+    return instance.admit(call, function) ? static_cast<int>(work(instance)) : kError;
   } catch (const std::exception& e) {
-    status = static_cast<int>(instance.fail(std::string(function) + ": " + e.what()));
+    return static_cast<int>(instance.fail(std::string(function) + ": " + e.what()));
   }
-  instance.busy = false;
-  return status;
+}
+
+/// Allowed in all states. While another call runs on the instance, that call frees it at its end.
+inline void free_instance(void* handle, const char* function) {
+  if (!handle) return;
+  auto* instance = static_cast<Instance*>(handle);
+  auto use = Instance::Use::idle;
+  if (!instance->use.compare_exchange_strong(use, Instance::Use::freed)) {
+    instance->log().write(
+        Status::error,
+        std::string(function) + ": another call runs on this instance, which is freed at its end");
+    if (instance->use.exchange(Instance::Use::freed) != Instance::Use::idle) return;
+  }
+  delete instance;
+}
+
+/// An instance with the resources at a location, FMI 2's URI or FMI 3's path; null: the log says
+/// why.
+inline void* instantiate(Standard standard, const char* name, const char* token,
+                         const char* location, const Log& log) try {
+  const auto folder = folder_of(location ? location : "");
+  if (!folder) {
+    log.write(Status::error,
+              "the location of the resources is no URI: \"" + std::string(location) + "\"");
+    return nullptr;
+  }
+  return Instance::create(standard, name ? name : "", token ? token : "", *folder, log).release();
+} catch (const std::exception& e) {
+  log.write(Status::error, e.what());
+  return nullptr;
 }
 
 /// Arrays of the C interface; a null pointer counts as empty.
@@ -38,13 +90,12 @@ std::span<T> array(T* first, std::size_t size) {
 
 /// A function of FMI that the capabilities in modelDescription.xml rule out.
 inline int unsupported(void* handle, const char* function) {
-  if (!handle) return static_cast<int>(Status::error);
+  if (!handle) return kError;
   Instance& instance = *static_cast<Instance*>(handle);
-  if (instance.busy.exchange(true)) return static_cast<int>(Status::error);
-  const Status status =
-      instance.fail(std::string(function) + " is not supported, as modelDescription.xml says");
-  instance.busy = false;
-  return static_cast<int>(status);
+  const Hold hold(instance, function);
+  if (!hold) return kError;
+  return static_cast<int>(
+      instance.fail(std::string(function) + " is not supported, as modelDescription.xml says"));
 }
 
 /// Values of a type that none of our variables has.
@@ -157,21 +208,6 @@ inline Status switch_logging(Instance& instance, bool on, std::size_t count,
           "there is no such log category; they are listed in "
           "modelDescription.xml");
   return Status::ok;
-}
-
-/// A folder from FMI 2's URI ("file:///tmp/a%20b/resources") or FMI 3's path; empty: none.
-inline std::string folder_of(const char* location) {
-  std::string text = location ? location : "";
-  if (text.rfind("file:", 0) != 0) return text;
-  text.erase(0, 5);
-  if (text.rfind("//", 0) == 0) text.erase(0, text.find('/', 2));
-  std::string path;
-  for (std::size_t k = 0; k < text.size(); ++k) {
-    const bool escaped = text[k] == '%' && k + 2 < text.size();
-    path += escaped ? static_cast<char>(std::stoi(text.substr(k + 1, 2), nullptr, 16)) : text[k];
-    k += escaped ? 2 : 0;
-  }
-  return path;
 }
 
 }  // namespace mbcosim::fmi

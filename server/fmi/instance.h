@@ -77,8 +77,9 @@ class Instance {
   Status derivative(std::span<const std::uint32_t> unknowns, std::span<const std::uint32_t> knowns,
                     std::span<const double> seed, std::span<double> sensitivity, bool transposed);
 
-  /// Taken while a call runs: a second one at the same time is refused.
-  std::atomic<bool> busy{false};
+  /// busy: a call runs, a second one at the same time is refused; freed: no call may begin.
+  enum class Use { idle, busy, freed };
+  std::atomic<Use> use{Use::idle};
 
  private:
   struct Variable {

@@ -230,7 +230,8 @@ class Fmu2(Instance):
         create.restype = c.c_void_p
         create.argtypes = [c.c_char_p, c.c_int, c.c_char_p, c.c_char_p, c.c_void_p, c.c_int, c.c_int]
         self.archive.library.fmi2FreeInstance.argtypes = [c.c_void_p]
-        uri = "file://" + resources.replace("%", "%25").replace(" ", "%20")
+        is_uri = resources.startswith("file:")
+        uri = resources if is_uri else "file://" + resources.replace("%", "%25").replace(" ", "%20")
         return c.c_void_p(create(name, kind, token, uri.encode(), c.byref(self._callbacks), 0, logging))
 
     def enter_initialization(self, start, stop=None):

@@ -261,16 +261,20 @@ def test_eight_instances_in_eight_threads_have_the_bits_of_one(exported):
     assert alone[0] == alone[1]
 
 
+def long_step(instance, count):
+    """Status of `count` steps of the deck; again when it was refused because another thread had the instance."""
+    status = ERROR
+    while status == ERROR:
+        status = instance.do_step(0, count * instance.archive.experiment()[2])
+    return status
+
+
 def test_two_calls_at_once_on_one_instance_are_refused_without_harm(exported):
     fmu = exported("chain")
     with instance_of(fmu) as instance, instance_of(fmu) as alone:
         instance.initialize(), alone.initialize()
         statuses = []
-
-        def step():
-            statuses.append(instance.do_step(0, 500 * fmu.experiment()[2]))
-
-        thread = threading.Thread(target=step)
+        thread = threading.Thread(target=lambda: statuses.append(long_step(instance, 500)))
         thread.start()
         refused = 0
         while thread.is_alive():
@@ -280,8 +284,28 @@ def test_two_calls_at_once_on_one_instance_are_refused_without_harm(exported):
                 refused += failed.status == ERROR
         thread.join()
         assert statuses == [OK] and refused > 0
-        assert alone.do_step(0, 500 * fmu.experiment()[2]) == OK
+        assert (ERROR, "logStatusError", "fmi3GetFloat64: another call runs on this instance") in instance.log
+        assert long_step(alone, 500) == OK
         assert instance["node.structural.2.X"] == alone["node.structural.2.X"]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_an_instance_that_is_freed_during_a_step_ends_with_the_step(exported, standard):
+    fmu = exported("chain", standard)
+    instance = instance_of(fmu)
+    instance.initialize()
+    statuses = []
+    thread = threading.Thread(target=lambda: statuses.append(long_step(instance, 2000)))
+    thread.start()
+    while instance.set_logging(True) == OK:
+        assert thread.is_alive()
+    assert instance.call("EnterEventMode") == ERROR  # never allowed; it does not end the step either
+    instance.free()
+    thread.join()
+    assert statuses == [OK]
+    assert [entry[2] for entry in instance.log[-2:]] == [
+        f"fmi{standard}EnterEventMode: another call runs on this instance",
+        f"fmi{standard}FreeInstance: another call runs on this instance, which is freed at its end"]
 
 
 # ------------------------------------------------------------------ calls out of order
@@ -574,6 +598,39 @@ def test_points_of_a_port_move_with_their_node(ports):
         assert instance["port.wing.positions"] == pytest.approx([a + b for a, b in zip(x, arm)] + x, abs=1e-14)
         assert instance["port.wing.velocities"] == pytest.approx([a + b for a, b in zip(v, turn)] + v, abs=1e-14)
         assert instance["port.wing.orientations"] == R + R
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_a_deck_that_is_missing_in_the_resources_is_named(ports, tmp_path, standard):
+    fmu, resources = ports(standard), tmp_path / "resources"
+    shutil.copytree(fmu.resources, resources)
+    (resources / "files" / "1-ports.mbd").unlink()
+    refused = instance_of(fmu, resources=str(resources))
+    assert not refused.handle
+    assert refused.log[-1][0] == ERROR and "cannot read" in refused.log[-1][2] and "files/1-ports.mbd" in refused.log[-1][2]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("uri", ["file:///tmp/%zz/resources", "file:///tmp/%+1", "file:///tmp/% 1/%2", "file:%"])
+def test_a_damaged_uri_of_the_resources_is_refused(ports, standard, uri):
+    refused = instance_of(ports(standard), resources=uri)
+    assert not refused.handle
+    assert refused.log[-1][0] == ERROR and f'is no URI: "{uri}' in refused.log[-1][2]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_instances_of_other_kinds_are_refused(ports, standard):
+    with instance_of(ports(standard)) as instance:
+        library = instance.archive.library
+        if standard == "2":
+            refused = [library.fmi2Instantiate(b"i", 0, instance.archive.token.encode(), b"", ctypes.byref(instance._callbacks), 0, 1)]
+        else:
+            names, flags = (b"i", instance.archive.token.encode(), b""), (False, True)
+            library.fmi3InstantiateModelExchange.restype = library.fmi3InstantiateScheduledExecution.restype = ctypes.c_void_p
+            refused = [library.fmi3InstantiateModelExchange(*names, *flags, None, instance._logger),
+                       library.fmi3InstantiateScheduledExecution(*names, *flags, None, instance._logger, None, None, None)]
+        assert not any(refused)
+        assert [text for status, _, text in instance.log if status == ERROR] == ["this FMU is for co-simulation"] * len(refused)
 
 
 @pytest.mark.parametrize("standard", STANDARDS)
