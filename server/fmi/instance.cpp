@@ -186,6 +186,7 @@ Status Instance::setup(double start_time, std::optional<double> stop_time) {
     return fail("the stop time " + number(*stop_time) + " s lies before the start");
   communication_time_ = last_time_ = start_time;
   stop_time_ = stop_time;
+  mode_ = Mode::set_up;
   return Status::ok;
 }
 

@@ -5,13 +5,14 @@
 
 namespace mbcosim::fmi {
 
-/// FMI 3's Step Mode is FMI 2's step complete. FMI 3 knows neither `step_failed` (after a discarded
-/// step it goes on) nor `failed` (it is then Terminated).
-enum class Mode { instantiated, initialization, step, step_failed, terminated, failed };
+/// FMI 3's Step Mode is FMI 2's step complete. FMI 3 knows neither `set_up` (Instantiated, after
+/// fmi2SetupExperiment) nor `step_failed` (after a discarded step it goes on) nor `failed` (it is
+/// then Terminated).
+enum class Mode { instantiated, set_up, initialization, step, step_failed, terminated, failed };
 
+/// Freeing an instance is always allowed, and what modelDescription.xml rules out never.
 enum class Call {
   set_debug_logging,
-  free_instance,
   setup_experiment,
   enter_initialization,
   exit_initialization,
@@ -21,10 +22,7 @@ enum class Call {
   set,
   state,  ///< get, set, free and (de)serialize FMU states
   derivative,
-  input_derivatives,
-  output_derivatives,
   do_step,
-  cancel_step,
   step_status,
   count
 };

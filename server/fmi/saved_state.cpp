@@ -8,7 +8,7 @@
 namespace mbcosim::fmi {
 namespace {
 
-constexpr std::string_view kMagic = "mbcosim FMU state 2\n";
+constexpr std::string_view kMagic = "mbcosim FMU state 3\n";
 
 void put(std::uint64_t value, std::string& out) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);

@@ -314,6 +314,10 @@ def to_instantiated(i):
     pass
 
 
+def to_set_up(i):
+    i.must("SetupExperiment", *ARGUMENTS["SetupExperiment"]())
+
+
 def to_initialization(i):
     i.enter_initialization(0.0)
 
@@ -346,74 +350,164 @@ def to_failed(i):
     assert i.do_step(0.0, 0.1) == DISCARD
 
 
-MODES = [to_instantiated, to_initialization, to_step, to_terminated, to_error, to_failed]
-# Allowed calls by mode, one letter a mode in the order of MODES. A discarded step leaves FMI 3 in Step Mode.
-CALLS = {
-    "SetupExperiment": ("x.....", None),
-    "EnterInitializationMode": ("x.....", "x....."),
-    "ExitInitializationMode": (".x....", ".x...."),
-    "Terminate": ("..x..x", "..x..x"),
-    "Reset": ("xxxxxx", "xxxxxx"),
-    "get": (".xxxxx", "xxxxxx"),
-    "set": ("xxx...", "xxx..x"),
-    "do_step": ("..x...", "..x..x"),
-    "get_state": ("xxxxxx", "xxxxxx"),
-    "derivative": (".xxxxx", ".xxxxx"),
-    "set_logging": ("xxxxxx", "xxxxxx"),
-    "CancelStep": ("......", None),
-    "EnterEventMode": ("......", "......"),
-    "EnterContinuousTimeMode": ("......", "......"),
-    "EnterStepMode": (None, "......"),
-    "EnterConfigurationMode": (None, "......"),
-    "EvaluateDiscreteStates": (None, "......"),
-}
+MODES = {"2": [to_instantiated, to_set_up, to_initialization, to_step, to_failed, to_terminated, to_error],
+         "3": [to_instantiated, to_initialization, to_step, to_failed, to_terminated, to_error]}
+TYPES3 = "Int8 UInt8 Int16 UInt16 UInt32 Int64 UInt64 Float32 Binary Clock".split()  # no variable of ours has them
+MODEL_EXCHANGE = ["EnterEventMode", "EnterContinuousTimeMode", "CompletedIntegratorStep", "SetTime", "SetContinuousStates",
+                  "GetEventIndicators", "GetContinuousStates", "GetNominalsOfContinuousStates"]
 
 
-def perform(instance, call, fmu):
+def rows(letters, *names):
+    return dict.fromkeys(names, letters)
+
+
+# Every function that takes an instance, without "fmi2" or "fmi3"; one letter a mode in the order of MODES. x: allowed; d: discarded, since
+# there is no such status; dot: an error. A discarded step leaves FMI 3 in Step Mode. What modelDescription.xml rules out is never allowed.
+FUNCTIONS = {
+    "2": {**rows("xxxxxxx", "SetDebugLogging", "FreeInstance", "Reset", "GetFMUstate", "SetFMUstate", "FreeFMUstate",
+                 "SerializedFMUstateSize", "SerializeFMUstate", "DeSerializeFMUstate"),
+          **rows("xx.....", "SetupExperiment"),
+          **rows(".x.....", "EnterInitializationMode"),
+          **rows("..x....", "ExitInitializationMode"),
+          **rows("...xx..", "Terminate"),
+          **rows("..xxxxx", "GetReal", "GetInteger", "GetBoolean", "GetString", "GetDirectionalDerivative"),
+          **rows("xxxx...", "SetReal"),
+          **rows("xxx....", "SetInteger", "SetBoolean", "SetString"),  # fixed parameters
+          **rows("...x...", "DoStep"),
+          **rows("...xxx.", "GetRealStatus", "GetBooleanStatus"),
+          **rows("...ddd.", "GetStatus", "GetIntegerStatus", "GetStringStatus"),
+          **rows(".......", "CancelStep", "SetRealInputDerivatives", "GetRealOutputDerivatives", "NewDiscreteStates", "GetDerivatives",
+                 *MODEL_EXCHANGE)},
+    "3": {**rows("xxxxxx", "SetDebugLogging", "FreeInstance", "Reset", "GetFMUState", "SetFMUState", "FreeFMUState",
+                 "SerializedFMUStateSize", "SerializeFMUState", "DeserializeFMUState", "GetFloat64", "GetInt32", "GetBoolean", "GetString",
+                 *["Get" + name for name in TYPES3]),
+          **rows("x.....", "EnterInitializationMode"),
+          **rows(".x....", "ExitInitializationMode"),
+          **rows("..xx..", "Terminate", "DoStep"),
+          **rows("xxxx..", "SetFloat64", *["Set" + name for name in TYPES3]),
+          **rows("xx....", "SetInt32", "SetBoolean", "SetString"),  # fixed parameters
+          **rows(".xxxxx", "GetDirectionalDerivative", "GetAdjointDerivative"),
+          **rows("......", "EnterStepMode", "EnterConfigurationMode", "ExitConfigurationMode", "EvaluateDiscreteStates",
+                 "UpdateDiscreteStates", "GetContinuousStateDerivatives", "GetNumberOfEventIndicators", "GetNumberOfContinuousStates",
+                 "GetNumberOfVariableDependencies", "GetVariableDependencies", "GetOutputDerivatives", "ActivateModelPartition",
+                 "GetIntervalDecimal", "GetIntervalFraction", "GetShiftDecimal", "GetShiftFraction", "SetIntervalDecimal",
+                 "SetIntervalFraction", "SetShiftDecimal", "SetShiftFraction", *MODEL_EXCHANGE)}}
+WITHOUT_INSTANCE = {"2": {"GetTypesPlatform", "GetVersion", "Instantiate"},
+                    "3": {"GetVersion", "InstantiateCoSimulation", "InstantiateModelExchange", "InstantiateScheduledExecution"}}
+
+
+def test_every_function_is_in_the_table(ports):
+    visible = visible_names(ports("3"))
+    for standard in STANDARDS:
+        assert {name[4:] for name in visible if name.startswith("fmi" + standard)} == {*FUNCTIONS[standard], *WITHOUT_INSTANCE[standard]}
+
+
+def test_functions_without_an_instance_tell_the_version(ports):
+    library = ports("3").library
+    for name in ("fmi2GetVersion", "fmi3GetVersion", "fmi2GetTypesPlatform"):
+        getattr(library, name).restype = ctypes.c_char_p
+    assert (library.fmi2GetVersion(), library.fmi3GetVersion(), library.fmi2GetTypesPlatform()) == (b"2.0", b"3.0", b"default")
+
+
+@pytest.fixture(scope="module")
+def all_types(exported, tmp_path_factory):
+    """A port, and a symbol of every type."""
+    path = tmp_path_factory.mktemp("deck") / "types.mbd"
+    path.write_text('set: const integer COUNT = 2; set: const bool HEAVY = TRUE; set: const string NOTE = "plain";' + PORTS)
+    return lambda standard: exported(str(path), standard)
+
+
+SIZE, REAL = ctypes.c_size_t, ctypes.c_double
+SYMBOL_OF = {"Integer": "symbol.COUNT", "Int32": "symbol.COUNT", "Boolean": "symbol.HEAVY", "String": "symbol.NOTE"}
+ARGUMENTS = {  # right ones of both standards; functions that are never allowed look at none
+    "SetDebugLogging": lambda: (0, SIZE(0), None),
+    "SetupExperiment": lambda: (0, REAL(0), REAL(0), 0, REAL(0)),
+    "EnterInitializationMode": lambda: (0, REAL(0), REAL(0), 0, REAL(0)),
+    "DoStep": lambda: (REAL(0), REAL(0.01), 0, None, None, None, None),
+    "GetStatus": lambda: (0, ctypes.byref(ctypes.c_int())),
+    "GetRealStatus": lambda: (2, ctypes.byref(REAL())),  # the last successful time
+    "GetIntegerStatus": lambda: (0, ctypes.byref(ctypes.c_int())),
+    "GetBooleanStatus": lambda: (3, ctypes.byref(ctypes.c_int())),  # terminated
+    "GetStringStatus": lambda: (1, ctypes.byref(ctypes.c_char_p()))}
+
+
+def perform_on_state(instance, function):
+    """With a state of the instance in its present mode."""
+    state = instance.get_state()
+    data = instance.serialize(state)
+    do = {"get": lambda: instance.get_state(state), "set": lambda: instance.set_state(state), "free": lambda: None,
+          "serializedsize": lambda: instance.serialize(state), "serialize": lambda: instance.serialize(state),
+          "deserialize": lambda: instance.free_state(instance.deserialize(data))}
+    do[function.lower().replace("fmustate", "")]()
+    instance.free_state(state)
+
+
+def perform_typed(instance, function):
+    """Status of getting or setting one variable of the type, none if there is no such variable."""
+    name = "port.wing.loads.force" + ("[1,1]" if instance.archive.version == "2.0" else "")
+    if function in ("GetReal", "GetFloat64"):
+        instance[name]
+    elif function in ("SetReal", "SetFloat64"):
+        instance[name] = [1.0] * instance.archive.sizes[name]
+    elif function[3:] not in SYMBOL_OF:
+        instance.must(function, None, SIZE(0), None, None, SIZE(0))
+    else:
+        values = instance._array(SYMBOL_OF[function[3:]], *{"Integer": [2], "Int32": [2], "Boolean": [True], "String": [b"plain"]}[function[3:]])
+        return instance._typed(function[:3], SYMBOL_OF[function[3:]], values)
+    return OK
+
+
+def perform(instance, function):
     """Status of a call with right arguments."""
-    scalar = "node.structural.1.X" + ("[1]" if fmu.version == "2.0" else "")
-    force = "port.wing.loads.force" + ("[1,1]" if fmu.version == "2.0" else "")
+    two = instance.archive.version == "2.0"
     try:
-        if call == "get":
-            instance[scalar]
-        elif call == "set":
-            instance[force] = [1.0] * fmu.sizes[force]
-        elif call == "do_step":
-            return instance.do_step(0.0, 0.01)
-        elif call == "get_state":
-            instance.free_state(instance.get_state())
-        elif call == "derivative":
-            instance.derivative([scalar], [force], [1.0] * fmu.sizes[force])
-        elif call == "set_logging":
-            return instance.set_logging(False, ["logEvents"])
-        elif call == "SetupExperiment":
-            instance.must(call, 0, ctypes.c_double(0), ctypes.c_double(0), 0, ctypes.c_double(0))
-        elif call == "EnterInitializationMode" and fmu.version == "3.0":
-            instance.enter_initialization(0.0)
+        if function == "FreeInstance":
+            instance.free()
+        elif "FMUstate" in function or "FMUState" in function:
+            perform_on_state(instance, function)
+        elif function.endswith("Derivative"):
+            outputs, inputs = (["node.structural.1.X[1]"], ["port.wing.loads.force[1,1]"]) if two else (
+                ["node.structural.1.X"], ["port.wing.loads.force"])
+            if function == "GetAdjointDerivative":
+                instance.derivative(outputs, inputs, [1.0] * 3, function, 6)
+            else:
+                instance.derivative(outputs, inputs, [1.0] * (1 if two else 6))
+        elif re.fullmatch("[GS]et(Real|Integer|Boolean|String|Float64|Int32|" + "|".join(TYPES3) + ")", function):
+            return perform_typed(instance, function)
         else:
-            return instance.call(call)
+            return instance.call(function, *ARGUMENTS.get(function, tuple)())
     except Failed as failed:
         return failed.status
     return OK
 
 
-@pytest.mark.parametrize("standard", STANDARDS)
-@pytest.mark.parametrize("call", CALLS)
-def test_calls_are_allowed_in_the_states_that_the_standard_names(ports, call, standard):
-    allowed = CALLS[call][STANDARDS.index(standard)]
-    fmu = ports(standard)
-    for mode, letter in zip(MODES, allowed or ""):
+@pytest.mark.parametrize("standard, function", [(s, f) for s in STANDARDS for f in FUNCTIONS[s]])
+def test_calls_are_allowed_in_the_states_that_the_standard_names(all_types, standard, function):
+    fmu, letters = all_types(standard), FUNCTIONS[standard][function]
+    assert len(letters) == len(MODES[standard])
+    for mode, letter in zip(MODES[standard], letters):
         with instance_of(fmu) as instance:
             mode(instance)
             instance.log.clear()
-            status = perform(instance, call, fmu)
-            assert status == (OK if letter == "x" else ERROR), f"{call} in {mode.__name__}: {instance.log}"
-            if letter != "x":
-                assert instance.log and instance.log[-1][:2] == (ERROR, "logStatusError")
-                assert perform(instance, "do_step", fmu) == ERROR  # the error ended the simulation
+            status = perform(instance, function)
+            assert status == {"x": OK, "d": DISCARD, ".": ERROR}[letter], f"{function} in {mode.__name__}: {instance.log}"
+            assert all(entry[0] == OK for entry in instance.log) == (letter == "x"), instance.log
+            if letter == ".":
+                assert instance.log[-1][:2] == (ERROR, "logStatusError")
+                assert perform(instance, "DoStep") == ERROR  # the error ended the simulation
                 assert instance.call("Reset") == OK
                 instance.initialize()
-                assert perform(instance, "do_step", fmu) == OK
+                assert perform(instance, "DoStep") == OK
+
+
+def test_the_initialization_begins_after_the_setup_of_the_experiment(ports):
+    with instance_of(ports("2")) as instance:
+        for _ in range(2):  # it is wanted again after a reset
+            assert instance.call("EnterInitializationMode") == ERROR
+            assert 'not allowed in the state "Instantiated, before fmi2SetupExperiment"' in instance.log[-1][2]
+            assert instance.call("Reset") == OK
+            instance.initialize()
+            assert instance.call("Reset") == OK
 
 
 # ------------------------------------------------------------------ bad input
@@ -503,6 +597,39 @@ def test_instances_need_their_resources_and_token(ports, tmp_path, standard):
     refused = instance_of(fmu, resources=str(damaged))
     assert not refused.handle and "damaged" in refused.log[-1][2]
     assert not instance_of(fmu, logging=False, token="{other}").log
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_a_deck_that_is_missing_in_the_resources_is_named(ports, tmp_path, standard):
+    fmu, resources = ports(standard), tmp_path / "resources"
+    shutil.copytree(fmu.resources, resources)
+    (resources / "files" / "1-ports.mbd").unlink()
+    refused = instance_of(fmu, resources=str(resources))
+    assert not refused.handle
+    assert refused.log[-1][0] == ERROR and "cannot read" in refused.log[-1][2] and "files/1-ports.mbd" in refused.log[-1][2]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("uri", ["file:///tmp/%zz/resources", "file:///tmp/%+1", "file:///tmp/% 1/%2", "file:%"])
+def test_a_damaged_uri_of_the_resources_is_refused(ports, standard, uri):
+    refused = instance_of(ports(standard), resources=uri)
+    assert not refused.handle
+    assert refused.log[-1][0] == ERROR and f'is no URI: "{uri}' in refused.log[-1][2]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_instances_of_other_kinds_are_refused(ports, standard):
+    with instance_of(ports(standard)) as instance:
+        library = instance.archive.library
+        if standard == "2":
+            refused = [library.fmi2Instantiate(b"i", 0, instance.archive.token.encode(), b"", ctypes.byref(instance._callbacks), 0, 1)]
+        else:
+            names, flags = (b"i", instance.archive.token.encode(), b""), (False, True)
+            library.fmi3InstantiateModelExchange.restype = library.fmi3InstantiateScheduledExecution.restype = ctypes.c_void_p
+            refused = [library.fmi3InstantiateModelExchange(*names, *flags, None, instance._logger),
+                       library.fmi3InstantiateScheduledExecution(*names, *flags, None, instance._logger, None, None, None)]
+        assert not any(refused)
+        assert [text for status, _, text in instance.log if status == ERROR] == ["this FMU is for co-simulation"] * len(refused)
 
 
 @pytest.mark.parametrize("standard", STANDARDS)
@@ -598,39 +725,6 @@ def test_points_of_a_port_move_with_their_node(ports):
         assert instance["port.wing.positions"] == pytest.approx([a + b for a, b in zip(x, arm)] + x, abs=1e-14)
         assert instance["port.wing.velocities"] == pytest.approx([a + b for a, b in zip(v, turn)] + v, abs=1e-14)
         assert instance["port.wing.orientations"] == R + R
-
-
-@pytest.mark.parametrize("standard", STANDARDS)
-def test_a_deck_that_is_missing_in_the_resources_is_named(ports, tmp_path, standard):
-    fmu, resources = ports(standard), tmp_path / "resources"
-    shutil.copytree(fmu.resources, resources)
-    (resources / "files" / "1-ports.mbd").unlink()
-    refused = instance_of(fmu, resources=str(resources))
-    assert not refused.handle
-    assert refused.log[-1][0] == ERROR and "cannot read" in refused.log[-1][2] and "files/1-ports.mbd" in refused.log[-1][2]
-
-
-@pytest.mark.parametrize("standard", STANDARDS)
-@pytest.mark.parametrize("uri", ["file:///tmp/%zz/resources", "file:///tmp/%+1", "file:///tmp/% 1/%2", "file:%"])
-def test_a_damaged_uri_of_the_resources_is_refused(ports, standard, uri):
-    refused = instance_of(ports(standard), resources=uri)
-    assert not refused.handle
-    assert refused.log[-1][0] == ERROR and f'is no URI: "{uri}' in refused.log[-1][2]
-
-
-@pytest.mark.parametrize("standard", STANDARDS)
-def test_instances_of_other_kinds_are_refused(ports, standard):
-    with instance_of(ports(standard)) as instance:
-        library = instance.archive.library
-        if standard == "2":
-            refused = [library.fmi2Instantiate(b"i", 0, instance.archive.token.encode(), b"", ctypes.byref(instance._callbacks), 0, 1)]
-        else:
-            names, flags = (b"i", instance.archive.token.encode(), b""), (False, True)
-            library.fmi3InstantiateModelExchange.restype = library.fmi3InstantiateScheduledExecution.restype = ctypes.c_void_p
-            refused = [library.fmi3InstantiateModelExchange(*names, *flags, None, instance._logger),
-                       library.fmi3InstantiateScheduledExecution(*names, *flags, None, instance._logger, None, None, None)]
-        assert not any(refused)
-        assert [text for status, _, text in instance.log if status == ERROR] == ["this FMU is for co-simulation"] * len(refused)
 
 
 @pytest.mark.parametrize("standard", STANDARDS)
@@ -800,9 +894,13 @@ def test_declared_units_have_their_names_and_factors(tmp_path, standard):
     assert float(units["N mm"]["factor"]) == pytest.approx(1e-3) and "m" not in units
 
 
+def visible_names(fmu):
+    names = subprocess.run(["nm", "-D", "--defined-only", fmu.library_path], capture_output=True, text=True, check=True).stdout
+    return {line.split()[-1] for line in names.splitlines()}
+
+
 def test_only_functions_of_fmi_are_visible(ports):
-    names = subprocess.run(["nm", "-D", "--defined-only", ports("3").library_path], capture_output=True, text=True, check=True).stdout
-    visible = {line.split()[-1] for line in names.splitlines()}
+    visible = visible_names(ports("3"))
     assert "fmi3DoStep" in visible and "fmi2DoStep" in visible
     assert all(name.startswith(("fmi2", "fmi3")) for name in visible)
 
