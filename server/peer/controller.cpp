@@ -89,8 +89,8 @@ class Controller2 : public Controller {
            const std::vector<double>& values) override {
     require(set_(handle_, references.data(), references.size(), values.data()), "its inputs");
   }
-  std::vector<double> get(const std::vector<std::uint32_t>& references) override {
-    std::vector<double> values(references.size());
+  std::vector<double> get(const std::vector<std::uint32_t>& references, std::size_t size) override {
+    std::vector<double> values(size);
     require(get_(handle_, references.data(), references.size(), values.data()), "its outputs");
     return values;
   }
@@ -152,8 +152,8 @@ class Controller3 : public Controller {
     require(set_(handle_, references.data(), references.size(), values.data(), values.size()),
             "its inputs");
   }
-  std::vector<double> get(const std::vector<std::uint32_t>& references) override {
-    std::vector<double> values(references.size());
+  std::vector<double> get(const std::vector<std::uint32_t>& references, std::size_t size) override {
+    std::vector<double> values(size);
     require(get_(handle_, references.data(), references.size(), values.data(), values.size()),
             "its outputs");
     return values;

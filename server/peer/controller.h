@@ -17,7 +17,9 @@ class Controller {
   virtual void start(double time) = 0;
   virtual void set(const std::vector<std::uint32_t>& references,
                    const std::vector<double>& values) = 0;
-  virtual std::vector<double> get(const std::vector<std::uint32_t>& references) = 0;
+  /// `size`: numbers of all of them.
+  virtual std::vector<double> get(const std::vector<std::uint32_t>& references,
+                                  std::size_t size) = 0;
   virtual void do_step(double time, double length) = 0;
   /// Keeps the state, instead of the one kept before; `restore` goes back to it.
   virtual void keep() = 0;

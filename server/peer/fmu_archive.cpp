@@ -2,6 +2,7 @@
 
 #include <zip.h>
 
+#include <charconv>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -18,6 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
 constexpr zip_int64_t kMostEntries = 100000;
+constexpr std::size_t kMostNumbers = 1000000;  ///< of an array
 
 using Archive = std::unique_ptr<zip_t, decltype(&zip_discard)>;
 using Entry = std::unique_ptr<zip_file_t, decltype(&zip_fclose)>;
@@ -51,6 +53,24 @@ std::optional<std::string> start_of(const pugi::xml_node& variable, bool fmi3) {
   if (fmi3 && variable.child("Start")) return variable.child("Start").attribute("value").value();
   const pugi::xml_attribute start = (fmi3 ? variable : variable.first_child()).attribute("start");
   return start ? std::optional<std::string>(start.value()) : std::nullopt;
+}
+
+/// Numbers of a variable of FMI 3; 0 when a structural parameter tells how many.
+std::size_t size_of(const pugi::xml_node& variable) {
+  std::size_t size = 1;
+  for (const pugi::xml_node dimension : variable.children("Dimension")) {
+    const pugi::xml_attribute start = dimension.attribute("start");
+    if (!start) return 0;
+    const std::string_view text = start.value();
+    std::size_t count = 0;
+    const auto read = std::from_chars(text.data(), text.data() + text.size(), count);
+    if (text.empty() || read.ec != std::errc() || read.ptr != text.data() + text.size() ||
+        count == 0 || count > kMostNumbers / size)
+      refuse("the dimensions of its variable \"" + std::string(variable.attribute("name").value()) +
+             "\" are not from 1 to a million");
+    size *= count;
+  }
+  return size;
 }
 
 }  // namespace
@@ -116,10 +136,13 @@ void FmuArchive::read_description() {
   for (const pugi::xml_node node : root.child("ModelVariables")) {
     const std::string_view type = fmi3_ ? node.name() : node.first_child().name();
     if (type == "Clock" || type == "Binary") continue;  // they need no start values
-    const bool real = fmi3_ ? type == "Float64" && !node.child("Dimension") : type == "Real";
+    const bool real = type == (fmi3_ ? "Float64" : "Real");
     const std::string_view causality = node.attribute("causality").value();
     variables_[node.attribute("name").value()] = {node.attribute("valueReference").as_uint(),
-                                                  causality == "input", causality == "output", real,
+                                                  causality == "input",
+                                                  causality == "output",
+                                                  real,
+                                                  fmi3_ ? size_of(node) : 1,
                                                   start_of(node, fmi3_)};
   }
 }

@@ -15,7 +15,8 @@ class FmuArchive {
   struct Variable {
     std::uint32_t reference = 0;
     bool input = false, output = false;
-    bool real = false;                 ///< one number of type Float64 (FMI 2: Real)
+    bool real = false;                 ///< of type Float64 (FMI 2: Real)
+    std::size_t size = 1;              ///< numbers of an array, row by row; 0: not fixed
     std::optional<std::string> start;  ///< as the description has it
   };
 

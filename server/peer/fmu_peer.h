@@ -16,18 +16,26 @@ struct PortSignals {
   std::vector<std::string> inputs;   ///< that it takes
 };
 
-/// Which variable of the FMU goes with each signal.
+/// Which number of the FMU goes with each signal.
 struct SignalMap {
+  struct Source {
+    int signal = -1;   ///< its place among the signals sent; -1: nothing sets the number
+    double start = 0;  ///< what it keeps then
+  };
   std::vector<std::uint32_t> inputs;   ///< of the FMU, that are set
-  std::vector<int> sources;            ///< their places among the signals sent
-  std::vector<std::uint32_t> outputs;  ///< of the FMU, in the order of the signals taken
+  std::vector<Source> sources;         ///< of all their numbers
+  std::vector<std::uint32_t> outputs;  ///< of the FMU, that are read
+  std::size_t output_size = 0;         ///< numbers of all of them
+  std::vector<int> targets;            ///< places among those, in the order of the signals taken
   /// Inputs of the FMU that nothing sets, with the start values that they keep.
   std::map<std::string, std::string> unset;
 };
 
-/// By equal names, or as `map` says (name in the FMU -> name of the signal). Throws
-/// std::runtime_error when a name is unknown, a signal that the simulation takes has no source, or
-/// an input of the FMU has neither a signal nor a start value.
+/// By equal names, or as `map` says (name in the FMU -> name of the signal). Numbers of an array
+/// are "name[1]", "name[2]", … row by row; the name of an array and that of a variable of the
+/// simulation stand for all their numbers. Throws std::runtime_error when a name is unknown, a
+/// signal that the simulation takes has no source, or an input of the FMU has neither a signal nor
+/// a start value.
 SignalMap map_signals(const FmuArchive& archive, const PortSignals& signals,
                       const std::map<std::string, std::string>& map);
 

@@ -78,7 +78,9 @@ int run(int argc, char** argv) {
   std::vector<std::string> pairs;
   CLI::App* fmu_app = app.add_subcommand("fmu", "An FMU is the peer of a signal port");
   fmu_app->add_option("file", fmu.file, "The FMU, of FMI 2.0 or 3.0 for co-simulation")->required();
-  fmu_app->add_option("--map", pairs, "NAME=SIGNAL: an input or output of the FMU and its signal");
+  fmu_app->add_option(
+      "--map", pairs,
+      "NAME=SIGNAL: an input or output of the FMU, of an array also NAME[k], and its signal");
   add_call(*fmu_app, call);
   SocketCall socket;
   std::string listen, connect;

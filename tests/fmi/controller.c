@@ -1,11 +1,13 @@
 /* A small FMU for tests of `mbcosim peer fmu`: y = gain * x with x' = u, by Euler's method in steps of 1 ms or less.
- * Compiled with -DFMI=2 or -DFMI=3; variables: u (0, input), y (1, output), gain (2, parameter). */
+ * Compiled with -DFMI=2 or -DFMI=3; variables: u (0, input), y (1, output), gain (2, parameter). With FMI 3 also arrays: us (10, input) of three
+ * numbers, x' = u + us[1] + 10 us[2] + 100 us[3], and ys (11, output) of two, y and 2 y. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
-  double u, x, gain;
+  double u, x, gain, us[3];
 } Model;
 
 static int get(Model* m, const uint32_t* references, size_t count, double* values) {
@@ -32,7 +34,8 @@ static int step(Model* m, double length) {
   if (length <= 0) return 3;
   if (m->u > 1e6) return 2; /* as if it did not converge */
   int count = (int)(length / 1e-3) + 1;
-  for (int k = 0; k < count; ++k) m->x += m->u * length / count;
+  const double rate = m->u + m->us[0] + 10 * m->us[1] + 100 * m->us[2];
+  for (int k = 0; k < count; ++k) m->x += rate * length / count;
   return 0;
 }
 
@@ -94,8 +97,27 @@ int fmi3EnterInitializationMode(void* m, bool a, double b, double c, bool d, dou
   return m ? 0 : 3;
 }
 int fmi3ExitInitializationMode(void* m) { return m ? 0 : 3; }
-int fmi3GetFloat64(void* m, const uint32_t* r, size_t n, double* v, size_t s) { return s == n ? get(m, r, n, v) : 3; }
-int fmi3SetFloat64(void* m, const uint32_t* r, size_t n, const double* v, size_t s) { return s == n ? set(m, r, n, v) : 3; }
+static size_t size_of(uint32_t reference) { return reference == 10 ? 3 : reference == 11 ? 2 : 1; }
+int fmi3GetFloat64(void* handle, const uint32_t* r, size_t n, double* v, size_t s) {
+  Model* m = handle;
+  for (size_t k = 0; k < n; v += size_of(r[k]), s -= size_of(r[k]), ++k) {
+    const double ys[] = {m->gain * m->x, 2 * m->gain * m->x};
+    if (s < size_of(r[k])) return 3;
+    if (r[k] == 10) memcpy(v, m->us, sizeof m->us);
+    if (r[k] == 11) memcpy(v, ys, sizeof ys);
+    if (size_of(r[k]) == 1 && get(m, r + k, 1, v) != 0) return 3;
+  }
+  return s == 0 ? 0 : 3;
+}
+int fmi3SetFloat64(void* handle, const uint32_t* r, size_t n, const double* v, size_t s) {
+  Model* m = handle;
+  for (size_t k = 0; k < n; v += size_of(r[k]), s -= size_of(r[k]), ++k) {
+    if (s < size_of(r[k]) || r[k] == 11) return 3;
+    if (r[k] == 10) memcpy(m->us, v, sizeof m->us);
+    if (r[k] != 10 && set(m, r + k, 1, v) != 0) return 3;
+  }
+  return s == 0 ? 0 : 3;
+}
 int fmi3DoStep(void* m, double t, double h, bool a, bool* event, bool* terminate, bool* early, double* last) {
   (void)a;
   *event = *terminate = *early = false;

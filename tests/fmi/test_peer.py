@@ -81,11 +81,11 @@ def signal_port():
     return mbcosim.signal_port("control", outputs=[SENT], inputs=["stream.force"])
 
 
-def run_fmu(daemon, program, path, mode, steps=20, notes=None):
+def run_fmu(daemon, program, path, mode, steps=20, notes=None, pairs=(f"u={SENT}[1]", "y=stream.force")):
     """Time, speed and force after each step; what the peer notes is added to `notes`."""
     with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
-        peer = program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode, "--map",
-                       f"u={SENT}[1]", "--map", "y=stream.force")
+        peer = program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
+                       *[word for pair in pairs for word in ("--map", pair)])
         assert "attached to port" in peer.first_line(), peer.finish() or peer.errors
         values = []
         for _ in range(steps):
@@ -159,6 +159,46 @@ def test_an_input_with_neither_a_signal_nor_a_start_value_is_refused(start_daemo
     assert 'the FMU\'s input "gain" has neither a signal nor a start value' in told and "--map gain=SIGNAL" in told
     told = refused(daemon, program, "fmu", path, "--map", f"n={SENT}[1]", "--map", "y=stream.force")
     assert 'the FMU has no real input or output "n"' in told
+
+
+ARRAYS = """<Float64 name="us" valueReference="10" causality="input" start="{start}"><Dimension start="3"/></Float64>
+<Float64 name="ys" valueReference="11" causality="output"><Dimension start="1"/><Dimension start="2"/></Float64>
+<UInt64 name="n" valueReference="13" causality="structuralParameter" start="3"/>
+<Float64 name="free" valueReference="10" causality="input" start="0 0 0"><Dimension valueReference="13"/></Float64>"""
+
+
+@pytest.mark.parametrize("pairs, rate", [((f"us={SENT}", "ys[1]=stream.force"), lambda v: v),
+                                         ((f"us[2]={SENT}[1]", "ys[2]=stream.force"), lambda v: 2 * (0.5 + 10 * v)),
+                                         ((f"us[3]={SENT}[1]", f"u={SENT}[1]", "ys[1]=stream.force"), lambda v: 0.5 + 101 * v)])
+def test_numbers_of_arrays_are_tied_one_by_one_or_together(start_daemon, program, fmus, pairs, rate):  # noqa: F811
+    """Those that nothing sets keep their start values, here 0.5, 0, 0."""
+    notes = []
+    values = run_fmu(start_daemon(), program, fmus(3, extra=ARRAYS.format(start="0.5 0 0")), "loose", notes=notes, pairs=pairs)
+    for (t0, v0, f0), (t1, _, f1) in zip(values, values[1:]):
+        assert f1 - f0 == pytest.approx((t1 - t0) * rate(v0), rel=1e-6, abs=1e-14)
+    assert values[-1][2] != 0
+    told = 'note: nothing sets the FMU\'s input "{}"; it keeps its start value {}'
+    expected = {} if pairs[0].startswith("us=") else {"us[1]": "0.5", "us[2]": "0", "us[3]": "0"}
+    expected.pop(pairs[0].split("=")[0], None)
+    unset = {"free": "0 0 0", **expected, **({} if pairs[1].startswith("u=") else {"u": "0"})}
+    assert notes == [told.format(name, unset[name]) for name in sorted(unset)]
+
+
+def test_arrays_that_do_not_fit_are_refused(start_daemon, program, fmus):  # noqa: F811
+    daemon, good = start_daemon(), ARRAYS.format(start="0 0 0")
+
+    def told(extra, *pairs):
+        return refused(daemon, program, "fmu", fmus(3, extra=extra), *[word for pair in pairs for word in ("--map", pair)])
+
+    assert 'the size of "free" follows from a structural parameter; arrays of fixed sizes are served' in told(good, f"free={SENT}")
+    assert 'the FMU has no real input or output "us[4]"' in told(good, f"us[4]={SENT}[1]")
+    assert 'the FMU has no real input or output "u[1]"' in told(good, f"u[1]={SENT}[1]")
+    assert 'the port has no signal "stream.force[1]"' in told(good, "ys=stream.force")
+    assert 'input "us" has 3 numbers, but its start values are "0 x 0"' in told(ARRAYS.format(start="0 x 0"), f"us[1]={SENT}[1]")
+    assert 'input "us" has 3 numbers, but its start values are "0 0"' in told(ARRAYS.format(start="0 0"), f"us[1]={SENT}[1]")
+    for size in ("0", "-1", "1000001", "3x", ""):
+        wrong = good.replace('Dimension start="3"', f'Dimension start="{size}"')
+        assert 'the dimensions of its variable "us" are not from 1 to a million' in told(wrong, f"us={SENT}")
 
 
 def test_an_fmu_that_discards_a_step_fails_it(start_daemon, program, fmus):  # noqa: F811
