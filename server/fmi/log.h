@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <functional>
 #include <span>
 #include <string>
@@ -27,17 +28,21 @@ inline constexpr std::array<LogCategory, 5> kLogCategories = {
 class Log {
  public:
   using Sink = std::function<void(Status, const char* category, const char* message)>;
-  Log(Sink sink, bool on) : sink_(std::move(sink)) { enabled_.fill(on); }
+  Log(Sink sink, bool on) : sink_(std::move(sink)), enabled_(on ? kAll : 0) {}
+  Log(const Log& other) : sink_(other.sink_), enabled_(other.enabled_.load()) {}
 
   /// `#` starts a value reference in messages of FMI; here it is text and is doubled.
   void write(Status status, const std::string& message) const;
-  void switch_all(bool on) { enabled_.fill(on); }
+  void switch_all(bool on) { enabled_ = on ? kAll : 0; }
   /// False: there is no such category.
   bool switch_one(const std::string& category, bool on);
 
  private:
+  static constexpr unsigned kAll = (1u << kLogCategories.size()) - 1;
+
   Sink sink_;  ///< may be empty
-  std::array<bool, kLogCategories.size()> enabled_{};
+  /// A bit a category; atomic, for a call that is refused writes while another may switch.
+  std::atomic<unsigned> enabled_;
 };
 
 }  // namespace mbcosim::fmi
