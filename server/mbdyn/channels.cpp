@@ -20,6 +20,15 @@ std::string name_of(const DeckChannel& channel) {
   return channel.card + " (" + text_of(channel.address) + ")";
 }
 
+/// Whoever connects at any time is served, and nobody is waited for.
+bool takes_anybody(const DeckChannel& channel) { return channel.content == Content::text; }
+
+std::unique_ptr<Listener> make_listener(const DeckChannel& channel) {
+  constexpr int kOne = 1, kMany = 64;
+  return std::make_unique<Listener>(channel.address, name_of(channel),
+                                    takes_anybody(channel) ? kMany : kOne);
+}
+
 /// A stream's own time-out is kept when it is the shorter one.
 Patience patience_of(const DeckChannel& channel, Patience patience) {
   const auto own = std::chrono::milliseconds(static_cast<long long>(1000 * channel.timeout));
@@ -49,15 +58,21 @@ Channels::Channels(const std::vector<const DeckChannel*>& channels, Simulation& 
   const auto end = Clock::now() + patience.time;
   std::vector<std::unique_ptr<Listener>> listeners(channels.size());
   for (std::size_t k = 0; k < channels.size(); ++k)
-    if (listens(*channels[k]))
-      listeners[k] = std::make_unique<Listener>(channels[k]->address, name_of(*channels[k]));
+    if (listens(*channels[k])) listeners[k] = make_listener(*channels[k]);
   std::vector<std::unique_ptr<Link>> links(channels.size());
   for (std::size_t k = 0; k < channels.size(); ++k)
     if (!listeners[k] && channels[k]->address.kind != Kind::files)
       links[k] = connect_to(channels[k]->address, name_of(*channels[k]), end, patience);
   for (std::size_t k = 0; k < channels.size(); ++k)
-    if (listeners[k]) links[k] = listeners[k]->accept(end, patience);
-  for (std::size_t k = 0; k < channels.size(); ++k) open(*channels[k], std::move(links[k]));
+    if (listeners[k] && !takes_anybody(*channels[k]))
+      links[k] = listeners[k]->accept(end, patience);
+  for (std::size_t k = 0; k < channels.size(); ++k) {
+    if (takes_anybody(*channels[k]))
+      text_sockets_.push_back(std::make_unique<TextSocket>(*channels[k], simulation_,
+                                                           std::move(listeners[k]), patience));
+    else
+      open(*channels[k], std::move(links[k]));
+  }
   simulation.set_exchange([this](int iteration) { return exchange(iteration, false); });
   simulation.set_start_exchange([this](int iteration) { return exchange(iteration, true); },
                                 [this](StartEvent event) { observe(event); });
@@ -91,6 +106,7 @@ void Channels::open(const DeckChannel& channel, std::unique_ptr<Link> link) {
 
 void Channels::step_begins() {
   for (const auto& receiver : receivers_) receiver->step_begins(simulation_);
+  for (const auto& socket : text_sockets_) socket->step_begins(simulation_);
   for (const auto& force : forces_) force->step_begins();
 }
 

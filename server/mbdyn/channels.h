@@ -10,6 +10,7 @@
 #include "mbdyn/force_dialogue.h"
 #include "mbdyn/link.h"
 #include "mbdyn/stream.h"
+#include "mbdyn/text_socket.h"
 
 namespace mbcosim::mbdyn {
 
@@ -52,6 +53,7 @@ class Channels {
   std::vector<std::unique_ptr<ForceDialogue>> forces_;
   std::vector<std::unique_ptr<StreamSender>> senders_;
   std::vector<std::unique_ptr<StreamReceiver>> receivers_;
+  std::vector<std::unique_ptr<TextSocket>> text_sockets_;
   bool ended_ = false;
 };
 

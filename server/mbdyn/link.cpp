@@ -177,13 +177,15 @@ bool Link::has_input() const {
 
 // ------------------------------------------------------------------ both ends
 
-Listener::Listener(const ChannelAddress& address, std::string name) : name_(std::move(name)) {
+Listener::Listener(const ChannelAddress& address, std::string name, int backlog)
+    : name_(std::move(name)) {
   const Endpoint endpoint = endpoint_of(address, name_);
   descriptor_ = open_socket(endpoint, name_);
   const int on = 1;
   if (endpoint.family == AF_INET)
     ::setsockopt(descriptor_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  if (::bind(descriptor_, endpoint.get(), endpoint.size()) != 0 || ::listen(descriptor_, 1) != 0) {
+  if (::bind(descriptor_, endpoint.get(), endpoint.size()) != 0 ||
+      ::listen(descriptor_, backlog) != 0) {
     const std::string reason = std::strerror(errno);
     ::close(descriptor_);
     throw ChannelLost(name_ + ": cannot listen: " + reason);
@@ -200,12 +202,16 @@ std::unique_ptr<Link> Listener::accept(Clock::time_point end, const Patience& pa
   for (;;) {
     if (!wait_for(descriptor_, POLLIN, end, patience))
       throw ChannelLost(name_ + ": nobody connected in time");
-    const int peer = ::accept4(descriptor_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    if (peer < 0 && (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED)) continue;
-    if (peer < 0) throw ChannelLost(name_ + ": " + std::strerror(errno));
-    tune(peer, path_.empty() ? AF_INET : AF_UNIX, SOCK_STREAM);
-    return std::make_unique<Link>(peer, name_, patience);
+    if (auto link = accept_if_any(patience)) return link;
   }
+}
+
+std::unique_ptr<Link> Listener::accept_if_any(const Patience& patience) {
+  const int peer = ::accept4(descriptor_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (peer < 0 && (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED)) return nullptr;
+  if (peer < 0) throw ChannelLost(name_ + ": " + std::strerror(errno));
+  tune(peer, path_.empty() ? AF_INET : AF_UNIX, SOCK_STREAM);
+  return std::make_unique<Link>(peer, name_, patience);
 }
 
 std::unique_ptr<Link> connect_to(const ChannelAddress& address, const std::string& name,

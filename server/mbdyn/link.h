@@ -61,16 +61,19 @@ class Link {
   Patience patience_;
 };
 
-/// A socket that waits for its one peer. The path of a Unix socket is removed at the end.
+/// A socket that waits for its peer. The path of a Unix socket is removed at the end.
 class Listener {
  public:
-  /// Binds; throws ChannelLost when the address is taken or not ours.
-  Listener(const ChannelAddress& address, std::string name);
+  /// Binds; throws ChannelLost when the address is taken or not ours. `backlog`: peers that may
+  /// have connected before they are accepted.
+  Listener(const ChannelAddress& address, std::string name, int backlog = 1);
   ~Listener();
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
   /// The first peer that comes before `end`.
   std::unique_ptr<Link> accept(Clock::time_point end, const Patience& patience);
+  /// A peer that waits; null: nobody does.
+  std::unique_ptr<Link> accept_if_any(const Patience& patience);
 
  private:
   int descriptor_ = -1;

@@ -60,7 +60,7 @@ struct ChannelTiming {
 /// what the deck says, or leaves the channel's values as they are. The model keeps channels among
 /// its step listeners.
 struct DeckChannel : StepListener {
-  enum class Content { structural, mapped, modal, output, input };
+  enum class Content { structural, mapped, modal, output, input, text };
 
   Content content = Content::structural;
   std::string port;  ///< name of the port or stream
@@ -83,6 +83,8 @@ struct DeckChannel : StepListener {
   std::string echo;                  ///< file that keeps what crosses; empty: none
   int echo_precision = 6;
   double echo_shift = 0;  ///< added to the times of the file [s]
+  // text
+  std::string user, password;  ///< that a connection must give; empty: none
 
   void advance(const EvalContext&, State&, bool) const override {}
 };

@@ -151,6 +151,38 @@ def test_streams_and_a_force_together_carry_the_bytes_of_mbcosim_run(run, server
     assert (force_seen, out) == (expected[0].end(), expected[2].end())
 
 
+def text_driver(address):
+    return deck("force: 1, absolute, 1, position, null, 1.,0.,0., file, 1, 1;", counts="forces: 1; file drivers: 1;",
+                drivers=f"begin: drivers; file: 1, socket, 1, initial values, 3., {address}; end: drivers;")
+
+
+def test_lines_of_text_set_the_values_of_the_next_step(server, folder):
+    with server.load_text(text_driver('local, "t"'), deck_sockets=0.5) as simulation:
+        simulation.step()
+        assert simulation["stream.socket1"] == 3
+        for text, expected in [(b"label: 1\nvalue: 4\n.\n", 4), (b"label: 2\nvalue: 5\n.\n", 4), (b"label: 1\nval", 4)]:
+            with socket.socket(socket.AF_UNIX) as code:
+                code.connect(str(folder / "t"))
+                code.sendall(text)
+                start = time.monotonic()
+                assert simulation.step().outcome == "ACCEPTED"  # nobody is lost, who stays silent is closed
+                assert time.monotonic() - start < 5 * TIME_FACTOR
+            assert simulation["stream.socket1"] == expected
+    assert not list(folder.iterdir())
+
+
+def test_text_drivers_listen_inside_the_folder_only_and_are_ports_otherwise(server, folder):
+    with pytest.raises(mbcosim.Error, match='socket drive "socket1": the server opens Unix sockets only, not 127.0.0.1:5555'):
+        server.load_text(text_driver("port, 5555"), deck_sockets=True)
+    with pytest.raises(mbcosim.Error, match="is not inside"):
+        server.load_text(text_driver('local, "../t"'), deck_sockets=True)
+    with server.load_text(text_driver('local, "t"')) as simulation:
+        with simulation.couple("socket1", lambda motion: [2.5]):
+            simulation.step()
+        assert simulation["stream.socket1"] == 2.5
+    assert not list(folder.iterdir())
+
+
 def test_without_being_asked_the_sockets_are_ports_and_nothing_is_opened(server, folder):
     with server.load_text(PULL) as simulation:
         name = simulation.describe().ports[0].name

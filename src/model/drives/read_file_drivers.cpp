@@ -138,8 +138,9 @@ std::vector<double> read_initial_values(Card& card, int channels) {
 
 /// Keeps what the card says with the model, unless the stream is a port of the daemon.
 void keep_channel(Card& card, DeckChannel channel, const StreamInput& stream) {
+  const bool text = channel.content == DeckChannel::Content::text;
   channel.port = stream.name;
-  channel.card = "stream drive \"" + stream.name + "\"";
+  channel.card = (text ? "socket drive \"" : "stream drive \"") + stream.name + "\"";
   channel.every = stream.every;
   channel.at_start = stream.receive_first;
   if (channel.address.kind != ChannelAddress::Kind::port)
@@ -179,20 +180,41 @@ FileDriverPtr read_stream(Card& card) {
   return add_stream(card, std::move(stream), initial);
 }
 
+/// [password, user, "name", credentials, "word" [, salt format, "..."]]
+void read_authentication(Card& card, DeckChannel& channel) {
+  if (!card.more()) return;
+  if (!card.keyword("password"))
+    card.fail_expected("socket: an authentication that is supported expected",
+                       "write `password, user, \"name\", credentials, \"word\"`");
+  if (!card.keyword("user")) card.fail_expected("socket: `user` expected");
+  channel.user = card.quoted("user");
+  if (!card.keyword("credentials")) card.fail_expected("socket: `credentials` expected");
+  if (!card.at_string())
+    card.fail_expected("socket: the word expected: a run asks nobody for it",
+                       "write it in quotes after `credentials`");
+  channel.password = card.quoted("credentials");
+  if (channel.user.empty() || channel.password.empty())
+    card.fail("socket: the user and the word must not be empty");
+  if (card.keyword("salt format")) card.quoted("salt format");  // how MBDyn keeps the word
+}
+
 FileDriverPtr read_socket(Card& card) {
   constexpr int kDefaultPort = 5555;
+  DeckChannel channel;
+  channel.content = DeckChannel::Content::text;
   StreamInput stream;
   stream.where = card.next();
   stream.channels = read_stream_channels(card);
   stream.name = "socket" + std::to_string(card.model().stream_inputs.size() + 1);
   const std::vector<double> initial = read_initial_values(card, stream.channels);
-  (void)read_channel_address(card, kDefaultPort);  // peers attach to the port by its name
-  while (card.more()) {                            // authentication: the daemon has its own
-    if (card.at_string())
-      card.quoted("authentication");
-    else
-      card.word("authentication");
-  }
+  if (card.peek_word() == "create")
+    card.fail_at(card.next(), "socket: the driver always listens", "leave `create` out");
+  channel.address = read_channel_address(card, kDefaultPort);
+  channel.address.create = true;
+  if (channel.address.kind == ChannelAddress::Kind::udp)
+    card.fail("socket: input over UDP is not supported", "write `socket type, tcp`");
+  read_authentication(card, channel);
+  keep_channel(card, std::move(channel), stream);
   return add_stream(card, std::move(stream), initial);
 }
 
