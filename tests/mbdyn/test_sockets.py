@@ -186,6 +186,33 @@ def test_tight_sequence_and_numbers(run):
     assert (x[1], v[1]) == pytest.approx((-0.999387037, 0.0455555556), abs=6e-10)
 
 
+class Counted:
+    """A socket that counts its bytes."""
+
+    def __init__(self, peer):
+        self.peer, self.sent, self.received = peer, 0, 0
+
+    def sendall(self, data):
+        self.peer.sendall(data)
+        self.sent += len(data)
+
+    def recv(self, size):
+        data = self.peer.recv(size)
+        self.received += len(data)
+        return data
+
+
+@pytest.mark.parametrize("options,answers,received,sent", [("", lambda _: b"\6" + LOADS, 869, 300),
+                                                           ("coupling, tight,", lambda k: (b"\6" if k % 3 == 0 else b"\2") + LOADS, 1736, 591)])
+def test_bytes_of_a_whole_run(run, options, answers, received, sent):
+    done = run(force(options))
+    peer = Counted(done.connect())
+    shake(peer, 0x202, 2)
+    talk(peer, 288, answers)
+    assert done.finish() == 0, done.errors
+    assert (peer.received, peer.sent) == (received, sent)
+
+
 def test_tight_code_that_ends_a_step_without_data(run):
     done = run(force("coupling, tight,"))
     peer = done.connect()
@@ -297,6 +324,57 @@ def test_reference_node(run):
     assert point[21:24] == pytest.approx([-1.94055, 0.790283, -0.780836], abs=6e-6)  # in the reference's frame, unlike MBDyn's
 
 
+def rotation_of(numbers, flag):
+    """Matrix of the rotation in one of the forms of the messages."""
+    if flag == 0x200:
+        return numbers.reshape(3, 3).T
+    if flag == 0x400:
+        a, b, c = np.radians(numbers)
+        Rx = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+        Ry = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+        Rz = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]])
+        return Rx @ Ry @ Rz
+    angle = np.linalg.norm(numbers)
+    k = np.array([[0, -numbers[2], numbers[1]], [numbers[2], 0, -numbers[0]], [-numbers[1], numbers[0], 0]])
+    return np.eye(3) + np.sin(angle) / angle * k + (1 - np.cos(angle)) / angle ** 2 * k @ k
+
+
+def reference_deck(options, end=0.02):
+    return deck(f'force: 5, external structural, socket, create, yes, path, "s", reference node, 2, {options} 1, 1, offset, .1,0.,0.;', end=end,
+                node2=TURNED)
+
+
+@pytest.mark.parametrize("labels", [False, True])
+@pytest.mark.parametrize("rotation", ROTATIONS)
+def test_forms_with_a_reference_node(run, rotation, labels):
+    """Place, rotation and velocities of the reference node, then of the point in its frame; a force in that frame turns with it."""
+    flag, size = ROTATIONS[rotation]
+    done = run(reference_deck(("labels, yes," if labels else "") + rotation))
+    peer = done.connect()
+    shake(peer, 0x6 | flag | (0x10 if labels else 0), 1)
+    half = 8 * ((9 + size) if size else 6)
+    heads = [struct.pack("<II", 2, 0), struct.pack("<II", 1, 0)] if labels else [b"", b""]
+    moment = bytes(24) if size else b""
+    f = np.array([1.0, 2, 3])
+    answer = heads[0] + f.tobytes() + moment + heads[1] + f.tobytes() + moment
+    messages = talk(peer, 2 * half + len(heads[0] + heads[1]), lambda _: b"\6" + answer)
+    assert done.finish() == 0, done.errors
+    data, n = messages[0][1], len(heads[0])
+    assert (data[:n], data[n + half:n + half + n]) == tuple(heads)
+    reference, point = np.frombuffer(data[n:n + half]), np.frombuffer(data[n + half + n:])
+    R2 = rotation_of(np.array([0.2, 0.3, -0.1]) * 180 / np.pi, 0x400)
+    R1 = rotation_of(np.array([0.1, 0.2, 0.3]) * 180 / np.pi, 0x400)
+    assert reference[:3] == pytest.approx([2, -1, 1.5]) and reference[3 + size:6 + size] == pytest.approx([0.5, 0.6, 0.7])
+    assert point[:3] == pytest.approx([-1.43819, 3.13781, 0.546341], abs=6e-6)
+    assert point[3 + size:6 + size] == pytest.approx([6.87457, 3.48100, -3.96673], abs=6e-6)
+    if size:
+        assert rotation_of(reference[3:3 + size], flag) == pytest.approx(R2, abs=1e-9)
+        assert rotation_of(point[3:3 + size], flag) == pytest.approx(R2.T @ R1, abs=1e-9)
+        assert reference[6 + size:] == pytest.approx([1, 2, 3])
+        assert point[6 + size:] == pytest.approx([-0.255679, -2.39496, -1.78851], abs=6e-6)
+    assert np.array(done.last(1)[2]) == pytest.approx(np.array([0.1, 0.2, 0.3]) + 0.02 * R2 @ f, abs=3e-3)
+
+
 def test_loads_on_the_reference_node_are_totals(run):
     """F1 = sum of the points' forces: nothing remains for the reference node itself."""
     done = run(deck('force: 5, external structural, socket, create, yes, path, "s", reference node, 2, 1, 1;', node2=FREE.replace("1.,0.,0.", "null")))
@@ -339,6 +417,19 @@ def test_the_run_connects_when_the_deck_says_so(run, tmp_path):
     assert receive(peer, 10).hex() == "07" "02020000" "02000000" "08"
     assert len(talk(peer, 288, lambda _: b"\6" + LOADS)) == 3
     assert done.finish() == 0
+
+
+def test_the_run_connects_over_tcp_when_the_deck_says_so(run):
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen(1)
+        listener.settimeout(20 * TIME_FACTOR)
+        done = run(force(address=f'socket, create, no, port, {listener.getsockname()[1]}, host, "localhost"'))
+        peer = listener.accept()[0]
+    peer.settimeout(20 * TIME_FACTOR)
+    assert receive(peer, 10).hex() == "07" "02020000" "02000000" "08"
+    assert len(talk(peer, 288, lambda _: b"\6" + LOADS)) == 3
+    assert done.finish() == 0, done.errors
 
 
 def free_port():
@@ -460,33 +551,48 @@ def test_rigid_motion_of_a_modal_element(run):
     assert done.last(1)[2][2] == pytest.approx(0.38, abs=1e-6)
 
 
-MODES = 2
-
-
-@pytest.mark.parametrize("options,flags,sent,taken", [("", 0x5, 144 + 16 * MODES, 48 + 8 * MODES), ("type, modal,", 0x1, 16 * MODES, 8 * MODES),
-                                                      ("type, rigid,", 0x5, 144, 48)])
-def test_modes_of_a_modal_joint(run, tmp_path, options, flags, sent, taken):
+def modal_joint(run, folder, options, modes, coupling="", end="10.", joint="STATIC"):
+    """A run of the tutorial's modal body with so many of its modes, and a code for it."""
     models = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "client_examples", "models")
     for name in ("modal_body_static.fem", "modal_body_dynamic.fem"):
-        shutil.copy(os.path.join(models, name), tmp_path)
+        shutil.copy(os.path.join(models, name), folder)
     with open(os.path.join(models, "modal_body.mbd")) as file:
-        text = file.read()
-    text = text.replace("forces: 2;", "forces: 3;")
-    card = f'    force: 5, external modal, socket, create, yes, path, "s", STATIC, {options}'.rstrip(", ")
-    assert text.count("end: elements;") == 1 and "forces: 3;" in text
-    done = run(text.replace("end: elements;", card + ";\nend: elements;"))
+        text = file.read().replace("forces: 2;", "forces: 3;").replace("final time: 10.;", f"final time: {end};")
+    card = f'    force: 5, external modal, socket, create, yes, path, "s", {coupling} {joint}, {options}'.rstrip(", ")
+    assert text.count("end: elements;") == 1 and "forces: 3;" in text and "2, 3, " in text
+    if modes == 1:
+        text = text.replace("2, 3, ", "1, list, 1, 3, ", 1)
+    return run(text.replace("end: elements;", card + ";\nend: elements;"))
+
+
+MODAL = [("", 0x5, 144, 48, 1), ("type, modal,", 0x1, 0, 0, 1), ("type, rigid,", 0x5, 144, 48, 0)]
+
+
+@pytest.mark.parametrize("modes", [1, 2])
+@pytest.mark.parametrize("options,flags,sent,taken,travel", MODAL)
+def test_modes_of_a_modal_joint(run, tmp_path, options, flags, sent, taken, travel, modes):
+    """Of one mode: 160 bytes out and 56 in, 16 and 8, 144 and 48."""
+    done = modal_joint(run, tmp_path, options, modes)
     peer = done.connect()
-    shake(peer, flags, MODES)
-    messages = talk(peer, sent, lambda k: b"\6" + bytes(taken) if k < 5 else b"\5")
-    assert len(messages) == 5
-    assert done.finish() == 5
+    shake(peer, flags, modes)
+    messages = talk(peer, sent + 16 * modes * travel, lambda k: b"\6" + bytes(taken + 8 * modes * travel) if k < 5 else b"\5")
+    assert len(messages) == 5 and all(command == 6 for command, _ in messages)
+    assert done.finish() == 5 and "force 5: the peer ended the run" in done.errors
+
+
+@pytest.mark.parametrize("options,flags", [row[:2] for row in MODAL])
+def test_a_modal_peer_without_modes_is_refused(run, tmp_path, options, flags):
+    done = modal_joint(run, tmp_path, options, 1)
+    peer = done.connect()
+    peer.sendall(b"\7" + struct.pack("<II", flags, 0))
+    assert receive(peer, 1) == b"\5"
+    assert done.finish() == 5 and "number of modes: the deck has 1, the peer 0" in done.errors
 
 
 # ------------------------------------------------------------------ streams
 
-def stream_out(options, values="values, 2, drive, time, drive, const, 7."):
-    return deck(f'stream output: 9, stream name, "out", create, yes, path, "o", {options} {values};', end=0.05,
-                counts="output elements: 1;")
+def stream_out(options, values="values, 2, drive, time, drive, const, 7.", address='create, yes, path, "o"', end=0.05):
+    return deck(f'stream output: 9, stream name, "out", {address}, {options} {values};', end=end, counts="output elements: 1;")
 
 
 def drain(peer):
@@ -503,6 +609,40 @@ def test_stream_output(run, options, times):
     numbers = np.frombuffer(drain(peer)).reshape(-1, 2)
     assert done.finish() == 0, done.errors
     assert numbers[:, 0] == pytest.approx([0.01 * t for t in times], abs=1e-12) and np.all(numbers[:, 1] == 7)
+
+
+def test_stream_output_in_datagrams(run):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sink:
+        sink.bind(("127.0.0.1", 0))
+        sink.settimeout(20 * TIME_FACTOR)
+        done = run(stream_out("", address=f'create, no, port, {sink.getsockname()[1]}, host, "127.0.0.1", socket type, udp'))
+        datagrams = [sink.recv(1000) for _ in range(6)]
+    assert done.finish() == 0, done.errors
+    assert np.array([np.frombuffer(each) for each in datagrams]) == pytest.approx(np.array([[0.01 * k, 7] for k in range(6)]), abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["unix", "tcp"])
+def test_stream_output_to_a_sink_that_listens(run, tmp_path, kind):
+    with socket.socket(socket.AF_UNIX if kind == "unix" else socket.AF_INET) as listener:
+        listener.bind(str(tmp_path / "p") if kind == "unix" else ("127.0.0.1", 0))
+        listener.listen(1)
+        listener.settimeout(20 * TIME_FACTOR)
+        where = 'path, "p"' if kind == "unix" else f'port, {listener.getsockname()[1]}, host, "localhost"'
+        done = run(stream_out("", address=f"create, no, {where}"))
+        sink = listener.accept()[0]
+    assert np.frombuffer(drain(sink)).reshape(-1, 2)[:, 0] == pytest.approx([0.01 * k for k in range(6)], abs=1e-12)
+    assert done.finish() == 0, done.errors
+
+
+def test_stream_output_that_does_not_block_drops_whole_messages_of_a_sink_that_sleeps(run):
+    done = run(stream_out("non blocking,", "values, 500, " + ", ".join(["drive, time"] * 500), end=10.0))
+    sink = done.connect("o")
+    assert done.finish() == 0, done.errors
+    data = drain(sink)
+    assert len(data) % 4000 == 0
+    times = np.frombuffer(data).reshape(-1, 500)
+    assert 1 < len(times) < 1001 and np.all(np.diff(times[:, 0]) > 0) and np.all(times == times[:, :1])
+    assert "warning" not in done.errors
 
 
 def test_stream_output_casts(run):
@@ -538,6 +678,21 @@ def test_motion_output(run):
     assert data[2, 1, 15:] == pytest.approx([1, 0, 0])
 
 
+@pytest.mark.parametrize("flags,size,first", [
+    ("", 3, [1, 2, 3]), ("output flags, orientation matrix,", 9, [0.936293, -0.289629, 0.198669]),
+    ("output flags, orientation matrix transpose,", 9, [0.936293, 0.312992, -0.159345]),
+    ("output flags, orientation matrix, orientation matrix transpose, velocity,", 21, [0.936293, -0.289629, 0.198669])])
+@pytest.mark.parametrize("nodes", ["all", "1, 2"])
+def test_motion_output_of_all_nodes_and_of_transposed_matrices(run, nodes, flags, size, first):
+    done = run(deck(f'stream motion output: 9, stream name, "out", create, yes, path, "o", {flags} {nodes};', counts="output elements: 1;"))
+    data = np.frombuffer(drain(done.connect("o"))).reshape(3, 2, size)
+    assert done.finish() == 0, done.errors
+    assert data[0, 0, :3] == pytest.approx(first, abs=1e-6)
+    if size == 21:
+        assert np.all(data[:, :, :9].reshape(3, 2, 3, 3) == data[:, :, 9:18].reshape(3, 2, 3, 3).transpose(0, 1, 3, 2))
+        assert data[0, 0, 18:] == pytest.approx([0.1, 0.2, 0.3])
+
+
 def test_a_broken_output_lets_the_run_go_on_or_ends_it(run, tmp_path):
     for options, code, goes_on in [("", 0, True), ("abort if broken,", 5, False)]:
         text = deck(f'stream output: 9, stream name, "out", create, yes, path, "o", {options} values, 1, drive, time;', end=10.0,
@@ -549,8 +704,8 @@ def test_a_broken_output_lets_the_run_go_on_or_ends_it(run, tmp_path):
         assert (len(done.rows()) >= 2002) == goes_on
 
 
-def stream_in(options, every="", address='create, yes, path, "i"'):
-    drivers = f'begin: drivers; file: 1, stream, stream drive name, "in", {address}, {every} {options} 1, initial values, 100.; end: drivers;'
+def stream_in(options, every="", address='create, yes, path, "i"', modifier=""):
+    drivers = f'begin: drivers; file: 1, stream, stream drive name, "in", {address}, {every} {options} 1, initial values, 100.{modifier}; end: drivers;'
     return deck('force: 5, absolute, 1, position, null, 1.,0.,0., file, 1, 1;\nstream output: 9, stream name, "out", create, yes, path, "o", '
                 "values, 1, drive, file, 1, 1;", end=0.05, counts="forces: 1; file drivers: 1; output elements: 1;", drivers=drivers)
 
@@ -564,6 +719,39 @@ def test_which_record_sees_which_message(run, every, options, expected):
     source.sendall(np.arange(1.0, 7).tobytes())
     assert list(np.frombuffer(drain(sink))) == expected
     assert done.finish() == 0, done.errors
+
+
+@pytest.mark.parametrize("modifier,layout", [("all, float", "<f"), ("swap, yes, int16_t", ">h"), ("skip, 2, uint8_t, size, 5", "<xxBxx"),
+                                             ("swap, detect, skip, 1, double", ">xd"), ("swap, no, int32_t, skip, 3", "<ixxx")])
+def test_messages_of_a_stream_driver_in_other_layouts(run, modifier, layout):
+    done = run(stream_in("", modifier=f", modifier, copy cast, {modifier}"))
+    source, sink = done.connect("i"), done.connect("o")
+    source.sendall(b"".join(struct.pack(layout, k) for k in range(1, 7)))
+    assert list(np.frombuffer(drain(sink))) == [1, 2, 3, 4, 5, 6]
+    assert done.finish() == 0, done.errors
+
+
+def test_a_stream_driver_keeps_in_a_file_what_differs_from_the_message_before(run, tmp_path):
+    done = run(stream_in('echo, "e.txt", precision, 3, shift, 1.,'))
+    source, sink = done.connect("i"), done.connect("o")
+    source.sendall(np.array([1.0, 1, 2, 2, 2, 3]).tobytes())
+    drain(sink)
+    assert done.finish() == 0, done.errors
+    with open(tmp_path / "e.txt") as file:
+        text = file.read().splitlines()
+    assert text[1:3] == ["# Time, Channel #1", "1.000e+00 1.000e+00"]
+    assert [float(line.split()[1]) for line in text[2:]] == [1, 2, 3]
+
+
+def test_the_time_out_of_a_stream_driver_is_its_own(run):
+    done = run(stream_in("timeout, .5,"))
+    source, sink = done.connect("i"), done.connect("o")
+    source.sendall(np.array([1.0, 2.0]).tobytes())
+    start = time.monotonic()
+    assert list(np.frombuffer(drain(sink))) == [1, 2]
+    assert done.finish() == 5
+    assert time.monotonic() - start < 10 * TIME_FACTOR and 'error: stream drive "in" (i): silent for 0.5 s' in done.errors
+    source.close()
 
 
 ENDS = ["create", "connect"]
