@@ -29,6 +29,7 @@ struct RunOptions {
   bool quiet = false;
   bool deck_sockets = true;  ///< the sockets and files that the deck names are served
   double peer_timeout = 60;  ///< longest wait for a code behind them [s]
+  bool pads_labels = false;  ///< the codes pad labels of an odd number of points
   bool real_time = false;    ///< a second of the model lasts a second
 };
 

@@ -223,6 +223,9 @@ int main(int argc, char** argv) {
                    "Longest wait for an external code [s]")
       ->capture_default_str()
       ->check(CLI::Range(1e-3, 1e6));
+  run_app->add_flag("--padded-labels", run_options.pads_labels,
+                    "The codes pad labels of an odd number of points, as MBDyn does: they do not "
+                    "use its client library, which misreads them");
   run_app->add_flag("--real-time", run_options.real_time,
                     "Hold the run back to the wall clock; steps that end late are counted");
   run_app->callback([&] { exit_code = run(run_options); });

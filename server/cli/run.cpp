@@ -81,7 +81,7 @@ ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWri
   mbdyn::Patience patience;
   patience.time = std::chrono::milliseconds(std::llround(1000 * options.peer_timeout));
   patience.cancelled = [cancel] { return cancel->cancelled(); };
-  mbdyn::Channels channels(deck_channels(*model), *simulation, patience);
+  mbdyn::Channels channels(deck_channels(*model), *simulation, patience, options.pads_labels);
   if (const auto started = channels.start(cancel); !started) return complain(started.error());
   while (!simulation->finished()) {
     const StepReport report = channels.step(cancel);

@@ -53,8 +53,8 @@ std::vector<std::string> files_changed_by(const DeckChannel& channel) {
 }
 
 Channels::Channels(const std::vector<const DeckChannel*>& channels, Simulation& simulation,
-                   const Patience& patience)
-    : simulation_(simulation), patience_(patience) {
+                   const Patience& patience, bool pads_labels)
+    : simulation_(simulation), patience_(patience), pads_labels_(pads_labels) {
   const auto end = Clock::now() + patience.time;
   std::vector<std::unique_ptr<Listener>> listeners(channels.size());
   for (std::size_t k = 0; k < channels.size(); ++k)
@@ -94,6 +94,7 @@ void Channels::open(const DeckChannel& channel, std::unique_ptr<Link> link) {
     receivers_.push_back(std::make_unique<StreamReceiver>(channel, simulation_, std::move(link)));
   } else {
     ForcePort port(channel, simulation_);
+    port.form().pads_labels = pads_labels_;
     write_layout(channel, port, simulation_);
     std::unique_ptr<ForceWire> wire;
     if (link)

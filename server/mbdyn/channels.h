@@ -23,7 +23,7 @@ class Channels {
  public:
   /// Opens and connects all: listening sockets first, so that codes may come in any order.
   Channels(const std::vector<const DeckChannel*>& channels, Simulation& simulation,
-           const Patience& patience);
+           const Patience& patience, bool pads_labels = false);
   ~Channels();
   Channels(const Channels&) = delete;
   Channels& operator=(const Channels&) = delete;
@@ -50,6 +50,7 @@ class Channels {
 
   Simulation& simulation_;
   const Patience patience_;
+  const bool pads_labels_;  ///< see ForceForm
   std::vector<std::unique_ptr<ForceDialogue>> forces_;
   std::vector<std::unique_ptr<StreamSender>> senders_;
   std::vector<std::unique_ptr<StreamReceiver>> receivers_;

@@ -40,6 +40,12 @@ std::uint32_t rotation_flag(Rotation rotation) {
   }
 }
 
+Rotation rotation_of_flags(std::uint32_t flags) {
+  if ((flags & kRotationMatrix) != 0) return Rotation::matrix;
+  if ((flags & kRotationVector) != 0) return Rotation::vector;
+  return (flags & kRotationEuler) != 0 ? Rotation::euler123 : Rotation::none;
+}
+
 /// The bits that a listening side expects.
 std::uint32_t flags_of(const ForceForm& form) {
   std::uint32_t flags = form.kind == FormKind::modal ? kModal : kNodal;
@@ -87,10 +93,17 @@ Vec3 take_vector(const std::string& bytes, std::size_t& at) {
   return v;
 }
 
-bool has_padding(const ForceForm& form) { return form.padded && form.points() % 2 != 0; }
+bool has_padding(const ForceForm& form) { return form.labels && form.points() % 2 != 0; }
 bool has_rotations(const ForceForm& form) { return form.rotation != Rotation::none; }
+Rotation reference_rotation(const ForceForm& form) {
+  return has_rotations(form) ? form.rotation : form.reference_rotation;
+}
 bool has_moments(const ForceForm& form) {
   return form.kind == FormKind::nodal && has_rotations(form);
+}
+
+bool has_reference_moment(const ForceForm& form) {
+  return form.kind == FormKind::modal || reference_rotation(form) != Rotation::none;
 }
 
 /// Of a mapping's reference node the rotation always travels.
@@ -99,13 +112,14 @@ void put_reference(const ForceForm& form, const PointState& r, std::string& out)
     put(form.reference_label, out);
     put(std::uint32_t{0}, out);
   }
+  const Rotation rotation = reference_rotation(form);
   put(r.x, out);
-  put_rotation(r.R, form.rotation, out);
+  put_rotation(r.R, rotation, out);
   put(r.v, out);
-  if (has_rotations(form)) put(r.w, out);
+  if (rotation != Rotation::none) put(r.w, out);
   if (!form.accelerations) return;
   put(r.a, out);
-  if (has_rotations(form)) put(r.wp, out);
+  if (rotation != Rotation::none) put(r.wp, out);
 }
 
 void put_labels(const ForceForm& form, std::string& out) {
@@ -162,7 +176,7 @@ std::vector<int> take_labels(const ForceForm& form, const std::string& bytes, st
     if (std::find(order.begin(), order.end() - 1, order[k]) != order.end() - 1)
       refuse(" comes twice");
   }
-  if (form.labels && has_padding(form)) take<std::uint32_t>(bytes, at);
+  if (has_padding(form)) take<std::uint32_t>(bytes, at);
   return order;
 }
 
@@ -176,7 +190,21 @@ void take_reference(const ForceForm& form, const std::string& bytes, std::size_t
                         std::to_string(form.reference_label));
   }
   loads.f0 = take_vector(bytes, at);
-  if (form.kind == FormKind::modal || has_rotations(form)) loads.m0 = take_vector(bytes, at);
+  if (has_reference_moment(form)) loads.m0 = take_vector(bytes, at);
+}
+
+/// MBDyn's client library announces itself by the rotation of its reference node; without such a
+/// node its flags are those of any code. Empty: it is clear how the peer speaks.
+std::string adapt(std::uint32_t flags, ForceForm& form) {
+  const std::uint32_t announced = flags & kReferenceRotations;
+  if (form.kind != FormKind::nodal) return "";
+  if (form.reference && !has_rotations(form))
+    form.reference_rotation = rotation_of_flags(announced >> kReferenceShift);
+  const bool other_code = form.pads_labels || (form.reference && announced == 0);
+  if (!has_padding(form) || other_code) return "";
+  return "; labels of an odd number of points: MBDyn's client library misreads them, and the flags "
+         "do not tell that the peer is another code; if it is, and pads them as MBDyn does, say so "
+         "with --padded-labels; else give the deck an even number of points or no labels";
 }
 
 std::string hexadecimal(std::uint32_t number) {
@@ -217,8 +245,7 @@ std::string check_request(const std::string& request, ForceForm& form) {
     mismatches += "; number of " + std::string(form.kind == FormKind::modal ? "modes" : "points") +
                   ": the deck has " + std::to_string(form.count) + ", the peer " +
                   std::to_string(count);
-  // MBDyn's client library announces itself by these bits; it does not pad labels.
-  if (form.kind == FormKind::nodal && (flags & kReferenceRotations) != 0) form.padded = false;
+  if (mismatches.empty()) mismatches = adapt(flags, form);
   return mismatches.empty() ? "" : mismatches.substr(2);
 }
 
@@ -236,7 +263,7 @@ std::size_t loads_size(const ForceForm& form) {
   if (form.kind == FormKind::modal)
     return (form.reference ? 2 * kVector : 0) + form.modes * sizeof(double);
   std::size_t size = 0;
-  if (form.reference) size += kVector + (has_rotations(form) ? kVector : 0);
+  if (form.reference) size += kVector + (has_reference_moment(form) ? kVector : 0);
   if (form.reference && form.labels) size += 2 * kLabel;
   if (form.labels) size += kLabel * (form.count + (has_padding(form) ? 1 : 0));
   return size + form.count * (has_moments(form) ? 2 * kVector : kVector);

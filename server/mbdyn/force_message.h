@@ -31,7 +31,12 @@ struct ForceForm {
   bool sorted = true;       ///< labels of the peer come in the order of the deck
   std::uint32_t count = 0;  ///< points, or modes
   int modes = 0;            ///< that travel
-  bool padded = true;       ///< labels of an odd number of points are followed by four bytes
+  /// The user says that the peer pads labels of an odd number of points, as MBDyn does; its client
+  /// library misreads them.
+  bool pads_labels = false;
+  /// Of a reference node whose points have no rotations: MBDyn has none there, its client library
+  /// has the one that its flags name.
+  Rotation reference_rotation = Rotation::none;
   std::uint32_t reference_label = 0;
   std::vector<std::uint32_t> node_labels, point_labels;  ///< (points)
 
@@ -55,7 +60,7 @@ constexpr std::size_t kRequestSize = 8;  ///< flags and count, after kNegotiate
 /// Flags and count as the side that connects sends them.
 std::string encode_request(const ForceForm& form);
 /// Compares a peer's request with ours. Empty: they agree, and `form` has what the peer's own flags
-/// say about its library. Otherwise every mismatch with both values.
+/// say about its library. Otherwise every mismatch with both values, and what they leave open.
 std::string check_request(const std::string& request, ForceForm& form);
 
 std::string encode_state(const ForceForm& form, const ForceState& state);

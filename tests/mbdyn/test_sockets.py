@@ -387,15 +387,48 @@ def test_loads_on_the_reference_node_are_totals(run):
     assert done.last(2)[2][0] == pytest.approx(0, abs=1e-9)
 
 
-@pytest.mark.parametrize("library", [False, True])
-def test_odd_numbers_of_labels_are_padded_but_for_the_client_library(run, library):
-    done = run(force("labels, yes, orientation, orientation vector,", points="1", count=1))
+@pytest.mark.parametrize("flags", [0x112, 0x1112])
+def test_odd_numbers_of_labels_are_padded_for_codes_that_do_not_use_the_library(run, flags):
+    done = run(force("labels, yes, orientation, orientation vector,", points="1", count=1), "--padded-labels")
     peer = done.connect()
-    shake(peer, 0x112 | (0x1000 if library else 0), 1)
-    head = struct.pack("<I", 1) + (b"" if library else bytes(4))
+    shake(peer, flags, 1)
+    head = struct.pack("<II", 1, 0)
     messages = talk(peer, len(head) + 96, lambda _: b"\6" + head + LOADS[:24] + bytes(24))
     assert done.finish() == 0, done.errors
-    assert messages[0][1][:len(head)] == head
+    assert messages[0][1][:len(head)] == head and done.last(1)[2][0] == pytest.approx(0.12, abs=1e-6)
+
+
+@pytest.mark.parametrize("node,flags", [("", 0x112), ("", 0x1112), ("reference node, 2,", 0x1116)])
+def test_odd_numbers_of_labels_are_refused_to_codes_that_may_use_the_library(run, node, flags):
+    """The library reads four bytes less than MBDyn sends, from the wrong place: with a reference node its flags tell that it is there."""
+    done = run(force(node + "labels, yes, orientation, orientation vector,", points="1", count=1))
+    peer = done.connect()
+    peer.sendall(b"\7" + struct.pack("<II", flags, 1))
+    assert receive(peer, 1) == b"\5" and peer.recv(1) == b""
+    assert done.finish() == 5
+    assert "force 5 (s): the peer does not fit: labels of an odd number of points: MBDyn's client library misreads them" in done.errors
+    assert "say so with --padded-labels; else give the deck an even number of points or no labels" in done.errors
+
+
+@pytest.mark.parametrize("accelerations", [False, True])
+@pytest.mark.parametrize("flag, size", [(0x100, 3), (0x200, 9), (0x400, 3)])
+def test_the_client_library_gets_the_rotation_of_a_reference_node_whose_points_have_none(run, flag, size, accelerations):
+    done = run(reference_deck("orientation, none," + ("accelerations, yes," if accelerations else "")))
+    peer = done.connect()
+    shake(peer, 0x6 | flag << 4 | (8 if accelerations else 0), 1)
+    sent = 8 * (9 + size) + 48 + (48 + 24 if accelerations else 0)
+    f = np.array([0.0, 0, 0.6])
+    messages = talk(peer, sent, lambda _: b"\6" + bytes(24) + f.tobytes() + bytes(24))
+    assert done.finish() == 0, done.errors
+    numbers = np.frombuffer(messages[0][1])
+    R2 = rotation_of(np.array([0.2, 0.3, -0.1]) * 180 / np.pi, 0x400)
+    assert numbers[:3] == pytest.approx([2, -1, 1.5])
+    assert rotation_of(numbers[3:3 + size], flag) == pytest.approx(R2, abs=1e-9)
+    assert numbers[3 + size:9 + size] == pytest.approx([0.5, 0.6, 0.7, 1, 2, 3])
+    points = numbers[9 + size + (6 if accelerations else 0):]
+    assert points[:6] == pytest.approx([-1.43819, 3.13781, 0.546341, 6.87457, 3.48100, -3.96673], abs=6e-6)
+    spin = np.array(done.last(2)[3]) - [1, 2, 3]
+    assert np.linalg.norm(spin) == pytest.approx(0.6 * 0.02, rel=1e-3)  # the moment acts on the reference node
 
 
 def test_unsorted_labels_name_the_points(run):
