@@ -313,7 +313,8 @@ struct PortLayout {
   std::vector<std::string> outputs, inputs;            ///< variables of a signal or modal port
   std::vector<int> mode_numbers;                       ///< of a modal port
   std::vector<std::string> output_units, input_units;  ///< of `outputs` and `inputs`
-  std::optional<Units> units;  ///< of all that crosses; none: the deck's, not declared
+  std::optional<Units> units;     ///< of all that crosses; none: the deck's, not declared
+  std::vector<int> point_labels;  ///< those of the nodes unless the deck says otherwise
 };
 
 /// An attached peer. Ends when it is destroyed.

@@ -154,6 +154,7 @@ PortLayout to_layout(const v1::PortLayout& from) {
   PortLayout layout;
   layout.modal = from.kind() == v1::PORT_KIND_MODAL;
   layout.node_labels.assign(from.node_labels().begin(), from.node_labels().end());
+  layout.point_labels.assign(from.point_labels().begin(), from.point_labels().end());
   layout.reference_node = from.reference_node_label();
   layout.outputs.assign(from.output_names().begin(), from.output_names().end());
   layout.inputs.assign(from.input_names().begin(), from.input_names().end());

@@ -55,19 +55,51 @@ ChannelAddress address_of(const std::string& text, bool create) {
   return address;
 }
 
-void add_socket(CLI::App& app, SocketCall& socket, std::string& listen, std::string& connect) {
-  std::string& protocol = socket.protocol;
-  app.add_option("--protocol", protocol, "mbdyn: that of MBDyn's external forces")
+/// Where codes are met, as the command line has it.
+struct AddressTexts {
+  std::string listen, connect, inputs_listen, inputs_connect;
+};
+
+void add_addresses(CLI::App& app, AddressTexts& texts) {
+  auto* listens = app.add_option("--listen", texts.listen, "unix:PATH or HOST:PORT for the code");
+  app.add_option("--connect", texts.connect, "unix:PATH or HOST:PORT where the code listens")
+      ->excludes(listens);
+  auto* inputs = app.add_option("--inputs-listen", texts.inputs_listen,
+                                "Signal port: unix:PATH or HOST:PORT for the code that sends the "
+                                "inputs; default: the one that gets the outputs");
+  app.add_option("--inputs-connect", texts.inputs_connect,
+                 "Signal port: unix:PATH or HOST:PORT where the code that sends the inputs listens")
+      ->excludes(inputs);
+}
+
+void add_socket(CLI::App& app, SocketCall& socket) {
+  app.add_option("--protocol", socket.protocol,
+                 "mbdyn: that of MBDyn's external forces and streams")
       ->required()
       ->check(CLI::IsMember({"mbdyn"}));
-  auto* listens = app.add_option("--listen", listen, "unix:PATH or HOST:PORT for the code");
-  app.add_option("--connect", connect, "unix:PATH or HOST:PORT where the code listens")
-      ->excludes(listens);
   app.add_option("--orientation", socket.rotation, "Form of rotations")
       ->capture_default_str()
       ->check(CLI::IsMember({"none", "vector", "matrix", "euler123"}));
-  app.add_flag("--labels", socket.labels, "Labels of nodes travel, too");
+  auto* labels = app.add_flag("--labels", socket.labels, "Labels of nodes travel, too");
+  app.add_flag("--unsorted", socket.unsorted,
+               "Labels of the answers are those of the points, in any order")
+      ->needs(labels);
+  app.add_flag(
+      "--padded-labels", socket.pads_labels,
+      "The code pads labels of an odd number of points, as MBDyn does: it does not use its "
+      "client library, which misreads them");
   app.add_flag("--accelerations", socket.accelerations, "Accelerations travel, too");
+}
+
+void set_addresses(const AddressTexts& texts, SocketCall& socket) {
+  if (texts.listen.empty() && texts.connect.empty())
+    throw std::runtime_error("give either --listen or --connect");
+  const auto read = [](const std::string& listen, const std::string& connect) {
+    return address_of(listen.empty() ? connect : listen, !listen.empty());
+  };
+  socket.address = read(texts.listen, texts.connect);
+  if (!texts.inputs_listen.empty() || !texts.inputs_connect.empty())
+    socket.inputs = read(texts.inputs_listen, texts.inputs_connect);
 }
 
 int run(int argc, char** argv) {
@@ -83,10 +115,11 @@ int run(int argc, char** argv) {
       "NAME=SIGNAL: an input or output of the FMU, of an array also NAME[k], and its signal");
   add_call(*fmu_app, call);
   SocketCall socket;
-  std::string listen, connect;
+  AddressTexts texts;
   CLI::App* socket_app =
       app.add_subcommand("socket", "A code that speaks another protocol is the peer");
-  add_socket(*socket_app, socket, listen, connect);
+  add_addresses(*socket_app, texts);
+  add_socket(*socket_app, socket);
   add_call(*socket_app, call);
   app.footer("Exit codes: 0 the simulation is gone, 4 refused, 5 the code is missing or lost.");
   try {
@@ -104,9 +137,7 @@ int run(int argc, char** argv) {
     serve_fmu(call, fmu);
     return kDone;
   }
-  if (listen.empty() == connect.empty())
-    throw std::runtime_error("give either --listen or --connect");
-  socket.address = address_of(listen.empty() ? connect : listen, !listen.empty());
+  set_addresses(texts, socket);
   serve_socket(call, socket);
   return kDone;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,10 +26,13 @@ struct FmuCall {
 };
 
 struct SocketCall {
-  std::string protocol;  ///< "mbdyn": that of MBDyn's external forces
+  std::string protocol;  ///< "mbdyn": that of MBDyn's external forces and streams
   ChannelAddress address;
-  std::string rotation = "matrix";  ///< none, vector, matrix, euler123
+  std::optional<ChannelAddress> inputs;  ///< signal port: of a link of their own
+  std::string rotation = "matrix";       ///< none, vector, matrix, euler123
   bool labels = false, accelerations = false;
+  bool unsorted = false;     ///< labels of the points, in any order
+  bool pads_labels = false;  ///< the code pads labels of an odd number of points
 };
 
 /// Each serves until the simulation is gone. Throw std::exception.
@@ -38,5 +42,8 @@ void serve_socket(const PeerCall& call, const SocketCall& socket);
 /// The simulation, by what `call` says of the daemon.
 client::Server connect(const PeerCall& call);
 client::PeerOptions options_of(const PeerCall& call);
+/// A name for each number of these variables.
+std::vector<std::string> expanded(const client::Simulation& simulation,
+                                  const std::vector<std::string>& variables);
 
 }  // namespace mbcosim::peer
