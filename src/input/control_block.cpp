@@ -27,8 +27,8 @@ void read_use(DeckCard& card) {
   while (card.more() && !closed) {
     const SourceSpan where = card.next();
     switch (card.required("kind of element",
-                          {"beams", "loadable elements", "in assembly", "rigid bodies", "gravity",
-                           "forces", "plates", "aerodynamic elements"})) {
+                          {"beams", "loadable elements", "in assembly", "forces", "rigid bodies",
+                           "gravity", "plates", "aerodynamic elements"})) {
       case 0:
         break;
       case 1:
@@ -36,6 +36,9 @@ void read_use(DeckCard& card) {
         break;
       case 2:
         closed = true;
+        break;
+      case 3:
+        control(card).assemble_forces = true;
         break;
       default:
         card.warn_at(where, "without effect: these elements take no part in the initial assembly",

@@ -93,7 +93,7 @@ struct InitialValueSettings {
 };
 
 struct ControlSettings {
-  bool skip_assembly = false;
+  bool skip_assembly = false, assemble_forces = false;
   double assembly_tolerance = 1e-6;
   int assembly_max_iterations = 1;
   double assembly_epsilon = 1;

@@ -73,8 +73,14 @@ class Assembly {
   bool is_assembled(const ElementRef& e) const {
     if (e.set->assembly_role(e.index) == AssemblyRole::none || !e.set->is_active(state_, e.index))
       return false;
-    return e.set->info(e.index).family != Family::loadable ||
-           find_part<UserElementsInAssembly>(model_) != nullptr;
+    switch (e.set->info(e.index).family) {
+      case Family::force:
+        return model_.control.assemble_forces;
+      case Family::loadable:
+        return find_part<UserElementsInAssembly>(model_) != nullptr;
+      default:
+        return true;
+    }
   }
 
   /// Local numbering: position level first, then the rate level. Node rows are the equilibrium

@@ -212,7 +212,7 @@ const char* const kControl = R"(
 skip initial joint assembly
 use
   = { rigid bodies | gravity | forces | beams | plates | aerodynamic elements | loadable elements } , in assembly
-  ! partly: `beams`, which take part anyhow, and `loadable elements`; the others have no effect (with a warning)
+  ! partly: `beams`, which take part anyhow, `forces` and `loadable elements`; the others have no effect (with a warning)
 initial stiffness
   = <position stiffness> [ , <velocity stiffness> ]
 stiffness

@@ -171,7 +171,7 @@ TEST(InitialValue, ReadsOutputAndEigenanalysis) {
 
 TEST(ControlData, ReadsAssemblyAndOutput) {
   const ModelPtr model = control(
-      "skip initial joint assembly; use: beams, in assembly; initial tolerance: "
+      "skip initial joint assembly; use: beams, forces, in assembly; initial tolerance: "
       "1e-3; max initial iterations: 9;"
       "initial stiffness: 2., 3.; omega rotates: yes; epsilon: .5; output frequency: 4; output "
       "precision: 12;"
@@ -181,7 +181,7 @@ TEST(ControlData, ReadsAssemblyAndOutput) {
       "output: position;");
   ASSERT_TRUE(model);
   const ControlSettings& c = model->control;
-  EXPECT_TRUE(c.skip_assembly);
+  EXPECT_TRUE(c.skip_assembly && c.assemble_forces);
   EXPECT_EQ(c.assembly_tolerance, 1e-3);
   EXPECT_EQ(c.assembly_max_iterations, 9);
   EXPECT_EQ(c.position_stiffness, 2);
@@ -238,8 +238,8 @@ TEST(WordsWithoutEffect, AreNamed) {
   EXPECT_EQ(finding("nonlinear solver: line search, non negative slope continue, yes;", ""),
             "note: nonlinear solver: `non negative slope continue` has no effect: along a "
             "correction the slope of the squared residual is taken as negative");
-  EXPECT_EQ(finding("", "use: beams, loadable elements, in assembly;"), "");
-  for (const char* word : {"rigid bodies", "gravity", "forces", "plates", "aerodynamic elements"})
+  EXPECT_EQ(finding("", "use: beams, forces, loadable elements, in assembly;"), "");
+  for (const char* word : {"rigid bodies", "gravity", "plates", "aerodynamic elements"})
     EXPECT_EQ(finding("", std::string("use: ") + word + ", in assembly;"),
               "warning: without effect: these elements take no part in the initial assembly");
 }
