@@ -180,12 +180,12 @@ FileDriverPtr read_stream(Card& card) {
   return add_stream(card, std::move(stream), initial);
 }
 
-/// [password, user, "name", credentials, "word" [, salt format, "..."]]
+/// [noauth | password, user, "name", credentials, "word" [, salt format, "..."]]
 void read_authentication(Card& card, DeckChannel& channel) {
-  if (!card.more()) return;
+  if (!card.more() || card.keyword("noauth")) return;
   if (!card.keyword("password"))
     card.fail_expected("socket: an authentication that is supported expected",
-                       "write `password, user, \"name\", credentials, \"word\"`");
+                       "write `noauth`, or `password, user, \"name\", credentials, \"word\"`");
   if (!card.keyword("user")) card.fail_expected("socket: `user` expected");
   channel.user = card.quoted("user");
   if (!card.keyword("credentials")) card.fail_expected("socket: `credentials` expected");

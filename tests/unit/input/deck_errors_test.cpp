@@ -129,6 +129,7 @@ INSTANTIATE_TEST_SUITE_P(
         Malformed{"frequencyTwice", control("output frequency: 2; output meter: 1.;"),
                   "error: output frequency or output meter is given twice"},
         Malformed{"use", control("use: rigid bodies;"),
+                  "warning: without effect: these elements take no part in the initial assembly\n"
                   "error: \"in assembly\" missing at the end of the card"}),
     [](const auto& info) { return std::string(info.param.name); });
 

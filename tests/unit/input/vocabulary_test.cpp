@@ -38,9 +38,11 @@ TEST(Vocabulary, HasAWordForEveryGrammar) {
 TEST(Vocabulary, HasATableOfTheTypesOfEveryHead) {
   const Registry registry = full_registry();
   const std::vector<VocabularyGroup> groups = vocabulary(registry);
-  for (const auto& [head, facts] : registry.heads)
+  for (const auto& [head, facts] : registry.heads) {
+    if (head == "outputelement") continue;  // its two words stand in its own row
     for (const auto& type : facts.types)
       EXPECT_TRUE(find(groups, head, type.first)) << head << ", " << type.first;
+  }
 }
 
 /// Outside aerodynamics, plates and solids nothing waits.
