@@ -152,7 +152,7 @@ def test_streams_and_a_force_together_carry_the_bytes_of_mbcosim_run(run, server
 
 
 def text_driver(address):
-    return deck("force: 1, absolute, 1, position, null, 1.,0.,0., file, 1, 1;", counts="forces: 1; file drivers: 1;",
+    return deck("force: 1, absolute, 1, position, null, 1.,0.,0., file, 1, 1;", end=1.0, counts="forces: 1; file drivers: 1;",
                 drivers=f"begin: drivers; file: 1, socket, 1, initial values, 3., {address}; end: drivers;")
 
 
