@@ -10,6 +10,8 @@
 namespace mbcosim::client {
 namespace {
 
+constexpr double kPartingSeconds = 2;  // for the server to end the stream: then the port is free
+
 v1::CouplingMode to_proto(Mode mode) {
   switch (mode) {
     case Mode::loose:
@@ -264,7 +266,13 @@ void Peer::Impl::answer(const Loads& loads) {
 
 void Peer::Impl::write(const v1::PeerMessage& message) {
   const server::Guard guard(write_mutex);
-  wire->write(message);
+  if (!parted) wire->write(message);
+}
+
+void Peer::Impl::part() {
+  const server::Guard guard(write_mutex);
+  parted = true;
+  if (!ended) wire->part();
 }
 
 void Peer::Impl::start_heart(const PeerOptions& options) {
@@ -378,10 +386,12 @@ void Peer::Impl::give_up(const std::string& why) {
 void Peer::Impl::close() {
   if (!open) return;
   open = false;
-  wire->cancel();  // ends a read that is under way
+  const Deadline deadline(kPartingSeconds, [this] { wire->cancel(); });
   stop_heart();
+  part();
   if (thread.joinable()) thread.join();
-  end();
+  while (read()) {
+  }
 }
 
 Peer::Peer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

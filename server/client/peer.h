@@ -35,11 +35,13 @@ struct Peer::Impl {
   void end();                                               ///< learns how the stream has ended
   void blame(const Error& error) TS_EXCLUDES(blame_mutex);  ///< the first counts
   void write(const v1::PeerMessage& message) TS_EXCLUDES(write_mutex);
+  void part() TS_EXCLUDES(write_mutex);  ///< the last thing that is written
   void close();
 
   std::shared_ptr<Server::Impl> server;
   std::unique_ptr<Wire> wire;
   server::Mutex write_mutex;  ///< the heart writes to the wire, too
+  bool parted TS_GUARDED_BY(write_mutex) = false;
   Tangent tangent = Tangent::none;
   StepEnded step_ended;
   PortLayout layout;

@@ -22,6 +22,7 @@ class GrpcWire : public Wire {
       : context_(server, kEndless, simulation), stream_(server.coupling->Attach(&context_)) {}
   bool write(const v1::PeerMessage& message) override { return stream_->Write(message); }
   bool read(v1::ServerMessage* message) override { return stream_->Read(message); }
+  void part() override { stream_->WritesDone(); }
   void cancel() override { context_.TryCancel(); }
   grpc::Status finish() override { return stream_->Finish(); }
 
@@ -54,6 +55,7 @@ class SharedMemoryWire : public Wire {
       return false;
     }
   }
+  void part() override { cancel(); }
   void cancel() override {
     channel_.close();
     ::shutdown(channel_.socket(), SHUT_WR);

@@ -458,19 +458,6 @@ TEST_P(Coupled, RefusalsTellWhatIsWrong) {
   EXPECT_EQ(refused("spring", options()), "PORT_TAKEN");
 }
 
-/// The server hears of a peer's end soon after it: until then its port is taken.
-Peer couple_when_free(Simulation& simulation, const PeerOptions& options) {
-  const auto end = std::chrono::steady_clock::now() + mbcosim::stretched(10);
-  for (;;) {
-    try {
-      return simulation.couple("spring", spring, options);
-    } catch (const Error& error) {
-      if (error.reason() != "PORT_TAKEN" || std::chrono::steady_clock::now() > end) throw;
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-  }
-}
-
 TEST_P(Coupled, APeerThatIsAheadIsRefusedUnlessItCanGoBack) {
   Server server = connect();
   Simulation simulation = server.load_text(body(), with_port());
@@ -491,14 +478,14 @@ TEST_P(Coupled, APeerThatIsAheadIsRefusedUnlessItCanGoBack) {
   }
   ahead.can_go_back = true;
   {
-    const Peer back = couple_when_free(simulation, ahead);
+    const Peer back = simulation.couple("spring", spring, ahead);
     EXPECT_EQ(back.step(), 3);
     EXPECT_TRUE(simulation.step().ok());
   }
   PeerOptions behind = options();
   behind.step = 1;
   behind.mode = Mode::tight;
-  const Peer late = couple_when_free(simulation, behind);
+  const Peer late = simulation.couple("spring", spring, behind);
   EXPECT_EQ(late.step(), 1);
   EXPECT_TRUE(simulation.step(2).ok());
   const auto end = std::chrono::steady_clock::now() + mbcosim::stretched(10);
