@@ -5,20 +5,17 @@
 #include <charconv>
 #include <cmath>
 
+#include "model/text.h"
+
 namespace mbcosim::mbdyn {
 namespace {
 
 constexpr std::size_t kLongestLine = 1023;
 constexpr int kMostLines = 1000, kMostConnections = 64, kMostWarnings = 20;
 
-std::string trimmed(const std::string& text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string::npos) return "";
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
-/// In lower case: words come in any case.
-std::string word_of(std::string text) {
+/// In lower case, without blanks: words come in any case.
+std::string word_of(std::string_view given) {
+  std::string text(trimmed(given));
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return text;
 }
@@ -68,15 +65,15 @@ std::string receive_line(Link& link, Clock::time_point end) {
 // ------------------------------------------------------------------ lines
 
 bool TextDialogue::take(const std::string& line) {
-  const std::string all = trimmed(line);
+  const std::string all(trimmed(line));
   if (all == ".") {
     if (next_ != Next::values) throw ChannelLost("missing label");
     return false;
   }
   const std::size_t colon = all.find(':');
   if (colon == std::string::npos) throw ChannelLost("no `word: text`, but " + shown(all));
-  const std::string word = word_of(trimmed(all.substr(0, colon)));
-  const std::string text = trimmed(all.substr(colon + 1));
+  const std::string word = word_of(std::string_view(all).substr(0, colon));
+  const std::string text(trimmed(std::string_view(all).substr(colon + 1)));
   if (word == "user" || word == "password")
     take_credential(word, text);
   else if (word == "label")

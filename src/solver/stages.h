@@ -3,9 +3,8 @@
 ///   after the prediction   once a step: what follows from the predicted state (a shell's average
 ///                          frame), into State::memory
 ///   accumulation           before each residual and each matrix, those of the initial assembly
-///   too:
-///                          contributions to what elements sum over others (a rotor over its
-///                          blades), into Scratch::sums
+///                          too: contributions to what elements sum over others (a rotor over
+///                          its blades), into Scratch::sums
 ///   residual, matrix       all elements, in tiles; sums are read
 ///   after convergence      once a step: what the accepted state leaves behind, into State::memory
 ///
