@@ -15,9 +15,9 @@ class Wire {
   virtual ~Wire() = default;
   virtual bool write(const v1::PeerMessage& message) = 0;
   virtual bool read(v1::ServerMessage* message) = 0;  ///< false: the end
-  virtual void part() = 0;    ///< nothing more is written; the server then ends the stream
-  virtual void cancel() = 0;                          ///< ends a read that is under way
-  virtual grpc::Status finish() = 0;                  ///< once, after the end
+  virtual void part() = 0;            ///< nothing more is written; the server then ends the stream
+  virtual void cancel() = 0;          ///< ends a read that is under way
+  virtual grpc::Status finish() = 0;  ///< once, after the end
 };
 
 /// Over gRPC.
