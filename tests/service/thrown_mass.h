@@ -1,21 +1,17 @@
 /// A simulation whose motion is known, for tests of the parts of a session.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <map>
 #include <memory>
 #include <string>
 
-#include "simulation/load.h"
-#include "simulation/simulation.h"
+#include "deck_simulation.h"
 
 namespace mbcosim::server {
 
 /// A mass of 2 kg at the origin with 1 m/s along x, and the force of parameter node 2 [N], 0 at
 /// first, along x; steps of 1/8 s up to 1 s.
 inline std::unique_ptr<Simulation> thrown_mass() {
-  const std::string deck =
+  return simulation_of(
       "begin: data; problem: initial value; end: data;\n"
       "begin: initial value; initial time: 0.; final time: 1.; time step: .125; method: ms, 1.; "
       "tolerance: 1e-9; max iterations: 10; end: initial value;\n"
@@ -24,13 +20,7 @@ inline std::unique_ptr<Simulation> thrown_mass() {
       "begin: nodes; structural: 1, dynamic displacement, null, 1., 0., 0.; parameter: 2, 0.; "
       "end: nodes;\n"
       "begin: elements; body: 1, 1, 2.; force: 1, absolute displacement, 1, 1., 0., 0., dof, 2, "
-      "parameter, linear, 0., 1.; end: elements;\n";
-  const LoadReport report =
-      load_deck(BundleSource(std::map<std::string, std::string>{{"deck.mbd", deck}}), "deck.mbd");
-  for (const Diagnostic& d : report.diagnostics) EXPECT_NE(d.severity, Severity::error) << d.text();
-  auto created = Simulation::create(report.model);
-  EXPECT_TRUE(created) << created.error().message;
-  return std::move(*created);
+      "parameter, linear, 0., 1.; end: elements;\n");
 }
 
 }  // namespace mbcosim::server

@@ -1,0 +1,126 @@
+#include "service/counted_solver.h"
+
+#include "rod_cube.h"
+#include "thrown_mass.h"
+#include "wire/refusal.h"
+
+namespace mbcosim::server {
+namespace {
+
+class Counted : public testing::Test {
+ protected:
+  std::optional<StepReport> step(Simulation& simulation, const StepChoice& choice = {}) {
+    SimulationMemory memory(simulation);
+    return solver_.step(simulation, choice, memory);
+  }
+
+  MemoryBudget budget_{1 << 30};
+  CancelToken token_;
+  CountedSolver solver_{budget_, token_};
+  std::unique_ptr<Simulation> mass_ = thrown_mass();
+};
+
+TEST_F(Counted, ReportsTheStepThatItTakes) {
+  const std::optional<StepReport> report = step(*mass_);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->outcome, StepOutcome::accepted);
+  EXPECT_EQ(report->steps_done, 1);
+  EXPECT_EQ(report->step, 1);
+  EXPECT_EQ(report->time, .125);
+  EXPECT_EQ(mass_->time(), .125);
+  EXPECT_EQ(solver_.why_stopped(), "");
+}
+
+TEST_F(Counted, CountsTheFactorizationsOfItsOwnStepsAlone) {
+  mass_->step();
+  const std::int64_t before = mass_->factorizations();
+  ASSERT_GT(before, 0);
+  EXPECT_EQ(solver_.factorizations(), 0);
+  step(*mass_);
+  const std::int64_t first = solver_.factorizations();
+  EXPECT_GT(first, 0);
+  step(*mass_);
+  EXPECT_GT(solver_.factorizations(), first);
+  EXPECT_EQ(solver_.factorizations(), mass_->factorizations() - before);
+}
+
+TEST_F(Counted, RefusesALengthThatNoStepCanHave) {
+  const std::string before = mass_->export_state();
+  StepChoice backwards;
+  backwards.length = -1;
+  try {
+    step(*mass_, backwards);
+    FAIL() << "not refused";
+  } catch (const Refusal& refusal) {
+    EXPECT_EQ(refusal.reason(), v1::REASON_BAD_ARGUMENT);
+  }
+  EXPECT_EQ(mass_->export_state(), before);
+}
+
+TEST_F(Counted, OfACancelledCallIsInterruptedAndTheStateStays) {
+  const std::string before = mass_->export_state();
+  token_.cancel();
+  const std::optional<StepReport> report = step(*mass_);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->outcome, StepOutcome::interrupted);
+  EXPECT_EQ(report->steps_done, 0);
+  ASSERT_TRUE(report->error);
+  EXPECT_EQ(report->error->kind, ErrorKind::cancelled);
+  EXPECT_EQ(mass_->export_state(), before);
+}
+
+TEST_F(Counted, MemoryFollowsWhatFactorizationsTake) {
+  const auto cube = rod_cube();
+  ASSERT_TRUE(cube);
+  constexpr std::int64_t kModel = 5 << 20;
+  const auto at_first = static_cast<std::int64_t>(cube->factor_bytes());
+  {
+    SimulationMemory memory(*cube);
+    memory.hold(MemoryShare(budget_, kModel));
+    for (int i = 0; i < 4; ++i) {
+      ASSERT_TRUE(solver_.step(*cube, {}, memory));
+      const auto now = static_cast<std::int64_t>(cube->factor_bytes());
+      EXPECT_EQ(budget_.used(), kModel + now - at_first) << "step " << i + 1;
+    }
+    EXPECT_GT(budget_.used(), kModel + (1 << 20)) << "the matrix of step 3 is another";
+  }
+  EXPECT_EQ(budget_.used(), 0);
+}
+
+#if !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)  // there `new` is the sanitizer's
+
+TEST_F(Counted, BeyondTheBudgetStopsWithTheStateAsItWas) {
+  const auto cube = rod_cube(), free = rod_cube();
+  ASSERT_TRUE(cube && free);
+  cube->step_many(2);
+  free->step_many(3);
+  const std::string before = cube->export_state();
+  MemoryBudget small(2 << 20);
+  CountedSolver stopped(small, token_);
+  SimulationMemory memory(*cube);
+  EXPECT_FALSE(stopped.step(*cube, {}, memory));
+  EXPECT_EQ(stopped.why_stopped(), "the server's memory budget is used up");
+  EXPECT_EQ(small.used(), 0);
+  EXPECT_EQ(cube->step_number(), 2);
+  EXPECT_EQ(cube->export_state(), before);
+  ASSERT_TRUE(step(*cube)) << "there is room now";
+  EXPECT_EQ(cube->export_state(), free->export_state()) << "as if it had never been stopped";
+}
+
+TEST_F(Counted, BeyondAnIdentitysPartNamesThat) {
+  const auto cube = rod_cube();
+  ASSERT_TRUE(cube);
+  cube->step_many(2);
+  MemoryBudget part(2 << 20, &budget_);
+  CountedSolver stopped(part, token_);
+  SimulationMemory memory(*cube);
+  EXPECT_FALSE(stopped.step(*cube, {}, memory));
+  EXPECT_EQ(stopped.why_stopped(), "the memory that one identity may have is used up");
+  EXPECT_EQ(budget_.used(), 0);
+}
+
+#endif
+
+}  // namespace
+}  // namespace mbcosim::server
