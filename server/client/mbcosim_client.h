@@ -230,6 +230,14 @@ struct Motion {
   std::vector<double> a, wp;    ///< accelerations [m/s², rad/s²] (3n) when agreed, else empty
   std::vector<double> signals;  ///< of a signal port; of a modal one: amplitudes, then their rates
   std::vector<double> forces, moments;  ///< of a motion port: reactions [N], [N·m] (3n)
+  /// Of the port's reference node itself, always in the global frame; empty: it has none.
+  struct Reference {
+    std::vector<double> x;      ///< position [m] (3)
+    std::vector<double> R;      ///< orientation in the form agreed (9, 4 or 3)
+    std::vector<double> v;      ///< velocity [m/s] (3)
+    std::vector<double> w;      ///< angular velocity [rad/s] (3)
+    std::vector<double> a, wp;  ///< accelerations [m/s², rad/s²] (3) when agreed, else empty
+  } reference;
 };
 
 /// What a peer answers.
@@ -307,9 +315,13 @@ struct PeerOptions {
 
 /// What crosses a port, as the server said at the handshake.
 struct PortLayout {
+  std::string name;
   bool modal = false;
-  std::vector<int> node_labels;                        ///< of the points, or the modal node
-  int reference_node = 0;                              ///< label; 0: none
+  bool motion = false;               ///< it takes imposed motion
+  std::vector<int> node_labels;      ///< of the points, or the modal node
+  int reference_node = 0;            ///< label; 0: none
+  bool reference_loads = false;      ///< the answer has the total load on the reference node
+  std::optional<int> mapped_points;  ///< that the peer sees; none: those of the nodes
   std::vector<std::string> outputs, inputs;            ///< variables of a signal or modal port
   std::vector<int> mode_numbers;                       ///< of a modal port
   std::vector<std::string> output_units, input_units;  ///< of `outputs` and `inputs`
@@ -493,7 +505,8 @@ class Simulation {
   SimulationInfo refresh(double timeout = kUsual);
   SimulationInfo update(const UpdateOptions& options);
   std::vector<Variable> variables(double timeout = kUsual) const;  ///< all of them
-  const std::vector<Diagnostic>& diagnostics() const;              ///< of its deck: warnings, notes
+  std::vector<PortLayout> ports(double timeout = kUsual) const;
+  const std::vector<Diagnostic>& diagnostics() const;  ///< of its deck: warnings, notes
 
   Snapshot snapshot(const std::string& display_name = {}, double timeout = kUsual);
   std::vector<Snapshot> snapshots(double timeout = kUsual) const;

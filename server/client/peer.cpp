@@ -126,6 +126,12 @@ void take(const v1::ServerExchange& in, Motion& motion) {
   take(in.signals(), motion.signals);
   take(in.forces(), motion.forces);
   take(in.moments(), motion.moments);
+  take(in.reference_position(), motion.reference.x);
+  take(in.reference_rotation(), motion.reference.R);
+  take(in.reference_velocity(), motion.reference.v);
+  take(in.reference_angular_velocity(), motion.reference.w);
+  take(in.reference_acceleration(), motion.reference.a);
+  take(in.reference_angular_acceleration(), motion.reference.wp);
 }
 
 void put(const std::vector<double>& values, Numbers* out) {
@@ -152,12 +158,18 @@ void put(const Loads& loads, v1::PeerAnswer* out) {
   out->set_unfinished(loads.unfinished);
 }
 
+}  // namespace
+
 PortLayout to_layout(const v1::PortLayout& from) {
   PortLayout layout;
+  layout.name = from.name();
   layout.modal = from.kind() == v1::PORT_KIND_MODAL;
+  layout.motion = from.kind() == v1::PORT_KIND_MOTION;
   layout.node_labels.assign(from.node_labels().begin(), from.node_labels().end());
   layout.point_labels.assign(from.point_labels().begin(), from.point_labels().end());
   layout.reference_node = from.reference_node_label();
+  layout.reference_loads = from.reference_loads();
+  if (from.has_mapped_points()) layout.mapped_points = from.mapped_points();
   layout.outputs.assign(from.output_names().begin(), from.output_names().end());
   layout.inputs.assign(from.input_names().begin(), from.input_names().end());
   layout.mode_numbers.assign(from.mode_numbers().begin(), from.mode_numbers().end());
@@ -166,8 +178,6 @@ PortLayout to_layout(const v1::PortLayout& from) {
   if (from.has_units()) layout.units = to_units(from.units());
   return layout;
 }
-
-}  // namespace
 
 v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& port,
                      const PeerOptions& options) {

@@ -14,6 +14,7 @@
 
 namespace mbcosim::client {
 
+PortLayout to_layout(const v1::PortLayout& from);
 v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& port,
                      const PeerOptions& options);
 

@@ -70,6 +70,15 @@ std::vector<Variable> Simulation::variables(double timeout) const {
   return all;
 }
 
+std::vector<PortLayout> Simulation::ports(double timeout) const {
+  v1::DescribeSimulationRequest request;
+  request.set_page_size(1);  // the first one has them all
+  const auto reply = ask(*impl_, &Stub::DescribeSimulation, request, timeout);
+  std::vector<PortLayout> all;
+  for (const v1::PortLayout& port : reply.model().ports()) all.push_back(to_layout(port));
+  return all;
+}
+
 std::vector<double> Simulation::read(const std::string& variable, double timeout) const {
   v1::ReadVariablesRequest request;
   request.add_handles(impl_->handles({variable}, timeout).front());

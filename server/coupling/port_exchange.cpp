@@ -65,6 +65,7 @@ void PortModel::fill(const Simulation& simulation, const Agreement& agreement,
     fill_mapped(agreement, out);
   else
     for (const Motion& m : sent_) put_motion(m, agreement, out);
+  if (has_reference_) put_reference(agreement, out);
   if (reactions_ >= 0) put_reactions(simulation, out);
   if (agreement.units) agreement.units->to_peer(out);
 }
@@ -91,6 +92,17 @@ void PortModel::put_motion(const Motion& global, const Agreement& agreement,
   if (!agreement.accelerations) return;
   put(turn * m.a, out->mutable_accelerations());
   put(turn * m.wp, out->mutable_angular_accelerations());
+}
+
+void PortModel::put_reference(const Agreement& agreement, v1::ServerExchange* out) const {
+  const Motion& r = sent_reference_;
+  put(r.x, out->mutable_reference_position());
+  put_rotation(r.R, agreement.rotation_form, out->mutable_reference_rotation());
+  put(r.v, out->mutable_reference_velocity());
+  put(r.w, out->mutable_reference_angular_velocity());
+  if (!agreement.accelerations) return;
+  put(r.a, out->mutable_reference_acceleration());
+  put(r.wp, out->mutable_reference_angular_acceleration());
 }
 
 // One that cannot be evaluated (a logarithm of zero) is not a number for the peer.

@@ -294,6 +294,7 @@ void PortModel::make_mapped(const Simulation& simulation) {
   layout_.set_kind(v1::PORT_KIND_STRUCTURAL);
   layout_.set_reference_loads(points.use_reference_loads);
   make_points(simulation, points);
+  layout_.set_mapped_points(peer_points());
   needs_accelerations_ = points.accelerations;
 }
 

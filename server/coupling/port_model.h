@@ -103,6 +103,7 @@ class PortModel {
   void make_mapped(const Simulation& simulation);
   void make_output();
   void put_motion(const Motion& m, const Agreement& agreement, v1::ServerExchange* out) const;
+  void put_reference(const Agreement& agreement, v1::ServerExchange* out) const;
   void fill_mapped(const Agreement& agreement, v1::ServerExchange* out) const;
   std::string decode_own(const v1::PeerAnswer& in, const Agreement& agreement,
                          Answer* answer) const;

@@ -70,13 +70,19 @@ std::vector<double> UnitConversion::factors(const std::vector<SignalUnit>& signa
 }
 
 void UnitConversion::to_peer(v1::ServerExchange* out) const {
+  const double acceleration = length_ / (time_ * time_), angular = 1 / (time_ * time_);
   out->set_time(out->time() * time_);
   out->set_target_time(out->target_time() * time_);
   scale(out->mutable_positions(), length_);
   scale(out->mutable_velocities(), length_ / time_);
   scale(out->mutable_angular_velocities(), 1 / time_);
-  scale(out->mutable_accelerations(), length_ / (time_ * time_));
-  scale(out->mutable_angular_accelerations(), 1 / (time_ * time_));
+  scale(out->mutable_accelerations(), acceleration);
+  scale(out->mutable_angular_accelerations(), angular);
+  scale(out->mutable_reference_position(), length_);
+  scale(out->mutable_reference_velocity(), length_ / time_);
+  scale(out->mutable_reference_angular_velocity(), 1 / time_);
+  scale(out->mutable_reference_acceleration(), acceleration);
+  scale(out->mutable_reference_angular_acceleration(), angular);
   scale(out->mutable_forces(), force_);
   scale(out->mutable_moments(), moment_);
   const int signals = std::min(out->signals_size(), static_cast<int>(outputs_.size()));

@@ -26,6 +26,20 @@ struct PortRecord {
   const v1::RecordEntry* peek() const { return next < entries.size() ? entries[next] : nullptr; }
 };
 
+/// As a server of the record's time would have sent it: earlier ones did not tell the motion of
+/// reference nodes.
+v1::ServerMessage as_then(const v1::ServerMessage& recorded, v1::ServerMessage now) {
+  if (!recorded.exchange().reference_position().empty() || !now.has_exchange()) return now;
+  v1::ServerExchange* exchange = now.mutable_exchange();
+  exchange->clear_reference_position();
+  exchange->clear_reference_rotation();
+  exchange->clear_reference_velocity();
+  exchange->clear_reference_angular_velocity();
+  exchange->clear_reference_acceleration();
+  exchange->clear_reference_angular_acceleration();
+  return now;
+}
+
 /// The recorded peer of one port.
 class RecordedPeer : public server::PeerLink {
  public:
@@ -40,7 +54,8 @@ class RecordedPeer : public server::PeerLink {
       return true;
     }
     ++record_.next;
-    if (const auto difference = first_difference(expected->to_peer(), now, tolerance_))
+    if (const auto difference =
+            first_difference(expected->to_peer(), as_then(expected->to_peer(), now), tolerance_))
       note(*difference);
     if (!now.has_exchange()) return true;
     ++outcome_.exchanges;

@@ -317,6 +317,33 @@ def test_a_mapping_takes_the_load_of_its_reference_node(server):
         assert simulation["node.structural.2.XP"][2] > before[2]
 
 
+@pytest.mark.parametrize("frame", ["global", "reference", "node"])
+@pytest.mark.parametrize("rotation, size", [("matrix", (3, 3)), ("vector", (3,)), ("quaternion", (4,)), ("euler_123", (3,))])
+def test_the_motion_of_a_reference_node_is_told(server, rotation, size, frame):
+    """In the global frame, whatever that of the points is."""
+    ports = [mbcosim.structural_port("p", nodes=[2], reference=1)]
+    with server.load_text(cards("", ""), ports=ports) as simulation:
+        names = [f"node.structural.1.{what}" for what in ("X", "R", "XP", "Omega", "XPP", "OmegaP")]
+        expected, seen = [simulation[name] for name in names], []
+        with simulation.couple("p", lambda m: seen.append(m.reference) or np.zeros((1, 3)), rotation=rotation, frame=frame, accelerations=True) as peer:
+            simulation.step()
+            assert peer.error is None
+    told = seen[0]
+    for found, value in zip((told.x, told.v, told.w, told.a, told.wp), expected[:1] + expected[2:]):
+        assert np.array_equal(found, np.ravel(value))
+    assert told.rotation.shape == size
+    if rotation == "matrix":
+        assert np.array_equal(told.rotation, np.reshape(expected[1], (3, 3)))
+
+
+def test_ports_without_a_reference_node_tell_none(server):
+    with server.load_text(cards("", ""), ports=[mbcosim.structural_port("p", nodes=[2])]) as simulation:
+        seen = []
+        with simulation.couple("p", lambda m: seen.append(m) or np.zeros((1, 3))):
+            simulation.step()
+        assert seen[0].reference is None
+
+
 def test_external_modal_mapping_of_the_deck(server):
     """One mode, twice the path of node 1 along axis 1."""
     card = 'force: 5, external modal mapping, grpc, port, "modes", nodes number, 1, 1, modes number, 1, sparse mapping file, "H.dat";'

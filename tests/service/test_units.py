@@ -176,6 +176,18 @@ def test_all_of_a_motion_is_converted(server):
             assert peer.accepted == [(3, pytest.approx(3e-2))]
 
 
+def test_the_motion_of_a_reference_node_is_converted(server):
+    units, L, M, T = FACTORS["mm kg ms"]
+    seen = []
+    with server.load_text(bodies(L, M, T), ports=[mbcosim.structural_port("rod", nodes=[2], reference=1)], units=units) as simulation:
+        x, v, w, a, wp = (simulation[name] for name in (X, XP, OMEGA, "node.structural.1.XPP", "node.structural.1.OmegaP"))
+        with simulation.couple("rod", lambda m: seen.append(m.reference) or np.zeros((1, 3)), accelerations=True, units=SI) as peer:
+            simulation.step()
+            assert peer.error is None
+    for found, value in zip((seen[0].x, seen[0].v, seen[0].w, seen[0].a, seen[0].wp), (x / L, v * T / L, w * T, a * T**2 / L, wp * T**2)):
+        assert found == pytest.approx(value, rel=1e-12, abs=1e-15)
+
+
 def test_moments_are_converted_apart_from_forces(server):
     with server.load_text(bodies(*FACTORS["mm t s"][1:]), ports=[mbcosim.structural_port("rod", nodes=[1, 2])], units=TONNE) as simulation:
         with simulation.couple("rod", lambda m: ([[1, 2, 3], [0, 0, 0]], [[0.1, 0.2, 0.3], [0, 0, 0]]), units=SI) as peer:

@@ -17,14 +17,14 @@ from .coupling import Peer, modal_port, motion_port, signal_port, structural_por
 from .errors import (Busy, DeckError, Error, LimitExceeded, NotAllowed, NotFound, PreconditionFailed,
                      StepFailed, TimedOut, Unavailable)
 from .events import Events
-from .exchange import Loads, Motion, Reject
+from .exchange import Loads, Motion, ReferenceMotion, Reject
 from .histories import History
 from .local import LocalServer, connect_or_start, local
 from .simulation import Simulation, Snapshot, Stepper, Subscription
 
 __all__ = [
     "__version__", "connect", "connect_or_start", "local", "default_address", "Server", "LocalServer", "Simulation", "Snapshot", "StepResult",
-    "Stepper", "Subscription", "Events", "History", "StateSpace", "Modes", "Motion", "Loads", "Condition", "Reject", "Peer", "modal_port",
-    "motion_port", "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound",
+    "Stepper", "Subscription", "Events", "History", "StateSpace", "Modes", "Motion", "ReferenceMotion", "Loads", "Condition", "Reject",
+    "Peer", "modal_port", "motion_port", "signal_port", "structural_port", "Error", "DeckError", "LimitExceeded", "NotAllowed", "NotFound",
     "PreconditionFailed", "StepFailed", "TimedOut", "Unavailable", "Geometry", "Busy", "grant", "units",
 ]

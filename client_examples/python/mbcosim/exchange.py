@@ -22,6 +22,17 @@ _EMPTY = np.zeros(0)
 
 
 @dataclasses.dataclass
+class ReferenceMotion:
+    """Motion of a port's reference node, always in the global frame."""
+    x: Array         # 3
+    rotation: Array  # 3 x 3 for "matrix", 4 for "quaternion", else 3
+    v: Array
+    w: Array
+    a: Array         # empty unless agreed
+    wp: Array
+
+
+@dataclasses.dataclass
 class Motion:
     """What the simulation sends. Arrays are n x 3 for n nodes, in the frame agreed; read-only. Units are the deck's, written here as SI, unless the
     peer has given its own."""
@@ -39,6 +50,7 @@ class Motion:
     forces: Array     # of a motion port: reactions [N], and moments [N m]
     moments: Array
     target_estimated: bool  # the step may turn out to have another length
+    reference: Optional[ReferenceMotion] = None  # of a port with a reference node
 
 
 class Reject(Exception):
@@ -147,20 +159,31 @@ _E = pb.ServerExchange
 
 def motion(fields: dict[int, Any], rotation: str) -> Motion:
     """The fields of an exchange as a Motion."""
-    def rows(number: int, width: int = 3) -> Array:
+    def numbers(number: int) -> Array:
         data = fields.get(number)
-        return (np.frombuffer(data, "<f8") if data is not None else _EMPTY).reshape(-1, width)
+        return np.frombuffer(data, "<f8") if data is not None else _EMPTY
+
+    def rows(number: int, width: int = 3) -> Array:
+        return numbers(number).reshape(-1, width)
 
     rotations = rows(_E.ROTATIONS_FIELD_NUMBER, _ROTATION_SIZE[rotation])
     if rotation == "matrix":
         rotations = rotations.reshape(-1, 3, 3)
+    reference = None
+    if _E.REFERENCE_POSITION_FIELD_NUMBER in fields:
+        turned = numbers(_E.REFERENCE_ROTATION_FIELD_NUMBER)
+        reference = ReferenceMotion(
+            numbers(_E.REFERENCE_POSITION_FIELD_NUMBER), turned.reshape(3, 3) if rotation == "matrix" else turned,
+            numbers(_E.REFERENCE_VELOCITY_FIELD_NUMBER), numbers(_E.REFERENCE_ANGULAR_VELOCITY_FIELD_NUMBER),
+            numbers(_E.REFERENCE_ACCELERATION_FIELD_NUMBER), numbers(_E.REFERENCE_ANGULAR_ACCELERATION_FIELD_NUMBER))
     return Motion(
         fields.get(_E.STEP_FIELD_NUMBER, 0), fields.get(_E.TIME_FIELD_NUMBER, 0.0),
         fields.get(_E.TARGET_TIME_FIELD_NUMBER, 0.0), fields.get(_E.ITERATION_FIELD_NUMBER, 0),
         rows(_E.POSITIONS_FIELD_NUMBER), rotations, rows(_E.VELOCITIES_FIELD_NUMBER),
         rows(_E.ANGULAR_VELOCITIES_FIELD_NUMBER), rows(_E.ACCELERATIONS_FIELD_NUMBER),
-        rows(_E.ANGULAR_ACCELERATIONS_FIELD_NUMBER), rows(_E.SIGNALS_FIELD_NUMBER, 1).ravel(),
-        rows(_E.FORCES_FIELD_NUMBER), rows(_E.MOMENTS_FIELD_NUMBER), bool(fields.get(_E.TARGET_ESTIMATED_FIELD_NUMBER, 0)))
+        rows(_E.ANGULAR_ACCELERATIONS_FIELD_NUMBER), numbers(_E.SIGNALS_FIELD_NUMBER),
+        rows(_E.FORCES_FIELD_NUMBER), rows(_E.MOMENTS_FIELD_NUMBER), bool(fields.get(_E.TARGET_ESTIMATED_FIELD_NUMBER, 0)),
+        reference)
 
 
 def index(fields: dict[int, Any]) -> int:
