@@ -88,6 +88,9 @@ void add_socket(CLI::App& app, SocketCall& socket) {
       "--padded-labels", socket.pads_labels,
       "The code pads labels of an odd number of points, as MBDyn does: it does not use its "
       "client library, which misreads them");
+  app.add_flag("--global-reference-loads", socket.global_reference_loads,
+               "Loads on the reference node come in the global frame, as with `rotate reference "
+               "node forces, no`");
   app.add_flag("--accelerations", socket.accelerations, "Accelerations travel, too");
 }
 

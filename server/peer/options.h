@@ -31,8 +31,9 @@ struct SocketCall {
   std::optional<ChannelAddress> inputs;  ///< signal port: of a link of their own
   std::string rotation = "matrix";       ///< none, vector, matrix, euler123
   bool labels = false, accelerations = false;
-  bool unsorted = false;     ///< labels of the points, in any order
-  bool pads_labels = false;  ///< the code pads labels of an odd number of points
+  bool unsorted = false;                ///< labels of the points, in any order
+  bool pads_labels = false;             ///< the code pads labels of an odd number of points
+  bool global_reference_loads = false;  ///< those on the reference node are not in its frame
 };
 
 /// Each serves until the simulation is gone. Throw std::exception.

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <stdexcept>
 
@@ -14,72 +15,108 @@ Vec3 triple(const std::vector<double>& numbers, std::size_t k) {
   return Vec3(numbers[3 * k], numbers[3 * k + 1], numbers[3 * k + 2]);
 }
 
-PointState point_of(const client::Motion& motion, std::size_t k) {
+/// Point k of a client::Motion, or its reference node. Mapped points have positions and their rates
+/// alone.
+template <class Source>
+PointState point_of(const Source& motion, std::size_t k) {
+  const auto put = [k](const std::vector<double>& numbers, Vec3& v) {
+    if (!numbers.empty()) v = triple(numbers, k);
+  };
   PointState p;
-  p.x = triple(motion.x, k);
-  p.R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&motion.R[9 * k]);
-  p.v = triple(motion.v, k);
-  p.w = triple(motion.w, k);
-  if (motion.a.empty()) return p;
-  p.a = triple(motion.a, k);
-  p.wp = triple(motion.wp, k);
+  put(motion.x, p.x);
+  if (!motion.R.empty())
+    p.R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&motion.R[9 * k]);
+  put(motion.v, p.v);
+  put(motion.w, p.w);
+  put(motion.a, p.a);
+  put(motion.wp, p.wp);
   return p;
 }
 
-mbdyn::ForceForm form_of(const client::PortLayout& layout, const SocketCall& call) {
-  using Rotation = mbdyn::ForceForm::Rotation;
+using Form = mbdyn::ForceForm;
+
+void make_points(const client::PortLayout& layout, const SocketCall& call, Form& form) {
+  form.reference = layout.reference_node != 0;
+  form.reference_label = static_cast<std::uint32_t>(layout.reference_node);
+  form.labels = call.labels;
+  if (!layout.mapped_points) {
+    form.count = static_cast<std::uint32_t>(layout.node_labels.size());
+    form.node_labels.assign(layout.node_labels.begin(), layout.node_labels.end());
+    form.point_labels.assign(layout.point_labels.begin(), layout.point_labels.end());
+    return;
+  }
+  if (call.labels)
+    throw std::runtime_error("port \"" + layout.name + "\": mapped points have no labels");
+  if (form.reference && form.rotation == Form::Rotation::none)
+    throw std::runtime_error("port \"" + layout.name +
+                             "\": the reference node of mapped points has an orientation");
+  form.kind = Form::Kind::mapped;
+  form.count = static_cast<std::uint32_t>(*layout.mapped_points);
+}
+
+Form form_of(const client::PortLayout& layout, const SocketCall& call) {
+  using Rotation = Form::Rotation;
   static const std::map<std::string, Rotation> kRotations = {{"none", Rotation::none},
                                                              {"vector", Rotation::vector},
                                                              {"matrix", Rotation::matrix},
                                                              {"euler123", Rotation::euler123}};
-  mbdyn::ForceForm form;
-  if (layout.reference_node != 0)
-    throw std::runtime_error("a port with a reference node is served by `mbcosim run` only");
+  if (layout.motion)
+    throw std::runtime_error("port \"" + layout.name +
+                             "\" takes imposed motion, which no code of MBDyn's protocols sends");
+  Form form;
   form.rotation = kRotations.at(call.rotation);
-  form.labels = call.labels;
   form.sorted = !call.unsorted;
   form.pads_labels = call.pads_labels;
   form.accelerations = call.accelerations;
   form.modes = static_cast<int>(layout.mode_numbers.size());
-  if (layout.modal) {
-    form.kind = mbdyn::ForceForm::Kind::modal;
-    form.reference = !layout.node_labels.empty();
-    form.count = static_cast<std::uint32_t>(form.modes);
+  if (!layout.modal) {
+    make_points(layout, call, form);
     return form;
   }
-  form.count = static_cast<std::uint32_t>(layout.node_labels.size());
-  form.node_labels.assign(layout.node_labels.begin(), layout.node_labels.end());
-  form.point_labels.assign(layout.point_labels.begin(), layout.point_labels.end());
+  form.kind = Form::Kind::modal;
+  form.reference = !layout.node_labels.empty();
+  form.count = static_cast<std::uint32_t>(form.modes);
   return form;
 }
 
-/// A mapped port has no orientations, and points that its layout does not tell.
-void check_points(const mbdyn::ForceForm& form, const client::Motion& motion) {
-  const std::size_t points =
-      form.kind == mbdyn::ForceForm::Kind::modal ? (form.reference ? 1 : 0) : form.count;
-  if (motion.x.size() != 3 * points || motion.R.size() != 9 * points)
-    throw mbdyn::ChannelLost("a mapped port is served by `mbcosim run` only");
+/// Daemons of earlier versions tell neither reference nodes nor mapped points.
+void check_motion(const Form& form, const client::Motion& motion) {
+  const bool modal = form.kind == Form::Kind::modal;
+  const std::size_t points = modal ? (form.reference ? 1 : 0) : form.count;
+  const std::size_t orientations = form.kind == Form::Kind::mapped ? 0 : points;
+  const bool told = modal || !form.reference || !motion.reference.x.empty();
+  if (!told || motion.x.size() != 3 * points || motion.R.size() != 9 * orientations)
+    throw mbdyn::ChannelLost("the daemon does not tell the motion that this port's code needs");
 }
 
-mbdyn::ForceState state_of(const mbdyn::ForceForm& form, const client::Motion& motion) {
-  check_points(form, motion);
+mbdyn::ForceState state_of(const Form& form, const client::Motion& motion) {
+  check_motion(form, motion);
   mbdyn::ForceState state;
-  for (std::size_t k = 0; 3 * k < motion.x.size(); ++k) state.points.push_back(point_of(motion, k));
-  if (form.kind != mbdyn::ForceForm::Kind::modal) return state;
-  if (form.reference) state.reference = state.points.at(0);
-  state.points.clear();
-  state.q.assign(motion.signals.begin(), motion.signals.begin() + form.modes);
-  state.qp.assign(motion.signals.begin() + form.modes, motion.signals.end());
+  if (form.kind == Form::Kind::modal) {
+    if (form.reference) state.reference = point_of(motion, 0);
+    state.q.assign(motion.signals.begin(), motion.signals.begin() + form.modes);
+    state.qp.assign(motion.signals.begin() + form.modes, motion.signals.end());
+    return state;
+  }
+  if (form.reference) state.reference = point_of(motion.reference, 0);
+  for (std::size_t k = 0; k < form.count; ++k) state.points.push_back(point_of(motion, k));
   return state;
 }
 
-client::Loads loads_of(const mbdyn::ForceForm& form, const mbdyn::ForceLoads& from) {
+/// What a port takes of a code's loads, and how.
+struct LoadsForm {
+  Form form;
+  bool reference_loads = false;         ///< the port takes the total load on the reference node
+  bool global_reference_loads = false;  ///< which comes in the global frame
+};
+
+client::Loads loads_of(const LoadsForm& as, const mbdyn::ForceLoads& from, const Mat3& reference) {
   client::Loads loads;
   const auto put = [](const Vec3& v, std::vector<double>& out) {
     out.insert(out.end(), v.data(), v.data() + 3);
   };
-  if (form.kind == mbdyn::ForceForm::Kind::modal) {
-    if (form.reference) {
+  if (as.form.kind == Form::Kind::modal) {
+    if (as.form.reference) {
       put(from.f0, loads.forces);
       put(from.m0, loads.moments);
     }
@@ -87,7 +124,13 @@ client::Loads loads_of(const mbdyn::ForceForm& form, const mbdyn::ForceLoads& fr
     return loads;
   }
   for (const Vec3& f : from.f) put(f, loads.forces);
-  for (const Vec3& m : from.m) put(m, loads.moments);
+  if (as.form.kind == Form::Kind::nodal)
+    for (const Vec3& m : from.m) put(m, loads.moments);
+  if (!as.reference_loads) return loads;
+  const Mat3 turn =
+      as.global_reference_loads ? Mat3(reference.transpose()) : Mat3(Mat3::Identity());
+  put(turn * from.f0, loads.reference_force);
+  put(turn * from.m0, loads.reference_moment);
   return loads;
 }
 
@@ -95,31 +138,33 @@ client::Loads loads_of(const mbdyn::ForceForm& form, const mbdyn::ForceLoads& fr
 /// done; its last loads then serve the rest of the step.
 class SocketAnswers {
  public:
-  SocketAnswers(mbdyn::SocketWire& wire, mbdyn::ForceForm form)
-      : wire_(wire), form_(std::move(form)) {}
+  SocketAnswers(mbdyn::SocketWire& wire, LoadsForm as) : wire_(wire), as_(std::move(as)) {}
 
   client::Loads answer(const client::Motion& motion) {
     const bool implicit = motion.iteration > 0;
     if (motion.iteration <= 1) done_ = false;
-    if (!done_) {
-      wire_.send(implicit ? mbdyn::kData : mbdyn::kLastData, state_of(form_, motion));
-      mbdyn::ForceLoads loads;
-      const mbdyn::Command command = wire_.receive(loads);
-      if (command == mbdyn::kData || command == mbdyn::kLastData) last_ = loads_of(form_, loads);
-      ended_ = command == mbdyn::kEnd;
-      done_ = command != mbdyn::kData;
-    }
-    if (last_.forces.empty() && last_.signals.empty())
-      throw mbdyn::ChannelLost("the code keeps loads that it never gave");
-    last_.unfinished = implicit && !done_;
-    return last_;
+    const mbdyn::ForceState state = state_of(as_.form, motion);
+    if (!done_) ask(implicit ? mbdyn::kData : mbdyn::kLastData, state);
+    if (!last_) throw mbdyn::ChannelLost("the code keeps loads that it never gave");
+    client::Loads loads = loads_of(as_, *last_, state.reference.R);
+    loads.unfinished = implicit && !done_;
+    return loads;
   }
   bool ended() const { return ended_; }
 
  private:
+  void ask(mbdyn::Command how, const mbdyn::ForceState& state) {
+    wire_.send(how, state);
+    mbdyn::ForceLoads loads;
+    const mbdyn::Command command = wire_.receive(loads);
+    if (command == mbdyn::kData || command == mbdyn::kLastData) last_ = std::move(loads);
+    ended_ = command == mbdyn::kEnd;
+    done_ = command != mbdyn::kData;
+  }
+
   mbdyn::SocketWire& wire_;
-  const mbdyn::ForceForm form_;
-  client::Loads last_;
+  const LoadsForm as_;
+  std::optional<mbdyn::ForceLoads> last_;
   bool done_ = false, ended_ = false;
 };
 
@@ -195,6 +240,13 @@ void serve_streams(const PeerCall& call, client::Peer& peer, std::size_t inputs,
   }
 }
 
+bool has_reference(const client::Simulation& simulation, const std::string& port) {
+  const auto ports = simulation.ports();
+  return std::any_of(ports.begin(), ports.end(), [&](const client::PortLayout& layout) {
+    return layout.name == port && layout.reference_node != 0;
+  });
+}
+
 }  // namespace
 
 void serve_socket(const PeerCall& call, const SocketCall& socket) {
@@ -204,6 +256,7 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
   options.accelerations = socket.accelerations;
+  if (has_reference(simulation, call.port)) options.frame = client::Frame::reference;
   std::vector<std::unique_ptr<mbdyn::Link>> links = open_links(socket, patience);
   client::Peer peer = simulation.attach(call.port, options);
   const SimulationWatch watch(server, call.simulation, peer);
@@ -215,9 +268,9 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
   if (links.size() > 1)
     throw std::runtime_error("inputs of their own link are those of a signal port; \"" + call.port +
                              "\" is none");
-  const mbdyn::ForceForm form = form_of(peer.layout(), socket);
+  const Form form = form_of(peer.layout(), socket);
   mbdyn::SocketWire wire(std::move(links[0]), form, socket.address.create);
-  SocketAnswers answers(wire, form);
+  SocketAnswers answers(wire, {form, peer.layout().reference_loads, socket.global_reference_loads});
   while (!answers.ended() &&
          answer_next(peer, [&](const client::Motion& motion) { return answers.answer(motion); })) {
   }

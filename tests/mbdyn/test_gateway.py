@@ -237,28 +237,10 @@ def test_streams_know_no_iterations(server, program, tmp_path):  # noqa: F811
         assert "streams know no iterations" in gateway.program.errors
 
 
-# ------------------------------------------------------------------ what the gateway does not serve
-
-@pytest.mark.parametrize("card, options, message", [
-    ('force: 5, external structural, grpc, port, "p", reference node, 2, 1, 1;', [], "a port with a reference node is served by `mbcosim run` only"),
-    ('force: 5, external structural, grpc, port, "p", 1, 1;',
-     ["--inputs-listen", "unix:{}"], 'inputs of their own link are those of a signal port; "p" is none')])
-def test_what_is_not_served_is_refused(server, program, tmp_path, card, options, message):  # noqa: F811
-    with server.load_text(deck(card, end=1.0)) as simulation:
+def test_inputs_of_their_own_link_are_those_of_a_signal_port(server, program, tmp_path):  # noqa: F811
+    with server.load_text(deck('force: 5, external structural, grpc, port, "p", 1, 1;', end=1.0)) as simulation:
         second = str(tmp_path / "i")
-        gateway = Gateway(program, server, simulation, "p", str(tmp_path / "s"), *[word.format(second) for word in options])
-        codes = [connect(gateway.path)] + ([connect(second)] if options else [])
-        assert gateway.program.finish() == 4 and message in gateway.program.errors
-        for code in codes:
-            code.close()
-
-
-def test_a_mapped_port_is_refused(server, program, tmp_path):  # noqa: F811
-    text = deck('force: 5, external structural mapping, grpc, port, "p", points number, 1, 1, offset, null;', end=1.0)
-    with server.load_text(text) as simulation:
-        gateway = Gateway(program, server, simulation, "p", str(tmp_path / "s"))
-        code = connect(gateway.path)
-        shake(code, 0x202, 1)
-        with pytest.raises(mbcosim.StepFailed, match="a mapped port is served by `mbcosim run` only"):
-            simulation.step()
-        assert gateway.program.finish() == 5
+        gateway = Gateway(program, server, simulation, "p", str(tmp_path / "s"), "--inputs-listen", f"unix:{second}")
+        with connect(gateway.path), connect(second):
+            assert gateway.program.finish() == 4
+        assert 'inputs of their own link are those of a signal port; "p" is none' in gateway.program.errors
