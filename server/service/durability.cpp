@@ -103,7 +103,7 @@ void Durability::read_folder() {
         folder_->remove(id);
         continue;
       }
-      read_one(id);
+      add_suspended(id, read_one(id));
     } catch (const StorageError& error) {
       spdlog::error("state folder: {}; put aside as {}", error.what(), folder_->put_aside(id));
     }
@@ -113,7 +113,7 @@ void Durability::read_folder() {
     spdlog::info("state folder: {} simulations are suspended", suspended_.size());
 }
 
-void Durability::read_one(const std::string& id) {
+Suspended Durability::read_one(const std::string& id) const {
   const v1::CheckpointHead head = folder_->read_head(id);
   if (head.simulation() != kSimulations + id)
     throw StorageError(id + "/model: it is of " + head.simulation());
@@ -123,9 +123,13 @@ void Durability::read_one(const std::string& id) {
   found.request_digest = head.request_digest();
   found.info = read_latest(id).point.info();
   found.since = folder_->written_at(id);
+  return found;
+}
+
+void Durability::add_suspended(const std::string& id, Suspended found) {
   Guard guard(mutex_);
   if (parts_) found.share = share_of(found);
-  suspended_[head.simulation()] = std::move(found);
+  suspended_[kSimulations + id] = std::move(found);
 }
 
 // Of what is in the folder anyway: it is counted, and never refused.
@@ -339,7 +343,8 @@ void Durability::post(const SessionPtr& session) {
 bool Durability::suspend(Session& session) {
   try {
     if (session.keeping()->stale(session.changes())) write(session);
-    read_one(id_of(session.identity().id));
+    const std::string id = id_of(session.identity().id);
+    add_suspended(id, read_one(id));
     return true;
   } catch (const std::exception& error) {
     log_.checkpoint_failed(session.subject(), error.what());

@@ -108,7 +108,8 @@ class Durability {
   StoredPoint read_latest(const std::string& id) const;
   void store(Session& session);
   void read_folder();
-  void read_one(const std::string& id);
+  Suspended read_one(const std::string& id) const;
+  void add_suspended(const std::string& id, Suspended found) TS_EXCLUDES(mutex_);
   MemoryBudget& memory_of(const Session& session) const;  ///< its owner's
   void write(Session& session);
   void loop();

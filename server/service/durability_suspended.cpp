@@ -336,6 +336,7 @@ bool Durability::imported(const std::string& request_id, std::uint64_t digest, c
 
 void Durability::put_in_folder(const std::string& simulation, const StoredBundle& bundle) {
   const std::string id = id_of(simulation);
+  Suspended stored;
   store_new(*folder_, id, [&] {
     folder_->write_model(id, bundle.model);
     for (const v1::CheckpointSnapshot& snapshot : bundle.point.point.snapshots()) {
@@ -346,8 +347,9 @@ void Durability::put_in_folder(const std::string& simulation, const StoredBundle
       folder_->write_snapshot(id, snapshot.number(), state->second);
     }
     folder_->write_point(id, bundle.point);
-    read_one(id);
+    stored = read_one(id);
   });
+  add_suspended(id, std::move(stored));
   log_.created({simulation, bundle.model.head.owner()}, bundle.point.point.info().display_name(),
                "");
 }
