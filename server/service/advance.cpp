@@ -37,8 +37,7 @@ void Advance::run(const Progress& progress) {
 }
 
 void Advance::run_slices(const Progress& progress) {
-  const bool coupled = parts_.deck_sockets || !parts_.coupler.ports().empty();
-  while (!(coupled ? run_coupled_step() : run_slice())) {
+  while (!(is_coupled() ? run_coupled_step() : run_slice())) {
     wait_for_subscribers();
     pace_.wait(token_, progress);
     if (progress) progress();
@@ -46,6 +45,8 @@ void Advance::run_slices(const Progress& progress) {
   pace_.wait(token_, progress);
   while (must_wait()) wait_for_subscribers();
 }
+
+bool Advance::is_coupled() const { return parts_.deck_sockets || !parts_.coupler.ports().empty(); }
 
 // What was done stays, and a repeat of the request goes on from there.
 void Advance::break_off() {
@@ -78,6 +79,7 @@ void Advance::begin() {
     parts_.variables.write(request_.inputs(), parts_.simulation);
     parts_.storage.note_change();
     if (request_.inputs().handles_size() > 0) journal_.note();
+    if (parts_.recorder || is_coupled()) journal_.settle(parts_.simulation);  // others see them
     news_.inputs(request_.inputs());
   }
   started_ = true;
@@ -116,7 +118,10 @@ bool Advance::may_write() {
 bool Advance::run_slice() {
   const Guard lock(parts_.lock);
   begin();
-  if (must_wait()) return false;
+  if (must_wait()) {
+    journal_.settle(parts_.simulation);
+    return false;
+  }
   if (wants_more() && !step_for_a_while()) {
     journal_.settle(parts_.simulation);
     return false;

@@ -52,6 +52,7 @@ class Advance {
  private:
   void run_slices(const Progress& progress);
   void break_off();
+  bool is_coupled() const;
   bool must_wait() const;
   void wait_for_subscribers();
   void begin() TS_REQUIRES(parts_.lock);

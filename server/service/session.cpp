@@ -64,7 +64,7 @@ Session::Session(Identity identity, Origin origin, std::unique_ptr<Simulation> s
                options.optional_ports()) {
   check_grants(options.grants());
   status_.set_display_name(identity_.display_name);
-  set_policy(options.non_convergence_policy(), minimum_in(options));
+  set_policy(policy_of(options.non_convergence_policy(), minimum_in(options)));
   status_.publish(*simulation_);
   if (recorder_) start_record(options);
   if (results_) results_->keep();
@@ -96,7 +96,7 @@ void Session::start_record(const v1::CreateOptions& options) {
 
 // ------------------------------------------------------------------ choices
 
-void Session::set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum) {
+StepPolicy Session::policy_of(v1::NonConvergencePolicy kind, std::optional<double> minimum) {
   if (!v1::NonConvergencePolicy_IsValid(kind))
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`non_convergence_policy` is unknown to this server");
   if (minimum && (!(*minimum > 0) || std::isinf(*minimum)))
@@ -108,8 +108,22 @@ void Session::set_policy(v1::NonConvergencePolicy kind, std::optional<double> mi
                 : kind == v1::NON_CONVERGENCE_POLICY_ACCEPT_FLAGGED ? StepPolicy::accept
                                                                     : StepPolicy::fail;
   policy.minimum = minimum.value_or(0);
+  return policy;
+}
+
+void Session::set_policy(const StepPolicy& policy) {
   simulation_->set_policy(policy);
   status_.set_policy(policy);
+}
+
+StepPolicy Session::changed_policy(const v1::UpdateSimulationRequest& request) const {
+  const StepPolicy now = simulation_->policy();
+  if (!request.has_non_convergence_policy() && !request.has_minimum_step_size()) return now;
+  std::optional<double> minimum = minimum_in(request);
+  if (!minimum && now.minimum > 0) minimum = now.minimum;
+  return policy_of(
+      request.has_non_convergence_policy() ? request.non_convergence_policy() : to_proto(now),
+      minimum);
 }
 
 void Session::update(const v1::UpdateSimulationRequest& request, const Caller& caller,
@@ -121,18 +135,24 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Caller& c
   check_display_name(request.display_name());  // before anything changes
   if (request.has_grants()) check_grants(request.grants().grants());
   const CallGuard lock(lock_, call);
+  Draft draft{status_.view(), request.has_grants() ? request.grants().grants() : grants_.list()};
+  draft.view.policy = changed_policy(request);
+  if (request.has_display_name()) draft.view.display_name = request.display_name();
+  fill(draft.view, reply->mutable_simulation());
+  if (grants_.allow(caller, Access::own))
+    *reply->mutable_simulation()->mutable_grants() = draft.grants;
   storage_.note_change();
-  const StepPolicy now = simulation_->policy();
-  std::optional<double> minimum = minimum_in(request);
-  if (!minimum && now.minimum > 0) minimum = now.minimum;
-  if (request.has_non_convergence_policy() || request.has_minimum_step_size())
-    set_policy(
-        request.has_non_convergence_policy() ? request.non_convergence_policy() : to_proto(now),
-        minimum);
-  if (request.has_grants()) grants_.replace(request.grants().grants());
-  if (request.has_display_name()) status_.set_display_name(request.display_name());
-  fill(reply->mutable_simulation(), caller);
-  storage_.store_change(*simulation_, turn, *reply);
+  draft_ = draft;
+  try {
+    storage_.store_change(*simulation_, turn, *reply);
+  } catch (...) {
+    draft_.reset();
+    throw;
+  }
+  draft_.reset();
+  set_policy(draft.view.policy);
+  grants_.replace(draft.grants);
+  status_.set_display_name(draft.view.display_name);
 }
 
 void Session::check_grants(const Grants::List& grants) const {
@@ -170,8 +190,9 @@ v1::SimulationState phase_of(const SessionStatus::View& view) {
 
 v1::SimulationState Session::phase() const { return phase_of(status_.view()); }
 
-void Session::fill(v1::SimulationInfo* out) const {
-  const SessionStatus::View p = status_.view();
+void Session::fill(v1::SimulationInfo* out) const { fill(status_.view(), out); }
+
+void Session::fill(const SessionStatus::View& p, v1::SimulationInfo* out) const {
   out->set_name(identity_.id);
   out->set_display_name(p.display_name);
   if (const UnitSystem* units = find_part<UnitSystem>(*model_))

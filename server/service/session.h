@@ -177,10 +177,19 @@ class Session {
   Advance::Parts advance_parts() TS_NO_THREAD_SAFETY_ANALYSIS;
   void go_to(const State& state, const Call& call, std::int64_t results_until);
   void check(const v1::StepRequest& request) const;
-  void set_policy(v1::NonConvergencePolicy kind, std::optional<double> minimum) TS_REQUIRES(lock_);
+  /// What `update` changes, while nobody but its caller may see it.
+  struct Draft {
+    SessionStatus::View view;
+    Grants::List grants;
+  };
+  static StepPolicy policy_of(v1::NonConvergencePolicy kind, std::optional<double> minimum);
+  void set_policy(const StepPolicy& policy) TS_REQUIRES(lock_);
+  StepPolicy changed_policy(const v1::UpdateSimulationRequest& request) const TS_REQUIRES(lock_);
+  void fill(const SessionStatus::View& view, v1::SimulationInfo* out) const;
   void start_record(const v1::CreateOptions& options) TS_REQUIRES(lock_);
   void check_grants(const Grants::List& grants) const;
-  void fill_stored(const Simulation& simulation, v1::SimulationInfo* out) const;
+  void fill_stored(const Simulation& simulation, v1::SimulationInfo* out) const
+      TS_NO_THREAD_SAFETY_ANALYSIS;  // called by the storage, under the lock
   void require_usable() const;
   void require_way_back() const;
   State state_at_rest(const Call& call, std::int64_t* step);
@@ -206,6 +215,7 @@ class Session {
   FairMutex lock_;                                 // protects all below
   const std::unique_ptr<SessionResults> results_;  // null: none are written; outlives its writer
   SessionStorage storage_;
+  std::optional<Draft> draft_ TS_GUARDED_BY(lock_);  ///< while it is being stored
   const std::unique_ptr<Simulation> simulation_ TS_PT_GUARDED_BY(lock_);
   const std::unique_ptr<DeckSockets> deck_sockets_;  // null: none are served
   const std::unique_ptr<Recorder> recorder_;         // thread-safe; null: nothing is recorded

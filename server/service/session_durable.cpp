@@ -6,8 +6,8 @@
 namespace mbcosim::server {
 
 void Session::fill_stored(const Simulation& simulation, v1::SimulationInfo* out) const {
-  fill(out);
-  *out->mutable_grants() = grants_.list();
+  fill(draft_ ? draft_->view : status_.view(), out);
+  *out->mutable_grants() = draft_ ? draft_->grants : grants_.list();
   out->set_state(v1::SIMULATION_STATE_SUSPENDED);
   out->set_step(simulation.step_number());
   out->set_time(simulation.time());
@@ -36,8 +36,9 @@ void Session::take_over(const v1::CheckpointPoint& point,
   storage_.take_over(point);
   coupler_.take_over(point.ports());
   const v1::SimulationInfo& info = point.info();
-  set_policy(info.non_convergence_policy(),
-             info.has_minimum_step_size() ? std::optional(info.minimum_step_size()) : std::nullopt);
+  set_policy(policy_of(info.non_convergence_policy(), info.has_minimum_step_size()
+                                                          ? std::optional(info.minimum_step_size())
+                                                          : std::nullopt));
   grants_.replace(info.grants());
   if (!info.last_failure().empty()) status_.remember_failure(info.last_failure());
   for (const v1::CheckpointSnapshot& snapshot : point.snapshots()) {

@@ -342,6 +342,30 @@ def test_a_full_disk_takes_steps_back_and_loses_nothing(start):
         assert bits(server.attach(name)) == after
 
 
+def test_an_update_that_cannot_be_stored_changes_nothing(start):
+    daemon = start("--checkpoint-interval", "3600")
+    limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal", name="first")
+        simulation.step(10)
+        before = simulation.refresh()
+        change = dict(name="second", policy="cut_step", minimum_step=1e-5, grants=[mbcosim.grant("token:x", "observe")])
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (100, limits[1]))
+        with pytest.raises(mbcosim.LimitExceeded) as caught:
+            simulation.update(**change)
+        assert caught.value.reason == "STORAGE_FULL"
+        assert simulation.refresh() == before
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, limits)
+        simulation.update(**change)
+        after = simulation.refresh()
+        assert after.display_name == "second" and len(after.grants) == 1
+    daemon.kill()
+    with start().connect() as server:
+        again = server.attach(simulation.name)
+        again.read(["step"])
+        assert again.refresh() == after
+
+
 def test_a_change_that_could_not_be_stored_is_no_success_when_it_is_asked_for_again(start):
     daemon = start("--checkpoint-interval", "3600")
     limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
