@@ -52,6 +52,7 @@ void Session::go_to(const State& state, const Call& call, std::int64_t results_u
   if (!status) throw Refusal(results_ ? results_->without_paths(status.error()) : status.error());
   if (results_) snapshots_.results_end_at(results_->end());
   coupler_.reset();
+  storage_.remember(coupler_.memory());
   if (recorder_) recorder_->restored(simulation_->step_number(), simulation_->time());
   storage_.note_change();
   const SessionStatus::View before = status_.view();

@@ -180,6 +180,32 @@ def test_kills_with_a_peer_lose_nothing_that_it_was_told(start, options):
         assert due > 5 and bits(straight) == bits(again)
 
 
+@pytest.mark.parametrize("go_back", [lambda simulation, saved: saved.restore(), lambda simulation, saved: simulation.reset()], ids=["restore", "reset"])
+def test_a_peer_is_asked_anew_after_a_restore_and_a_kill(start, go_back):
+    daemon = start("--checkpoint-interval", "3600")
+    with daemon.connect() as server:
+        simulation = coupled(server, "journal")
+        saved = simulation.snapshot()
+        with Spring(mode="loose").couple(simulation):
+            simulation.step()
+        go_back(simulation, saved)
+    daemon.kill()
+    asked = []
+
+    def pushing(motion):
+        asked.append(motion.step)
+        return [np.array([0.0, 3.0, 0.0])]
+    with start().connect() as server:
+        again = server.attach(simulation.name)
+        with again.couple("spring", pushing, mode="loose"):
+            again.step()
+        assert asked == [0]
+        straight = coupled(server, "none")
+        with straight.couple("spring", pushing, mode="loose"):
+            straight.step()
+        assert bits(straight) == bits(again)
+
+
 def is_finished(event):
     return event.state_changed.state == pb.SIMULATION_STATE_FINISHED
 
