@@ -10,8 +10,6 @@
 namespace mbcosim::client {
 namespace {
 
-constexpr double kPartingSeconds = 2;  // for the server to end the stream: then the port is free
-
 v1::CouplingMode to_proto(Mode mode) {
   switch (mode) {
     case Mode::loose:

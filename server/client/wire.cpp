@@ -13,7 +13,6 @@ namespace {
 
 constexpr std::size_t kLongestMessage = std::size_t{1} << 30;
 constexpr int kBoundSeconds = 5;                 // of the handshake
-constexpr int kPartingSeconds = 2;               // of the server's last words
 constexpr auto kLook = std::chrono::seconds(1);  // rounds of an endless wait
 
 class GrpcWire : public Wire {

@@ -9,6 +9,8 @@
 
 namespace mbcosim::client {
 
+constexpr int kPartingSeconds = 2;  ///< for the server to end a stream that is closed
+
 /// One thread reads, one writes or parts, any cancels.
 class Wire {
  public:

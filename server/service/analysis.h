@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "rpc/call.h"
 #include "service/reply_pages.h"
 #include "service/variable_access.h"
 
