@@ -68,7 +68,10 @@ void Durability::start(const Parts& parts) {
                           [this](Session& session) { return suspend(session); },
                           [this](const auto& name) { unsuspend(name); },
                           [this](Session& session) { forget(session); },
-                          [this](Session& session) { store(session); }});
+                          [this](Session& session) { store(session); },
+                          [this](Session& session, CapturedPoint captured) {
+                            store_ahead(session, std::move(captured));
+                          }});
   thread_ = std::thread([this] { loop(); });
 }
 
@@ -168,6 +171,7 @@ StoredPoint Durability::read_latest(const std::string& id) const {
     latest.point.set_changes(entry.changes());
     *latest.point.mutable_info() = entry.info();
     *latest.point.mutable_ports() = entry.ports();
+    latest.point.clear_results_until_step();
     keep_replies(entry, &latest.point);
     latest.state = std::move(stored.state);
   });
@@ -253,11 +257,21 @@ void Durability::write(Session& session) {
   write_held(session, keeping);
 }
 
+void Durability::store_ahead(Session& session, CapturedPoint captured) try {
+  Keeping& keeping = *session.keeping();
+  if (!keeping.over) write_captured(session, keeping, std::move(captured));
+} catch (const StorageError& error) {
+  refuse_storage("the state to restore cannot be stored", error);
+}
+
 void Durability::write_held(Session& session, Keeping& keeping) {
+  if (keeping.over || session.has_failed()) return;
+  write_captured(session, keeping, session.capture());
+}
+
+void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoint captured) {
   const auto begin = std::chrono::steady_clock::now();
   const std::string id = id_of(session.identity().id);
-  if (keeping.over || session.has_failed()) return;
-  CapturedPoint captured = session.capture();
   const MemoryShare share(
       memory_of(session),
       2 * (size_of(captured.state) + static_cast<std::int64_t>(captured.point.ByteSizeLong())));

@@ -89,9 +89,11 @@ class Durability {
   SessionPtr revive(const std::string& simulation, const std::string& owner, Call& call);
   SessionPtr session_of(StoredModel& model, const StoredPoint& point, MemoryBudget& memory);
   std::unique_ptr<Simulation> simulation_at(const ModelPtr& model, TimeKeeping time_keeping,
-                                            const std::string& state, SessionResults* results,
+                                            const StoredPoint& stored, SessionResults* results,
                                             bool has_files);
   void write_held(Session& session, Keeping& keeping) TS_REQUIRES(keeping.mutex);
+  void write_captured(Session& session, Keeping& keeping, CapturedPoint captured)
+      TS_REQUIRES(keeping.mutex);
   void put_in_folder(const std::string& simulation, const StoredBundle& bundle);
   void write_snapshots(Session& session, Keeping& keeping, const std::string& id,
                        v1::CheckpointPoint& point) TS_REQUIRES(keeping.mutex);
@@ -107,6 +109,8 @@ class Durability {
                                         const v1::CreateOptions& options) const;
   StoredPoint read_latest(const std::string& id) const;
   void store(Session& session);
+  void store_ahead(Session& session, CapturedPoint captured)
+      TS_NO_THREAD_SAFETY_ANALYSIS;  // the call has the keeping's mutex
   void read_folder();
   Suspended read_one(const std::string& id) const;
   void add_suspended(const std::string& id, Suspended found) TS_EXCLUDES(mutex_);

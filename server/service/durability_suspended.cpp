@@ -226,8 +226,7 @@ SessionPtr Durability::session_of(StoredModel& model, const StoredPoint& point,
     results = std::make_unique<SessionResults>(parts_->results, head.simulation(),
                                                head.options().results(),
                                                config_.limits.results_bytes, &has_files);
-  auto simulation =
-      simulation_at(deck.model, time_keeping(head), point.state, results.get(), has_files);
+  auto simulation = simulation_at(deck.model, time_keeping(head), point, results.get(), has_files);
   Session::Origin origin{deck.model,
                          std::move(deck.symbols),
                          time_keeping(head),
@@ -242,14 +241,15 @@ SessionPtr Durability::session_of(StoredModel& model, const StoredPoint& point,
 
 std::unique_ptr<Simulation> Durability::simulation_at(const ModelPtr& model,
                                                       TimeKeeping time_keeping,
-                                                      const std::string& state,
+                                                      const StoredPoint& stored,
                                                       SessionResults* results, bool has_files) {
   auto simulation = Simulation::create(model, nullptr, nullptr, time_keeping);
   if (!simulation) throw Refusal(simulation.error());
-  if (const Status status = (*simulation)->import_state(state); !status)
+  if (const Status status = (*simulation)->import_state(stored.state); !status)
     throw Refusal(status.error());
   if (!results) return std::move(*simulation);
   const auto writer = results->start(*model);
+  if (stored.point.has_results_until_step()) results->expect(stored.point.results_until_step());
   const Status goes_on =
       has_files ? (*simulation)->resume_writing(writer) : (*simulation)->write_to(writer);
   if (!goes_on) throw Refusal(results->without_paths(goes_on.error()));

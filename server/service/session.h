@@ -23,6 +23,8 @@ namespace mbcosim::server {
 
 class RowTable;
 
+class SessionStore;
+
 /// What a checkpoint holds, the states of snapshots apart.
 struct CapturedPoint {
   v1::CheckpointPoint point;
@@ -101,13 +103,14 @@ class Session {
                    v1::ComputeEigenvaluesReply* reply);
 
   void save(const std::string& display_name, const Call& call, v1::Snapshot* out);
-  void restore(int snapshot, const Call& call);
+  void restore(int snapshot, const Call& call, const SessionStore& store);
   void forget(int snapshot);
-  void reset(const Call& call, const CancelToken& cancel);  ///< to the initial solution
+  /// To the initial solution.
+  void reset(const Call& call, const SessionStore& store, const CancelToken& cancel);
   SnapshotShelf& snapshots() { return snapshots_; }
   std::string export_state(int snapshot, const Call& call);  ///< negative: the current state
   void import_state(const std::string& bytes, const std::string& display_name, bool also_restore,
-                    const Call& call, v1::Snapshot* out);
+                    const Call& call, const SessionStore& store, v1::Snapshot* out);
   /// `snapshot`: negative: the current state. Throws CANCELLED.
   std::unique_ptr<Simulation> fork(int snapshot, const Call& call, const CancelToken& cancel);
   State state(const Call& call);  ///< a copy
@@ -175,7 +178,11 @@ class Session {
 
  private:
   Advance::Parts advance_parts() TS_NO_THREAD_SAFETY_ANALYSIS;
-  void go_to(const State& state, const Call& call, std::int64_t results_until);
+  void go_to(const State& state, const Call& call, const SessionStore& store,
+             std::int64_t results_until);
+  void store_ahead(const State& state, const SessionStore& store, std::int64_t results_until)
+      TS_REQUIRES(lock_);
+  CapturedPoint capture_held() TS_REQUIRES(lock_);
   void check(const v1::StepRequest& request) const;
   /// What `update` changes, while nobody but its caller may see it.
   struct Draft {

@@ -17,8 +17,12 @@ void Session::fill_stored(const Simulation& simulation, v1::SimulationInfo* out)
 }
 
 CapturedPoint Session::capture() {
-  CapturedPoint captured;
   const Guard lock(lock_);
+  return capture_held();
+}
+
+CapturedPoint Session::capture_held() {
+  CapturedPoint captured;
   storage_.capture(*simulation_, &captured.point, &captured.journal_end);
   captured.changes = captured.point.changes();
   snapshots_.describe(&captured.point);

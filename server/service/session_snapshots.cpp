@@ -1,10 +1,27 @@
 /// The part of Session that saves, restores and copies its state.
+#include <algorithm>
+
 #include "model/inverse_problem.h"
 #include "service/display_name.h"
-#include "service/session.h"
+#include "service/session_store.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
+namespace {
+
+// Captured after the step to which the session goes, before all else of it follows.
+void tell_of_arrival(std::int64_t results_until, v1::CheckpointPoint* point) {
+  point->set_results_until_step(results_until);
+  point->mutable_info()->clear_last_failure();
+  for (v1::CheckpointSnapshot& snapshot : *point->mutable_snapshots())
+    snapshot.set_agrees_until_step(std::min(snapshot.agrees_until_step(), results_until));
+  for (v1::CheckpointPort& port : *point->mutable_ports()) {
+    port.clear_answered_for_step();
+    port.clear_answers();
+  }
+}
+
+}  // namespace
 
 void Session::save(const std::string& display_name, const Call& call, v1::Snapshot* out) {
   require_usable();
@@ -16,15 +33,15 @@ void Session::save(const std::string& display_name, const Call& call, v1::Snapsh
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
 }
 
-void Session::restore(int snapshot, const Call& call) {
+void Session::restore(int snapshot, const Call& call, const SessionStore& store) {
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
   require_way_back();
-  go_to(snapshots_.get(snapshot), call, results_ ? snapshots_.agrees_until(snapshot) : 0);
+  go_to(snapshots_.get(snapshot), call, store, results_ ? snapshots_.agrees_until(snapshot) : 0);
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
                        status_.view().step);
 }
 
-void Session::reset(const Call& call, const CancelToken& cancel) {
+void Session::reset(const Call& call, const SessionStore& store, const CancelToken& cancel) {
   constexpr std::int64_t kNothing = -1, kInitialSolution = 0;
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
   require_way_back();
@@ -33,11 +50,12 @@ void Session::reset(const Call& call, const CancelToken& cancel) {
     return Simulation::create(origin_.model, &cancel, /*writer=*/nullptr, origin_.time_keeping);
   });
   if (!fresh) throw Refusal(fresh.error());
-  go_to((*fresh)->state(), call, origin_.forked ? kNothing : kInitialSolution);
+  go_to((*fresh)->state(), call, store, origin_.forked ? kNothing : kInitialSolution);
 }
 
 // `results_until`: the state shares its history with the result files up to this step.
-void Session::go_to(const State& state, const Call& call, std::int64_t results_until) {
+void Session::go_to(const State& state, const Call& call, const SessionStore& store,
+                    std::int64_t results_until) {
   if (!status_.claim(nullptr))
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; restore when it has ended");
@@ -46,6 +64,7 @@ void Session::go_to(const State& state, const Call& call, std::int64_t results_u
     ~Release() { status.release(); }
   } const release{status_};
   const CallGuard lock(lock_, call);
+  if (results_ && storage_.keeping()) store_ahead(state, store, results_until);
   if (results_) results_->expect(results_until);
   const auto status = simulation_->restore(state);
   if (results_) results_->restored();
@@ -60,6 +79,27 @@ void Session::go_to(const State& state, const Call& call, std::int64_t results_u
   status_.publish(*simulation_);
   if ((before.failed || before.finished) && !simulation_->finished())
     shared_.log.state_changed(subject(), v1::SIMULATION_STATE_READY, simulation_->step_number());
+}
+
+// The result files are cut when the state is on the disk: until then a restart goes on from one
+// that needs all that is in them.
+void Session::store_ahead(const State& state, const SessionStore& store,
+                          std::int64_t results_until) {
+  const State before = simulation_->snapshot();
+  results_->expect(results_until);
+  results_->only_try();
+  if (const Status status = simulation_->restore(state); !status)
+    throw Refusal(results_->without_paths(status.error()));
+  try {
+    CapturedPoint captured = capture_held();
+    tell_of_arrival(results_until, &captured.point);
+    store.put_ahead_on_disk(*this, std::move(captured));
+  } catch (...) {
+    results_->only_try();
+    if (const Status status = simulation_->restore(before); !status)
+      status_.fail(status.error().message);
+    throw;
+  }
 }
 
 void Session::forget(int snapshot) {
@@ -119,7 +159,8 @@ std::string Session::export_state(int snapshot, const Call& call) {
 }
 
 void Session::import_state(const std::string& bytes, const std::string& display_name,
-                           bool also_restore, const Call& call, v1::Snapshot* out) {
+                           bool also_restore, const Call& call, const SessionStore& store,
+                           v1::Snapshot* out) {
   if (also_restore) require_way_back();
   check_display_name(display_name);
   std::int64_t results_end = 0;  // an imported state is taken for one of this history so far
@@ -132,7 +173,7 @@ void Session::import_state(const std::string& bytes, const std::string& display_
   const int number = snapshots_.add(std::move(*state), display_name, out, results_end);
   storage_.note_change();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
-  if (also_restore) restore(number, call);
+  if (also_restore) restore(number, call, store);
 }
 
 }  // namespace mbcosim::server

@@ -39,7 +39,7 @@ class SnapshotImport final : public Upload<v1::ImportSnapshotRequest> {
     const auto import = [this](Session& session, const v1::ImportSnapshotHeader&,
                                v1::ImportSnapshotReply* out, const CallFrame& frame) {
       session.import_state(bytes_, header_.display_name(), header_.restore(), frame.call,
-                           out->mutable_snapshot());
+                           parts_.store, out->mutable_snapshot());
     };
     once_stored(parts_.store, **session_, frame_of(exchange, share_), question(), &reply, import);
     exchange.end(serialized(reply));
@@ -107,19 +107,20 @@ void add_saved(Gate& gate, const Parts& parts) {
                parts, Role::observe, Lane::work, [](Session& session, const auto&, auto* reply) {
                  session.snapshots().list(reply);
                }));
-  gate.add(simulations_path("RestoreSnapshot"),
-           on_session<v1::RestoreSnapshotRequest, v1::RestoreSnapshotReply>(
-               parts, Role::control, Lane::work,
-               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
-                 session.restore(snapshot_in(request), frame.call);
-                 session.fill(reply->mutable_simulation(), frame.caller);
-               }));
+  gate.add(
+      simulations_path("RestoreSnapshot"),
+      on_session<v1::RestoreSnapshotRequest, v1::RestoreSnapshotReply>(
+          parts, Role::control, Lane::work,
+          [&parts](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+            session.restore(snapshot_in(request), frame.call, parts.store);
+            session.fill(reply->mutable_simulation(), frame.caller);
+          }));
   gate.add(simulations_path("ResetSimulation"),
            on_session<v1::ResetSimulationRequest, v1::ResetSimulationReply>(
                parts, Role::control, Lane::heavy,
-               [](Session& session, const auto&, auto* reply, const CallFrame& frame) {
+               [&parts](Session& session, const auto&, auto* reply, const CallFrame& frame) {
                  const CallToken token(frame.call);
-                 session.reset(frame.call, token);
+                 session.reset(frame.call, parts.store, token);
                  session.fill(reply->mutable_simulation(), frame.caller);
                }));
   gate.add(simulations_path("DeleteSnapshot"),
@@ -140,13 +141,14 @@ void add_snapshots(Gate& gate, const Parts& parts) {
                }));
   gate.add(simulations_path("ImportSnapshot"),
            stream(Role::control, [&parts] { return std::make_unique<SnapshotImport>(parts); }));
-  gate.add(simulations_path("ImportSnapshotInline"),
-           on_session<v1::ImportSnapshotInlineRequest, v1::ImportSnapshotInlineReply>(
-               parts, Role::control, Lane::work,
-               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
-                 session.import_state(request.data(), request.display_name(), request.restore(),
-                                      frame.call, reply->mutable_snapshot());
-               }));
+  gate.add(
+      simulations_path("ImportSnapshotInline"),
+      on_session<v1::ImportSnapshotInlineRequest, v1::ImportSnapshotInlineReply>(
+          parts, Role::control, Lane::work,
+          [&parts](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
+            session.import_state(request.data(), request.display_name(), request.restore(),
+                                 frame.call, parts.store, reply->mutable_snapshot());
+          }));
   gate.add(simulations_path("GetRecord"),
            series<v1::GetRecordRequest, v1::GetRecordReply>(
                Role::observe, Lane::work, [&parts](const CallFrame& frame, const auto& request) {

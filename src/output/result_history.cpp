@@ -169,12 +169,14 @@ void ResultHistory::resume(const Model& model) {
 
 Status ResultHistory::restored(const EvalContext& context) {
   const std::int64_t expected = std::exchange(expected_, kOwn);
+  const bool only_try = std::exchange(only_try_, false);
   const std::int64_t target = context.state->step, common = std::min(target, expected);
   const Mark mark = step_ <= common ? mark_now() : find(common);
   if (mark.positions.empty())
     return make_error(
         ErrorKind::data_loss, "RESULTS_CUT_SHORT",
         "the result files have nothing of step " + std::to_string(common) + " or before");
+  if (only_try) return ok();
   if (auto status = go_back(mark, context); !status) return status;
   if (mark.step < target)
     writer_->note("# Goes on after step " + std::to_string(target) +

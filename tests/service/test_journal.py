@@ -269,24 +269,94 @@ def test_changes_of_every_kind_outlive_a_kill(start):
         assert [(s.display_name, s.step) for s in again.snapshots()] == [("seven", 7)]
 
 
-def test_results_go_on_from_what_the_journal_tells(start, tmp_path):
+def with_results(tmp_path):
     root = tmp_path / "results"
     root.mkdir()
-    options = ("--results-root", str(root), "--checkpoint-interval", "3600")
+    return "--results-root", str(root)
+
+
+def load_with_results(server, durability):
+    return server.load_text(deck(), durability=durability, results="text", summed_time=True)
+
+
+def files_of(simulation):
+    return {file: simulation.result_file(file) for file in simulation.result_files()}
+
+
+def check_results_at(step, server, simulation):
+    """They are those of one run to there."""
+    simulation.step(step - step_of(server, simulation.name))
+    with load_with_results(server, "none") as straight:
+        straight.step(step)
+        assert files_of(straight) == files_of(simulation)
+
+
+def test_results_go_on_from_what_the_journal_tells(start, tmp_path):
+    options = (*with_results(tmp_path), "--checkpoint-interval", "3600")
     daemon = start(*options)
     with daemon.connect() as server:
-        simulation = server.load_text(deck(), durability="journal", results="text", summed_time=True)
-        name = simulation.name
+        simulation = load_with_results(server, "journal")
         for _ in range(20):
             simulation.step(3)
     daemon.kill()
     with start(*options).connect() as server:
-        again = server.attach(name)
-        again.step(40)
-        with server.load_text(deck(), durability="none", results="text", summed_time=True) as straight:
-            straight.step(100)
-            for file in straight.result_files():
-                assert straight.result_file(file) == again.result_file(file), file
+        check_results_at(100, server, server.attach(simulation.name))
+
+
+@pytest.mark.parametrize("durability", ["checkpoint", "journal"])
+def test_kills_in_restores_lose_no_results(start, tmp_path, durability):
+    rolls, options = random.Random(23), (*with_results(tmp_path), "--checkpoint-interval", "0.02")
+    daemon = start(*options)
+    with daemon.connect() as server:
+        name = load_with_results(server, durability).name
+        server.attach(name).snapshot()
+    for _ in range(KILLS):
+        with daemon.connect() as server:
+            simulation = server.attach(name)
+            saved, = simulation.snapshots() or [simulation.snapshot()]  # CHECKPOINT may not have it yet
+            killer = threading.Timer(rolls.uniform(0.05, 0.2), daemon.kill)
+            killer.start()
+            try:
+                while True:
+                    server.simulations.Step(pb.StepRequest(simulation=name, steps=7))
+                    server.simulations.RestoreSnapshot(pb.RestoreSnapshotRequest(simulation=name, snapshot=saved.name))
+            except LOST:
+                killer.join()
+        daemon = start(*options)
+        with daemon.connect() as server:
+            again = server.attach(name)
+            again.read(["step"])
+            assert b"# Goes on after" not in again.result_file("results.out")
+    with daemon.connect() as server:
+        check_results_at(100, server, server.attach(name))
+
+
+@pytest.mark.parametrize("durability", ["checkpoint", "journal"])
+def test_a_restore_that_cannot_be_stored_changes_nothing(start, tmp_path, durability):
+    options = (*with_results(tmp_path), "--checkpoint-interval", "3600")
+    daemon = start(*options)
+    limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
+    with daemon.connect() as server:
+        simulation = load_with_results(server, durability)
+        simulation.step(5)
+        saved = simulation.snapshot()
+        simulation.step(7)
+        before, files = (bits(simulation), simulation.refresh()), files_of(simulation)
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (100, limits[1]))
+        for act in (saved.restore, simulation.reset):
+            with pytest.raises(mbcosim.LimitExceeded) as caught:
+                act()
+            assert caught.value.reason == "STORAGE_FULL"
+        assert (bits(simulation), simulation.refresh()) == before
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, limits)
+        assert files_of(simulation) == files
+        simulation.step(8)
+        saved.restore()
+    daemon.kill()
+    with start(*options).connect() as server:
+        again = server.attach(simulation.name)
+        assert step_of(server, simulation.name) == 5
+        check_results_at(100, server, again)
 
 
 def test_the_last_64_replies_are_kept(start):
