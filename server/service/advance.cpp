@@ -290,12 +290,12 @@ void Advance::tell(const StepReport& report) {
 void Advance::fail(v1::StepOutcome outcome, v1::Reason reason, const std::string& why) {
   const double end = parts_.simulation.time() + length_of(choice_, parts_.simulation);
   account_.fail(outcome, reason, why, parts_.simulation.step_number() + 1, end);
-  news_.failed(account_.reply(), parts_.simulation);
+  end_ = End::failed;
 }
 
 void Advance::interrupt() {
   account_.end(v1::STEP_OUTCOME_INTERRUPTED);
-  news_.unsolved(parts_.simulation);
+  end_ = End::unsolved;
 }
 
 // The reply is complete.
@@ -305,8 +305,14 @@ void Advance::conclude() {
   parts_.storage.rest();
   const bool stored = journal_.has_unsettled();
   journal_.settle(parts_.simulation, /*whole=*/true);
+  tell_end();
   turn_.keep(account_.reply(), stored || !parts_.storage.has_journal());
   if (turn_.has_id()) parts_.storage.note_change();
+}
+
+void Advance::tell_end() {
+  if (end_ == End::unsolved) news_.unsolved(parts_.simulation);
+  if (end_ == End::failed) news_.failed(account_.reply(), parts_.simulation);
 }
 
 }  // namespace mbcosim::server

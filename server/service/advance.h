@@ -50,6 +50,8 @@ class Advance {
   std::int64_t factorizations() const { return solver_.factorizations(); }
 
  private:
+  enum class End { solved, unsolved, failed };
+
   void run_slices(const Progress& progress);
   void break_off();
   bool is_coupled() const;
@@ -74,6 +76,7 @@ class Advance {
       TS_REQUIRES(parts_.lock);
   void interrupt() TS_REQUIRES(parts_.lock);
   void conclude() TS_REQUIRES(parts_.lock);
+  void tell_end() TS_REQUIRES(parts_.lock);
   StepSlot take_slot() const;
 
   const Parts parts_;
@@ -88,6 +91,7 @@ class Advance {
   CountedSolver solver_;
   StepChoice choice_;  ///< of the next step
   bool started_ = false;
+  End end_ = End::solved;  ///< of the last step; told when all before it is on the disk
 };
 
 }  // namespace mbcosim::server

@@ -359,6 +359,29 @@ def test_a_restore_that_cannot_be_stored_changes_nothing(start, tmp_path, durabi
         check_results_at(100, server, again)
 
 
+def test_an_end_that_cannot_be_stored_is_not_told(start, folder, tmp_path):
+    """The steps before it, of the same call, are not on the disk either."""
+    quota = 60_000
+    daemon = start(*with_results(tmp_path), "--checkpoint-interval", "3600")
+    limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal", results="text", results_quota=quota)
+        simulation.step(5)
+        journal, = entries(folder, simulation.name)
+        while journal.stat().st_size <= quota:
+            simulation.update(name=f"{journal.stat().st_size} bytes")
+        before = simulation.refresh()
+        with server.events(simulation.name) as events:
+            resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (journal.stat().st_size, limits[1]))
+            with pytest.raises(mbcosim.LimitExceeded) as caught:
+                simulation.step(4000)  # until the quota is used up
+            assert caught.value.reason == "STORAGE_FULL"
+            assert simulation.refresh() == before
+            resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, limits)
+            simulation.snapshot()
+            assert is_saved(next(event for event in events if event.WhichOneof("content") in ("snapshot", "step_failed")))
+
+
 def test_the_last_64_replies_are_kept(start):
     daemon = start("--checkpoint-interval", "3600")
     with daemon.connect() as server:
