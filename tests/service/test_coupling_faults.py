@@ -9,7 +9,7 @@ import time
 import pytest
 
 import mbcosim
-from conftest import TIME_FACTOR, Daemon, leaves_no_thread, wait_for
+from conftest import TIME_FACTOR, Daemon, leaves_no_thread, stop, wait_for
 from relay import BlackHole, Unreliable
 from test_coupling import PORT, oscillator, spring
 
@@ -168,8 +168,10 @@ def test_daemon(tmp_path_factory, tmp_path, blow, when):
     start = time.monotonic()
     if blow == "black hole":
         hole.fall_silent()
+    elif blow == "stop":
+        stop(daemon.process.pid)
     else:
-        daemon.process.send_signal({"kill": signal.SIGKILL, "stop": signal.SIGSTOP, "close": signal.SIGTERM}[blow])
+        daemon.process.send_signal({"kill": signal.SIGKILL, "close": signal.SIGTERM}[blow])
     if blow == "close":
         assert daemon.process.wait(10) == 0
     client.join(5)
