@@ -46,7 +46,7 @@ void Session::take_over(const v1::CheckpointPoint& point,
   grants_.replace(info.grants());
   if (!info.last_failure().empty()) status_.remember_failure(info.last_failure());
   for (const v1::CheckpointSnapshot& snapshot : point.snapshots()) {
-    auto state = state_from_bytes(snapshots.at(snapshot.number()), model_->digest);
+    auto state = simulation_->state_of(snapshots.at(snapshot.number()));
     if (!state) throw Refusal(state.error());
     snapshots_.put(snapshot, std::move(*state));
   }

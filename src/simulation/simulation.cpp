@@ -31,10 +31,20 @@ Error another_model() {
                     "the state belongs to another model: its layout differs");
 }
 
+/// `a`, from wherever it came, can take the place of `b`, a state of the model: all that a step
+/// reads is there.
 bool same_layout(const State& a, const State& b) {
-  return a.y.size() == b.y.size() && a.rotation.size() == b.rotation.size() &&
-         a.memory.size() == b.memory.size() && a.variables.size() == b.variables.size() &&
-         a.control.started == b.control.started && a.kept_matrix.size() == b.kept_matrix.size();
+  for (const auto array :
+       {&State::y, &State::yp, &State::memory, &State::variables, &State::kept_matrix})
+    if ((a.*array).size() != (b.*array).size()) return false;
+  const auto is_past = [&](const std::vector<double>& y) {
+    return y.empty() || y.size() == b.y.size();
+  };
+  const std::size_t loads = 6 * b.rotation.size();
+  return is_past(a.y1) && a.yp1.size() == a.y1.size() && is_past(a.y2) &&
+         a.yp2.size() == a.y2.size() && a.rotation.size() == b.rotation.size() &&
+         (a.external_loads.empty() || a.external_loads.size() == loads) &&
+         a.control.started == b.control.started;
 }
 
 }  // namespace

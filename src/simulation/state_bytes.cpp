@@ -1,6 +1,9 @@
 #include "simulation/state_bytes.h"
 
+#include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 #include "math/hash.h"
 
@@ -105,6 +108,19 @@ void each_member(Control& c, Visit visit) {
     visit(*number);
 }
 
+/// Counts go on from here, and times are added to.
+bool can_go_on(const State& state) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 53;
+  const auto counts = [](std::int64_t count) { return count >= 0 && count <= kMost; };
+  bool fine = counts(state.step) && std::isfinite(state.time) && std::isfinite(state.h) &&
+              std::isfinite(state.h_previous);
+  each_member(state.control, [&](const auto& member) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(member)>, std::int64_t>)
+      fine = fine && counts(member);
+  });
+  return fine;
+}
+
 }  // namespace
 
 std::string state_to_bytes(const State& state, std::uint64_t model_digest) {
@@ -153,7 +169,7 @@ Result<State> state_from_bytes(std::string_view bytes, std::uint64_t model_diges
   each_array(state, [&](std::vector<double>& v) { fine = fine && in.array(v); });
   std::vector<double> rotations;
   fine = fine && in.array(rotations) && rotations.size() % kRotationDoubles == 0 && in.empty();
-  if (!fine) return damaged;
+  if (!fine || !can_go_on(state)) return damaged;
   unflatten_rotations(rotations, state);
   return state;
 }

@@ -31,10 +31,12 @@ void BeamSlider::connect(GeneralConnection& c) {
   c.memory(1);
 }
 
-/// The span that holds s_ref, sought from the one of the last accepted step on.
+/// The span that holds s_ref, sought from the one of the last accepted step on; an imported state
+/// may name one that is not there.
 int BeamSlider::span_at(const GeneralView& u, double s_ref) const {
-  int b = static_cast<int>(u.memory(0));
   const int last = static_cast<int>(spans.size()) - 1;
+  const double before = u.memory(0);
+  int b = before >= 0 && before <= last ? static_cast<int>(before) : 0;
   while (b > 0 && s_ref - 2 * b < -1) --b;
   while (b < last && s_ref - 2 * b > 1) ++b;
   return b;

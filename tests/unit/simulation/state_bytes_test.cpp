@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <functional>
 
+#include "deck_run.h"
 #include "math/hash.h"
 
 namespace mbcosim {
@@ -67,6 +71,53 @@ TEST(StateBytes, FlagsThatAreNeitherSetNorNotAreDamage) {
   const Result<State> read = state_from_bytes(changed(bytes, kFlagsAt, 2), 99);
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().kind, ErrorKind::data_loss);
+}
+
+TEST(StateBytes, OfCountsAndTimesFromWhichNoStepCanGoOnAreDamage) {
+  const auto reason = [](const std::function<void(State&)>& change) {
+    State state = some_state();
+    change(state);
+    const Result<State> read = state_from_bytes(state_to_bytes(state, 99), 99);
+    return read ? "" : read.error().reason;
+  };
+  EXPECT_EQ(reason([](State&) {}), "");
+  EXPECT_EQ(reason([](State& s) { s.step = INT64_MAX; }), "STATE_DAMAGED");
+  EXPECT_EQ(reason([](State& s) { s.step = -1; }), "STATE_DAMAGED");
+  EXPECT_EQ(reason([](State& s) { s.control.grid_count = INT64_MAX; }), "STATE_DAMAGED");
+  EXPECT_EQ(reason([](State& s) { s.control.strategy.since_raise = -7; }), "STATE_DAMAGED");
+  EXPECT_EQ(reason([](State& s) { s.time = HUGE_VAL; }), "STATE_DAMAGED");
+  EXPECT_EQ(reason([](State& s) { s.h = NAN; }), "STATE_DAMAGED");
+}
+
+/// A checksum anybody can compute: what a step reads must be there whoever made the state.
+TEST(StateBytes, WithAnArrayOfAnotherLengthDoNotBecomeTheState) {
+  DeckRun run(
+      "begin: data; problem: initial value; end: data;\n"
+      "begin: initial value; initial time: 0.; final time: 1.; time step: .1; tolerance: 1e-9; "
+      "max iterations: 10; end: initial value;\n"
+      "begin: control data; structural nodes: 1; rigid bodies: 1; end: control data;\n"
+      "begin: nodes; structural: 1, dynamic, null, eye, 1., 0., 0., null; end: nodes;\n"
+      "begin: elements; body: 1, 1, 2., null, eye; end: elements;\n");
+  ASSERT_TRUE(run.ready());
+  run.step(2);
+  const State own = run.simulation().snapshot();
+  const std::uint64_t digest = run.model().digest;
+  const auto imported = [&](const std::function<void(State&)>& change) {
+    State state = own;
+    change(state);
+    const Status status = run.simulation().import_state(state_to_bytes(state, digest));
+    return status ? "" : status.error().reason;
+  };
+  for (const auto array : {&State::y, &State::yp, &State::y1, &State::yp1, &State::y2, &State::yp2,
+                           &State::memory, &State::variables, &State::kept_matrix}) {
+    EXPECT_EQ(imported([&](State& s) { (s.*array).push_back(1); }), "STATE_OF_ANOTHER_MODEL");
+    if (!(own.*array).empty())
+      EXPECT_EQ(imported([&](State& s) { (s.*array).pop_back(); }), "STATE_OF_ANOTHER_MODEL");
+  }
+  EXPECT_EQ(imported([](State& s) { s.external_loads = {1}; }), "STATE_OF_ANOTHER_MODEL");
+  EXPECT_EQ(imported([](State& s) { s.rotation.clear(); }), "STATE_OF_ANOTHER_MODEL");
+  EXPECT_EQ(imported([](State& s) { s.external_loads.assign(6, 1.5); }), "");
+  run.step();
 }
 
 }  // namespace
