@@ -317,11 +317,11 @@ struct PeerOptions {
 struct PortLayout {
   std::string name;
   bool modal = false;
-  bool motion = false;               ///< it takes imposed motion
-  std::vector<int> node_labels;      ///< of the points, or the modal node
-  int reference_node = 0;            ///< label; 0: none
-  bool reference_loads = false;      ///< the answer has the total load on the reference node
-  std::optional<int> mapped_points;  ///< that the peer sees; none: those of the nodes
+  bool motion = false;                ///< it takes imposed motion
+  std::vector<int> node_labels;       ///< of the points, or the modal node
+  std::optional<int> reference_node;  ///< label; none: the port has none
+  bool reference_loads = false;       ///< the answer has the total load on the reference node
+  std::optional<int> mapped_points;   ///< that the peer sees; none: those of the nodes
   std::vector<std::string> outputs, inputs;            ///< variables of a signal or modal port
   std::vector<int> mode_numbers;                       ///< of a modal port
   std::vector<std::string> output_units, input_units;  ///< of `outputs` and `inputs`

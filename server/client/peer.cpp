@@ -165,7 +165,7 @@ PortLayout to_layout(const v1::PortLayout& from) {
   layout.motion = from.kind() == v1::PORT_KIND_MOTION;
   layout.node_labels.assign(from.node_labels().begin(), from.node_labels().end());
   layout.point_labels.assign(from.point_labels().begin(), from.point_labels().end());
-  layout.reference_node = from.reference_node_label();
+  if (from.has_reference_node_label()) layout.reference_node = from.reference_node_label();
   layout.reference_loads = from.reference_loads();
   if (from.has_mapped_points()) layout.mapped_points = from.mapped_points();
   layout.outputs.assign(from.output_names().begin(), from.output_names().end());

@@ -36,8 +36,8 @@ PointState point_of(const Source& motion, std::size_t k) {
 using Form = mbdyn::ForceForm;
 
 void make_points(const client::PortLayout& layout, const SocketCall& call, Form& form) {
-  form.reference = layout.reference_node != 0;
-  form.reference_label = static_cast<std::uint32_t>(layout.reference_node);
+  form.reference = layout.reference_node.has_value();
+  form.reference_label = static_cast<std::uint32_t>(layout.reference_node.value_or(0));
   form.labels = call.labels;
   if (!layout.mapped_points) {
     form.count = static_cast<std::uint32_t>(layout.node_labels.size());
@@ -243,7 +243,7 @@ void serve_streams(const PeerCall& call, client::Peer& peer, std::size_t inputs,
 bool has_reference(const client::Simulation& simulation, const std::string& port) {
   const auto ports = simulation.ports();
   return std::any_of(ports.begin(), ports.end(), [&](const client::PortLayout& layout) {
-    return layout.name == port && layout.reference_node != 0;
+    return layout.name == port && layout.reference_node;
   });
 }
 

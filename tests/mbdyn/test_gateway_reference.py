@@ -139,19 +139,21 @@ def test_loads_on_the_reference_node_in_the_global_frame(run, server, program, t
     assert np.abs(turned - expected).max() > 1e-3
 
 
-def test_an_attached_port_with_a_reference_node(server, program, tmp_path):  # noqa: F811
+@pytest.mark.parametrize("label", [2, 0])
+def test_an_attached_port_with_a_reference_node(server, program, tmp_path, label):  # noqa: F811
     """Its points are told relative to the node, which takes no loads."""
     code = Code(9)
     code.loads = lambda data, points: np.tile([0.0, 0, 3.0], points).tobytes() + bytes(24 * points)
-    with server.load_text(deck("", counts="", end=1.0, node2=TURNED), ports=[mbcosim.structural_port("p", nodes=[1, 1], offsets=[[.1, 0, 0], [0, 0, 0]],
-                                                                                                   reference=2)]) as simulation:
-        before = simulation["node.structural.2.XP"]
+    text = deck("", counts="", end=1.0, node2=TURNED).replace("structural: 2,", f"structural: {label},").replace("body: 2, 2,", f"body: 2, {label},")
+    ports = [mbcosim.structural_port("p", nodes=[1, 1], offsets=[[.1, 0, 0], [0, 0, 0]], reference=label)]
+    with server.load_text(text, ports=ports) as simulation:
+        before = simulation[f"node.structural.{label}.XP"]
         gateway = Gateway(program, server, simulation, "p", str(tmp_path / "s"))
         peer = connect(gateway.path)
         shake(peer, 0x2206, 2)
         threading.Thread(target=code.talk, args=(peer,), daemon=True).start()
         simulation.step(STEPS)
-        assert simulation["node.structural.2.XP"] == pytest.approx(before, abs=1e-12)
+        assert simulation[f"node.structural.{label}.XP"] == pytest.approx(before, abs=1e-12)
         assert np.linalg.norm(simulation["node.structural.1.XP"]) > 0.25
     reference, points = np.frombuffer(code.messages[0][:144]), np.frombuffer(code.messages[0][144:])
     assert reference[:3] == pytest.approx([2, -1, 1.5]) and reference[12:] == pytest.approx([0.5, 0.6, 0.7, 1, 2, 3])

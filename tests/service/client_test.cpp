@@ -241,6 +241,131 @@ TEST_P(Coupled, OptionsOfTheExchange) {
   EXPECT_EQ(seen.x.at(0), 0.5);
 }
 
+/// Port "wing" of body 1, counted from node 0, which turns and accelerates: its body's center of
+/// mass lies beside it.
+std::string with_reference_node() {
+  return "begin: data; problem: initial value; end: data; begin: initial value; initial time: 0.; "
+         "final time: 1.; time step: 1.e-2; tolerance: 1.e-9; max iterations: 20; derivatives "
+         "tolerance: 1.e-4; derivatives max iterations: 20; end: initial value; begin: control "
+         "data; structural nodes: 2; rigid bodies: 2; forces: 1; end: control data; begin: nodes; "
+         "structural: 0, dynamic, 2., -1., 1.5, euler123, .2, .3, -.1, .5, .6, .7, 1., 2., 3.; "
+         "structural: 1, dynamic, 1., 2., 3., eye, 0., 1., 0., null; end: nodes; begin: elements; "
+         "body: 0, 0, 1., .1, .2, .3, diag, 1., 2., 3.; body: 1, 1, 1., null, eye; "
+         "force: 5, external structural, grpc, port, \"wing\", reference node, 0, use "
+         "reference node forces, no, 1, 1, offset, null; end: elements;";
+}
+
+Motion::Reference read_reference(const Simulation& simulation) {
+  const auto read = [&](const char* what) {
+    return simulation.read(std::string("node.structural.0.") + what);
+  };
+  return {read("X"), read("R"), read("XP"), read("Omega"), read("XPP"), read("OmegaP")};
+}
+
+/// Motions of the exchanges of steps one by one, and what the simulation told before each.
+struct Told {
+  std::vector<Motion> motions;
+  std::vector<Motion::Reference> references;
+  std::vector<std::vector<double>> points;  ///< positions of node 1
+};
+
+Told tell_reference(Server& server, const PeerOptions& options) {
+  Simulation simulation = server.load_text(with_reference_node());
+  Told told;
+  const auto answer = [&](const Motion& motion) {
+    told.motions.push_back(motion);
+    return Loads{.forces = {1, 2, 3}};
+  };
+  const Peer peer = simulation.couple("wing", answer, options);
+  EXPECT_EQ(peer.layout().reference_node, std::optional<int>(0));
+  for (int k = 0; k < 3; ++k) {
+    told.references.push_back(read_reference(simulation));
+    told.points.push_back(simulation.read("node.structural.1.X"));
+    const StepResult result = simulation.step();
+    EXPECT_TRUE(result.ok()) << result.failure;
+  }
+  return told;
+}
+
+std::vector<double> matrix_of(const std::vector<double>& quaternion) {
+  const double w = quaternion.at(0), x = quaternion.at(1), y = quaternion.at(2),
+               z = quaternion.at(3);
+  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+}
+
+/// Position in the frame of the reference node.
+std::vector<double> seen_from(const Motion::Reference& r, const std::vector<double>& x) {
+  std::vector<double> seen(3);
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t k = 0; k < 3; ++k) seen[i] += r.R.at(3 * k + i) * (x.at(k) - r.x.at(k));
+  return seen;
+}
+
+void expect_near(const std::vector<double>& found, const std::vector<double>& expected) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], 1e-12);
+}
+
+TEST_P(Coupled, TheMotionOfAReferenceNodeIsToldInTheGlobalFrame) {
+  Server server = connect();
+  PeerOptions options = this->options();
+  options.mode = Mode::loose;
+  options.accelerations = true;
+  for (const Frame frame : {Frame::global, Frame::reference})
+    for (const Rotation rotation : {Rotation::matrix, Rotation::quaternion}) {
+      options.frame = frame;
+      options.rotation = rotation;
+      const Told told = tell_reference(server, options);
+      ASSERT_EQ(told.motions.size(), told.references.size());
+      for (std::size_t k = 0; k < told.motions.size(); ++k) {
+        const Motion::Reference &found = told.motions[k].reference, &expected = told.references[k];
+        EXPECT_EQ(found.x, expected.x);
+        EXPECT_EQ(found.v, expected.v);
+        EXPECT_EQ(found.w, expected.w);
+        EXPECT_EQ(found.a, expected.a);
+        EXPECT_EQ(found.wp, expected.wp);
+        expect_near(rotation == Rotation::matrix ? found.R : matrix_of(found.R), expected.R);
+        const std::vector<double>& point = told.points[k];
+        expect_near(told.motions[k].x,
+                    frame == Frame::reference ? seen_from(expected, point) : point);
+      }
+      EXPECT_NE(told.references.front().a, std::vector<double>(3)) << "the node accelerates";
+      EXPECT_NE(told.references.front().wp, std::vector<double>(3));
+    }
+}
+
+TEST_P(Coupled, OfAReferenceNodeNothingIsToldThatWasNotAgreedOn) {
+  Server server = connect();
+  const Told told = tell_reference(server, options());
+  ASSERT_FALSE(told.motions.empty());
+  EXPECT_EQ(told.motions.front().reference.x.size(), 3u);
+  EXPECT_TRUE(told.motions.front().reference.a.empty());
+  EXPECT_TRUE(told.motions.front().reference.wp.empty());
+}
+
+TEST_P(Coupled, APortWithoutAReferenceNodeTellsNone) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body(), with_port());
+  PeerOptions options = this->options();
+  options.accelerations = true;
+  Motion seen;
+  const Peer peer = simulation.couple(
+      "spring",
+      [&](const Motion& motion) {
+        seen = motion;
+        return spring(motion);
+      },
+      options);
+  EXPECT_FALSE(peer.layout().reference_node);
+  ASSERT_TRUE(simulation.step().ok());
+  ASSERT_EQ(seen.a.size(), 3u);
+  const Motion::Reference& none = seen.reference;
+  for (const auto& numbers : {none.x, none.R, none.v, none.w, none.a, none.wp})
+    EXPECT_TRUE(numbers.empty());
+}
+
 TEST(Client, ChoosesLengthsAndEnds) {
   Server server = connect();
   Simulation simulation = server.load_text(body());
