@@ -179,6 +179,8 @@ def check_arrays(values, rotation_size=9):
     sizes = [len(values.positions), len(values.rotations), len(values.velocities), len(values.angular_velocities),
              len(values.accelerations), len(values.signals)]
     require(sizes == [3 * NODES, rotation_size * NODES, 3 * NODES, 3 * NODES, 0, 0], f"lengths of the arrays: {sizes}")
+    told = [field.name for field, _ in values.ListFields() if field.name.startswith("reference_")]
+    require(not told, f"motion of a reference node that the port does not have: {told}")
     require(all(math.isfinite(x) for field in (values.positions, values.rotations, values.velocities) for x in field),
             "numbers that are not finite")
 

@@ -29,6 +29,7 @@ FAULTS = [
     "negative quaternion", "refuses without a reason", "a second peer is let in", "first mismatch only", "heartbeats end the stream",
     "no notice of rejection", "any version is spoken", "accelerations unasked", "two exchanges at once", "rejections are ignored",
     "preference untold", "estimate untold", "lengths are ignored", "a peer ahead is let in", "a peer that goes back is refused",
+    "motion of no reference node",
 ]
 
 
@@ -114,6 +115,8 @@ class Session:
         out.angular_velocities.extend([*SPIN, 0, 0, 0])
         if fault == "accelerations unasked":
             out.accelerations.extend([0.0] * 6)
+        if fault == "motion of no reference node":
+            out.reference_velocity.extend([0.0] * 3)
         angle = SPIN * out.time
         if peer.hello.form.rotation_form == types.ROTATION_FORM_QUATERNION:
             half = np.linalg.norm(angle) / 2
