@@ -1096,6 +1096,7 @@ TEST(ASilentServer, EndsEveryCallAtItsTimeout) {
       {"refresh", [&] { simulation.refresh(0.3); }},
       {"update", [&] { simulation.update({.timeout = 0.3}); }},
       {"variables", [&] { simulation.variables(0.3); }},
+      {"ports", [&] { simulation.ports(0.3); }},
       {"snapshot", [&] { simulation.snapshot("", 0.3); }},
       {"snapshots", [&] { simulation.snapshots(0.3); }},
       {"restore", [&] { simulation.restore(saved, 0.3); }},
