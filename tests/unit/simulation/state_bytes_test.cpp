@@ -111,8 +111,8 @@ TEST(StateBytes, WithAnArrayOfAnotherLengthDoNotBecomeTheState) {
   for (const auto array : {&State::y, &State::yp, &State::y1, &State::yp1, &State::y2, &State::yp2,
                            &State::memory, &State::variables, &State::kept_matrix}) {
     EXPECT_EQ(imported([&](State& s) { (s.*array).push_back(1); }), "STATE_OF_ANOTHER_MODEL");
-    if (!(own.*array).empty())
-      EXPECT_EQ(imported([&](State& s) { (s.*array).pop_back(); }), "STATE_OF_ANOTHER_MODEL");
+    if ((own.*array).empty()) continue;
+    EXPECT_EQ(imported([&](State& s) { (s.*array).pop_back(); }), "STATE_OF_ANOTHER_MODEL");
   }
   EXPECT_EQ(imported([](State& s) { s.external_loads = {1}; }), "STATE_OF_ANOTHER_MODEL");
   EXPECT_EQ(imported([](State& s) { s.rotation.clear(); }), "STATE_OF_ANOTHER_MODEL");
