@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <functional>
+#include <optional>
+#include <system_error>
 
 #include "client/convert.h"
 #include "client/deadline.h"
@@ -394,7 +396,12 @@ void Peer::Impl::give_up(const std::string& why) {
 void Peer::Impl::close() {
   if (!open) return;
   open = false;
-  const Deadline deadline(kPartingSeconds, [this] { wire->cancel(); });
+  std::optional<Deadline> deadline;
+  try {
+    deadline.emplace(kPartingSeconds, [this] { wire->cancel(); });
+  } catch (const std::system_error&) {  // no thread to be had
+    wire->cancel();
+  }
   stop_heart();
   part();
   if (thread.joinable()) thread.join();

@@ -249,7 +249,8 @@ std::unique_ptr<Simulation> Durability::simulation_at(const ModelPtr& model,
     throw Refusal(status.error());
   if (!results) return std::move(*simulation);
   const auto writer = results->start(*model);
-  if (stored.point.has_results_until_step()) results->expect(stored.point.results_until_step());
+  if (has_files && stored.point.has_results_until_step())
+    results->expect(stored.point.results_until_step());
   const Status goes_on =
       has_files ? (*simulation)->resume_writing(writer) : (*simulation)->write_to(writer);
   if (!goes_on) throw Refusal(results->without_paths(goes_on.error()));
@@ -314,7 +315,8 @@ v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheck
   point.mutable_info()->clear_grants();
   if (header.has_display_name()) point.mutable_info()->set_display_name(header.display_name());
   check_display_name(point.info().display_name());
-  point.clear_kept_replies();  // of others' requests
+  point.clear_kept_replies();        // of others' requests
+  point.clear_results_until_step();  // its files begin here
   const auto longest = google::protobuf::util::TimeUtil::SecondsToDuration(
       std::chrono::duration_cast<std::chrono::seconds>(config_.limits.lease).count());
   using google::protobuf::operator<;

@@ -178,6 +178,7 @@ class Session {
 
  private:
   Advance::Parts advance_parts() TS_NO_THREAD_SAFETY_ANALYSIS;
+  void go_to_snapshot(int snapshot, const Call& call, const SessionStore& store);
   void go_to(const State& state, const Call& call, const SessionStore& store,
              std::int64_t results_until);
   void store_ahead(const State& state, const SessionStore& store, std::int64_t results_until)

@@ -34,11 +34,15 @@ void Session::save(const std::string& display_name, const Call& call, v1::Snapsh
 }
 
 void Session::restore(int snapshot, const Call& call, const SessionStore& store) {
+  go_to_snapshot(snapshot, call, store);
+  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
+                       status_.view().step);
+}
+
+void Session::go_to_snapshot(int snapshot, const Call& call, const SessionStore& store) {
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
   require_way_back();
   go_to(snapshots_.get(snapshot), call, store, results_ ? snapshots_.agrees_until(snapshot) : 0);
-  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
-                       status_.view().step);
 }
 
 void Session::reset(const Call& call, const SessionStore& store, const CancelToken& cancel) {
@@ -64,11 +68,16 @@ void Session::go_to(const State& state, const Call& call, const SessionStore& st
     ~Release() { status.release(); }
   } const release{status_};
   const CallGuard lock(lock_, call);
-  if (results_ && storage_.keeping()) store_ahead(state, store, results_until);
+  const bool ahead = results_ && storage_.keeping();
+  if (ahead) store_ahead(state, store, results_until);
   if (results_) results_->expect(results_until);
   const auto status = simulation_->restore(state);
   if (results_) results_->restored();
-  if (!status) throw Refusal(results_ ? results_->without_paths(status.error()) : status.error());
+  if (!status) {
+    const Refusal refusal(results_ ? results_->without_paths(status.error()) : status.error());
+    if (ahead) status_.fail(refusal.what());  // the state is there already, the files are not
+    throw refusal;
+  }
   if (results_) snapshots_.results_end_at(results_->end());
   coupler_.reset();
   storage_.remember(coupler_.memory());
@@ -85,6 +94,7 @@ void Session::go_to(const State& state, const Call& call, const SessionStore& st
 // that needs all that is in them.
 void Session::store_ahead(const State& state, const SessionStore& store,
                           std::int64_t results_until) {
+  const MemoryShare share(shared_.memory, size_of(simulation_->state()));
   const State before = simulation_->snapshot();
   results_->expect(results_until);
   results_->only_try();
@@ -172,8 +182,15 @@ void Session::import_state(const std::string& bytes, const std::string& display_
   if (!state) throw Refusal(state.error());
   const int number = snapshots_.add(std::move(*state), display_name, out, results_end);
   storage_.note_change();
+  try {
+    if (also_restore) go_to_snapshot(number, call, store);
+  } catch (...) {
+    snapshots_.remove(number);
+    throw;
+  }
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
-  if (also_restore) restore(number, call, store);
+  if (also_restore)
+    shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, out->name(), out->step());
 }
 
 }  // namespace mbcosim::server
