@@ -8,6 +8,7 @@
 #include "durable/build.h"
 #include "service/display_name.h"
 #include "service/durability.h"
+#include "service/event_log.h"
 #include "service/storing.h"
 #include "wire/convert.h"
 
@@ -176,11 +177,12 @@ LoadedDeck read_deck(StoredModel& model, const Config& config) {
 
 void warn_of_another_build(const v1::CheckpointHead& head) {
   if (head.program() == MBCOSIM_VERSION && head.build() == this_build()) return;
+  const auto told = [](const std::string& text) { return printable(text.substr(0, 100)); };
   spdlog::warn(
       "{} began with mbcosim {} ({}), this is {} ({}): from here on it need not have the bits that "
       "it would have had there",
-      head.simulation(), head.program(), head.build().empty() ? "unknown build" : head.build(),
-      MBCOSIM_VERSION, this_build());
+      head.simulation(), told(head.program()),
+      head.build().empty() ? "unknown build" : told(head.build()), MBCOSIM_VERSION, this_build());
 }
 
 }  // namespace

@@ -21,6 +21,8 @@ sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "
 import decks
 import local_attacks
 from broken_off import BrokenOff
+from forged_checkpoints import ForgedCheckpoints
+from forged_states import ForgedStates
 from fuzzer import Fuzzer
 from requests_of_http import Requests
 from google.protobuf import descriptor_pool, message_factory
@@ -113,6 +115,18 @@ class Attacker:
     def folder(self):
         """Files of the state folder that change under the daemon."""
         attack = local_attacks.Folder(self, self.state)
+        while self.going():
+            attack.once()
+
+    def states(self):
+        """Snapshots that nobody saved, with checksums that fit."""
+        attack = ForgedStates(self)
+        while self.going():
+            attack.once()
+
+    def checkpoints(self):
+        """Checkpoints that no server wrote."""
+        attack = ForgedCheckpoints(self, BODY, local_attacks.PORT)
         while self.going():
             attack.once()
 
@@ -398,7 +412,8 @@ def is_open(connection):
 # What each kind must have come to, or it attacks nothing.
 KINDS = {"fuzz": ["OK", "INVALID_ARGUMENT", "NOT_FOUND"], "cancel": ["CANCELLED"], "race": ["OK", "NOT_FOUND"], "slow": ["OK"],
          "silent": ["UNAUTHENTICATED"], "half_open": ["OK"], "greedy": ["OK"], "large": ["CANCELLED"],
-         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"], "shared_memory": ["OK"], "folder": ["OK", "DATA_LOSS"]}
+         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"], "shared_memory": ["OK"], "folder": ["OK", "DATA_LOSS"],
+         "states": ["OK", "FAILED_PRECONDITION", "DATA_LOSS"], "checkpoints": ["OK", "DATA_LOSS"]}
 
 
 def main():
