@@ -203,7 +203,8 @@ class ModelReplay {
     v1::WriteVariablesReply reply;
     *request.mutable_values() = values;
     const server::Call nobody;
-    session_.write(request, nobody, &reply, /*turn=*/nullptr);
+    const server::KeptReplies::Turn turn(session_.kept(), server::Caller{}, "", 0, nobody);
+    session_.write(request, nobody, turn, &reply);
   }
   void step(const v1::RecordEntry& entry) {
     const bool accepted = entry.has_accepted();

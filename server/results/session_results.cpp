@@ -96,6 +96,11 @@ Error SessionResults::without_paths(Error error) const {
 
 void SessionResults::expect(std::int64_t step) { writer_->expect(step); }
 
+void SessionResults::check_way_back(std::int64_t step) const {
+  if (const Status possible = writer_->can_go_back(step); !possible)
+    throw Refusal(without_paths(possible.error()));
+}
+
 // ------------------------------------------------------------------ reading
 
 void SessionResults::flush() {

@@ -51,8 +51,8 @@ class SessionResults {
   std::int64_t end() const { return writer_->end(); }
   /// The next restore goes to a state that shares its history with the files up to this step.
   void expect(std::int64_t step);
-  /// The next restore is tried only: the files stay as they are.
-  void only_try() { writer_->only_try(); }
+  /// Throws what such a restore would end with, as far as it is known before.
+  void check_way_back(std::int64_t step) const;
   /// A restore has been done, or not.
   void restored() { cuts_.fetch_add(1); }
 

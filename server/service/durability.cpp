@@ -59,19 +59,16 @@ void Durability::start(const Parts& parts) {
     for (auto& [name, suspended] : suspended_) suspended.share = share_of(suspended);
   }
   if (!folder_) return;
-  parts.store.set_keeper({[this](const auto& name, const Caller& caller, Call& call) {
-                            return wake(name, caller, call);
-                          },
-                          [this](const auto& name, const Caller& caller, const Call& call) {
-                            return remove(name, caller, call);
-                          },
-                          [this](Session& session) { return suspend(session); },
-                          [this](const auto& name) { unsuspend(name); },
-                          [this](Session& session) { forget(session); },
-                          [this](Session& session) { store(session); },
-                          [this](Session& session, CapturedPoint captured) {
-                            store_ahead(session, std::move(captured));
-                          }});
+  parts.store.set_keeper(
+      {[this](const auto& name, const Caller& caller, Call& call) {
+         return wake(name, caller, call);
+       },
+       [this](const auto& name, const Caller& caller, const Call& call) {
+         return remove(name, caller, call);
+       },
+       [this](Session& session) { return suspend(session); },
+       [this](const auto& name) { unsuspend(name); }, [this](Session& session) { forget(session); },
+       [this](Session& session, CapturedPoint captured) { store(session, std::move(captured)); }});
   thread_ = std::thread([this] { loop(); });
 }
 
@@ -145,16 +142,9 @@ MemoryShare Durability::share_of(const Suspended& suspended) const {
 
 namespace {
 
-// What was kept later under the same id takes the place of what was kept before.
 void keep_replies(const v1::JournalEntry& entry, v1::CheckpointPoint* point) {
   auto* kept = point->mutable_kept_replies();
-  for (const v1::KeptReply& reply : entry.kept_replies()) {
-    const auto same = std::remove_if(kept->begin(), kept->end(), [&](const v1::KeptReply& other) {
-      return other.request_id() == reply.request_id() && other.identity() == reply.identity();
-    });
-    kept->erase(same, kept->end());
-    *kept->Add() = reply;
-  }
+  for (const v1::KeptReply& reply : entry.kept_replies()) KeptReplies::put_last(reply, kept);
   const int over = kept->size() - static_cast<int>(KeptReplies::kReplies);
   if (over > 0) kept->DeleteSubrange(0, over);
 }
@@ -247,21 +237,17 @@ MemoryBudget& Durability::memory_of(const Session& session) const {
   return parts_->runtime.budgets.of(session.identity().owner);
 }
 
-void Durability::store(Session& session) try { write(session); } catch (const StorageError& error) {
-  refuse_storage("what was done is not stored yet", error);
-}
-
 void Durability::write(Session& session) {
   Keeping& keeping = *session.keeping();
   Guard guard(keeping.mutex);
   write_held(session, keeping);
 }
 
-void Durability::store_ahead(Session& session, CapturedPoint captured) try {
+void Durability::store(Session& session, CapturedPoint captured) try {
   Keeping& keeping = *session.keeping();
   if (!keeping.over) write_captured(session, keeping, std::move(captured));
 } catch (const StorageError& error) {
-  refuse_storage("the state to restore cannot be stored", error);
+  refuse_storage("what was asked cannot be stored", error);
 }
 
 void Durability::write_held(Session& session, Keeping& keeping) {

@@ -108,8 +108,7 @@ class Durability {
   std::unique_ptr<Keeping> make_keeping(const std::string& simulation,
                                         const v1::CreateOptions& options) const;
   StoredPoint read_latest(const std::string& id) const;
-  void store(Session& session);
-  void store_ahead(Session& session, CapturedPoint captured)
+  void store(Session& session, CapturedPoint captured)
       TS_NO_THREAD_SAFETY_ANALYSIS;  // the call has the keeping's mutex
   void read_folder();
   Suspended read_one(const std::string& id) const;

@@ -69,19 +69,7 @@ void EventLog::add(const Subject& subject, v1::Event event) {
     event.set_method(call->method);
     event.set_trace_id(call->trace_id);
   }
-  if (HeldEvents* held = HeldEvents::current_)
-    held->held_.push_back({journal_, std::move(event), subject.owner});
-  else
-    journal_.add(std::move(event), subject.owner);
-}
-
-thread_local HeldEvents* HeldEvents::current_ = nullptr;
-
-HeldEvents::~HeldEvents() {
-  current_ = nullptr;
-  run_caught("events", [this] {
-    for (Held& held : held_) held.journal.add(std::move(held.event), held.owner);
-  });
+  journal_.add(std::move(event), subject.owner);
 }
 
 void EventLog::refused(const std::string& method, const std::string& identity,

@@ -66,28 +66,6 @@ class EventLog {
   EventJournal journal_;
 };
 
-/// Keeps back the events that this thread makes while what they tell of is being stored; lets them
-/// go at its end. One at a time in a thread.
-class HeldEvents {
- public:
-  HeldEvents() { current_ = this; }
-  ~HeldEvents();
-  HeldEvents(const HeldEvents&) = delete;
-  HeldEvents& operator=(const HeldEvents&) = delete;
-  /// Nobody is told: it could not be stored.
-  void drop() { held_.clear(); }
-
- private:
-  friend class EventLog;
-  struct Held {
-    EventJournal& journal;
-    v1::Event event;
-    std::string owner;
-  };
-  static thread_local HeldEvents* current_;
-  std::vector<Held> held_;
-};
-
 /// The text with '?' in place of control characters.
 std::string printable(std::string text);
 

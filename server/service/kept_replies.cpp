@@ -75,7 +75,12 @@ KeptReplies::Turn::~Turn() {
   if (id_.empty() || known_) return;
   Guard guard(kept_.mutex_);
   Entry* entry = kept_.find(identity_, id_);
-  if (entry && entry->at_work) kept_.forget(identity_, id_);
+  if (entry && entry->at_work) {
+    if (entry->begun)
+      entry->at_work = false;  // refused before it went on
+    else
+      kept_.forget(identity_, id_);
+  }
   kept_.changed_.notify_all();
 }
 
@@ -94,6 +99,7 @@ void KeptReplies::Turn::put(const google::protobuf::MessageLite& reply, bool beg
   Entry* entry = kept_.find(identity_, id_);
   kept_.share_.shrink(static_cast<std::int64_t>(entry->reply.size()));  // of what was begun
   entry->reply.clear();
+  entry->begun = false;
   if (!kept_.make_room(static_cast<std::int64_t>(bytes.size()))) return;
   entry = kept_.find(identity_, id_);
   entry->reply = std::move(bytes);
@@ -130,10 +136,10 @@ void KeptReplies::forget(const std::string& identity, const std::string& id) {
   entries_.erase(found);
 }
 
-void KeptReplies::describe(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const {
+void KeptReplies::describe(Messages* out) const {
   Guard guard(mutex_);
   for (const Entry& entry : entries_)
-    if (!entry.at_work) describe(entry, out->Add());
+    if (!entry.at_work || entry.begun) describe(entry, out->Add());
 }
 
 void KeptReplies::describe(const Entry& entry, v1::KeptReply* out) {
@@ -144,7 +150,7 @@ void KeptReplies::describe(const Entry& entry, v1::KeptReply* out) {
   out->set_begun(entry.begun);
 }
 
-void KeptReplies::describe_unstored(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const {
+void KeptReplies::describe_unstored(Messages* out) const {
   Guard guard(mutex_);
   for (const Entry& entry : entries_)
     if (!entry.at_work && !entry.stored) describe(entry, out->Add());
@@ -156,7 +162,15 @@ void KeptReplies::all_stored() {
     if (!entry.at_work) entry.stored = true;
 }
 
-void KeptReplies::take_over(const google::protobuf::RepeatedPtrField<v1::KeptReply>& kept) {
+void KeptReplies::put_last(v1::KeptReply reply, Messages* kept) {
+  const auto same = std::remove_if(kept->begin(), kept->end(), [&](const v1::KeptReply& other) {
+    return other.request_id() == reply.request_id() && other.identity() == reply.identity();
+  });
+  kept->erase(same, kept->end());
+  *kept->Add() = std::move(reply);
+}
+
+void KeptReplies::take_over(const Messages& kept) {
   Guard guard(mutex_);
   for (const v1::KeptReply& reply : kept)
     if (make_room(std::ssize(reply.reply())))

@@ -27,12 +27,14 @@ class KeptReplies {
 
   explicit KeptReplies(MemoryBudget& memory) : share_(memory) {}
 
+  using Messages = google::protobuf::RepeatedPtrField<v1::KeptReply>;
   /// All that are kept, oldest first, and back.
-  void describe(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const TS_EXCLUDES(mutex_);
-  void take_over(const google::protobuf::RepeatedPtrField<v1::KeptReply>& kept) TS_EXCLUDES(mutex_);
+  void describe(Messages* out) const TS_EXCLUDES(mutex_);
+  void take_over(const Messages& kept) TS_EXCLUDES(mutex_);
+  /// In place of one of the same request.
+  static void put_last(v1::KeptReply reply, Messages* kept);
   /// JOURNAL: those that no entry has, oldest first; then they are in one.
-  void describe_unstored(google::protobuf::RepeatedPtrField<v1::KeptReply>* out) const
-      TS_EXCLUDES(mutex_);
+  void describe_unstored(Messages* out) const TS_EXCLUDES(mutex_);
   void all_stored() TS_EXCLUDES(mutex_);
 
   /// One request at work. What went well is kept by `keep`; without it the request may be tried

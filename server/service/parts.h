@@ -66,31 +66,20 @@ void once(Session& session, const CallFrame& frame, const Request& request, Repl
 }
 
 /// The same for what changes a durable session: no checkpoint is taken between the change and its
-/// reply, and with JOURNAL both are on the disk before the caller, or who watches events, is told.
+/// reply.
 template <class Request, class Reply, class Body>
-void once_stored(const SessionStore& store, Session& session, const CallFrame& frame,
-                 const Request& request, Reply* reply, Body& body) {
-  constexpr bool stores = std::is_invocable_v<Body, Session&, const Request&, Reply*,
-                                              const CallFrame&, const KeptReplies::Turn*>;
+void change_once(const SessionStore& store, Session& session, const CallFrame& frame,
+                 const Request& request, Reply* reply, const Body& body) {
   const std::string& id = request.request_id();
   const std::uint64_t digest =
       id.empty() ? 0 : digest_of(Request::descriptor()->name().c_str(), request);
   KeptReplies::Turn turn(session.kept(), frame.caller, id, digest, frame.call);
   if (turn.known()) {
-    if (!stores && session.keeping() && session.keeping()->stale(session.changes()))
-      store.put_on_disk(session);  // which may have failed for the first one
     reply->ParseFromString(*turn.known());
     return;
   }
-  HeldEvents events;
   const auto act = [&] {
-    if constexpr (stores)
-      body(session, request, reply, frame, &turn);
-    else if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*,
-                                           const CallFrame&>)
-      body(session, request, reply, frame);
-    else
-      body(session, request, reply);
+    body(session, request, reply, Session::Change{frame.caller, frame.call, store, turn});
     turn.keep(*reply);
     session.note_change();
   };
@@ -99,13 +88,6 @@ void once_stored(const SessionStore& store, Session& session, const CallFrame& f
     act();
   } else {
     act();
-  }
-  if (stores) return;
-  try {
-    store.put_on_disk(session);
-  } catch (...) {
-    events.drop();
-    throw;
   }
 }
 
@@ -125,7 +107,7 @@ Method on_session(const Parts& parts, Role role, Lane lane, Body body,
                                   access);
         if constexpr (requires { request.request_id(); } &&
                       !std::is_same_v<Request, v1::StepRequest>)
-          once_stored(parts.store, *session, frame, request, reply, body);
+          change_once(parts.store, *session, frame, request, reply, body);
         else if constexpr (std::is_invocable_v<Body, Session&, const Request&, Reply*,
                                                const CallFrame&>)
           body(*session, request, reply, frame);

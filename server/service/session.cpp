@@ -126,30 +126,25 @@ StepPolicy Session::changed_policy(const v1::UpdateSimulationRequest& request) c
       minimum);
 }
 
-void Session::update(const v1::UpdateSimulationRequest& request, const Caller& caller,
-                     const Call& call, v1::UpdateSimulationReply* reply,
-                     const KeptReplies::Turn* turn) {
-  if (request.has_grants() && !grants_.allow(caller, Access::own))
+void Session::update(const v1::UpdateSimulationRequest& request, const Change& change,
+                     v1::UpdateSimulationReply* reply) {
+  if (request.has_grants() && !grants_.allow(change.caller, Access::own))
     throw Refusal(v1::REASON_NOT_GRANTED, "only the owner and admins change `grants`",
                   {{"wanted", "own"}});
   check_display_name(request.display_name());  // before anything changes
   if (request.has_grants()) check_grants(request.grants().grants());
-  const CallGuard lock(lock_, call);
+  const CallGuard lock(lock_, change.call);
   Draft draft{status_.view(), request.has_grants() ? request.grants().grants() : grants_.list()};
   draft.view.policy = changed_policy(request);
   if (request.has_display_name()) draft.view.display_name = request.display_name();
   fill(draft.view, reply->mutable_simulation());
-  if (grants_.allow(caller, Access::own))
+  if (grants_.allow(change.caller, Access::own))
     *reply->mutable_simulation()->mutable_grants() = draft.grants;
   storage_.note_change();
-  draft_ = draft;
-  try {
-    storage_.store_change(*simulation_, turn, *reply);
-  } catch (...) {
-    draft_.reset();
-    throw;
+  {
+    const DraftInUse in_use(draft_, draft);
+    storage_.store_change(*simulation_, change.turn, *reply);
   }
-  draft_.reset();
   set_policy(draft.view.policy);
   grants_.replace(draft.grants);
   status_.set_display_name(draft.view.display_name);
@@ -356,7 +351,7 @@ void Session::read(const v1::ReadVariablesRequest& request, const Call& call,
 }
 
 void Session::write(const v1::WriteVariablesRequest& request, const Call& call,
-                    v1::WriteVariablesReply* reply, const KeptReplies::Turn* turn) {
+                    const KeptReplies::Turn& turn, v1::WriteVariablesReply* reply) {
   require_usable();
   variables_.check_inputs(request.values(), "values");
   if (status_.stepping())

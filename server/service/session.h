@@ -55,6 +55,14 @@ class Session {
     std::shared_ptr<const AttachedFiles> attached = {};  ///< for viewers
   };
   using Progress = Advance::Progress;
+  /// A call that changes more than the step, and what keeps its reply. With JOURNAL both are on the
+  /// disk before others see them; where that fails with STORAGE_FULL nothing has changed.
+  struct Change {
+    const Caller& caller;
+    Call& call;
+    const SessionStore& store;
+    const KeptReplies::Turn& turn;
+  };
 
   Session(Identity identity, Origin origin, std::unique_ptr<Simulation> simulation, Shared shared,
           const v1::CreateOptions& options = {}, std::unique_ptr<SessionResults> results = nullptr,
@@ -88,29 +96,30 @@ class Session {
             const Progress& progress = {}, RowTable* table = nullptr);
   bool interrupt();  ///< was anything advancing?
   /// Throws NOT_GRANTED when the caller must not change grants.
-  void update(const v1::UpdateSimulationRequest& request, const Caller& caller, const Call& call,
-              v1::UpdateSimulationReply* reply, const KeptReplies::Turn* turn);
+  void update(const v1::UpdateSimulationRequest& request, const Change& change,
+              v1::UpdateSimulationReply* reply);
   /// The record of the ports. Throws NOT_RECORDING.
   const Recorder& record() const;
   void read(const v1::ReadVariablesRequest& request, const Call& call,
             v1::ReadVariablesReply* reply);
-  /// `turn`: what keeps the reply, or null.
   void write(const v1::WriteVariablesRequest& request, const Call& call,
-             v1::WriteVariablesReply* reply, const KeptReplies::Turn* turn);
+             const KeptReplies::Turn& turn, v1::WriteVariablesReply* reply);
 
   void linearize(const v1::LinearizeRequest& request, Call& call, v1::LinearizeReply* reply);
   void eigenvalues(const v1::ComputeEigenvaluesRequest& request, Call& call,
                    v1::ComputeEigenvaluesReply* reply);
 
-  void save(const std::string& display_name, const Call& call, v1::Snapshot* out);
-  void restore(int snapshot, const Call& call, const SessionStore& store);
-  void forget(int snapshot);
+  void save(const std::string& display_name, const Change& change, v1::CreateSnapshotReply* reply);
+  void restore(int snapshot, const Change& change, v1::RestoreSnapshotReply* reply);
+  void forget(int snapshot, const Change& change, v1::DeleteSnapshotReply* reply);
   /// To the initial solution.
-  void reset(const Call& call, const SessionStore& store, const CancelToken& cancel);
+  void reset(const Change& change, const CancelToken& cancel, v1::ResetSimulationReply* reply);
   SnapshotShelf& snapshots() { return snapshots_; }
   std::string export_state(int snapshot, const Call& call);  ///< negative: the current state
+  /// `out`: of `reply`.
   void import_state(const std::string& bytes, const std::string& display_name, bool also_restore,
-                    const Call& call, const SessionStore& store, v1::Snapshot* out);
+                    const Change& change, const google::protobuf::Message& reply,
+                    v1::Snapshot* out);
   /// `snapshot`: negative: the current state. Throws CANCELLED.
   std::unique_ptr<Simulation> fork(int snapshot, const Call& call, const CancelToken& cancel);
   State state(const Call& call);  ///< a copy
@@ -178,17 +187,34 @@ class Session {
 
  private:
   Advance::Parts advance_parts() TS_NO_THREAD_SAFETY_ANALYSIS;
-  void go_to_snapshot(int snapshot, const Call& call, const SessionStore& store);
-  void go_to(const State& state, const Call& call, const SessionStore& store,
-             std::int64_t results_until);
-  void store_ahead(const State& state, const SessionStore& store, std::int64_t results_until)
+  /// A state to go to, and what of the reply tells of the session then: null: nothing.
+  struct Goal {
+    const State& state;
+    std::int64_t results_until;  ///< it shares its history with the result files up to this step
+    const google::protobuf::Message& reply;
+    v1::SimulationInfo* info;
+  };
+  void go_to(const Goal& goal, const Change& change);
+  void arrive(const Goal& goal, bool stored) TS_REQUIRES(lock_);
+  void store_ahead(const Goal& goal, const Change& change) TS_REQUIRES(lock_);
+  void store_changed(const Change& change, const google::protobuf::Message& reply)
       TS_REQUIRES(lock_);
+  void fill_recovered(const Caller& caller, v1::SimulationInfo* out) const TS_REQUIRES(lock_);
   CapturedPoint capture_held() TS_REQUIRES(lock_);
   void check(const v1::StepRequest& request) const;
-  /// What `update` changes, while nobody but its caller may see it.
+  /// What a call changes, while nobody else may see it.
   struct Draft {
     SessionStatus::View view;
     Grants::List grants;
+  };
+  struct DraftInUse {
+    DraftInUse(std::optional<Draft>& place, Draft draft) : place(place) {
+      place = std::move(draft);
+    }
+    ~DraftInUse() { place.reset(); }
+    DraftInUse(const DraftInUse&) = delete;
+    DraftInUse& operator=(const DraftInUse&) = delete;
+    std::optional<Draft>& place;
   };
   static StepPolicy policy_of(v1::NonConvergencePolicy kind, std::optional<double> minimum);
   void set_policy(const StepPolicy& policy) TS_REQUIRES(lock_);

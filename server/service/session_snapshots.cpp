@@ -9,10 +9,9 @@
 namespace mbcosim::server {
 namespace {
 
-// Captured after the step to which the session goes, before all else of it follows.
+// Captured where the session goes to, before all else of it follows.
 void tell_of_arrival(std::int64_t results_until, v1::CheckpointPoint* point) {
   point->set_results_until_step(results_until);
-  point->mutable_info()->clear_last_failure();
   for (v1::CheckpointSnapshot& snapshot : *point->mutable_snapshots())
     snapshot.set_agrees_until_step(std::min(snapshot.agrees_until_step(), results_until));
   for (v1::CheckpointPort& port : *point->mutable_ports()) {
@@ -21,31 +20,46 @@ void tell_of_arrival(std::int64_t results_until, v1::CheckpointPoint* point) {
   }
 }
 
+void put_on_disk(Session& session, CapturedPoint captured, const Session::Change& change,
+                 const google::protobuf::Message& reply) {
+  if (change.turn.has_id())
+    *captured.point.add_kept_replies() = change.turn.described(reply, /*begun=*/false);
+  change.store.put_on_disk(session, std::move(captured));
+}
+
 }  // namespace
 
-void Session::save(const std::string& display_name, const Call& call, v1::Snapshot* out) {
+// The state of a simulation that has failed is not kept: its last checkpoint stays.
+void Session::store_changed(const Change& change, const google::protobuf::Message& reply) {
+  if (storage_.has_journal() && !status_.failed())
+    put_on_disk(*this, capture_held(), change, reply);
+}
+
+void Session::save(const std::string& display_name, const Change& change,
+                   v1::CreateSnapshotReply* reply) {
   require_usable();
   check_display_name(display_name);
-  const CallGuard lock(lock_, call);
+  const CallGuard lock(lock_, change.call);
   snapshots_.check_room(size_of(simulation_->state()));
-  snapshots_.add(simulation_->snapshot(), display_name, out);
+  v1::Snapshot* const out = reply->mutable_snapshot();
+  SnapshotShelf::Change saved = snapshots_.add(simulation_->snapshot(), display_name, out);
   storage_.note_change();
+  store_changed(change, *reply);
+  saved.make();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
 }
 
-void Session::restore(int snapshot, const Call& call, const SessionStore& store) {
-  go_to_snapshot(snapshot, call, store);
-  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
-                       status_.view().step);
-}
-
-void Session::go_to_snapshot(int snapshot, const Call& call, const SessionStore& store) {
+void Session::restore(int snapshot, const Change& change, v1::RestoreSnapshotReply* reply) {
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
   require_way_back();
-  go_to(snapshots_.get(snapshot), call, store, results_ ? snapshots_.agrees_until(snapshot) : 0);
+  const State state = snapshots_.get(snapshot);
+  go_to({state, snapshots_.agrees_until(snapshot), *reply, reply->mutable_simulation()}, change);
+  shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
+                       state.step);
 }
 
-void Session::reset(const Call& call, const SessionStore& store, const CancelToken& cancel) {
+void Session::reset(const Change& change, const CancelToken& cancel,
+                    v1::ResetSimulationReply* reply) {
   constexpr std::int64_t kNothing = -1, kInitialSolution = 0;
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
   require_way_back();
@@ -54,12 +68,12 @@ void Session::reset(const Call& call, const SessionStore& store, const CancelTok
     return Simulation::create(origin_.model, &cancel, /*writer=*/nullptr, origin_.time_keeping);
   });
   if (!fresh) throw Refusal(fresh.error());
-  go_to((*fresh)->state(), call, store, origin_.forked ? kNothing : kInitialSolution);
+  go_to({(*fresh)->state(), origin_.forked ? kNothing : kInitialSolution, *reply,
+         reply->mutable_simulation()},
+        change);
 }
 
-// `results_until`: the state shares its history with the result files up to this step.
-void Session::go_to(const State& state, const Call& call, const SessionStore& store,
-                    std::int64_t results_until) {
+void Session::go_to(const Goal& goal, const Change& change) {
   if (!status_.claim(nullptr))
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; restore when it has ended");
@@ -67,22 +81,11 @@ void Session::go_to(const State& state, const Call& call, const SessionStore& st
     SessionStatus& status;
     ~Release() { status.release(); }
   } const release{status_};
-  const CallGuard lock(lock_, call);
-  const bool ahead = results_ && storage_.keeping();
-  if (ahead) store_ahead(state, store, results_until);
-  if (results_) results_->expect(results_until);
-  const auto status = simulation_->restore(state);
-  if (results_) results_->restored();
-  if (!status) {
-    const Refusal refusal(results_ ? results_->without_paths(status.error()) : status.error());
-    if (ahead) status_.fail(refusal.what());  // the state is there already, the files are not
-    throw refusal;
-  }
-  if (results_) snapshots_.results_end_at(results_->end());
-  coupler_.reset();
-  storage_.remember(coupler_.memory());
-  if (recorder_) recorder_->restored(simulation_->step_number(), simulation_->time());
-  storage_.note_change();
+  const CallGuard lock(lock_, change.call);
+  const bool stored = storage_.keeping() && (results_ || storage_.has_journal());
+  if (stored) store_ahead(goal, change);
+  arrive(goal, stored);
+  if (!stored) fill_recovered(change.caller, goal.info);
   const SessionStatus::View before = status_.view();
   status_.recover();
   status_.publish(*simulation_);
@@ -90,31 +93,52 @@ void Session::go_to(const State& state, const Call& call, const SessionStore& st
     shared_.log.state_changed(subject(), v1::SIMULATION_STATE_READY, simulation_->step_number());
 }
 
-// The result files are cut when the state is on the disk: until then a restart goes on from one
-// that needs all that is in them.
-void Session::store_ahead(const State& state, const SessionStore& store,
-                          std::int64_t results_until) {
-  const MemoryShare share(shared_.memory, size_of(simulation_->state()));
-  const State before = simulation_->snapshot();
-  results_->expect(results_until);
-  results_->only_try();
-  if (const Status status = simulation_->restore(state); !status)
-    throw Refusal(results_->without_paths(status.error()));
-  try {
-    CapturedPoint captured = capture_held();
-    tell_of_arrival(results_until, &captured.point);
-    store.put_ahead_on_disk(*this, std::move(captured));
-  } catch (...) {
-    results_->only_try();
-    if (const Status status = simulation_->restore(before); !status)
-      status_.fail(status.error().message);
-    throw;
+void Session::arrive(const Goal& goal, bool stored) {
+  if (results_) results_->expect(goal.results_until);
+  const auto status = simulation_->restore(goal.state);
+  if (results_) results_->restored();
+  if (!status) {
+    const Refusal refusal(results_ ? results_->without_paths(status.error()) : status.error());
+    if (stored) status_.fail(refusal.what());  // the state is there already, the files are not
+    throw refusal;
   }
+  if (results_) snapshots_.results_end_at(results_->end());
+  coupler_.reset();
+  storage_.remember(coupler_.memory());
+  if (recorder_) recorder_->restored(simulation_->step_number(), simulation_->time());
+  storage_.note_change();
 }
 
-void Session::forget(int snapshot) {
-  const std::int64_t step = snapshots_.remove(snapshot);
+// The result files are cut when the state is on the disk: until then a restart goes on from one
+// that needs all that is in them.
+void Session::store_ahead(const Goal& goal, const Change& change) {
+  const MemoryShare share(shared_.memory, size_of(simulation_->state()));
+  if (results_) results_->check_way_back(std::min(goal.state.step, goal.results_until));
+  const Status there = simulation_->look_from(goal.state, [&]() TS_REQUIRES(lock_) {
+    fill_recovered(change.caller, goal.info);
+    const DraftInUse draft(draft_, {status_.recovered(*simulation_), grants_.list()});
+    CapturedPoint captured = capture_held();
+    tell_of_arrival(goal.results_until, &captured.point);
+    put_on_disk(*this, std::move(captured), change, goal.reply);
+  });
+  if (!there) throw Refusal(there.error());
+}
+
+void Session::fill_recovered(const Caller& caller, v1::SimulationInfo* out) const {
+  if (!out) return;
+  fill(status_.recovered(*simulation_), out);
+  if (grants_.allow(caller, Access::own)) *out->mutable_grants() = grants_.list();
+}
+
+void Session::forget(int snapshot, const Change& change, v1::DeleteSnapshotReply* reply) {
+  const std::int64_t step = snapshots_.step_of(snapshot);
+  SnapshotShelf::Change removed = snapshots_.remove(snapshot);
   storage_.note_change();
+  if (storage_.has_journal()) {
+    const CallGuard lock(lock_, change.call);
+    store_changed(change, *reply);
+  }
+  removed.make();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_DELETED, snapshots_.name_of(snapshot), step);
 }
 
@@ -169,25 +193,26 @@ std::string Session::export_state(int snapshot, const Call& call) {
 }
 
 void Session::import_state(const std::string& bytes, const std::string& display_name,
-                           bool also_restore, const Call& call, const SessionStore& store,
-                           v1::Snapshot* out) {
+                           bool also_restore, const Change& change,
+                           const google::protobuf::Message& reply, v1::Snapshot* out) {
   if (also_restore) require_way_back();
   check_display_name(display_name);
   std::int64_t results_end = 0;  // an imported state is taken for one of this history so far
   Result<State> state = [&] {
-    const CallGuard lock(lock_, call);
+    const CallGuard lock(lock_, change.call);
     results_end = results_ ? results_->end() : 0;
     return simulation_->state_of(bytes);
   }();
   if (!state) throw Refusal(state.error());
-  const int number = snapshots_.add(std::move(*state), display_name, out, results_end);
+  SnapshotShelf::Change imported = snapshots_.add(*state, display_name, out, results_end);
   storage_.note_change();
-  try {
-    if (also_restore) go_to_snapshot(number, call, store);
-  } catch (...) {
-    snapshots_.remove(number);
-    throw;
+  if (also_restore) {
+    go_to({*state, std::min(results_end, state->step), reply, /*info=*/nullptr}, change);
+  } else if (storage_.has_journal()) {
+    const CallGuard lock(lock_, change.call);
+    store_changed(change, reply);
   }
+  imported.make();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
   if (also_restore)
     shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, out->name(), out->step());

@@ -4,13 +4,29 @@
 
 namespace mbcosim::server {
 
+namespace {
+
+void update(SessionStatus::View& view, const Simulation& simulation, double next_step) {
+  view.step = simulation.step_number();
+  view.time = simulation.time();
+  view.next_step = next_step;
+  view.finished = simulation.finished();
+}
+
+}  // namespace
+
 void SessionStatus::publish(const Simulation& simulation) {
-  const double next_step = simulation.next_step_size();
+  const double next_step = simulation.next_step_size();  // a drive is evaluated
   const Guard guard(mutex_);
-  view_.step = simulation.step_number();
-  view_.time = simulation.time();
-  view_.next_step = next_step;
-  view_.finished = simulation.finished();
+  update(view_, simulation, next_step);
+}
+
+SessionStatus::View SessionStatus::recovered(const Simulation& simulation) const {
+  View then = view();
+  update(then, simulation, simulation.next_step_size());
+  then.failed = then.stepping = false;
+  then.last_failure.clear();
+  return then;
 }
 
 void SessionStatus::set_display_name(const std::string& name) {

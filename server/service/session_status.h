@@ -26,6 +26,8 @@ class SessionStatus {
     return view_;
   }
   void publish(const Simulation& simulation);
+  /// What `view` will give when the simulation, restored, is published and nobody advances it.
+  View recovered(const Simulation& simulation) const;
   void set_display_name(const std::string& name);
   void set_policy(const StepPolicy& policy);
   void count_late_step(double delay);

@@ -23,7 +23,7 @@ void SessionStorage::capture(const Simulation& simulation, v1::CheckpointPoint* 
   parts_.kept.describe(out->mutable_kept_replies());
   const auto& [turn, reply] = at_work_;
   if (turn && turn->has_id() && reply->steps_done() > 0)
-    *out->add_kept_replies() = turn->described(*reply, /*begun=*/true);
+    KeptReplies::put_last(turn->described(*reply, /*begun=*/true), out->mutable_kept_replies());
   *out->mutable_ports() = peers_;
   if (parts_.results) parts_.results->prepare();
   if (!has_journal()) return;
@@ -68,11 +68,12 @@ void SessionStorage::store(const Simulation& simulation,
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
 }
 
-void SessionStorage::store_change(const Simulation& simulation, const KeptReplies::Turn* turn,
+void SessionStorage::store_change(const Simulation& simulation, const KeptReplies::Turn& turn,
                                   const google::protobuf::MessageLite& reply) {
   if (!has_journal()) return;
-  const bool keeps = turn && turn->has_id();
-  store(simulation, keeps ? std::optional(turn->described(reply, /*begun=*/false)) : std::nullopt);
+  std::optional<v1::KeptReply> kept;
+  if (turn.has_id()) kept = turn.described(reply, /*begun=*/false);
+  store(simulation, kept);
 }
 
 }  // namespace mbcosim::server

@@ -61,8 +61,8 @@ class SessionStorage {
   /// The state, and replies since the last time, are on the disk. Throws STORAGE_FULL,
   /// LIMIT_EXCEEDED.
   void store(const Simulation& simulation, const std::optional<v1::KeptReply>& reply);
-  /// With JOURNAL: what a call other than `Step` changed, and its reply. `turn`: keeps it, or null.
-  void store_change(const Simulation& simulation, const KeptReplies::Turn* turn,
+  /// With JOURNAL: what a call other than `Step` changed, and its reply, which `turn` keeps.
+  void store_change(const Simulation& simulation, const KeptReplies::Turn& turn,
                     const google::protobuf::MessageLite& reply);
 
  private:

@@ -55,21 +55,16 @@ class SessionStore {
     std::function<bool(Session&)> suspend;                 ///< false: it must live on
     std::function<void(const std::string& id)> unsuspend;  ///< it lives on after all
     std::function<void(Session&)> forget;
-    std::function<void(Session&)> store;  ///< a checkpoint now; throws STORAGE_FULL
-    /// One of where it goes to; the call has the keeping's mutex. Throws STORAGE_FULL.
-    std::function<void(Session&, CapturedPoint)> store_ahead;
+    /// The call has the keeping's mutex. Throws STORAGE_FULL.
+    std::function<void(Session&, CapturedPoint)> store;
   };
   /// Before anybody uses the store.
   void set_keeper(Keeper keeper) { keeper_ = std::move(keeper); }
 
   void add(SessionPtr session);
-  /// With JOURNAL: all that the session holds. Throws STORAGE_FULL.
-  void put_on_disk(Session& session) const {
-    if (session.keeping() && session.keeping()->journal) keeper_.store(session);
-  }
-  /// Where a durable session goes to, by a call that changes it. Throws STORAGE_FULL.
-  void put_ahead_on_disk(Session& session, CapturedPoint captured) const {
-    keeper_.store_ahead(session, std::move(captured));
+  /// What a durable session becomes by a call that changes it. Throws STORAGE_FULL.
+  void put_on_disk(Session& session, CapturedPoint captured) const {
+    keeper_.store(session, std::move(captured));
   }
   std::vector<SessionPtr> all() const;
   bool has(const std::string& id) const;

@@ -152,11 +152,10 @@ void add_life(Gate& gate, const Parts& parts) {
       on_session<v1::UpdateSimulationRequest, v1::UpdateSimulationReply>(
           parts, Role::control, Lane::work,
           [&parts](Session& session, const v1::UpdateSimulationRequest& request,
-                   v1::UpdateSimulationReply* reply, const CallFrame& frame,
-                   const KeptReplies::Turn* turn) {
-            if (session.grants().allow(frame.caller, Access::own))  // else it is refused anyway
+                   v1::UpdateSimulationReply* reply, const Session::Change& change) {
+            if (session.grants().allow(change.caller, Access::own))  // else it is refused anyway
               Grants::check_known(request.grants().grants(), parts.runtime.authenticator);
-            session.update(request, frame.caller, frame.call, reply, turn);
+            session.update(request, change, reply);
           }));
   gate.add(
       simulations_path("DescribeSimulation"),
@@ -174,13 +173,13 @@ void add_variables(Gate& gate, const Parts& parts) {
                  frame.share.grow(session.variable_access().bytes_of(request.handles()));
                  session.read(request, frame.call, reply);
                }));
-  gate.add(
-      simulations_path("WriteVariables"),
-      on_session<v1::WriteVariablesRequest, v1::WriteVariablesReply>(
-          parts, Role::control, Lane::work,
-          [](Session& session, const v1::WriteVariablesRequest& request,
-             v1::WriteVariablesReply* reply, const CallFrame& frame,
-             const KeptReplies::Turn* turn) { session.write(request, frame.call, reply, turn); }));
+  gate.add(simulations_path("WriteVariables"),
+           on_session<v1::WriteVariablesRequest, v1::WriteVariablesReply>(
+               parts, Role::control, Lane::work,
+               [](Session& session, const v1::WriteVariablesRequest& request,
+                  v1::WriteVariablesReply* reply, const Session::Change& change) {
+                 session.write(request, change.call, change.turn, reply);
+               }));
 }
 
 void add_analysis(Gate& gate, const Parts& parts) {

@@ -37,11 +37,11 @@ class SnapshotImport final : public Upload<v1::ImportSnapshotRequest> {
       throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
     v1::ImportSnapshotReply reply;
     const auto import = [this](Session& session, const v1::ImportSnapshotHeader&,
-                               v1::ImportSnapshotReply* out, const CallFrame& frame) {
-      session.import_state(bytes_, header_.display_name(), header_.restore(), frame.call,
-                           parts_.store, out->mutable_snapshot());
+                               v1::ImportSnapshotReply* out, const Session::Change& change) {
+      session.import_state(bytes_, header_.display_name(), header_.restore(), change, *out,
+                           out->mutable_snapshot());
     };
-    once_stored(parts_.store, **session_, frame_of(exchange, share_), question(), &reply, import);
+    change_once(parts_.store, **session_, frame_of(exchange, share_), question(), &reply, import);
     exchange.end(serialized(reply));
   }
 
@@ -96,12 +96,13 @@ RecordReplies::Source recorded(const Parts& parts, const CallFrame& frame,
 }
 
 void add_saved(Gate& gate, const Parts& parts) {
-  gate.add(simulations_path("CreateSnapshot"),
-           on_session<v1::CreateSnapshotRequest, v1::CreateSnapshotReply>(
-               parts, Role::control, Lane::work,
-               [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
-                 session.save(request.display_name(), frame.call, reply->mutable_snapshot());
-               }));
+  gate.add(
+      simulations_path("CreateSnapshot"),
+      on_session<v1::CreateSnapshotRequest, v1::CreateSnapshotReply>(
+          parts, Role::control, Lane::work,
+          [](Session& session, const auto& request, auto* reply, const Session::Change& change) {
+            session.save(request.display_name(), change, reply);
+          }));
   gate.add(simulations_path("ListSnapshots"),
            on_session<v1::ListSnapshotsRequest, v1::ListSnapshotsReply>(
                parts, Role::observe, Lane::work, [](Session& session, const auto&, auto* reply) {
@@ -111,23 +112,23 @@ void add_saved(Gate& gate, const Parts& parts) {
       simulations_path("RestoreSnapshot"),
       on_session<v1::RestoreSnapshotRequest, v1::RestoreSnapshotReply>(
           parts, Role::control, Lane::work,
-          [&parts](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
-            session.restore(snapshot_in(request), frame.call, parts.store);
-            session.fill(reply->mutable_simulation(), frame.caller);
+          [](Session& session, const auto& request, auto* reply, const Session::Change& change) {
+            session.restore(snapshot_in(request), change, reply);
           }));
   gate.add(simulations_path("ResetSimulation"),
            on_session<v1::ResetSimulationRequest, v1::ResetSimulationReply>(
                parts, Role::control, Lane::heavy,
-               [&parts](Session& session, const auto&, auto* reply, const CallFrame& frame) {
-                 const CallToken token(frame.call);
-                 session.reset(frame.call, parts.store, token);
-                 session.fill(reply->mutable_simulation(), frame.caller);
+               [](Session& session, const auto&, auto* reply, const Session::Change& change) {
+                 const CallToken token(change.call);
+                 session.reset(change, token, reply);
                }));
-  gate.add(simulations_path("DeleteSnapshot"),
-           on_session<v1::DeleteSnapshotRequest, v1::DeleteSnapshotReply>(
-               parts, Role::control, Lane::work, [](Session& session, const auto& request, auto*) {
-                 session.forget(snapshot_in(request));
-               }));
+  gate.add(
+      simulations_path("DeleteSnapshot"),
+      on_session<v1::DeleteSnapshotRequest, v1::DeleteSnapshotReply>(
+          parts, Role::control, Lane::work,
+          [](Session& session, const auto& request, auto* reply, const Session::Change& change) {
+            session.forget(snapshot_in(request), change, reply);
+          }));
 }
 
 }  // namespace
@@ -145,9 +146,9 @@ void add_snapshots(Gate& gate, const Parts& parts) {
       simulations_path("ImportSnapshotInline"),
       on_session<v1::ImportSnapshotInlineRequest, v1::ImportSnapshotInlineReply>(
           parts, Role::control, Lane::work,
-          [&parts](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
-            session.import_state(request.data(), request.display_name(), request.restore(),
-                                 frame.call, parts.store, reply->mutable_snapshot());
+          [](Session& session, const auto& request, auto* reply, const Session::Change& change) {
+            session.import_state(request.data(), request.display_name(), request.restore(), change,
+                                 *reply, reply->mutable_snapshot());
           }));
   gate.add(simulations_path("GetRecord"),
            series<v1::GetRecordRequest, v1::GetRecordReply>(

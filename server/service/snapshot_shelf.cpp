@@ -48,18 +48,37 @@ void SnapshotShelf::require_room(std::int64_t bytes) const {
                         "the simulation's snapshots would take too much memory");
 }
 
-int SnapshotShelf::add(State state, const std::string& display_name, v1::Snapshot* out,
-                       std::int64_t results_end) {
+SnapshotShelf::Change::~Change() {
+  if (number_ == 0) return;
+  const Guard guard(shelf_.mutex_);
+  if (adds_)
+    shelf_.take_out(number_);
+  else
+    shelf_.saved_.at(number_).kept = true;
+}
+
+void SnapshotShelf::Change::make() {
+  const Guard guard(shelf_.mutex_);
+  const int number = std::exchange(number_, 0);
+  if (adds_)
+    shelf_.saved_.at(number).seen = true;
+  else
+    shelf_.take_out(number);
+}
+
+SnapshotShelf::Change SnapshotShelf::add(State state, const std::string& display_name,
+                                         v1::Snapshot* out, std::int64_t results_end) {
   const std::int64_t bytes = size_of(state), agrees_until = std::min(results_end, state.step);
   const Guard guard(mutex_);
   require_room(bytes);
   MemoryShare share(memory_, bytes);
-  const auto added =
-      saved_.emplace(next_, Saved{display_name, std::move(state), std::move(share), agrees_until})
-          .first;
+  const auto added = saved_
+                         .emplace(next_, Saved{display_name, std::move(state), std::move(share),
+                                               agrees_until, /*seen=*/false})
+                         .first;
   bytes_ += bytes;
   fill(next_, added->second, out);
-  return next_++;
+  return {*this, next_++, /*adds=*/true};
 }
 
 State SnapshotShelf::get(int number) const {
@@ -77,23 +96,34 @@ void SnapshotShelf::results_end_at(std::int64_t step) {
   for (auto& [number, saved] : saved_) saved.agrees_until = std::min(saved.agrees_until, step);
 }
 
-std::int64_t SnapshotShelf::remove(int number) {
+SnapshotShelf::Change SnapshotShelf::remove(int number) {
   const Guard guard(mutex_);
-  const std::int64_t step = find(number).state.step;
-  bytes_ -= find(number).share.bytes();
+  if (!find(number).kept) refuse(number);  // another call removes it
+  saved_.at(number).kept = false;
+  return {*this, number, /*adds=*/false};
+}
+
+void SnapshotShelf::take_out(int number) {
+  bytes_ -= saved_.at(number).share.bytes();
   saved_.erase(number);
-  return step;
+}
+
+std::int64_t SnapshotShelf::step_of(int number) const {
+  const Guard guard(mutex_);
+  return find(number).state.step;
 }
 
 void SnapshotShelf::list(v1::ListSnapshotsReply* out) const {
   const Guard guard(mutex_);
-  for (const auto& [number, saved] : saved_) fill(number, saved, out->add_snapshots());
+  for (const auto& [number, saved] : saved_)
+    if (saved.seen) fill(number, saved, out->add_snapshots());
 }
 
 void SnapshotShelf::describe(v1::CheckpointPoint* out) const {
   const Guard guard(mutex_);
   out->set_next_snapshot(next_);
   for (const auto& [number, saved] : saved_) {
+    if (!saved.kept) continue;
     v1::CheckpointSnapshot* snapshot = out->add_snapshots();
     snapshot->set_number(number);
     snapshot->set_display_name(saved.display_name);
@@ -124,7 +154,11 @@ void SnapshotShelf::go_on_from(int number) {
 
 const SnapshotShelf::Saved& SnapshotShelf::find(int number) const {
   const auto found = saved_.find(number);
-  if (found != saved_.end()) return found->second;
+  if (found != saved_.end() && found->second.seen) return found->second;
+  refuse(number);
+}
+
+void SnapshotShelf::refuse(int number) const {
   throw Refusal(v1::REASON_NO_SUCH_SNAPSHOT, simulation_ + " has no snapshot " +
                                                  std::to_string(number) + "; it has " +
                                                  std::to_string(saved_.size()));

@@ -167,16 +167,29 @@ void ResultHistory::resume(const Model& model) {
   step_ = INT64_MAX;  // as far as the index goes
 }
 
+namespace {
+
+Error nothing_of(std::int64_t step) {
+  return make_error(ErrorKind::data_loss, "RESULTS_CUT_SHORT",
+                    "the result files have nothing of step " + std::to_string(step) + " or before");
+}
+
+}  // namespace
+
+ResultHistory::Mark ResultHistory::mark_for(std::int64_t step) {
+  return step_ <= step ? mark_now() : find(step);
+}
+
+Status ResultHistory::can_go_back(std::int64_t step) {
+  if (mark_for(step).positions.empty()) return nothing_of(step);
+  return ok();
+}
+
 Status ResultHistory::restored(const EvalContext& context) {
   const std::int64_t expected = std::exchange(expected_, kOwn);
-  const bool only_try = std::exchange(only_try_, false);
   const std::int64_t target = context.state->step, common = std::min(target, expected);
-  const Mark mark = step_ <= common ? mark_now() : find(common);
-  if (mark.positions.empty())
-    return make_error(
-        ErrorKind::data_loss, "RESULTS_CUT_SHORT",
-        "the result files have nothing of step " + std::to_string(common) + " or before");
-  if (only_try) return ok();
+  const Mark mark = mark_for(common);
+  if (mark.positions.empty()) return nothing_of(common);
   if (auto status = go_back(mark, context); !status) return status;
   if (mark.step < target)
     writer_->note("# Goes on after step " + std::to_string(target) +

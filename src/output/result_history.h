@@ -25,8 +25,8 @@ class ResultHistory final : public ResultWriter {
   /// The state that `restored` will be told shares its history with the files up to this step only;
   /// by default up to its own step.
   void expect(std::int64_t step) { expected_ = step; }
-  /// The next restore is tried only: the files stay as they are.
-  void only_try() { only_try_ = true; }
+  /// Could the files be cut to what they share with a history up to this step?
+  Status can_go_back(std::int64_t step);
   /// Is there room for another step as large as twice the largest since the last restore?
   bool has_room() const;
 
@@ -63,6 +63,7 @@ class ResultHistory final : public ResultWriter {
   void append(const Mark& mark);
   /// The last mark that is not after `step`.
   Mark find(std::int64_t step);
+  Mark mark_for(std::int64_t step);
   Status go_back(const Mark& mark, const EvalContext& context);
   std::int64_t bytes() const;
 
@@ -75,7 +76,6 @@ class ResultHistory final : public ResultWriter {
   Mark last_;               ///< in the index
   std::int64_t step_ = -1;  ///< that the files are at; -1: before the first record
   std::int64_t expected_ = kOwn;
-  bool only_try_ = false;
   std::int64_t bytes_before_ = 0, largest_step_ = 0;  ///< since the last restore
 };
 

@@ -491,11 +491,27 @@ Status Simulation::set(int handle, std::span<const double> values) {
 Status Simulation::restore(const State& state) {
   if (!same_layout(state, impl_->state)) return another_model();
   State before = std::exchange(impl_->state, state);
-  impl_->ended = false;
-  if (!impl_->writer) return ok();
-  Status cut = impl_->writer->restored(impl_->context());
-  if (!cut) impl_->state = std::move(before);
+  const Status cut = impl_->writer ? impl_->writer->restored(impl_->context()) : ok();
+  if (cut)
+    impl_->ended = false;
+  else
+    impl_->state = std::move(before);
   return cut;
+}
+
+Status Simulation::look_from(const State& state, const std::function<void()>& look) {
+  if (!same_layout(state, impl_->state)) return another_model();
+  struct Place {
+    Impl& impl;
+    State state;
+    bool ended;
+    ~Place() {
+      impl.state = std::move(state);
+      impl.ended = ended;
+    }
+  } const before{*impl_, std::exchange(impl_->state, state), std::exchange(impl_->ended, false)};
+  look();
+  return ok();
 }
 
 Status Simulation::write_to(std::shared_ptr<ResultWriter> writer) try {

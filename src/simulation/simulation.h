@@ -179,6 +179,9 @@ class Simulation {
   /// ErrorKind::precondition when `state` has another model's layout. The writer is told; when it
   /// cannot follow, nothing changes.
   Status restore(const State& state);
+  /// Stands at `state` while `look` runs, and then where it was. Results are not told. The same
+  /// error as `restore`.
+  Status look_from(const State& state, const std::function<void()>& look);
   /// Results go there from now on, beginning with the present state.
   Status write_to(std::shared_ptr<ResultWriter> writer);
   /// The same with files that an earlier process wrote, which are cut back to the present step.

@@ -35,31 +35,6 @@ TEST(Log, TextsOfClientsCannotBeginALineNorColourIt) {
             "arm?2026 error??[31mred? \xc3\xa9");
 }
 
-TEST(Events, ThatAreHeldAreToldAtTheEnd) {
-  EventLog log;
-  const std::string name = "simulations/1", owner = "local";
-  {
-    const HeldEvents held;
-    log.snapshot({name, owner}, v1::SNAPSHOT_CHANGE_SAVED, name + "/snapshots/1", 3);
-    log.state_changed({name, owner}, v1::SIMULATION_STATE_READY, 3);
-    EXPECT_EQ(log.journal().last(), 0);
-  }
-  EXPECT_EQ(log.journal().last(), 2);
-  log.state_changed({name, owner}, v1::SIMULATION_STATE_FINISHED, 4);
-  EXPECT_EQ(log.journal().last(), 3);
-}
-
-TEST(Events, OfWhatCouldNotBeStoredAreNotTold) {
-  EventLog log;
-  const std::string name = "simulations/1", owner = "local";
-  {
-    HeldEvents held;
-    log.snapshot({name, owner}, v1::SNAPSHOT_CHANGE_SAVED, name + "/snapshots/1", 3);
-    held.drop();
-  }
-  EXPECT_EQ(log.journal().last(), 0);
-}
-
 /// Takes the place of the daemon's log.
 class LogOfLibraries : public testing::Test {
  protected:

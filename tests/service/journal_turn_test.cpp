@@ -143,8 +143,9 @@ TEST_F(JournaledCall, ACheckpointHasWhatACallAtWorkHasDone) {
 TEST_F(JournaledCall, AChangeIsStoredWithItsWholeReply) {
   v1::WriteVariablesReply reply;
   reply.set_step(5);
-  storage_.store_change(*simulation_, &turn_, reply);
-  storage_.store_change(*simulation_, nullptr, reply);
+  storage_.store_change(*simulation_, turn_, reply);
+  const KeptReplies::Turn without_id(kept_, Caller{"ann", Role::control}, "", 0, call_);
+  storage_.store_change(*simulation_, without_id, reply);
   const auto stored = entries();
   ASSERT_EQ(stored.size(), 2u);
   ASSERT_EQ(stored[0].kept_replies_size(), 1);

@@ -2,7 +2,9 @@
 
 #include <list>
 #include <string>
+#include <vector>
 
+#include "service/kept_replies.h"
 #include "service/lease.h"
 #include "service/peer_places.h"
 #include "service/snapshot_shelf.h"
@@ -56,6 +58,29 @@ class Shelf : public testing::Test {
     s.y.assign(100, 0.5);
     return s;
   }
+  int add(std::int64_t step) {
+    SnapshotShelf::Change added = shelf_.add(state(step), "", &out_);
+    const int number = added.number();
+    added.make();
+    return number;
+  }
+  std::vector<int> kept() const {
+    v1::CheckpointPoint point;
+    shelf_.describe(&point);
+    std::vector<int> numbers;
+    for (const v1::CheckpointSnapshot& snapshot : point.snapshots())
+      numbers.push_back(snapshot.number());
+    return numbers;
+  }
+  std::vector<int> seen() const {
+    v1::ListSnapshotsReply list;
+    shelf_.list(&list);
+    std::vector<int> numbers;
+    std::string simulation;
+    for (const v1::Snapshot& snapshot : list.snapshots())
+      numbers.push_back(number_of_snapshot(snapshot.name(), &simulation));
+    return numbers;
+  }
   const ServiceLimits limits_ = limits();
   MemoryBudget memory_{1 << 20};
   SnapshotShelf shelf_{"simulations/1", "digest", limits_, memory_};
@@ -63,25 +88,115 @@ class Shelf : public testing::Test {
 };
 
 TEST_F(Shelf, NumbersAreNotGivenTwice) {
-  EXPECT_EQ(shelf_.add(state(7), "a", &out_), 1);
+  EXPECT_EQ(add(7), 1);
   EXPECT_EQ(out_.name(), "simulations/1/snapshots/1");
   EXPECT_EQ(out_.step(), 7);
   EXPECT_GE(out_.size_bytes(), 800);
-  shelf_.remove(1);
-  EXPECT_EQ(shelf_.add(state(8), "b", &out_), 2);
+  shelf_.remove(1).make();
+  EXPECT_EQ(add(8), 2);
   EXPECT_EQ(shelf_.get(2).step, 8);
   EXPECT_EQ(reason_of_refusal([&] { shelf_.get(1); }), v1::REASON_NO_SUCH_SNAPSHOT);
 }
 
 TEST_F(Shelf, RefusesWhatIsTooMuchAndHasRoomAgainAfterARemoval) {
-  shelf_.add(state(1), "", &out_);
-  shelf_.add(state(2), "", &out_);
-  EXPECT_EQ(reason_of_refusal([&] { shelf_.add(state(3), "", &out_); }), v1::REASON_LIMIT_EXCEEDED);
-  shelf_.remove(1);
-  EXPECT_EQ(shelf_.add(state(3), "", &out_), 3);
-  v1::ListSnapshotsReply list;
-  shelf_.list(&list);
-  EXPECT_EQ(list.snapshots_size(), 2);
+  add(1);
+  add(2);
+  EXPECT_EQ(reason_of_refusal([&] { add(3); }), v1::REASON_LIMIT_EXCEEDED);
+  shelf_.remove(1).make();
+  EXPECT_EQ(add(3), 3);
+  EXPECT_EQ(seen(), (std::vector<int>{2, 3}));
+}
+
+TEST_F(Shelf, CheckpointsHaveWhatIsAddedBeforeOthersSeeIt) {
+  {
+    SnapshotShelf::Change added = shelf_.add(state(1), "", &out_);
+    EXPECT_EQ(kept(), std::vector<int>{1});
+    EXPECT_TRUE(shelf_.find_state(1));
+    EXPECT_TRUE(seen().empty());
+    EXPECT_EQ(reason_of_refusal([&] { shelf_.get(1); }), v1::REASON_NO_SUCH_SNAPSHOT);
+    added.make();
+    EXPECT_EQ(seen(), std::vector<int>{1});
+  }
+  EXPECT_EQ(kept(), std::vector<int>{1});
+}
+
+TEST_F(Shelf, CheckpointsDoNotHaveWhatIsRemovedWhileOthersSeeIt) {
+  add(1);
+  SnapshotShelf::Change removed = shelf_.remove(1);
+  EXPECT_TRUE(kept().empty());
+  EXPECT_EQ(seen(), std::vector<int>{1});
+  EXPECT_EQ(shelf_.get(1).step, 1);
+  EXPECT_EQ(reason_of_refusal([&] { (void)shelf_.remove(1); }), v1::REASON_NO_SUCH_SNAPSHOT);
+  removed.make();
+  EXPECT_TRUE(seen().empty());
+}
+
+TEST_F(Shelf, ChangesThatAreNotMadeAreUndone) {
+  add(1);
+  const std::int64_t before = memory_.used();
+  {
+    const SnapshotShelf::Change added = shelf_.add(state(2), "", &out_), removed = shelf_.remove(1);
+    EXPECT_EQ(kept(), std::vector<int>{2});
+  }
+  EXPECT_EQ(kept(), std::vector<int>{1});
+  EXPECT_EQ(seen(), std::vector<int>{1});
+  EXPECT_EQ(memory_.used(), before);
+}
+
+class Replies : public testing::Test {
+ protected:
+  KeptReplies::Messages kept() const {
+    KeptReplies::Messages messages;
+    replies_.describe(&messages);
+    return messages;
+  }
+  MemoryBudget memory_{1 << 20};
+  KeptReplies replies_{memory_};
+  const Caller ann_{"ann", Role::control};
+  Call call_;
+};
+
+TEST_F(Replies, WhatWasBegunOutlivesARepeatThatIsRefusedBeforeItGoesOn) {
+  v1::StepReply half, whole;
+  half.set_steps_done(2);
+  whole.set_steps_done(5);
+  KeptReplies::Turn(replies_, ann_, "run", 7, call_).break_off(half);
+  for (int refused = 0; refused < 2; ++refused) {
+    const KeptReplies::Turn repeat(replies_, ann_, "run", 7, call_);
+    ASSERT_TRUE(repeat.begun());
+    EXPECT_EQ(*repeat.begun(), half.SerializeAsString());
+    ASSERT_EQ(kept().size(), 1) << "a checkpoint meanwhile has it";
+    EXPECT_TRUE(kept()[0].begun());
+  }
+  {
+    KeptReplies::Turn repeat(replies_, ann_, "run", 7, call_);
+    repeat.keep(whole);
+  }
+  ASSERT_EQ(kept().size(), 1);
+  EXPECT_FALSE(kept()[0].begun());
+  const KeptReplies::Turn known(replies_, ann_, "run", 7, call_);
+  ASSERT_TRUE(known.known());
+  EXPECT_EQ(*known.known(), whole.SerializeAsString());
+}
+
+TEST_F(Replies, ARequestThatDidNothingMayBeTriedAnew) {
+  { const KeptReplies::Turn failed(replies_, ann_, "run", 7, call_); }
+  EXPECT_TRUE(kept().empty());
+  const KeptReplies::Turn again(replies_, ann_, "run", 7, call_);
+  EXPECT_FALSE(again.known() || again.begun());
+}
+
+TEST_F(Replies, ALaterOneTakesThePlaceOfOneOfTheSameRequest) {
+  KeptReplies::Messages messages;
+  for (const char* id : {"a", "b", "a"}) {
+    v1::KeptReply reply;
+    reply.set_request_id(id);
+    reply.set_reply(std::to_string(messages.size()));
+    KeptReplies::put_last(std::move(reply), &messages);
+  }
+  ASSERT_EQ(messages.size(), 2);
+  EXPECT_EQ(messages[0].request_id(), "b");
+  EXPECT_EQ(messages[1].reply(), "2");
 }
 
 TEST(VariableAccess, RefusesHandlesWrongSizesAndWhatIsNoInput) {

@@ -1,4 +1,5 @@
 """Simulations with a journal: whatever anybody was told outlives a kill, requests are done once, and runs go on bit for bit."""
+import itertools
 import os
 import random
 import resource
@@ -485,27 +486,53 @@ def test_an_update_that_cannot_be_stored_changes_nothing(start):
         assert again.refresh() == after
 
 
-def test_a_change_that_could_not_be_stored_is_no_success_when_it_is_asked_for_again(start):
+def test_changes_that_cannot_be_stored_are_none(start):
+    """The state, its snapshots and what is told of it stay; a repeat of the request does it once the disk has room."""
     daemon = start("--checkpoint-interval", "3600")
     limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
     with daemon.connect() as server:
         simulation = server.load_text(deck(), durability="journal")
-        simulation.step(10)
-        request = pb.CreateSnapshotRequest(simulation=simulation.name, request_id="once")
-        with server.events(simulation.name) as events:
+        name = simulation.name
+        simulation.step(5)
+        first = simulation.snapshot("first")
+        data = first.export()
+        simulation.run_until(1e9)
+        snapshot = dict(simulation=name, snapshot=first.name)
+        state = dict(simulation=name, data=data)
+        changes = [("CreateSnapshot", pb.CreateSnapshotRequest(simulation=name)), ("RestoreSnapshot", pb.RestoreSnapshotRequest(**snapshot)),
+                   ("ResetSimulation", pb.ResetSimulationRequest(simulation=name)), ("ImportSnapshotInline", pb.ImportSnapshotInlineRequest(**state)),
+                   ("ImportSnapshotInline", pb.ImportSnapshotInlineRequest(**state, restore=True)),
+                   ("DeleteSnapshot", pb.DeleteSnapshotRequest(**snapshot))]
+        for number, (_, request) in enumerate(changes):
+            request.request_id = f"change {number}"
+
+        def repeat(method, request):
+            return getattr(server.simulations, method)(request)
+
+        def seen():
+            return bits(simulation), simulation.refresh(), [(s.name, s.step) for s in simulation.snapshots()]
+        before = seen()
+        with server.events(name) as events:
             resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (100, limits[1]))
-            for _ in range(2):
+            for method, request in changes:
                 with pytest.raises(grpc.RpcError) as caught:
-                    server.simulations.CreateSnapshot(request)
-                assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+                    repeat(method, request)
+                assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED and "what was asked cannot be stored" in caught.value.details()
+                assert seen() == before, method
             resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, limits)
-            saved = server.simulations.CreateSnapshot(request).snapshot
-            simulation.snapshot("another")
-            told = next(event.snapshot.name for event in events if is_saved(event))
-            assert told != saved.name  # nobody was told of what was not on the disk
+            replies = [repeat(*change) for change in changes]
+            told = list(itertools.islice(iter(events), 7))
+        assert told[1].state_changed.state == pb.SIMULATION_STATE_READY
+        assert [events_pb2.SnapshotChange.Name(event.snapshot.change).rsplit("_", 1)[-1] for event in told if event.HasField("snapshot")] == [
+            "SAVED", "RESTORED", "SAVED", "SAVED", "RESTORED", "DELETED"]
+        assert replies[1].simulation.step == 5 and replies[2].simulation.step == 0
+        after = seen()
+        assert (after[1].step, [step for _, step in after[2]]) == (5, [4000, 5, 5])
     daemon.kill()
     with start().connect() as server:
-        assert [s.name for s in server.attach(simulation.name).snapshots()] == [saved.name, told]
+        assert [repeat(*change) for change in changes] == replies
+        simulation = server.attach(name)
+        assert seen()[::2] == after[::2]
 
 
 def test_checkpoints_take_the_journals_place(start, folder):
