@@ -351,7 +351,12 @@ std::string DeckCard::card_name() const {
   return name;
 }
 
-void DeckCard::add_remedy(Diagnostic& d) const { add_form(d, form_.group, form_.word); }
+void DeckCard::add_remedy(Diagnostic& d) const {
+  if (form_.wider_group.empty() || find_grammar(form_.group, form_.word))
+    add_form(d, form_.group, form_.word);
+  else
+    add_form(d, form_.wider_group, form_.wider_word);
+}
 
 void DeckCard::expect_end() {
   if (!more()) return;

@@ -122,7 +122,11 @@ class DeckCard final : public Card, public BeamOutputDefault {
   const std::string& defined_kind() const { return defined_kind_; }
   int defined_label() const { return defined_label_; }
   /// The word of the grammar that the card reads now: errors without a remedy tell its form.
-  void set_form(std::string_view group, std::string_view word) { form_ = {group, word}; }
+  void set_form(std::string_view group, std::string_view word) { form_ = {group, word, "", ""}; }
+  /// The same for a type of it, unless the grammar does not have it.
+  void set_type_form(std::string_view group, std::string_view word) {
+    form_ = {group, word, form_.group, form_.word};
+  }
   /// Adds the form to an error about the card that has no hint.
   void add_remedy(Diagnostic& d) const;
   int drive_depth() const { return drive_depth_; }
@@ -169,7 +173,8 @@ class DeckCard final : public Card, public BeamOutputDefault {
     Vec3 v = Vec3::Zero(), w = Vec3::Zero();
   };
   struct Form {
-    std::string_view group, word;  ///< of the grammar; texts of tables that stay
+    std::string_view group, word;              ///< of the grammar; texts of tables that stay
+    std::string_view wider_group, wider_word;  ///< where the grammar does not have the word
   };
   enum class Entity { position, orientation, other };
   enum class Prefix {
@@ -207,7 +212,7 @@ class DeckCard final : public Card, public BeamOutputDefault {
   /// form.
   template <class Read>
   auto read_as(std::string_view group, std::string_view word, const Read& read) {
-    const Form outer = std::exchange(form_, {group, word});
+    const Form outer = std::exchange(form_, {group, word, "", ""});
     auto made = read(*this);
     form_ = outer;
     return made;

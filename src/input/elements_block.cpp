@@ -1,7 +1,6 @@
 /// Cards of the `elements` block: any element by its head, `driven`, `bind`, `output`.
 #include "input/cards.h"
 #include "input/deck.h"
-#include "input/grammar/grammar.h"
 #include "input/model_functions.h"
 #include "input/suggest.h"
 #include "model/family.h"
@@ -38,7 +37,7 @@ const Registry::ElementReader& typed_reader(DeckCard& card, const Registry::Head
   if (reader != head.types.end()) {
     card.skip();
     info.type = registry.display.at(type);
-    if (find_grammar(word, type)) card.set_form(word, reader->first);
+    card.set_type_form(word, reader->first);
     return reader->second;
   }
   if (type.empty()) card.fail_expected(what + " expected");

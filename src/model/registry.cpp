@@ -1,15 +1,13 @@
 #include "model/registry.h"
 
-#include <cctype>
-
 namespace mbcosim {
 
 std::string normalized(std::string_view word) {
   std::string r;
   r.reserve(word.size());
   for (const char c : word)
-    if (!std::isspace(static_cast<unsigned char>(c)))
-      r += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (c != ' ' && (c < '\t' || c > '\r'))
+      r += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   return r;
 }
 
@@ -19,26 +17,29 @@ template <class Words, class Table, class Reader>
 void enter(std::map<std::string, std::string>& display, Table& table, const Words& words,
            const Reader& reader) {
   for (const auto word : words) {
-    table[normalized(word)] = reader;
-    display[normalized(word)] = std::string(word);
+    const std::string key = normalized(word);
+    table[key] = reader;
+    display[key] = std::string(word);
   }
 }
 
 }  // namespace
 
 void Registry::element(std::string_view head, Family family, ElementReader reader, bool has_label) {
-  Head& h = heads[normalized(head)];
+  const std::string key = normalized(head);
+  Head& h = heads[key];
   h.family = family;
   h.has_label = has_label;
   h.reader = std::move(reader);
-  display[normalized(head)] = std::string(head);
+  display[key] = std::string(head);
 }
 
 void Registry::typed(std::string_view head, Family family,
                      std::initializer_list<std::string_view> words, ElementReader reader) {
-  Head& h = heads[normalized(head)];
+  const std::string key = normalized(head);
+  Head& h = heads[key];
   h.family = family;
-  display[normalized(head)] = std::string(head);
+  display[key] = std::string(head);
   enter(display, h.types, words, reader);
 }
 
@@ -66,8 +67,9 @@ void Registry::file_driver(std::initializer_list<std::string_view> words, FileDr
 }
 
 void Registry::unsupported(std::string_view context, std::string_view word, std::string_view what) {
-  not_supported[std::string(context)][normalized(word)] = std::string(what);
-  display[normalized(word)] = std::string(word);
+  const std::string key = normalized(word);
+  not_supported[std::string(context)][key] = std::string(what);
+  display[key] = std::string(word);
 }
 
 }  // namespace mbcosim
