@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <cstring>
 #include <new>
+#include <string>
+#include <string_view>
 
 #include "cli/commands.h"
 #include "cli/shell.h"
@@ -178,6 +180,62 @@ void add_starts(CLI::App& app, std::string& word, std::string& output, int& exit
   man->callback([&] { std::fputs(mbcosim::cli::manual_page(app).c_str(), stdout); });
 }
 
+/// All but `run`, and what their options give.
+struct OtherCommands {
+  void add(CLI::App& app, int& exit_code);
+
+  std::string deck, convert, word, output, http = "127.0.0.1:0";
+  bool json = false;
+  mbcosim::SymbolValues symbols;
+  mbcosim::cli::ReduceCommand reduce_command;
+  mbcosim::cli::PlotCommand plot_command;
+  mbcosim::cli::DiffCommand diff_command;
+  mbcosim::cli::EigCommand eig_command;
+};
+
+void OtherCommands::add(CLI::App& app, int& exit_code) {
+  using namespace mbcosim::cli;
+  CLI::App* validate_app =
+      app.add_subcommand("validate", "Read a deck and report all that is wrong with it");
+  validate_app->add_option("deck", deck, "Main file of the deck")->required();
+  add_symbols(*validate_app, symbols);
+  validate_app->add_flag("--json", json, "Print the diagnostics as JSON");
+  validate_app->callback([this, &exit_code] { exit_code = validate(deck, symbols, json); });
+
+  CLI::App* describe_app =
+      app.add_subcommand("describe", "List a deck's nodes, elements and variables");
+  describe_app->add_option("deck", deck, "Main file of the deck")->required();
+  add_symbols(*describe_app, symbols);
+  describe_app->add_flag("--json", json, "Print the description as JSON");
+  describe_app->callback([this, &exit_code] { exit_code = describe(deck, symbols, json); });
+
+  add_reduce(app, reduce_command, exit_code);
+  CLI::App* fem_app = app.add_subcommand("fem-info", "Tell what a FEM data file holds");
+  fem_app->add_option("file", deck, "FEM data file, text or binary")->required();
+  fem_app->add_flag("--json", json, "Print it as JSON");
+  fem_app->add_option("--convert", convert,
+                      "Write a copy to this file; the packed form when its name ends with .bin");
+  fem_app->callback([this, &exit_code] { exit_code = fem_info(deck, json, convert); });
+
+  add_programs(app, exit_code);
+  add_plot(app, plot_command, exit_code);
+  add_diff(app, diff_command, exit_code);
+  add_eig(app, eig_command, exit_code);
+  add_starts(app, word, output, exit_code);
+
+  CLI::App* view_app = app.add_subcommand(
+      "view", "Show a deck in a browser: starts a daemon of its own and prints the address");
+  view_app->add_option("deck", deck, "Main file of the deck")->required();
+  view_app->add_option("--http", http, "HOST:PORT of the page; port 0: any that is free")
+      ->capture_default_str();
+  view_app->callback([this, &exit_code] { exit_code = view(deck, http); });
+
+  CLI::App* keywords_app = app.add_subcommand(
+      "keywords", "List the words of the input language; refused ones are marked");
+  keywords_app->add_flag("--json", json, "Print the list as JSON");
+  keywords_app->callback([this, &exit_code] { exit_code = keywords(json); });
+}
+
 /// A full device or a closed pipe: `exit_code` is no success then.
 int finished(int exit_code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
@@ -230,55 +288,9 @@ int main(int argc, char** argv) {
                     "Hold the run back to the wall clock; steps that end late are counted");
   run_app->callback([&] { exit_code = run(run_options); });
 
-  std::string deck;
-  bool json = false;
-  mbcosim::SymbolValues symbols;
-  CLI::App* validate_app =
-      app.add_subcommand("validate", "Read a deck and report all that is wrong with it");
-  validate_app->add_option("deck", deck, "Main file of the deck")->required();
-  add_symbols(*validate_app, symbols);
-  validate_app->add_flag("--json", json, "Print the diagnostics as JSON");
-  validate_app->callback([&] { exit_code = validate(deck, symbols, json); });
-
-  CLI::App* describe_app =
-      app.add_subcommand("describe", "List a deck's nodes, elements and variables");
-  describe_app->add_option("deck", deck, "Main file of the deck")->required();
-  add_symbols(*describe_app, symbols);
-  describe_app->add_flag("--json", json, "Print the description as JSON");
-  describe_app->callback([&] { exit_code = describe(deck, symbols, json); });
-
-  ReduceCommand reduce_command;
-  add_reduce(app, reduce_command, exit_code);
-  CLI::App* fem_app = app.add_subcommand("fem-info", "Tell what a FEM data file holds");
-  fem_app->add_option("file", deck, "FEM data file, text or binary")->required();
-  fem_app->add_flag("--json", json, "Print it as JSON");
-  std::string convert;
-  fem_app->add_option("--convert", convert,
-                      "Write a copy to this file; the packed form when its name ends with .bin");
-  fem_app->callback([&] { exit_code = fem_info(deck, json, convert); });
-
-  add_programs(app, exit_code);
-  PlotCommand plot_command;
-  add_plot(app, plot_command, exit_code);
-  DiffCommand diff_command;
-  add_diff(app, diff_command, exit_code);
-  EigCommand eig_command;
-  add_eig(app, eig_command, exit_code);
-  std::string word, output;
-  add_starts(app, word, output, exit_code);
-
-  std::string http = "127.0.0.1:0";
-  CLI::App* view_app = app.add_subcommand(
-      "view", "Show a deck in a browser: starts a daemon of its own and prints the address");
-  view_app->add_option("deck", deck, "Main file of the deck")->required();
-  view_app->add_option("--http", http, "HOST:PORT of the page; port 0: any that is free")
-      ->capture_default_str();
-  view_app->callback([&] { exit_code = view(deck, http); });
-
-  CLI::App* keywords_app = app.add_subcommand(
-      "keywords", "List the words of the input language; refused ones are marked");
-  keywords_app->add_flag("--json", json, "Print the list as JSON");
-  keywords_app->callback([&] { exit_code = keywords(json); });
+  OtherCommands others;
+  // Their options take longer than a small deck to read.
+  if (argc < 2 || std::string_view(argv[1]) != "run") others.add(app, exit_code);
 
   try {
     app.parse(argc, argv);

@@ -170,7 +170,11 @@ void AtomicFile::commit() {
     fail_storage("a file cannot get its name");
   ::close(file_);
   file_ = -1;
-  sync_path(folder_of(path_));
+  try {
+    sync_path(folder_of(path_));
+  } catch (const StorageError& error) {
+    throw NotSynced(error.what());
+  }
 }
 
 void sync_path(const std::string& path) {

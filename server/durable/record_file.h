@@ -32,6 +32,12 @@ class StorageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// It has its name, but that need not be on the disk.
+class NotSynced : public StorageError {
+ public:
+  using StorageError::StorageError;
+};
+
 /// Throws StorageError with `what` and what the system says (errno).
 [[noreturn]] void fail_storage(const std::string& what);
 

@@ -197,6 +197,9 @@ void StateFolder::write_file(const std::string& id, const std::string& name, Wri
     write(records);
     records.end();
     file.commit();
+  } catch (const NotSynced&) {
+    give_back(before);
+    throw;
   } catch (...) {
     give_back(taken);
     throw;

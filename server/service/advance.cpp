@@ -52,6 +52,11 @@ bool Advance::is_coupled() const { return parts_.deck_sockets || !parts_.coupler
 void Advance::break_off() {
   const Guard lock(parts_.lock);
   parts_.storage.rest();
+  try {
+    if (!parts_.status.failed()) journal_.settle(parts_.simulation);
+  } catch (const Refusal&) {
+    // What could not be stored is taken back; the call fails for its own reason.
+  }
   if (account_.reply().steps_done() > 0 && turn_.has_id()) turn_.break_off(account_.reply());
 }
 

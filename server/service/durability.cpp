@@ -247,12 +247,12 @@ void Durability::store(Session& session, CapturedPoint captured) try {
   Keeping& keeping = *session.keeping();
   if (!keeping.over) write_captured(session, keeping, std::move(captured));
 } catch (const StorageError& error) {
+  session.note_change();  // should it be there all the same, the next checkpoint sets it right
   refuse_storage("what was asked cannot be stored", error);
 }
 
 void Durability::write_held(Session& session, Keeping& keeping) {
-  if (keeping.over || session.has_failed()) return;
-  write_captured(session, keeping, session.capture());
+  if (!keeping.over) write_captured(session, keeping, session.capture());
 }
 
 void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoint captured) {
@@ -261,20 +261,55 @@ void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoin
   const MemoryShare share(
       memory_of(session),
       2 * (size_of(captured.state) + static_cast<std::int64_t>(captured.point.ByteSizeLong())));
-  write_snapshots(session, keeping, id, captured.point);
-  session.sync_results();
+  const std::set<int> before = keeping.snapshots;
+  std::string state;
+  try {
+    write_snapshots(session, keeping, id, captured.point);
+    session.sync_results();
+    state =
+        captured.failed ? put_stored_state(id, captured.point) : session.bytes_of(captured.state);
+    if (captured.reply)
+      KeptReplies::put_last(*captured.reply, captured.point.mutable_kept_replies());
+  } catch (...) {
+    remove_snapshots_but(id, keeping, before);
+    throw;
+  }
   std::set<int> kept;
   for (const auto& snapshot : captured.point.snapshots()) kept.insert(snapshot.number());
-  std::string state = session.bytes_of(captured.state);
   const auto bytes = static_cast<std::int64_t>(state.size() + captured.point.ByteSizeLong());
-  folder_->write_point(id, {std::move(captured.point), std::move(state)});
-  for (const int number : keeping.snapshots)
-    if (kept.count(number) == 0) folder_->remove_snapshot(id, number);
-  keeping.snapshots = std::move(kept);
+  try {
+    folder_->write_point(id, {std::move(captured.point), std::move(state)});
+  } catch (const NotSynced&) {
+    throw;  // it may need them
+  } catch (...) {
+    remove_snapshots_but(id, keeping, before);
+    throw;
+  }
+  remove_snapshots_but(id, keeping, kept);
   folder_->remove_journals(id, captured.journal_end);
   keeping.done(captured.changes, captured.state.step);
   metrics_.count_checkpoint(
       bytes, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+}
+
+void Durability::remove_snapshots_but(const std::string& id, Keeping& keeping,
+                                      const std::set<int>& kept) {
+  for (auto number = keeping.snapshots.begin(); number != keeping.snapshots.end();) {
+    if (kept.count(*number) == 0) {
+      folder_->remove_snapshot(id, *number);
+      number = keeping.snapshots.erase(number);
+    } else {
+      ++number;
+    }
+  }
+}
+
+// Of a simulation that has failed the last stored state stays. Its bytes.
+std::string Durability::put_stored_state(const std::string& id, v1::CheckpointPoint& point) const {
+  StoredPoint stored = read_latest(id);
+  SessionStorage::take_settings(point, &stored.point);
+  point = std::move(stored.point);
+  return std::move(stored.state);
 }
 
 // States of snapshots that have no file yet. One that was deleted meanwhile leaves the point.

@@ -4,6 +4,7 @@
 
 #include <ctime>
 #include <functional>
+#include <set>
 
 #include "durable/build.h"
 #include "service/display_name.h"
@@ -291,6 +292,23 @@ OpenFiles Durability::open_files(Session& session) try {
   refuse_storage("the checkpoint cannot be written", error);
 }
 
+namespace {
+
+void check_numbers(const v1::CheckpointPoint& point) {
+  constexpr int kMost = 1 << 30;  // there are as many to come
+  std::set<int> numbers;
+  bool fine = point.next_snapshot() >= 0 && point.next_snapshot() <= kMost;
+  for (const v1::CheckpointSnapshot& snapshot : point.snapshots()) {
+    const int number = snapshot.number();
+    fine = fine && number > 0 && number <= kMost && numbers.insert(number).second;
+  }
+  if (!fine)
+    throw Refusal(v1::REASON_DAMAGED_STATE,
+                  "the checkpoint's snapshots are not numbered as any server does");
+}
+
+}  // namespace
+
 v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheckpointHeader& header,
                                       std::uint64_t digest, const Caller& caller,
                                       const Call& call) {
@@ -304,6 +322,7 @@ v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheck
   }
   if (bundle.model.head.simulation().empty() || bundle.point.state.empty())
     throw Refusal(v1::REASON_DAMAGED_STATE, "the checkpoint has no model, or no state");
+  check_numbers(bundle.point.point);
   v1::CheckpointHead& head = bundle.model.head;
   const std::string name = new_name();
   head.set_simulation(name);

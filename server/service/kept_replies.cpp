@@ -57,6 +57,7 @@ KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::stri
     if (!entry->at_work) {
       (entry->begun ? begun_ : known_) = entry->reply;
       entry->at_work = entry->begun;
+      entry->awaited = false;
       return;
     }
     if (entry->awaited && !waits)

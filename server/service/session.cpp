@@ -143,7 +143,10 @@ void Session::update(const v1::UpdateSimulationRequest& request, const Change& c
   storage_.note_change();
   {
     const DraftInUse in_use(draft_, draft);
-    storage_.store_change(*simulation_, change.turn, *reply);
+    if (status_.failed())
+      put_on_disk(capture_change(), change, *reply);
+    else
+      storage_.store_change(*simulation_, change.turn, *reply);
   }
   set_policy(draft.view.policy);
   grants_.replace(draft.grants);
@@ -350,27 +353,31 @@ void Session::read(const v1::ReadVariablesRequest& request, const Call& call,
   variables_.read(*simulation_, request.handles(), reply->mutable_values());
 }
 
-void Session::write(const v1::WriteVariablesRequest& request, const Call& call,
-                    const KeptReplies::Turn& turn, v1::WriteVariablesReply* reply) {
+void Session::require_at_rest() const {
   require_usable();
-  variables_.check_inputs(request.values(), "values");
   if (status_.stepping())
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; inputs are written between advances");
+}
+
+void Session::write(const v1::WriteVariablesRequest& request, const Call& call,
+                    const KeptReplies::Turn& turn, v1::WriteVariablesReply* reply) {
+  variables_.check_inputs(request.values(), "values");
+  require_at_rest();
   const CallGuard lock(lock_, call);
+  require_at_rest();  // still
   if (request.has_expected_step()) check_step(request.expected_step(), *simulation_);
-  std::optional<State> before;
-  if (storage_.has_journal()) before = simulation_->state();
-  variables_.write(request.values(), *simulation_);
   storage_.note_change();
   reply->set_step(simulation_->step_number());
-  try {
-    storage_.store_change(*simulation_, turn, *reply);
-  } catch (const Refusal&) {
-    if (const Status status = simulation_->restore(*before); !status)
-      status_.fail(status.error().message);
-    throw;
+  if (storage_.has_journal()) {
+    const MemoryShare share(shared_.memory, size_of(simulation_->state()));
+    const Status stored = simulation_->look_from(simulation_->state(), [&]() TS_REQUIRES(lock_) {
+      variables_.write(request.values(), *simulation_);
+      storage_.store_change(*simulation_, turn, *reply);
+    });
+    if (!stored) throw Refusal(stored.error());
   }
+  variables_.write(request.values(), *simulation_);
   if (recorder_) recorder_->inputs(request.values());
 }
 

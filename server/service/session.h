@@ -31,6 +31,8 @@ struct CapturedPoint {
   State state;
   std::int64_t changes = 0;  ///< of the session, at that moment
   int journal_end = 0;       ///< the journal's files before this one tell of nothing later
+  bool failed = false;       ///< the stored state stands, and what callers set goes with it
+  std::optional<v1::KeptReply> reply = {};  ///< of the call that changes the session
 };
 
 /// Thread-safe. One call at a time advances the simulation; others read between its steps, and wait
@@ -152,7 +154,6 @@ class Session {
   std::int64_t changes() const { return storage_.changes(); }
   void note_change() { storage_.note_change(); }
   std::int64_t step_number() const { return status_.view().step; }
-  bool has_failed() const { return status_.failed(); }
   /// Nobody works on it.
   bool is_free() {
     const bool free = lock_.try_lock();
@@ -187,18 +188,22 @@ class Session {
 
  private:
   Advance::Parts advance_parts() TS_NO_THREAD_SAFETY_ANALYSIS;
-  /// A state to go to, and what of the reply tells of the session then: null: nothing.
   struct Goal {
     const State& state;
-    std::int64_t results_until;  ///< it shares its history with the result files up to this step
+    std::optional<int> snapshot;  ///< of which it is
+    std::int64_t results_until;   ///< of no snapshot: as SnapshotShelf::agrees_until
     const google::protobuf::Message& reply;
-    v1::SimulationInfo* info;
+    v1::SimulationInfo* info;  ///< what of the reply tells of the session then; null: nothing
   };
-  void go_to(const Goal& goal, const Change& change);
-  void arrive(const Goal& goal, bool stored) TS_REQUIRES(lock_);
+  void go_to(Goal goal, const Change& change);
+  void arrive(const Goal& goal) TS_REQUIRES(lock_);
+  void fail(const std::string& why) TS_REQUIRES(lock_);
   void store_ahead(const Goal& goal, const Change& change) TS_REQUIRES(lock_);
-  void store_changed(const Change& change, const google::protobuf::Message& reply)
-      TS_REQUIRES(lock_);
+  /// With JOURNAL: what a checkpoint holds now.
+  std::optional<CapturedPoint> capture_change() TS_REQUIRES(lock_);
+  /// Nothing without `captured`.
+  void put_on_disk(std::optional<CapturedPoint> captured, const Change& change,
+                   const google::protobuf::Message& reply);
   void fill_recovered(const Caller& caller, v1::SimulationInfo* out) const TS_REQUIRES(lock_);
   CapturedPoint capture_held() TS_REQUIRES(lock_);
   void check(const v1::StepRequest& request) const;
@@ -225,6 +230,7 @@ class Session {
   void fill_stored(const Simulation& simulation, v1::SimulationInfo* out) const
       TS_NO_THREAD_SAFETY_ANALYSIS;  // called by the storage, under the lock
   void require_usable() const;
+  void require_at_rest() const;
   void require_way_back() const;
   State state_at_rest(const Call& call, std::int64_t* step);
 

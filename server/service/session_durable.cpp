@@ -27,7 +27,13 @@ CapturedPoint Session::capture_held() {
   captured.changes = captured.point.changes();
   snapshots_.describe(&captured.point);
   captured.state = simulation_->snapshot();
+  captured.failed = draft_ ? draft_->view.failed : status_.failed();
   return captured;
+}
+
+std::optional<CapturedPoint> Session::capture_change() {
+  if (!storage_.has_journal()) return {};
+  return capture_held();
 }
 
 std::string Session::bytes_of(const State& state) const {

@@ -20,31 +20,30 @@ void tell_of_arrival(std::int64_t results_until, v1::CheckpointPoint* point) {
   }
 }
 
-void put_on_disk(Session& session, CapturedPoint captured, const Session::Change& change,
-                 const google::protobuf::Message& reply) {
-  if (change.turn.has_id())
-    *captured.point.add_kept_replies() = change.turn.described(reply, /*begun=*/false);
-  change.store.put_on_disk(session, std::move(captured));
-}
-
 }  // namespace
 
-// The state of a simulation that has failed is not kept: its last checkpoint stays.
-void Session::store_changed(const Change& change, const google::protobuf::Message& reply) {
-  if (storage_.has_journal() && !status_.failed())
-    put_on_disk(*this, capture_held(), change, reply);
+void Session::put_on_disk(std::optional<CapturedPoint> captured, const Change& change,
+                          const google::protobuf::Message& reply) {
+  if (!captured) return;
+  if (change.turn.has_id()) captured->reply = change.turn.described(reply, /*begun=*/false);
+  change.store.put_on_disk(*this, std::move(*captured));
 }
 
 void Session::save(const std::string& display_name, const Change& change,
                    v1::CreateSnapshotReply* reply) {
-  require_usable();
   check_display_name(display_name);
-  const CallGuard lock(lock_, change.call);
-  snapshots_.check_room(size_of(simulation_->state()));
   v1::Snapshot* const out = reply->mutable_snapshot();
-  SnapshotShelf::Change saved = snapshots_.add(simulation_->snapshot(), display_name, out);
-  storage_.note_change();
-  store_changed(change, *reply);
+  std::optional<CapturedPoint> captured;
+  SnapshotShelf::Change saved = [&] {
+    const CallGuard lock(lock_, change.call);
+    require_usable();
+    snapshots_.check_room(size_of(simulation_->state()));
+    SnapshotShelf::Change added = snapshots_.add(simulation_->snapshot(), display_name, out);
+    storage_.note_change();
+    captured = capture_change();
+    return added;
+  }();
+  put_on_disk(std::move(captured), change, *reply);
   saved.make();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
 }
@@ -53,7 +52,7 @@ void Session::restore(int snapshot, const Change& change, v1::RestoreSnapshotRep
   if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
   require_way_back();
   const State state = snapshots_.get(snapshot);
-  go_to({state, snapshots_.agrees_until(snapshot), *reply, reply->mutable_simulation()}, change);
+  go_to({state, snapshot, 0, *reply, reply->mutable_simulation()}, change);
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_RESTORED, snapshots_.name_of(snapshot),
                        state.step);
 }
@@ -68,12 +67,15 @@ void Session::reset(const Change& change, const CancelToken& cancel,
     return Simulation::create(origin_.model, &cancel, /*writer=*/nullptr, origin_.time_keeping);
   });
   if (!fresh) throw Refusal(fresh.error());
-  go_to({(*fresh)->state(), origin_.forked ? kNothing : kInitialSolution, *reply,
+  go_to({(*fresh)->state(),
+         {},
+         origin_.forked ? kNothing : kInitialSolution,
+         *reply,
          reply->mutable_simulation()},
         change);
 }
 
-void Session::go_to(const Goal& goal, const Change& change) {
+void Session::go_to(Goal goal, const Change& change) {
   if (!status_.claim(nullptr))
     throw Refusal(v1::REASON_SIMULATION_BUSY,
                   "a call advances the simulation; restore when it has ended");
@@ -82,9 +84,15 @@ void Session::go_to(const Goal& goal, const Change& change) {
     ~Release() { status.release(); }
   } const release{status_};
   const CallGuard lock(lock_, change.call);
+  if (goal.snapshot) goal.results_until = snapshots_.agrees_until(*goal.snapshot);
   const bool stored = storage_.keeping() && (results_ || storage_.has_journal());
   if (stored) store_ahead(goal, change);
-  arrive(goal, stored);
+  try {
+    arrive(goal);
+  } catch (const std::exception& error) {
+    if (stored) fail(error.what());  // the state is on the disk already
+    throw;
+  }
   if (!stored) fill_recovered(change.caller, goal.info);
   const SessionStatus::View before = status_.view();
   status_.recover();
@@ -93,15 +101,16 @@ void Session::go_to(const Goal& goal, const Change& change) {
     shared_.log.state_changed(subject(), v1::SIMULATION_STATE_READY, simulation_->step_number());
 }
 
-void Session::arrive(const Goal& goal, bool stored) {
+void Session::fail(const std::string& why) {
+  status_.fail(why);
+  shared_.log.state_changed(subject(), v1::SIMULATION_STATE_FAILED, simulation_->step_number());
+}
+
+void Session::arrive(const Goal& goal) {
   if (results_) results_->expect(goal.results_until);
   const auto status = simulation_->restore(goal.state);
   if (results_) results_->restored();
-  if (!status) {
-    const Refusal refusal(results_ ? results_->without_paths(status.error()) : status.error());
-    if (stored) status_.fail(refusal.what());  // the state is there already, the files are not
-    throw refusal;
-  }
+  if (!status) throw Refusal(results_ ? results_->without_paths(status.error()) : status.error());
   if (results_) snapshots_.results_end_at(results_->end());
   coupler_.reset();
   storage_.remember(coupler_.memory());
@@ -119,7 +128,7 @@ void Session::store_ahead(const Goal& goal, const Change& change) {
     const DraftInUse draft(draft_, {status_.recovered(*simulation_), grants_.list()});
     CapturedPoint captured = capture_held();
     tell_of_arrival(goal.results_until, &captured.point);
-    put_on_disk(*this, std::move(captured), change, goal.reply);
+    put_on_disk(std::move(captured), change, goal.reply);
   });
   if (!there) throw Refusal(there.error());
 }
@@ -135,8 +144,12 @@ void Session::forget(int snapshot, const Change& change, v1::DeleteSnapshotReply
   SnapshotShelf::Change removed = snapshots_.remove(snapshot);
   storage_.note_change();
   if (storage_.has_journal()) {
-    const CallGuard lock(lock_, change.call);
-    store_changed(change, *reply);
+    std::optional<CapturedPoint> captured;
+    {
+      const CallGuard lock(lock_, change.call);
+      captured = capture_change();
+    }
+    put_on_disk(std::move(captured), change, *reply);
   }
   removed.make();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_DELETED, snapshots_.name_of(snapshot), step);
@@ -197,21 +210,22 @@ void Session::import_state(const std::string& bytes, const std::string& display_
                            const google::protobuf::Message& reply, v1::Snapshot* out) {
   if (also_restore) require_way_back();
   check_display_name(display_name);
-  std::int64_t results_end = 0;  // an imported state is taken for one of this history so far
-  Result<State> state = [&] {
+  std::optional<State> state;
+  std::optional<CapturedPoint> captured;
+  SnapshotShelf::Change imported = [&] {
     const CallGuard lock(lock_, change.call);
-    results_end = results_ ? results_->end() : 0;
-    return simulation_->state_of(bytes);
+    auto read = simulation_->state_of(bytes);
+    if (!read) throw Refusal(read.error());
+    state = std::move(*read);
+    // It is taken for a state of this history so far.
+    SnapshotShelf::Change added =
+        snapshots_.add(*state, display_name, out, results_ ? results_->end() : 0);
+    storage_.note_change();
+    if (!also_restore) captured = capture_change();
+    return added;
   }();
-  if (!state) throw Refusal(state.error());
-  SnapshotShelf::Change imported = snapshots_.add(*state, display_name, out, results_end);
-  storage_.note_change();
-  if (also_restore) {
-    go_to({*state, std::min(results_end, state->step), reply, /*info=*/nullptr}, change);
-  } else if (storage_.has_journal()) {
-    const CallGuard lock(lock_, change.call);
-    store_changed(change, reply);
-  }
+  put_on_disk(std::move(captured), change, reply);
+  if (also_restore) go_to({*state, imported.number(), 0, reply, /*info=*/nullptr}, change);
   imported.make();
   shared_.log.snapshot(subject(), v1::SNAPSHOT_CHANGE_SAVED, out->name(), out->step());
   if (also_restore)

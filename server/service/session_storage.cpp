@@ -31,6 +31,19 @@ void SessionStorage::capture(const Simulation& simulation, v1::CheckpointPoint* 
   *journal_end = keeping_->journal->next();
 }
 
+void SessionStorage::take_settings(const v1::CheckpointPoint& from, v1::CheckpointPoint* to) {
+  const v1::SimulationInfo& now = from.info();
+  v1::SimulationInfo& info = *to->mutable_info();
+  info.set_display_name(now.display_name());
+  info.set_non_convergence_policy(now.non_convergence_policy());
+  info.clear_minimum_step_size();
+  if (now.has_minimum_step_size()) info.set_minimum_step_size(now.minimum_step_size());
+  *info.mutable_grants() = now.grants();
+  *to->mutable_snapshots() = from.snapshots();
+  to->set_next_snapshot(from.next_snapshot());
+  to->set_changes(from.changes());
+}
+
 v1::JournalEntry SessionStorage::next_entry(const Simulation& simulation,
                                             const std::optional<v1::KeptReply>& reply) {
   v1::JournalEntry entry;

@@ -88,7 +88,9 @@ State SnapshotShelf::get(int number) const {
 
 std::int64_t SnapshotShelf::agrees_until(int number) const {
   const Guard guard(mutex_);
-  return find(number).agrees_until;
+  const auto found = saved_.find(number);
+  if (found == saved_.end()) refuse(number);
+  return found->second.agrees_until;
 }
 
 void SnapshotShelf::results_end_at(std::int64_t step) {
@@ -142,6 +144,7 @@ void SnapshotShelf::put(const v1::CheckpointSnapshot& snapshot, State state) {
   const Guard guard(mutex_);
   require_room(bytes);
   MemoryShare share(memory_, bytes);
+  next_ = std::max(next_, snapshot.number() + 1);
   saved_.emplace(snapshot.number(), Saved{snapshot.display_name(), std::move(state),
                                           std::move(share), snapshot.agrees_until_step()});
   bytes_ += bytes;

@@ -59,7 +59,8 @@ class SnapshotShelf {
                            std::int64_t results_end = INT64_MAX);
   /// A copy of a saved state. Throws NO_SUCH_SNAPSHOT.
   State get(int number) const;
-  /// Step up to which a state shares its history with the result files. Throws NO_SUCH_SNAPSHOT.
+  /// Step up to which a state, seen or not, shares its history with the result files. Throws
+  /// NO_SUCH_SNAPSHOT.
   std::int64_t agrees_until(int number) const;
   /// The result files were cut there: no state shares more with them.
   void results_end_at(std::int64_t step);

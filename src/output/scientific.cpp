@@ -64,15 +64,18 @@ std::optional<Scaled> scale(std::uint64_t m, int e, int n) {
                 compare(2 * (number - whole * divisor), divisor)};
 }
 
+// The digits after the first from the last one on, two at a time.
 char* write_digits(char* out, std::uint64_t digits, int precision) {
-  char text[kMostDigits + 1] = {};
-  int k = precision + 1;
-  for (; k >= 2; k -= 2, digits /= 100) std::memcpy(text + k - 2, &kPairs[2 * (digits % 100)], 2);
-  if (k == 1) text[0] = static_cast<char>('0' + digits);
-  *out++ = text[0];
-  if (precision > 0) *out++ = '.';
-  std::memcpy(out, text + 1, precision);
-  return out + precision;
+  int k = precision;
+  for (; k >= 2; k -= 2, digits /= 100) std::memcpy(out + k, &kPairs[2 * (digits % 100)], 2);
+  if (k == 1) {
+    out[2] = static_cast<char>('0' + digits % 10);
+    digits /= 10;
+  }
+  out[0] = static_cast<char>('0' + digits);
+  if (precision == 0) return out + 1;
+  out[1] = '.';
+  return out + 2 + precision;
 }
 
 char* write_exponent(char* out, int exponent) {

@@ -490,7 +490,8 @@ Status Simulation::set(int handle, std::span<const double> values) {
 
 Status Simulation::restore(const State& state) {
   if (!same_layout(state, impl_->state)) return another_model();
-  State before = std::exchange(impl_->state, state);
+  State before = state;
+  std::swap(before, impl_->state);
   const Status cut = impl_->writer ? impl_->writer->restored(impl_->context()) : ok();
   if (cut)
     impl_->ended = false;
@@ -501,6 +502,7 @@ Status Simulation::restore(const State& state) {
 
 Status Simulation::look_from(const State& state, const std::function<void()>& look) {
   if (!same_layout(state, impl_->state)) return another_model();
+  State there = state;
   struct Place {
     Impl& impl;
     State state;
@@ -509,7 +511,8 @@ Status Simulation::look_from(const State& state, const std::function<void()>& lo
       impl.state = std::move(state);
       impl.ended = ended;
     }
-  } const before{*impl_, std::exchange(impl_->state, state), std::exchange(impl_->ended, false)};
+  } const before{*impl_, std::exchange(impl_->state, std::move(there)),
+                 std::exchange(impl_->ended, false)};
   look();
   return ok();
 }

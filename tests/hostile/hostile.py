@@ -211,6 +211,8 @@ def main():
         prober.join()
         most = math.inf if options.sanitized else MEMORY + (300 << 20)  # besides the budget: program, gRPC's buffers, allocator
         faults += judge(daemon, bystander, p99(quiet), p99(loud), before, peak[0], most, log)
+        if faults:
+            print("the daemon's last words:\n" + open(log).read()[-5000:])
         bystander.channel.close()
         crashes = Crashes(lambda name: start_again(options.bin, folder, name), places[3], options.seed)
         for log in crashes.run():
@@ -228,10 +230,16 @@ def start_again(program, folder, log_name):
 
 def remaining(bystander, pid, before):
     """What is left of threads and descriptors when all but the bystander's simulation are gone: a journal has a descriptor."""
-    for info in bystander.stub.ListSimulations(pb.ListSimulationsRequest(), metadata=ROOT, timeout=30 * FACTOR).simulations:
+    try:
+        listed = bystander.stub.ListSimulations(pb.ListSimulationsRequest(), metadata=ROOT, timeout=30 * FACTOR, wait_for_ready=True).simulations
+    except grpc.RpcError as error:
+        yield f"simulations cannot be listed: {error.code()} {error.details()}"
+        return
+    for info in listed:
         if info.name != bystander.name and info.state != pb.SIMULATION_STATE_SUSPENDED:
             try:
-                bystander.stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=info.name), metadata=ROOT, timeout=30 * FACTOR)
+                bystander.stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=info.name), metadata=ROOT, timeout=30 * FACTOR,
+                                                wait_for_ready=True)
             except grpc.RpcError as error:
                 if error.code() is not grpc.StatusCode.NOT_FOUND:  # its lease was over
                     yield f"a simulation cannot be deleted: {error.code()} {error.details()}"

@@ -80,6 +80,8 @@ TEST_F(TwoSessions, AnInternalErrorFailsOneSessionAndNoOther) {
   mistaken_.fill(&info);
   EXPECT_EQ(info.step(), 2) << "the state is that of the last accepted step";
   EXPECT_EQ(step(other_, 5).steps_done(), 5);
+  EXPECT_TRUE(mistaken_.capture().failed) << "its state is not to be stored";
+  EXPECT_FALSE(other_.capture().failed);
 }
 
 TEST(ExitCode, OfAnInternalErrorIsItsOwn) {

@@ -2,13 +2,16 @@
 import concurrent.futures
 import os
 import subprocess
+import sys
 
 import grpc
 import pytest
 
 import mbcosim
 from conftest import BIN
-from mbcosim.v1 import simulations_pb2 as pb
+from mbcosim.v1 import checkpoints_pb2, simulations_pb2 as pb
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(__file__)), "hostile"))
+from forged_checkpoints import POINT, bytes_of, records_of
 from test_durable import at_the_end, bits, deck, folder, start, state_of  # noqa: F401 (fixtures)
 
 
@@ -56,6 +59,25 @@ def test_damaged_bytes_are_refused_and_leave_nothing(start, damage):
                 server.import_checkpoint(damage(data))
             assert refused.value.reason in ("DAMAGED_STATE", "BAD_ARGUMENT"), refused.value
             assert [info.name for info in server.list()] == [simulation.info.name]
+
+
+@pytest.mark.parametrize("numbers, following", [([1, 1], 3), ([0, 2], 3), ([2**31 - 1, 1], 3), ([1, 2], -1), ([1, 2], 2**31 - 1)])
+def test_snapshots_that_no_server_numbers_so_are_refused(start, numbers, following):
+    with start().connect() as server:
+        simulation = server.load_text(deck())
+        for _ in numbers:
+            simulation.snapshot()
+        records = records_of(simulation.export_checkpoint())
+        for record in records:
+            if record[0] == POINT:
+                point = checkpoints_pb2.CheckpointPoint.FromString(record[1])
+                for snapshot, number in zip(point.snapshots, numbers):
+                    snapshot.number = number
+                point.next_snapshot = following
+                record[1] = point.SerializeToString()
+        with pytest.raises(mbcosim.Error) as caught:
+            server.import_checkpoint(bytes_of(records))
+        assert caught.value.reason == "DAMAGED_STATE"
 
 
 def test_a_repeated_import_makes_one_simulation(start):

@@ -486,6 +486,47 @@ def test_an_update_that_cannot_be_stored_changes_nothing(start):
         assert again.refresh() == after
 
 
+def test_a_refused_snapshot_leaves_no_file(start, folder):
+    """There is room for the snapshot's file, and none for the checkpoint that names it."""
+    daemon = start("--checkpoint-interval", "3600")
+    limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), durability="journal")
+        simulation.step(5)
+        simulation.snapshot()
+
+        def files():
+            return sorted(path.name for path in (folder / simulation.name).iterdir())
+        before, size = files(), (folder / simulation.name / "snapshot-1").stat().st_size
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (size, limits[1]))
+        for _ in range(3):
+            with pytest.raises(mbcosim.LimitExceeded):
+                simulation.snapshot()
+        assert [name for name in files() if name.startswith("snapshot")] == ["snapshot-1"]
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, limits)
+        simulation.snapshot()
+        assert len(files()) == len(before) + 1 and len(simulation.snapshots()) == 2
+
+
+def test_steps_before_one_that_is_refused_are_stored(start):
+    """The call takes ten steps to the final time and is refused the eleventh, beyond it."""
+    daemon = start("--checkpoint-interval", "3600")
+    text = decks.body(final_time="1.", step="0.01")
+    with daemon.connect() as server:
+        simulation = server.load_text(text, durability="journal", summed_time=True)
+        request = pb.StepRequest(simulation=simulation.name, steps=20, request_id="beyond")
+        request.step_size = 0.1
+        with pytest.raises(grpc.RpcError) as caught:
+            server.simulations.Step(request)
+        assert "goes beyond the final time" in caught.value.details()
+        assert simulation.refresh().step == simulation.read(["step"])["step"] == 10
+        before = bits(simulation)
+    daemon.kill()
+    with start().connect() as server:
+        again = server.attach(simulation.name)
+        assert again.info.step == 10 and bits(again) == before
+
+
 def test_changes_that_cannot_be_stored_are_none(start):
     """The state, its snapshots and what is told of it stay; a repeat of the request does it once the disk has room."""
     daemon = start("--checkpoint-interval", "3600")
