@@ -52,11 +52,6 @@ bool Advance::is_coupled() const { return parts_.deck_sockets || !parts_.coupler
 void Advance::break_off() {
   const Guard lock(parts_.lock);
   parts_.storage.rest();
-  try {
-    if (!parts_.status.failed()) journal_.settle(parts_.simulation);
-  } catch (const Refusal&) {
-    // What could not be stored is taken back; the call fails for its own reason.
-  }
   if (account_.reply().steps_done() > 0 && turn_.has_id()) turn_.break_off(account_.reply());
 }
 
@@ -122,6 +117,24 @@ bool Advance::may_write() {
 // Steps for a while with lock and slot held. True: the advance has ended and the reply is complete.
 bool Advance::run_slice() {
   const Guard lock(parts_.lock);
+  try {
+    return step_and_settle();
+  } catch (...) {
+    settle_before_failure();
+    throw;
+  }
+}
+
+// What could not be stored is taken back; the call fails for its own reason.
+void Advance::settle_before_failure() {
+  if (parts_.status.failed()) return;
+  try {
+    journal_.settle(parts_.simulation);
+  } catch (const Refusal&) {
+  }
+}
+
+bool Advance::step_and_settle() {
   begin();
   if (must_wait()) {
     journal_.settle(parts_.simulation);

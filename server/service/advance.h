@@ -62,6 +62,8 @@ class Advance {
   bool choose() TS_REQUIRES(parts_.lock);
   bool may_write() TS_REQUIRES(parts_.lock);
   bool run_slice();
+  bool step_and_settle() TS_REQUIRES(parts_.lock);
+  void settle_before_failure() TS_REQUIRES(parts_.lock);
   bool step_for_a_while() TS_REQUIRES(parts_.lock);
   bool run_coupled_step();
   void exchange_and_solve(CoupledStep& step);

@@ -143,10 +143,8 @@ MemoryShare Durability::share_of(const Suspended& suspended) const {
 namespace {
 
 void keep_replies(const v1::JournalEntry& entry, v1::CheckpointPoint* point) {
-  auto* kept = point->mutable_kept_replies();
-  for (const v1::KeptReply& reply : entry.kept_replies()) KeptReplies::put_last(reply, kept);
-  const int over = kept->size() - static_cast<int>(KeptReplies::kReplies);
-  if (over > 0) kept->DeleteSubrange(0, over);
+  for (const v1::KeptReply& reply : entry.kept_replies())
+    KeptReplies::put_last(reply, point->mutable_kept_replies());
 }
 
 }  // namespace
@@ -266,8 +264,8 @@ void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoin
   try {
     write_snapshots(session, keeping, id, captured.point);
     session.sync_results();
-    state =
-        captured.failed ? put_stored_state(id, captured.point) : session.bytes_of(captured.state);
+    state = captured.failed ? put_stored_state(id, keeping, captured.point)
+                            : session.bytes_of(captured.state);
     if (captured.reply)
       KeptReplies::put_last(*captured.reply, captured.point.mutable_kept_replies());
   } catch (...) {
@@ -305,9 +303,14 @@ void Durability::remove_snapshots_but(const std::string& id, Keeping& keeping,
 }
 
 // Of a simulation that has failed the last stored state stays. Its bytes.
-std::string Durability::put_stored_state(const std::string& id, v1::CheckpointPoint& point) const {
+std::string Durability::put_stored_state(const std::string& id, const Keeping& keeping,
+                                         v1::CheckpointPoint& point) const {
   StoredPoint stored = read_latest(id);
   SessionStorage::take_settings(point, &stored.point);
+  if (keeping.journal) {  // else the replies to the calls that made or deleted them would be lost
+    *stored.point.mutable_snapshots() = point.snapshots();
+    stored.point.set_next_snapshot(point.next_snapshot());
+  }
   point = std::move(stored.point);
   return std::move(stored.state);
 }
@@ -322,8 +325,8 @@ void Durability::write_snapshots(Session& session, Keeping& keeping, const std::
       const std::optional<State> state = session.snapshots().find_state(number);
       if (!state) continue;
       const MemoryShare share(memory_of(session), 2 * size_of(*state));
+      keeping.snapshots.insert(number);  // the file may be there even when that throws
       folder_->write_snapshot(id, number, session.bytes_of(*state));
-      keeping.snapshots.insert(number);
     }
     *kept.Add() = snapshot;
   }

@@ -94,7 +94,8 @@ class Durability {
   void write_held(Session& session, Keeping& keeping) TS_REQUIRES(keeping.mutex);
   void write_captured(Session& session, Keeping& keeping, CapturedPoint captured)
       TS_REQUIRES(keeping.mutex);
-  std::string put_stored_state(const std::string& id, v1::CheckpointPoint& point) const;
+  std::string put_stored_state(const std::string& id, const Keeping& keeping,
+                               v1::CheckpointPoint& point) const;
   void remove_snapshots_but(const std::string& id, Keeping& keeping, const std::set<int>& kept)
       TS_REQUIRES(keeping.mutex);
   void put_in_folder(const std::string& simulation, const StoredBundle& bundle);

@@ -169,6 +169,8 @@ void KeptReplies::put_last(v1::KeptReply reply, Messages* kept) {
   });
   kept->erase(same, kept->end());
   *kept->Add() = std::move(reply);
+  const int over = kept->size() - static_cast<int>(kReplies);
+  if (over > 0) kept->DeleteSubrange(0, over);
 }
 
 void KeptReplies::take_over(const Messages& kept) {

@@ -31,7 +31,7 @@ class KeptReplies {
   /// All that are kept, oldest first, and back.
   void describe(Messages* out) const TS_EXCLUDES(mutex_);
   void take_over(const Messages& kept) TS_EXCLUDES(mutex_);
-  /// In place of one of the same request.
+  /// In place of one of the same request; the oldest of too many goes.
   static void put_last(v1::KeptReply reply, Messages* kept);
   /// JOURNAL: those that no entry has, oldest first; then they are in one.
   void describe_unstored(Messages* out) const TS_EXCLUDES(mutex_);

@@ -334,6 +334,7 @@ void Session::step(const v1::StepRequest& request, const Caller& caller, Call& c
   check(request);
   Advance advance(advance_parts(), request, *reply, turn, table);
   const SteppingClaim claim(status_, lease_, call, advance.token());
+  require_usable();  // still
   advance.run(progress);
   shared_.metrics.count_advance(*reply, advance.factorizations());
   if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());

@@ -57,6 +57,7 @@ void Session::take_over(const v1::CheckpointPoint& point,
     snapshots_.put(snapshot, std::move(*state));
   }
   snapshots_.go_on_from(point.next_snapshot());
+  if (results_) snapshots_.results_end_at(results_->end());  // they were cut to the state
 }
 
 }  // namespace mbcosim::server

@@ -39,8 +39,6 @@ void SessionStorage::take_settings(const v1::CheckpointPoint& from, v1::Checkpoi
   info.clear_minimum_step_size();
   if (now.has_minimum_step_size()) info.set_minimum_step_size(now.minimum_step_size());
   *info.mutable_grants() = now.grants();
-  *to->mutable_snapshots() = from.snapshots();
-  to->set_next_snapshot(from.next_snapshot());
   to->set_changes(from.changes());
 }
 
