@@ -10,6 +10,7 @@ folder and killed, and files are damaged in between (crashes.py). The seed is pr
 the same interleaving. A sanitizer's report is a fault, too; its build takes memory of its own, which --sanitized does not judge.
 """
 import argparse
+import atexit
 import json
 import math
 import os
@@ -185,6 +186,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         prepare(folder)
         daemon, places, log = start(options.bin, folder)
+        atexit.register(daemon.kill)  # whatever comes; nothing once it has ended
         address = places[0]
         bystander = Bystander(address)
         bystander.watch(1)
