@@ -195,19 +195,18 @@ struct OtherCommands {
 
 void OtherCommands::add(CLI::App& app, int& exit_code) {
   using namespace mbcosim::cli;
-  CLI::App* validate_app =
-      app.add_subcommand("validate", "Read a deck and report all that is wrong with it");
-  validate_app->add_option("deck", deck, "Main file of the deck")->required();
-  add_symbols(*validate_app, symbols);
-  validate_app->add_flag("--json", json, "Print the diagnostics as JSON");
-  validate_app->callback([this, &exit_code] { exit_code = validate(deck, symbols, json); });
-
-  CLI::App* describe_app =
-      app.add_subcommand("describe", "List a deck's nodes, elements and variables");
-  describe_app->add_option("deck", deck, "Main file of the deck")->required();
-  add_symbols(*describe_app, symbols);
-  describe_app->add_flag("--json", json, "Print the description as JSON");
-  describe_app->callback([this, &exit_code] { exit_code = describe(deck, symbols, json); });
+  const auto add_report = [&](const char* name, const char* help, const char* json_help,
+                              auto* report) {
+    CLI::App* report_app = app.add_subcommand(name, help);
+    report_app->add_option("deck", deck, "Main file of the deck")->required();
+    add_symbols(*report_app, symbols);
+    report_app->add_flag("--json", json, json_help);
+    report_app->callback([this, &exit_code, report] { exit_code = report(deck, symbols, json); });
+  };
+  add_report("validate", "Read a deck and report all that is wrong with it",
+             "Print the diagnostics as JSON", &validate);
+  add_report("describe", "List a deck's nodes, elements and variables",
+             "Print the description as JSON", &describe);
 
   add_reduce(app, reduce_command, exit_code);
   CLI::App* fem_app = app.add_subcommand("fem-info", "Tell what a FEM data file holds");
