@@ -290,8 +290,11 @@ struct PeerOptions {
   Rotation rotation = Rotation::matrix;
   Frame frame = Frame::port_default;
   bool accelerations = false;
-  Hold hold = Hold::zero_order;     ///< of inputs between exchanges
-  Tangent tangent = Tangent::none;  ///< tight: the answers carry derivatives
+  /// Loads turn with the node or reference node in whose frame they are, until the next answer.
+  bool following_loads = false;
+  bool global_reference_loads = false;  ///< those on the reference node are not in `frame`
+  Hold hold = Hold::zero_order;         ///< of inputs between exchanges
+  Tangent tangent = Tangent::none;      ///< tight: the answers carry derivatives
   /// The library sends a sign of life three times in so long [s], also while the peer computes;
   /// when none comes the server takes the peer for dead. 0: no such promise.
   double heartbeat_timeout = 0;

@@ -179,6 +179,17 @@ PortLayout to_layout(const v1::PortLayout& from) {
   return layout;
 }
 
+/// A server that does not know a choice would take the answers otherwise.
+void require_features(const v1::VersionRange& server, const PeerOptions& options) {
+  if (!options.following_loads && !options.global_reference_loads) return;
+  for (const std::string& feature : server.features())
+    if (feature == "following_loads") return;
+  throw Error(
+      "the server is too old: it knows neither loads that follow a node nor global loads "
+      "on a reference node in another frame",
+      static_cast<int>(grpc::StatusCode::UNIMPLEMENTED), "", {});
+}
+
 v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& port,
                      const PeerOptions& options) {
   v1::Hello hello;
@@ -193,6 +204,8 @@ v1::Hello make_hello(const v1::SimulationInfo& simulation, const std::string& po
   form->set_rotation_form(to_proto(options.rotation));
   form->set_frame(to_proto(options.frame));
   form->set_accelerations(options.accelerations);
+  form->set_following_loads(options.following_loads);
+  form->set_global_reference_loads(options.global_reference_loads);
   v1::ExchangeSchedule* schedule = hello.mutable_schedule();
   schedule->set_mode(to_proto(options.mode));
   if (options.every) schedule->set_every(*options.every);
@@ -230,6 +243,7 @@ std::unique_ptr<Peer::Impl> attach_peer(std::shared_ptr<Server::Impl> server,
   *first.mutable_hello() = hello;
   const Deadline deadline(options.timeout, [&wire = *impl->wire] { wire.cancel(); });
   if (impl->wire->write(first) && impl->wire->read(&impl->in)) {
+    require_features(impl->in.welcome().protocol(), options);
     impl->tangent = options.tangent;
     impl->layout = to_layout(impl->in.welcome().layout());
     impl->step =

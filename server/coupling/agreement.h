@@ -14,6 +14,8 @@ struct Agreement {
   v1::RotationForm rotation_form = v1::ROTATION_FORM_MATRIX;
   v1::PortFrame frame = v1::PORT_FRAME_GLOBAL;
   bool accelerations = false;
+  bool following_loads = false;  ///< answers stay in `frame`; they are turned at each iterate
+  bool global_reference_loads = false;  ///< those on the reference node do not come in `frame`
   v1::CouplingMode mode = v1::COUPLING_MODE_LOOSE;
   int every = 1;  ///< steps between exchanges; tight: iterations
   v1::InputHold hold = v1::INPUT_HOLD_ZERO_ORDER;
@@ -36,6 +38,10 @@ struct Agreement {
   bool is_window() const { return mode == v1::COUPLING_MODE_WINDOW; }
   bool is_tight() const { return mode == v1::COUPLING_MODE_TIGHT; }
   bool is_implicit() const { return is_window() || is_tight(); }
+  /// Are answers kept in `frame` until the next one?
+  bool follows() const {
+    return following_loads && frame > v1::PORT_FRAME_GLOBAL && !is_implicit();
+  }
   bool has_tangent() const { return is_tight() && tangent != v1::TANGENT_FORM_NONE; }
 };
 

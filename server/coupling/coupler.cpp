@@ -22,6 +22,11 @@ class Stopwatch {
   Clock::time_point start_ = Clock::now();
 };
 
+/// Do kept answers mean something else?
+bool writes_otherwise(const Agreement& now, const Agreement& before) {
+  return now.follows() != before.follows() || (now.follows() && now.frame != before.frame);
+}
+
 }  // namespace
 
 Coupler::Coupler(const google::protobuf::RepeatedPtrField<v1::PortDefinition>& ports,
@@ -130,6 +135,11 @@ google::protobuf::RepeatedPtrField<v1::CheckpointPort> Coupler::memory() const {
     out->set_port(line.port->model().name());
     out->set_had_peer(line.port->had_peer());
     out->set_input_hold(line.agreement.hold);
+    if (line.agreement.follows()) {
+      out->mutable_form()->set_frame(line.agreement.frame);
+      out->mutable_form()->set_following_loads(true);
+      out->mutable_form()->set_global_reference_loads(line.agreement.global_reference_loads);
+    }
     if (line.answered_for >= 0) out->set_answered_for_step(line.answered_for);
     for (const InputHistory::Point& point : line.history.points()) {
       v1::CheckpointAnswer* answer = out->add_answers();
@@ -146,6 +156,9 @@ void Coupler::take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointP
       if (line.port->model().name() != in.port()) continue;
       if (in.had_peer()) line.port->expect_peer();
       line.agreement.hold = in.input_hold();
+      line.agreement.frame = in.form().frame();
+      line.agreement.following_loads = in.form().following_loads();
+      line.agreement.global_reference_loads = in.form().global_reference_loads();
       line.history = InputHistory(line.agreement.held_answers());
       for (const v1::CheckpointAnswer& answer : in.answers())
         line.history.add(answer.time(), {answer.values().begin(), answer.values().end()});
@@ -172,7 +185,8 @@ void Coupler::prepare(const Simulation& simulation, double length, bool estimate
   target_time_ = simulation.time() + length;
   for (Line& line : lines_) {
     const Agreement now = line.port->agreement();
-    if (now.hold != line.agreement.hold) line.history = InputHistory(now.held_answers());
+    if (now.hold != line.agreement.hold || writes_otherwise(now, line.agreement))
+      line.history = InputHistory(now.held_answers());
     line.agreement = now;
     line.due = asks(line, step);
     const bool on_its_way = line.sent_for == step && line.port->is_waiting();
@@ -209,8 +223,20 @@ void Coupler::exchange(const CancelToken& cancel) {
 
 void Coupler::apply(Simulation& simulation) {
   for (Line& line : lines_)
-    if (!line.agreement.is_implicit() && !line.history.empty())
+    if (!line.agreement.is_implicit() && !line.history.empty() && !line.agreement.follows())
       line.port->model().apply(line.history.at(target_time_), simulation);
+  turn_loads(simulation);
+}
+
+bool Coupler::has_following() const {
+  return std::any_of(lines_.begin(), lines_.end(),
+                     [](const Line& line) { return line.agreement.follows(); });
+}
+
+void Coupler::turn_loads(Simulation& simulation) const {
+  for (const Line& line : lines_)
+    if (line.agreement.follows() && !line.history.empty())
+      line.port->model().apply_following(line.history.at(target_time_), line.agreement, simulation);
 }
 
 void Coupler::finish(const Simulation& simulation) {

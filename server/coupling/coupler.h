@@ -43,6 +43,9 @@ class Coupler {
   void prepare(const Simulation& simulation, double length, bool estimated);
   void exchange(const CancelToken& cancel);  ///< throws PeerLost, PeerRejected, as all exchanges do
   void apply(Simulation& simulation);
+  /// Explicit ports whose loads follow their nodes: turns them to the present iterate.
+  bool has_following() const;
+  void turn_loads(Simulation& simulation) const;
   void finish(const Simulation& simulation);
   /// The simulation went to another state: what peers answered before says nothing any more.
   void reset();

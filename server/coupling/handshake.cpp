@@ -120,6 +120,8 @@ void check_form(const v1::ExchangeForm& form, const PortModel& port, Mismatches&
   mismatches.expect(
       form.frame() != v1::PORT_FRAME_REFERENCE || port.layout().has_reference_node_label(), "frame",
       "the port has no reference node");
+  mismatches.expect(!form.global_reference_loads() || port.layout().reference_loads(),
+                    "global_reference_loads", "the port takes no loads on a reference node");
   mismatches.expect(!port.is_motion() || form.frame() <= v1::PORT_FRAME_GLOBAL, "frame",
                     "motion ports count in the global frame");
   mismatches.expect(!port.is_mapped() || form.frame() != v1::PORT_FRAME_NODE, "frame",
@@ -190,6 +192,8 @@ std::shared_ptr<const UnitConversion> conversion_of(const v1::Hello& hello, cons
 void check_agreement(const Agreement& agreement, const PortModel& port, Mismatches& mismatches) {
   mismatches.expect(!port.is_motion() || agreement.policy != v1::PEER_POLICY_ZERO, "policy",
                     "motion has no zero; choose HOLD_LAST");
+  mismatches.expect(!agreement.following_loads || agreement.frame > v1::PORT_FRAME_GLOBAL,
+                    "following_loads", "the frame is GLOBAL: there is no node that they follow");
   if (agreement.tangent == v1::TANGENT_FORM_NONE) return;
   mismatches.expect(agreement.is_tight(), "tangent", "belongs to mode TIGHT");
   mismatches.expect(port.takes_tangents(), "tangent", "the port takes none");
@@ -206,6 +210,8 @@ Agreement choose(const v1::Hello& hello, const PortModel& port) {
       chosen(form.rotation_form(), chosen(layout.default_rotation_form(), agreement.rotation_form));
   agreement.frame = chosen(form.frame(), chosen(layout.default_frame(), agreement.frame));
   agreement.accelerations = form.accelerations() || port.needs_accelerations();
+  agreement.following_loads = form.following_loads();
+  agreement.global_reference_loads = form.global_reference_loads();
   const v1::ExchangeSchedule& schedule = hello.schedule();
   agreement.mode = chosen(schedule.mode(), chosen(layout.default_mode(), agreement.mode));
   const bool stepwise =

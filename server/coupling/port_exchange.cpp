@@ -147,12 +147,6 @@ void PortModel::fill_mapped(const Agreement& agreement, v1::ServerExchange* out)
 
 // ------------------------------------------------------------------ answers
 
-Mat3 PortModel::to_global(const Agreement& agreement, std::size_t point) const {
-  if (agreement.frame == v1::PORT_FRAME_NODE) return sent_[point].R;
-  if (agreement.frame == v1::PORT_FRAME_REFERENCE) return sent_reference_.R;
-  return Mat3::Identity();
-}
-
 int PortModel::peer_points() const {
   if (is_mapped()) return static_cast<int>(element_->element->mapping()->rows()) / 3;
   return static_cast<int>(points_.size());
@@ -181,10 +175,8 @@ std::string PortModel::decode_own(const v1::PeerAnswer& in, const Agreement& agr
   if (wrong.empty() && (in.positions_size() > 0 || in.rotations_size() > 0))
     wrong = "`positions` and `rotations` belong to motion ports";
   if (!wrong.empty()) return wrong;
-  if (loads && !moments)
-    decode_mapped(in, agreement, answer);
-  else if (loads)
-    decode_loads(in, agreement, &answer->values);
+  if (loads) take_loads(in, &answer->values);
+  if (loads && !agreement.follows()) turn_loads(agreement, sent_, sent_reference_, &answer->values);
   answer->values.insert(answer->values.end(), in.signals().begin(), in.signals().end());
   return decode_tangent(in, agreement, answer);
 }
@@ -223,44 +215,49 @@ std::string PortModel::decode_motion(const v1::PeerAnswer& in, const Agreement& 
   return wrong;
 }
 
-// F = Hᵀ F̂ on the points.
-void PortModel::decode_mapped(const v1::PeerAnswer& in, const Agreement& agreement,
-                              Answer* answer) const {
-  const MappingMatrix& H = *element_->element->mapping();
-  const VecX f = H.transpose() * Eigen::Map<const VecX>(in.forces().data(), in.forces_size());
+// In the peer's frame; mapped: F = Hᵀ F̂ on the points.
+void PortModel::take_loads(const v1::PeerAnswer& in, std::vector<double>* answer) const {
+  const auto put = [&](const Vec3& v) { answer->insert(answer->end(), v.data(), v.data() + 3); };
+  VecX mapped;
+  if (is_mapped())
+    mapped = element_->element->mapping()->transpose() *
+             Eigen::Map<const VecX>(in.forces().data(), in.forces_size());
   for (std::size_t k = 0; k < points_.size(); ++k) {
-    const Vec3 force = to_global(agreement, k) * f.segment<3>(static_cast<Eigen::Index>(3 * k));
-    answer->values.insert(answer->values.end(), force.data(), force.data() + 3);
-    answer->values.insert(answer->values.end(), 3, 0.0);
+    put(is_mapped() ? Vec3(mapped.segment<3>(static_cast<Eigen::Index>(3 * k)))
+                    : triple(in.forces(), k));
+    put(in.moments().empty() ? Vec3(Vec3::Zero()) : triple(in.moments(), k));
   }
-  decode_reference(in, agreement, &answer->values);
-}
-
-// The moment about the node when the node takes the load; about the point when the deck's element
-// does.
-void PortModel::decode_loads(const v1::PeerAnswer& in, const Agreement& agreement,
-                             std::vector<double>* answer) const {
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Mat3 turn = to_global(agreement, i);
-    const Vec3 force = turn * triple(in.forces(), i);
-    Vec3 moment = Vec3::Zero();
-    if (deck_loads_ < 0) moment = sent_[i].arm.cross(force);
-    if (!in.moments().empty()) moment += turn * triple(in.moments(), i);
-    answer->insert(answer->end(), force.data(), force.data() + 3);
-    answer->insert(answer->end(), moment.data(), moment.data() + 3);
-  }
-  decode_reference(in, agreement, answer);
-}
-
-void PortModel::decode_reference(const v1::PeerAnswer& in, const Agreement& agreement,
-                                 std::vector<double>* answer) const {
   if (!layout_.reference_loads()) return;
-  Mat3 turn = Mat3::Identity();
-  if (agreement.frame != v1::PORT_FRAME_GLOBAL) turn = sent_reference_.R;
-  for (const Vec3& v : {triple(in.reference_force(), 0), triple(in.reference_moment(), 0)}) {
-    const Vec3 global = turn * v;
-    answer->insert(answer->end(), global.data(), global.data() + 3);
+  put(triple(in.reference_force(), 0));
+  put(triple(in.reference_moment(), 0));
+}
+
+// To global components. The moment about the node when the node takes the load; about the point
+// when the deck's element does.
+void PortModel::turn_loads(const Agreement& agreement, const std::vector<Motion>& points,
+                           const Motion& reference, std::vector<double>* answer) const {
+  const bool of_node = agreement.frame == v1::PORT_FRAME_NODE;
+  const bool of_reference = agreement.frame == v1::PORT_FRAME_REFERENCE;
+  double* at = answer->data();
+  const auto turn_next = [&](const Mat3& R) {
+    Eigen::Map<Vec3> v(at);
+    v = (R * v).eval();
+    at += 3;
+    return v;
+  };
+  for (const Motion& point : points) {
+    Mat3 R = Mat3::Identity();
+    if (of_node) R = point.R;
+    if (of_reference) R = reference.R;
+    const Vec3 force = turn_next(R);
+    auto moment = turn_next(R);
+    if (deck_loads_ < 0) moment += point.arm.cross(force);
   }
+  if (!layout_.reference_loads()) return;
+  const bool turned = (of_node || of_reference) && !agreement.global_reference_loads;
+  const Mat3 R = turned ? reference.R : Mat3(Mat3::Identity());
+  turn_next(R);
+  turn_next(R);
 }
 
 // Several points of one node: their sum.
@@ -300,6 +297,15 @@ void PortModel::apply(const std::vector<double>& answer, Simulation& simulation)
     if (!status) throw Refusal(status.error());
     value += size;
   }
+}
+
+void PortModel::apply_following(std::vector<double> answer, const Agreement& agreement,
+                                Simulation& simulation) const {
+  std::vector<Motion> points;
+  for (const Point& point : points_) points.push_back(motion(simulation, point));
+  const Motion reference = has_reference_ ? motion(simulation, reference_) : Motion{};
+  turn_loads(agreement, points, reference, &answer);
+  apply(answer, simulation);
 }
 
 // Part of the state, so that a restored simulation redoes a step from where it started the first

@@ -13,7 +13,7 @@
 
 namespace mbcosim::server {
 
-/// What a peer answered, in global components.
+/// What a peer answered, in global components; loads that follow their nodes in the agreed frame.
 struct Answer {
   std::vector<double> values;
   bool unfinished = false;  ///< the peer's own iteration goes on
@@ -24,7 +24,7 @@ struct Answer {
 /// Structural: motion of points xᵢ = x + R fᵢ out; forces F and moments M about the points in,
 /// applied to the nodes as F and M + (R fᵢ) × F. Mapped: H x and H v out, F̂ in, F = Hᵀ F̂. Motion:
 /// reactions out, x and R in. Modal: q, q̇ out, generalized forces in. Signal: any variables out,
-/// inputs in. Answers are kept in global components.
+/// inputs in.
 class PortModel {
  public:
   /// Resolves labels and names. Throws Refusal that names what does not exist.
@@ -62,11 +62,14 @@ class PortModel {
 
   /// Motion or signals at the simulation's state. Keeps what is needed to decode the answer.
   void fill(const Simulation& simulation, const Agreement& agreement, v1::ServerExchange* out);
-  /// An answer in global components; empty text, or what is wrong with it.
+  /// Empty text, or what is wrong with the answer.
   std::string decode(const v1::PeerAnswer& in, const Agreement& agreement, Answer* answer) const;
   /// Where derivatives of the answer enter the equations. Empty: the port has none.
   LoadTangent tangent(const Agreement& agreement) const;
   void apply(const std::vector<double>& answer, Simulation& simulation) const;
+  /// Of loads that follow their nodes, turned by the present orientations.
+  void apply_following(std::vector<double> answer, const Agreement& agreement,
+                       Simulation& simulation) const;
   /// The answer that is in force at the simulation's state, where that can be told; else zero.
   Eigen::VectorXd applied(const Simulation& simulation) const;
 
@@ -90,11 +93,9 @@ class PortModel {
   void put_expressions(const Simulation& simulation, v1::ServerExchange* out) const;
   Motion motion(const Simulation& simulation, const Point& point) const;
   void make_relative(Motion& motion) const;
-  void decode_reference(const v1::PeerAnswer& in, const Agreement& agreement,
-                        std::vector<double>* answer) const;
-  void decode_loads(const v1::PeerAnswer& in, const Agreement& agreement,
-                    std::vector<double>* answer) const;
-  Mat3 to_global(const Agreement& agreement, std::size_t point) const;
+  void take_loads(const v1::PeerAnswer& in, std::vector<double>* answer) const;
+  void turn_loads(const Agreement& agreement, const std::vector<Motion>& points,
+                  const Motion& reference, std::vector<double>* answer) const;
   std::string check_loads(const v1::PeerAnswer& in, bool moments) const;
   void make_reference(const Simulation& simulation, int label);
   void make_points(const Simulation& simulation, const StructuralPort& port);
@@ -109,7 +110,6 @@ class PortModel {
                          Answer* answer) const;
   std::string decode_motion(const v1::PeerAnswer& in, const Agreement& agreement,
                             Answer* answer) const;
-  void decode_mapped(const v1::PeerAnswer& in, const Agreement& agreement, Answer* answer) const;
   std::string decode_tangent(const v1::PeerAnswer& in, const Agreement& agreement,
                              Answer* answer) const;
   void move_to_nodes(const v1::PeerAnswer& in, const Agreement& agreement, Answer* answer) const;

@@ -413,6 +413,13 @@ std::shared_ptr<grpc::ChannelCredentials> credentials_of(const HealthCheck& chec
   return grpc::SslCredentials(options);
 }
 
+std::string refusal_of(const HealthCheck& check, const grpc::Status& status) {
+  if (status.ok()) return "the daemon does not serve: it starts, drains or ends";
+  if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
+    return "no answer within " + std::to_string(check.timeout) + " s";
+  return status.error_message();
+}
+
 }  // namespace
 
 int check_health(const HealthCheck& check) {
@@ -425,11 +432,12 @@ int check_health(const HealthCheck& check) {
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(check.timeout));
   grpc::health::v1::HealthCheckResponse response;
   const grpc::Status status = stub->Check(&context, {}, &response);
-  const bool asks_credentials = status.error_code() == grpc::StatusCode::UNAUTHENTICATED;
-  const bool serves =
-      status.ok() &&
-      (check.alive || response.status() == grpc::health::v1::HealthCheckResponse::SERVING);
-  return serves || asks_credentials ? 0 : 1;
+  if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED) return 0;
+  const bool serves = response.status() == grpc::health::v1::HealthCheckResponse::SERVING;
+  if (status.ok() && (serves || check.alive)) return 0;
+  std::fprintf(stderr, "mbcosimd: %s: %s\n", check.address.c_str(),
+               refusal_of(check, status).c_str());
+  return 1;
 }
 
 }  // namespace mbcosim::server

@@ -23,6 +23,7 @@ namespace {
 
 constexpr int kWaiting = 1024;        ///< connections not yet accepted
 constexpr int kLookMs = 100;          ///< how soon the end is noticed
+constexpr int kAtOnce = 64;           ///< accepted before the next is handed over
 constexpr int kKeptDescriptors = 32;  ///< for files, while connections come and go
 
 [[noreturn]] void fail(const std::string& address, int error) {
@@ -58,6 +59,12 @@ std::string source_of(int fd) {
 ino_t inode_of(int fd) {
   struct stat info {};
   return ::fstat(fd, &info) == 0 ? info.st_ino : 0;
+}
+
+/// Has the client closed it, having said nothing?
+bool has_gone(int fd) {
+  char first = 0;
+  return ::recv(fd, &first, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
 }
 
 int port_of(int socket) {
@@ -163,27 +170,49 @@ void Listener::loop() {
   std::vector<pollfd> looks;
   for (const shm::Descriptor& socket : sockets_) looks.push_back({socket.get(), POLLIN, 0});
   while (!stop_.load()) {
-    if (::poll(looks.data(), looks.size(), kLookMs) <= 0) continue;
+    const int events = ::poll(looks.data(), looks.size(), accepted_.empty() ? kLookMs : 0);
     for (const pollfd& look : looks)
-      if (look.revents != 0) run_caught("listener", [&] { accept_from(look.fd); });
+      if (events > 0 && look.revents != 0) run_caught("listener", [&] { accept_from(look.fd); });
+    run_caught("listener", [&] { hand_over_next(); });
   }
+  accepted_.clear();
 }
 
 void Listener::accept_from(int listener) {
-  const int fd = ::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-  if (fd < 0) {
-    if (errno == EMFILE || errno == ENFILE) drop_one(listener);
-    return;  // anything else is the client's: it has gone already, say
+  for (int k = 0; k < kAtOnce && accept_one(listener); ++k) {
   }
+}
+
+/// False: nobody waits, as far as can be told.
+bool Listener::accept_one(int listener) {
+  shm::Descriptor socket(::accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+  if (!socket) {
+    if (errno == EMFILE || errno == ENFILE) drop_one(listener);
+    return false;  // anything else is the client's: it has gone already, say
+  }
+  const int fd = socket.get();
   if (!may_stay(fd)) {
-    ::close(fd);
-    return tell_dropped();
+    tell_dropped();
+    return true;
   }
   const int on = 1;
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);  // not for Unix sockets
+  accepted_[peers_.at(fd).source].push_back({listener, std::move(socket)});
+  return true;
+}
+
+void Listener::hand_over_next() {
+  if (accepted_.empty()) return;
+  auto next = accepted_.upper_bound(last_source_);
+  if (next == accepted_.end()) next = accepted_.begin();
+  last_source_ = next->first;
+  Accepted chosen = std::move(next->second.front());
+  next->second.pop_front();
+  if (next->second.empty()) accepted_.erase(next);
+  if (has_gone(chosen.socket.get())) return;
   Acceptor::NewConnectionParameters connection;
-  connection.listener_fd = listener;
-  connection.fd = fd;
+  connection.listener_fd = chosen.listener;
+  connection.fd = chosen.socket.release();
   acceptor_->HandleNewConnection(&connection);
 }
 

@@ -5,6 +5,7 @@
 #include <sys/types.h>
 
 #include <atomic>
+#include <deque>
 #include <map>
 #include <memory>
 #include <string>
@@ -23,6 +24,7 @@ constexpr std::string_view kUnix = "unix:";  ///< begins the address of a socket
 /// the process has no file descriptor left. Here the connection is dropped then, the last few
 /// descriptors are kept for files, and one source (an address, a process of this host) has at most
 /// a third as many as are free: also while several take what they can, a probe still comes in.
+/// gRPC takes its time for a connection, in the thread that hands it over: sources take turns.
 class Listener {
  public:
   using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
@@ -42,6 +44,8 @@ class Listener {
   void bind_tcp(const std::string& host, const std::string& port);
   void loop();
   void accept_from(int listener);
+  bool accept_one(int listener);
+  void hand_over_next();
   bool may_stay(int fd);
   /// For one more of it, with so many descriptors `free`?
   bool has_room(const std::string& source, std::int64_t free) const;
@@ -56,7 +60,14 @@ class Listener {
     std::string source;
     ino_t inode = 0;  ///< of its socket: another one means that the connection is gone
   };
-  std::map<int, Peer> peers_;  ///< of the thread, by descriptor
+  // --- of the thread
+  std::map<int, Peer> peers_;  ///< by descriptor
+  struct Accepted {
+    int listener = -1;
+    shm::Descriptor socket;
+  };
+  std::map<std::string, std::deque<Accepted>> accepted_;  ///< not yet handed over, by source
+  std::string last_source_;                               ///< whose turn it was
   Rate drops_{1};
   std::atomic<bool> stop_{false};
   std::thread thread_;

@@ -103,14 +103,13 @@ mbdyn::ForceState state_of(const Form& form, const client::Motion& motion) {
   return state;
 }
 
-/// What a port takes of a code's loads, and how.
+/// What a port takes of a code's loads.
 struct LoadsForm {
   Form form;
-  bool reference_loads = false;         ///< the port takes the total load on the reference node
-  bool global_reference_loads = false;  ///< which comes in the global frame
+  bool reference_loads = false;  ///< the port takes the total load on the reference node
 };
 
-client::Loads loads_of(const LoadsForm& as, const mbdyn::ForceLoads& from, const Mat3& reference) {
+client::Loads loads_of(const LoadsForm& as, const mbdyn::ForceLoads& from) {
   client::Loads loads;
   const auto put = [](const Vec3& v, std::vector<double>& out) {
     out.insert(out.end(), v.data(), v.data() + 3);
@@ -127,10 +126,8 @@ client::Loads loads_of(const LoadsForm& as, const mbdyn::ForceLoads& from, const
   if (as.form.kind == Form::Kind::nodal)
     for (const Vec3& m : from.m) put(m, loads.moments);
   if (!as.reference_loads) return loads;
-  const Mat3 turn =
-      as.global_reference_loads ? Mat3(reference.transpose()) : Mat3(Mat3::Identity());
-  put(turn * from.f0, loads.reference_force);
-  put(turn * from.m0, loads.reference_moment);
+  put(from.f0, loads.reference_force);
+  put(from.m0, loads.reference_moment);
   return loads;
 }
 
@@ -146,7 +143,7 @@ class SocketAnswers {
     const mbdyn::ForceState state = state_of(as_.form, motion);
     if (!done_) ask(implicit ? mbdyn::kData : mbdyn::kLastData, state);
     if (!last_) throw mbdyn::ChannelLost("the code keeps loads that it never gave");
-    client::Loads loads = loads_of(as_, *last_, state.reference.R);
+    client::Loads loads = loads_of(as_, *last_);
     loads.unfinished = implicit && !done_;
     return loads;
   }
@@ -256,7 +253,9 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
   options.accelerations = socket.accelerations;
-  if (has_reference(simulation, call.port)) options.frame = client::Frame::reference;
+  options.following_loads = has_reference(simulation, call.port);
+  if (options.following_loads) options.frame = client::Frame::reference;
+  options.global_reference_loads = socket.global_reference_loads;
   std::vector<std::unique_ptr<mbdyn::Link>> links = open_links(socket, patience);
   client::Peer peer = simulation.attach(call.port, options);
   const SimulationWatch watch(server, call.simulation, peer);
@@ -270,7 +269,7 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
                              "\" is none");
   const Form form = form_of(peer.layout(), socket);
   mbdyn::SocketWire wire(std::move(links[0]), form, socket.address.create);
-  SocketAnswers answers(wire, {form, peer.layout().reference_loads, socket.global_reference_loads});
+  SocketAnswers answers(wire, {form, peer.layout().reference_loads});
   while (!answers.ended() &&
          answer_next(peer, [&](const client::Motion& motion) { return answers.answer(motion); })) {
   }

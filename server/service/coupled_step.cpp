@@ -14,7 +14,10 @@ class ExchangeInStep {
   ExchangeInStep(Coupler& coupler, DeckSockets* sockets, Simulation& simulation, StepSlot& slot,
                  const CancelToken& token)
       : coupler_(coupler), sockets_(sockets), simulation_(simulation), slot_(slot), token_(token) {
-    if (coupler_.has_tight() || sockets_) iterate();
+    if (coupler_.has_tight() || sockets_)
+      iterate();
+    else if (coupler_.has_following())
+      follow();
     if (coupler_.has_window()) repeat();
   }
   ~ExchangeInStep() {
@@ -42,11 +45,22 @@ class ExchangeInStep {
       if (sockets_) sockets_->attempt_failed();
     });
     simulation_.set_exchange([this](int iteration) {
+      turn_loads();
       return wait([&] {
         const bool done = !sockets_ || sockets_->exchange(iteration, token_);
         return coupler_.exchange_iteration(simulation_, iteration, token_) && done;
       });
     });
+  }
+  void follow() {
+    simulation_.set_exchange([this](int) {
+      turn_loads();
+      return true;
+    });
+  }
+  void turn_loads() {
+    const MemoryPause uncounted;
+    coupler_.turn_loads(simulation_);
   }
   void repeat() {
     StepPasses passes;

@@ -14,7 +14,8 @@ constexpr int kProtocolVersion = 2;
 constexpr const char* kFeatures[] = {"grants",           "geometry", "symbols",      "step_sizes",
                                      "request_ids",      "pages",    "reset",        "results",
                                      "tables",           "events",   "checkpoints",  "pace",
-                                     "sample_intervals", "journal",  "deck_sockets", "units"};
+                                     "sample_intervals", "journal",  "deck_sockets", "units",
+                                     "following_loads"};
 
 inline void fill_protocol(v1::VersionRange* out) {
   out->set_lowest(kProtocolVersion);

@@ -249,7 +249,8 @@ Refusal limit_refusal(const std::string& limit, long long maximum, const std::st
 grpc::Status Refusal::status() const {
   v1::ErrorStatus details;
   details.set_code(code_of(reason_));
-  details.set_message(message_);
+  const std::string message = utf8(message_);  // it may quote what somebody sent
+  details.set_message(message);
   v1::ErrorInfo info;
   info.set_reason(reason_name(reason_));
   info.set_domain("mbcosim.dev");
@@ -260,11 +261,11 @@ grpc::Status Refusal::status() const {
   if (reason_ == v1::REASON_BAD_ARGUMENT) add_bad_request(message_, &details);
   if (const int after = retry_after(reason_)) add_retry_info(after, &details);
   if (failure_) details.add_details()->PackFrom(fitting(*failure_));
-  const std::size_t taken = details.ByteSizeLong() + message_.size();  // which is sent beside them
+  const std::size_t taken = details.ByteSizeLong() + message.size();  // which is sent beside them
   if (diagnostics_)
     details.add_details()->PackFrom(
         fitting(*diagnostics_, kMostDetails - std::min(taken, kMostDetails)));
-  return {code_of(reason_), message_, details.SerializeAsString()};
+  return {code_of(reason_), message, details.SerializeAsString()};
 }
 
 }  // namespace mbcosim::server

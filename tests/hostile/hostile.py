@@ -137,14 +137,39 @@ def watch_memory(pid, peak, stop):
             return
 
 
-def probe(program, address, faults, stop):
+def probe(program, pid, address, faults, stop):
     """What an orchestrator does: a new connection, by a process of its own, every two seconds; two failures in a row count."""
-    failed = 0
+    failed, begin = 0, time.monotonic()
+    command = [os.path.join(program, "mbcosimd"), "--check", address, "--check-timeout", str(math.ceil(3 * FACTOR))]
     while not stop.wait(2):
-        command = [os.path.join(program, "mbcosimd"), "--check", address, "--check-timeout", str(math.ceil(3 * FACTOR))]
-        failed = failed + 1 if subprocess.run(command, timeout=60 * FACTOR).returncode != 0 else 0
+        asked = time.monotonic()
+        result = subprocess.run(command, timeout=60 * FACTOR, stderr=subprocess.PIPE, text=True)
+        failed = failed + 1 if result.returncode != 0 else 0
+        if result.returncode != 0 and os.path.exists(f"/proc/{pid}/fd"):
+            print(f"  probe, {asked - begin:.0f} s after the start, {time.monotonic() - asked:.1f} s long: {result.stderr[-500:].strip()} "
+                  f"({descriptors_of(pid)} descriptors, {threads_of(pid)} threads)", flush=True)
         if failed == 2:
             faults.append("the probe finds no healthy daemon")
+
+
+def processor_time(pid):
+    """[s]"""
+    with open(f"/proc/{pid}/stat") as file:
+        fields = file.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def time_to_rest(pid, most):
+    """How long the daemon works on what was sent, until it takes less than a tenth of a core for a second [s]; `most`: no longer than that."""
+    start = last = time.monotonic()
+    used = processor_time(pid)
+    while last - start < most:
+        time.sleep(1)
+        now, then = time.monotonic(), processor_time(pid)
+        if then - used < 0.1 * (now - last):
+            return last - start
+        last, used = now, then
+    return most
 
 
 def send(attackers, number):
@@ -193,7 +218,7 @@ def main():
         before = threads_of(daemon.pid), descriptors_of(daemon.pid)
         peak, stop = [0], threading.Event()
         threading.Thread(target=watch_memory, args=(daemon.pid, peak, stop), daemon=True).start()
-        prober = threading.Thread(target=probe, args=(options.bin, address, faults, stop), daemon=True)
+        prober = threading.Thread(target=probe, args=(options.bin, daemon.pid, address, faults, stop), daemon=True)
         prober.start()
         attackers = attack(options.kinds.split(","), places, options.seed, options.seconds)
         quiet, loud = watch_both(bystander, attackers, options.seconds)
@@ -209,6 +234,11 @@ def main():
             missing = [code for code in attacks.KINDS[kind] if not result["codes"].get(code)]
             if missing:
                 faults.append(f"{kind}: none of its attacks came to {', '.join(missing)}")
+        if daemon.poll() is None:
+            rest = time_to_rest(daemon.pid, 60 * FACTOR)
+            print(f"at rest {rest:.1f} s after the last of them", flush=True)
+            if rest >= 10 * FACTOR:
+                faults.append(f"the daemon works for {rest:.0f} s on what nobody waits for")
         stop.set()
         prober.join()
         most = math.inf if options.sanitized else MEMORY + (300 << 20)  # besides the budget: program, gRPC's buffers, allocator

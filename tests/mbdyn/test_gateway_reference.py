@@ -100,11 +100,11 @@ def with_gateway(server, program, path, text, flags, code, *options, count=2):  
 @pytest.mark.parametrize("more", [False, True], ids=["plain", "labels and accelerations"])
 @pytest.mark.parametrize("rotation", ROTATIONS)
 @pytest.mark.parametrize("mode", ["loose", "staggered"])
-def test_explicit_codes_have_the_numbers_of_a_run(run, server, program, tmp_path, mode, rotation, more):  # noqa: F811
-    """Bit for bit. The first message of a run belongs to its derivatives phase, in which a daemon asks nobody; and the reference node does not turn,
-    since in a run, unlike in a daemon, loads turn with it within a step."""
+@pytest.mark.parametrize("node", [LOCKED, FREE], ids=["locked", "turning"])
+def test_explicit_codes_have_the_numbers_of_a_run(run, server, program, tmp_path, node, mode, rotation, more):  # noqa: F811
+    """Bit for bit. The first message of a run belongs to its derivatives phase, in which a daemon asks nobody."""
     flag, size = ROTATIONS[rotation]
-    text = reference_deck("coupling, staggered, reference node, 2," + ("labels, yes," if more else "") + rotation + ("accelerations, yes," if more else ""), *LOCKED)
+    text = reference_deck("coupling, staggered, reference node, 2," + ("labels, yes," if more else "") + rotation + ("accelerations, yes," if more else ""), *node)
     flags = 0x6 | flag | (0x18 if more else 0)
     alone, code = Code(size, more, more, ignored=1), Code(size, more, more)
     expected = with_run(run, text, flags, alone)

@@ -118,6 +118,36 @@ def test_moments_offsets_and_frames(server):
     assert found["node"] == pytest.approx(found["global"], abs=1e-3)
 
 
+@pytest.mark.parametrize("frame", ["node", "reference"])
+def test_loads_that_follow_a_node_turn_with_it_between_answers(server, frame):
+    """A force that is constant on a body which spins about its axis z: v = F/(m w) (sin wt, 1 - cos wt), of one answer and to second order.
+    Without `following_loads` it keeps the direction that it had at the exchange: v = F t/m. What the force gives from `start` on is looked at: it
+    begins with the first step, not in the initial state."""
+    force, spin, start, end = 3.0, 5.0, 0.1, 0.3
+    port = [mbcosim.structural_port("jet", nodes=[1], offsets=[[0, 0, 0.2]], **({"reference": 1} if frame == "reference" else {}))]
+
+    def velocity(step, follow):
+        with server.load_text(decks.body(spin=f"0., 0., {spin}", step=f"{step}"), ports=port) as simulation:
+            loads = [[force, 0, 0]], [[0, -0.2 * force, 0]]  # about the point; no moment is left about the centre of mass
+            with simulation.couple("jet", lambda _: loads, frame=frame, every=10000, following_loads=follow) as peer:
+                simulation.run_until(start)
+                before = simulation["node.structural.1.XP"][:2]
+                simulation.run_until(end)
+                assert (peer.exchanges, peer.error) == (1, None)
+            return simulation["node.structural.1.XP"][:2] - before
+
+    exact = force / spin * np.array([np.sin(spin * end) - np.sin(spin * start), np.cos(spin * start) - np.cos(spin * end)])
+    errors = [np.abs(velocity(step, True) - exact).max() for step in (4e-3, 2e-3)]
+    assert errors[1] < 1e-5 and np.log2(errors[0] / errors[1]) > 1.9
+    assert velocity(2e-3, False) == pytest.approx([force * (end - start), 0], abs=1e-6)
+
+
+def test_loads_follow_only_in_the_frame_of_a_node(server):
+    with oscillator(server) as simulation, pytest.raises(mbcosim.Error) as caught:
+        simulation.couple("spring", spring, following_loads=True, global_reference_loads=True)
+    assert {"following_loads", "global_reference_loads"} <= set(caught.value.metadata)
+
+
 def test_signals(server):
     port = [mbcosim.signal_port("control", outputs=["node.structural.1.X", "time"], inputs=["node.structural.1.load"])]
     with server.load_text(decks.body(spin="null", final_time="10."), ports=port) as simulation:

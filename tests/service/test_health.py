@@ -78,7 +78,8 @@ def test_a_check_ends_in_its_time(tmp_path):
         silent.bind(path)
         silent.listen()
         asked = [DAEMON, "--check", f"unix:{path}", "--check-timeout", "1"]
-        assert subprocess.run(asked, timeout=30 * TIME_FACTOR, check=False).returncode == 1
+        run = subprocess.run(asked, stderr=subprocess.PIPE, text=True, timeout=30 * TIME_FACTOR, check=False)
+        assert run.returncode == 1 and run.stderr == f"mbcosimd: unix:{path}: no answer within 1 s\n", run.stderr
     for wrong in ("0", "-1", "0.5", "nan", "1000000", "soon"):
         run = subprocess.run([*asked[:-1], wrong], stderr=subprocess.PIPE, text=True, timeout=30 * TIME_FACTOR, check=False)
         assert run.returncode == 4 and "--check-timeout" in run.stderr, wrong

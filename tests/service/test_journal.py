@@ -126,19 +126,22 @@ class Spring:
 
     def answer(self, motion):
         self.seen = max(self.seen, motion.step - (self.options["mode"] in ("tight", "window")))
-        return [-100.0 * np.asarray(motion.x[0]) * (1 + 1e-3 * motion.step)]
+        force = -100.0 * np.asarray(motion.x[0]) * (1 + 1e-3 * motion.step)
+        return [motion.rotations[0].T @ force - 20.0 * motion.v[0] if self.options.get("frame") == "node" else force]
 
     def couple(self, simulation):
         return simulation.couple("spring", self.answer, step=self.seen, **self.options)  # or it is refused
 
 
 COUPLINGS = [{"mode": "loose"}, {"mode": "loose", "every": 3, "hold": "quadratic"}, {"mode": "staggered"},
-             {"mode": "staggered", "every": 2, "hold": "linear"}, {"mode": "tight"}, {"mode": "window"}]
+             {"mode": "staggered", "every": 2, "hold": "linear"}, {"mode": "tight"}, {"mode": "window"},
+             {"mode": "loose", "every": 2, "hold": "linear", "frame": "node", "following_loads": True}]
 
 
 def coupled(server, durability):
     text = decks._OSCILLATOR.replace("final time: 10.", "final time: 1.e6") % (1, "")
     text = text[:text.index("  joint: 2,")] + text[text.index("end: elements;"):]
+    text = text.replace("3., 0.2, 0., null;", "3., 0.2, 0., 0., 0., 2.;")  # it turns
     return server.load_text(text, ports=[mbcosim.structural_port("spring", nodes=[1])], durability=durability)
 
 

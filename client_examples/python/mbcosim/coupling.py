@@ -76,6 +76,8 @@ class Peer(exchange.Course):
     every      steps between exchanges; "tight": iterations; None: the port's own, 1 unless its deck says otherwise
     mode       "loose", "staggered", "tight" or "window"; None: the port's own, "loose" unless its deck says otherwise
     frame      "global", "node" or "reference"; None: the port's own, "reference" if its deck gives it a reference node
+    following_loads     loads keep their components in that node's frame until the next answer: they turn with it
+    global_reference_loads  those on the reference node are global in any frame
     tangent    "dense" or "block_diagonal" when answers are Loads with derivatives
     units      of the peer, mbcosim.units(...): the server converts all that crosses, times and derivatives too; None: the deck's
     peer_timeout        the server waits so long for an answer [s]

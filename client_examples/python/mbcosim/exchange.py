@@ -6,6 +6,7 @@ import struct
 from collections.abc import Iterator
 from typing import Any, Optional, Union
 
+import grpc
 import numpy as np
 import numpy.typing as npt
 
@@ -80,17 +81,18 @@ class Loads:
 
 
 def hello(simulation: Any, port: str, *, mode: Optional[str] = None, rotation: str = "matrix", frame: Optional[str] = None,
-          accelerations: bool = False, every: Optional[int] = None, hold: str = "zero_order", peer_timeout: float = 10.0,
-          policy: str = "fail_step", acceleration: str = "none", relaxation: Optional[float] = None, tolerance: Optional[float] = None,
-          maximum_passes: Optional[int] = None, check_model: bool = True, tangent: str = "none",
-          heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None,
+          accelerations: bool = False, following_loads: bool = False, global_reference_loads: bool = False, every: Optional[int] = None,
+          hold: str = "zero_order", peer_timeout: float = 10.0, policy: str = "fail_step", acceleration: str = "none",
+          relaxation: Optional[float] = None, tolerance: Optional[float] = None, maximum_passes: Optional[int] = None,
+          check_model: bool = True, tangent: str = "none", heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None,
           units: Optional[common_pb2.UnitSystem] = None, step: Optional[int] = None, can_go_back: bool = False) -> pb.PeerMessage:
     """First message of a peer."""
     message = pb.Hello(
         protocol=protocol(), simulation=simulation.name, port=port, units=units,
         expected=pb.PeerExpectation(model_digest=simulation.info.model_digest if check_model else "", step=step, can_go_back=can_go_back),
         form=pb.ExchangeForm(rotation_form=_enum(types.RotationForm, "ROTATION_FORM_", rotation),
-                             frame=_enum(types.PortFrame, "PORT_FRAME_", frame), accelerations=accelerations),
+                             frame=_enum(types.PortFrame, "PORT_FRAME_", frame), accelerations=accelerations,
+                             following_loads=following_loads, global_reference_loads=global_reference_loads),
         schedule=pb.ExchangeSchedule(mode=_enum(types.CouplingMode, "COUPLING_MODE_", mode), every=every,
                                      input_hold=_enum(types.InputHold, "INPUT_HOLD_", hold)),
         iteration=pb.InterfaceIteration(acceleration=_enum(types.Acceleration, "ACCELERATION_", acceleration), relaxation=relaxation,
@@ -260,7 +262,10 @@ class Course:
         self._asked: Optional[int] = None  # step of the last exchange, in explicit modes
 
     def _begin(self, welcome: pb.Welcome, step: Optional[int]) -> None:
-        """The peer is attached; `step` is where it said that it stands."""
+        """The peer is attached; `step` is where it said that it stands. Refused by a server that would take the answers otherwise."""
+        form = welcome.agreed.form
+        if (form.following_loads or form.global_reference_loads) and "following_loads" not in welcome.protocol.features:
+            raise Error("the server is too old: it knows neither following_loads nor global_reference_loads", grpc.StatusCode.UNIMPLEMENTED)
         self.welcome = welcome
         self.step = welcome.step if step is None else min(step, welcome.step)
 

@@ -26,7 +26,7 @@ _Class = TypeVar("_Class", bound=type)
 
 PROTOCOL_VERSION = 2
 FEATURES = ("grants", "geometry", "symbols", "step_sizes", "request_ids", "pages", "reset", "results", "tables", "events", "checkpoints",
-            "pace", "sample_intervals", "journal", "deck_sockets", "units")  # that this library knows
+            "pace", "sample_intervals", "journal", "deck_sockets", "units", "following_loads")  # that this library knows
 USUAL = 30.0    # seconds that a call which advances nothing may take
 LONGEST = 1e9   # seconds of a duration or timeout
 PARTING = 2.0   # seconds that leaving a `with` block may take
