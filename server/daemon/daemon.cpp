@@ -28,6 +28,7 @@
 #include "service/results_service.h"
 #include "service/simulations_service.h"
 #include "service/telemetry_service.h"
+#include "threads/top_frame.h"
 
 namespace mbcosim::server {
 namespace {
@@ -381,18 +382,35 @@ bool let_go_of_grpc(std::chrono::seconds wait) {
 
 }  // namespace
 
+// gRPC closes no connection in the middle of a write: a client that stands still with its socket
+// full would hold it for ever.
+void Daemon::end_server() {
+  static constexpr std::chrono::milliseconds kLastWords(500);
+  std::promise<void> ended;
+  std::thread cutter([this, end = ended.get_future()] {
+    run_caught("shutdown", [&] {
+      if (end.wait_for(config_.shutdown_grace + kLastWords) == std::future_status::ready) return;
+      for (const auto& listener : listeners_) listener->cut();
+    });
+  });
+  server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace);
+  ended.set_value();
+  cutter.join();
+  listeners_.clear();
+  server_.reset();
+}
+
 bool Daemon::shut_down() {
   constexpr std::chrono::seconds kLastJobs(1);
   spdlog::info("shutting down");
   health_.stop();
   gate_.close();
   eager_resume_.stop();
-  listeners_.clear();
+  for (const auto& listener : listeners_) listener->stop();
   store_.close_all();
   shared_memory_.clear();
   door_.reset();
-  server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace);
-  server_.reset();
+  end_server();
   metrics_.close();
   const bool ended = lanes_.stop(kLastJobs);
   durability_.stop(!ended);

@@ -44,6 +44,7 @@ class Daemon {
   void listen();
   void open_shared_memory();
   void open_http();
+  void end_server();
   void check_listener(const std::string& address) const;
   std::shared_ptr<grpc::ServerCredentials> credentials_for(const std::string& address) const;
 

@@ -161,9 +161,17 @@ void Listener::start(std::unique_ptr<Acceptor> acceptor) {
 void Listener::stop() {
   stop_.store(true);
   if (thread_.joinable()) thread_.join();
+  acceptor_.reset();
   sockets_.clear();
   if (!path_.empty()) ::unlink(path_.c_str());
   path_.clear();
+}
+
+void Listener::cut() {
+  std::int64_t count = 0;
+  for (const auto& [fd, peer] : peers_)
+    if (inode_of(fd) == peer.inode) count += ::shutdown(fd, SHUT_RDWR) == 0;
+  if (count > 0) spdlog::warn("{}: {} connections that did not end are cut", bound_, count);
 }
 
 void Listener::loop() {

@@ -37,7 +37,9 @@ class Listener {
 
   const std::string& bound() const { return bound_; }  ///< the address, with the port that it got
   void start(std::unique_ptr<Acceptor> acceptor);
-  void stop();
+  void stop();  ///< those who are there stay
+  /// After `stop`: breaks off who is still there, as if their host had vanished.
+  void cut();
 
  private:
   void bind_unix(const std::string& path);

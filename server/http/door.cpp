@@ -20,6 +20,7 @@
 namespace mbcosim::server::http {
 namespace {
 
+constexpr std::chrono::milliseconds kLastWords{500};  // for a reader, once the door closes
 constexpr const char* kPlainText = "text/plain; charset=utf-8";
 constexpr const char* kNoPage =
     "This daemon was built without its page (CMake option MBCOSIM_PAGE, or no npm at build time).\n"
@@ -126,6 +127,7 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
 
 Door::Impl::~Impl() {
   rpc.close();
+  reaper.hurry(kLastWords);
   if (context) mg_stop(context);
   mg_exit_library();
 }

@@ -2,6 +2,8 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
+
 #include "threads/top_frame.h"
 
 namespace mbcosim::server::http {
@@ -25,13 +27,19 @@ Reaper::~Reaper() {
 void Reaper::arm(int socket, std::chrono::milliseconds time) {
   if (socket < 0) return;
   const Guard lock(mutex_);
-  deadlines_[socket] = Clock::now() + time;
+  deadlines_[socket] = std::min(end_, Clock::now() + time);
   if (deadlines_.size() == 1) changed_.notify_one();
 }
 
 void Reaper::disarm(int socket) {
   const Guard lock(mutex_);
   deadlines_.erase(socket);
+}
+
+void Reaper::hurry(std::chrono::milliseconds time) {
+  const Guard lock(mutex_);
+  end_ = Clock::now() + time;
+  for (auto& [socket, deadline] : deadlines_) deadline = std::min(end_, deadline);
 }
 
 void Reaper::loop() {

@@ -23,6 +23,8 @@ class Reaper {
   /// Replaces the time that the socket had. The caller disarms before the socket is closed.
   void arm(int socket, std::chrono::milliseconds time);
   void disarm(int socket);
+  /// Nobody, later ones included, has more time than this from now on.
+  void hurry(std::chrono::milliseconds time);
 
  private:
   void loop();
@@ -30,6 +32,7 @@ class Reaper {
   Mutex mutex_;
   Condition changed_;
   std::map<int, Clock::time_point> deadlines_ TS_GUARDED_BY(mutex_);  ///< by socket
+  Clock::time_point end_ TS_GUARDED_BY(mutex_) = Clock::time_point::max();
   bool stop_ TS_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };

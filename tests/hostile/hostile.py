@@ -242,7 +242,7 @@ def main():
         stop.set()
         prober.join()
         most = math.inf if options.sanitized else MEMORY + (300 << 20)  # besides the budget: program, gRPC's buffers, allocator
-        faults += judge(daemon, bystander, p99(quiet), p99(loud), before, peak[0], most, log)
+        faults += judge(daemon, places, bystander, p99(quiet), p99(loud), before, peak[0], most, log)
         if faults:
             print("the daemon's last words:\n" + open(log).read()[-5000:])
         bystander.channel.close()
@@ -283,7 +283,7 @@ def remaining(bystander, pid, before):
             yield f"{count(pid)} {what} are left, {then} were there before"
 
 
-def judge(daemon, bystander, quiet, loud, before, peak, most, log):
+def judge(daemon, places, bystander, quiet, loud, before, peak, most, log):
     floor = 0.05 * FACTOR
     decides = f", where the floor of {1e3 * floor:.0f} ms decides" if 5 * quiet < loud <= floor else ""
     print(f"bystander p99: quiet {1e3 * quiet:.1f} ms, under attack {1e3 * loud:.1f} ms, {loud / quiet:.1f} times as long{decides}; "
@@ -303,6 +303,9 @@ def judge(daemon, bystander, quiet, loud, before, peak, most, log):
                                                                       timeout=10 * FACTOR, wait_for_ready=True)
         except grpc.RpcError as error:
             yield f"a new connection is not served: {error.code()}"
+    still = attack(["slow"], places, 1, 600)
+    time.sleep(3 * FACTOR)
+    send(still, signal.SIGSTOP)
     daemon.send_signal(signal.SIGTERM)
     try:
         code = daemon.wait((GRACE + 3) * FACTOR)
@@ -311,7 +314,8 @@ def judge(daemon, bystander, quiet, loud, before, peak, most, log):
     except subprocess.TimeoutExpired:
         daemon.kill()
         daemon.wait()
-        yield "SIGTERM did not end the daemon within its grace"
+        yield "SIGTERM did not end the daemon within its grace, while a client of it stood still"
+    send(still, signal.SIGKILL)
     yield from reports(log)
 
 

@@ -4,6 +4,7 @@ import http.client
 import json
 import math
 import os
+import signal
 import socket
 import struct
 import subprocess
@@ -416,6 +417,20 @@ def open_stream(door, simulation, handles=()):
     while b'"every"' not in answer and b'"error"' not in answer:
         answer += link.recv(65536)
     return link, answer
+
+
+def test_a_reader_that_stands_still_does_not_hold_up_the_end(start_daemon, pendulum):
+    daemon = start_daemon("--http", "127.0.0.1:0")
+    door = Door(daemon.page())
+    with daemon.connect() as server:
+        simulation = server.load(pendulum)
+        handle = simulation.handles(["node.structural.2.X"])[0]
+        link, answer = open_stream(door, simulation.name, [handle] * 5000)
+        assert b" 200 " in answer
+        simulation.step(300)
+        daemon.process.send_signal(signal.SIGTERM)
+        assert daemon.process.wait(20 * TIME_FACTOR) == 0
+        link.close()
 
 
 def test_streams_of_an_identity_are_capped_and_a_closed_one_makes_room(door, server, pendulum):

@@ -2,6 +2,7 @@
 import contextlib
 import os
 import resource
+import signal
 import subprocess
 import sys
 import threading
@@ -330,6 +331,34 @@ def start_crowd():
         crowd.kill()
         crowd.wait()
         crowd.stdout.close()
+
+
+READER = """
+import sys, time
+import mbcosim
+with mbcosim.connect(sys.argv[1]) as server:
+    samples = server.attach(sys.argv[2]).subscribe(["node.structural.1.X"] * 5000)
+    print("there", flush=True)
+    time.sleep(600)
+"""
+
+
+def test_a_client_that_stands_still_with_its_socket_full_does_not_hold_up_the_end(start_daemon):
+    """gRPC closes no connection in the middle of a write; a stopped process, or a paused container, may stay one for ever."""
+    daemon = ready(start_daemon())
+    with daemon.connect() as server:
+        simulation = server.load_text(decks.endless())
+        reader = subprocess.Popen([sys.executable, "-c", READER, daemon.address, simulation.name], stdout=subprocess.PIPE, text=True)
+        try:
+            assert reader.stdout.readline() == "there\n"
+            reader.send_signal(signal.SIGSTOP)
+            simulation.step(200)
+            daemon.process.send_signal(signal.SIGTERM)
+            assert daemon.process.wait(20 * TIME_FACTOR) == 0
+        finally:
+            reader.kill()
+            reader.wait()
+            reader.stdout.close()
 
 
 def is_found_healthy(daemon):
