@@ -200,9 +200,11 @@ void fill(const LoadOptions& options, v1::CreateOptions* out) {
   if (options.results) *out->mutable_results() = to_proto(*options.results);
   fill_durability(options, out);
   if (options.pace) out->mutable_pace()->set_rate(*options.pace);
-  if (options.deck_sockets)
+  if (options.deck_sockets) {
     *out->mutable_deck_sockets()->mutable_peer_timeout() =
         to_duration(*options.deck_sockets, "deck_sockets.peer_timeout");
+    out->mutable_deck_sockets()->set_padded_labels(options.padded_labels);
+  }
   if (options.units) *out->mutable_units() = to_proto(*options.units);
   out->set_optional_ports(options.optional_ports);
 }

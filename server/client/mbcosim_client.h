@@ -131,6 +131,8 @@ struct LoadOptions {
   std::optional<std::int64_t> checkpoint_steps = {};  ///< none: by time alone
   /// Serves the sockets that the deck names, and waits at most so long for each code [s].
   std::optional<double> deck_sockets = {};
+  /// Their codes pad labels of an odd number of points as MBDyn does.
+  bool padded_labels = false;
   std::optional<double> pace = {};  ///< seconds of the model in one of the clock; none: all speed
   std::optional<Units> units = {};  ///< that the deck is written in; none: as its card `units` says
   bool optional_ports = false;      ///< steps wait for no peer of a port that has had none

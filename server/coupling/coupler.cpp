@@ -24,7 +24,8 @@ class Stopwatch {
 
 /// Do kept answers mean something else?
 bool writes_otherwise(const Agreement& now, const Agreement& before) {
-  return now.follows() != before.follows() || (now.follows() && now.frame != before.frame);
+  if (!now.follows() || !before.follows()) return now.follows() != before.follows();
+  return now.frame != before.frame || now.global_reference_loads != before.global_reference_loads;
 }
 
 }  // namespace
@@ -154,11 +155,12 @@ void Coupler::take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointP
   for (const v1::CheckpointPort& in : memory)
     for (Line& line : lines_) {
       if (line.port->model().name() != in.port()) continue;
-      if (in.had_peer()) line.port->expect_peer();
       line.agreement.hold = in.input_hold();
       line.agreement.frame = in.form().frame();
       line.agreement.following_loads = in.form().following_loads();
       line.agreement.global_reference_loads = in.form().global_reference_loads();
+      if (in.had_peer()) line.port->expect_peer(line.agreement);
+      line.agreement = line.port->agreement();
       line.history = InputHistory(line.agreement.held_answers());
       for (const v1::CheckpointAnswer& answer : in.answers())
         line.history.add(answer.time(), {answer.values().begin(), answer.values().end()});
@@ -180,16 +182,22 @@ bool Coupler::asks(const Line& line, std::int64_t step) const {
   return line.answered_for != step && step % line.agreement.every == 0;
 }
 
+// Kept answers stay as far as they mean the same.
+void Coupler::take_agreement(Line& line, const Agreement& now) {
+  if (now.hold != line.agreement.hold || writes_otherwise(now, line.agreement))
+    line.history = InputHistory(now.held_answers());
+  line.agreement = now;
+}
+
 void Coupler::prepare(const Simulation& simulation, double length, bool estimated) {
   const std::int64_t step = simulation.step_number();
   target_time_ = simulation.time() + length;
   for (Line& line : lines_) {
     const Agreement now = line.port->agreement();
-    if (now.hold != line.agreement.hold || writes_otherwise(now, line.agreement))
-      line.history = InputHistory(now.held_answers());
-    line.agreement = now;
+    const bool same_peer = now.generation == line.agreement.generation;
+    take_agreement(line, now);
     line.due = asks(line, step);
-    const bool on_its_way = line.sent_for == step && line.port->is_waiting();
+    const bool on_its_way = same_peer && line.sent_for == step && line.port->is_waiting();
     if (!line.due || on_its_way) continue;
     line.sent_for = -1;
     fill(line, simulation, target_time_, 0);

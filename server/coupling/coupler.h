@@ -102,6 +102,7 @@ class Coupler {
   void add(PortModel model, const Simulation& simulation);
   void claim(const PortModel& model, const Simulation& simulation);
   void fill(Line& line, const Simulation& simulation, double target_time, int iteration);
+  static void take_agreement(Line& line, const Agreement& now);
   void take_answer(Line& line, const CancelToken& cancel);
   bool asks(const Line& line, std::int64_t step) const;
   void start(Line& line, const Simulation& simulation);

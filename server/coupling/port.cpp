@@ -175,9 +175,11 @@ bool Port::had_peer() const {
   return agreement_.generation > 0;
 }
 
-void Port::expect_peer() {
+void Port::expect_peer(const Agreement& left) {
   const Guard guard(mutex_);
-  if (agreement_.generation == 0) agreement_.generation = 1;
+  if (agreement_.generation > 0) return;
+  agreement_ = left;
+  agreement_.generation = 1;
 }
 
 bool Port::is_idle() const {

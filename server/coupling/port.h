@@ -90,8 +90,8 @@ class Port {
   bool is_idle() const;
   /// Has a peer ever attached?
   bool had_peer() const;
-  /// One has, in an earlier process: the port takes part in steps.
-  void expect_peer();
+  /// One has, in an earlier process: the port takes part in steps. `left`: in what its answers are.
+  void expect_peer(const Agreement& left);
   /// Waits until a peer is attached, as long as the policy says.
   void await_peer(const CancelToken& cancel);
   /// Sends what `model().fill` put into `message` for the peer of this handshake. Does not throw:

@@ -1,6 +1,7 @@
 #include "coupling/port_model.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "coupling/port_numbers.h"
@@ -305,7 +306,8 @@ void PortModel::apply_following(std::vector<double> answer, const Agreement& agr
   for (const Point& point : points_) points.push_back(motion(simulation, point));
   const Motion reference = has_reference_ ? motion(simulation, reference_) : Motion{};
   turn_loads(agreement, points, reference, &answer);
-  apply(answer, simulation);
+  if (std::all_of(answer.begin(), answer.end(), [](double value) { return std::isfinite(value); }))
+    apply(answer, simulation);  // an iterate that has diverged is the solver's to judge
 }
 
 // Part of the state, so that a restored simulation redoes a step from where it started the first

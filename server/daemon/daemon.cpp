@@ -269,6 +269,7 @@ void Daemon::listen() {
   add_channel_arguments(builder, config_.limits);
   bound_messages(builder, config_.limits);
   for (const std::string& address : config_.listen) check_listener(address);
+  if (!config_.tls_certificate.empty()) certificate_.emplace(config_);
   std::vector<std::unique_ptr<Listener::Acceptor>> acceptors;
   for (const std::string& address : config_.listen) {
     listeners_.push_back(std::make_unique<Listener>(address));
@@ -345,17 +346,23 @@ void Daemon::check_listener(const std::string& address) const {
 
 std::shared_ptr<grpc::ServerCredentials> Daemon::credentials_for(const std::string& address) const {
   if (is_unix(address) || config_.tls_certificate.empty()) return grpc::InsecureServerCredentials();
-  return watched_credentials(config_);
+  return certificate_->credentials();
 }
 
 void Daemon::reload(bool asked) {
-  if (config_.tokens_file.empty() || (!tokens_watch_.has_changed() && !asked)) return;
-  try {
+  const auto attempt = [](const char* what, const std::function<bool()>& take) {
+    try {
+      if (take()) spdlog::info("{} read anew", what);
+    } catch (const std::exception& error) {
+      spdlog::error("{}; what was there before stays in force", error.what());
+    }
+  };
+  attempt("the tokens were", [&] {
+    if (config_.tokens_file.empty() || (!tokens_watch_.has_changed() && !asked)) return false;
     authenticator_.reload(config_.tokens_file);
-    spdlog::info("the tokens were read anew");
-  } catch (const std::exception& error) {
-    spdlog::error("{}; those before stay in force", error.what());
-  }
+    return true;
+  });
+  attempt("the certificates were", [&] { return certificate_ && certificate_->reload(asked); });
 }
 
 bool Daemon::drain() {
@@ -431,11 +438,25 @@ std::shared_ptr<grpc::ChannelCredentials> credentials_of(const HealthCheck& chec
   return grpc::SslCredentials(options);
 }
 
-std::string refusal_of(const HealthCheck& check, const grpc::Status& status) {
+grpc::Status ask(const HealthCheck& check, grpc::health::v1::Health::Stub& stub, bool at_once,
+                 grpc::health::v1::HealthCheckResponse* response) {
+  constexpr std::chrono::milliseconds kAtOnce(100);
+  grpc::ClientContext context;
+  context.set_wait_for_ready(!at_once);  // a connection that is dropped is tried again
+  const std::chrono::milliseconds wait =
+      at_once ? kAtOnce : std::chrono::milliseconds(std::chrono::seconds(check.timeout));
+  context.set_deadline(std::chrono::system_clock::now() + wait);
+  return stub.Check(&context, {}, response);
+}
+
+std::string refusal_of(const HealthCheck& check, const grpc::Status& status,
+                       const grpc::Status& at_once) {
   if (status.ok()) return "the daemon does not serve: it starts, drains or ends";
-  if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
-    return "no answer within " + std::to_string(check.timeout) + " s";
-  return status.error_message();
+  if (status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED)
+    return printable(status.error_message());
+  const bool has_reason = at_once.error_code() == grpc::StatusCode::UNAVAILABLE;
+  return "no answer within " + std::to_string(check.timeout) + " s" +
+         (has_reason ? ": " + printable(at_once.error_message()) : "");
 }
 
 }  // namespace
@@ -445,16 +466,15 @@ int check_health(const HealthCheck& check) {
   if (!check.name.empty()) arguments.SetSslTargetNameOverride(check.name);
   const auto stub = grpc::health::v1::Health::NewStub(
       grpc::CreateCustomChannel(check.address, credentials_of(check), arguments));
-  grpc::ClientContext context;
-  context.set_wait_for_ready(true);  // a connection that is dropped is tried again
-  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(check.timeout));
   grpc::health::v1::HealthCheckResponse response;
-  const grpc::Status status = stub->Check(&context, {}, &response);
+  const grpc::Status status = ask(check, *stub, false, &response);
   if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED) return 0;
   const bool serves = response.status() == grpc::health::v1::HealthCheckResponse::SERVING;
   if (status.ok() && (serves || check.alive)) return 0;
+  grpc::Status at_once;  // who waits does not hear why a connection cannot be had
+  if (!status.ok()) at_once = ask(check, *stub, true, &response);
   std::fprintf(stderr, "mbcosimd: %s: %s\n", check.address.c_str(),
-               refusal_of(check, status).c_str());
+               refusal_of(check, status, at_once).c_str());
   return 1;
 }
 

@@ -5,12 +5,14 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/file_watch.h"
 #include "daemon/listener.h"
 #include "daemon/options.h"
+#include "daemon/tls.h"
 #include "http/door.h"
 #include "rpc/health.h"
 #include "service/config.h"
@@ -28,7 +30,7 @@ class Daemon {
   explicit Daemon(const Config& config);
   ~Daemon();
 
-  /// Takes tokens that have changed, or all of them, `asked`. Certificates are watched anyway.
+  /// Takes tokens and certificates that have changed, or all of them, `asked`.
   void reload(bool asked);
   /// Health says NOT_SERVING from now on, and all is served. False: there is no time for that.
   bool drain();
@@ -51,6 +53,7 @@ class Daemon {
   const Config config_;
   Authenticator authenticator_;
   FileWatch tokens_watch_;
+  std::optional<ServerCertificate> certificate_;
   Metrics metrics_;
   EventLog log_;
   SolverSlots slots_;

@@ -39,6 +39,15 @@ std::int64_t most_descriptors() {
   return ::getrlimit(RLIMIT_NOFILE, &limit) == 0 ? static_cast<std::int64_t>(limit.rlim_cur) : 1024;
 }
 
+/// An address of a host as a source: those of one network of version 6 are one host's.
+void mask(sockaddr_storage& name) {
+  if (name.ss_family != AF_INET6) return;
+  in6_addr& address = reinterpret_cast<sockaddr_in6&>(name).sin6_addr;
+  constexpr std::size_t kNetwork = 8;  // bytes
+  if (!IN6_IS_ADDR_V4MAPPED(&address))
+    std::memset(&address.s6_addr[kNetwork], 0, sizeof address - kNetwork);
+}
+
 /// The other side: the process of a Unix socket, the address of another.
 std::string source_of(int fd) {
   sockaddr_storage name{};
@@ -51,6 +60,7 @@ std::string source_of(int fd) {
     ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &process, &length);
     return "process " + std::to_string(process.pid);
   }
+  mask(name);
   ::getnameinfo(reinterpret_cast<const sockaddr*>(&name), size, text, sizeof text, nullptr, 0,
                 NI_NUMERICHOST);
   return text;
@@ -61,10 +71,10 @@ ino_t inode_of(int fd) {
   return ::fstat(fd, &info) == 0 ? info.st_ino : 0;
 }
 
-/// Has the client closed it, having said nothing?
+/// Has the client closed it?
 bool has_gone(int fd) {
-  char first = 0;
-  return ::recv(fd, &first, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+  pollfd look{fd, POLLRDHUP, 0};
+  return ::poll(&look, 1, 0) > 0 && (look.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
 }
 
 int port_of(int socket) {
@@ -205,18 +215,22 @@ bool Listener::accept_one(int listener) {
   }
   const int on = 1;
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);  // not for Unix sockets
-  accepted_[peers_.at(fd).source].push_back({listener, std::move(socket)});
+  const std::string& source = peers_.at(fd).source;
+  if (accepted_.count(source) == 0) turns_.push_back(source);
+  accepted_[source].push_back({listener, std::move(socket)});
   return true;
 }
 
 void Listener::hand_over_next() {
-  if (accepted_.empty()) return;
-  auto next = accepted_.upper_bound(last_source_);
-  if (next == accepted_.end()) next = accepted_.begin();
-  last_source_ = next->first;
+  if (turns_.empty()) return;
+  const auto next = accepted_.find(turns_.front());
   Accepted chosen = std::move(next->second.front());
   next->second.pop_front();
-  if (next->second.empty()) accepted_.erase(next);
+  if (next->second.empty())
+    accepted_.erase(next);
+  else
+    turns_.push_back(turns_.front());
+  turns_.pop_front();
   if (has_gone(chosen.socket.get())) return;
   Acceptor::NewConnectionParameters connection;
   connection.listener_fd = chosen.listener;
@@ -228,21 +242,35 @@ bool Listener::may_stay(int fd) {
   const std::int64_t free =
       most_descriptors() - kKeptDescriptors - fd;  // numbers are given in order
   const Peer fresh{source_of(fd), inode_of(fd)};
-  if (!has_room(fresh.source, free)) {  // some of them may have gone
-    std::erase_if(peers_,
-                  [](const auto& entry) { return inode_of(entry.first) != entry.second.inode; });
-    if (!has_room(fresh.source, free)) return false;
-  }
-  peers_[fd] = fresh;
+  if (const auto before = peers_.find(fd); before != peers_.end()) forget(before);
+  if (!has_room(fresh.source, free)) forget_who_has_gone();
+  if (!has_room(fresh.source, free)) return false;
+  peers_.emplace(fd, fresh);
+  ++alike_[fresh.source];
   return true;
+}
+
+void Listener::forget(std::map<int, Peer>::iterator peer) {
+  const auto alike = alike_.find(peer->second.source);
+  if (--alike->second == 0) alike_.erase(alike);
+  peers_.erase(peer);
+}
+
+/// Not for each connection of a crowd: it takes a while.
+void Listener::forget_who_has_gone() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now - looked_ < std::chrono::milliseconds(kLookMs)) return;
+  looked_ = now;
+  for (auto peer = peers_.begin(); peer != peers_.end();) {
+    const auto each = peer++;
+    if (inode_of(each->first) != each->second.inode) forget(each);
+  }
 }
 
 bool Listener::has_room(const std::string& source, std::int64_t free) const {
   constexpr std::int64_t kShare = 3;
-  const auto alike = std::count_if(peers_.begin(), peers_.end(), [&](const auto& entry) {
-    return entry.second.source == source;
-  });
-  return kShare * alike < free;
+  const auto alike = alike_.find(source);
+  return kShare * (alike == alike_.end() ? 0 : alike->second) < free;
 }
 
 // Without this the client would wait, and this thread would spin.

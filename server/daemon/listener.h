@@ -5,6 +5,7 @@
 #include <sys/types.h>
 
 #include <atomic>
+#include <chrono>
 #include <deque>
 #include <map>
 #include <memory>
@@ -42,6 +43,10 @@ class Listener {
   void cut();
 
  private:
+  struct Peer {
+    std::string source;
+    ino_t inode = 0;  ///< of its socket: another one means that the connection is gone
+  };
   void bind_unix(const std::string& path);
   void bind_tcp(const std::string& host, const std::string& port);
   void loop();
@@ -51,6 +56,8 @@ class Listener {
   bool may_stay(int fd);
   /// For one more of it, with so many descriptors `free`?
   bool has_room(const std::string& source, std::int64_t free) const;
+  void forget(std::map<int, Peer>::iterator peer);
+  void forget_who_has_gone();
   void drop_one(int listener);
   void tell_dropped();
 
@@ -58,18 +65,16 @@ class Listener {
   std::vector<shm::Descriptor> sockets_;
   shm::Descriptor reserve_;  ///< given up for a moment to drop a connection
   std::unique_ptr<Acceptor> acceptor_;
-  struct Peer {
-    std::string source;
-    ino_t inode = 0;  ///< of its socket: another one means that the connection is gone
-  };
   // --- of the thread
-  std::map<int, Peer> peers_;  ///< by descriptor
+  std::map<int, Peer> peers_;                       ///< by descriptor
+  std::map<std::string, std::int64_t> alike_;       ///< how many of `peers_` are of a source
+  std::chrono::steady_clock::time_point looked_{};  ///< who of them has gone
   struct Accepted {
     int listener = -1;
     shm::Descriptor socket;
   };
   std::map<std::string, std::deque<Accepted>> accepted_;  ///< not yet handed over, by source
-  std::string last_source_;                               ///< whose turn it was
+  std::deque<std::string> turns_;                         ///< its keys, who is next first
   Rate drops_{1};
   std::atomic<bool> stop_{false};
   std::thread thread_;

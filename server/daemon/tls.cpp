@@ -5,7 +5,11 @@
 #include <openssl/bio.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -23,8 +27,7 @@ Bio open_text(const std::string& text) {
   return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
 }
 
-Certificate read_certificate(const std::string& path) {
-  const std::string bytes = read_file(path);
+Certificate read_certificate(const std::string& path, const std::string& bytes) {
   const Bio text = open_text(bytes);
   Certificate certificate(PEM_read_bio_X509(text.get(), nullptr, nullptr, nullptr));
   if (!certificate) throw std::runtime_error(path + " holds no certificate in PEM form");
@@ -34,16 +37,32 @@ Certificate read_certificate(const std::string& path) {
 /// A key that wants one would be asked for at the terminal.
 int no_passphrase(char*, int, int, void*) { return 0; }
 
-/// A pair that does not fit would refuse every connection, and say so nowhere.
-void check_pair(const Config& config) {
-  const Certificate certificate = read_certificate(config.tls_certificate);
-  const std::string bytes = read_file(config.tls_key);
+void check_key(const std::string& path, const std::string& bytes, X509& certificate,
+               const std::string& path_of_certificate) {
   const Bio text = open_text(bytes);
   const Key key(PEM_read_bio_PrivateKey(text.get(), nullptr, no_passphrase, nullptr));
-  if (!key) throw std::runtime_error(config.tls_key + " holds no key in PEM form");
-  if (X509_check_private_key(certificate.get(), key.get()) != 1)
-    throw std::runtime_error("the key in " + config.tls_key +
-                             " is not that of the certificate in " + config.tls_certificate);
+  if (!key) throw std::runtime_error(path + " holds no key in PEM form");
+  if (X509_check_private_key(&certificate, key.get()) != 1)
+    throw std::runtime_error("the key in " + path + " is not that of the certificate in " +
+                             path_of_certificate);
+}
+
+/// A file without a name, which ends with the process.
+shm::Descriptor in_memory() {
+  shm::Descriptor file(::memfd_create("certificate", MFD_CLOEXEC));
+  if (!file) throw std::runtime_error(std::string("no file in memory: ") + std::strerror(errno));
+  return file;
+}
+
+std::string path_of(const shm::Descriptor& file) {
+  return "/proc/self/fd/" + std::to_string(file.get());
+}
+
+void put(const std::string& bytes, const shm::Descriptor& file) {
+  const auto size = static_cast<ssize_t>(bytes.size());
+  if (::pwrite(file.get(), bytes.data(), bytes.size(), 0) != size ||
+      ::ftruncate(file.get(), size) != 0)
+    throw std::runtime_error(std::string("a copy cannot be kept: ") + std::strerror(errno));
 }
 
 }  // namespace
@@ -56,19 +75,40 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
-std::shared_ptr<grpc::ServerCredentials> watched_credentials(const Config& config) {
+ServerCertificate::ServerCertificate(const Config& config) {
+  for (const std::string& path : {config.tls_certificate, config.tls_key, config.tls_client_ca})
+    if (!path.empty()) files_.push_back({path, FileWatch(path), in_memory()});
+  take();
+}
+
+void ServerCertificate::take() {
+  std::vector<std::string> bytes;
+  for (const File& file : files_) bytes.push_back(read_file(file.path));
+  const Certificate certificate = read_certificate(files_[0].path, bytes[0]);
+  check_key(files_[1].path, bytes[1], *certificate, files_[0].path);
+  if (authority()) (void)read_certificate(authority()->path, bytes[2]);
+  for (std::size_t k = 0; k < files_.size(); ++k) put(bytes[k], files_[k].copy);
+}
+
+bool ServerCertificate::reload(bool asked) {
+  bool changed = asked;
+  for (File& file : files_) changed = file.watch.has_changed() || changed;
+  if (changed) take();
+  return changed;
+}
+
+std::shared_ptr<grpc::ServerCredentials> ServerCertificate::credentials() const {
   using namespace grpc::experimental;
   constexpr unsigned kLookSeconds = 1;
-  check_pair(config);
-  if (!config.tls_client_ca.empty()) (void)read_certificate(config.tls_client_ca);
   TlsServerCredentialsOptions options(std::make_shared<FileWatcherCertificateProvider>(
-      config.tls_key, config.tls_certificate, config.tls_client_ca, kLookSeconds));
+      path_of(files_[1].copy), path_of(files_[0].copy),
+      authority() ? path_of(authority()->copy) : "", kLookSeconds));
   options.watch_identity_key_cert_pairs();
-  if (config.tls_client_ca.empty()) {
-    options.set_cert_request_type(GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE);
-  } else {
+  if (authority()) {
     options.watch_root_certs();
     options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
+  } else {
+    options.set_cert_request_type(GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE);
   }
   return TlsServerCredentials(options);
 }

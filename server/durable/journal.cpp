@@ -26,9 +26,9 @@ std::string packed(std::string_view message, std::string_view state) {
 }
 
 StoredEntry unpacked(std::string_view content) {
-  if (content.size() < 2 * kNumber) throw StorageError("an entry is too short");
+  if (content.size() < 2 * kNumber) throw DamagedFile("an entry is too short");
   const std::uint64_t size = number_at(content, kNumber, kNumber);
-  if (size > content.size() - 2 * kNumber) throw StorageError("an entry cannot be understood");
+  if (size > content.size() - 2 * kNumber) throw DamagedFile("an entry cannot be understood");
   return {std::string(content.substr(2 * kNumber, size)),
           std::string(content.substr(2 * kNumber + size))};
 }
@@ -115,8 +115,8 @@ void Journal::write(std::string_view bytes) {
 namespace {
 
 [[noreturn]] void damaged(std::int64_t number, std::size_t at, const std::string& what) {
-  throw StorageError("record " + std::to_string(number) + " at byte " + std::to_string(at) + ": " +
-                     what);
+  throw DamagedFile("record " + std::to_string(number) + " at byte " + std::to_string(at) + ": " +
+                    what);
 }
 
 /// Is what follows the last whole record only the start of one?

@@ -52,7 +52,7 @@ using EntryHandler = std::function<void(StoredEntry)>;
 
 /// Reads the bytes of a journal's file, whose name is `file`. Returns where its last whole entry
 /// ends: what follows was being written when the daemon was killed, and nobody was told of it.
-/// Throws StorageError that names the record when anything else is damaged.
+/// Throws DamagedFile that names the record when anything else is damaged.
 std::size_t read_journal(std::string_view bytes, const std::string& file,
                          const EntryHandler& handler);
 

@@ -50,7 +50,7 @@ bool claims_to_end_within(std::string_view bytes) {
 std::optional<RecordView> record_at(std::string_view bytes) {
   if (!claims_to_end_within(bytes)) return std::nullopt;
   const auto kind = number_at(bytes, 0, 4);
-  if (kind < 1 || kind > static_cast<std::uint64_t>(RecordKind::entry)) return std::nullopt;
+  if (kind < 1 || kind > static_cast<std::uint64_t>(RecordKind::removal)) return std::nullopt;
   const std::string_view content =
       bytes.substr(kRecordHeader, static_cast<std::size_t>(number_at(bytes, 4, 8)));
   if (number_at(bytes, 12, 4) != checksum(bytes.substr(0, 12), content)) return std::nullopt;
@@ -72,8 +72,8 @@ void RecordWriter::add(RecordKind kind, std::string_view content) {
 // ------------------------------------------------------------------ reading
 
 void RecordReader::damaged(const std::string& what) const {
-  throw StorageError("record " + std::to_string(number_ + 1) + " at byte " + std::to_string(at_) +
-                     ": " + what);
+  throw DamagedFile("record " + std::to_string(number_ + 1) + " at byte " + std::to_string(at_) +
+                    ": " + what);
 }
 
 void RecordReader::take(std::string_view bytes) {
@@ -119,11 +119,17 @@ void RecordReader::finish() const {
 // ------------------------------------------------------------------ files
 
 ReadFile::ReadFile(const std::string& path) : file_(::open(path.c_str(), O_RDONLY | kOpenOwn)) {
+  if (file_ < 0 && (errno == ENOENT || errno == ENOTDIR))
+    throw DamagedFile(std::string("it cannot be opened: ") + std::strerror(errno));
   if (file_ < 0) fail_storage("it cannot be opened");
   struct stat info {};
-  if (::fstat(file_, &info) == 0 && S_ISREG(info.st_mode)) return;
+  const bool known = ::fstat(file_, &info) == 0;
+  if (known && S_ISREG(info.st_mode)) return;
+  const int error = errno;
   ::close(file_);
-  throw StorageError("it is no regular file");
+  errno = error;
+  if (!known) fail_storage("it cannot be looked at");
+  throw DamagedFile("it is no regular file");
 }
 
 ReadFile::~ReadFile() { ::close(file_); }

@@ -23,13 +23,21 @@ enum class RecordKind : std::uint32_t {
   file = 4,
   point = 5,
   state = 6,
-  entry = 7
+  entry = 7,
+  removal = 8
 };
 
 /// What cannot be written, as the system says. The message has no path.
 class StorageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+/// What is stored is not what was written. Any other StorageError is the system's: what it keeps
+/// from us may be whole.
+class DamagedFile : public StorageError {
+ public:
+  using StorageError::StorageError;
 };
 
 /// It has its name, but that need not be on the disk.
@@ -40,6 +48,17 @@ class NotSynced : public StorageError {
 
 /// Throws StorageError with `what` and what the system says (errno).
 [[noreturn]] void fail_storage(const std::string& what);
+/// What `read` returns; its error is thrown on with `name` before it, and is of the same kind.
+template <class Read>
+auto named(const std::string& name, Read&& read) {
+  try {
+    return read();
+  } catch (const DamagedFile& error) {
+    throw DamagedFile(name + ": " + error.what());
+  } catch (const StorageError& error) {
+    throw StorageError(name + ": " + error.what());
+  }
+}
 
 constexpr std::size_t kRecordHeader = 16;  ///< bytes before a record's content
 
@@ -75,14 +94,14 @@ class RecordWriter {
   const ByteSink sink_;
 };
 
-/// Takes bytes as they come and hands over whole records. Throws StorageError that names the record
+/// Takes bytes as they come and hands over whole records. Throws DamagedFile that names the record
 /// and its place when bytes are damaged, or a record is longer than `most`.
 class RecordReader {
  public:
   using Handler = std::function<void(RecordKind, std::string content)>;
   RecordReader(std::int64_t most, Handler handler) : most_(most), handler_(std::move(handler)) {}
   void take(std::string_view bytes);
-  /// Nothing follows. Throws StorageError when the last file has no end.
+  /// Nothing follows. Throws DamagedFile when the last file has no end.
   void finish() const;
   /// Of the file that `begin` named last.
   const std::string& file() const { return file_; }
@@ -106,7 +125,7 @@ constexpr int kOpenOwn = O_CLOEXEC | O_NONBLOCK;
 /// A regular file that is read from its start on.
 class ReadFile {
  public:
-  /// Throws StorageError when there is none, or it is a pipe, a device or a folder.
+  /// Throws StorageError; DamagedFile when there is none, or it is a pipe, a device or a folder.
   explicit ReadFile(const std::string& path);
   ~ReadFile();
   ReadFile(const ReadFile&) = delete;

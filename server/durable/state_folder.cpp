@@ -26,6 +26,7 @@ constexpr std::size_t kPiece = 1 << 20;  // of a file of the model in one record
 const std::string kSnapshot = "snapshot-", kJournal = "journal-";
 const std::string kUnfinished = "/unfinished";
 const std::string kDamaged = ".damaged", kGone = ".gone";
+const std::string kRemovals = "removals";
 
 int take_lock(const std::string& path) {
   const std::string name = path + "/lock";
@@ -55,7 +56,16 @@ void remove_gone(const std::string& path) {
 
 template <class Message>
 void parse(const std::string& content, Message* message) {
-  if (!message->ParseFromString(content)) throw StorageError("a record cannot be understood");
+  if (!message->ParseFromString(content)) throw DamagedFile("a record cannot be understood");
+}
+
+/// All records of a file, which must be the one of that name.
+void read_records(const std::string& folder, const std::string& name,
+                  const RecordReader::Handler& handler) {
+  RecordReader reader(kLongestRecord, handler);
+  read_pieces(folder + "/" + name, [&](std::string_view piece) { reader.take(piece); });
+  reader.finish();
+  if (reader.file() != name) throw DamagedFile("it is the file \"" + reader.file() + "\"");
 }
 
 /// N of a file "PREFIXN".
@@ -95,7 +105,7 @@ void StoredBundle::add(const std::string& file, RecordKind kind, std::string con
   } else if (file == "point" && kind == RecordKind::state) {
     point.state = std::move(content);
   } else {
-    throw StorageError("the file \"" + file.substr(0, 100) + "\" has a record of a wrong kind");
+    throw DamagedFile("the file \"" + file.substr(0, 100) + "\" has a record of a wrong kind");
   }
 }
 
@@ -175,9 +185,69 @@ std::vector<std::string> StateFolder::list() const {
     const std::string name = entry->path().filename();
     if (name.find('.') == std::string::npos) ids.push_back(name);
   }
+  if (error)
+    throw std::runtime_error("the state folder " + path_ + " cannot be read: " + error.message());
   std::sort(ids.begin(), ids.end());
   return ids;
 }
+
+// ------------------------------------------------------------------ deletions
+
+namespace {
+
+constexpr std::size_t kTextLength = 4;  // bytes of a text's length within a record
+
+std::string bytes_of(const StoredRemoval& removal) {
+  std::string content;
+  for (const std::string* text : {&removal.identity, &removal.request_id, &removal.simulation})
+    content += number_bytes(text->size(), kTextLength) + *text;
+  return content;
+}
+
+StoredRemoval removal_in(std::string_view content) {
+  StoredRemoval removal;
+  for (std::string* text : {&removal.identity, &removal.request_id, &removal.simulation}) {
+    if (content.size() < kTextLength) throw DamagedFile("a record is too short");
+    const std::uint64_t size = number_at(content, 0, kTextLength);
+    content.remove_prefix(kTextLength);
+    if (size > content.size()) throw DamagedFile("a record is too short");
+    *text = content.substr(0, size);
+    content.remove_prefix(size);
+  }
+  return removal;
+}
+
+/// Gives the ending to the name of a file or folder. Throws StorageError.
+std::string renamed(const std::string& path, const std::string& ending) {
+  std::string name = path + ending;
+  if (::rename(path.c_str(), name.c_str()) != 0) fail_storage("it cannot be put aside");
+  return name;
+}
+
+}  // namespace
+
+void StateFolder::write_removals(const std::deque<StoredRemoval>& removals) {
+  AtomicFile file(path_ + "/" + kRemovals);
+  RecordWriter records([&](std::string_view bytes) { file.write(bytes); });
+  records.begin(kRemovals);
+  for (const StoredRemoval& removal : removals) records.add(RecordKind::removal, bytes_of(removal));
+  records.end();
+  file.commit();
+}
+
+std::deque<StoredRemoval> StateFolder::read_removals() const {
+  std::deque<StoredRemoval> removals;
+  std::error_code error;
+  if (!fs::exists(path_ + "/" + kRemovals, error) && !error) return removals;
+  named(kRemovals, [&] {
+    read_records(path_, kRemovals, [&](RecordKind kind, const std::string& content) {
+      if (kind == RecordKind::removal) removals.push_back(removal_in(content));
+    });
+  });
+  return removals;
+}
+
+std::string StateFolder::put_removals_aside() { return renamed(path_ + "/" + kRemovals, kDamaged); }
 
 // ------------------------------------------------------------------ writing
 
@@ -225,8 +295,10 @@ void StateFolder::finish(const std::string& id) {
 }
 
 bool StateFolder::is_unfinished(const std::string& id) const {
-  std::error_code none;
-  return fs::exists(folder(id) + kUnfinished, none);
+  std::error_code error;
+  const bool there = fs::exists(folder(id) + kUnfinished, error);
+  if (error) throw StorageError(id + kUnfinished + ": it cannot be looked for: " + error.message());
+  return there;
 }
 
 void StateFolder::write_model(const std::string& id, const StoredModel& model) {
@@ -273,22 +345,13 @@ void StateFolder::remove(const std::string& id) {
   give_back(size);
 }
 
-std::string StateFolder::put_aside(const std::string& id) {
-  std::error_code none;
-  fs::rename(folder(id), folder(id) + kDamaged, none);
-  return folder(id) + kDamaged;
-}
+std::string StateFolder::put_aside(const std::string& id) { return renamed(folder(id), kDamaged); }
 
 // ------------------------------------------------------------------ reading
 
 void StateFolder::read_file(const std::string& id, const std::string& name,
-                            const RecordReader::Handler& handler) const try {
-  RecordReader reader(kLongestRecord, handler);
-  read_pieces(folder(id) + "/" + name, [&](std::string_view piece) { reader.take(piece); });
-  reader.finish();
-  if (reader.file() != name) throw StorageError("it is the file \"" + reader.file() + "\"");
-} catch (const StorageError& error) {
-  throw StorageError(id + "/" + name + ": " + error.what());
+                            const RecordReader::Handler& handler) const {
+  named(id + "/" + name, [&] { read_records(folder(id), name, handler); });
 }
 
 v1::CheckpointHead StateFolder::read_head(const std::string& id) const {
@@ -337,6 +400,8 @@ std::vector<int> StateFolder::numbered(const std::string& id, const std::string&
   for (fs::directory_iterator entry(folder(id), error), end; !error && entry != end;
        entry.increment(error))
     if (const auto number = number_of(entry->path().filename(), prefix)) numbers.push_back(*number);
+  if (error && error != std::errc::no_such_file_or_directory)
+    throw StorageError(id + ": its files cannot be listed: " + error.message());
   std::sort(numbers.begin(), numbers.end());
   return numbers;
 }
@@ -365,17 +430,15 @@ std::vector<int> StateFolder::journals(const std::string& id) const {
 void StateFolder::read_journals(const std::string& id, const EntryHandler& handler) {
   for (const int number : journals(id)) {
     const std::string name = journal_name(number), path = journal_path(id, number);
-    try {
+    named(id + "/" + name, [&] {
       std::string bytes;
       read_pieces(path, [&](std::string_view piece) { bytes += piece; });
       const std::size_t whole = read_journal(bytes, name, handler);
-      if (whole == bytes.size()) continue;
+      if (whole == bytes.size()) return;
       if (::truncate(path.c_str(), static_cast<off_t>(whole)) != 0)
-        throw StorageError(std::string("it cannot be cut: ") + std::strerror(errno));
+        fail_storage("it cannot be cut");
       give_back(static_cast<std::int64_t>(bytes.size() - whole));
-    } catch (const StorageError& error) {
-      throw StorageError(id + "/" + name + ": " + error.what());
-    }
+    });
   }
 }
 

@@ -45,10 +45,16 @@ class OpenFiles {
   std::deque<ReadFile> files_;
 };
 
-/// DIR/lock, which one daemon holds; DIR/name; DIR/simulations/ID with the files "model" (written
-/// once), "point" (replaced by each checkpoint), "snapshot-N" and "journal-N", and "unfinished"
-/// while it is made; ID.gone before that and while it is removed, ID.damaged when it cannot be
-/// read. Thread-safe, as long as each simulation is written by one thread at a time.
+/// A deletion whose request had an id.
+struct StoredRemoval {
+  std::string identity, request_id;
+  std::string simulation;  ///< its name
+};
+
+/// DIR/lock, which one daemon holds; DIR/name; DIR/removals; DIR/simulations/ID with the files
+/// "model" (written once), "point" (replaced by each checkpoint), "snapshot-N" and "journal-N", and
+/// "unfinished" while it is made; ID.gone before that and while it is removed, ID.damaged when it
+/// cannot be read. Thread-safe, as long as each simulation is written by one thread at a time.
 class StateFolder {
  public:
   /// `most`: bytes of all that is in it. Throws std::runtime_error when the folder cannot be used
@@ -61,10 +67,18 @@ class StateFolder {
   /// A name for whose folder this is, made with it: 8 of 0 to 9 and a to f. Throws
   /// std::runtime_error when it can neither be read nor written.
   std::string name();
-  /// IDs of the simulations that are stored.
+  /// IDs of the simulations that are stored. Throws std::runtime_error when that cannot be told.
   std::vector<std::string> list() const;
+  /// Deletions, the oldest first: all of them, in the place of those before. They count nothing, so
+  /// that a full folder keeps nobody from deleting. Throws StorageError.
+  void write_removals(const std::deque<StoredRemoval>& removals);
+  /// Those that were written last. Throws StorageError.
+  std::deque<StoredRemoval> read_removals() const;
+  /// Keeps the damaged file of deletions where nobody reads it; its new name. Throws StorageError.
+  std::string put_removals_aside();
 
-  // --- of one simulation. All throw StorageError; what is written is on the disk then.
+  // --- of one simulation. All throw StorageError, those that read DamagedFile where what is stored
+  // is at fault; what is written is on the disk then.
   /// Until `finish` it is no simulation yet, should the daemon be killed.
   void start(const std::string& id);
   void finish(const std::string& id);
@@ -99,7 +113,8 @@ class StateFolder {
   std::int64_t written_at(const std::string& id) const;
   /// Nothing when there is none.
   void remove(const std::string& id);
-  /// Keeps what is damaged where nobody takes it for a simulation; its new name.
+  /// Keeps what is damaged where nobody takes it for a simulation; its new name. Throws
+  /// StorageError when it must stay where it is.
   std::string put_aside(const std::string& id);
 
   /// All of a simulation as one stream of bytes.

@@ -194,7 +194,7 @@ Code fmi2GetIntegerStatus(Component component, StatusKind, Integer*) {
 Code fmi2GetBooleanStatus(Component component, StatusKind kind, Boolean* value) {
   return guarded(component, Call::step_status, "fmi2GetBooleanStatus", [&](Instance& core) {
     if (kind != kTerminated || !value) return core.discard("no such boolean status");
-    *value = 0;  // an FMU of ours never asks for the end of the simulation
+    *value = core.ended();
     return Status::ok;
   });
 }

@@ -190,6 +190,7 @@ Code fmi3DoStep(Handle instance, Float64 time, Float64 length, Boolean, Boolean*
   return guarded(instance, Call::do_step, "fmi3DoStep", [&](Instance& core) {
     const Status status = core.do_step(time, length);
     if (last_time) *last_time = core.last_time();
+    if (terminate) *terminate = core.ended();
     return status;
   });
 }

@@ -132,7 +132,7 @@ void Instance::set_start_values() {
   given_.clear();
   for (const FmuVariable& variable : manifest_.variables) given_.push_back(variable.start);
   simulation_ = Simulation::prepare(model_);
-  started_ = ahead_ = false;
+  started_ = ahead_ = ended_ = false;
   behind_ = true;
   ++revision_;
 }
@@ -410,6 +410,7 @@ std::unique_ptr<SavedState> Instance::save() {
   saved->symbols = chosen_;
   saved->communication_time = communication_time_;
   saved->last_time = last_time_;
+  saved->ended = ended_;
   saved->stop_time = stop_time_;
   if (started_) saved->state = simulation_->snapshot();
   return saved;
@@ -434,6 +435,7 @@ Status Instance::restore(const SavedState& saved) {
   mode_ = saved.mode;
   communication_time_ = saved.communication_time;
   last_time_ = saved.last_time;
+  ended_ = saved.ended;
   stop_time_ = saved.stop_time;
   ++revision_;
   log_.write(Status::ok, "state of t = " + number(communication_time_) + " s restored");
@@ -462,32 +464,83 @@ std::unique_ptr<SavedState> Instance::deserialize(std::string_view bytes) {
 
 // ------------------------------------------------------------------ derivatives
 
-/// Handles, each once; `elements`: where each number of the references stands among theirs.
-std::optional<std::vector<int>> Instance::handles_of(std::span<const std::uint32_t> references,
-                                                     bool inputs, std::vector<int>& elements) {
-  std::vector<int> handles, starts;
-  int size = 0;
+int Instance::Sums::place_of(int handle, int handle_size) {
+  const auto known = std::find(handles.begin(), handles.end(), handle);
+  if (known != handles.end()) return starts[known - handles.begin()];
+  handles.push_back(handle);
+  starts.push_back(size);
+  size += handle_size;
+  return starts.back();
+}
+
+void Instance::Sums::add(int number, double factor) { rows.back().emplace_back(number, factor); }
+
+/// Derivatives of x = X + R f, R, v = V + ω × R f and ω of points are those of their nodes:
+///
+///   dx = dX + dR f,  dv = dV + dω × R f + ω × dR f
+void Instance::add_motion(const Variable& variable, Sums& sums) const {
+  using Source = FmuVariable::Source;
+  const StructuralPort& port = *find_structural_port(*model_, variable.of->name);
+  const Source source = variable.of->source;
+  const int per_point = source == Source::orientations ? 9 : 3;
+  for (const int element : variable.of->elements) {
+    const int k = element / per_point, i = element % per_point;
+    const Vec3& f = port.offsets[k];
+    const std::string prefix =
+        "node.structural." + std::to_string(model_->structural[port.nodes[k]].label) + ".";
+    const auto add = [&](const char* name, int number, double factor) {
+      const int handle = factor != 0 ? simulation_->find_variable(prefix + name) : -1;
+      if (handle < 0) return;  // a node without orientation
+      const int size = simulation_->variables()[handle].size;
+      sums.add(sums.place_of(handle, size) + number, factor);
+    };
+    const auto add_arm = [&](int row, double factor) {
+      for (int j = 0; j < 3; ++j) add("R", 3 * row + j, factor * f[j]);
+    };
+    sums.rows.emplace_back();
+    if (source == Source::orientations) add("R", i, 1);
+    if (source == Source::angular_velocities) add("Omega", i, 1);
+    if (source == Source::positions) {
+      add("X", i, 1);
+      add_arm(i, 1);
+    }
+    if (source == Source::velocities) {
+      const PointState point = variable.motion->at(*simulation_, k);
+      const Vec3 arm = point.R * f;
+      const int p = (i + 1) % 3, q = (i + 2) % 3;
+      add("XP", i, 1);
+      add("Omega", p, arm[q]);
+      add("Omega", q, -arm[p]);
+      add_arm(q, point.w[p]);
+      add_arm(p, -point.w[q]);
+    }
+  }
+}
+
+std::optional<Instance::Sums> Instance::sums_of(std::span<const std::uint32_t> references,
+                                                bool inputs) {
+  Sums sums;
   for (const std::uint32_t reference : references) {
     const Variable* variable = find(reference);
-    const bool fits = variable && variable->handle >= 0 &&
-                      variable->of->role != FmuVariable::Role::independent &&
+    const bool fits = variable && variable->of->role != FmuVariable::Role::independent &&
                       given_[index_of(*variable)].empty() != inputs;
     if (!fits) {
       fail("variable " + std::to_string(reference) + " is no " +
            (inputs ? "input" : "output with derivatives"));
       return std::nullopt;
     }
-    auto known = std::find(handles.begin(), handles.end(), variable->handle);
-    if (known == handles.end()) {
-      handles.push_back(variable->handle);
-      starts.push_back(size);
-      size += simulation_->variables()[variable->handle].size;
-      known = handles.end() - 1;
+    if (variable->motion) {
+      add_motion(*variable, sums);
+      continue;
     }
-    for (const int element : variable->of->elements)
-      elements.push_back(starts[known - handles.begin()] + element);
+    const int start =
+        sums.place_of(variable->handle, simulation_->variables()[variable->handle].size);
+    for (const int element : variable->of->elements) {
+      sums.rows.emplace_back();
+      sums.add(start + element, 1);
+    }
   }
-  return handles;
+  return sums;
 }
 
 mbcosim::Status Instance::compute_derivative(std::span<const std::uint32_t> unknowns,
@@ -497,19 +550,23 @@ mbcosim::Status Instance::compute_derivative(std::span<const std::uint32_t> unkn
   if (derivative_ && derivative_->revision == revision_ && derivative_->unknowns == now.unknowns &&
       derivative_->knowns == now.knowns)
     return ok();
-  std::vector<int> rows, columns;
-  const auto outputs = handles_of(unknowns, false, rows);
-  const auto inputs = outputs ? handles_of(knowns, true, columns) : std::nullopt;
+  const auto outputs = sums_of(unknowns, false);
+  const auto inputs = outputs ? sums_of(knowns, true) : std::nullopt;
   if (!inputs) return make_error(ErrorKind::argument, "", "");
   if (model_->unknowns > kLargest)
     return make_error(ErrorKind::limit, "",
                       "derivatives are given for models of at most " + std::to_string(kLargest) +
                           " unknowns; this one has " + std::to_string(model_->unknowns));
-  const auto io = simulation_->linearize(*inputs, *outputs);
+  const auto io = simulation_->linearize(inputs->handles, outputs->handles);
   if (!io) return io.error();
   const auto system = state_space(simulation_->linearize(), *io);
   if (!system) return system.error();
-  now.d = system->d(rows, columns);
+  now.d = MatX::Zero(static_cast<Eigen::Index>(outputs->rows.size()),
+                     static_cast<Eigen::Index>(inputs->rows.size()));
+  for (Eigen::Index j = 0; j < now.d.cols(); ++j)
+    for (Eigen::Index i = 0; i < now.d.rows(); ++i)
+      for (const auto& [number, factor] : outputs->rows[i])
+        now.d(i, j) += factor * system->d(number, inputs->rows[j].front().first);
   derivative_ = std::move(now);
   return ok();
 }

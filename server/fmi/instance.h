@@ -28,6 +28,7 @@ struct SavedState {
   std::vector<std::vector<double>> given;  ///< last values of inputs and parameters, by variable
   SymbolValues symbols;                    ///< values of symbols that are not the deck's
   double communication_time = 0, last_time = 0;
+  bool ended = false;  ///< the deck ended the run in the last step
   std::optional<double> stop_time;
   std::optional<State> state;  ///< when the start was computed
 };
@@ -65,6 +66,7 @@ class Instance {
                      const std::vector<Value>& values);
   Status do_step(double time, double length);
   double last_time() const { return last_time_; }  ///< that the last step reached [s]
+  bool ended() const { return ended_; }  ///< the deck ended the run there, in the last step
 
   /// null: the state cannot be had, which is logged.
   std::unique_ptr<SavedState> save();
@@ -86,6 +88,16 @@ class Instance {
     const FmuVariable* of = nullptr;
     int handle = -1;                      ///< of the simulation
     const PointMotion* motion = nullptr;  ///< of a port's points
+  };
+  /// Derivatives of numbers, Σ factor × derivative of a number of the simulation.
+  struct Sums {
+    std::vector<int> handles, starts;  ///< its variables, each once, and where their numbers begin
+    int size = 0;                      ///< of them together
+    std::vector<std::vector<std::pair<int, double>>> rows;  ///< number, factor; inputs: 1 each
+
+    /// Where the numbers of a variable begin.
+    int place_of(int handle, int handle_size);
+    void add(int number, double factor);  ///< to the last row
   };
   /// D of all outputs by all inputs of a call, kept while nothing changes.
   struct Derivative {
@@ -119,10 +131,11 @@ class Instance {
   void read(const Variable& variable, std::vector<double>& all, std::vector<double>& out) const;
   Status may_set(const Variable& variable);
   bool write(const Variable& variable, std::span<const double> values);
-  mbcosim::Status advance(double length, double end);
+  Result<double> advance(double length, double end);
   Result<StepReport> take_step(std::optional<double> end);
   double next_step_size() const;
   Status failed_step(const Error& error, const State& before);
+  Status end_run(double time);
   // --- with a daemon: the state here is brought up to date when somebody wants it
   mbcosim::Status ensure_connected();
   mbcosim::Status pull();
@@ -130,8 +143,9 @@ class Instance {
   Status check_step(double time, double length);
   mbcosim::Status compute_derivative(std::span<const std::uint32_t> unknowns,
                                      std::span<const std::uint32_t> knowns);
-  std::optional<std::vector<int>> handles_of(std::span<const std::uint32_t> references, bool inputs,
-                                             std::vector<int>& elements);
+  /// Each number of a call's variables, in turn.
+  std::optional<Sums> sums_of(std::span<const std::uint32_t> references, bool inputs);
+  void add_motion(const Variable& variable, Sums& sums) const;
 
   const Standard standard_;
   const std::string name_;
@@ -157,6 +171,7 @@ class Instance {
   Mode mode_ = Mode::instantiated;
   bool started_ = false;
   double communication_time_ = 0, last_time_ = 0;
+  bool ended_ = false;
   std::optional<double> stop_time_;
   std::uint64_t revision_ = 1;  ///< counts changes of state and inputs
   std::optional<Derivative> derivative_;

@@ -21,7 +21,8 @@ Status Instance::check_step(double time, double length) {
 }
 
 /// Steps of the deck's length; what is left at the end is a step of its own, which ends at `end`.
-mbcosim::Status Instance::advance(double length, double end) {
+/// The length that was taken [s]; less than `length`: there the deck ended the run (`bailout`).
+Result<double> Instance::advance(double length, double end) {
   double left = length;
   while (left > kRounding * length) {
     const double h = next_step_size();
@@ -29,9 +30,10 @@ mbcosim::Status Instance::advance(double length, double end) {
     const auto report = take_step(whole ? std::nullopt : std::optional(end));
     if (!report) return report.error();
     if (report->error) return *report->error;
+    if (report->steps_done == 0) return length - left;
     left = whole ? left - report->step_size : 0;
   }
-  return ok();
+  return length;
 }
 
 double Instance::next_step_size() const {
@@ -43,9 +45,11 @@ Result<StepReport> Instance::take_step(std::optional<double> end) {
   if (remote_) {
     const auto step = remote_->step(end);
     if (!step) return step.error();
+    StepReport report;
+    if (step->ended) return report;
     ahead_ = true;
     remote_next_size_ = step->next_size;
-    StepReport report;
+    report.steps_done = 1;
     report.step_size = step->size;
     return report;
   }
@@ -56,14 +60,30 @@ Result<StepReport> Instance::take_step(std::optional<double> end) {
 }
 
 Status Instance::do_step(double time, double length) {
+  ended_ = false;
   if (const Status status = check_step(time, length); status != Status::ok) return status;
   if (const auto pulled = pull(); !pulled) return fail(pulled.error().message);
   if (const auto pushed = push(); !pushed) return fail(pushed.error().message);
   const State before = simulation_->snapshot();
   ++revision_;
-  if (const auto done = advance(length, time + length); !done)
-    return failed_step(done.error(), before);
+  const auto taken = advance(length, time + length);
+  if (!taken) return failed_step(taken.error(), before);
+  if (*taken < length) return end_run(time + *taken);
   communication_time_ = last_time_ = time + length;
+  return Status::ok;
+}
+
+/// The instance stands at `time`, and further steps end there, too. FMI 2 has fmi2Discard for it,
+/// after which it tells the time; in FMI 3 a discarded step has changed nothing and tells nothing.
+Status Instance::end_run(double time) {
+  communication_time_ = last_time_ = time;
+  ended_ = true;
+  const std::string message = "the deck ended the run at t = " + number(time) + " s";
+  if (standard_ == Standard::fmi2) {
+    mode_ = Mode::step_failed;
+    return discard(message);
+  }
+  log_.write(Status::ok, name_ + ": " + message);
   return Status::ok;
 }
 

@@ -21,7 +21,8 @@ struct LogCategory {
 inline constexpr std::array<LogCategory, 5> kLogCategories = {
     {{"logEvents", "what the instance does: models read, simulations started, states restored"},
      {"logStatusWarning", "warnings of the deck"},
-     {"logStatusDiscard", "steps that did not converge and values that were refused"},
+     {"logStatusDiscard",
+      "steps that did not converge or in which the deck ended, and values that were refused"},
      {"logStatusError", "calls that failed"},
      {"logStatusFatal", "failures after which no call is allowed"}}};
 

@@ -245,16 +245,18 @@ Result<Remote::Step> Remote::step(std::optional<double> end) {
       return make_error(ErrorKind::not_converged, "",
                         reply->at("failure").value("message", "the step failed"));
     const std::string outcome = reply->at("outcome");
-    if (reply->at("stepsDone") == "0")
+    if (reply->at("stepsDone") == "0") {
+      const bool finished = outcome == "STEP_OUTCOME_FINISHED";
+      if (finished && reply->at("largestStepSize") != 0) return Step{.ended = true};
       return make_error(ErrorKind::precondition, "",
-                        outcome == "STEP_OUTCOME_FINISHED"
-                            ? "the daemon's simulation ends at the deck's final time"
-                            : "the daemon took no step: " + outcome);
+                        finished ? "the daemon's simulation ends at the deck's final time"
+                                 : "the daemon took no step: " + outcome);
+    }
     const std::string number = reply->at("step");
     const auto [rest, code] =
         std::from_chars(number.data(), number.data() + number.size(), number_);
     if (code != std::errc() || *rest != '\0') return is_no_daemon("its step is \"" + number + "\"");
-    return Step{reply->at("stepSize"), reply->at("nextStepSize")};
+    return Step{.size = reply->at("stepSize"), .next_size = reply->at("nextStepSize")};
   } catch (const json::exception& e) {
     return is_no_daemon(e.what());
   }

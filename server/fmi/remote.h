@@ -21,6 +21,7 @@ class Remote {
  public:
   struct Step {
     double size = 0, next_size = 0;  ///< of this step, and of the next one as the deck has it [s]
+    bool ended = false;              ///< no step: the deck ended the run before its final time
   };
   struct Choice {
     std::string display_name;  ///< for people who look at the daemon

@@ -8,7 +8,7 @@
 namespace mbcosim::fmi {
 namespace {
 
-constexpr std::string_view kMagic = "mbcosim FMU state 3\n";
+constexpr std::string_view kMagic = "mbcosim FMU state 4\n";
 
 void put(std::uint64_t value, std::string& out) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);
@@ -102,6 +102,7 @@ std::string to_bytes(const SavedState& saved, std::uint64_t model_digest) {
   put(static_cast<std::uint64_t>(saved.mode), out);
   put(saved.communication_time, out);
   put(saved.last_time, out);
+  put(static_cast<std::uint64_t>(saved.ended), out);
   put(static_cast<std::uint64_t>(saved.stop_time.has_value()), out);
   put(saved.stop_time.value_or(0.0), out);
   put(saved.symbols, out);
@@ -135,6 +136,7 @@ Result<SavedState> saved_state_from_bytes(std::string_view bytes, const std::str
   saved.mode = static_cast<Mode>(mode);
   saved.communication_time = in.take<double>();
   saved.last_time = in.take<double>();
+  saved.ended = in.take<std::uint64_t>() != 0;
   const bool has_stop_time = in.take<std::uint64_t>() != 0;
   const auto stop_time = in.take<double>();
   if (has_stop_time) saved.stop_time = stop_time;

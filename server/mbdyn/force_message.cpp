@@ -204,7 +204,8 @@ std::string adapt(std::uint32_t flags, ForceForm& form) {
   if (!has_padding(form) || other_code) return "";
   return "; labels of an odd number of points: MBDyn's client library misreads them, and the flags "
          "do not tell that the peer is another code; if it is, and pads them as MBDyn does, say so "
-         "with --padded-labels; else give the deck an even number of points or no labels";
+         "with --padded-labels, or `padded_labels` in a daemon; else give the deck an even number "
+         "of points or no labels";
 }
 
 std::string hexadecimal(std::uint32_t number) {

@@ -142,20 +142,25 @@ bool Link::send_if_room(const std::string& bytes) {
 
 std::string Link::receive(std::size_t size) {
   const auto end = Clock::now() + patience_.time;
-  std::string bytes(size, '\0');
-  for (std::size_t done = 0; done < size;) {
-    const ssize_t n = ::recv(descriptor_, bytes.data() + done, size - done, 0);
+  std::string message(size, '\0');
+  for (std::size_t done = 0; !receive_at_once(message, done);) await(POLLIN, end);
+  return message;
+}
+
+bool Link::receive_at_once(std::string& message, std::size_t& done) {
+  while (done < message.size()) {
+    const ssize_t n = ::recv(descriptor_, message.data() + done, message.size() - done, 0);
     if (n > 0)
       done += static_cast<std::size_t>(n);
-    else if (n == 0 || (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR))
+    else if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
+      return false;
+    else if (n == 0 || errno != EINTR)
       throw ChannelLost(name_ + ": closed by the peer" +
                         (done > 0 ? " after " + std::to_string(done) + " of " +
-                                        std::to_string(size) + " bytes of a message"
+                                        std::to_string(message.size()) + " bytes of a message"
                                   : ""));
-    else
-      await(POLLIN, end);
   }
-  return bytes;
+  return true;
 }
 
 void Link::finish(milliseconds time) noexcept {
@@ -168,11 +173,6 @@ void Link::finish(milliseconds time) noexcept {
     constexpr int kSlice = 20;
     if (n < 0) ::poll(&entry, 1, kSlice);
   }
-}
-
-bool Link::has_input() const {
-  pollfd entry{descriptor_, POLLIN, 0};
-  return ::poll(&entry, 1, 0) > 0;
 }
 
 // ------------------------------------------------------------------ both ends

@@ -48,11 +48,11 @@ class Link {
   bool send_if_room(const std::string& bytes);
   /// Waits for so many bytes.
   std::string receive(std::size_t size);
+  /// Takes what is there, after the first `done` bytes of a message; true: it is whole.
+  bool receive_at_once(std::string& message, std::size_t& done);
   /// Sends no more and drops what still comes until the peer closes, at most for so long: what was
   /// sent last then arrives.
   void finish(std::chrono::milliseconds time) noexcept;
-  /// Are there bytes (or the end) to be received at once?
-  bool has_input() const;
 
  private:
   void await(short events, Clock::time_point end) const;

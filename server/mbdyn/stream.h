@@ -3,6 +3,7 @@
 
 #include <fstream>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "mbdyn/link.h"
@@ -33,7 +34,8 @@ class StreamSender {
   bool wants_end_ = false;
 };
 
-/// File driver `stream`. When the peer closes, the last values stay to the end of the run.
+/// File driver `stream`. When the peer closes, the last values stay to the end of the run; when it
+/// is `non blocking`, they hold until a message is whole.
 class StreamReceiver {
  public:
   StreamReceiver(const DeckChannel& channel, const Simulation& simulation,
@@ -43,10 +45,13 @@ class StreamReceiver {
 
  private:
   void receive(Simulation& simulation);
+  bool has_message();  ///< waits for it, or not, as the channel is
   void write_echo(const Simulation& simulation, const std::vector<double>& values);
 
   const DeckChannel channel_;
   std::unique_ptr<Link> link_;  ///< null when closed
+  std::string message_;         ///< its first `received_` bytes have come
+  std::size_t received_ = 0;
   std::ofstream echo_;
   std::vector<double> last_;
   int handle_ = -1, count_ = 0;

@@ -6,10 +6,14 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "peer/options.h"
+
 namespace mbcosim::peer {
 namespace {
 
 constexpr double kRounding = 1e-9;
+
+double tolerance_at(double time) { return kRounding * std::max(1.0, std::abs(time)); }
 
 std::string listed(const std::vector<std::string>& names) {
   std::string text;
@@ -162,42 +166,73 @@ FmuPeer::FmuPeer(Controller& controller, SignalMap map, bool keeps_states, doubl
 
 void FmuPeer::begin_step() {
   if (keeps_states_) controller_.keep();
+  kept_ = keeps_states_;
   before_ = time_;
-  in_step_ = true;
 }
 
 void FmuPeer::go_back() {
-  if (!keeps_states_)
-    throw std::runtime_error("the step is asked for again, and the FMU has no way back");
   controller_.restore();
   time_ = before_;
 }
 
-std::vector<double> FmuPeer::exchange(const client::Motion& motion) {
-  const bool implicit = motion.iteration > 0;
-  const double target = implicit ? motion.time : motion.target_time;
-  const double tolerance = kRounding * std::max(1.0, std::abs(target));
-  const bool again = implicit ? in_step_ : target <= time_ + tolerance;
-  if (again)
+bool FmuPeer::is_before_kept(const client::Motion& motion, double target) const {
+  if (motion.step < step_) return true;
+  const double tolerance = tolerance_at(target);
+  if (target > time_ + tolerance) return false;
+  return kept_ ? target <= before_ + tolerance : step_ >= 0 || target < time_ - tolerance;
+}
+
+void FmuPeer::enter_step(const client::Motion& motion, double target) {
+  if (is_before_kept(motion, target)) {
+    std::ostringstream text;
+    text << "the simulation went back to t = " << std::min(motion.time, target)
+         << ", the FMU stands at t = " << time_ << " and keeps no state of it; attach it anew";
+    throw Lost(text.str());
+  }
+  const bool again = in_step_ || target <= time_ + tolerance_at(target);
+  if (again && kept_)
     go_back();
   else
     begin_step();
+  step_ = motion.step;
+  in_step_ = motion.iteration > 0;
+}
+
+std::vector<double> FmuPeer::advance(const client::Motion& motion, double target) {
   std::vector<double> inputs;
   for (const auto& [signal, start] : map_.sources)
     inputs.push_back(signal < 0 ? start : motion.signals.at(signal));
   if (!inputs.empty()) controller_.set(map_.inputs, inputs);
-  if (target > time_ + tolerance) {
+  if (target > time_ + tolerance_at(target)) {
     controller_.do_step(time_, target - time_);
     time_ = target;
   }
   const std::vector<double> given = controller_.get(map_.outputs, map_.output_size);
   std::vector<double> loads;
-  for (const int target : map_.targets) loads.push_back(given[target]);
+  for (const int place : map_.targets) loads.push_back(given[place]);
   return loads;
 }
 
-void FmuPeer::step_ended(bool accepted) {
+std::vector<double> FmuPeer::exchange(const client::Motion& motion) {
+  const double target = motion.iteration > 0 ? motion.time : motion.target_time;
+  enter_step(motion, target);
+  try {
+    return advance(motion, target);
+  } catch (const std::exception& failure) {
+    const std::string what = failure.what();
+    if (!kept_) throw Lost(what + "; it keeps no states and cannot go on");
+    try {
+      go_back();
+    } catch (const std::exception& e) {
+      throw Lost(what + ", then " + e.what() + "; it cannot go on");
+    }
+    throw;
+  }
+}
+
+void FmuPeer::step_ended(bool accepted, std::int64_t step) {
   if (!accepted && in_step_) go_back();
+  if (!accepted) step_ = std::min(step_, step);
   in_step_ = false;
 }
 

@@ -41,24 +41,31 @@ SignalMap map_signals(const FmuArchive& archive, const PortSignals& signals,
 
 /// Advances the FMU with the simulation: at each exchange inputs are set and the FMU steps to the
 /// time for which an answer is wanted. A step that is asked for again starts from the state before
-/// it.
+/// it, which is the only one kept: there is no way back to what lies before.
 class FmuPeer {
  public:
   /// `time`: of the simulation now [s]; the FMU starts there.
   FmuPeer(Controller& controller, SignalMap map, bool keeps_states, double time);
+  /// Throws Lost when the FMU cannot go on, std::runtime_error when the step alone has failed: the
+  /// FMU then stands at its beginning.
   std::vector<double> exchange(const client::Motion& motion);
-  /// An implicit step ended: accepted, or to be redone.
-  void step_ended(bool accepted);
+  /// An implicit step ended: accepted, or to be redone from the end of step `step`.
+  void step_ended(bool accepted, std::int64_t step);
 
  private:
+  bool is_before_kept(const client::Motion& motion, double target) const;
+  void enter_step(const client::Motion& motion, double target);
+  std::vector<double> advance(const client::Motion& motion, double target);
   void begin_step();
   void go_back();
 
   Controller& controller_;
   const SignalMap map_;
   const bool keeps_states_;
-  bool in_step_ = false;  ///< the state before the present step is kept
-  double time_, before_;  ///< of the FMU, and of its state before the step [s]
+  bool in_step_ = false;    ///< an implicit step has begun and not ended
+  bool kept_ = false;       ///< the state before the last step is kept
+  std::int64_t step_ = -1;  ///< of the last exchange
+  double time_, before_;    ///< of the FMU, and of its state before the step [s]
 };
 
 }  // namespace mbcosim::peer

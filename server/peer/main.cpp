@@ -1,16 +1,19 @@
 /// mbcosim-peer: `mbcosim peer` hands over to it.
+#include <grpcpp/support/status_code_enum.h>
 #include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 
 #include "mbdyn/link.h"
+#include "peer/interrupt.h"
 #include "peer/options.h"
 
 namespace mbcosim::peer {
 namespace {
 
-constexpr int kDone = 0, kRefused = 4, kPeerLost = 5;
+constexpr int kDone = 0, kRefused = 4, kPeerLost = 5, kInterrupted = 130;
 
 /// Where a daemon of this user listens by default.
 std::string default_server() {
@@ -124,7 +127,10 @@ int run(int argc, char** argv) {
   add_addresses(*socket_app, texts);
   add_socket(*socket_app, socket);
   add_call(*socket_app, call);
-  app.footer("Exit codes: 0 the simulation is gone, 4 refused, 5 the code is missing or lost.");
+  app.footer(
+      "Exit codes: 0 the simulation is gone, 4 refused, 5 the code, the FMU or the daemon is "
+      "missing "
+      "or lost, 130 interrupted.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -150,13 +156,23 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace mbcosim::peer;
-  try {
-    return run(argc, argv);
-  } catch (const mbcosim::mbdyn::ChannelLost& lost) {
-    std::fprintf(stderr, "mbcosim peer: %s\n", lost.what());
-    return kPeerLost;
-  } catch (const std::exception& error) {
+  const Interrupt interrupt;
+  const auto complain = [](const std::exception& error, int code) {
+    if (Interrupt::seen()) return kInterrupted;
     std::fprintf(stderr, "mbcosim peer: %s\n", error.what());
-    return kRefused;
+    return code;
+  };
+  try {
+    const int code = run(argc, argv);
+    return Interrupt::seen() ? kInterrupted : code;
+  } catch (const mbcosim::mbdyn::ChannelLost& lost) {
+    return complain(lost, kPeerLost);
+  } catch (const Lost& lost) {
+    return complain(lost, kPeerLost);
+  } catch (const mbcosim::client::Error& error) {
+    const bool lost = error.code() == static_cast<int>(grpc::StatusCode::UNAVAILABLE);
+    return complain(error, lost ? kPeerLost : kRefused);
+  } catch (const std::exception& error) {
+    return complain(error, kRefused);
   }
 }

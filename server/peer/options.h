@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -36,13 +37,25 @@ struct SocketCall {
   bool global_reference_loads = false;  ///< those on the reference node are not in its frame
 };
 
-/// Each serves until the simulation is gone. Throw std::exception.
+/// The daemon or the FMU is lost. The text says why.
+class Lost : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Each serves until the simulation is gone or a signal comes (`Interrupt::seen`). Throw
+/// std::exception.
 void serve_fmu(const PeerCall& call, const FmuCall& fmu);
 void serve_socket(const PeerCall& call, const SocketCall& socket);
 
 /// The simulation, by what `call` says of the daemon.
 client::Server connect(const PeerCall& call);
 client::PeerOptions options_of(const PeerCall& call);
+/// The next exchange; false: the stream has ended. Throws Lost.
+bool next_exchange(client::Peer& peer, client::Motion& motion);
+/// Of a peer whose stream has ended. Throws Lost unless the simulation is gone in good order or a
+/// signal came.
+void require_good_end(client::Server& server, const PeerCall& call, const client::Peer& peer);
 /// A name for each number of these variables.
 std::vector<std::string> expanded(const client::Simulation& simulation,
                                   const std::vector<std::string>& variables);

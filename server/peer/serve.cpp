@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "peer/fmu_peer.h"
+#include "peer/interrupt.h"
 #include "peer/options.h"
 #include "peer/simulation_watch.h"
 
@@ -60,8 +61,30 @@ client::PeerOptions options_of(const PeerCall& call) {
   return options;
 }
 
+bool next_exchange(client::Peer& peer, client::Motion& motion) {
+  try {
+    return peer.next(motion);
+  } catch (const client::Error& error) {
+    if (Interrupt::seen() || error.reason() == "NO_SUCH_SIMULATION") return false;
+    throw Lost(std::string("the connection to the simulation is lost: ") + error.what());
+  }
+}
+
+void require_good_end(client::Server& server, const PeerCall& call, const client::Peer& peer) {
+  if (Interrupt::seen()) return;
+  try {
+    if (const auto error = peer.error()) throw *error;
+    (void)server.find(call.simulation);
+  } catch (const client::Error& error) {
+    if (error.reason() == "NO_SUCH_SIMULATION") return;
+    throw Lost(std::string("the connection to the simulation is lost: ") + error.what());
+  }
+  throw Lost("the connection to the simulation is lost: the daemon ended it");
+}
+
 void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
   const FmuArchive archive(fmu.file);
+  if (Interrupt::seen()) return;
   client::Server server = connect(call);
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
@@ -74,8 +97,8 @@ void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
     if (options.mode == Mode::port_default) options.mode = Mode::loose;
   }
   FmuPeer* running = nullptr;
-  options.step_ended = [&](bool accepted, std::int64_t, double) {
-    if (running) running->step_ended(accepted);
+  options.step_ended = [&](bool accepted, std::int64_t step, double) {
+    if (running) running->step_ended(accepted, step);
   };
   client::Peer peer = simulation.attach(call.port, options);
   const PortSignals signals{expanded(simulation, peer.layout().outputs),
@@ -92,13 +115,17 @@ void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
   std::fflush(stdout);
   const SimulationWatch watch(server, call.simulation, peer);
   client::Motion motion;
-  while (peer.next(motion)) {
+  while (next_exchange(peer, motion)) {
     try {
       peer.answer({.signals = host.exchange(motion)});
+    } catch (const Lost& lost) {
+      peer.fail(archive.name() + ": " + lost.what());
+      throw;
     } catch (const std::exception& e) {
       peer.fail(archive.name() + ": " + e.what());
     }
   }
+  require_good_end(server, call, peer);
 }
 
 }  // namespace mbcosim::peer

@@ -1,10 +1,13 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <sstream>
 #include <stdexcept>
 
 #include "mbdyn/link.h"
 #include "mbdyn/socket_wire.h"
 #include "mbdyn/stream_message.h"
+#include "peer/interrupt.h"
 #include "peer/options.h"
 #include "peer/simulation_watch.h"
 
@@ -131,6 +134,38 @@ client::Loads loads_of(const LoadsForm& as, const mbdyn::ForceLoads& from) {
   return loads;
 }
 
+/// Looks whether the simulation goes back across steps, which no code of these protocols can be
+/// told. A step that is repeated, and one that is iterated, is none of that.
+class Progress {
+ public:
+  /// Throws ChannelLost.
+  void check(const client::Motion& motion) {
+    const bool before = motion.step < step_;
+    const bool again = ended_ && motion.iteration > 0 && motion.step == step_ &&
+                       motion.time <= time_ + kRounding * std::max(1.0, std::abs(time_));
+    if (before || again) {
+      std::ostringstream text;
+      text << "the simulation went back to t = " << motion.time
+           << ", which the code cannot be told; attach it anew";
+      throw mbdyn::ChannelLost(text.str());
+    }
+    step_ = motion.step;
+    time_ = motion.time;
+    ended_ = false;
+  }
+  /// An implicit step has ended: accepted, or to be redone from the end of step `step`.
+  void step_ended(bool accepted, std::int64_t step) {
+    ended_ = accepted;
+    if (!accepted) step_ = std::min(step_, step);
+  }
+
+ private:
+  static constexpr double kRounding = 1e-9;
+  std::int64_t step_ = -1;
+  double time_ = 0;     ///< [s]
+  bool ended_ = false;  ///< the last exchange was that of an implicit step that was accepted
+};
+
 /// Answers of a code to the exchanges of a port. In an implicit step the code is asked until it is
 /// done; its last loads then serve the rest of the step.
 class SocketAnswers {
@@ -191,10 +226,11 @@ std::vector<std::unique_ptr<mbdyn::Link>> open_links(const SocketCall& call,
 
 /// Waits for an exchange and answers it; false: there are no more. A lost code fails the step.
 template <class Answer>
-bool answer_next(client::Peer& peer, Answer&& answer) {
+bool answer_next(client::Peer& peer, Progress& progress, Answer&& answer) {
   client::Motion motion;
-  if (!peer.next(motion)) return false;
+  if (!next_exchange(peer, motion)) return false;
   try {
+    progress.check(motion);
     peer.answer(answer(motion));
   } catch (const mbdyn::ChannelLost& lost) {
     peer.fail(lost.what());
@@ -222,9 +258,9 @@ std::vector<double> receive_inputs(mbdyn::Link& link, std::size_t count) {
 
 /// At each exchange the outputs are sent, if there are any, then the inputs are read, if there are
 /// any: over one link, or over two.
-void serve_streams(const PeerCall& call, client::Peer& peer, std::size_t inputs,
+void serve_streams(const PeerCall& call, client::Peer& peer, std::size_t inputs, Progress& progress,
                    const std::vector<std::unique_ptr<mbdyn::Link>>& links) {
-  while (answer_next(peer, [&](const client::Motion& motion) {
+  while (answer_next(peer, progress, [&](const client::Motion& motion) {
     if (motion.iteration > 0)
       throw mbdyn::ChannelLost("streams know no iterations: port \"" + call.port +
                                "\" needs --mode loose or staggered");
@@ -235,6 +271,22 @@ void serve_streams(const PeerCall& call, client::Peer& peer, std::size_t inputs,
     return loads;
   })) {
   }
+}
+
+/// At the end, good or bad, the code gets 5. False: it was the code's.
+bool serve_forces(client::Peer& peer, Progress& progress, mbdyn::SocketWire& wire,
+                  SocketAnswers& answers, std::chrono::milliseconds farewell) {
+  try {
+    while (!answers.ended() && answer_next(peer, progress, [&](const client::Motion& motion) {
+      return answers.answer(motion);
+    })) {
+    }
+  } catch (...) {
+    wire.end(mbdyn::Clock::now() + farewell);
+    throw;
+  }
+  wire.end(mbdyn::Clock::now() + farewell);
+  return !answers.ended();
 }
 
 bool has_reference(const client::Simulation& simulation, const std::string& port) {
@@ -248,7 +300,8 @@ bool has_reference(const client::Simulation& simulation, const std::string& port
 
 void serve_socket(const PeerCall& call, const SocketCall& socket) {
   const mbdyn::Patience patience{
-      .time = std::chrono::milliseconds(static_cast<long long>(1000 * call.timeout))};
+      .time = std::chrono::milliseconds(static_cast<long long>(1000 * call.timeout)),
+      .cancelled = Interrupt::seen};
   client::Server server = connect(call);
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
@@ -256,13 +309,18 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
   options.following_loads = has_reference(simulation, call.port);
   if (options.following_loads) options.frame = client::Frame::reference;
   options.global_reference_loads = socket.global_reference_loads;
+  Progress progress;
+  options.step_ended = [&](bool accepted, std::int64_t step, double) {
+    progress.step_ended(accepted, step);
+  };
   std::vector<std::unique_ptr<mbdyn::Link>> links = open_links(socket, patience);
   client::Peer peer = simulation.attach(call.port, options);
   const SimulationWatch watch(server, call.simulation, peer);
   if (is_signal_port(peer.layout())) {
     if (options.mode == client::Mode::tight || options.mode == client::Mode::window)
       throw std::runtime_error("streams know no iterations: give --mode loose or staggered");
-    return serve_streams(call, peer, expanded(simulation, peer.layout().inputs).size(), links);
+    serve_streams(call, peer, expanded(simulation, peer.layout().inputs).size(), progress, links);
+    return require_good_end(server, call, peer);
   }
   if (links.size() > 1)
     throw std::runtime_error("inputs of their own link are those of a signal port; \"" + call.port +
@@ -270,10 +328,8 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
   const Form form = form_of(peer.layout(), socket);
   mbdyn::SocketWire wire(std::move(links[0]), form, socket.address.create);
   SocketAnswers answers(wire, {form, peer.layout().reference_loads});
-  while (!answers.ended() &&
-         answer_next(peer, [&](const client::Motion& motion) { return answers.answer(motion); })) {
-  }
-  wire.end(mbdyn::Clock::now() + patience.farewell);
+  if (serve_forces(peer, progress, wire, answers, patience.farewell))
+    require_good_end(server, call, peer);
 }
 
 }  // namespace mbcosim::peer

@@ -6,37 +6,50 @@
 #include <thread>
 
 #include "client/mbcosim_client.h"
+#include "peer/interrupt.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::peer {
 
-/// Ends a peer when its simulation is gone, which an idle stream does not tell.
+/// Ends a peer when its simulation is gone, which an idle stream does not tell, or at a signal.
 class SimulationWatch {
  public:
   SimulationWatch(client::Server& server, const std::string& name, client::Peer& peer)
-      : simulation_(server.find(name)), peer_(peer), thread_([this] { run(); }) {}
+      : simulation_(server.find(name)),
+        peer_(peer),
+        asking_([this] { ask(); }),
+        listening_([this] { listen(); }) {}
   ~SimulationWatch() {
     stop_.stop();
-    thread_.join();
+    asking_.join();
+    listening_.join();
   }
   SimulationWatch(const SimulationWatch&) = delete;
   SimulationWatch& operator=(const SimulationWatch&) = delete;
 
  private:
-  void run() {
+  void ask() {
+    constexpr int kTooLate = 4;  // DEADLINE_EXCEEDED: a long step is no end
     while (!stop_.stopped_within(std::chrono::seconds(1))) {
       try {
         (void)simulation_.read("time");
+      } catch (const client::Error& error) {
+        if (error.code() != kTooLate) return peer_.interrupt();
       } catch (const std::exception&) {
         return peer_.interrupt();
       }
     }
   }
+  // Apart from the other, whose call may take long.
+  void listen() {
+    while (!stop_.stopped_within(std::chrono::milliseconds(100)))
+      if (Interrupt::seen()) return peer_.interrupt();
+  }
 
   client::Simulation simulation_;
   client::Peer& peer_;
   server::StopSignal stop_;
-  std::thread thread_;
+  std::thread asking_, listening_;
 };
 
 }  // namespace mbcosim::peer

@@ -69,7 +69,8 @@ struct Made {
 };
 
 /// A simulation whose creator vanished before it learned the name: nobody would ever delete it. So
-/// what the call has made goes with the call, and half an upload leaves nothing behind.
+/// what the call has made goes with the call, and half an upload leaves nothing behind; only what a
+/// repeat of the request was given stays.
 class Fresh {
  public:
   explicit Fresh(const Parts& parts) : parts_(parts) {}

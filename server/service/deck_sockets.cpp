@@ -134,15 +134,15 @@ std::unique_ptr<DeckSockets> DeckSocketFolder::open(Simulation& simulation,
   if (channels.empty())
     throw Refusal(v1::REASON_BAD_ARGUMENT, "`deck_sockets`: the deck names no socket");
   const Waiting waiting(*this);
-  return std::unique_ptr<DeckSockets>(
-      new DeckSockets(*this, simulation, channels, std::move(patience), token));
+  return std::unique_ptr<DeckSockets>(new DeckSockets(
+      *this, simulation, channels, std::move(patience), options.padded_labels(), token));
 }
 
 // ------------------------------------------------------------------ those of one simulation
 
 DeckSockets::DeckSockets(DeckSocketFolder& folder, Simulation& simulation,
                          const std::vector<DeckChannel>& channels, mbdyn::Patience patience,
-                         const CancelToken& token)
+                         bool pads_labels, const CancelToken& token)
     : folder_(folder),
       simulation_(simulation),
       share_(std::make_unique<DeckSocketFolder::Share>(folder, static_cast<int>(channels.size()))) {
@@ -156,8 +156,9 @@ DeckSockets::DeckSockets(DeckSocketFolder& folder, Simulation& simulation,
   std::vector<const DeckChannel*> all;
   for (const DeckChannel& channel : channels) all.push_back(&channel);
   try {
-    guarded(token,
-            [&] { channels_ = std::make_unique<mbdyn::Channels>(all, simulation, patience); });
+    guarded(token, [&] {
+      channels_ = std::make_unique<mbdyn::Channels>(all, simulation, patience, pads_labels);
+    });
   } catch (const PeerLost& lost) {
     throw Refusal(token.cancelled() ? v1::REASON_CANCELLED : v1::REASON_PEER_LOST, lost.text);
   }

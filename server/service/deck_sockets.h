@@ -64,7 +64,7 @@ class DeckSockets {
  private:
   friend class DeckSocketFolder;
   DeckSockets(DeckSocketFolder& folder, Simulation& simulation,
-              const std::vector<DeckChannel>& channels, mbdyn::Patience patience,
+              const std::vector<DeckChannel>& channels, mbdyn::Patience patience, bool pads_labels,
               const CancelToken& token);
   template <class Work>
   void guarded(const CancelToken& token, Work&& work);

@@ -59,12 +59,20 @@ void Durability::start(const Parts& parts) {
     for (auto& [name, suspended] : suspended_) suspended.share = share_of(suspended);
   }
   if (!folder_) return;
+  {
+    Guard guard(removing_);
+    for (const StoredRemoval& removal : removals_)
+      parts.store.note_removal(removal.simulation, {removal.identity, removal.request_id});
+  }
   parts.store.set_keeper(
       {[this](const auto& name, const Caller& caller, Call& call) {
          return wake(name, caller, call);
        },
-       [this](const auto& name, const Caller& caller, const Call& call) {
-         return remove(name, caller, call);
+       [this](const auto& name, const Caller& caller, const Call& call, const auto& request_id) {
+         return remove(name, caller, call, request_id);
+       },
+       [this](const auto& name, const auto& request) {
+         store_removal(name, request.first, request.second);
        },
        [this](Session& session) { return suspend(session); },
        [this](const auto& name) { unsuspend(name); }, [this](Session& session) { forget(session); },
@@ -96,16 +104,15 @@ std::string Durability::new_name() const {
 // ------------------------------------------------------------------ what is in the folder
 
 void Durability::read_folder() {
+  read_removals();
   for (const std::string& id : folder_->list()) {
     try {
-      if (folder_->is_unfinished(id)) {
-        spdlog::info("state folder: {} was not yet made when the daemon ended; it is removed", id);
-        folder_->remove(id);
-        continue;
-      }
-      add_suspended(id, read_one(id));
+      read_simulation(id);
     } catch (const StorageError& error) {
-      spdlog::error("state folder: {}; put aside as {}", error.what(), folder_->put_aside(id));
+      spdlog::error("state folder: {}; {} stays as it is until the daemon is started anew",
+                    error.what(), id);
+      Guard guard(mutex_);
+      unreadable_[kSimulations + id] = error.what();
     }
   }
   Guard guard(mutex_);
@@ -113,10 +120,41 @@ void Durability::read_folder() {
     spdlog::info("state folder: {} simulations are suspended", suspended_.size());
 }
 
+// Throws StorageError: it is there, and not damaged as far as that can be told, or must stay where
+// it is.
+void Durability::read_simulation(const std::string& id) {
+  try {
+    if (!folder_->is_unfinished(id)) return add_suspended(id, read_one(id));
+    spdlog::info("state folder: {} was not yet made when the daemon ended; it is removed", id);
+    folder_->remove(id);
+  } catch (const DamagedFile& damage) {
+    const std::string aside = named(damage.what(), [&] { return folder_->put_aside(id); });
+    spdlog::error("state folder: {}; put aside as {}", damage.what(), aside);
+  }
+}
+
+// A deletion is noted before the simulation goes: of one that is still there nobody was told.
+void Durability::read_removals() try {
+  Guard guard(removing_);
+  try {
+    removals_ = folder_->read_removals();
+  } catch (const DamagedFile& damage) {
+    const std::string aside = named(damage.what(), [&] { return folder_->put_removals_aside(); });
+    spdlog::error("state folder: {}; put aside as {}", damage.what(), aside);
+  }
+  for (const std::string& id : folder_->list())
+    std::erase_if(removals_, [&](const StoredRemoval& removal) {
+      return removal.simulation == kSimulations + id;
+    });
+} catch (const StorageError& error) {
+  throw std::runtime_error("the state folder " + config_.state_dir +
+                           " cannot be used: " + error.what());
+}
+
 Suspended Durability::read_one(const std::string& id) const {
   const v1::CheckpointHead head = folder_->read_head(id);
   if (head.simulation() != kSimulations + id)
-    throw StorageError(id + "/model: it is of " + head.simulation());
+    throw DamagedFile(id + "/model: it is of " + head.simulation());
   Suspended found;
   found.owner = head.owner();
   found.request_id = head.options().request_id();
@@ -154,7 +192,7 @@ StoredPoint Durability::read_latest(const std::string& id) const {
   StoredPoint latest = folder_->read_point(id);
   v1::JournalEntry entry;
   folder_->read_journals(id, [&](StoredEntry stored) {
-    if (!entry.ParseFromString(stored.message)) throw StorageError("an entry cannot be understood");
+    if (!entry.ParseFromString(stored.message)) throw DamagedFile("an entry cannot be understood");
     if (entry.changes() <= latest.point.changes()) return;
     latest.point.set_changes(entry.changes());
     *latest.point.mutable_info() = entry.info();
@@ -207,8 +245,8 @@ void Durability::begin(Session& session, const KeptDeck& deck, const v1::CreateO
   *model.head.mutable_options() = options;
   *model.head.mutable_model_options() = deck.options;
   model.files = deck.files;
-  session.set_keeping(make_keeping(session.identity().id, options));
   store_new(*folder_, id, [&] {
+    session.set_keeping(make_keeping(session.identity().id, options));
     folder_->write_model(id, model);
     write(session);
   });
@@ -393,6 +431,21 @@ bool Durability::suspend(Session& session) {
 void Durability::unsuspend(const std::string& simulation) {
   Guard guard(mutex_);
   suspended_.erase(simulation);
+}
+
+// On the disk when it returns. A disk that is full keeps nobody from deleting: the repeat of such a
+// request is known until the daemon ends.
+void Durability::store_removal(const std::string& simulation, const std::string& identity,
+                               const std::string& request_id) {
+  if (request_id.empty()) return;
+  Guard guard(removing_);
+  removals_.push_back({identity, request_id, simulation});
+  if (removals_.size() > SessionStore::kRemovals) removals_.pop_front();
+  try {
+    folder_->write_removals(removals_);
+  } catch (const StorageError& error) {
+    spdlog::warn("state folder: the deletion of {} is not noted: {}", simulation, error.what());
+  }
 }
 
 void Durability::forget(Session& session) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <deque>
 #include <map>
 #include <memory>
 #include <set>
@@ -29,7 +30,8 @@ struct Suspended {
 /// Thread-safe. Without a state folder nothing is durable.
 class Durability {
  public:
-  /// Takes the folder and reads what is in it: what is damaged is put aside, and said so. Throws
+  /// Takes the folder and reads what is in it: what is damaged is put aside, what the system does
+  /// not let be read stays as it is until the next start, and both are said. Throws
   /// std::runtime_error when the folder cannot be used.
   Durability(const Config& config, EventLog& log, Metrics& metrics);
   ~Durability();
@@ -74,8 +76,9 @@ class Durability {
   /// Names and owners of all, those used last first.
   std::vector<std::pair<std::string, std::string>> by_last_use() const;
   /// False: none of that name that the caller may see. Waits while it is being brought back. Throws
-  /// NOT_GRANTED, CANCELLED when the call ends first.
-  bool remove(const std::string& simulation, const Caller& caller, const Call& call);
+  /// NOT_GRANTED, CANCELLED when the call ends first, STORAGE_FULL where it could not be read.
+  bool remove(const std::string& simulation, const Caller& caller, const Call& call,
+              const std::string& request_id);
   /// The simulation that the caller created with this request id; empty: none.
   std::string find_request(const std::string& owner, const std::string& request_id) const;
 
@@ -85,6 +88,9 @@ class Durability {
   bool suspend(Session& session);
   void unsuspend(const std::string& simulation) TS_EXCLUDES(mutex_);
   void forget(Session& session);
+  void store_removal(const std::string& simulation, const std::string& identity,
+                     const std::string& request_id) TS_EXCLUDES(removing_);
+  void check_readable(const std::string& simulation) const TS_REQUIRES(mutex_);
   StoredBundle read_stored(const std::string& id) const;
   SessionPtr revive(const std::string& simulation, const std::string& owner, Call& call);
   SessionPtr session_of(StoredModel& model, const StoredPoint& point, MemoryBudget& memory);
@@ -115,6 +121,8 @@ class Durability {
   void store(Session& session, CapturedPoint captured)
       TS_NO_THREAD_SAFETY_ANALYSIS;  // the call has the keeping's mutex
   void read_folder();
+  void read_simulation(const std::string& id) TS_EXCLUDES(mutex_);
+  void read_removals() TS_EXCLUDES(removing_);
   Suspended read_one(const std::string& id) const;
   void add_suspended(const std::string& id, Suspended found) TS_EXCLUDES(mutex_);
   MemoryBudget& memory_of(const Session& session) const;  ///< its owner's
@@ -132,9 +140,12 @@ class Durability {
   const Parts* parts_ = nullptr;
   mutable Mutex mutex_;
   Condition changed_;
-  std::map<std::string, Suspended> suspended_ TS_GUARDED_BY(mutex_);  ///< by name
+  std::map<std::string, Suspended> suspended_ TS_GUARDED_BY(mutex_);     ///< by name
+  std::map<std::string, std::string> unreadable_ TS_GUARDED_BY(mutex_);  ///< names, and why
   std::set<std::string> waking_ TS_GUARDED_BY(mutex_);
   bool stop_ TS_GUARDED_BY(mutex_) = false;
+  Mutex removing_;
+  std::deque<StoredRemoval> removals_ TS_GUARDED_BY(removing_);  ///< as they are in the folder
   std::thread thread_;
 };
 

@@ -19,6 +19,13 @@ bool Durability::may_see(const Suspended& suspended, const Caller& caller, Acces
   return Grants(suspended.owner, suspended.info.grants()).allow(caller, access);
 }
 
+void Durability::check_readable(const std::string& simulation) const {
+  const auto found = unreadable_.find(simulation);
+  if (found != unreadable_.end())
+    throw Refusal(v1::REASON_STORAGE_FULL,
+                  simulation + " could not be read when the server began: " + found->second);
+}
+
 bool Durability::knows(const std::string& simulation, const Caller& caller) const {
   Guard guard(mutex_);
   const auto found = suspended_.find(simulation);
@@ -56,17 +63,21 @@ std::vector<std::pair<std::string, std::string>> Durability::by_last_use() const
   return result;
 }
 
-bool Durability::remove(const std::string& simulation, const Caller& caller, const Call& call) {
+bool Durability::remove(const std::string& simulation, const Caller& caller, const Call& call,
+                        const std::string& request_id) {
   std::string owner;
   {
     Guard guard(mutex_);
+    check_readable(simulation);
     await_waking(simulation, call);
     const auto found = suspended_.find(simulation);
     if (found == suspended_.end() || !may_see(found->second, caller, Access::see)) return false;
     if (!may_see(found->second, caller, Access::own)) refuse_access(simulation, Access::own);
     owner = found->second.owner;
     suspended_.erase(found);
+    parts_->store.note_removal(simulation, {caller.identity, request_id});
   }
+  store_removal(simulation, caller.identity, request_id);
   folder_->remove(id_of(simulation));
   parts_->results.remove(simulation);
   log_.deleted({simulation, owner}, v1::DELETION_CAUSE_ASKED);
@@ -121,6 +132,7 @@ bool Durability::wake(const std::string& simulation, const Caller& caller, Call&
   std::string owner;
   {
     Guard guard(mutex_);
+    check_readable(simulation);
     await_waking(simulation, call);
     const auto found = suspended_.find(simulation);
     if (found == suspended_.end()) return parts_->store.has(simulation);
@@ -215,8 +227,10 @@ SessionPtr Durability::revive(const std::string& simulation, const std::string& 
   }
   warn_of_another_build(stored.model.head);
   return session;
+} catch (const DamagedFile& damage) {
+  throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be brought back: " + damage.what());
 } catch (const StorageError& error) {
-  throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be brought back: " + error.what());
+  refuse_storage(simulation + " cannot be brought back", error);
 }
 
 SessionPtr Durability::session_of(StoredModel& model, const StoredPoint& point,
@@ -273,8 +287,10 @@ namespace {
 OpenFiles open_stored(const StateFolder& folder, const std::string& simulation) {
   try {
     return OpenFiles(folder.files_of(id_of(simulation)));
+  } catch (const DamagedFile& damage) {
+    throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be read: " + damage.what());
   } catch (const StorageError& error) {
-    throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be read: " + error.what());
+    refuse_storage(simulation + " cannot be read", error);
   }
 }
 

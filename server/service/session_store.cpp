@@ -34,7 +34,10 @@ SessionStore::Place::Place(SessionStore& store, const std::string& request_id, s
     if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
     known_ = store_.find_request(request_);
     if (known_ && known_->identity().request_digest != digest) refuse_other_request(request_id);
-    if (known_) return;
+    if (known_) {
+      store_.repeated_.insert(known_->identity().id);
+      return;
+    }
   }
   store_.check_room(caller.identity);
   store_.places_.insert(caller.identity);
@@ -163,18 +166,18 @@ void SessionStore::end_removal(Removal removal, const std::string& id, const Cal
                                const Call& call, const std::string& request_id) {
   constexpr int kTries = 3;
   for (int tries = 0; !removal.session && !removal.repeated; ++tries) {
-    if (keeper_.remove && keeper_.remove(id, caller, call))
-      return note_removal(id, Request(caller.identity, request_id));
+    if (keeper_.remove && keeper_.remove(id, caller, call, request_id)) return;
     removal = begin_removal(id, caller, request_id);
     if (tries == kTries && !removal.session) refuse_unknown(id);
   }
   if (removal.repeated) return;
+  if (removal.session->keeping() && keeper_.note)
+    keeper_.note(id, Request(caller.identity, request_id));
   removal.session->discard_results();
   bury(removal.session, v1::DELETION_CAUSE_ASKED);
 }
 
 void SessionStore::note_removal(const std::string& id, const Request& request) {
-  constexpr std::size_t kRemovals = 1024;
   if (request.second.empty()) return;
   Guard guard(mutex_);
   removals_.emplace_back(request, id);
@@ -185,21 +188,26 @@ void SessionStore::discard(const std::string& id) {
   SessionPtr session;
   {
     Guard guard(mutex_);
-    const auto found = sessions_.find(id);
-    if (found != sessions_.end()) session = found->second;
+    if (repeated_.count(id) == 0) session = take_out_held(id);
   }
   if (!session) return;
   session->discard_results();
-  drop(id);
+  session->close();
+  bury(session, v1::DELETION_CAUSE_ASKED);
 }
 
 SessionPtr SessionStore::take_out(const std::string& id) {
   Guard guard(mutex_);
+  return take_out_held(id);
+}
+
+SessionPtr SessionStore::take_out_held(const std::string& id) {
   const auto found = sessions_.find(id);
   if (found == sessions_.end()) return nullptr;
   SessionPtr session = std::move(found->second);
   sessions_.erase(found);
   std::erase(order_, id);
+  repeated_.erase(id);
   return session;
 }
 

@@ -24,6 +24,10 @@ using SessionPtr = std::shared_ptr<Session>;
 /// Thread-safe. Closes sessions whose lease is over.
 class SessionStore {
  public:
+  using Request = std::pair<std::string, std::string>;  ///< identity and request id
+  /// So many deletions are known for who asks again.
+  static constexpr std::size_t kRemovals = 1024;
+
   SessionStore(const ServiceLimits& limits, EventLog& log);
   ~SessionStore();
 
@@ -43,7 +47,7 @@ class SessionStore {
 
    private:
     SessionStore& store_;
-    const std::pair<std::string, std::string> request_;  ///< owner and request id
+    const Request request_;
     SessionPtr known_;
   };
 
@@ -51,7 +55,11 @@ class SessionStore {
   struct Keeper {
     std::function<bool(const std::string& id, const Caller&, Call&)> wake;  ///< true: it is back
     /// True: it was there. Waits for one that is being brought back.
-    std::function<bool(const std::string& id, const Caller&, const Call&)> remove;
+    std::function<bool(const std::string& id, const Caller&, const Call&,
+                       const std::string& request_id)>
+        remove;
+    /// A session is about to be forgotten, as this request wants: its repeat is known from now on.
+    std::function<void(const std::string& id, const Request&)> note;
     std::function<bool(Session&)> suspend;                 ///< false: it must live on
     std::function<void(const std::string& id)> unsuspend;  ///< it lives on after all
     std::function<void(Session&)> forget;
@@ -86,21 +94,23 @@ class SessionStore {
   /// that is being brought back. Throws the same, and CANCELLED when the call ends first.
   void end_removal(Removal removal, const std::string& id, const Caller& caller, const Call& call,
                    const std::string& request_id);
-  /// The same for a session that nobody has seen.
+  /// The repeat of this deletion does nothing more; without a request id nothing is noted.
+  void note_removal(const std::string& id, const Request& request) TS_EXCLUDES(mutex_);
+  /// The same for a session whose creator did not learn its name. One that a repeat of the creation
+  /// was given stays.
   void discard(const std::string& id);
   /// Ends a session; nothing when it is gone already.
   void drop(const std::string& id, v1::DeletionCause cause = v1::DELETION_CAUSE_ASKED);
   void close_all();
 
  private:
-  using Request = std::pair<std::string, std::string>;
   SessionPtr find_request(const Request& request) const TS_REQUIRES(mutex_);
   bool was_removed(const std::string& id, const Request& request) const TS_REQUIRES(mutex_);
-  void note_removal(const std::string& id, const Request& request) TS_EXCLUDES(mutex_);
   void check_room(const std::string& owner) const TS_REQUIRES(mutex_);
   SessionPtr find(const std::string& id, const Caller& caller, Access access,
                   const std::string& port) const TS_REQUIRES(mutex_);
-  SessionPtr take_out(const std::string& id);
+  SessionPtr take_out(const std::string& id) TS_EXCLUDES(mutex_);
+  SessionPtr take_out_held(const std::string& id) TS_REQUIRES(mutex_);
   void bury(const SessionPtr& session, v1::DeletionCause cause);
   void park(const SessionPtr& session);
   void watch_leases();
@@ -114,6 +124,7 @@ class SessionStore {
   std::vector<std::string> order_ TS_GUARDED_BY(mutex_);
   std::multiset<std::string> places_ TS_GUARDED_BY(mutex_);  ///< owners of creations under way
   std::set<Request> creations_ TS_GUARDED_BY(mutex_);        ///< under way, with a request id
+  std::set<std::string> repeated_ TS_GUARDED_BY(mutex_);     ///< that a repeat of the creation has
   /// The last deletions that had a request id, and what they deleted.
   std::deque<std::pair<Request, std::string>> removals_ TS_GUARDED_BY(mutex_);
   bool stop_ TS_GUARDED_BY(mutex_) = false;

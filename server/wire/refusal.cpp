@@ -254,11 +254,11 @@ grpc::Status Refusal::status() const {
   v1::ErrorInfo info;
   info.set_reason(reason_name(reason_));
   info.set_domain("mbcosim.dev");
-  info.mutable_metadata()->insert(metadata_.begin(), metadata_.end());
+  for (const auto& [name, value] : metadata_) (*info.mutable_metadata())[name] = utf8(value);
   google::protobuf::Any* any = details.add_details();
   any->set_type_url(kErrorInfoUrl);
   info.SerializeToString(any->mutable_value());
-  if (reason_ == v1::REASON_BAD_ARGUMENT) add_bad_request(message_, &details);
+  if (reason_ == v1::REASON_BAD_ARGUMENT) add_bad_request(message, &details);
   if (const int after = retry_after(reason_)) add_retry_info(after, &details);
   if (failure_) details.add_details()->PackFrom(fitting(*failure_));
   const std::size_t taken = details.ByteSizeLong() + message.size();  // which is sent beside them

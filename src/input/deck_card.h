@@ -130,11 +130,11 @@ class DeckCard final : public Card, public BeamOutputDefault {
   /// Adds the form to an error about the card that has no hint.
   void add_remedy(Diagnostic& d) const;
   int drive_depth() const { return drive_depth_; }
-  std::string_view next_text();            ///< the next argument as it is written
-  void skip();                             ///< the next argument
-  FileDriverPtr file_driver_definition();  ///< `<type>, ...` of a `file` card
-  FluidPtr fluid_definition();             ///< `<type>, ...` of a `hydraulic fluid` card
-  void read_function_definition();         ///< `"<name>", <definition>` of a `scalar function` card
+  std::string_view next_text();                     ///< the next argument as it is written
+  void skip();                                      ///< the next argument
+  FileDriverPtr file_driver_definition(int label);  ///< `<type>, ...` of a `file` card
+  FluidPtr fluid_definition();                      ///< `<type>, ...` of a `hydraulic fluid` card
+  void read_function_definition();  ///< `"<name>", <definition>` of a `scalar function` card
   /// Refuses arguments that nobody read.
   void expect_end();
   /// Refuses a word of the language that this program does not serve: "`rotor` (induced velocity

@@ -190,7 +190,7 @@ void read_driver_card(DeckCard& card) {
   deck.count_entity(card, Kind::file_driver, label);
   card.set_subject("file driver " + std::to_string(label));
   card.optional_name();
-  FileDriverPtr driver = card.file_driver_definition();
+  FileDriverPtr driver = card.file_driver_definition(label);
   card.expect_end();
   deck.file_drivers[label] = {std::move(driver), card.head()};
 }

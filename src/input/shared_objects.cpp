@@ -375,7 +375,7 @@ FluidPtr DeckCard::fluid_definition() {
 
 FileDriverPtr DeckCard::file_driver() { return labelled(*this, deck_.file_drivers, "file driver"); }
 
-FileDriverPtr DeckCard::file_driver_definition() {
+FileDriverPtr DeckCard::file_driver_definition(int label) {
   need_argument("file driver type");
   const std::string w = peek_word();
   const auto reader = registry().file_drivers.find(w);
@@ -383,7 +383,7 @@ FileDriverPtr DeckCard::file_driver_definition() {
     fail_word("file driver type", w, registry().file_drivers, "file driver");
   skip();
   set_form("file driver", reader->first);
-  return reader->second(*this);
+  return reader->second(*this, label);
 }
 
 }  // namespace mbcosim

@@ -1,5 +1,7 @@
 #include "model/deck_channel.h"
 
+#include <sstream>
+
 #include "model/card.h"
 #include "model/model.h"
 
@@ -67,6 +69,27 @@ std::vector<const DeckChannel*> deck_channels(const Model& model) {
     if (const auto* channel = dynamic_cast<const DeckChannel*>(listener.get()))
       channels.push_back(channel);
   return channels;
+}
+
+std::string log_line(const DeckChannel& channel) {
+  const ChannelAddress& address = channel.address;
+  const bool is_output = channel.content == DeckChannel::Content::output;
+  std::ostringstream s;
+  s << (is_output ? "outputelement: " : "filedriver: ") << channel.label << " stream ";
+  if (address.kind == ChannelAddress::Kind::local)
+    s << "UNIX " << channel.port << ' ' << address.path;
+  else
+    s << "INET " << channel.port << ' ' << address.host << ' ' << address.port;
+  s << (address.kind == ChannelAddress::Kind::udp ? " udp " : " tcp ") << address.create << ' '
+    << channel.signal << ' ';
+  if (is_output)
+    s << channel.blocking << ' ' << channel.at_start << ' ' << channel.abort_if_broken << ' '
+      << channel.every;
+  else
+    s << !channel.blocking << ' ' << channel.every << ' ' << channel.at_start << ' '
+      << channel.timeout;
+  s << ' ' << channel.log_end;
+  return s.str();
 }
 
 ChannelAddress read_channel_address(Card& card, int default_port) {

@@ -63,6 +63,7 @@ struct DeckChannel : StepListener {
   enum class Content { structural, mapped, modal, output, input, text };
 
   Content content = Content::structural;
+  int label = 0;     ///< of the card
   std::string port;  ///< name of the port or stream
   std::string card;  ///< "force 5", "stream drive \"push\"": for messages
   ChannelAddress address;
@@ -76,6 +77,7 @@ struct DeckChannel : StepListener {
   int every = 1;         ///< steps between two messages
   bool at_start = true;  ///< `send first`, `receive first`
   bool blocking = true;  ///< false: what cannot be sent at once is dropped, what is late is missed
+  bool signal = true;    ///< as the card says: nothing here raises one
   bool abort_if_broken = false;
   double timeout = 0;                ///< of an input [s]; 0: none of its own
   std::vector<ChannelField> fields;  ///< empty: a float64 for each value
@@ -83,6 +85,7 @@ struct DeckChannel : StepListener {
   std::string echo;                  ///< file that keeps what crosses; empty: none
   int echo_precision = 6;
   double echo_shift = 0;  ///< added to the times of the file [s]
+  std::string log_end;    ///< of its line in the .log: what crosses
   // text
   std::string user, password;  ///< that a connection must give; empty: none
 
@@ -91,6 +94,9 @@ struct DeckChannel : StepListener {
 
 /// All of a model, in the order of the deck.
 std::vector<const DeckChannel*> deck_channels(const Model& model);
+
+/// Line of a stream in the .log.
+std::string log_line(const DeckChannel& channel);
 
 /// `create, … , {path | local}, "…" | port, …, host, "…"`, `socket type, …` or `grpc`.
 /// `default_port` 0: the card must say where; then a card that says nothing is refused.

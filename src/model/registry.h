@@ -25,7 +25,7 @@ class Registry {
   using FunctionReader = std::function<ScalarFunctionPtr(Card&)>;
   using FluidReader = std::function<FluidPtr(Card&)>;
   /// Reads what follows the type word of a `file` card of the drivers block.
-  using FileDriverReader = std::function<FileDriverPtr(Card&)>;
+  using FileDriverReader = std::function<FileDriverPtr(Card&, int label)>;
 
   /// A statement head of the elements block: `body`, `beam3`, `gravity`, or a family with types:
   /// `joint`, `force`.

@@ -2,6 +2,8 @@
 
 #include <charconv>
 
+#include "model/deck_channel.h"
+
 namespace mbcosim {
 
 namespace {
@@ -96,6 +98,8 @@ std::string model_log(const Model& model) {
                   '\n';
   for (std::size_t k = 0; k < model.structural.size(); ++k)
     node_line(s, model, static_cast<int>(k));
+  for (const DeckChannel* channel : deck_channels(model))
+    if (channel->content == DeckChannel::Content::input) s += log_line(*channel) + '\n';
   for (const ElementRef& e : model.elements) {
     const std::string line = e.set->log_line(model, e.index);
     if (!line.empty()) s += line + '\n';

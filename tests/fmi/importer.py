@@ -197,8 +197,14 @@ class Fmu3(Instance):
 
     def do_step(self, time, length):
         event, terminate, early, self.last_time = c.c_bool(), c.c_bool(), c.c_bool(), c.c_double()
-        return self.call("DoStep", c.c_double(time), c.c_double(length), c.c_bool(False), c.byref(event), c.byref(terminate),
-                         c.byref(early), c.byref(self.last_time))
+        status = self.call("DoStep", c.c_double(time), c.c_double(length), c.c_bool(False), c.byref(event), c.byref(terminate),
+                           c.byref(early), c.byref(self.last_time))
+        self.flags = event.value, terminate.value, early.value
+        return status
+
+    def end_of_step(self):
+        """Does the FMU ask for the end of the simulation, and the time that the last step reached."""
+        return self.flags[1], self.last_time.value
 
     def set_logging(self, on, categories=()):
         names = (c.c_char_p * max(1, len(categories)))(*[x.encode() for x in categories])
@@ -249,6 +255,13 @@ class Fmu2(Instance):
 
     def do_step(self, time, length):
         return self.call("DoStep", c.c_double(time), c.c_double(length), 0)
+
+    def end_of_step(self):
+        """Does the FMU ask for the end of the simulation, and the time that the last step reached."""
+        terminated, time = c.c_int(), c.c_double()
+        self.must("GetBooleanStatus", 3, c.byref(terminated))
+        self.must("GetRealStatus", 2, c.byref(time))
+        return terminated.value != 0, time.value
 
     def set_logging(self, on, categories=()):
         names = (c.c_char_p * max(1, len(categories)))(*[x.encode() for x in categories])

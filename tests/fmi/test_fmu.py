@@ -656,6 +656,94 @@ def test_a_step_that_fails_is_discarded_and_changes_nothing(ports, standard):
         assert instance[outputs] == other[outputs]
 
 
+# The last sample is 1 µs after 0.2 s: with steps of 0.04 s the last one that has a value ends at 0.2 s.
+ENDING = """begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: .04; tolerance: 1e-9; max iterations: 20; end: initial value;
+begin: control data; structural nodes: 1; rigid bodies: 1; forces: 1; file drivers: 1; end: control data;
+begin: nodes; structural: 1, dynamic, 0.,0.,0., eye, null, 0.,0.,1.; end: nodes;
+begin: drivers; file: 1, fixed step, count, 1, initial time, -1e-6, time step, .100001, bailout, upper, "ending.drv"; end: drivers;
+begin: elements; body: 1, 1, 2., null, diag, 1.,2.,3.; force: 1, absolute, 1, position, null, 1.,0.,0., file, 1, 1; end: elements;
+"""
+ENDS = {"2": (DISCARD, "logStatusDiscard"), "3": (OK, "logEvents")}  # a discarded step of FMI 3 would have changed nothing
+
+
+@pytest.fixture(scope="module")
+def ending(exported, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("deck")
+    (folder / "ending.mbd").write_text(ENDING)
+    (folder / "ending.drv").write_text("0.\n1.\n3.\n")
+    return lambda standard, *options: exported(str(folder / "ending.mbd"), standard, *options)
+
+
+def run_past_the_end(fmu, length):
+    """Values at the start, before the step in which the deck ends the run, and after it; the step is the first that does not reach its end."""
+    standard, outputs, values = fmu.version[0], fmu.names("output"), []
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        values.append(instance[outputs])
+        now = 0.0
+        while now + length < 0.2 + 1e-9:
+            assert instance.do_step(now, length) == OK
+            if standard == "3":
+                assert instance.flags == (False, False, False) and instance.last_time.value == now + length
+            now += length
+        values.append(instance[outputs])
+        instance.log.clear()
+        status, category = ENDS[standard]
+        assert instance.do_step(now, length) == status
+        assert instance.log == [(status, category, "instance: the deck ended the run at t = 0.2 s")]
+        terminate, time = instance.end_of_step()
+        assert terminate and time == pytest.approx(0.2, abs=1e-12) and instance["time"] == [time]
+        values.append(instance[outputs])
+        if standard == "3":  # an importer that goes on all the same
+            assert instance.do_step(time, length) == OK and instance.end_of_step() == (True, time)
+            assert instance.do_step(time + length, length) == ERROR and "stands at" in instance.log[-1][2]
+        else:
+            assert instance.call("Terminate") == OK
+    return values
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_a_deck_that_ends_the_run_asks_for_the_end_where_it_stands(ending, standard):
+    _, before, after = run_past_the_end(ending(standard), 0.04)
+    assert before == after  # no part of the step was possible
+    start, before, after_two = run_past_the_end(ending(standard), 0.12)
+    assert start != before != after_two and after_two == after  # two of its three steps were
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_states_lead_back_from_the_end_of_the_run_and_to_it(ending, standard):
+    fmu = ending(standard)
+    outputs = fmu.names("output")
+    with instance_of(fmu) as instance, instance_of(fmu) as other:
+        instance.initialize()
+        before = instance.get_state()
+        instance.do_step(0.0, 0.24)
+        reached, values = instance.end_of_step(), instance[outputs]
+        at_end = instance.get_state()
+        instance.set_state(before)
+        assert instance.do_step(0.0, 0.12) == OK
+        assert instance.do_step(0.12, 0.08) == OK and instance[outputs] == values
+        assert instance.do_step(0.2, 0.04) == ENDS[standard][0]
+        taken = other.deserialize(instance.serialize(at_end))
+        other.set_state(taken)
+        assert other[outputs] == values and reached[0]
+        if standard == "2":
+            assert other.end_of_step() == reached
+        other.free_state(taken)
+        for state in (before, at_end):
+            instance.free_state(state)
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_a_step_that_fails_asks_for_no_end(ports, standard):
+    with instance_of(ports(standard)) as instance:
+        instance.initialize()
+        push(instance)
+        assert instance.do_step(0.0, 0.1) == DISCARD
+        assert instance.end_of_step() == (False, 0.0)
+
+
 @pytest.mark.parametrize("standard", STANDARDS)
 def test_log_categories_can_be_switched(ports, standard):
     with instance_of(ports(standard)) as instance:
@@ -710,6 +798,98 @@ def test_adjoint_derivatives_are_the_transpose(ports):
         instance.initialize()
         seed = instance.derivative(["node.structural.1.XPP"], ["port.wing.loads.force"], [0.0, 1.0, 0.0], "GetAdjointDerivative", 6)
         assert seed == pytest.approx([0.0, 0.5, 0.0, 0.0, 0.5, 0.0], rel=1e-6, abs=1e-9)
+
+
+# A node that gives way to its forces at once (no mass), turned, and one that turns; the points of the port have arms.
+YIELDING = """begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: 1e-3; tolerance: 1e-10; max iterations: 30; end: initial value;
+begin: control data; structural nodes: 3; rigid bodies: 1; joints: 2; forces: 1; end: control data;
+begin: nodes; structural: 1, static, .1,.2,.3, euler, .3,.2,.1, null, null; structural: 2, dynamic, 1.,0.,0., euler, .2,-.4,.6, 1.,2.,3., .4,.5,.6;
+structural: 3, static, 0.,0.,0., eye, null, null; end: nodes;
+begin: elements; body: 1, 2, 2., null, diag, 1.,2.,3.;
+joint: 1, clamp, 3, node, node;
+joint: 2, deformable joint, 3, position, .1,.2,.3, orientation, euler, .3,.2,.1, 1, position, null,
+linear elastic generic, diag, 100.,200.,300.,40.,50.,60.;
+force: 1, external structural, grpc, port, "wing", coupling, loose, 2, 1, offset, .1,.5,-.2, 2, offset, .3,.2,.1; end: elements;
+"""
+MOTION = {"positions": 3, "orientations": 9, "velocities": 3, "angular_velocities": 3}  # numbers of a point
+
+
+@pytest.fixture(scope="module")
+def yielding(exported, tmp_path_factory):
+    path = tmp_path_factory.mktemp("deck") / "yielding.mbd"
+    path.write_text(YIELDING)
+    return lambda standard: exported(str(path), standard)
+
+
+def derivatives(instance, variable, force, seed):
+    """Of a variable by a force of the port, by the names that FMI 3 has."""
+    knowns = names_of(instance.archive, force)
+    return instance.derivative(names_of(instance.archive, variable), knowns, seed)
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_derivatives_of_motion_are_zero_where_those_of_the_node_are(ports, standard):
+    """A free body: forces change accelerations alone."""
+    with instance_of(ports(standard)) as instance:
+        instance.initialize()
+        assert instance.do_step(0.0, 0.01) == OK
+        seed = [0.5, -1.0, 2.0, 1.0, 4.0, -3.0]
+        for name, size in MOTION.items():
+            found = derivatives(instance, "port.wing." + name, "port.wing.loads.force", seed)
+            assert found == pytest.approx([0.0] * (2 * size), abs=1e-9), name
+        for name in ("X", "R", "XP", "Omega"):
+            found = derivatives(instance, "node.structural.1." + name, "port.wing.loads.force", seed)
+            assert found == pytest.approx([0.0] * len(found), abs=1e-9), name
+        assert max(map(abs, derivatives(instance, "node.structural.1.XPP", "port.wing.loads.force", seed))) > 0.1
+        assert instance.do_step(0.01, 0.01) == OK  # the instance goes on
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_derivatives_of_motion_are_those_of_the_nodes_and_their_arms(yielding, standard):
+    """Not of velocities: those of a node without mass depend on the rates of forces."""
+    offsets = [[.1, .5, -.2], [.3, .2, .1]]
+    with instance_of(yielding(standard)) as instance:
+        instance.initialize()
+        seed = [5.0, -10.0, 20.0, 1.0, 4.0, -3.0]
+        x, R = (derivatives(instance, "port.wing." + name, "port.wing.loads.force", seed) for name in ("positions", "orientations"))
+        for k, f in enumerate(offsets):
+            dX, dR = (derivatives(instance, f"node.structural.{k + 1}.{name}", "port.wing.loads.force", seed) for name in ("X", "R"))
+            arm = [sum(dR[3 * i + j] * f[j] for j in range(3)) for i in range(3)]
+            assert x[3 * k:3 * k + 3] == pytest.approx([a + b for a, b in zip(dX, arm)], rel=1e-9, abs=1e-12)
+            assert R[9 * k:9 * k + 9] == pytest.approx(dR, rel=1e-9, abs=1e-12)
+        assert max(map(abs, x[:3])) > 1e-3  # the massless node gives way at once
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_derivatives_of_positions_are_those_of_steps_with_two_forces(yielding, standard):
+    fmu, step, seed = yielding(standard), 1e-3, [5.0, -10.0, 20.0, 1.0, 4.0, -3.0]
+    positions_of, forces = names_of(fmu, "port.wing.positions"), names_of(fmu, "port.wing.loads.force")
+
+    def after(factor):
+        """Where the massless node stands after a step with these forces; the step is so short that the other one hardly moves."""
+        with instance_of(fmu) as instance:
+            instance.initialize()
+            numbers = [factor * x for x in seed]
+            for name in forces:
+                instance[name] = [numbers.pop(0) for _ in range(fmu.sizes[name])]
+            assert instance.do_step(0.0, 1e-3) == OK, instance.log
+            return instance[positions_of][:3]
+
+    with instance_of(fmu) as instance:
+        instance.initialize()
+        expected = derivatives(instance, "port.wing.positions", "port.wing.loads.force", seed)[:3]
+    found = [(a - b) / (2 * step) for a, b in zip(after(step), after(-step))]
+    assert found == pytest.approx(expected, rel=1e-4, abs=1e-7) and max(map(abs, found)) > 1e-3
+
+
+def test_adjoint_derivatives_of_motion_are_the_transpose(yielding):
+    with instance_of(yielding("3")) as instance:
+        instance.initialize()
+        outputs, forces, unit = ["port.wing.positions"], ["port.wing.loads.force"], [[float(i == k) for i in range(6)] for k in range(6)]
+        D = [instance.derivative(outputs, forces, column) for column in unit]
+        transposed = [instance.derivative(outputs, forces, row, "GetAdjointDerivative", 6) for row in unit]
+        assert D == [[row[k] for row in transposed] for k in range(6)] and max(map(abs, D[0])) > 1e-3
 
 
 def test_points_of_a_port_move_with_their_node(ports):

@@ -1,6 +1,7 @@
 """`mbcosim peer`: FMUs and codes that speak MBDyn's protocol as peers of a daemon's simulation."""
 import os
 import shutil
+import signal
 import socket
 import struct
 import subprocess
@@ -50,9 +51,9 @@ def fmus(tmp_path_factory):
 
 
 class PeerProgram:
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, **options):
         self.process = subprocess.Popen([os.path.join(BIN, "mbcosim"), "peer", *arguments], stdout=subprocess.PIPE,
-                                        stderr=subprocess.PIPE, text=True)
+                                        stderr=subprocess.PIPE, text=True, **options)
 
     def first_line(self):
         return self.process.stdout.readline()
@@ -66,8 +67,8 @@ class PeerProgram:
 def program():
     programs = []
 
-    def start(*arguments):
-        programs.append(PeerProgram(*arguments))
+    def start(*arguments, **options):
+        programs.append(PeerProgram(*arguments, **options))
         return programs[-1]
 
     yield start
@@ -201,18 +202,102 @@ def test_arrays_that_do_not_fit_are_refused(start_daemon, program, fmus):  # noq
         assert 'the dimensions of its variable "us" are not from 1 to a million' in told(wrong, f"us={SENT}")
 
 
-def test_an_fmu_that_discards_a_step_fails_it(start_daemon, program, fmus):  # noqa: F811
-    daemon = start_daemon()
-    with daemon.connect() as server, server.load(CART, ports=[mbcosim.signal_port("control", outputs=["node.structural.1.load"],
-                                                                                  inputs=["stream.force"])]) as cart:
-        peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", "loose",
+LOADED = mbcosim.signal_port("control", outputs=["node.structural.1.load"], inputs=["stream.force"])
+
+
+def fail_once(daemon, program, path, after):
+    """`after(cart)` once the FMU has discarded a step; returns the program."""
+    with daemon.connect() as server, server.load(CART, ports=[LOADED]) as cart:
+        peer = program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", "loose",
                        "--map", "u=node.structural.1.load[3]", "--map", "y=stream.force")
         assert "attached" in peer.first_line()
         assert cart.step(1).outcome == "ACCEPTED"
         cart["node.structural.1.load"] = [0, 0, 2e6, 0, 0, 0]
         with pytest.raises(mbcosim.errors.StepFailed, match="the FMU discards the step"):
             cart.step(1)
-    assert peer.finish() == 0
+        after(cart, peer)
+    return peer
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_an_fmu_that_discards_a_step_fails_it_and_goes_on_from_its_state(start_daemon, program, fmus, version):  # noqa: F811
+    def step_again(cart, _):
+        before = np.ravel(cart["time"])[0]
+        cart["node.structural.1.load"] = [0, 0, 3.0, 0, 0, 0]
+        result = cart.step(1, outputs=["stream.force"])
+        assert result.outcome == "ACCEPTED"
+        assert np.ravel(result.values["stream.force"])[0] == pytest.approx(3.0 * (result.time - before), rel=1e-6)
+
+    peer = fail_once(start_daemon(), program, fmus(version), step_again)
+    assert peer.finish() == 0, peer.errors
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_an_fmu_that_discards_a_step_and_keeps_no_states_ends(start_daemon, program, fmus, version):  # noqa: F811
+    def look(_, peer):
+        assert peer.finish() == 5
+        assert "the FMU discards the step; it keeps no states and cannot go on" in peer.errors
+
+    fail_once(start_daemon(), program, fmus(version, "false"), look)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("mode, state", [("loose", "true"), ("loose", "false"), ("staggered", "true"), ("tight", "true"), ("window", "true")])
+@pytest.mark.parametrize("reset", [False, True])
+def test_an_fmu_that_cannot_follow_a_simulation_back_ends(start_daemon, program, fmus, version, mode, state, reset):  # noqa: F811
+    daemon = start_daemon()
+    with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
+        peer = program("fmu", fmus(version, state), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
+                       "--map", f"u={SENT}[1]", "--map", "y=stream.force")
+        assert "attached" in peer.first_line()
+        assert cart.step(2).outcome == "ACCEPTED"
+        snapshot = cart.snapshot()
+        assert cart.step(4).outcome == "ACCEPTED"
+        cart.reset() if reset else cart.restore(snapshot)
+        with pytest.raises(mbcosim.errors.StepFailed, match="the simulation went back to t = .*keeps no state of it; attach it anew"):
+            cart.step(1)
+        assert peer.finish() == 5
+        assert "the simulation went back to t = " in peer.errors and ", the FMU stands at t = " in peer.errors
+
+
+@pytest.mark.parametrize("mode", ["loose", "tight"])
+def test_an_fmu_follows_a_simulation_back_by_the_one_step_that_it_keeps(start_daemon, program, fmus, mode):  # noqa: F811
+    daemon = start_daemon()
+    with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
+        peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
+                       "--map", f"u={SENT}[1]", "--map", "y=stream.force")
+        assert "attached" in peer.first_line()
+        cart.step(4)
+        snapshot = cart.snapshot()
+        first, = np.ravel(cart.step(1, outputs=["stream.force"]).values["stream.force"])
+        cart.restore(snapshot)
+        second, = np.ravel(cart.step(1, outputs=["stream.force"]).values["stream.force"])
+        assert first != 0 and second == pytest.approx(first, rel=1e-6)
+    assert peer.finish() == 0, peer.errors
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_removes_the_folder_of_an_fmu(start_daemon, program, fmus, tmp_path, sent):  # noqa: F811
+    daemon = start_daemon()
+    with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
+        peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--map", f"u={SENT}[1]",
+                       "--map", "y=stream.force", env={**os.environ, "TMPDIR": str(tmp_path)})
+        assert "attached" in peer.first_line()
+        assert list(tmp_path.glob("mbcosim-fmu-*"))
+        peer.process.send_signal(sent)
+        assert peer.finish() == 130
+        assert not list(tmp_path.glob("mbcosim-fmu-*"))
+
+
+def test_a_lost_daemon_is_told(start_daemon, program, fmus):  # noqa: F811
+    daemon = start_daemon()
+    cart = daemon.connect().load(CART, ports=[signal_port()])
+    peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--map", f"u={SENT}[1]",
+                   "--map", "y=stream.force")
+    assert "attached" in peer.first_line()
+    daemon.kill()
+    assert peer.finish() == 5, peer.errors
+    assert "lost: " in peer.errors or "closed" in peer.errors  # it may still be looking at the port
 
 
 # ------------------------------------------------------------------ MBDyn's protocol

@@ -15,7 +15,7 @@ sys.path.insert(0, os.path.join(HERE, "..", "service"))
 sys.path.insert(0, HERE)
 from conftest import TIME_FACTOR, Daemon, start_daemon, stop  # noqa: E402,F401
 from importer import DISCARD, ERROR, OK, Failed, instance_of  # noqa: E402
-from test_fmu import BIN, MODELS, PORTS, STANDARDS, exported, fails, positions, symbols  # noqa: E402,F401
+from test_fmu import BIN, MODELS, PORTS, STANDARDS, ending, exported, fails, positions, run_past_the_end, symbols  # noqa: E402,F401
 
 INPUTS = ("--inputs", "stream.push,node.structural.1.load,node.parameter.*")
 
@@ -242,6 +242,13 @@ def test_steps_and_stop_times_after_the_final_time_are_refused(pushed, daemon, s
         if standard == "3":
             assert instance[remote.names("output")] == before
             assert instance.do_step(0.0, 0.01) == OK
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("length", [0.04, 0.12])
+def test_a_deck_that_ends_the_run_has_the_bits_of_the_engine_inside(ending, daemon, standard, length):  # noqa: F811
+    inside, remote = both(lambda _, *options: ending(*options), daemon, "", standard)
+    assert run_past_the_end(remote, length) == run_past_the_end(inside, length)
 
 
 @pytest.mark.parametrize("standard", STANDARDS)

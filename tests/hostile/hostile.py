@@ -143,7 +143,11 @@ def probe(program, pid, address, faults, stop):
     command = [os.path.join(program, "mbcosimd"), "--check", address, "--check-timeout", str(math.ceil(3 * FACTOR))]
     while not stop.wait(2):
         asked = time.monotonic()
-        result = subprocess.run(command, timeout=60 * FACTOR, stderr=subprocess.PIPE, text=True)
+        try:
+            result = subprocess.run(command, timeout=60 * FACTOR, stderr=subprocess.PIPE, text=True)
+        except subprocess.TimeoutExpired:
+            faults.append("the probe does not end in its time")
+            return
         failed = failed + 1 if result.returncode != 0 else 0
         if result.returncode != 0 and os.path.exists(f"/proc/{pid}/fd"):
             print(f"  probe, {asked - begin:.0f} s after the start, {time.monotonic() - asked:.1f} s long: {result.stderr[-500:].strip()} "
@@ -304,10 +308,10 @@ def judge(daemon, places, bystander, quiet, loud, before, peak, most, log):
         except grpc.RpcError as error:
             yield f"a new connection is not served: {error.code()}"
     still = attack(["slow"], places, 1, 600)
-    time.sleep(3 * FACTOR)
-    send(still, signal.SIGSTOP)
-    daemon.send_signal(signal.SIGTERM)
     try:
+        time.sleep(3 * FACTOR)
+        send(still, signal.SIGSTOP)
+        daemon.send_signal(signal.SIGTERM)
         code = daemon.wait((GRACE + 3) * FACTOR)
         if code != 0:
             yield f"the daemon ended with {code}"
@@ -315,7 +319,8 @@ def judge(daemon, places, bystander, quiet, loud, before, peak, most, log):
         daemon.kill()
         daemon.wait()
         yield "SIGTERM did not end the daemon within its grace, while a client of it stood still"
-    send(still, signal.SIGKILL)
+    finally:
+        send(still, signal.SIGKILL)
     yield from reports(log)
 
 

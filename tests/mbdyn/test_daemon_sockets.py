@@ -272,6 +272,32 @@ def test_a_code_that_does_not_fit_is_told(server, folder):
     assert code.end() == b"\5"
 
 
+@pytest.mark.parametrize("padded", [True, False])
+def test_codes_that_pad_labels_are_served_when_the_client_says_that_they_do(server, folder, padded):
+    text = force("labels, yes, orientation, orientation vector,", points="1", count=1)
+    head = struct.pack("<II", 1, 0)
+
+    def work(peer):
+        peer.sendall(b"\7" + struct.pack("<II", 0x112, 1))
+        messages = []
+        if receive(peer, 1) == b"\10":
+            while receive(peer, 1) != b"\5":
+                messages.append(receive(peer, len(head) + 96))
+                peer.sendall(b"\6" + head + LOADS[:24] + bytes(24))
+        return messages
+
+    code = Code(str(folder / "s"), work)
+    if padded:
+        with server.load_text(text, deck_sockets=True, padded_labels=True) as simulation:
+            simulation.step(2)
+        messages = code.end()
+        assert len(messages) == 3 and all(message.startswith(head) for message in messages)
+    else:
+        with pytest.raises(mbcosim.Error, match="or `padded_labels` in a daemon"):
+            server.load_text(text, deck_sockets=True)
+        assert code.end() == []
+
+
 def answers(replies):
     """A code that gives these answers, then stays silent."""
     def work(peer):

@@ -1,5 +1,6 @@
 """`mbcosim peer socket`: codes that speak MBDyn's protocols at the ports of a daemon's simulation."""
 import os
+import signal
 import struct
 import sys
 import threading
@@ -166,6 +167,89 @@ def test_a_code_moves_modes_as_a_python_peer_does(server, program, tmp_path, opt
         assert simulation.step(STEPS).outcome == "ACCEPTED"
         assert np.concatenate([simulation[name] for name in names]) == pytest.approx(expected, abs=1e-12)
     assert gateway.program.finish() == 0
+
+
+# ------------------------------------------------------------------ the end
+
+def ready(program, server, simulation, path, *options):  # noqa: F811
+    """A gateway at port "p" of one node without rotations, and its code."""
+    gateway = Gateway(program, server, simulation, "p", path, "--orientation", "none", *options)
+    code = connect(path)
+    shake(code, 0x2, 1)
+    wait_for(lambda: simulation.describe().ports[0].has_peer)
+    return gateway, code
+
+
+ONE = [mbcosim.structural_port("p", nodes=[1])]
+
+
+@pytest.mark.parametrize("mode", ["loose", "staggered", "tight"])
+@pytest.mark.parametrize("reset", [False, True])
+def test_a_simulation_that_goes_back_ends_the_code(server, program, tmp_path, mode, reset):  # noqa: F811
+    with server.load_text(TWO, ports=ONE) as simulation:
+        gateway, code = ready(program, server, simulation, str(tmp_path / "s"), "--mode", mode)
+        messages = []
+        talking = threading.Thread(target=lambda: messages.extend(speak(code, 48, lambda _: bytes(24), mode == "tight")))
+        talking.start()
+        assert simulation.step(1).outcome == "ACCEPTED"
+        snapshot = simulation.snapshot()
+        assert simulation.step(STEPS).outcome == "ACCEPTED"
+        simulation.reset() if reset else simulation.restore(snapshot)
+        with pytest.raises(mbcosim.StepFailed, match="the simulation went back to t = .*the code cannot be told"):
+            simulation.step()
+        talking.join(60 * TIME_FACTOR)
+        assert not talking.is_alive() and len(messages) > STEPS
+        assert gateway.program.finish() == 5 and "the simulation went back to t = " in gateway.program.errors
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("asked", [False, True])
+def test_at_a_signal_the_code_gets_the_end(server, program, tmp_path, sent, asked):  # noqa: F811
+    """Between steps, and while an answer is awaited."""
+    with server.load_text(TWO, ports=ONE) as simulation:
+        gateway, code = ready(program, server, simulation, str(tmp_path / "s"), "--mode", "loose")
+        failures = []
+
+        def step():
+            try:
+                simulation.step()
+            except mbcosim.StepFailed as failure:
+                failures.append(failure)
+
+        stepping = threading.Thread(target=step)
+        if asked:
+            stepping.start()
+            assert receive(code, 1) == b"\6" and len(receive(code, 48)) == 48
+        gateway.program.process.send_signal(sent)
+        assert receive(code, 1) == b"\5" and code.recv(1) == b""
+        code.close()
+        assert gateway.program.finish() == 130
+        if asked:
+            stepping.join(60 * TIME_FACTOR)
+            assert failures
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_at_a_signal_a_listener_removes_its_path(server, program, tmp_path, sent):  # noqa: F811
+    with server.load_text(TWO, ports=ONE) as simulation:
+        gateway = Gateway(program, server, simulation, "p", str(tmp_path / "s"))
+        assert "waiting for a code" in gateway.program.first_line() and os.path.exists(gateway.path)
+        gateway.program.process.send_signal(sent)
+        assert gateway.program.finish() == 130
+        assert not os.path.exists(gateway.path)
+
+
+def test_a_lost_daemon_is_told_and_ends_the_code(start_daemon, program, tmp_path):  # noqa: F811
+    daemon = start_daemon()
+    connection = daemon.connect()
+    connection.address = daemon.address
+    simulation = connection.load_text(TWO, ports=ONE)
+    gateway, code = ready(program, connection, simulation, str(tmp_path / "s"))
+    daemon.kill()
+    assert receive(code, 1) == b"\5"
+    code.close()
+    assert gateway.program.finish() == 5
+    assert "the connection to the simulation is lost: " in gateway.program.errors
 
 
 # ------------------------------------------------------------------ streams

@@ -3,6 +3,7 @@
 
 * The files that the Dockerfile copies, less what .dockerignore holds back, suffice to configure the build.
 * Every library that the daemon needs is in a package of the list for the final stage, or one that such a package pulls in.
+* Every daemon in a container has a limit of memory: it budgets a part of that, and of the whole host's where there is none.
 * The daemon knows the options and variables that the Dockerfile, the compose files, the Kubernetes manifests and the systemd unit give it.
 """
 import fnmatch
@@ -97,6 +98,25 @@ def invocations(root):
         yield "mbcosimd.service", shlex.split(line.replace("...", "/secrets/any"))[1:], {}
 
 
+def unlimited(root):
+    """Names of the daemons in containers that have no limit of memory."""
+    docker = root / "docker"
+    for file in sorted(docker.glob("compose*.yaml")):
+        for name, service in yaml.safe_load(file.read_text())["services"].items():
+            limits = service.get("deploy", {}).get("resources", {}).get("limits", {})
+            if service["image"] == "mbcosim" and "memory" not in limits and "MBCOSIMD_LIMIT_MEMORY" not in service.get("environment", {}):
+                yield f"{file.name}, {name}"
+    for part in yaml.safe_load_all((docker / "kubernetes.yaml").read_text()):
+        for container in part["spec"].get("template", {}).get("spec", {}).get("containers", []):
+            if "memory" not in container.get("resources", {}).get("limits", {}):
+                yield f"kubernetes.yaml, {container['name']}"
+
+
+def memory(root):
+    if found := list(unlimited(root)):
+        sys.exit(f"without a limit of memory: {'; '.join(found)}")
+
+
 def there(value, folder):
     """A path of the container, as one that exists in `folder`; a name without an ending is a folder's."""
     if not value.startswith("/"):
@@ -124,6 +144,7 @@ def options(root, daemon):
 
 
 if __name__ == "__main__":
+    memory(pathlib.Path(sys.argv[1]))
     options(pathlib.Path(sys.argv[1]), sys.argv[2])
     libraries(pathlib.Path(sys.argv[1]), sys.argv[2])
     configure(pathlib.Path(sys.argv[1]))

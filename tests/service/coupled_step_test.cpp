@@ -74,6 +74,23 @@ TEST_F(Coupled, AnExplicitPeerIsAskedBeforeTheStepThatItsAnswerMoves) {
   EXPECT_EQ(peer.exchanges, 1);
 }
 
+TEST_F(Coupled, WhatAPeerOfAnEarlierProcessAnsweredStaysInForceUntilOneComes) {
+  Agreement linear;
+  linear.hold = v1::INPUT_HOLD_LINEAR;
+  {
+    DirectPeer peer(port_, linear, pull_back);
+    take_step();
+    take_step();
+  }
+  const auto before = coupler_.memory();
+  ASSERT_EQ(before[0].answers_size(), 2);
+  Coupler later(spring_port(), *simulation_, 1000ms);
+  later.take_over(before);
+  later.prepare(*simulation_, .125, false);  // nobody has come
+  const auto after = later.memory();
+  EXPECT_EQ(after[0].SerializeAsString(), before[0].SerializeAsString());
+}
+
 TEST_F(Coupled, ATightPeerIsAskedWithinTheStepWhileOthersHaveTheSlot) {
   DirectPeer peer(port_, v1::COUPLING_MODE_TIGHT,
                   [&](const v1::ServerExchange& motion, v1::PeerExchange* answer) {

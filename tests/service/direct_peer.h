@@ -13,9 +13,9 @@ class DirectPeer : public PeerLink {
  public:
   using Answer = std::function<void(const v1::ServerExchange&, v1::PeerExchange*)>;
   DirectPeer(Port& port, v1::CouplingMode mode, Answer answer)
+      : DirectPeer(port, agreement_of(mode), std::move(answer)) {}
+  DirectPeer(Port& port, const Agreement& agreement, Answer answer)
       : port_(port), answer_(std::move(answer)) {
-    Agreement agreement;
-    agreement.mode = mode;
     port_.reserve(agreement);
     port_.attach(this, {});
   }
@@ -38,6 +38,12 @@ class DirectPeer : public PeerLink {
   int exchanges = 0, accepted = 0, rejected = 0;  ///< messages so far
 
  private:
+  static Agreement agreement_of(v1::CouplingMode mode) {
+    Agreement agreement;
+    agreement.mode = mode;
+    return agreement;
+  }
+
   Port& port_;
   const Answer answer_;
 };

@@ -119,7 +119,7 @@ TEST_F(JournalTest, EveryFlippedBitIsFoundAndNamed) {
     try {
       messages();
       ADD_FAILURE() << "byte " << at;
-    } catch (const StorageError& error) {
+    } catch (const DamagedFile& error) {
       EXPECT_EQ(std::string(error.what()).substr(0, 20), "id/journal-1: record") << error.what();
     }
   }
@@ -154,6 +154,20 @@ TEST_F(JournalTest, TheLimitOfTheFolderHolds) {
   EXPECT_THROW(journal.append("large", std::string(2 << 20, 'x')), StorageError);
   append(journal, "1");
   EXPECT_EQ(messages(), Messages{"1"});
+}
+
+TEST_F(JournalTest, DeletionsComeBackInTheirOrderAndCountNothing) {
+  const std::int64_t before = folder_.used();
+  EXPECT_TRUE(folder_.read_removals().empty());
+  folder_.write_removals({{"given", "up", "simulations/0"}});
+  folder_.write_removals({{"an identity", "a", "simulations/1"}, {"", std::string(128, '\0'), ""}});
+  const std::deque<StoredRemoval> found = folder_.read_removals();
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].identity, "an identity");
+  EXPECT_EQ(found[0].request_id, "a");
+  EXPECT_EQ(found[0].simulation, "simulations/1");
+  EXPECT_EQ(found[1].request_id, std::string(128, '\0'));
+  EXPECT_EQ(folder_.used(), before);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ std::string two_files() {
 
 using Found = std::vector<std::pair<RecordKind, std::string>>;
 
-/// Reads in pieces of `piece` bytes. Throws StorageError.
+/// Reads in pieces of `piece` bytes. Throws DamagedFile.
 Found read(const std::string& bytes, std::size_t piece = 1 << 20) {
   Found found;
   RecordReader reader(1 << 20, [&](RecordKind kind, std::string content) {
@@ -55,7 +55,7 @@ TEST(Records, TellEveryFlippedBit) {
   for (std::size_t at = 0; at < bytes.size(); ++at) {
     std::string damaged = bytes;
     damaged[at] ^= static_cast<char>(1 << (at % 8));
-    EXPECT_THROW(read(damaged), StorageError) << "byte " << at;
+    EXPECT_THROW(read(damaged), DamagedFile) << "byte " << at;
   }
 }
 
@@ -64,7 +64,7 @@ TEST(Records, TellEveryCut) {
   EXPECT_EQ(read(first).size(), 4u) << "the first file is whole";
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     if (size == first.size()) continue;
-    EXPECT_THROW(read(bytes.substr(0, size)), StorageError) << size;
+    EXPECT_THROW(read(bytes.substr(0, size)), DamagedFile) << size;
   }
 }
 
@@ -138,6 +138,24 @@ TEST_F(Atomic, WhatIsNoFileIsToldAndNotWaitedFor) {
   fs::remove(path);
   fs::create_directory(path);
   EXPECT_EQ(reason(), "it is no regular file");
+}
+
+TEST_F(Atomic, OnlyWhatIsStoredCanBeDamaged) {
+  const std::string path = folder_ + "/file";
+  const auto look = [&] { read_pieces(path, [](std::string_view) {}); };
+  EXPECT_THROW(look(), DamagedFile) << "it is missing";
+  fs::create_symlink(path, path);
+  try {
+    named("point", look);
+    FAIL();
+  } catch (const DamagedFile&) {
+    FAIL() << "the system does not let it be read";
+  } catch (const StorageError& error) {
+    EXPECT_STREQ(error.what(), "point: it cannot be opened: Too many levels of symbolic links");
+  }
+  fs::remove(path);
+  fs::create_directory(path);
+  EXPECT_THROW(named("point", look), DamagedFile);
 }
 
 TEST_F(Atomic, AFullDiskIsTold) {

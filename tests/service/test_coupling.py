@@ -142,6 +142,29 @@ def test_loads_that_follow_a_node_turn_with_it_between_answers(server, frame):
     assert velocity(2e-3, False) == pytest.approx([force * (end - start), 0], abs=1e-6)
 
 
+def test_answers_of_another_form_are_not_kept(server):
+    """A peer that comes with another form is asked at once, whatever its `every`: what the one before it left means something else."""
+    port = [mbcosim.structural_port("jet", nodes=[1])]
+    with server.load_text(decks.body(spin="0., 0., 5."), ports=port) as simulation:
+        for options in ({"following_loads": True}, {}, {"following_loads": True}):
+            with simulation.couple("jet", lambda _: [[1.0, 0, 0]], frame="node", every=1000, **options) as peer:
+                simulation.step(3)
+                assert peer.exchanges == 1
+            wait_for(lambda: not simulation.describe().ports[0].has_peer)
+
+
+@pytest.mark.parametrize("policy, left", [("hold_last", 3.0), ("zero", 0.0)])
+def test_loads_that_follow_a_node_go_on_as_the_policy_says(server, policy, left):
+    port = [mbcosim.structural_port("jet", nodes=[1])]
+    with server.load_text(decks.body(spin="0., 0., 5."), ports=port) as simulation:
+        with simulation.couple("jet", lambda _: [[3.0, 0, 0]], frame="node", following_loads=True, policy=policy):
+            simulation.step(10)
+        wait_for(lambda: not simulation.describe().ports[0].has_peer)
+        simulation.step(10)
+        angle = 5.0 * simulation.time
+        assert simulation["node.structural.1.load"][:2] == pytest.approx(left * np.array([np.cos(angle), np.sin(angle)]), abs=1e-3)
+
+
 def test_loads_follow_only_in_the_frame_of_a_node(server):
     with oscillator(server) as simulation, pytest.raises(mbcosim.Error) as caught:
         simulation.couple("spring", spring, following_loads=True, global_reference_loads=True)

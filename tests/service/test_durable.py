@@ -1,7 +1,10 @@
 """Simulations that outlive the daemon: bit for bit from their last checkpoint, whatever happens in between."""
 import os
 import random
+import shutil
 import signal
+import socket
+import struct
 import subprocess
 import threading
 import time
@@ -10,6 +13,7 @@ import grpc
 import pytest
 
 import decks
+import http2
 import mbcosim
 from conftest import BIN, TIME_FACTOR, wait_for
 from mbcosim.v1 import events_pb2, simulations_pb2 as pb
@@ -164,6 +168,69 @@ def test_one_on_the_disk_is_deleted_once(start):
             server.attach(name).delete()
 
 
+def end(name):
+    return pb.DeleteSimulationRequest(simulation=name, request_id="end")
+
+
+@pytest.mark.parametrize("how", ["alive", "suspended"])
+@pytest.mark.parametrize("durability", ["checkpoint", "journal"])
+def test_a_deletion_is_done_once_across_restarts(start, folder, how, durability):
+    daemon = start()
+    with daemon.connect() as server:
+        name, other = (server.load_text(deck(), durability=durability).name for _ in range(2))
+        fleeting = server.load_text(deck(), durability="none").name
+        if how == "alive":
+            server.simulations.DeleteSimulation(end(name))
+        server.simulations.DeleteSimulation(pb.DeleteSimulationRequest(simulation=fleeting, request_id="fleeting"))
+    kill(daemon)
+    if how == "suspended":
+        daemon = start()
+        with daemon.connect() as server:
+            server.simulations.DeleteSimulation(end(name))
+        kill(daemon)
+    for _ in range(2):  # what was known at the start is kept for the next
+        daemon = start()
+        with daemon.connect() as server:
+            assert server.simulations.DeleteSimulation(end(name)) == pb.DeleteSimulationReply()
+            with pytest.raises(grpc.RpcError, match="another request"):
+                server.simulations.DeleteSimulation(end(other))
+            with pytest.raises(grpc.RpcError, match="no simulation is named"):
+                server.simulations.DeleteSimulation(pb.DeleteSimulationRequest(simulation=fleeting, request_id="fleeting"))
+            assert [info.name for info in server.list()] == [other]
+        kill(daemon)
+
+
+def test_a_deletion_that_a_kill_stopped_is_done_by_its_repeat(start, folder, tmp_path):
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(deck()).name
+        shutil.copytree(folder / name, tmp_path / "copy")
+        server.simulations.DeleteSimulation(end(name))
+    kill(daemon)
+    shutil.copytree(tmp_path / "copy", folder / name)  # as it is when the deletion is noted and nothing is removed
+    with start().connect() as server:
+        assert state_of(server, name) == pb.SIMULATION_STATE_SUSPENDED
+        for _ in range(2):
+            server.simulations.DeleteSimulation(end(name))
+        assert server.list() == [] and not (folder / name).exists()
+
+
+def test_damaged_notes_of_deletions_are_named_and_put_aside(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(deck()).name
+        server.simulations.DeleteSimulation(end(name))
+        good = server.load_text(deck()).name
+    kill(daemon)
+    damage(folder / "removals")
+    daemon = start()
+    with daemon.connect() as server:
+        assert [info.name for info in server.list()] == [good]
+        server.simulations.DeleteSimulation(end(good))
+    line, = [line for line in daemon.log().splitlines() if "put aside" in line]
+    assert "state folder: removals: record 2 at byte " in line and (folder / "removals.damaged").exists()
+
+
 def test_a_creation_is_done_once_across_restarts(start):
     def create(server):
         header = pb.UploadHeader(bundle_main_file="deck", options=pb.CreateOptions(request_id="same"))
@@ -176,6 +243,27 @@ def test_a_creation_is_done_once_across_restarts(start):
     kill(daemon)
     with start().connect() as server:
         assert create(server) == name and len(server.list()) == 1
+
+
+def test_what_a_repeat_was_given_stays_when_the_first_reply_is_lost(start):
+    """The first client opens no window, so that its replies stay with the server until its connection ends."""
+    requests = [pb.InlineUpload(header=pb.UploadHeader(bundle_main_file="deck", options=pb.CreateOptions(request_id=request_id)),
+                                files=[{"path": "deck", "data": deck().encode()}]) for request_id in ("alone", "repeated")]
+    daemon = start()
+    with daemon.connect() as server, socket.socket(socket.AF_UNIX) as first:
+        first.connect(daemon.address[len("unix:"):])
+        first.sendall(http2.PREFACE + http2.frame(http2.SETTINGS, 0, 0, struct.pack(">HI", 4, 0)))  # the first window of a stream
+        for stream, request in zip((1, 3), requests):
+            data = request.SerializeToString()
+            first.sendall(http2.frame(http2.HEADERS, 4, stream, http2.headers_of("/mbcosim.v1.Simulations/CreateSimulationInline"))
+                          + http2.frame(http2.DATA, 1, stream, b"\0" + struct.pack(">I", len(data)) + data))
+        wait_for(lambda: len(server.list()) == 2)
+        name = server.simulations.CreateSimulationInline(requests[1]).simulation.name
+        assert name in [info.name for info in server.list()] and len(server.list()) == 2
+        first.close()
+        wait_for(lambda: [info.name for info in server.list()] == [name])  # nobody would delete the other
+        time.sleep(0.5)
+        assert server.attach(name).step(3).step == 3
 
 
 def test_the_end_of_a_lease_suspends(start):
@@ -429,6 +517,50 @@ def test_what_is_damaged_is_named_and_stops_nobody_else(start, folder, file, dam
     assert (folder / (bad + ".damaged") / file).exists()
 
 
+@pytest.mark.parametrize("file", ["model", "point", "unfinished"])
+def test_what_the_system_does_not_let_be_read_stays_and_is_found_again(start, folder, file):
+    daemon = start()
+    with daemon.connect() as server:
+        bad, good = server.load_text(deck()).name, server.load_text(deck()).name
+        server.attach(bad).step(7)
+    daemon.stop()
+    path, away = folder / bad / file, folder / "away"
+    if path.exists():
+        path.rename(away)
+    path.symlink_to(path)  # ELOOP: it holds for root, too
+    daemon = start()
+    with daemon.connect() as server:
+        assert [info.name for info in server.list()] == [good]
+        assert server.attach(good).step(3).step == 3
+        for call in (lambda: server.attach(bad), lambda: server.simulations.Step(pb.StepRequest(simulation=bad)),
+                     lambda: server.simulations.DeleteSimulation(pb.DeleteSimulationRequest(simulation=bad))):
+            with pytest.raises((mbcosim.Error, grpc.RpcError), match="could not be read when the server began: .*symbolic links"):
+                call()
+    line, = [line for line in daemon.log().splitlines() if "stays as it is until the daemon is started anew" in line]
+    assert f"{bad.split('/')[1]}/{file}: " in line and "Too many levels of symbolic links" in line
+    assert "put aside" not in daemon.log() and (folder / bad).exists()
+    daemon.stop()
+    path.unlink()
+    if away.exists():
+        away.rename(path)
+    with start().connect() as server:
+        assert server.attach(bad).read(["step"])["step"] == 7
+
+
+def test_what_is_damaged_and_cannot_be_put_aside_is_told(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        bad = server.load_text(deck()).name
+    kill(daemon)
+    damage(folder / bad / "model")
+    (folder / (bad + ".damaged") / "there").mkdir(parents=True)
+    daemon = start()
+    with daemon.connect() as server, pytest.raises(mbcosim.Error, match="it cannot be put aside: Directory not empty"):
+        server.attach(bad)
+    assert "model: record " in daemon.log() and "it cannot be put aside: Directory not empty" in daemon.log()
+    assert (folder / bad / "model").exists()
+
+
 def test_what_was_being_made_or_removed_when_the_daemon_was_killed_is_removed(start, folder):
     daemon = start()
     with daemon.connect() as server:
@@ -659,10 +791,12 @@ def test_a_full_disk_is_told_and_loses_nothing(start_daemon, small_disk):
         assert "No space left on device" in failed.checkpoint_failed.message
         assert len(server.list()) == 2
         name = journal.name
+        server.simulations.DeleteSimulation(end(checkpoints.name))  # which makes room
+        assert [info.name for info in server.list()] == [name]
     kill(daemon)
     (small_disk / "filler").unlink()
     with start_daemon("--state-dir", str(small_disk)).connect() as server:
-        assert len(server.list()) == 2
+        assert [info.name for info in server.list()] == [name]
         assert bits(server.attach(name)) == stands
 
 

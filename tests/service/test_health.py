@@ -35,7 +35,8 @@ def test_health_and_socket_mode(daemon, server):
                                      request_serializer=bytes, response_deserializer=bytes)
         assert b"mbcosim.v1.Simulations" in next(info(iter([b"\x3a\x01*"])))
     assert subprocess.run([DAEMON, "--check", daemon.address]).returncode == 0
-    assert subprocess.run([DAEMON, "--check", "unix:/nonexistent/socket"]).returncode == 1
+    nobody = subprocess.run([DAEMON, "--check", "unix:/nonexistent/socket", "--check-timeout", "1"], stderr=subprocess.PIPE, text=True)
+    assert nobody.returncode == 1 and "no answer within 1 s: " in nobody.stderr and "No such file or directory" in nobody.stderr, nobody.stderr
 
 
 def test_health_is_told_by_the_name_of_the_service(daemon):

@@ -52,7 +52,7 @@ def test_tokens_are_read_anew(start_daemon, tmp_path, asked):
             assert again.attach(simulation.name).step().step == 1  # the same identity, another token
     tokens_file(file, "second-token nonsense two")
     daemon.process.send_signal(signal.SIGHUP)
-    wait_for(lambda: 'role "nonsense" is none of observe, control, admin; those before stay in force' in daemon.log())
+    wait_for(lambda: 'role "nonsense" is none of observe, control, admin; what was there before stays in force' in daemon.log())
     assert identity(daemon, "second-token") == "token:two"
 
 
@@ -92,6 +92,40 @@ def test_a_new_certificate_is_shown_without_a_restart(secured, tmp_path):
         assert simulation.step().step == 1  # connections that are open go on
     with mbcosim.connect(address, credentials=credentials) as server:
         assert server.info().identity == "cert:CN=arm"
+
+
+def test_a_new_key_that_does_not_fit_is_named_and_the_old_pair_stays(secured, tmp_path):
+    daemon, address = secured
+    first = shown(address, tmp_path / "ca.pem")
+    certificate(tmp_path, "next", "/CN=localhost", "ca", ["-addext", "subjectAltName=DNS:localhost"])
+    os.replace(tmp_path / "next.key", tmp_path / "server.key")
+    wait_for(lambda: f"the key in {tmp_path}/server.key is not that of the certificate in {tmp_path}/server.pem; what was there before stays"
+             in daemon.log())
+    for _ in range(5):
+        assert shown(address, tmp_path / "ca.pem") == first
+        time.sleep(0.5)
+    os.replace(tmp_path / "next.pem", tmp_path / "server.pem")
+    daemon.process.send_signal(signal.SIGHUP)
+    wait_for(lambda: shown(address, tmp_path / "ca.pem") not in (None, first), 20)
+
+
+def test_a_new_authority_of_the_clients_counts_from_then_on(secured, tmp_path):
+    daemon, address = secured
+    authority = (tmp_path / "ca.pem").read_bytes()
+    certificate(tmp_path, "other", "/CN=another authority")
+    pem, key = certificate(tmp_path, "client", "/CN=arm", "other")
+    credentials = grpc.ssl_channel_credentials(authority, key, pem)
+
+    def is_let_in():
+        with grpc.secure_channel(address, credentials, options=[("grpc.use_local_subchannel_pool", 1)]) as channel:
+            try:
+                return health(channel) == 1
+            except grpc.RpcError:
+                return False
+
+    assert not is_let_in()
+    os.replace(tmp_path / "other.pem", tmp_path / "ca.pem")
+    wait_for(is_let_in, 20)
 
 
 def test_a_key_of_another_certificate_is_refused_at_the_start(tmp_path):

@@ -355,6 +355,7 @@ def test_a_client_that_stands_still_with_its_socket_full_does_not_hold_up_the_en
             simulation.step(200)
             daemon.process.send_signal(signal.SIGTERM)
             assert daemon.process.wait(20 * TIME_FACTOR) == 0
+            assert "that did not end are cut" in daemon.log()
         finally:
             reader.kill()
             reader.wait()

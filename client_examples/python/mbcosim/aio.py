@@ -391,9 +391,7 @@ class Peer(exchange.Course):
 
     async def _attach(self, hello: coupling_pb2.PeerMessage, timeout: Optional[float]) -> None:
         self._stream = open_stream(self._connection.channel)(metadata=self._connection.about(hello.hello.simulation))
-        expected = hello.hello.expected
-        self._begin(await _bounded(timeout, self._shake_hands(hello), self._stream.cancel, "attaching the peer"),
-                    expected.step if expected.HasField("step") else None)
+        self._begin(await _bounded(timeout, self._shake_hands(hello), self._stream.cancel, "attaching the peer"), hello.hello)
         loop = asyncio.get_running_loop()
         if self._beats is not None or self._silence is not None:
             self._heart = loop.create_task(self._beat())

@@ -178,6 +178,7 @@ class ServerCalls(Generic[SimulationKind]):
                       longest time [s], and steps, between two checkpoints; None: the server's, and any
         deck_sockets  serves the sockets that the deck names to the codes for which it was written, where the server allows it: True, or the longest
                       wait for a code [s]; the call ends when they have come
+        padded_labels with deck_sockets: the codes pad labels of an odd number of points as MBDyn does
         units         that the deck is written in, mbcosim.units(...), where it does not tell by a card: descriptions name them, and ports
                       convert them for peers that count in others; no value changes
         optional_ports
@@ -197,7 +198,7 @@ class ServerCalls(Generic[SimulationKind]):
                 record: bool = False, summed_time: bool = False, symbols: Optional[Mapping[str, Symbol]] = None,
                 grants: Iterable[pb.Grant] = (), results: Results = False, results_quota: Optional[int] = None,
                 durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None, pace: Optional[float] = None,
-                deck_sockets: Union[bool, float] = False, units: Optional[common_pb2.UnitSystem] = None, optional_ports: bool = False,
+                deck_sockets: Union[bool, float] = False, padded_labels: bool = False, units: Optional[common_pb2.UnitSystem] = None, optional_ports: bool = False,
                 timeout: Optional[float] = None) -> Calls[SimulationKind]:
         header.options.request_id = _new_id()
         header.options.protocol.CopyFrom(protocol())
@@ -225,6 +226,7 @@ class ServerCalls(Generic[SimulationKind]):
             header.options.pace.rate = pace
         if deck_sockets is not False:
             header.options.deck_sockets.SetInParent()
+            header.options.deck_sockets.padded_labels = padded_labels
         if deck_sockets is not False and deck_sockets is not True:
             fill_duration(header.options.deck_sockets.peer_timeout, deck_sockets, "deck_sockets.peer_timeout")
         if lease is not None:

@@ -96,14 +96,14 @@ class Peer(exchange.Course):
         super().__init__(rotation)
         self._function = answer
         self._out: queue.SimpleQueue[Optional[pb.PeerMessage]] = queue.SimpleQueue()
-        self._out.put(exchange.hello(
-            simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout,
-            heartbeat_interval=None if server_timeout is None else server_timeout / 3, **options))
+        first = exchange.hello(simulation, port, rotation=rotation, heartbeat_timeout=heartbeat_timeout,
+                               heartbeat_interval=None if server_timeout is None else server_timeout / 3, **options)
+        self._out.put(first)
         connection = simulation._connection
         self._stream = open_stream(connection.channel)(iter(self._out.get, None), metadata=connection.about(simulation.name))
         end_with(self._stream, self._out)
         with bounded(timeout, self._stream.cancel, "attaching the peer"), translated():
-            self._begin(exchange.receive(next(self._stream))[1], options.get("step"))
+            self._begin(exchange.receive(next(self._stream))[1], first.hello)
         self._closing = threading.Event()
         self._waiting_since: Optional[float] = None
         if heartbeat_timeout is not None or server_timeout is not None:

@@ -261,13 +261,13 @@ class Course:
         self._rotation, self._index = rotation, 0
         self._asked: Optional[int] = None  # step of the last exchange, in explicit modes
 
-    def _begin(self, welcome: pb.Welcome, step: Optional[int]) -> None:
-        """The peer is attached; `step` is where it said that it stands. Refused by a server that would take the answers otherwise."""
-        form = welcome.agreed.form
+    def _begin(self, welcome: pb.Welcome, hello: pb.Hello) -> None:
+        """The peer is attached with this `hello`. An error when the server would take its answers otherwise."""
+        form, expected = hello.form, hello.expected
         if (form.following_loads or form.global_reference_loads) and "following_loads" not in welcome.protocol.features:
             raise Error("the server is too old: it knows neither following_loads nor global_reference_loads", grpc.StatusCode.UNIMPLEMENTED)
         self.welcome = welcome
-        self.step = welcome.step if step is None else min(step, welcome.step)
+        self.step = min(expected.step, welcome.step) if expected.HasField("step") else welcome.step
 
     def _take(self, data: bytes) -> Optional[Motion]:
         """The Motion of a message; None when it tells something else, which is noted."""

@@ -136,6 +136,7 @@ void read_external_structural(Card& card, ElementInfo& info) {
 std::string read_port_name(Card& card, int label, DeckChannel& channel) {
   const SourceSpan where = card.next();
   channel.port = read_communicator(card, label, channel);
+  channel.label = label;
   channel.card = "force " + std::to_string(label);
   if (channel.port.empty()) card.fail_at(where, "the name of the port is empty");
   if (has_port(card.model(), channel.port))

@@ -1,4 +1,5 @@
 /// Cards of ports besides `external structural` and `external modal mapping`.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -163,6 +164,7 @@ void read_stream_flags(Card& card, DeckChannel& channel) {
     const int flag = card.one_of({"signal", "no signal", "blocking", "non blocking", "send first",
                                   "no send first", "abort if broken", "do not abort if broken"});
     if (flag < 0) return;
+    if (flag == signal || flag == no_signal) channel.signal = flag == signal;
     if (flag == blocking || flag == non_blocking) channel.blocking = flag == blocking;
     if (flag == send_first || flag == no_send_first) channel.at_start = flag == send_first;
     if (flag == abort || flag == go_on) channel.abort_if_broken = flag == abort;
@@ -170,8 +172,9 @@ void read_stream_flags(Card& card, DeckChannel& channel) {
 }
 
 /// What stands before the content: name, address and flags.
-/// `named`: what `name` gave when it followed the label, as it may for every element.
-ElementPort read_stream_head(Card& card, const std::string& named, DeckChannel& channel) {
+/// The name may have followed the label, as it may for every element.
+ElementPort read_stream_head(Card& card, const ElementInfo& info, DeckChannel& channel) {
+  const std::string& named = info.name;
   constexpr int kDefaultPort = 9011;
   ElementPort port;
   const bool has_name = card.one_of({"stream name", "name"}) >= 0;
@@ -182,6 +185,7 @@ ElementPort read_stream_head(Card& card, const std::string& named, DeckChannel& 
   if (has_port(card.model(), port.name))
     card.fail_at(where, "there is a port named \"" + port.name + "\" already");
   channel.content = DeckChannel::Content::output;
+  channel.label = info.label;
   channel.port = port.name;
   channel.card = "stream output \"" + port.name + "\"";
   channel.address = read_channel_address(card, kDefaultPort);
@@ -259,10 +263,24 @@ void name_motion(const Model& model, const std::vector<StreamOutput::Motion>& mo
     }
 }
 
+/// `values n`, or a 0 or 1 for each kind of motion and the labels of the nodes.
+std::string content_text(const Model& model, int values,
+                         const std::vector<StreamOutput::Motion>& motion,
+                         const std::vector<int>& nodes) {
+  using Motion = StreamOutput::Motion;
+  if (motion.empty()) return "values " + std::to_string(values);
+  std::string s = "motion";
+  for (const Motion kind : {Motion::position, Motion::orientation, Motion::transposed_orientation,
+                            Motion::velocity, Motion::angular_velocity})
+    s += std::count(motion.begin(), motion.end(), kind) > 0 ? " 1" : " 0";
+  for (const int node : nodes) s += ' ' + std::to_string(model.structural[node].label);
+  return s;
+}
+
 /// All its words mean the same; old decks leave `values` or `motion` out, which the head then says.
 void read_stream_output(Card& card, ElementInfo& info, bool motion_by_default) {
   DeckChannel channel;
-  ElementPort port = read_stream_head(card, info.name, channel);
+  ElementPort port = read_stream_head(card, info, channel);
   std::vector<StreamOutput::Value> values;
   std::vector<StreamOutput::Motion> motion;
   std::vector<int> nodes;
@@ -275,11 +293,14 @@ void read_stream_output(Card& card, ElementInfo& info, bool motion_by_default) {
     values = read_stream_values(card, port);
   }
   read_channel_modifier(card, static_cast<int>(port.output_names.size()), channel);
+  channel.log_end = content_text(card.model(), static_cast<int>(values.size()), motion, nodes);
+  std::string log = channel.address.kind == ChannelAddress::Kind::port ? "" : log_line(channel);
   keep_channel(card, std::move(channel));
   port.output_size = static_cast<int>(port.output_names.size());
-  add_general_element(card.builder(), info,
-                      std::make_unique<StreamOutput>(std::move(port), std::move(values),
-                                                     std::move(motion), std::move(nodes)));
+  add_general_element(
+      card.builder(), info,
+      std::make_unique<StreamOutput>(std::move(port), std::move(values), std::move(motion),
+                                     std::move(nodes), std::move(log)));
 }
 
 }  // namespace

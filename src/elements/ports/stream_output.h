@@ -17,12 +17,14 @@ class StreamOutput : public GeneralElement, public PortElement {
   };
   enum class Motion { position, orientation, transposed_orientation, velocity, angular_velocity };
 
+  /// `log`: line of the .log; empty: none.
   StreamOutput(ElementPort port, std::vector<Value> values, std::vector<Motion> motion,
-               std::vector<int> nodes)
+               std::vector<int> nodes, std::string log)
       : port_(std::move(port)),
         values_(std::move(values)),
         motion_(std::move(motion)),
-        nodes_(std::move(nodes)) {}
+        nodes_(std::move(nodes)),
+        log_(std::move(log)) {}
   const ElementPort& port() const override { return port_; }
   void outputs(const GeneralView& u, std::vector<double>& out) const override;
 
@@ -30,12 +32,14 @@ class StreamOutput : public GeneralElement, public PortElement {
   void pattern(GeneralPattern&) const override {}
   void residual(const GeneralView&, GeneralResidual&) const override {}
   void jacobian(const GeneralView&, GeneralJacobian&) const override {}
+  std::string log(const Model&, int) const override { return log_; }
 
  private:
   ElementPort port_;
   std::vector<Value> values_;
   std::vector<Motion> motion_;  ///< of each node, in this order
   std::vector<int> nodes_;
+  std::string log_;
 };
 
 }  // namespace mbcosim

@@ -1,4 +1,5 @@
 #include <charconv>
+#include <sstream>
 
 #include "model/deck_channel.h"
 #include "model/drives/file_driver.h"
@@ -69,7 +70,7 @@ FileDriverPtr make_table_driver(Card& card, SampleTable table, const TableOption
   return std::make_shared<TableDriver>(std::move(table), options);
 }
 
-FileDriverPtr read_fixed_step(Card& card) {
+FileDriverPtr read_fixed_step(Card& card, int) {
   const int rows = card.keyword("count") ? -1 : read_count(card, "number of steps");
   SampleTable table;
   table.channels = read_count(card, "number of channels");
@@ -92,7 +93,7 @@ FileDriverPtr read_fixed_step(Card& card) {
   return make_table_driver(card, std::move(table), options);
 }
 
-FileDriverPtr read_variable_step(Card& card) {
+FileDriverPtr read_variable_step(Card& card, int) {
   SampleTable table;
   table.channels = read_count(card, "number of channels");
   const TableOptions options = read_table_options(card);
@@ -147,22 +148,37 @@ void keep_channel(Card& card, DeckChannel channel, const StreamInput& stream) {
     card.builder().on_step(std::make_shared<DeckChannel>(std::move(channel)));
 }
 
-FileDriverPtr read_stream(Card& card) {
+void read_input_flags(Card& card, DeckChannel& channel) {
+  enum { signal, no_signal, blocking, non_blocking };
+  for (;;) {
+    const int flag = card.one_of({"signal", "no signal", "blocking", "non blocking"});
+    if (flag < 0) return;
+    if (flag == signal || flag == no_signal) channel.signal = flag == signal;
+    if (flag == blocking || flag == non_blocking) channel.blocking = flag == blocking;
+  }
+}
+
+/// Number of values, and those that they start with where they are given.
+std::string input_text(int channels, const std::vector<double>& initial) {
+  std::ostringstream s;
+  s << channels;
+  for (const double value : initial) s << ' ' << value;
+  return s.str();
+}
+
+FileDriverPtr read_stream(Card& card, int label) {
   constexpr int kDefaultPort = 9012;
   StreamInput stream;
   DeckChannel channel;
   channel.content = DeckChannel::Content::input;
+  channel.label = label;
   stream.where = card.next();
   if (card.one_of({"name", "stream drive name"}) < 0) card.fail_expected("stream: `name` expected");
   stream.name = card.quoted("name");
   channel.address = read_channel_address(card, kDefaultPort);
   if (channel.address.kind == ChannelAddress::Kind::udp)
     card.fail("stream: input over UDP is not supported", "write `socket type, tcp`");
-  for (;;) {
-    const int flag = card.one_of({"signal", "no signal", "blocking", "non blocking"});
-    if (flag < 0) break;
-    if (flag >= 2) channel.blocking = flag == 2;
-  }
+  read_input_flags(card, channel);
   if (card.keyword("input every")) stream.every = read_count(card, "steps between two inputs");
   if (card.keyword("receive first")) stream.receive_first = card.yes_no("receive first");
   if (card.keyword("timeout")) {
@@ -176,6 +192,7 @@ FileDriverPtr read_stream(Card& card) {
   stream.channels = read_stream_channels(card);
   const std::vector<double> initial = read_initial_values(card, stream.channels);
   read_channel_modifier(card, stream.channels, channel);
+  channel.log_end = input_text(stream.channels, initial);
   keep_channel(card, std::move(channel), stream);
   return add_stream(card, std::move(stream), initial);
 }
@@ -198,10 +215,11 @@ void read_authentication(Card& card, DeckChannel& channel) {
   if (card.keyword("salt format")) card.quoted("salt format");  // how MBDyn keeps the word
 }
 
-FileDriverPtr read_socket(Card& card) {
+FileDriverPtr read_socket(Card& card, int label) {
   constexpr int kDefaultPort = 5555;
   DeckChannel channel;
   channel.content = DeckChannel::Content::text;
+  channel.label = label;
   StreamInput stream;
   stream.where = card.next();
   stream.channels = read_stream_channels(card);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "deck_run.h"
+#include "output/model_log.h"
 
 namespace mbcosim {
 namespace {
@@ -84,6 +85,29 @@ TEST(DeckChannel, StreamsHaveDefaultPortsAndFields) {
   EXPECT_EQ(out.every, 4);
   EXPECT_EQ(out.echo, "e");
   EXPECT_EQ(out.echo_precision, 8);
+}
+
+TEST(DeckChannel, LinesOfTheLogSayWhatTheCardsSay) {
+  DeckRun run(deck("output elements: 2; file drivers: 2;",
+                   "begin: drivers; file: 3, stream, name, \"i\", create, yes, no signal, non "
+                   "blocking, input every, 2, receive first, no, timeout, 1.5, 2, initial values, "
+                   "3., 4.5; file: 4, stream, name, \"p\", grpc, 1; end: drivers;",
+                   "stream output: 9, stream name, \"o\", port, 7001, host, \"h\", socket type, "
+                   "udp, no send first, non blocking, abort if broken, output every, 4, values, 1, "
+                   "drive, time; stream motion output: 10, stream name, \"m\", create, yes, path, "
+                   "\"s\", motion, output flags, position, velocity, 1;"));
+  ASSERT_TRUE(run.ready());
+  const auto channels = deck_channels(run.model());
+  ASSERT_EQ(channels.size(), 3u);
+  EXPECT_EQ(channels[0]->label, 3);
+  EXPECT_EQ(channels[1]->label, 9);
+  const std::string text = model_log(run.model());
+  for (const char* line :
+       {"\nfiledriver: 3 stream INET i 127.0.0.1 9012 tcp 1 0 1 2 0 1.5 2 3 4.5\n",
+        "\noutputelement: 9 stream INET o h 7001 udp 0 1 0 0 1 4 values 1\n",
+        "\noutputelement: 10 stream UNIX m s tcp 1 1 1 1 0 1 motion 1 0 0 1 0 1\n"})
+    EXPECT_NE(text.find(line), std::string::npos) << line << "is not in\n" << text;
+  EXPECT_EQ(text.find("filedriver: 4"), std::string::npos) << "a port of the daemon has no address";
 }
 
 TEST(DeckChannel, PortsOfTheDaemonAreNone) {
