@@ -6,8 +6,8 @@
 
 #include "cli/commands.h"
 #include "cli/deck_report.h"
-#include "cli/interrupt.h"
 #include "solver/eigen_spectrum.h"
+#include "threads/interrupt.h"
 
 namespace mbcosim::cli {
 namespace {

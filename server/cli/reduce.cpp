@@ -5,9 +5,9 @@
 
 #include "cli/commands.h"
 #include "cli/fem_file.h"
-#include "cli/interrupt.h"
 #include "input/sources.h"
 #include "reduction/job.h"
+#include "threads/interrupt.h"
 
 namespace fs = std::filesystem;
 

@@ -3,12 +3,12 @@
 
 #include "cli/commands.h"
 #include "cli/deck_report.h"
-#include "cli/interrupt.h"
 #include "cli/pace.h"
 #include "cli/progress.h"
 #include "input/sources.h"
 #include "mbdyn/channels.h"
 #include "output/result_files.h"
+#include "threads/interrupt.h"
 
 namespace mbcosim::cli {
 namespace {

@@ -156,9 +156,11 @@ void Coupler::take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointP
     for (Line& line : lines_) {
       if (line.port->model().name() != in.port()) continue;
       line.agreement.hold = in.input_hold();
-      line.agreement.frame = in.form().frame();
-      line.agreement.following_loads = in.form().following_loads();
-      line.agreement.global_reference_loads = in.form().global_reference_loads();
+      if (in.has_form()) {
+        line.agreement.frame = in.form().frame();
+        line.agreement.following_loads = in.form().following_loads();
+        line.agreement.global_reference_loads = in.form().global_reference_loads();
+      }
       if (in.had_peer()) line.port->expect_peer(line.agreement);
       line.agreement = line.port->agreement();
       line.history = InputHistory(line.agreement.held_answers());

@@ -480,37 +480,33 @@ void Instance::Sums::add(int number, double factor) { rows.back().emplace_back(n
 ///   dx = dX + dR f,  dv = dV + dω × R f + ω × dR f
 void Instance::add_motion(const Variable& variable, Sums& sums) const {
   using Source = FmuVariable::Source;
-  const StructuralPort& port = *find_structural_port(*model_, variable.of->name);
   const Source source = variable.of->source;
   const int per_point = source == Source::orientations ? 9 : 3;
   for (const int element : variable.of->elements) {
     const int k = element / per_point, i = element % per_point;
-    const Vec3& f = port.offsets[k];
-    const std::string prefix =
-        "node.structural." + std::to_string(model_->structural[port.nodes[k]].label) + ".";
-    const auto add = [&](const char* name, int number, double factor) {
-      const int handle = factor != 0 ? simulation_->find_variable(prefix + name) : -1;
-      if (handle < 0) return;  // a node without orientation
+    const PointMotion::Point& from = variable.motion->point(k);
+    const auto add = [&](int handle, int number, double factor) {
+      if (handle < 0 || factor == 0) return;  // a node without orientation
       const int size = simulation_->variables()[handle].size;
       sums.add(sums.place_of(handle, size) + number, factor);
     };
     const auto add_arm = [&](int row, double factor) {
-      for (int j = 0; j < 3; ++j) add("R", 3 * row + j, factor * f[j]);
+      for (int j = 0; j < 3; ++j) add(from.R, 3 * row + j, factor * from.offset[j]);
     };
     sums.rows.emplace_back();
-    if (source == Source::orientations) add("R", i, 1);
-    if (source == Source::angular_velocities) add("Omega", i, 1);
+    if (source == Source::orientations) add(from.R, i, 1);
+    if (source == Source::angular_velocities) add(from.w, i, 1);
     if (source == Source::positions) {
-      add("X", i, 1);
+      add(from.x, i, 1);
       add_arm(i, 1);
     }
     if (source == Source::velocities) {
       const PointState point = variable.motion->at(*simulation_, k);
-      const Vec3 arm = point.R * f;
+      const Vec3 arm = point.R * from.offset;
       const int p = (i + 1) % 3, q = (i + 2) % 3;
-      add("XP", i, 1);
-      add("Omega", p, arm[q]);
-      add("Omega", q, -arm[p]);
+      add(from.v, i, 1);
+      add(from.w, p, arm[q]);
+      add(from.w, q, -arm[p]);
       add_arm(q, point.w[p]);
       add_arm(p, -point.w[q]);
     }

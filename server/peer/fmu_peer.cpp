@@ -11,10 +11,6 @@
 namespace mbcosim::peer {
 namespace {
 
-constexpr double kRounding = 1e-9;
-
-double tolerance_at(double time) { return kRounding * std::max(1.0, std::abs(time)); }
-
 std::string listed(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;

@@ -7,8 +7,8 @@
 #include <cstdlib>
 
 #include "mbdyn/link.h"
-#include "peer/interrupt.h"
 #include "peer/options.h"
+#include "threads/interrupt.h"
 
 namespace mbcosim::peer {
 namespace {
@@ -108,10 +108,11 @@ void set_addresses(const AddressTexts& texts, SocketCall& socket) {
     socket.inputs = read(texts.inputs_listen, texts.inputs_connect);
 }
 
-int run(int argc, char** argv) {
+int run(int argc, char** argv, const CancelToken* interrupt) {
   CLI::App app{"Takes part in a simulation of a daemon.", "mbcosim peer"};
   app.require_subcommand(1);
   PeerCall call;
+  call.interrupt = interrupt;
   FmuCall fmu;
   std::vector<std::string> pairs;
   CLI::App* fmu_app = app.add_subcommand("fmu", "An FMU is the peer of a signal port");
@@ -156,15 +157,15 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace mbcosim::peer;
-  const Interrupt interrupt;
-  const auto complain = [](const std::exception& error, int code) {
-    if (Interrupt::seen()) return kInterrupted;
+  const mbcosim::InterruptGuard interrupt;
+  const auto complain = [&interrupt](const std::exception& error, int code) {
+    if (interrupt.token()->cancelled()) return kInterrupted;
     std::fprintf(stderr, "mbcosim peer: %s\n", error.what());
     return code;
   };
   try {
-    const int code = run(argc, argv);
-    return Interrupt::seen() ? kInterrupted : code;
+    const int code = run(argc, argv, interrupt.token());
+    return interrupt.token()->cancelled() ? kInterrupted : code;
   } catch (const mbcosim::mbdyn::ChannelLost& lost) {
     return complain(lost, kPeerLost);
   } catch (const Lost& lost) {

@@ -1,6 +1,8 @@
 /// What `mbcosim peer` is told.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -9,6 +11,7 @@
 
 #include "client/mbcosim_client.h"
 #include "model/deck_channel.h"
+#include "solver/cancel.h"
 
 namespace mbcosim::peer {
 
@@ -17,8 +20,10 @@ struct PeerCall {
   std::string server;  ///< address of the daemon
   std::string token_file, server_ca;
   std::string simulation, port;
-  std::string mode;     ///< loose, staggered, tight, window; empty: the port's
-  double timeout = 60;  ///< longest wait for the other side [s]
+  std::string mode;                        ///< loose, staggered, tight, window; empty: the port's
+  double timeout = 60;                     ///< longest wait for the other side [s]
+  const CancelToken* interrupt = nullptr;  ///< cancelled by a signal
+  bool interrupted() const { return interrupt && interrupt->cancelled(); }
 };
 
 struct FmuCall {
@@ -43,7 +48,10 @@ class Lost : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Each serves until the simulation is gone or a signal comes (`Interrupt::seen`). Throw
+/// Times of the simulation that differ by less are equal [s].
+inline double tolerance_at(double time) { return 1e-9 * std::max(1.0, std::abs(time)); }
+
+/// Each serves until the simulation is gone or a signal comes (`call.interrupted()`). Throw
 /// std::exception.
 void serve_fmu(const PeerCall& call, const FmuCall& fmu);
 void serve_socket(const PeerCall& call, const SocketCall& socket);
@@ -52,7 +60,7 @@ void serve_socket(const PeerCall& call, const SocketCall& socket);
 client::Server connect(const PeerCall& call);
 client::PeerOptions options_of(const PeerCall& call);
 /// The next exchange; false: the stream has ended. Throws Lost.
-bool next_exchange(client::Peer& peer, client::Motion& motion);
+bool next_exchange(const PeerCall& call, client::Peer& peer, client::Motion& motion);
 /// Of a peer whose stream has ended. Throws Lost unless the simulation is gone in good order or a
 /// signal came.
 void require_good_end(client::Server& server, const PeerCall& call, const client::Peer& peer);

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "peer/fmu_peer.h"
-#include "peer/interrupt.h"
 #include "peer/options.h"
 #include "peer/simulation_watch.h"
 
@@ -61,17 +60,17 @@ client::PeerOptions options_of(const PeerCall& call) {
   return options;
 }
 
-bool next_exchange(client::Peer& peer, client::Motion& motion) {
+bool next_exchange(const PeerCall& call, client::Peer& peer, client::Motion& motion) {
   try {
     return peer.next(motion);
   } catch (const client::Error& error) {
-    if (Interrupt::seen() || error.reason() == "NO_SUCH_SIMULATION") return false;
+    if (call.interrupted() || error.reason() == "NO_SUCH_SIMULATION") return false;
     throw Lost(std::string("the connection to the simulation is lost: ") + error.what());
   }
 }
 
 void require_good_end(client::Server& server, const PeerCall& call, const client::Peer& peer) {
-  if (Interrupt::seen()) return;
+  if (call.interrupted()) return;
   try {
     if (const auto error = peer.error()) throw *error;
     (void)server.find(call.simulation);
@@ -84,7 +83,7 @@ void require_good_end(client::Server& server, const PeerCall& call, const client
 
 void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
   const FmuArchive archive(fmu.file);
-  if (Interrupt::seen()) return;
+  if (call.interrupted()) return;
   client::Server server = connect(call);
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
@@ -110,12 +109,12 @@ void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
   const auto controller = make_controller(archive);
   FmuPeer host(*controller, std::move(map), archive.keeps_states(), simulation.read("time").at(0));
   running = &host;
+  const SimulationWatch watch(call, server, peer);
   std::printf("%s: FMI %s, attached to port \"%s\"\n", archive.name().c_str(),
               archive.is_fmi3() ? "3.0" : "2.0", call.port.c_str());
   std::fflush(stdout);
-  const SimulationWatch watch(server, call.simulation, peer);
   client::Motion motion;
-  while (next_exchange(peer, motion)) {
+  while (next_exchange(call, peer, motion)) {
     try {
       peer.answer({.signals = host.exchange(motion)});
     } catch (const Lost& lost) {

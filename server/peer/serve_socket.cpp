@@ -7,7 +7,6 @@
 #include "mbdyn/link.h"
 #include "mbdyn/socket_wire.h"
 #include "mbdyn/stream_message.h"
-#include "peer/interrupt.h"
 #include "peer/options.h"
 #include "peer/simulation_watch.h"
 
@@ -142,7 +141,7 @@ class Progress {
   void check(const client::Motion& motion) {
     const bool before = motion.step < step_;
     const bool again = ended_ && motion.iteration > 0 && motion.step == step_ &&
-                       motion.time <= time_ + kRounding * std::max(1.0, std::abs(time_));
+                       motion.time <= time_ + tolerance_at(time_);
     if (before || again) {
       std::ostringstream text;
       text << "the simulation went back to t = " << motion.time
@@ -160,7 +159,6 @@ class Progress {
   }
 
  private:
-  static constexpr double kRounding = 1e-9;
   std::int64_t step_ = -1;
   double time_ = 0;     ///< [s]
   bool ended_ = false;  ///< the last exchange was that of an implicit step that was accepted
@@ -226,9 +224,9 @@ std::vector<std::unique_ptr<mbdyn::Link>> open_links(const SocketCall& call,
 
 /// Waits for an exchange and answers it; false: there are no more. A lost code fails the step.
 template <class Answer>
-bool answer_next(client::Peer& peer, Progress& progress, Answer&& answer) {
+bool answer_next(const PeerCall& call, client::Peer& peer, Progress& progress, Answer&& answer) {
   client::Motion motion;
-  if (!next_exchange(peer, motion)) return false;
+  if (!next_exchange(call, peer, motion)) return false;
   try {
     progress.check(motion);
     peer.answer(answer(motion));
@@ -260,7 +258,7 @@ std::vector<double> receive_inputs(mbdyn::Link& link, std::size_t count) {
 /// any: over one link, or over two.
 void serve_streams(const PeerCall& call, client::Peer& peer, std::size_t inputs, Progress& progress,
                    const std::vector<std::unique_ptr<mbdyn::Link>>& links) {
-  while (answer_next(peer, progress, [&](const client::Motion& motion) {
+  while (answer_next(call, peer, progress, [&](const client::Motion& motion) {
     if (motion.iteration > 0)
       throw mbdyn::ChannelLost("streams know no iterations: port \"" + call.port +
                                "\" needs --mode loose or staggered");
@@ -274,10 +272,11 @@ void serve_streams(const PeerCall& call, client::Peer& peer, std::size_t inputs,
 }
 
 /// At the end, good or bad, the code gets 5. False: it was the code's.
-bool serve_forces(client::Peer& peer, Progress& progress, mbdyn::SocketWire& wire,
-                  SocketAnswers& answers, std::chrono::milliseconds farewell) {
+bool serve_forces(const PeerCall& call, client::Peer& peer, Progress& progress,
+                  mbdyn::SocketWire& wire, SocketAnswers& answers,
+                  std::chrono::milliseconds farewell) {
   try {
-    while (!answers.ended() && answer_next(peer, progress, [&](const client::Motion& motion) {
+    while (!answers.ended() && answer_next(call, peer, progress, [&](const client::Motion& motion) {
       return answers.answer(motion);
     })) {
     }
@@ -301,7 +300,7 @@ bool has_reference(const client::Simulation& simulation, const std::string& port
 void serve_socket(const PeerCall& call, const SocketCall& socket) {
   const mbdyn::Patience patience{
       .time = std::chrono::milliseconds(static_cast<long long>(1000 * call.timeout)),
-      .cancelled = Interrupt::seen};
+      .cancelled = [&call] { return call.interrupted(); }};
   client::Server server = connect(call);
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
@@ -315,7 +314,7 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
   };
   std::vector<std::unique_ptr<mbdyn::Link>> links = open_links(socket, patience);
   client::Peer peer = simulation.attach(call.port, options);
-  const SimulationWatch watch(server, call.simulation, peer);
+  const SimulationWatch watch(call, server, peer);
   if (is_signal_port(peer.layout())) {
     if (options.mode == client::Mode::tight || options.mode == client::Mode::window)
       throw std::runtime_error("streams know no iterations: give --mode loose or staggered");
@@ -328,7 +327,7 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
   const Form form = form_of(peer.layout(), socket);
   mbdyn::SocketWire wire(std::move(links[0]), form, socket.address.create);
   SocketAnswers answers(wire, {form, peer.layout().reference_loads});
-  if (serve_forces(peer, progress, wire, answers, patience.farewell))
+  if (serve_forces(call, peer, progress, wire, answers, patience.farewell))
     require_good_end(server, call, peer);
 }
 

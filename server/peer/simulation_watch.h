@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "client/mbcosim_client.h"
-#include "peer/interrupt.h"
+#include "peer/options.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::peer {
@@ -14,8 +14,9 @@ namespace mbcosim::peer {
 /// Ends a peer when its simulation is gone, which an idle stream does not tell, or at a signal.
 class SimulationWatch {
  public:
-  SimulationWatch(client::Server& server, const std::string& name, client::Peer& peer)
-      : simulation_(server.find(name)),
+  SimulationWatch(const PeerCall& call, client::Server& server, client::Peer& peer)
+      : call_(call),
+        simulation_(server.find(call.simulation)),
         peer_(peer),
         asking_([this] { ask(); }),
         listening_([this] { listen(); }) {}
@@ -43,9 +44,10 @@ class SimulationWatch {
   // Apart from the other, whose call may take long.
   void listen() {
     while (!stop_.stopped_within(std::chrono::milliseconds(100)))
-      if (Interrupt::seen()) return peer_.interrupt();
+      if (call_.interrupted()) return peer_.interrupt();
   }
 
+  const PeerCall& call_;
   client::Simulation simulation_;
   client::Peer& peer_;
   server::StopSignal stop_;

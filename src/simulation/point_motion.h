@@ -31,11 +31,14 @@ class PointMotion {
   int size() const { return static_cast<int>(points_.size()); }
   PointState at(const Simulation& simulation, int k) const;
 
- private:
+  /// Where the motion comes from.
   struct Point {
-    int x, R, v, w, a, wp;  ///< handles; −1: the node has none
-    Vec3 offset;
+    int x, R, v, w, a, wp;  ///< handles of the node's variables; −1: it has none
+    Vec3 offset;            ///< node frame [m]
   };
+  const Point& point(int k) const { return points_[k]; }
+
+ private:
   std::vector<Point> points_;
 };
 

@@ -257,6 +257,7 @@ interface Inside {
       } };
       session?: { name: string; playing: { value: string }; busy: boolean };
       sample?: { step: number; time: number };
+      calm: { value: number };
     };
     scene: {
       view: {
@@ -290,6 +291,26 @@ export async function turnTo(page: Page, simulation: string): Promise<void> {
 /** Waits until a simulation is on show. */
 export async function shown(page: Page): Promise<void> {
   await until(page, () => (window as unknown as Inside).mbcosim?.desk.sample !== undefined, undefined);
+}
+
+/** Waits until the samples of the page have a variable. */
+export async function samplesHave(page: Page, name: string): Promise<void> {
+  await until(page, (wanted) => {
+    const shown = (window as unknown as Inside).mbcosim.desk.shown.value;
+    const handle = shown?.model.variables.find((variable) => variable.name === wanted)?.handle;
+    return handle !== undefined && shown?.recording.samples.at(-1)?.layout.offset(handle) !== undefined;
+  }, name);
+}
+
+/** Moves a slider, and shows the last sample once more in the same turn of the page. */
+export async function moveSliderUnderSample(page: Page, label: string, value: string): Promise<void> {
+  await page.evaluate(([name, wanted]) => {
+    const slider = document.querySelector<HTMLInputElement>(`input[type=range][aria-label="${name}"]`);
+    if (!slider) throw new Error(`no slider ${name}`);
+    slider.value = wanted;
+    slider.dispatchEvent(new Event('input'));
+    (window as unknown as Inside).mbcosim.desk.calm.value += 1;
+  }, [label, value]);
 }
 
 /** Matrices of the nodes in the scene, 16 numbers by columns, by label, and the step that they belong to. */

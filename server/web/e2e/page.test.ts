@@ -6,7 +6,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, freePort, launch, MODELS, picture, recorded, rested, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
+import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, freePort, launch, MODELS, moveSliderUnderSample, picture, recorded, rested, samplesHave, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -366,15 +366,30 @@ describe('a picture', () => {
   });
 });
 
+async function becomes(view: View, name: string, values: number[]): Promise<void> {
+  const read = async () => (await view.read([name])).values[name];
+  let last = await read();
+  const end = Date.now() + 20_000 * FACTOR;
+  while (!values.every((value, k) => value === last[k]) && Date.now() < end) last = await read();
+  expect(last).toEqual(values);
+}
+
 describe('inputs', () => {
   test('are set by their sliders', async () => {
     await withPage(browser, 'pendulum_cart.mbd', async ({ page }, view) => {
       await page.locator('summary', { hasText: 'Inputs' }).click();
       await page.getByRole('slider', { name: 'stream.force' }).fill('2.5');
-      let read = await view.read(['stream.force']);
-      const end = Date.now() + 20_000 * FACTOR;
-      while (read.values['stream.force'][0] !== 2.5 && Date.now() < end) read = await view.read(['stream.force']);
-      expect(read.values['stream.force']).toEqual([2.5]);
+      await becomes(view, 'stream.force', [2.5]);
+    });
+  });
+
+  test('are not set back by a sample that arrives before they are sent', async () => {
+    await withPage(browser, 'pendulum_cart.mbd', async ({ page }, view) => {
+      await page.locator('summary', { hasText: 'Inputs' }).click();
+      await page.getByRole('slider', { name: 'stream.force' }).waitFor();
+      await samplesHave(page, 'stream.force');
+      await moveSliderUnderSample(page, 'stream.force', '2.5');
+      await becomes(view, 'stream.force', [2.5]);
     });
   });
 });

@@ -34,12 +34,17 @@ export function inputsPanel(desk: Desk): HTMLElement {
     const count = Math.min(variable.size, 9);
     const values = new Array<number>(variable.size).fill(0);
     const fields: { slider: HTMLInputElement; field: HTMLInputElement }[] = [];
+    const unsent = new Map<number, number>();  // what samples that are on their way do not know yet
     let timer = 0;
     const write = (k: number, value: number) => {
       if (!Number.isFinite(value)) return;
-      values[k] = value;
+      unsent.set(k, value);
       clearTimeout(timer);
-      timer = window.setTimeout(() => void desk.session?.write(variable, [...values]), WRITE_MILLISECONDS);
+      timer = window.setTimeout(() => {
+        for (const [place, wanted] of unsent) values[place] = wanted;
+        unsent.clear();
+        void desk.session?.write(variable, [...values]);
+      }, WRITE_MILLISECONDS);
     };
     const lines = Array.from({ length: count }, (_, k) => {
       const name = curveName(variable.name.replace('node.structural.', 'node '), variable.size, k);
@@ -61,6 +66,7 @@ export function inputsPanel(desk: Desk): HTMLElement {
       variable,
       set: (next) => next.slice(0, count).forEach((value, k) => {
         const { slider, field } = fields[k];
+        if (unsent.has(k)) return;
         values[k] = value;
         if (document.activeElement === slider || document.activeElement === field) return;
         widen(slider, value);

@@ -1,12 +1,14 @@
-/// Turns SIGINT and SIGTERM into a cancelled token while it lives.
+/// SIGINT and SIGTERM, for programs that end in good order.
 #pragma once
 
 #include <csignal>
 
-#include "simulation/simulation.h"
+#include "solver/cancel.h"
 
-namespace mbcosim::cli {
+namespace mbcosim {
 
+/// While it lives a first signal cancels the token; a second one ends the process at once. One at a
+/// time.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -20,4 +22,4 @@ class InterruptGuard {
   struct sigaction old_interrupt_, old_terminate_;
 };
 
-}  // namespace mbcosim::cli
+}  // namespace mbcosim

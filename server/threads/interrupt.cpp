@@ -1,8 +1,8 @@
-#include "cli/interrupt.h"
+#include "threads/interrupt.h"
 
 #include <atomic>
 
-namespace mbcosim::cli {
+namespace mbcosim {
 namespace {
 
 std::atomic<CancelToken*> active_token{nullptr};  // what a signal handler can reach
@@ -28,4 +28,4 @@ InterruptGuard::~InterruptGuard() {
   active_token.store(nullptr);
 }
 
-}  // namespace mbcosim::cli
+}  // namespace mbcosim
