@@ -9,6 +9,7 @@
 #include <array>
 #include <charconv>
 #include <cstring>
+#include <ctime>
 #include <memory>
 
 namespace mbcosim::server::http {
@@ -51,6 +52,24 @@ int find_socket(const mg_request_info& info) {
   return -1;
 }
 
+// civetweb would write the date by gmtime, whose result all threads share.
+std::string date_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  ::gmtime_r(&now, &parts);
+  std::array<char, 64> text{};
+  return {text.data(),
+          std::strftime(text.data(), text.size(), "%a, %d %b %Y %H:%M:%S GMT", &parts)};
+}
+
+void start_header(mg_connection* raw, int status, std::string_view content_type) {
+  mg_response_header_start(raw, status);
+  mg_response_header_add(raw, "Date", date_now().c_str(), -1);
+  mg_response_header_add(raw, "Content-Type", content_type.data(),
+                         static_cast<int>(content_type.size()));
+  mg_response_header_add(raw, "X-Content-Type-Options", "nosniff", -1);
+}
+
 int socket_of(mg_connection* raw, const mg_request_info& info) {
   auto* peer = static_cast<Peer*>(mg_get_user_connection_data(raw));
   if (!peer) {
@@ -61,6 +80,16 @@ int socket_of(mg_connection* raw, const mg_request_info& info) {
 }
 
 }  // namespace
+
+int answer_malformed(mg_connection* raw, int status, const char* message) {
+  const std::string body = std::string(message) + '\n';
+  start_header(raw, status, kPlainText);
+  mg_response_header_add(raw, "Content-Length", std::to_string(body.size()).c_str(), -1);
+  mg_response_header_add(raw, "Connection", "close", -1);
+  mg_response_header_send(raw);
+  mg_write(raw, body.data(), body.size());
+  return 0;
+}
 
 Connection::Connection(mg_connection* raw, Reaper& reaper)
     : raw_(raw), info_(mg_get_request_info(raw)), reaper_(reaper), socket_(socket_of(raw, *info_)) {
@@ -108,10 +137,7 @@ Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
 void Connection::start_answer(int status, std::string_view content_type, const Headers& headers) {
   status_ = status;
   reaper_.arm(socket_, kTransferTime);
-  mg_response_header_start(raw_, status);
-  mg_response_header_add(raw_, "Content-Type", content_type.data(),
-                         static_cast<int>(content_type.size()));
-  mg_response_header_add(raw_, "X-Content-Type-Options", "nosniff", -1);
+  start_header(raw_, status, content_type);
   for (const auto& [name, value] : headers)
     mg_response_header_add(raw_, name.c_str(), value.data(), static_cast<int>(value.size()));
 }

@@ -14,6 +14,8 @@
 
 namespace mbcosim::server::http {
 
+inline constexpr const char* kPlainText = "text/plain; charset=utf-8";
+
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
 /// What the door keeps for a connection while it lives, in civetweb's connection data.
@@ -62,6 +64,9 @@ class Connection {
   int status_ = 500;
   bool body_read_ = false;
 };
+
+/// Answers what is no request that a Connection could stand for; 0, as civetweb wants it.
+int answer_malformed(mg_connection* raw, int status, const char* message);
 
 /// The value of `name` in "a=1&b=2", decoded.
 std::optional<std::string> query_value(std::string_view query, const std::string& name);

@@ -21,7 +21,6 @@ namespace mbcosim::server::http {
 namespace {
 
 constexpr std::chrono::milliseconds kLastWords{500};  // for a reader, once the door closes
-constexpr const char* kPlainText = "text/plain; charset=utf-8";
 constexpr const char* kNoPage =
     "This daemon was built without its page (CMake option MBCOSIM_PAGE, or no npm at build time).\n"
     "Calls, /metrics and /healthz are served all the same.\n";
@@ -111,6 +110,7 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
   };
   callbacks.end_request = [](const mg_connection* raw, int) { ended(raw); };
   callbacks.connection_close = forget_peer;
+  callbacks.http_error = answer_malformed;
   callbacks.log_message = log_message;
   context = mg_start(&callbacks, this, const_cast<const char**>(settings.data()));
   if (!context)

@@ -86,14 +86,15 @@ class Bystander:
         self.name = self.stub.CreateSimulation(iter([
             pb.UploadRequest(header=pb.UploadHeader(bundle_main_file="deck")),
             pb.UploadRequest(chunk={"path": "deck", "data": attacks.BODY.encode()})]), metadata=self.metadata,
-            timeout=30).simulation.name
+            timeout=30 * FACTOR).simulation.name
         self.step = 0
         self.errors = []
 
     def once(self):
         start = time.monotonic()
-        reply = self.stub.Step(pb.StepRequest(simulation=self.name, steps=5, outputs=[0]), metadata=self.metadata, timeout=30)
-        assert self.health(b"", timeout=30) == b"\x08\x01"
+        reply = self.stub.Step(pb.StepRequest(simulation=self.name, steps=5, outputs=[0]), metadata=self.metadata,
+                               timeout=30 * FACTOR)
+        assert self.health(b"", timeout=30 * FACTOR) == b"\x08\x01"
         took = time.monotonic() - start
         self.step += 5
         assert reply.step == self.step, (reply.step, self.step)

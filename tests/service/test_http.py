@@ -1,5 +1,6 @@
 """The HTTP door: calls by Connect and gRPC-Web as by gRPC, and nobody else comes in."""
 import base64
+import email.utils
 import http.client
 import json
 import math
@@ -565,6 +566,16 @@ def test_pipelined_requests_are_answered_in_their_order(door):
     answers = all_of(link).split(b"HTTP/1.1 ")[1:]
     assert [answer[:3] for answer in answers] == [b"200", b"200", b"404", b"200"]
     assert answers[0].endswith(b"ok\n") and answers[1].endswith(b"ready\n")
+
+
+@pytest.mark.parametrize("request_line, status", [(b"GET /healthz HTTP/1.1", b"200"), (b"GET /healthz HTTP/9.9", b"505"), (b"GET nothing HTTP/1.1", b"400")])
+def test_answers_are_dated_whether_ours_or_the_library_s(door, request_line, status):
+    link = door.raw()
+    link.sendall(request_line + f"\r\nHost: {door.host}:{door.port}\r\nConnection: close\r\n\r\n".encode())
+    head, body = all_of(link).split(b"\r\n\r\n", 1)
+    dates = [line[6:].decode() for line in head.split(b"\r\n") if line.startswith(b"Date: ")]
+    assert head.split()[1] == status and body.endswith(b"\n") and len(dates) == 1
+    assert abs(email.utils.parsedate_to_datetime(dates[0]).timestamp() - time.time()) < 2 + TIME_FACTOR
 
 
 @pytest.mark.parametrize("behind", [b"\0\xff" * 500, b"{}{}{}\r\n\r\n", b"GET /healthz HTTP/1.1\r\n", b"\r\n" * 1000])
