@@ -1,7 +1,9 @@
 #include "options.h"
 
 #include <charconv>
+#include <fstream>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 
 const char* const kUsage =
@@ -19,7 +21,11 @@ const char* const kUsage =
     "  --force NAME         read: forces on the points [N]\n"
     "  --moment NAME        read: moments about the points [N m]\n"
     "  --displacement NAME  written: from where the points were at the start [m]\n"
-    "  --velocity NAME      written: velocities of the points [m/s]\n";
+    "  --velocity NAME      written: velocities of the points [m/s]\n"
+    "\n"
+    "To a daemon that wants to know who calls:\n"
+    "  --token-file FILE    with a bearer token\n"
+    "  --server-ca FILE     certificate of the daemon's authority: the connection uses TLS\n";
 
 namespace {
 
@@ -37,6 +43,22 @@ std::vector<int> read_labels(const std::string& list) {
     if (rest == end) return labels;
     at = rest + 1;
   }
+}
+
+std::string text_of(const std::string& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in || text.str().empty()) throw std::invalid_argument("cannot read \"" + file + '"');
+  return text.str();
+}
+
+mbcosim::client::Credentials read_credentials(const std::string& token_file,
+                                              const std::string& server_ca) {
+  mbcosim::client::Credentials credentials;
+  if (!token_file.empty()) std::istringstream(text_of(token_file)) >> credentials.token;
+  if (!server_ca.empty()) credentials.server_ca = text_of(server_ca);
+  return credentials;
 }
 
 void check(const Options& options) {
@@ -58,8 +80,8 @@ void check(const Options& options) {
 Options read_options(int argc, const char* const* argv) {
   constexpr int kPositional = 4;
   if (argc <= kPositional) throw std::invalid_argument("too few arguments");
-  Options options{argv[1], argv[2], argv[3], argv[4], {}, {}, {}, {}, {}};
-  std::string nodes;
+  Options options{argv[1], argv[2], argv[3], argv[4], {}, {}, {}, {}, {}, {}};
+  std::string nodes, token_file, server_ca;
   const std::map<std::string, std::string*> known = {{"--deck", &options.deck},
                                                      {"--simulation", &options.simulation},
                                                      {"--port", &options.port},
@@ -67,7 +89,9 @@ Options read_options(int argc, const char* const* argv) {
                                                      {"--force", &options.data.force},
                                                      {"--moment", &options.data.moment},
                                                      {"--displacement", &options.data.displacement},
-                                                     {"--velocity", &options.data.velocity}};
+                                                     {"--velocity", &options.data.velocity},
+                                                     {"--token-file", &token_file},
+                                                     {"--server-ca", &server_ca}};
   for (int i = kPositional + 1; i < argc; i += 2) {
     const auto option = known.find(argv[i]);
     if (option == known.end())
@@ -76,6 +100,7 @@ Options read_options(int argc, const char* const* argv) {
     *option->second = argv[i + 1];
   }
   if (!nodes.empty()) options.nodes = read_labels(nodes);
+  options.credentials = read_credentials(token_file, server_ca);
   check(options);
   return options;
 }

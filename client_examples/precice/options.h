@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "client/mbcosim_client.h"
+
 /// Names of the data in preCICE's configuration; empty: not exchanged.
 struct DataNames {
   std::string force, moment;           ///< read: [N], [N·m] about the points
@@ -18,6 +20,7 @@ struct Options {
   std::string port;        ///< that the deck or the other client names; empty: `nodes` tell it
   std::vector<int> nodes;  ///< labels of the nodes of a port that is made for the deck
   DataNames data;
+  mbcosim::client::Credentials credentials;  ///< towards the daemon
 };
 
 extern const char* const kUsage;

@@ -118,7 +118,7 @@ client::PeerOptions tight_peer() {
 }
 
 void couple(const Options& options, std::unique_ptr<precice::Participant>& participant) {
-  client::Server server = client::Server::connect(options.address);
+  client::Server server = client::Server::connect(options.address, 10, options.credentials);
   client::Simulation simulation = open_simulation(server, options);
   const client::Motion start = motion_at_start(simulation, port_of(options));
   participant = std::make_unique<precice::Participant>(options.participant, options.configuration,

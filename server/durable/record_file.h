@@ -2,7 +2,7 @@
 ///
 /// A record: kind (4 bytes), length of its content (8 bytes), CRC-32 of kind, length and content
 /// (4 bytes), all with the lowest byte first, then the content. A file begins with a record of kind
-/// `begin`, whose content is "mbcosim 2 " and the file's name, and ends with one of kind `end`.
+/// `begin`, whose content is "mbcosim 1 " and the file's name, and ends with one of kind `end`.
 #pragma once
 
 #include <fcntl.h>

@@ -27,4 +27,19 @@ std::optional<std::string> folder_of(std::string_view location) {
   return path;
 }
 
+std::string uri_of(std::string_view folder) {
+  constexpr std::string_view kPlain =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/";
+  constexpr char kDigits[] = "0123456789ABCDEF";
+  std::string uri = "file://";
+  for (const char c : folder) {
+    const auto code = static_cast<unsigned char>(c);
+    if (kPlain.find(c) != std::string_view::npos)
+      uri += c;
+    else
+      uri += {'%', kDigits[code >> 4], kDigits[code & 15]};
+  }
+  return uri;
+}
+
 }  // namespace mbcosim::fmi

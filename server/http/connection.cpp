@@ -1,55 +1,22 @@
 #include "http/connection.h"
 
-#include <arpa/inet.h>
-#include <dirent.h>
-#include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 
 #include <array>
-#include <charconv>
-#include <cstring>
 #include <ctime>
-#include <memory>
+
+#include "http/sockets.h"
 
 namespace mbcosim::server::http {
 namespace {
 
 constexpr std::chrono::milliseconds kLinger{2000};  // for the rest of a request that is refused
 
-struct Endpoint {
-  std::string address;
-  int port = -1;
-};
-
-Endpoint peer_of(int socket) {
-  sockaddr_storage name{};
-  socklen_t length = sizeof name;
-  if (::getpeername(socket, reinterpret_cast<sockaddr*>(&name), &length) != 0) return {};
-  std::array<char, INET6_ADDRSTRLEN> text{};
-  if (name.ss_family == AF_INET) {
-    const auto& v4 = reinterpret_cast<const sockaddr_in&>(name);
-    ::inet_ntop(AF_INET, &v4.sin_addr, text.data(), text.size());
-    return {text.data(), ntohs(v4.sin_port)};
-  }
-  if (name.ss_family != AF_INET6) return {};
-  const auto& v6 = reinterpret_cast<const sockaddr_in6&>(name);
-  ::inet_ntop(AF_INET6, &v6.sin6_addr, text.data(), text.size());
-  return {text.data(), ntohs(v6.sin6_port)};
-}
-
 // civetweb does not tell the socket of a connection: it is the one with this peer.
 int find_socket(const mg_request_info& info) {
-  const std::unique_ptr<DIR, int (*)(DIR*)> folder(::opendir("/proc/self/fd"), ::closedir);
-  if (!folder) return -1;
-  while (const dirent* entry = ::readdir(folder.get())) {
-    int socket = -1;
-    const char* end = entry->d_name + std::strlen(entry->d_name);
-    if (std::from_chars(entry->d_name, end, socket).ec != std::errc()) continue;
-    const Endpoint peer = peer_of(socket);
-    if (peer.port == info.remote_port && peer.address == info.remote_addr) return socket;
-  }
-  return -1;
+  const Endpoint wanted{info.remote_addr, info.remote_port};
+  return find_descriptor([&](int fd) { return peer_of(fd) == wanted; });
 }
 
 // civetweb would write the date by gmtime, whose result all threads share.

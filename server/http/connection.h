@@ -53,6 +53,8 @@ class Connection {
   /// Whether the client has hung up. Cheap.
   bool gone() const;
   int status() const { return status_; }
+  /// -1: not found.
+  int socket() const { return socket_; }
 
  private:
   void start_answer(int status, std::string_view content_type, const Headers& headers);

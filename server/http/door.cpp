@@ -9,6 +9,7 @@
 
 #include "http/admission.h"
 #include "http/connection.h"
+#include "http/crowd.h"
 #include "http/page.h"
 #include "http/reaper.h"
 #include "http/rpc_error.h"
@@ -45,10 +46,6 @@ int log_message(const mg_connection*, const char* message) {
   return 1;
 }
 
-void forget_peer(const mg_connection* raw) {
-  delete static_cast<Peer*>(mg_get_user_connection_data(raw));
-}
-
 }  // namespace
 
 struct Door::Impl {
@@ -61,10 +58,14 @@ struct Door::Impl {
   void serve_call(Connection& connection, const google::protobuf::MethodDescriptor& method);
   static void fail(Connection& connection, v1::Reason reason, const std::string& message,
                    int status = 0);
+  static Impl& of(const mg_connection* raw);
+  static int came(const mg_connection* raw, void** connection_data);
   static void ended(const mg_connection* raw);
+  static void went(const mg_connection* raw);
 
   DoorParts parts;
   Reaper reaper;
+  Crowd crowd;
   std::unique_ptr<Admission> admission;
   RpcHandler rpc;
   std::string address, page_address;
@@ -74,6 +75,7 @@ struct Door::Impl {
 
 Door::Impl::Impl(const DoorOptions& options, DoorParts given)
     : parts(std::move(given)),
+      crowd(options.connections),
       rpc(parts.channel, parts.budgets,
           {options.message_bytes, options.streams_per_identity,
            std::max(1, options.connections * 3 / 4)}) {
@@ -105,11 +107,10 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
                                              "no",
                                              nullptr};
   mg_callbacks callbacks{};
-  callbacks.begin_request = [](mg_connection* raw) {
-    return static_cast<Impl*>(mg_get_user_data(mg_get_context(raw)))->serve(raw);
-  };
+  callbacks.init_connection = came;
+  callbacks.begin_request = [](mg_connection* raw) { return of(raw).serve(raw); };
   callbacks.end_request = [](const mg_connection* raw, int) { ended(raw); };
-  callbacks.connection_close = forget_peer;
+  callbacks.connection_close = went;
   callbacks.http_error = answer_malformed;
   callbacks.log_message = log_message;
   context = mg_start(&callbacks, this, const_cast<const char**>(settings.data()));
@@ -117,8 +118,11 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
     throw std::runtime_error("cannot serve HTTP on " + options.address + "; is it in use?");
   mg_server_port port{};
   mg_get_server_ports(context, 1, &port);
-  const std::string host = options.address.substr(0, options.address.rfind(':'));
-  address = host + ":" + std::to_string(port.port);
+  const auto host_of = [](const std::string& text) { return text.substr(0, text.rfind(':')); };
+  address = host_of(options.address) + ":" + std::to_string(port.port);
+  std::string bound = host_of(wanted);
+  if (bound.front() == '[') bound = bound.substr(1, bound.size() - 2);
+  crowd.listens_at({bound, port.port});
   admission = std::make_unique<Admission>(parts.authenticator, address, options.origins);
   page_address = "http://" + address + "/";
   if (!admission->startup_token().empty()) page_address += "?token=" + admission->startup_token();
@@ -132,10 +136,27 @@ Door::Impl::~Impl() {
   mg_exit_library();
 }
 
+Door::Impl& Door::Impl::of(const mg_connection* raw) {
+  return *static_cast<Impl*>(mg_get_user_data(mg_get_context(raw)));
+}
+
+int Door::Impl::came(const mg_connection* raw, void**) {
+  of(raw).crowd.came();
+  return 0;
+}
+
 void Door::Impl::ended(const mg_connection* raw) {
-  auto* self = static_cast<Impl*>(mg_get_user_data(mg_get_context(raw)));
   const auto* peer = static_cast<const Peer*>(mg_get_user_connection_data(raw));
-  if (peer) self->reaper.disarm(peer->socket);
+  if (!peer) return;
+  of(raw).reaper.disarm(peer->socket);
+  of(raw).crowd.ended(peer->socket);
+}
+
+void Door::Impl::went(const mg_connection* raw) {
+  const std::unique_ptr<const Peer> peer(
+      static_cast<const Peer*>(mg_get_user_connection_data(raw)));
+  if (peer) of(raw).crowd.ended(peer->socket);
+  of(raw).crowd.went();
 }
 
 void Door::Impl::fail(Connection& connection, v1::Reason reason, const std::string& message,
@@ -150,6 +171,7 @@ int Door::Impl::serve(mg_connection* raw) {
   int status = 500;
   run_caught("http", [&] {
     Connection connection(raw, reaper);
+    crowd.began(connection.socket());
     try {
       route(connection);
     } catch (const Refusal& refusal) {

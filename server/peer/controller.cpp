@@ -9,6 +9,7 @@
 
 #include "fmi/fmi2_types.h"
 #include "fmi/fmi3_types.h"
+#include "fmi/location.h"
 
 namespace mbcosim::peer {
 namespace {
@@ -69,7 +70,7 @@ class Controller2 : public Controller {
                                       const fmi2::Callbacks*, fmi2::Boolean, fmi2::Boolean)>(
             "fmi2Instantiate");
     handle_ = instantiate("controller", kCoSimulation, archive.token().c_str(),
-                          ("file://" + archive.resources()).c_str(), &callbacks_, 0, 1);
+                          fmi::uri_of(archive.resources()).c_str(), &callbacks_, 0, 1);
     if (!handle_) throw std::runtime_error("the FMU cannot be instantiated");
   }
   ~Controller2() override {

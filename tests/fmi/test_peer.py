@@ -289,6 +289,20 @@ def test_a_signal_removes_the_folder_of_an_fmu(start_daemon, program, fmus, tmp_
         assert not list(tmp_path.glob("mbcosim-fmu-*"))
 
 
+@pytest.mark.parametrize("standard", [2, 3])
+def test_the_folder_of_an_fmu_may_have_any_name(start_daemon, program, fmus, tmp_path, standard):  # noqa: F811
+    """FMI 2 names it by a URI."""
+    folder = tmp_path / "50%25 of a b#ü?"
+    folder.mkdir()
+    daemon = start_daemon()
+    with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
+        peer = program("fmu", fmus(standard), "--server", daemon.address, "--simulation", cart.name, "--port", "control",
+                       "--map", f"u={SENT}[1]", "--map", "y=stream.force", env={**os.environ, "TMPDIR": str(folder)})
+        assert "attached" in peer.first_line(), peer.errors
+        assert cart.step(2).outcome == "ACCEPTED"
+    assert peer.finish() == 0, peer.errors
+
+
 def test_a_lost_daemon_is_told(start_daemon, program, fmus):  # noqa: F811
     daemon = start_daemon()
     cart = daemon.connect().load(CART, ports=[signal_port()])

@@ -1,0 +1,55 @@
+/// Clients that hold all workers of the door and ask for nothing.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "http/sockets.h"
+#include "threads/mutex.h"
+
+namespace mbcosim::server::http {
+
+/// A connection holds a worker while its client sends the head of a request, or nothing. When such
+/// and others hold all workers, those without a request are shut down, the longest idle first, as
+/// many as wait for a worker: slow senders delay others by tenths of a second, not by their own
+/// timeouts.
+class Crowd {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  explicit Crowd(int workers);
+  ~Crowd();
+  Crowd(const Crowd&) = delete;
+  Crowd& operator=(const Crowd&) = delete;
+
+  /// Where the door listens; before it is known, nobody is shut down.
+  void listens_at(const Endpoint& local);
+  /// A worker takes a connection, or lets it go.
+  void came();
+  void went();
+  /// A request begins, or ends if one had begun; `socket` -1: one that could not be found.
+  void began(int socket);
+  void ended(int socket);
+
+ private:
+  void loop();
+  void thin_out() TS_REQUIRES(mutex_);
+  bool is_ours(int socket) const TS_REQUIRES(mutex_);
+
+  const std::size_t workers_;
+  Mutex mutex_;
+  Condition changed_;
+  Endpoint local_ TS_GUARDED_BY(mutex_);
+  std::size_t held_ TS_GUARDED_BY(mutex_) = 0;
+  std::multiset<int> in_request_ TS_GUARDED_BY(mutex_);
+  /// By cookie: since when a socket is seen with nothing to read and no request.
+  std::map<std::uint64_t, Clock::time_point> idle_ TS_GUARDED_BY(mutex_);
+  bool stop_ TS_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace mbcosim::server::http
