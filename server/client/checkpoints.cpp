@@ -1,4 +1,5 @@
 /// Whole simulations as bytes.
+#include "client/attempts.h"
 #include "client/convert.h"
 #include "client/simulation.h"
 
@@ -14,13 +15,13 @@ std::string Simulation::export_checkpoint(double timeout) const {
 
 Simulation Server::import_checkpoint(const std::string& bytes, const std::string& display_name,
                                      double timeout) {
-  CallContext context(*impl_, timeout);
   v1::ImportCheckpointReply reply;
-  const auto stream = impl_->simulations->ImportCheckpoint(&context, &reply);
   v1::ImportCheckpointRequest message;
   message.mutable_header()->set_request_id(new_request_id());
   if (!display_name.empty()) message.mutable_header()->set_display_name(display_name);
-  upload(*stream, std::move(message), bytes);
+  repeated(*impl_, timeout, "", [&](CallContext& context) {
+    return upload(*impl_->simulations->ImportCheckpoint(&context, &reply), message, bytes);
+  });
   return Simulation::Impl::make(impl_, reply.simulation(), /*owned=*/false, {});
 }
 

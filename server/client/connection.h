@@ -37,7 +37,8 @@ std::string collect(Stream stream) {
 
 /// The other way: pieces of `bytes` after `header`, and the end.
 template <class Request>
-void upload(grpc::ClientWriter<Request>& stream, Request header, const std::string& bytes) {
+grpc::Status upload(grpc::ClientWriter<Request>& stream, const Request& header,
+                    const std::string& bytes) {
   constexpr std::size_t kChunkBytes = 1 << 20;
   bool open = stream.Write(header);
   for (std::size_t at = 0; open && at < bytes.size(); at += kChunkBytes) {
@@ -46,7 +47,7 @@ void upload(grpc::ClientWriter<Request>& stream, Request header, const std::stri
     open = stream.Write(piece);
   }
   stream.WritesDone();
-  require(stream.Finish());
+  return stream.Finish();
 }
 
 struct Server::Impl {

@@ -576,7 +576,7 @@ class Server {
   /// "unix:PATH" or "HOST:PORT"; waits until the server answers, at most `timeout` seconds. For
   /// `reconnect` seconds calls are made again when the server cannot be reached, and is perhaps
   /// about to come back with its simulations; timeouts grow by as much. Each is done once all the
-  /// same. Streams (steppers, subscriptions, peers, `simulate`, bytes) end.
+  /// same. Streams (steppers, subscriptions, peers, `simulate`, exports) end.
   static Server connect(const std::string& address, double timeout = 10,
                         const Credentials& credentials = {}, double reconnect = 0);
   Server(Server&&) noexcept;

@@ -103,16 +103,16 @@ std::string Simulation::export_state(const Snapshot& snapshot, double timeout) c
 
 Snapshot Simulation::import_state(const std::string& bytes, bool restore,
                                   const std::string& display_name, double timeout) {
-  CallContext context(*impl_->server, timeout, name());
   v1::ImportSnapshotReply reply;
-  const auto stream = impl_->server->simulations->ImportSnapshot(&context, &reply);
   v1::ImportSnapshotRequest message;
   v1::ImportSnapshotHeader* header = message.mutable_header();
   header->set_simulation(name());
   header->set_display_name(display_name);
   header->set_restore(restore);
   header->set_request_id(new_request_id());
-  upload(*stream, std::move(message), bytes);
+  repeated(*impl_->server, timeout, name(), [&](CallContext& context) {
+    return upload(*impl_->server->simulations->ImportSnapshot(&context, &reply), message, bytes);
+  });
   return to_snapshot(reply.snapshot());
 }
 

@@ -68,7 +68,7 @@ void Journal::mend() {
     std::string first;
     RecordWriter([&](std::string_view bytes) {
       first += bytes;
-    }).begin(StateFolder::journal_name(next_ - 1));
+    }).begin(kJournalFile + std::to_string(next_ - 1));
     write(first);
   }
   torn_ = false;

@@ -7,11 +7,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <optional>
 #include <random>
 
 #include "files/folder_size.h"
@@ -21,9 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kLongestRecord = 1LL << 40;
 constexpr std::size_t kPiece = 1 << 20;  // of a file of the model in one record
-const std::string kSnapshot = "snapshot-", kJournal = "journal-";
 const std::string kUnfinished = "/unfinished";
 const std::string kDamaged = ".damaged", kGone = ".gone";
 const std::string kRemovals = "removals";
@@ -54,75 +50,7 @@ void remove_gone(const std::string& path) {
   for (const fs::path& each : gone) fs::remove_all(each, none);
 }
 
-template <class Message>
-void parse(const std::string& content, Message* message) {
-  if (!message->ParseFromString(content)) throw DamagedFile("a record cannot be understood");
-}
-
-/// All records of a file, which must be the one of that name.
-void read_records(const std::string& folder, const std::string& name,
-                  const RecordReader::Handler& handler) {
-  RecordReader reader(kLongestRecord, handler);
-  read_pieces(folder + "/" + name, [&](std::string_view piece) { reader.take(piece); });
-  reader.finish();
-  if (reader.file() != name) throw DamagedFile("it is the file \"" + reader.file() + "\"");
-}
-
-/// N of a file "PREFIXN".
-std::optional<int> number_of(const std::string& name, const std::string& prefix) {
-  if (name.compare(0, prefix.size(), prefix) != 0) return std::nullopt;
-  int number = 0;
-  const char* end = name.data() + name.size();
-  const auto [at, error] = std::from_chars(name.data() + prefix.size(), end, number);
-  if (error != std::errc() || at != end || number < 1) return std::nullopt;
-  return number;
-}
-
 }  // namespace
-
-// ------------------------------------------------------------------ files in a series
-
-namespace {
-
-void add_file(const v1::FileChunk& chunk, StoredModel* model) {
-  model->files[chunk.path()] += chunk.data();
-}
-
-}  // namespace
-
-void StoredBundle::add(const std::string& file, RecordKind kind, std::string content) {
-  if (kind == RecordKind::begin || kind == RecordKind::end) return;
-  if (const auto number = number_of(file, kSnapshot); number && kind == RecordKind::state) {
-    snapshots[*number] = std::move(content);
-  } else if (file == "model" && kind == RecordKind::head) {
-    parse(content, &model.head);
-  } else if (file == "model" && kind == RecordKind::file) {
-    v1::FileChunk chunk;
-    parse(content, &chunk);
-    add_file(chunk, &model);
-  } else if (file == "point" && kind == RecordKind::point) {
-    parse(content, &point.point);
-  } else if (file == "point" && kind == RecordKind::state) {
-    point.state = std::move(content);
-  } else {
-    throw DamagedFile("the file \"" + file.substr(0, 100) + "\" has a record of a wrong kind");
-  }
-}
-
-OpenFiles::OpenFiles(const std::vector<std::string>& paths) {
-  for (const std::string& path : paths) files_.emplace_back(path);
-}
-
-std::string OpenFiles::read(std::size_t most) {
-  std::string piece(most, '\0');
-  for (; !files_.empty(); files_.pop_front()) {
-    const std::size_t count = files_.front().read(&piece).size();
-    if (count == 0) continue;
-    piece.resize(count);
-    return piece;
-  }
-  return {};
-}
 
 // ------------------------------------------------------------------ the folder
 
@@ -304,7 +232,7 @@ bool StateFolder::is_unfinished(const std::string& id) const {
 void StateFolder::write_model(const std::string& id, const StoredModel& model) {
   make_folder(folder(id));
   sync_path(path_ + "/simulations");
-  write_file(id, "model", [&](RecordWriter& records) {
+  write_file(id, kModelFile, [&](RecordWriter& records) {
     records.add(RecordKind::head, model.head.SerializeAsString());
     v1::FileChunk chunk;
     for (const auto& [name, bytes] : model.files) {
@@ -318,19 +246,16 @@ void StateFolder::write_model(const std::string& id, const StoredModel& model) {
 }
 
 void StateFolder::write_point(const std::string& id, const StoredPoint& point) {
-  write_file(id, "point", [&](RecordWriter& records) {
-    records.add(RecordKind::point, point.point.SerializeAsString());
-    records.add(RecordKind::state, point.state);
-  });
+  write_file(id, kPointFile, [&](RecordWriter& records) { add_records(point, records); });
 }
 
 void StateFolder::write_snapshot(const std::string& id, int number, const std::string& state) {
-  write_file(id, kSnapshot + std::to_string(number),
+  write_file(id, kSnapshotFile + std::to_string(number),
              [&](RecordWriter& records) { records.add(RecordKind::state, state); });
 }
 
 void StateFolder::remove_snapshot(const std::string& id, int number) {
-  const std::string path = folder(id) + "/" + kSnapshot + std::to_string(number);
+  const std::string path = folder(id) + "/" + kSnapshotFile + std::to_string(number);
   const std::int64_t size = bytes_of_file(path);
   if (::unlink(path.c_str()) == 0) give_back(size);
 }
@@ -349,65 +274,36 @@ std::string StateFolder::put_aside(const std::string& id) { return renamed(folde
 
 // ------------------------------------------------------------------ reading
 
-void StateFolder::read_file(const std::string& id, const std::string& name,
-                            const RecordReader::Handler& handler) const {
-  named(id + "/" + name, [&] { read_records(folder(id), name, handler); });
-}
-
 v1::CheckpointHead StateFolder::read_head(const std::string& id) const {
   return read_model(id).head;
 }
 
 StoredModel StateFolder::read_model(const std::string& id) const {
-  StoredModel model;
-  read_file(id, "model", [&](RecordKind kind, const std::string& content) {
-    if (kind == RecordKind::head) parse(content, &model.head);
-    if (kind != RecordKind::file) return;
-    v1::FileChunk chunk;
-    parse(content, &chunk);
-    add_file(chunk, &model);
-  });
-  return model;
+  return named(id + "/" + kModelFile, [&] { return server::read_model(folder(id)); });
 }
 
 StoredPoint StateFolder::read_point(const std::string& id) const {
-  StoredPoint point;
-  read_file(id, "point", [&](RecordKind kind, std::string content) {
-    if (kind == RecordKind::point) parse(content, &point.point);
-    if (kind == RecordKind::state) point.state = std::move(content);
-  });
-  return point;
+  return named(id + "/" + kPointFile, [&] { return server::read_point(folder(id)); });
 }
 
 std::string StateFolder::read_snapshot(const std::string& id, int number) const {
-  std::string state;
-  read_file(id, kSnapshot + std::to_string(number), [&](RecordKind kind, std::string content) {
-    if (kind == RecordKind::state) state = std::move(content);
-  });
-  return state;
+  return named(id + "/" + kSnapshotFile + std::to_string(number),
+               [&] { return server::read_snapshot(folder(id), number); });
 }
 
 std::vector<std::string> StateFolder::files_of(const std::string& id) const {
-  std::vector<std::string> paths = {folder(id) + "/model", folder(id) + "/point"};
+  std::vector<std::string> paths = {folder(id) + "/" + kModelFile, folder(id) + "/" + kPointFile};
   for (const int number : snapshots(id))
-    paths.push_back(folder(id) + "/" + kSnapshot + std::to_string(number));
+    paths.push_back(folder(id) + "/" + kSnapshotFile + std::to_string(number));
   return paths;
 }
 
 std::vector<int> StateFolder::numbered(const std::string& id, const std::string& prefix) const {
-  std::vector<int> numbers;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder(id), error), end; !error && entry != end;
-       entry.increment(error))
-    if (const auto number = number_of(entry->path().filename(), prefix)) numbers.push_back(*number);
-  if (error && error != std::errc::no_such_file_or_directory)
-    throw StorageError(id + ": its files cannot be listed: " + error.message());
-  std::sort(numbers.begin(), numbers.end());
-  return numbers;
+  return named(id, [&] { return numbers_of(folder(id), prefix); });
 }
 
 std::vector<int> StateFolder::snapshots(const std::string& id) const {
-  return numbered(id, kSnapshot);
+  return numbered(id, kSnapshotFile);
 }
 
 std::int64_t StateFolder::written_at(const std::string& id) const {
@@ -416,7 +312,7 @@ std::int64_t StateFolder::written_at(const std::string& id) const {
     struct stat info {};
     if (::stat(path.c_str(), &info) == 0) last = std::max<std::int64_t>(last, info.st_mtime);
   };
-  look(folder(id) + "/point");
+  look(folder(id) + "/" + kPointFile);
   for (const int number : journals(id)) look(journal_path(id, number));
   return last;
 }
@@ -424,12 +320,13 @@ std::int64_t StateFolder::written_at(const std::string& id) const {
 // ------------------------------------------------------------------ journals
 
 std::vector<int> StateFolder::journals(const std::string& id) const {
-  return numbered(id, kJournal);
+  return numbered(id, kJournalFile);
 }
 
 void StateFolder::read_journals(const std::string& id, const EntryHandler& handler) {
   for (const int number : journals(id)) {
-    const std::string name = journal_name(number), path = journal_path(id, number);
+    const std::string name = kJournalFile + std::to_string(number);
+    const std::string path = journal_path(id, number);
     named(id + "/" + name, [&] {
       std::string bytes;
       read_pieces(path, [&](std::string_view piece) { bytes += piece; });

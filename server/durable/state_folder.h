@@ -3,47 +3,13 @@
 
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <string>
 #include <vector>
 
-#include "durable/journal.h"
-#include "durable/record_file.h"
-#include "mbcosim/v1/checkpoints.pb.h"
+#include "durable/stored_files.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::server {
-
-/// What a stored simulation is made of.
-struct StoredModel {
-  v1::CheckpointHead head;
-  std::map<std::string, std::string> files;  ///< of the deck
-};
-struct StoredPoint {
-  v1::CheckpointPoint point;
-  std::string state;  ///< of Simulation::export_state
-};
-
-/// All of a stored simulation, as it is read from a series of files.
-struct StoredBundle {
-  StoredModel model;
-  StoredPoint point;
-  std::map<int, std::string> snapshots;  ///< states by number
-  /// Of the file of that name. Throws StorageError.
-  void add(const std::string& file, RecordKind kind, std::string content);
-};
-
-/// Files that are read one after the other, as they were when they were opened.
-class OpenFiles {
- public:
-  /// Throws StorageError.
-  explicit OpenFiles(const std::vector<std::string>& paths);
-  /// At most so many bytes; none: that was all. Throws StorageError.
-  std::string read(std::size_t most);
-
- private:
-  std::deque<ReadFile> files_;
-};
 
 /// A deletion whose request had an id.
 struct StoredRemoval {
@@ -94,9 +60,8 @@ class StateFolder {
   void remove_snapshot(const std::string& id, int number);
 
   // --- its journal
-  static std::string journal_name(int number) { return "journal-" + std::to_string(number); }
   std::string journal_path(const std::string& id, int number) const {
-    return folder(id) + "/" + journal_name(number);
+    return folder(id) + "/" + kJournalFile + std::to_string(number);
   }
   std::vector<int> journals(const std::string& id) const;
   /// All entries, the oldest first. What was being written when the daemon was killed is cut off.
@@ -125,8 +90,6 @@ class StateFolder {
   std::string folder(const std::string& id) const { return path_ + "/simulations/" + id; }
   template <class Write>
   void write_file(const std::string& id, const std::string& name, Write&& write);
-  void read_file(const std::string& id, const std::string& name,
-                 const RecordReader::Handler& handler) const;
   std::vector<int> numbered(const std::string& id, const std::string& prefix) const;
 
   const std::string path_;

@@ -129,7 +129,10 @@ void Durability::read_simulation(const std::string& id) {
     folder_->remove(id);
   } catch (const DamagedFile& damage) {
     const std::string aside = named(damage.what(), [&] { return folder_->put_aside(id); });
-    spdlog::error("state folder: {}; put aside as {}", damage.what(), aside);
+    spdlog::error(
+        "state folder: {}; put aside as {}: `mbcosim resume --from-checkpoint` makes a simulation "
+        "of what is whole there",
+        damage.what(), aside);
   }
 }
 
@@ -190,16 +193,9 @@ void keep_replies(const v1::JournalEntry& entry, v1::CheckpointPoint* point) {
 // The last checkpoint, and what the journal tells of later.
 StoredPoint Durability::read_latest(const std::string& id) const {
   StoredPoint latest = folder_->read_point(id);
-  v1::JournalEntry entry;
   folder_->read_journals(id, [&](StoredEntry stored) {
-    if (!entry.ParseFromString(stored.message)) throw DamagedFile("an entry cannot be understood");
-    if (entry.changes() <= latest.point.changes()) return;
-    latest.point.set_changes(entry.changes());
-    *latest.point.mutable_info() = entry.info();
-    *latest.point.mutable_ports() = entry.ports();
-    latest.point.clear_results_until_step();
-    keep_replies(entry, &latest.point);
-    latest.state = std::move(stored.state);
+    const v1::JournalEntry entry = message_of(stored);
+    if (go_on(entry, std::move(stored.state), &latest)) keep_replies(entry, &latest.point);
   });
   return latest;
 }

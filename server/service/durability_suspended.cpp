@@ -228,7 +228,10 @@ SessionPtr Durability::revive(const std::string& simulation, const std::string& 
   warn_of_another_build(stored.model.head);
   return session;
 } catch (const DamagedFile& damage) {
-  throw Refusal(v1::REASON_DAMAGED_STATE, simulation + " cannot be brought back: " + damage.what());
+  throw Refusal(v1::REASON_DAMAGED_STATE,
+                simulation + " cannot be brought back: " + damage.what() +
+                    "; `mbcosim resume --from-checkpoint` makes a simulation of what is whole in " +
+                    id_of(simulation) + " of the state folder");
 } catch (const StorageError& error) {
   refuse_storage(simulation + " cannot be brought back", error);
 }

@@ -10,6 +10,8 @@
 #include <sstream>
 
 #include "client/mbcosim_client.h"
+#include "durable/record_file.h"
+#include "durable/salvage.h"
 
 namespace {
 
@@ -22,6 +24,7 @@ struct Options {
   double timeout = 10;  ///< [s], to reach the daemon
   Credentials credentials;
   std::string simulation, file, name;
+  bool from_checkpoint = false;
 };
 
 std::string default_address() {
@@ -69,19 +72,50 @@ int checkpoint(const Options& options) {
   return kDone;
 }
 
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  if (!file) throw std::runtime_error("cannot read " + path);
+  return bytes.str();
+}
+
+/// Of a folder with damaged files, what is whole, when that is wanted.
+std::string salvaged(const Options& options) {
+  using namespace mbcosim::server;
+  const Salvage found = named(options.file, [&] { return salvage(options.file); });
+  std::ostringstream lost;
+  for (const std::string& damage : found.left_out)
+    lost << "  " << options.file << '/' << damage << '\n';
+  if (found.left_out.empty()) return found.bytes;
+  if (!options.from_checkpoint) {
+    std::ostringstream text;
+    text << "damaged:\n"
+         << lost.str() << "`--from-checkpoint` leaves that out: it goes on at step "
+         << found.info.step() << ", t = " << found.info.time();
+    throw std::runtime_error(text.str());
+  }
+  std::fprintf(stderr, "left out:\n%s", lost.str().c_str());
+  return found.bytes;
+}
+
 int resume(const Options& options) {
+  const bool is_folder = std::filesystem::is_directory(options.file);
+  if (options.from_checkpoint && !is_folder)
+    throw std::runtime_error(
+        "--from-checkpoint is for a folder DIR/simulations/ID.damaged, which \"" + options.file +
+        "\" is not");
+  const std::string bytes = is_folder ? salvaged(options) : "";
   Server server = reach(options);
-  std::ifstream file(options.file, std::ios::binary);
-  if (options.file.compare(0, 12, "simulations/") == 0) {
+  if (!is_folder && options.file.compare(0, 12, "simulations/") == 0) {
     Simulation simulation = server.find(options.file);
     (void)simulation.read("step");  // what needs the state brings it back
     std::printf("%s\n", simulation.name().c_str());
     return kDone;
   }
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  if (!file) throw std::runtime_error("cannot read " + options.file);
-  std::printf("%s\n", server.import_checkpoint(bytes.str(), options.name).name().c_str());
+  const Simulation made =
+      server.import_checkpoint(is_folder ? bytes : bytes_of(options.file), options.name);
+  std::printf("%s\n", made.name().c_str());
   return kDone;
 }
 
@@ -118,7 +152,13 @@ int run(int argc, char** argv) {
   store->callback([&] { chosen = checkpoint; });
   CLI::App* back = add(app, "resume",
                        "Make a simulation of such a file, or bring a suspended one back", options);
-  back->add_option("file", options.file, "The file, or simulations/NAME")->required();
+  back->add_option("file", options.file,
+                   "The file, simulations/NAME, or a folder of the state folder that was put aside")
+      ->required();
+  back->add_flag(
+      "--from-checkpoint", options.from_checkpoint,
+      "Of such a folder, leave out what is damaged: it goes on from the last checkpoint, "
+      "or the last whole entry of its journal");
   back->add_option("--name", options.name, "Name for people; default: that of the original");
   back->callback([&] { chosen = resume; });
   try {

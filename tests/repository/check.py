@@ -45,7 +45,7 @@ ARROWS = {
     "server/shared_memory": {"threads"},
     "server/http": {"service", "rpc", "threads", "wire", "mbcosim"},
     "server/view": {"client"},
-    "server/sessions": {"client"},
+    "server/sessions": {"client", "durable"},
     "server/daemon": {"input", "service", "rpc", "http", "shared_memory", "threads", "wire", "mbcosim", "grpc"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",

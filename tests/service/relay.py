@@ -10,9 +10,10 @@ import grpc
 
 
 class BlackHole:
-    """Forwards bytes of a Unix socket until `fall_silent`: from then on nothing passes, and no connection ends."""
+    """Forwards bytes of a Unix socket until `fall_silent`: from then on nothing passes, and no connection ends; `break_off` ends one."""
 
     def __init__(self, folder, target):
+        self._left, self._upwards = None, True
         self._target, self._silent, self._stop = target[len("unix:"):], threading.Event(), threading.Event()
         path = os.path.join(folder, "relay.sock")
         self.address = f"unix:{path}"
@@ -21,6 +22,13 @@ class BlackHole:
         self._listener.listen()
         self._threads = [threading.Thread(target=self._accept, daemon=True)]
         self._threads[0].start()
+
+    def break_off(self, after, upwards):
+        """Ends a connection, one time, when more than `after` bytes come over it in one direction; what is over is lost."""
+        self._left, self._upwards = after, upwards
+
+    def has_broken(self):
+        return self._left is not None and self._left < 0
 
     def fall_silent(self):
         self._silent.set()
@@ -66,12 +74,20 @@ class BlackHole:
                 for ready in select.select([client, server], [], [], 0.05)[0]:
                     try:
                         data = ready.recv(1 << 16)
+                        if self._breaks(ready is client, len(data)):
+                            return
                         if data and not self._silent.is_set():
                             other[ready].sendall(data)
                     except OSError:
                         data = b""
                     if not data:
                         return
+
+    def _breaks(self, upwards, count):
+        if self._left is None or self._left < 0 or upwards != self._upwards:
+            return False
+        self._left -= count
+        return self._left < 0
 
 
 class Unreliable(grpc.GenericRpcHandler):

@@ -1,6 +1,8 @@
 """Simulations as bytes: carried to another daemon they go on bit for bit; the commands that list, store and bring back."""
+import asyncio
 import concurrent.futures
 import os
+import re
 import subprocess
 import sys
 
@@ -8,11 +10,13 @@ import grpc
 import pytest
 
 import mbcosim
+import mbcosim.aio
 from conftest import BIN
 from mbcosim.v1 import checkpoints_pb2, simulations_pb2 as pb
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(__file__)), "hostile"))
 from forged_checkpoints import POINT, bytes_of, records_of
-from test_durable import at_the_end, bits, deck, folder, start, state_of  # noqa: F401 (fixtures)
+from relay import BlackHole
+from test_durable import at_the_end, bits, deck, folder, kill, start, state_of  # noqa: F401 (fixtures)
 
 
 @pytest.fixture
@@ -105,6 +109,52 @@ def test_a_repeated_import_makes_one_simulation(start):
         assert len(server.list()) == 2
 
 
+@pytest.mark.parametrize("upwards", [True, False], ids=["request", "reply"])
+@pytest.mark.parametrize("what", ["load", "checkpoint", "state"])
+@pytest.mark.parametrize("library", ["blocking", "asyncio"])
+def test_an_upload_that_breaks_off_is_made_again_and_counts_once(start, tmp_path, library, what, upwards):  # noqa: F811
+    daemon = start()
+    relay = BlackHole(str(tmp_path), daemon.address)
+    with daemon.connect() as direct:
+        original = direct.load_text(deck(100))
+        original.step(5)
+        checkpoint, state = original.export_checkpoint(), original.export_state()
+
+        async def upload(server, result):
+            if what == "load":
+                await result(server.load_text(deck(100)))
+            elif what == "checkpoint":
+                await result(server.import_checkpoint(checkpoint))
+            else:
+                await result((await result(server.attach(original.name))).import_state(state))
+
+        async def itself(value):
+            return value
+
+        async def through_asyncio():
+            async with mbcosim.aio.connect(relay.address, reconnect=30) as server:
+                await server.info()
+                relay.break_off(200 if upwards else 5, upwards)
+                await upload(server, lambda result: result)
+                assert relay.has_broken()
+                check()
+
+        def check():
+            assert len(direct.list()) == (1 if what == "state" else 2)
+            assert len(original.snapshots()) == (1 if what == "state" else 0)
+
+        if library == "asyncio":
+            asyncio.run(through_asyncio())
+        else:
+            with mbcosim.connect(relay.address, reconnect=30) as server:
+                server.info()
+                relay.break_off(200 if upwards else 5, upwards)
+                asyncio.run(upload(server, itself))
+                assert relay.has_broken()
+                check()
+    relay.close()
+
+
 def test_what_is_not_durable_is_refused_by_name(start, start_daemon):
     with start().connect() as server, start_daemon().connect() as without:
         with server.load_text(deck(100), durability="none") as simulation:
@@ -133,6 +183,86 @@ def test_the_commands_list_store_and_bring_back(start, other, tmp_path):
         assert (carried.info.display_name, carried.info.step) == ("again", 50)
         assert bits(carried) == bits(simulation)
         assert run("resume", printed.strip(), "--address", other.address)[0] == 0
+
+
+def flip(path, place=0.5):
+    data = bytearray(path.read_bytes())
+    data[int(len(data) * place)] ^= 4
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("place", [0.3, 0.6, 0.9])
+def test_what_is_whole_of_a_damaged_journal_goes_on(start, folder, place):  # noqa: F811
+    daemon = start("--checkpoint-interval", "3600")
+    with daemon.connect() as server:
+        expected = at_the_end(server, deck(400))
+        simulation = server.load_text(deck(400), name="body", durability="journal")
+        for _ in range(40):
+            simulation.step(1)
+        name = simulation.info.name
+    kill(daemon)
+    flip(folder / name / "journal-1", place)
+    daemon = start()
+    with daemon.connect() as server:
+        assert not server.list()
+        aside = str(folder / (name + ".damaged"))
+        assert f"put aside as {aside}: `mbcosim resume --from-checkpoint`" in daemon.log()
+        code, _, errors = run("resume", aside, "--address", daemon.address)
+        told = re.search(r"damaged:\n  " + re.escape(aside) + r"/journal-1: record (\d+) at byte \d+: .*\n"
+                         r"`--from-checkpoint` leaves that out: it goes on at step (\d+), t = ", errors)
+        assert code == 4 and told and not server.list()
+        code, printed, errors = run("resume", aside, "--from-checkpoint", "--address", daemon.address)
+        assert code == 0 and "left out:\n" in errors, errors
+        carried = server.attach(printed.strip())
+        assert carried.info.step == int(told[2]) == int(told[1]) - 2  # the record before is the last whole entry; the first is no entry
+        assert 40 * place - 3 <= carried.info.step <= 40 * place + 1 and carried.info.display_name == "body"
+        carried.run_until(1e9)
+        assert bits(carried) == expected
+
+
+def test_what_is_whole_beside_a_damaged_snapshot_goes_on(start, folder):  # noqa: F811
+    daemon = start()
+    with daemon.connect() as server:
+        expected = at_the_end(server, deck(400))
+        simulation = server.load_text(deck(400))
+        for snapshot in ("one", "two", "three"):
+            simulation.step(10)
+            simulation.snapshot(snapshot)
+        name = simulation.info.name
+    daemon.stop()
+    stored = folder / name
+    flip(stored / "snapshot-2")
+    (stored / "snapshot-3").unlink()
+    daemon = start()
+    with daemon.connect() as server:
+        with pytest.raises(mbcosim.Error, match="snapshot-2: record 2 .*`mbcosim resume --from-checkpoint`"):
+            server.attach(name).step()
+        code, printed, errors = run("resume", str(stored), "--from-checkpoint", "--name", "rest", "--address", daemon.address)
+        assert code == 0 and "snapshot-2: record 2 at byte" in errors and "snapshot-3: it cannot be opened" in errors, errors
+        carried = server.attach(printed.strip())
+        assert (carried.info.display_name, carried.info.step) == ("rest", 30)
+        assert [(s.display_name, s.step) for s in carried.snapshots()] == [("one", 10)]
+        assert carried.snapshot("four").name.endswith("/4")
+        carried.snapshots()[0].restore()
+        carried.run_until(1e9)
+        assert bits(carried) == expected
+
+
+@pytest.mark.parametrize("file", ["model", "point"])
+def test_without_its_model_or_checkpoint_nothing_is_made(start, folder, file):  # noqa: F811
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(deck()).info.name
+    daemon.stop()
+    flip(folder / name / file)
+    daemon = start()
+    aside = str(folder / (name + ".damaged"))
+    code, _, errors = run("resume", aside, "--from-checkpoint", "--address", daemon.address)
+    assert code == 4 and f"{aside}: {file}: record " in errors
+    code, _, errors = run("resume", "simulations/x", "--from-checkpoint", "--address", daemon.address)
+    assert code == 4 and "--from-checkpoint is for a folder" in errors
+    with daemon.connect() as server:
+        assert not server.list()
 
 
 def test_commands_say_what_is_wrong(start, tmp_path):

@@ -116,7 +116,7 @@ class Connection(Address):
     async def _once(self, call: Call) -> Any:
         if call.through is not None and call.timeout is None and (reply := await call.through(call.request)) is not None:
             return reply
-        answer = self.stubs.method(call.method)(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
+        answer = self.stubs.method(call.method)(call.sent(), metadata=self.metadata_of(call), timeout=call.timeout)
         if call.each is None:
             return await answer
         async for message in answer:

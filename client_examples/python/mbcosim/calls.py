@@ -9,6 +9,7 @@ import itertools
 import os
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any, Generic, Optional, TypeVar, Union
 
 import numpy as np
@@ -231,7 +232,7 @@ class ServerCalls(Generic[SimulationKind]):
             fill_duration(header.options.deck_sockets.peer_timeout, deck_sockets, "deck_sockets.peer_timeout")
         if lease is not None:
             fill_duration(header.options.lease, lease, "lease")
-        reply = yield Call("Simulations/CreateSimulation", bundle.requests(header, files), timeout)
+        reply = yield Call("Simulations/CreateSimulation", partial(bundle.requests, header, files), timeout, repeatable=True)
         return self._make(reply.simulation, reply.diagnostics, reply.printed)
 
     @call
@@ -239,7 +240,7 @@ class ServerCalls(Generic[SimulationKind]):
         """`mbcosim.v1.ValidateModelReply` about a deck on this machine."""
         main, files = bundle.collect(deck)
         header = pb.UploadHeader(bundle_main_file=main)
-        reply: pb.ValidateModelReply = yield Call("Simulations/ValidateModel", bundle.requests(header, files), timeout)
+        reply: pb.ValidateModelReply = yield Call("Simulations/ValidateModel", partial(bundle.requests, header, files), timeout, repeatable=True)
         return reply
 
     @call
@@ -264,7 +265,7 @@ class ServerCalls(Generic[SimulationKind]):
             elif progress is not None:
                 progress(reply.progress.phase, reply.progress.fraction)
 
-        yield Call("Reduction/Reduce", bundle.reduce_requests(header, files), timeout, each=take)
+        yield Call("Reduction/Reduce", partial(bundle.reduce_requests, header, files), timeout, each=take)
         return reports[-1], bytes(data)
 
     @call
@@ -288,12 +289,14 @@ class ServerCalls(Generic[SimulationKind]):
     @call
     def import_checkpoint(self, data: bytes, *, name: Optional[str] = None, timeout: Optional[float] = None) -> Calls[SimulationKind]:
         """A new simulation from what `Simulation.export_checkpoint` gave, here or on another server. It lives on afterwards."""
+        header = pb.ImportCheckpointHeader(request_id=_new_id(), display_name=name)
+
         def messages() -> Iterator[pb.ImportCheckpointRequest]:
-            yield pb.ImportCheckpointRequest(header=pb.ImportCheckpointHeader(request_id=_new_id(), display_name=name))
+            yield pb.ImportCheckpointRequest(header=header)
             for start in range(0, len(data), 1 << 20):
                 yield pb.ImportCheckpointRequest(data=data[start:start + (1 << 20)])
 
-        reply = yield Call("Simulations/ImportCheckpoint", messages(), timeout)
+        reply = yield Call("Simulations/ImportCheckpoint", messages, timeout, repeatable=True)
         return self._make(reply.simulation, owned=False)
 
 
@@ -571,13 +574,15 @@ class SimulationCalls(Generic[SnapshotKind]):
     @call
     def import_state(self, data: bytes, *, restore: bool = True, name: str = "", timeout: Optional[float] = None) -> Calls[SnapshotKind]:
         """Adds a saved state from bytes and, with `restore`, goes to it."""
+        header = pb.ImportSnapshotHeader(simulation=self.name, display_name=name, restore=restore, request_id=_new_id())
+
         def messages() -> Iterator[pb.ImportSnapshotRequest]:
-            yield pb.ImportSnapshotRequest(header=pb.ImportSnapshotHeader(
-                simulation=self.name, display_name=name, restore=restore, request_id=_new_id()))
+            yield pb.ImportSnapshotRequest(header=header)
             for start in range(0, len(data), 1 << 20):
                 yield pb.ImportSnapshotRequest(data=data[start:start + (1 << 20)])
 
-        snapshot = self._snapshot_class(self, (yield Call("Simulations/ImportSnapshot", messages(), timeout, simulation=self.name)).snapshot)
+        reply = yield Call("Simulations/ImportSnapshot", messages, timeout, repeatable=True, simulation=self.name)
+        snapshot = self._snapshot_class(self, reply.snapshot)
         if restore:
             self.step_number, self.time = snapshot.step, snapshot.time
         return snapshot

@@ -50,7 +50,7 @@ class Call:
     """One call of a server's method.
 
     method      "Simulations/Step"
-    request     a message, or an iterable of messages
+    request     a message, or a function that gives the messages of an upload
     timeout     seconds; None: as long as the server lives
     repeatable  a second call does no harm when the reply to the first was lost
     each        of a method that streams: called with every message
@@ -64,6 +64,10 @@ class Call:
     each: Optional[Callable[[Any], Any]] = None
     through: Optional[Callable[[Any], Any]] = None
     simulation: str = ""
+
+    def sent(self) -> Any:
+        """What gRPC takes, anew for each attempt."""
+        return self.request() if callable(self.request) else self.request
 
 
 Calls = Generator[Call, Any, T]  # is sent the replies, one after the other
@@ -129,7 +133,7 @@ def metadata(token: Optional[str]) -> list[tuple[str, str]]:
 
 
 def simulation_of(request: Any) -> str:
-    """Name of the simulation that a request is about; empty: none, or the request is a series of messages."""
+    """Name of the simulation that a request is about; empty: none, or the request is an upload."""
     name = getattr(request, "simulation", None)
     if name is None:
         name = getattr(getattr(request, "step", None), "simulation", "")
@@ -239,13 +243,13 @@ class Connection(Address):
             return self._stream(method, call)
         if call.through is not None and call.timeout is None and (reply := call.through(call.request)) is not None:
             return reply
-        if hasattr(call.request, "SerializeToString"):  # one message: this thread does it all, and gRPC ends it at its deadline
+        if not callable(call.request):  # one message: this thread does it all, and gRPC ends it at its deadline
             return method(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
         return self._bounded(method, call)
 
     def _bounded(self, method: Any, call: Call) -> Any:
         """As a future: what gRPC does not end at its deadline (an upload that nobody reads) ends soon after it."""
-        future = method.future(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
+        future = method.future(call.sent(), metadata=self.metadata_of(call), timeout=call.timeout)
         try:
             return future.result(None if call.timeout is None else call.timeout + _AGAIN)
         except grpc.FutureTimeoutError:
@@ -253,7 +257,7 @@ class Connection(Address):
             raise TimedOut(f"{call.method} took longer than {call.timeout} s", grpc.StatusCode.DEADLINE_EXCEEDED) from None
 
     def _stream(self, method: Any, call: Call) -> None:
-        messages = method(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
+        messages = method(call.sent(), metadata=self.metadata_of(call), timeout=call.timeout)
         latest = None if call.timeout is None else call.timeout + _AGAIN
         with bounded(latest, messages.cancel, call.method):
             for message in messages:
