@@ -20,6 +20,7 @@ from http2 import HalfMessages, reset_at_once
 from mbcosim import bundle
 from mbcosim.v1 import (coupling_pb2_grpc, reduction_pb2, reduction_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2,
                         telemetry_pb2_grpc)
+from test_operation import metrics
 
 TOKENS = ("ann-token-0123456789 control ann\nbob-token-0123456789 control bob\n"
           "eve-token-0123456789 observe eve\nroot-token-0123456789 admin root\n")
@@ -337,7 +338,7 @@ READER = """
 import sys, time
 import mbcosim
 with mbcosim.connect(sys.argv[1]) as server:
-    samples = server.attach(sys.argv[2]).subscribe(["node.structural.1.X"] * 5000)
+    samples = server.attach(sys.argv[2]).subscribe(["node.structural.1.X"] * 5000, policy="drop_oldest", buffer=4)
     print("there", flush=True)
     time.sleep(600)
 """
@@ -345,14 +346,14 @@ with mbcosim.connect(sys.argv[1]) as server:
 
 def test_a_client_that_stands_still_with_its_socket_full_does_not_hold_up_the_end(start_daemon):
     """gRPC closes no connection in the middle of a write; a stopped process, or a paused container, may stay one for ever."""
-    daemon = ready(start_daemon())
+    daemon = ready(start_daemon("--http", "127.0.0.1:0"))
     with daemon.connect() as server:
         simulation = server.load_text(decks.endless())
         reader = subprocess.Popen([sys.executable, "-c", READER, daemon.address, simulation.name], stdout=subprocess.PIPE, text=True)
         try:
             assert reader.stdout.readline() == "there\n"
             reader.send_signal(signal.SIGSTOP)
-            simulation.step(200)
+            wait_for(lambda: simulation.step(200) and metrics(daemon)["mbcosim_samples_dropped_total"] > 0)
             daemon.process.send_signal(signal.SIGTERM)
             assert daemon.process.wait(20 * TIME_FACTOR) == 0
             assert "that did not end are cut" in daemon.log()
