@@ -2,6 +2,7 @@
 
 #include <complex>
 
+#include "model/diagnostic.h"
 #include "service/kept_replies.h"
 #include "simulation/linearize.h"
 #include "wire/refusal.h"
@@ -119,7 +120,12 @@ void tell_pages(ReplyPages<Reply>& kept, const Request& request, MemoryBudget& m
   MemoryShare share;
   whole->pages = within(memory, &token, &share, [&] {
     PageWriter<Reply> pages(size);
-    const std::int64_t step = compute(token, pages);
+    std::int64_t step = 0;
+    try {
+      step = compute(token, pages);
+    } catch (const EvaluationError& error) {  // at a state that was imported, say
+      throw Refusal(v1::REASON_EVALUATION, error.what());
+    }
     std::vector<Reply> made = pages.take();
     for (Reply& page : made) page.set_step(step);
     return made;

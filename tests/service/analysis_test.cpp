@@ -122,6 +122,41 @@ class Analysed : public testing::Test {
   v1::ComputeEigenvaluesRequest eigenvalues_;
 };
 
+// Whoever imports a state may have made it.
+TEST(Analysis, OfAStateThatCannotBeEvaluatedIsRefused) {
+  const auto simulation = simulation_of(
+      "begin: data; problem: initial value; end: data;\n"
+      "begin: initial value; initial time: 0.; final time: 1.; time step: .125; method: ms, 1.; "
+      "tolerance: 1e-9; max iterations: 10; derivatives tolerance: 1e-3; end: initial value;\n"
+      "begin: control data; structural nodes: 1; rigid bodies: 1; forces: 1; end: control data;\n"
+      "begin: nodes; structural: 1, dynamic displacement, null, null; end: nodes;\n"
+      "begin: elements; body: 1, 1, 2.;\n"
+      "force: 1, absolute displacement, 1, 1., 0., 0., string, \"sqrt(2. - Time)\";\n"
+      "end: elements;\n");
+  const VariableAccess variables{simulation->variables()};
+  MemoryBudget memory{1 << 30};
+  Analysis analysis{simulation->model(), variables, memory};
+  Call call;
+  const auto late = [&](std::int64_t*) {
+    State state = simulation->snapshot();
+    state.time = 3;
+    return state;
+  };
+  v1::LinearizeReply linear;
+  v1::ComputeEigenvaluesReply spectrum;
+  const auto reason = [](auto&& ask) {
+    try {
+      ask();
+    } catch (const Refusal& refusal) {
+      return refusal.reason();
+    }
+    return v1::REASON_UNSPECIFIED;
+  };
+  EXPECT_EQ(reason([&] { analysis.linearize({}, late, call, &linear); }), v1::REASON_EVALUATION);
+  EXPECT_EQ(reason([&] { analysis.eigenvalues({}, late, call, &spectrum); }),
+            v1::REASON_EVALUATION);
+}
+
 TEST_F(Analysed, StateSpaceHasTheTransferFunctionsOfTheSprings) {
   linearize_.add_outputs(handle("node.structural.1.XP"));
   const v1::LinearizeReply reply = answer(linearize_);
