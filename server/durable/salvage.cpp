@@ -7,7 +7,6 @@
 namespace mbcosim::server {
 namespace {
 
-/// A file as it is, or as it is to be in the place of that.
 void copy_file(const std::string& folder, const std::string& name, std::string* out) {
   read_pieces(folder + "/" + name, [&](std::string_view piece) { *out += piece; });
 }

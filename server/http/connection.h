@@ -20,7 +20,8 @@ using Headers = std::vector<std::pair<std::string, std::string>>;
 
 /// What the door keeps for a connection while it lives, in civetweb's connection data.
 struct Peer {
-  int socket = -1;  ///< -1: not found
+  int socket = -1;          ///< -1: not found
+  bool in_request = false;  ///< that a Connection stands for
 };
 
 /// Time that a client has to send a request's body, or to read an answer.
@@ -53,8 +54,6 @@ class Connection {
   /// Whether the client has hung up. Cheap.
   bool gone() const;
   int status() const { return status_; }
-  /// -1: not found.
-  int socket() const { return socket_; }
 
  private:
   void start_answer(int status, std::string_view content_type, const Headers& headers);

@@ -73,8 +73,7 @@ void Crowd::began(int socket) {
 
 void Crowd::ended(int socket) {
   const Guard lock(mutex_);
-  const auto entry = in_request_.find(socket);
-  if (entry != in_request_.end()) in_request_.erase(entry);
+  in_request_.erase(in_request_.find(socket));
 }
 
 bool Crowd::is_ours(int socket) const {

@@ -31,7 +31,7 @@ class Crowd {
   /// A worker takes a connection, or lets it go.
   void came();
   void went();
-  /// A request begins, or ends if one had begun; `socket` -1: one that could not be found.
+  /// A request begins, or one that had begun ends; `socket` -1: one that could not be found.
   void began(int socket);
   void ended(int socket);
 

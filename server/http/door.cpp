@@ -60,6 +60,7 @@ struct Door::Impl {
                    int status = 0);
   static Impl& of(const mg_connection* raw);
   static int came(const mg_connection* raw, void** connection_data);
+  void began(const mg_connection* raw);
   static void ended(const mg_connection* raw);
   static void went(const mg_connection* raw);
 
@@ -145,17 +146,24 @@ int Door::Impl::came(const mg_connection* raw, void**) {
   return 0;
 }
 
+void Door::Impl::began(const mg_connection* raw) {
+  auto* peer = static_cast<Peer*>(mg_get_user_connection_data(raw));
+  if (!peer->in_request) crowd.began(peer->socket);
+  peer->in_request = true;
+}
+
+// Once or twice: with the request, and with the connection.
 void Door::Impl::ended(const mg_connection* raw) {
-  const auto* peer = static_cast<const Peer*>(mg_get_user_connection_data(raw));
+  auto* peer = static_cast<Peer*>(mg_get_user_connection_data(raw));
   if (!peer) return;
   of(raw).reaper.disarm(peer->socket);
-  of(raw).crowd.ended(peer->socket);
+  if (peer->in_request) of(raw).crowd.ended(peer->socket);
+  peer->in_request = false;
 }
 
 void Door::Impl::went(const mg_connection* raw) {
-  const std::unique_ptr<const Peer> peer(
-      static_cast<const Peer*>(mg_get_user_connection_data(raw)));
-  if (peer) of(raw).crowd.ended(peer->socket);
+  ended(raw);
+  delete static_cast<Peer*>(mg_get_user_connection_data(raw));
   of(raw).crowd.went();
 }
 
@@ -171,7 +179,7 @@ int Door::Impl::serve(mg_connection* raw) {
   int status = 500;
   run_caught("http", [&] {
     Connection connection(raw, reaper);
-    crowd.began(connection.socket());
+    began(raw);
     try {
       route(connection);
     } catch (const Refusal& refusal) {
