@@ -416,8 +416,10 @@ bool Daemon::shut_down() {
   for (const auto& listener : listeners_) listener->stop();
   store_.close_all();
   shared_memory_.clear();
-  door_.reset();
+  // Its threads look once in a second or two whether they are to end.
+  std::thread door_ends([this] { run_caught("http", [this] { door_.reset(); }); });
   end_server();
+  door_ends.join();
   metrics_.close();
   const bool ended = lanes_.stop(kLastJobs);
   durability_.stop(!ended);

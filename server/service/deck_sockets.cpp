@@ -206,7 +206,8 @@ Status DeckSockets::start(const CancelToken& token) {
 }
 
 void DeckSockets::begin(const CancelToken& token) {
-  if (const auto name = channels_->wants_end(); name && lost_.empty())
+  check();
+  if (const auto name = channels_->wants_end())
     lost_ = folder_.without_path(*name) + ": the code has ended the run";
   check();
   if (std::exchange(begun_for_, simulation_.step_number()) == simulation_.step_number())
@@ -225,6 +226,12 @@ void DeckSockets::accepted(const CancelToken& token) {
     guarded(token, [&] { channels_->converged(); });
   } catch (const PeerLost&) {  // remembered
   }
+}
+
+void DeckSockets::end() {
+  lost_ = "the simulation was deleted";
+  channels_.reset();
+  share_.reset();
 }
 
 }  // namespace mbcosim::server

@@ -60,6 +60,8 @@ class DeckSockets {
   void attempt_failed() { channels_->attempt_failed(); }
   /// Does not throw: a code that is lost here fails the next step.
   void accepted(const CancelToken& token);
+  /// Parts with the codes and closes the sockets; the simulation was deleted.
+  void end();
 
  private:
   friend class DeckSocketFolder;

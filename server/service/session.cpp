@@ -423,6 +423,13 @@ void Session::close() {
   for (const auto& port : coupler_.ports()) port->end(gone);
 }
 
+// At once, not when the last stream lets go of the session: another simulation may want the paths.
+void Session::close_deck_sockets() {
+  if (!deck_sockets_) return;
+  const Guard lock(lock_);
+  deck_sockets_->end();
+}
+
 Session::Use::Use(Session& session) : lease_(session.lease_) {
   if (!lease_.take())
     throw Refusal(v1::REASON_NO_SUCH_SIMULATION,

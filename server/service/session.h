@@ -172,6 +172,8 @@ class Session {
 
   /// Interrupts, ends subscriptions and the streams of peers; later calls find the session gone.
   void close();
+  /// After `close`: the sockets of the deck are closed. Waits for the end of a step.
+  void close_deck_sockets();
 
   /// Keeps the lease from running out while it lives. Throws NO_SUCH_SIMULATION when it has.
   class Use {

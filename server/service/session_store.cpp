@@ -220,6 +220,7 @@ void SessionStore::drop(const std::string& id, v1::DeletionCause cause) {
 
 /// One that is closed and taken out.
 void SessionStore::bury(const SessionPtr& session, v1::DeletionCause cause) {
+  session->close_deck_sockets();
   if (session->keeping() && keeper_.forget) keeper_.forget(*session);
   log_.deleted(session->subject(), cause);
 }

@@ -16,6 +16,7 @@ from conftest import TIME_FACTOR, start_daemon, wait_for  # noqa: E402,F401
 from test_sockets import LOADS, deck, force, receive, run, shake  # noqa: E402,F401
 
 import mbcosim  # noqa: E402
+from mbcosim.v1 import simulations_pb2 as pb  # noqa: E402
 
 PULL = force(points="1, 2")
 STREAMS = dict(counts="forces: 2; output elements: 1; file drivers: 1;",
@@ -169,6 +170,25 @@ def test_lines_of_text_set_the_values_of_the_next_step(server, folder):
                 assert time.monotonic() - start < 5 * TIME_FACTOR
             assert simulation["stream.socket1"] == expected
     assert not list(folder.iterdir())
+
+
+def test_with_the_simulation_its_sockets_go_although_a_stream_of_steps_is_open(server, folder):
+    """Who holds the stream does not hold the path: the next simulation of the deck listens there."""
+    for _ in range(3):
+        simulation = server.load_text(text_driver('local, "t"'), deck_sockets=0.5)
+        more = threading.Event()
+
+        def requests():
+            yield pb.StepRequest(simulation=simulation.name, steps=1)
+            more.wait(30 * TIME_FACTOR)
+
+        replies = server.simulations.StepStream(requests(), metadata=server.metadata)
+        assert next(replies).step.steps_done == 1
+        assert [path.name for path in folder.iterdir()] == ["t"]
+        server.simulations.DeleteSimulation(pb.DeleteSimulationRequest(simulation=simulation.name), metadata=server.metadata)
+        assert not list(folder.iterdir())
+        more.set()
+        replies.cancel()
 
 
 def test_text_drivers_listen_inside_the_folder_only_and_are_ports_otherwise(server, folder):
