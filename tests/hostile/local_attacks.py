@@ -113,7 +113,11 @@ class Damage:
         self.random.choice([os.mkdir, lambda p: os.symlink("/dev/zero", p), lambda p: os.mkfifo(p, 0o600), lambda p: os.symlink(p, p)])(path)
 
     def exchange_with(self, paths):
-        return lambda path: shutil.copyfile(path, self.random.choice(paths))
+        """By its own bytes: a link to /dev/zero has no end."""
+        def copy(path):
+            if os.path.isfile(path):
+                shutil.copyfile(path, self.random.choice(paths))
+        return copy
 
 
 class Folder:
