@@ -4,19 +4,23 @@
 usage: pages.py links ROOT            every link, anchor and cited file of every page and source comment exists
        pages.py blocks ROOT BUILD     every code block of every page runs as it stands
 
-A block of the language `console` is a session: lines that start with `$ ` are commands (with a final `&`, in the background), the
-lines that follow are what they print. Numbers may differ in the last digits, `...` stands for any lines. A comment line above a block says what
-else to do with it: `<!-- file: NAME -->` writes it to a file for the commands of the page that follow, `<!-- not run: REASON -->`
-leaves it alone. Blocks of a page share a folder, in which `build`, `client_examples`, `tests` and `docker` are those of the tree. Blocks of the
-language `mermaid` are sequence diagrams, whose form is looked at. Blocks without a language are for reading only.
+A block of the language `console` is a session: lines that start with `$ ` are commands, the lines that follow are what they print.
+Numbers may differ in the last digits, `...` stands for any lines. A command with a final `&` is a daemon: the next command comes when
+it tells that it is ready, as in sd_notify(3). A comment line above a block says what else to do with it: `<!-- file: NAME -->` writes it
+to a file for the commands of the page that follow, `<!-- not run: REASON -->` leaves it alone. Blocks of a page share a folder, in which
+`build`, `client_examples`, `tests` and `docker` are those of the tree. Blocks of the language `mermaid` are sequence diagrams, whose form
+is looked at. Blocks without a language are for reading only.
 """
+import contextlib
 import os
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
+import time
 
 FENCE = re.compile(r"(?:<!-- (?P<what>file|not run): (?P<detail>.*?) -->\n)?^```(?P<language>\w*)\n(?P<text>.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\[[^\]\n]*\]\(([^)\s]+)\)")
@@ -164,8 +168,7 @@ class Page:
         start = {"cwd": self.folder, "env": self.environment, "executable": "/bin/bash", "shell": True, "text": True,
                  "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
         if command.endswith("&"):
-            start["stdout"] = subprocess.DEVNULL
-            self.background.append(subprocess.Popen("exec " + command[:-1], start_new_session=True, **start))
+            yield from self.start_daemon(command, {**start, "stdout": subprocess.DEVNULL})
             return
         try:
             printed = subprocess.run(command, timeout=SECONDS, **start).stdout
@@ -174,6 +177,22 @@ class Page:
             return
         if not agree(expected, printed.rstrip("\n").split("\n") if printed else []):
             yield f"{self.name}: `{command}` prints\n{printed}instead of\n" + "\n".join(expected)
+
+    def start_daemon(self, command, start):
+        """Goes on when it is ready: a person would not type the next command before."""
+        address = self.folder / f"ready{len(self.background)}"
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+            manager.bind(str(address))
+            manager.settimeout(0.1)
+            start["env"] = {**self.environment, "NOTIFY_SOCKET": str(address)}
+            process = subprocess.Popen("exec " + command[:-1], start_new_session=True, **start)
+            self.background.append(process)
+            end, told = time.monotonic() + SECONDS, b""
+            while b"READY=1" not in told and process.poll() is None and time.monotonic() < end:
+                with contextlib.suppress(TimeoutError):
+                    told = manager.recv(4096)
+        if b"READY=1" not in told:
+            yield f"{self.name}: `{command}` did not get ready" + (f", it ended with {process.poll()}" if process.poll() is not None else "")
 
 
 def blocks(root, build):
