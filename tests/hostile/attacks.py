@@ -84,7 +84,7 @@ class Attacker:
     # ------------------------------------------------------------ kinds
 
     def fuzz(self):
-        """Every method of the contract, with random messages, deadlines and cancellations."""
+        """Every method of the contract, with random messages, some with mutated bytes, deadlines and cancellations."""
         fuzzer, methods = Fuzzer(self.random), all_methods()
         while self.going():
             self.feed(fuzzer)
@@ -166,7 +166,7 @@ class Attacker:
         path = f"/{service.full_name}/{method.name}"
         request, reply = get_class(method.input_type), get_class(method.output_type)
         kind = ("stream" if method.client_streaming else "unary") + ("_stream" if method.server_streaming else "_unary")
-        call = getattr(self.channel, kind)(path, request_serializer=request.SerializeToString,
+        call = getattr(self.channel, kind)(path, request_serializer=lambda message: self.bytes_of(message, fuzzer),
                                            response_deserializer=reply.FromString)
         deadline = self.random.choice([0.01, 0.2, 1.5])
         if method.client_streaming:
@@ -190,6 +190,11 @@ class Attacker:
             self.count(error, path)
         except grpc.FutureCancelledError:
             self.codes["CANCELLED"] += 1
+
+    def bytes_of(self, message, fuzzer):
+        """As protobuf writes it, or mutated."""
+        data = message.SerializeToString()
+        return fuzzer.mutated(data) if self.random.random() < 0.25 else data
 
     def cancel(self):
         """Uploads, steps, runs, analyses, reductions, exports and imports, broken off at every point."""

@@ -63,6 +63,24 @@ class Fuzzer:
             self.put(message, field, depth)
         return message
 
+    def mutated(self, data):
+        """Bytes of a message, some of them changed: it may not be one any more, or another."""
+        data = bytearray(data)
+        for _ in range(self.random.choice([1, 1, 2, 10])):
+            at = self.random.randrange(len(data) + 1)
+            change = self.random.randrange(5)
+            if change == 0 and at < len(data):
+                data[at] ^= 1 << self.random.randrange(8)
+            elif change == 1:
+                del data[at:at + self.random.choice([1, 2, 8])]
+            elif change == 2:
+                data[at:at] = self.random.randbytes(self.random.choice([1, 2, 8]))
+            elif change == 3:
+                data[at:at] = data[self.random.randrange(len(data) + 1):][:64]  # fields repeated, or one message in another
+            else:
+                del data[at:]
+        return bytes(data)
+
     def put(self, message, field, depth):
         try:
             if field.label == F.LABEL_REPEATED:
