@@ -27,7 +27,7 @@ LINK = re.compile(r"\[[^\]\n]*\]\(([^)\s]+)\)")
 CITED = re.compile(r"\b((?:src|server|proto|tests|client_examples|docker)/[\w./-]+\.(?:md|h|cpp|py|sh|proto|mbd|inc|yaml|txt|tsv|mjs|ts))\b")
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 LINKED = ("client_examples", "tests", "docker", "src", "server", "proto")
-SECONDS = 120 * float(os.environ.get("MBCOSIM_TIME_FACTOR", 1))
+WAIT = 120 * float(os.environ.get("MBCOSIM_TIME_FACTOR", 1))
 
 
 def tracked(root):
@@ -150,7 +150,7 @@ class Page:
         finally:
             for process in self.background:
                 os.killpg(process.pid, signal.SIGTERM)
-                process.wait(SECONDS)
+                process.wait(WAIT)
 
     def run_block(self, what, detail, language, text):
         if what == "file":
@@ -171,9 +171,9 @@ class Page:
             yield from self.start_daemon(command, {**start, "stdout": subprocess.DEVNULL})
             return
         try:
-            printed = subprocess.run(command, timeout=SECONDS, **start).stdout
+            printed = subprocess.run(command, timeout=WAIT, **start).stdout
         except subprocess.TimeoutExpired:
-            yield f"{self.name}: `{command}` did not end within {SECONDS:g} s"
+            yield f"{self.name}: `{command}` did not end within {WAIT:g} s"
             return
         if not agree(expected, printed.rstrip("\n").split("\n") if printed else []):
             yield f"{self.name}: `{command}` prints\n{printed}instead of\n" + "\n".join(expected)
@@ -187,7 +187,7 @@ class Page:
             start["env"] = {**self.environment, "NOTIFY_SOCKET": str(address)}
             process = subprocess.Popen("exec " + command[:-1], start_new_session=True, **start)
             self.background.append(process)
-            end, told = time.monotonic() + SECONDS, b""
+            end, told = time.monotonic() + WAIT, b""
             while b"READY=1" not in told and process.poll() is None and time.monotonic() < end:
                 with contextlib.suppress(TimeoutError):
                     told = manager.recv(4096)
