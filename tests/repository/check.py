@@ -115,6 +115,25 @@ def names(root):
             yield f"{name} stands in {' and '.join(places)}: a name means one thing"
 
 
+def types(root):
+    """Of classes of one name in one namespace, which no linker tells apart."""
+    opened = re.compile(r"(?:inline )?namespace ([\w:]*) ?\{")
+    defined = re.compile(r"(?:template <[^;]*> ?)?(?:class|struct|union|enum class|enum) (?:[A-Z_]+(?:\(.*?\))? )?(\w+)(?: final)?(?: ?:(?!:)[^;{]*)? ?\{")
+    places = {}
+    for path in sources(root / "src", ".h", ".cpp") + sources(root / "server", ".h", ".cpp"):
+        around = []
+        for line in path.read_text(encoding="utf-8").splitlines():
+            if match := opened.match(line):
+                around.append(match[1] or str(path))  # without a name: its own in each file
+            elif line.startswith("}  // namespace"):
+                around.pop()
+            elif match := defined.match(line):
+                places.setdefault("::".join([*around, match[1]]), set()).add(str(path.relative_to(root)))
+    for name, files in places.items():
+        if len(files) > 1:
+            yield f"{name} is defined in {' and '.join(sorted(files))}: a name means one thing"
+
+
 def bounds_on_time(root):
     """Of tests that compare what they took with a bound that a loaded machine would exceed."""
     elapsed = re.compile(r"monotonic\(\) - \w+ <|monotonic\(\) \+|steady_clock::now\(\) - \w+")
@@ -135,6 +154,7 @@ def references(root):
 
 def layout(root):
     yield from names(root)
+    yield from types(root)
     yield from references(root)
     yield from bounds_on_time(root)
     yield from locks(root)

@@ -76,17 +76,17 @@ LinearSystem companion_system(CanonicalForm form, const std::vector<double>& den
   return s;
 }
 
-void StateSpace::connect(GeneralConnection& c) {
+void LinearSystemElement::connect(GeneralConnection& c) {
   for (const NodeDof& dof : outputs_) output_.push_back(c.dof(dof));
   for (const ScalarValue& value : inputs_) input_.push_back(value.drive ? -1 : c.dof(value.dof));
   first_state_ = c.differential(system_.order());
 }
 
-double StateSpace::input(const GeneralView& u, int k) const {
+double LinearSystemElement::input(const GeneralView& u, int k) const {
   return inputs_[k].drive ? u.drive(inputs_[k].drive) : u.dof(inputs_[k].dof);
 }
 
-void StateSpace::residual(const GeneralView& u, GeneralResidual& r) const {
+void LinearSystemElement::residual(const GeneralView& u, GeneralResidual& r) const {
   const int n = system_.order();
   for (int i = 0; i < n; ++i) {
     double sum = 0;
@@ -110,7 +110,7 @@ void StateSpace::residual(const GeneralView& u, GeneralResidual& r) const {
   }
 }
 
-void StateSpace::jacobian(const GeneralView&, GeneralJacobian& jacobian) const {
+void LinearSystemElement::jacobian(const GeneralView&, GeneralJacobian& jacobian) const {
   const int n = system_.order();
   for (int j = 0; j < n; ++j) {
     const int column = first_state_ + j;
@@ -132,7 +132,7 @@ void StateSpace::jacobian(const GeneralView&, GeneralJacobian& jacobian) const {
   }
 }
 
-void StateSpace::start(const GeneralView& u, State& state) const {
+void LinearSystemElement::start(const GeneralView& u, State& state) const {
   for (int i = 0; i < system_.order(); ++i) {
     const int k = u.unknown(first_state_ + i);
     if (x0_.size() != 0) state.y[k] = x0_(i);
@@ -148,18 +148,18 @@ void StateSpace::start(const GeneralView& u, State& state) const {
   for (int i = 0; i < system_.order(); ++i) state.yp[u.unknown(first_state_ + i)] = rate(i);
 }
 
-void StateSpace::output(const GeneralView& u, OutputRow& row) const {
+void LinearSystemElement::output(const GeneralView& u, OutputRow& row) const {
   row.begin(OutputFile::gen, u.label());
   for (int i = 0; i < system_.order(); ++i) row.scalar("x", "", u.value(first_state_ + i));
   for (int i = 0; i < system_.order(); ++i) row.scalar("xP", "", u.rate(first_state_ + i));
   row.end();
 }
 
-int StateSpace::private_datum(std::string_view name) const {
+int LinearSystemElement::private_datum(std::string_view name) const {
   return index_of(private_data(), name);
 }
 
-std::vector<Datum> StateSpace::private_data() const {
+std::vector<Datum> LinearSystemElement::private_data() const {
   std::vector<Datum> data;
   for (const char* word : {"x", "xP"})
     for (int i = 1; i <= system_.order(); ++i)
@@ -167,7 +167,7 @@ std::vector<Datum> StateSpace::private_data() const {
   return data;
 }
 
-double StateSpace::private_value(const GeneralView& u, int datum) const {
+double LinearSystemElement::private_value(const GeneralView& u, int datum) const {
   const int n = system_.order();
   return datum < n ? u.value(first_state_ + datum) : u.rate(first_state_ + datum - n);
 }

@@ -33,9 +33,9 @@ LinearSystem companion_system(CanonicalForm form, const std::vector<double>& den
                               const std::vector<double>& numerator);
 
 /// Rows of the states: B u + A x − E ẋ; of each output dof: C x + D u − y.
-class StateSpace : public GeneralElement {
+class LinearSystemElement : public GeneralElement {
  public:
-  StateSpace(LinearSystem system, std::vector<NodeDof> outputs, std::vector<ScalarValue> inputs)
+  LinearSystemElement(LinearSystem system, std::vector<NodeDof> outputs, std::vector<ScalarValue> inputs)
       : system_(std::move(system)), outputs_(std::move(outputs)), inputs_(std::move(inputs)) {}
   /// Start values of the states and their rates; empty: zero.
   void set_start(VecX x, VecX xp) {

@@ -67,7 +67,7 @@ void read_gain_and_balance(Card& card, LinearSystem& s) {
 }
 
 /// [value, x0 [, derivative, xp0]]
-void read_start(Card& card, int n, bool has_rates, StateSpace& element) {
+void read_start(Card& card, int n, bool has_rates, LinearSystemElement& element) {
   if (!card.keyword("value")) return;
   VecX x = card.numbers("initial states", 1, n).transpose(), xp;
   if (has_rates && card.keyword("derivative")) xp = card.numbers("initial rates", 1, n).transpose();
@@ -81,7 +81,8 @@ void add_state_space(Card& card, ElementInfo& info, std::vector<NodeDof> outputs
       read_matrices(card, static_cast<int>(outputs.size()), static_cast<int>(inputs.size()), n);
   read_gain_and_balance(card, s);
   const bool descriptor = s.E.size() != 0;
-  auto element = std::make_unique<StateSpace>(std::move(s), std::move(outputs), std::move(inputs));
+  auto element =
+      std::make_unique<LinearSystemElement>(std::move(s), std::move(outputs), std::move(inputs));
   read_start(card, n, descriptor, *element);
   add_general_element(card.builder(), info, std::move(element));
 }
@@ -124,7 +125,8 @@ void read_scalar_filter(Card& card, ElementInfo& info) {
   LinearSystem s =
       companion_system(form, denominator, read_reals(card, "numerator coefficient", m + 1));
   read_gain_and_balance(card, s);
-  auto element = std::make_unique<StateSpace>(std::move(s), std::move(outputs), std::move(inputs));
+  auto element =
+      std::make_unique<LinearSystemElement>(std::move(s), std::move(outputs), std::move(inputs));
   add_general_element(card.builder(), info, std::move(element));
 }
 

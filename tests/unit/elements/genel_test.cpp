@@ -233,7 +233,7 @@ LinearSystem generic_system(Bench& bench, bool descriptor) {
   return s;
 }
 
-TEST(StateSpace, JacobianMatchesCentralDifferences) {
+TEST(LinearSystemElement, JacobianMatchesCentralDifferences) {
   for (const bool descriptor : {false, true}) {
     Bench bench;
     const NodeDof y1 = scalar_dof(bench), y2 = scalar_dof(bench), u1 = scalar_dof(bench, false);
@@ -243,9 +243,10 @@ TEST(StateSpace, JacobianMatchesCentralDifferences) {
                                     {structural_dof(bench.second, 4, 1), nullptr}};
     ElementInfo info;
     info.label = 1;
-    add_general_element(bench.builder, info,
-                        std::make_unique<StateSpace>(generic_system(bench, descriptor),
-                                                     std::vector<NodeDof>{y1, y2}, inputs));
+    add_general_element(
+        bench.builder, info,
+        std::make_unique<LinearSystemElement>(generic_system(bench, descriptor),
+                                              std::vector<NodeDof>{y1, y2}, inputs));
     bench.finish();
     bench.generic_state(0.3);
     const MatX J = bench.jacobian();
@@ -261,7 +262,7 @@ double transfer(const LinearSystem& s, double at) {
   return (s.C * m.inverse() * s.B)(0, 0) + direct;
 }
 
-TEST(StateSpace, CompanionFormsHaveTheTransferFunction) {
+TEST(LinearSystemElement, CompanionFormsHaveTheTransferFunction) {
   const std::vector<double> d = {.5, 20, 3};
   for (const CanonicalForm form : {CanonicalForm::controllable, CanonicalForm::observable})
     for (const std::vector<double>& n : {std::vector<double>{3, 4}, {2, 1, 7, 5}, {6}}) {
@@ -273,7 +274,7 @@ TEST(StateSpace, CompanionFormsHaveTheTransferFunction) {
     }
 }
 
-TEST(StateSpace, BalancingScalesByPowersOfTwoAndKeepsTheTransferFunction) {
+TEST(LinearSystemElement, BalancingScalesByPowersOfTwoAndKeepsTheTransferFunction) {
   LinearSystem s = companion_system(CanonicalForm::controllable, {13.31, 555.4}, {4.02, 555.4});
   const double before = transfer(s, 2.5);
   balance(s);
