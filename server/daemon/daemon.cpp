@@ -153,13 +153,13 @@ Daemon::Daemon(const Config& config)
       authenticator_(make_authenticator(config)),
       tokens_watch_(config.tokens_file),
       slots_(worker_count(config.workers)),
-      lanes_(config.limits.sessions, worker_count(config.workers)),
+      workers_(config.limits.sessions, worker_count(config.workers)),
       admission_({config.limits.open_calls, config.limits.identity_calls,
                   config.limits.identity_streams, config.limits.connection_calls}),
       budgets_(config_.limits.memory_bytes, config_.limits.identity_memory_bytes),
       runtime_{
-          lanes_,
-          timer_,
+          workers_.lanes,
+          workers_.timer,
           admission_,
           budgets_,
           authenticator_,
@@ -231,7 +231,7 @@ void Daemon::watch_values() {
   watch("mbcosim_state_bytes", "Bytes of all that is in the state folder",
         [this] { return durability_.bytes(); });
   watch("process_resident_memory_bytes", "Resident memory", resident_bytes);
-  lanes_.set_on_start(
+  workers_.lanes.set_on_start(
       [this](Lane lane, double seconds) { metrics_.count_queue_wait(lane, seconds); });
 }
 
@@ -321,7 +321,7 @@ void Daemon::open_http() {
 
 Daemon::~Daemon() {
   if (server_) shut_down();
-  lanes_.stop(std::chrono::hours(1));  // jobs use what is destroyed next
+  workers_.lanes.stop(std::chrono::hours(1));  // jobs use what is destroyed next
 }
 
 void Daemon::check_listener(const std::string& address) const {
@@ -421,7 +421,7 @@ bool Daemon::shut_down() {
   end_server();
   door_ends.join();
   metrics_.close();
-  const bool ended = lanes_.stop(kLastJobs);
+  const bool ended = workers_.lanes.stop(kLastJobs);
   durability_.stop(!ended);
   spdlog::info(ended ? "stopped" : "stopped; work that went on is dropped");
   return ended && let_go_of_grpc(kLastJobs);

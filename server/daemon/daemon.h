@@ -15,6 +15,7 @@
 #include "daemon/tls.h"
 #include "http/door.h"
 #include "rpc/health.h"
+#include "rpc/workers.h"
 #include "service/config.h"
 #include "service/deck_sockets.h"
 #include "service/durability.h"
@@ -57,8 +58,7 @@ class Daemon {
   Metrics metrics_;
   EventLog log_;
   SolverSlots slots_;
-  Lanes lanes_;
-  Timer timer_;
+  Workers workers_;
   Admission admission_;
   MemoryBudgets budgets_;
   const Runtime runtime_;

@@ -7,6 +7,7 @@
 
 #include "coupling/handshake.h"
 #include "replay/record_file.h"
+#include "rpc/workers.h"
 #include "service/session.h"
 #include "service/upload.h"
 #include "wire/convert.h"
@@ -145,7 +146,7 @@ class ModelReplay {
         slots_(1),
         origin_(load_model(deck, options_of(record.front().header()), record.front().header())),
         session_({}, origin_, start(origin_, record.front().header()),
-                 {slots_, limits_, metrics_, log_, memory_, lanes_, timer_},
+                 {slots_, limits_, metrics_, log_, memory_, workers_.lanes, workers_.timer},
                  options_of(record.front().header())) {
     for (const v1::RecordEntry& entry : record)
       if (!entry.port().empty()) ports_[entry.port()].entries.push_back(&entry);
@@ -231,8 +232,7 @@ class ModelReplay {
   const double tolerance_;
   server::SolverSlots slots_;
   server::MemoryBudget memory_{server::MemoryBudget::default_bytes()};
-  server::Lanes lanes_{1, 1};
-  server::Timer timer_;
+  server::Workers workers_{1, 1};
   server::ServiceLimits limits_;
   server::Metrics metrics_;
   server::EventLog log_;

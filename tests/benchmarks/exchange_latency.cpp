@@ -23,6 +23,7 @@
 
 #include "client/mbcosim_client.h"
 #include "mbcosim/v1/coupling.grpc.pb.h"
+#include "rpc/workers.h"
 #include "service/session.h"
 #include "shared_memory/channel.h"
 
@@ -213,8 +214,7 @@ Coupled couple_in_process(v1::CouplingMode mode, int numbers, int count) {
   server::EventLog log;
   server::SolverSlots slots(1);
   server::MemoryBudget memory(server::MemoryBudget::default_bytes());
-  server::Lanes lanes(1, 1);
-  server::Timer timer;
+  server::Workers workers(1, 1);
   const mbcosim::LoadReport loaded = mbcosim::load_deck(
       mbcosim::BundleSource(std::map<std::string, std::string>{{"deck", deck(numbers)}}), "deck");
   v1::CreateOptions session_options;
@@ -224,9 +224,9 @@ Coupled couple_in_process(v1::CouplingMode mode, int numbers, int count) {
   definition->add_output_variables("stream.wide");
   definition->add_input_variables("stream.wide");
   auto simulation = mbcosim::Simulation::create(loaded.model);
-  server::Session session({}, {}, std::move(*simulation),
-                          {slots, config.limits, metrics, log, memory, lanes, timer},
-                          session_options);
+  server::Session session(
+      {}, {}, std::move(*simulation),
+      {slots, config.limits, metrics, log, memory, workers.lanes, workers.timer}, session_options);
   server::Port& port = session.port("loop");
   server::Agreement agreement;
   agreement.mode = mode;

@@ -88,7 +88,7 @@ class Advancing : public testing::Test {
   const VariableAccess variables_{simulation_->variables()};
   SessionStatus status_;
   std::shared_ptr<TelemetryHub> telemetry_ =
-      std::make_shared<TelemetryHub>(memory_, daemon_.lanes, daemon_.timer);
+      std::make_shared<TelemetryHub>(memory_, daemon_.workers.lanes, daemon_.workers.timer);
   KeptReplies kept_{memory_};
   SessionStorage storage_{{nullptr, kept_, memory_, daemon_.metrics},
                           [](const Simulation&, v1::SimulationInfo*) {}};

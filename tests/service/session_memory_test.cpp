@@ -4,6 +4,7 @@
 #include <string>
 
 #include "rod_cube.h"
+#include "rpc/workers.h"
 #include "service/session.h"
 
 namespace mbcosim::server {
@@ -19,7 +20,7 @@ class SessionMemory : public testing::Test {
     auto simulation = rod_cube();
     if (!simulation) return {};
     Session session({}, {}, std::move(simulation),
-                    {slots_, limits_, metrics_, log_, memory, lanes_, timer_});
+                    {slots_, limits_, metrics_, log_, memory, workers_.lanes, workers_.timer});
     session.set_memory(MemoryShare(memory));
     v1::StepRequest request;
     request.set_steps(steps);
@@ -34,8 +35,7 @@ class SessionMemory : public testing::Test {
   ServiceLimits limits_;
   Metrics metrics_;
   EventLog log_;
-  Lanes lanes_{1, 1};
-  Timer timer_;
+  Workers workers_{1, 1};
 };
 
 TEST_F(SessionMemory, AFactorizationOfAStepIsCounted) {

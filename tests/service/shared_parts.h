@@ -1,6 +1,7 @@
 /// What sessions and their parts share, for tests.
 #pragma once
 
+#include "rpc/workers.h"
 #include "service/session_shared.h"
 
 namespace mbcosim::server {
@@ -12,9 +13,8 @@ struct SharedParts {
   Metrics metrics;
   EventLog log;
   MemoryBudget memory{1 << 30};
-  Lanes lanes{1, 1};
-  Timer timer;
-  SessionShared shared{slots, limits, metrics, log, memory, lanes, timer};
+  Workers workers{1, 1};
+  SessionShared shared{slots, limits, metrics, log, memory, workers.lanes, workers.timer};
 };
 
 }  // namespace mbcosim::server

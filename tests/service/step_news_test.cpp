@@ -1,5 +1,6 @@
 #include "service/step_news.h"
 
+#include "rpc/workers.h"
 #include "thrown_mass.h"
 
 namespace mbcosim::server {
@@ -39,10 +40,9 @@ class News : public testing::Test {
   EventLog log_;
   SessionStatus status_;
   MemoryBudget memory_{1 << 20};
-  Lanes lanes_{1, 1};
-  Timer timer_;
+  Workers workers_{1, 1};
   std::shared_ptr<TelemetryHub> telemetry_ =
-      std::make_shared<TelemetryHub>(memory_, lanes_, timer_);
+      std::make_shared<TelemetryHub>(memory_, workers_.lanes, workers_.timer);
   std::unique_ptr<Simulation> simulation_ = thrown_mass();
 };
 

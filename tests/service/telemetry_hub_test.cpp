@@ -4,6 +4,7 @@
 
 #include <atomic>
 
+#include "rpc/workers.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -60,12 +61,12 @@ class Telemetry : public testing::Test {
 
   std::atomic<int> woken_{0};
   MemoryBudget memory_{64 << 20};
-  Lanes lanes_{1, 1};
-  Timer timer_;
+  Workers workers_{1, 1};
   LoadReport loaded_ =
       load_deck(BundleSource(std::map<std::string, std::string>{{"deck", kDeck}}), "deck");
   std::unique_ptr<Simulation> simulation_ = std::move(*Simulation::create(loaded_.model));
-  std::shared_ptr<TelemetryHub> hub_ = std::make_shared<TelemetryHub>(memory_, lanes_, timer_);
+  std::shared_ptr<TelemetryHub> hub_ =
+      std::make_shared<TelemetryHub>(memory_, workers_.lanes, workers_.timer);
 };
 
 TEST_F(Telemetry, SamplesArriveOnceInOrderWithTheirNumbers) {
