@@ -1,28 +1,15 @@
 #include "reduction/block_kernels.h"
 
+#include "math/processor.h"
+
 namespace mbcosim {
 
 namespace {
 
-#ifdef __x86_64__
-/// By what tells the levels apart on the processors that there are.
-bool has_level_3() {
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-         __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
-}
-bool has_level_4() {
-  return has_level_3() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-         __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-         __builtin_cpu_supports("avx512vl");
-}
-#endif
-
 std::vector<const BlockKernels*> versions_for_this_processor() {
   std::vector<const BlockKernels*> found = {kPlainKernels};
-#ifdef __x86_64__
-  if (kKernelsV3 && has_level_3()) found.push_back(kKernelsV3);
-  if (kKernelsV4 && has_level_4()) found.push_back(kKernelsV4);
-#endif
+  if (kKernelsV3 && processor_level() >= 3) found.push_back(kKernelsV3);
+  if (kKernelsV4 && processor_level() >= 4) found.push_back(kKernelsV4);
   return found;
 }
 

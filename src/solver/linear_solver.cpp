@@ -8,7 +8,6 @@
 #include <new>
 #include <utility>
 
-#include "solver/dense_tail.h"
 #include "solver/supernodal_lu.h"
 
 namespace mbcosim {
@@ -19,8 +18,6 @@ constexpr double kPoorGrowth =
     1e-9;  ///< reciprocal pivot growth below which the kept pivots are given up
 constexpr double kSuspicious =
     1e-3;  ///< ratio of pivots, against the reference matrix, below which growth is looked at
-constexpr double kDenseOperations =
-    40;                        ///< operations an entry from which a dense tail is looked for
 constexpr double kLong = 1e9;  ///< operations of a factorization that may have to be stopped
 
 SparsePattern united(int n, const std::vector<int>& column_start, const std::vector<int>& row_index,
@@ -44,9 +41,8 @@ struct LinearSolver::Klu {
   klu_common common;
   klu_symbolic* symbolic = nullptr;
   std::unique_ptr<SupernodalLu> kept;  ///< with the kept pivots
-  std::unique_ptr<DenseTail> tail;     ///< as well, when much of the matrix is full
   klu_numeric* fresh = nullptr;        ///< of the last matrix, when the kept pivots were poor
-  enum class Current { none, kept, tail, fresh } current = Current::none;
+  enum class Current { none, kept, fresh } current = Current::none;
   double kept_ratio = 0;  ///< smallest to largest pivot of the reference matrix
   bool ordered = false;   ///< both orderings were compared
 
@@ -94,11 +90,6 @@ struct LinearSolver::Klu {
     klu_free_symbolic(&other, &common);
   }
   static double entries(const klu_numeric* n) { return static_cast<double>(n->lnz) + n->unz; }
-  /// Many operations an entry of the factors: some of them are nearly full.
-  bool is_dense_in_parts(klu_numeric* numeric) {
-    return klu_flops(symbolic, numeric, &common) &&
-           common.flops > kDenseOperations * entries(numeric);
-  }
   /// Pivots and pattern of factors; the rows of each column are sorted.
   FactorPattern pattern(klu_numeric* numeric) {
     FactorPattern p;
@@ -123,9 +114,7 @@ struct LinearSolver::Klu {
     return kept->pivot_ratio() > kSuspicious * kept_ratio ||
            kept->pivot_growth(values) > kPoorGrowth;
   }
-  std::size_t bytes() const {
-    return common.memusage + (kept ? kept->bytes() : 0) + (tail ? tail->bytes() : 0);
-  }
+  std::size_t bytes() const { return common.memusage + (kept ? kept->bytes() : 0); }
   /// Factors that nobody keeps.
   class Factors {
    public:
@@ -182,7 +171,6 @@ LinearSolver::Outcome LinearSolver::analyze(double* values) {
 LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values) {
   singular_column_ = -1;
   k.kept.reset();
-  k.tail.reset();
   k.current = Klu::Current::none;
   if (!k.symbolic) return without_factors(k);
   Klu::Factors factors(
@@ -191,9 +179,6 @@ LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values) {
   watch_.look();
   k.choose_ordering(n_, column_start_.data(), row_index_.data(), values, factors.get());
   watch_.look();
-  if (k.is_dense_in_parts(factors.get()))
-    k.tail = DenseTail::plan(n_, column_start_.data(), row_index_.data(), values, k.symbolic->P,
-                             k.symbolic->Q, watch_);
   k.kept =
       std::make_unique<SupernodalLu>(column_start_, row_index_, values, k.pattern(factors.get()));
   if (!k.kept->factor(values, watch_)) return Outcome::failed;
@@ -226,10 +211,6 @@ LinearSolver::Outcome LinearSolver::factor(double* values) {
   if (n_ == 0) return Outcome::ok;
   Klu& k = *klu_;
   k.current = Klu::Current::none;
-  if (k.tail && k.tail->factor(values, watch_)) {
-    k.current = Klu::Current::tail;
-    return Outcome::ok;
-  }
   if (!k.kept || !k.kept->factor(values, watch_) || !k.pivots_are_good(values))
     return factor_alone(values);
   k.current = Klu::Current::kept;
@@ -257,9 +238,6 @@ void LinearSolver::solve(double* rhs) {
       break;
     case Klu::Current::kept:
       k.kept->solve(rhs);
-      break;
-    case Klu::Current::tail:
-      k.tail->solve(rhs);
       break;
     case Klu::Current::fresh:
       klu_solve(k.symbolic, k.fresh, n_, 1, rhs, &k.common);

@@ -1,37 +1,14 @@
 #include "solver/supernodal_lu.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "solver/panel_kernels_version.h"
 
 namespace mbcosim {
 
 namespace {
-
-/// x[row(i)] −= Σ_q panel(i, q) u[q] for count rows of a panel.
-template <int Width, class Row>
-inline void subtract_product(const double* panel, std::ptrdiff_t stride, int count, const double* u,
-                             double* x, Row row) {
-  for (int i = 0; i < count; ++i) {
-    double a = x[row(i)];
-    for (int q = 0; q < Width; ++q) a -= panel[q * stride + i] * u[q];
-    x[row(i)] = a;
-  }
-}
-template <class Row>
-inline void subtract_product(const double* panel, std::ptrdiff_t stride, int count, const double* u,
-                             int width, double* x, Row row) {
-  for (; width >= 4; width -= 4, panel += 4 * stride, u += 4)
-    subtract_product<4>(panel, stride, count, u, x, row);
-  if (width == 3) subtract_product<3>(panel, stride, count, u, x, row);
-  if (width == 2) subtract_product<2>(panel, stride, count, u, x, row);
-  if (width == 1) subtract_product<1>(panel, stride, count, u, x, row);
-}
-
-/// u := L⁻¹ u for the unit lower triangle that starts at `panel` (width × width).
-inline void solve_triangle(const double* panel, std::ptrdiff_t stride, double* u, int width) {
-  for (int q = 0; q + 1 < width; ++q, panel += stride + 1)
-    for (int p = 1; p < width - q; ++p) u[q + p] -= panel[p] * u[q];
-}
 
 /// 1/x, rounded such that x times it is 1 exactly where that is possible: equations whose
 /// coefficients are all alike, as those of kinematics, are then solved without rounding.
@@ -45,19 +22,22 @@ double reciprocal(double x) {
 }  // namespace
 
 SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
-                           const double* values, const FactorPattern& factors)
+                           const double* values, const FactorPattern& factors,
+                           const PanelVersion& version)
     : n_(static_cast<int>(factors.row_of.size())),
       row_of_(factors.row_of),
       column_of_(factors.column_of),
       block_start_(factors.block_start),
       inverse_scale_(n_),
-      work_(n_, 0.0) {
+      work_(n_, 0.0),
+      version_(version) {
   std::vector<double> largest(n_, 0.0);
   for (std::size_t p = 0; p < row_index.size(); ++p)
     largest[row_index[p]] = std::max(largest[row_index[p]], std::abs(values[p]));
   for (int k = 0; k < n_; ++k) inverse_scale_[k] = reciprocal(largest[row_of_[k]]);
   find_supernodes(factors);
   find_segments(factors);
+  find_groups();
   place_matrix(column_start, row_index);
   const std::ptrdiff_t panels = panel_start_.back();
   numbers_.resize(static_cast<std::size_t>(panels) + upper_row_.size() + n_ + above_row_.size());
@@ -111,6 +91,26 @@ void SupernodalLu::find_segments(const FactorPattern& factors) {
                       factors.upper_row.begin() + factors.upper_start[k + 1] - 1);
     upper_start_.push_back(static_cast<int>(upper_row_.size()));
   }
+}
+
+/// A group's columns have the rows of U of its first one and those of the group itself.
+void SupernodalLu::find_groups() {
+  const auto rows_of = [this](int k) { return upper_start_[k + 1] - upper_start_[k]; };
+  const auto joins = [&](int k, int first) {
+    const int* const rows = upper_row_.data() + upper_start_[first];
+    const int* const own = upper_row_.data() + upper_start_[k];
+    return supernode_of_[k] == supernode_of_[first] && rows_of(k) == rows_of(first) + k - first &&
+           own[rows_of(first)] == first && std::equal(rows, rows + rows_of(first), own);
+  };
+  bool wide = false;
+  for (int k = 0; k < n_;) {
+    group_start_.push_back(k);
+    const int first = k++;
+    while (k < n_ && k - first < version_.wide.columns && joins(k, first)) ++k;
+    wide = wide || k - first > 1;
+  }
+  group_start_.push_back(n_);
+  if (wide) together_.assign(static_cast<std::size_t>(n_) * version_.wide.columns, 0.0);
 }
 
 void SupernodalLu::place_matrix(const std::vector<int>& column_start,
@@ -187,27 +187,24 @@ void SupernodalLu::set_column(int k, const std::vector<std::size_t>& place,
   }
 }
 
-bool SupernodalLu::eliminate(const double* values) {
+bool SupernodalLu::run_program(const double* values) {
   std::fill(panels_, above_, 0.0);
   elimination_->run(values, numbers_.data());
   return std::all_of(pivots_, pivots_ + n_,
                      [](double pivot) { return std::isfinite(pivot) && pivot != 0; });
 }
 
-/// Eliminates the rows of a segment from the column in work_.
-void SupernodalLu::update(const Segment& segment) {
+/// The columns of L of a segment.
+Panel SupernodalLu::panel_of(const Segment& segment) const {
   const int s = segment.supernode, first = first_[s], below = rows_start_[s + 1] - rows_start_[s];
   const std::ptrdiff_t stride = first_[s + 1] - first + below;
-  const int end = segment.end, skipped = segment.first - first, width = end - segment.first;
-  const double* panel = panels_ + panel_start_[s] + skipped * (stride + 1);
-  double* const u = work_.data() + segment.first;
-  if (width > 1) solve_triangle(panel, stride, u, width);
-  if (end < first_[s + 1])
-    subtract_product(panel + width, stride, first_[s + 1] - end, u, width, work_.data() + end,
-                     [](int i) { return i; });
-  const int* const rows = rows_.data() + rows_start_[s];
-  subtract_product(panel + (first_[s + 1] - segment.first), stride, below, u, width, work_.data(),
-                   [rows](int i) { return rows[i]; });
+  return {panels_ + panel_start_[s] + (segment.first - first) * (stride + 1),
+          stride,
+          segment.first,
+          segment.end - segment.first,
+          first_[s + 1] - segment.end,
+          rows_.data() + rows_start_[s],
+          below};
 }
 
 bool SupernodalLu::finish_column(int k, int supernode) {
@@ -234,25 +231,77 @@ bool SupernodalLu::finish_column(int k, int supernode) {
   return std::isfinite(pivot) && pivot != 0;
 }
 
+/// The matrix's column k into every `stride`-th number of x; what lies above its diagonal block
+/// into above_.
+void SupernodalLu::scatter(int k, const double* values, double* x, std::ptrdiff_t stride) {
+  const double* value = values + value_start_[k];
+  for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value)
+    x[entry_row_[p] * stride] = *value * inverse_scale_[entry_row_[p]];
+  for (int p = above_start_[k]; p < above_start_[k + 1]; ++p) {
+    above_[p] = x[above_row_[p] * stride];
+    x[above_row_[p] * stride] = 0;
+  }
+}
+
+bool SupernodalLu::factor_column(int k, const double* values) {
+  scatter(k, values, work_.data(), 1);
+  for (int q = segment_start_[k]; q < segment_start_[k + 1]; ++q)
+    eliminate<1>(panel_of(segments_[q]), work_.data());
+  return finish_column(k, supernode_of_[k]);
+}
+
+/// Columns first .. end − 1, with the operations of factor_column for each of their numbers in the
+/// same order.
+bool SupernodalLu::factor_group(int first, int end, const double* values) {
+  const PanelKernels& kernels = version_.of(end - first);
+  double* const x = together_.data();
+  const auto row_of = [&](int k) { return x + static_cast<std::ptrdiff_t>(k) * kernels.columns; };
+  const auto clear = [&](int k) { std::fill_n(row_of(k), kernels.columns, 0.0); };
+  for (int k = first; k < end; ++k) scatter(k, values, x + (k - first), kernels.columns);
+  for (int q = segment_start_[first]; q < segment_start_[first + 1]; ++q)
+    kernels.eliminate(panel_of(segments_[q]), x);
+  for (int p = upper_start_[first]; p < upper_start_[first + 1]; ++p) {
+    const double* const row = row_of(upper_row_[p]);
+    for (int k = first; k < end; ++k)
+      upper_[upper_start_[k] + p - upper_start_[first]] = row[k - first];
+    clear(upper_row_[p]);
+  }
+  bool fine = true;
+  for (int k = first; k < end; ++k) fine = finish_of_group(k, first, end, kernels) && fine;
+  const int s = supernode_of_[first];
+  for (int k = first; k < first_[s + 1]; ++k) clear(k);
+  for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) clear(rows_[p]);
+  return fine;
+}
+
+/// Column k of a group, and its part in the columns that follow.
+bool SupernodalLu::finish_of_group(int k, int first, int end, const PanelKernels& kernels) {
+  const int place = k - first;
+  const double* const diagonal =
+      together_.data() + static_cast<std::ptrdiff_t>(k) * kernels.columns;
+  const double pivot = pivots_[k] = diagonal[place];
+  std::array<double, kMostColumns> u{};
+  for (int c = place + 1; c < end - first; ++c)  // the group's rows of U are its last ones
+    u[c] = upper_[upper_start_[first + c + 1] - c + place] = diagonal[c];
+  kernels.finish(panel_of({supernode_of_[k], k, k + 1}), panels_ + below_diagonal(k), place, pivot,
+                 u.data(), together_.data());
+  return std::isfinite(pivot) && pivot != 0;
+}
+
 bool SupernodalLu::factor(const double* values, const Watch& watch) {
   if (elimination_) {
     watch.look();
-    return eliminate(values);
+    return run_program(values);
   }
   constexpr int kLook = 16;  // columns between two looks at the watch
-  double* const x = work_.data();
   bool fine = true;
-  for (int k = 0; k < n_ && fine; ++k) {
-    if (k % kLook == 0) watch.look();
-    const double* value = values + value_start_[k];
-    for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value)
-      x[entry_row_[p]] = *value * inverse_scale_[entry_row_[p]];
-    for (int p = above_start_[k]; p < above_start_[k + 1]; ++p) {
-      above_[p] = x[above_row_[p]];
-      x[above_row_[p]] = 0;
+  for (int g = 0, next = 0; fine && group_start_[g] < n_; ++g) {
+    const int first = group_start_[g], end = group_start_[g + 1];
+    if (first >= next) {
+      watch.look();
+      next = first + kLook;
     }
-    for (int q = segment_start_[k]; q < segment_start_[k + 1]; ++q) update(segments_[q]);
-    fine = finish_column(k, supernode_of_[k]);
+    fine = end - first == 1 ? factor_column(first, values) : factor_group(first, end, values);
   }
   return fine;
 }
@@ -263,7 +312,7 @@ void SupernodalLu::solve(double* b) {
   for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
     const int begin = block_start_[block], end = block_start_[block + 1];
     for (int s = supernode_of_[begin]; s < supernodes() && first_[s] < end; ++s)
-      update({s, first_[s], first_[s + 1]});
+      eliminate<1>(panel_of({s, first_[s], first_[s + 1]}), x);
     for (int k = end - 1; k >= begin; --k) {
       const double xk = x[k] /= pivots_[k];
       for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "solver/elimination_program.h"
+#include "solver/panel_kernels.h"
 #include "solver/watch.h"
 
 namespace mbcosim {
@@ -36,7 +37,8 @@ class SupernodalLu {
  public:
   /// The matrix's pattern in compressed columns; `values`: those of the reference matrix.
   SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
-               const double* values, const FactorPattern& factors);
+               const double* values, const FactorPattern& factors,
+               const PanelVersion& version = *panel_versions().back());
   SupernodalLu(const SupernodalLu&) = delete;
   SupernodalLu& operator=(const SupernodalLu&) = delete;
 
@@ -61,14 +63,19 @@ class SupernodalLu {
   void find_supernodes(const FactorPattern& factors);
   void find_segments(const FactorPattern& factors);
   void place_matrix(const std::vector<int>& column_start, const std::vector<int>& row_index);
-  void update(const Segment& segment);
+  void find_groups();
+  Panel panel_of(const Segment& segment) const;
+  void scatter(int k, const double* values, double* x, std::ptrdiff_t stride);
+  bool factor_column(int k, const double* values);
   bool finish_column(int k, int supernode);
+  bool factor_group(int first, int end, const double* values);
+  bool finish_of_group(int k, int first, int end, const PanelKernels& kernels);
   template <class Use>
   void for_column_below(int k, Use use) const;
   std::size_t place_of(const double* number) const { return number - numbers_.data(); }
   void make_program();
   void set_column(int k, const std::vector<std::size_t>& place, EliminationProgram& program) const;
-  bool eliminate(const double* values);
+  bool run_program(const double* values);
   std::ptrdiff_t below_diagonal(int k) const;  ///< of column k, its first number in panels_
 
   int n_;
@@ -98,6 +105,11 @@ class SupernodalLu {
   std::vector<double> numbers_;                    ///< panels, U, pivots, above
   std::optional<EliminationProgram> elimination_;  ///< of small matrices
   std::vector<double> work_;                       ///< by position; zero between calls
+
+  // neighbours in a supernode with the same rows of U before them are updated together
+  std::vector<int> group_start_;  ///< first column of each group, then n
+  const PanelVersion& version_;
+  std::vector<double> together_;  ///< row by row, for the widest group; zero between calls
 };
 
 }  // namespace mbcosim

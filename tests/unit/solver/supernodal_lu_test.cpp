@@ -150,6 +150,57 @@ TEST(SupernodalLu, JoinsColumnsWithTheSameRowsBelow) {
   EXPECT_EQ(supernodes(arrow), 6);
 }
 
+/// Groups of columns are another order of the same operations, for every version of the kernels and
+/// for one column at a time.
+TEST(SupernodalLu, ColumnsTogetherHaveTheBitsOfEachAlone) {
+  const PanelVersion alone{"", {1, nullptr, nullptr}, {1, nullptr, nullptr}};
+  for (unsigned seed = 1; seed <= 10; ++seed)
+    for (const double density : {.03, .1, .4, 1.}) {
+      const int n = 60 + 7 * static_cast<int>(seed);
+      Family family(n, density, {0, 3, n}, seed);
+      const Dense reference = family.matrix(), a = family.matrix();
+      const Sparse sparse(reference);
+      const Vector b = family.vector();
+      const auto solution = [&](const PanelVersion& version) {
+        SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
+                        family.pattern(reference), version);
+        Vector x = b;
+        EXPECT_TRUE(lu.factor(Sparse(a).values.data()));
+        lu.solve(x.data());
+        return x;
+      };
+      const Vector expected = solution(alone);
+      for (const PanelVersion* version : panel_versions())
+        EXPECT_EQ(solution(*version), expected)
+            << version->processor << ", " << n << ", " << density;
+    }
+}
+
+TEST(SupernodalLu, AGroupWithAVanishingPivotLeavesNothingBehind) {
+  Family family(90, 1, {0, 90}, 1);
+  const Dense a = family.matrix();
+  const Sparse sparse(a);
+  for (const PanelVersion* version : panel_versions()) {
+    SupernodalLu fresh(sparse.column_start, sparse.row_index, sparse.values.data(),
+                       family.pattern(a), *version);
+    SupernodalLu used(sparse.column_start, sparse.row_index, sparse.values.data(),
+                      family.pattern(a), *version);
+    Dense singular = a, invalid = a;
+    singular.row(41) = singular.row(40);
+    invalid(50, 50) = NAN;
+    const std::vector<double> zeros(sparse.values.size(), 0.0);
+    EXPECT_FALSE(used.factor(zeros.data()));
+    EXPECT_FALSE(used.factor(Sparse(invalid).values.data()));
+    (void)used.factor(Sparse(singular).values.data());  // by rounding its pivot may not vanish
+    ASSERT_TRUE(used.factor(sparse.values.data()));
+    ASSERT_TRUE(fresh.factor(sparse.values.data()));
+    Vector x = Vector::LinSpaced(90, 1, 2), y = x;
+    used.solve(x.data());
+    fresh.solve(y.data());
+    EXPECT_EQ(x, y) << version->processor;
+  }
+}
+
 /// A matrix without a usable pivot leaves nothing behind.
 TEST(SupernodalLu, RefusesAVanishingPivotAndGoesOn) {
   Dense a(3, 3);
@@ -208,6 +259,52 @@ TEST(LinearSolver, KeepsPivotsForMatricesOfOnePattern) {
       EXPECT_LT((x - expected).norm(), 1e-13 * expected.norm());
     }
   }
+}
+
+/// As of a modal body: `modes` unknowns q with p − q̇ = 0, a full block between p, a border of full
+/// rows and columns of which the last have no diagonal, and a chain of sparse unknowns.
+Dense modal_matrix(std::mt19937& random) {
+  const int modes = 100, border = 12, chain = 40, p = modes, b = 2 * modes, c = b + border;
+  const auto number = [&] { return std::uniform_real_distribution<double>(-1, 1)(random); };
+  Dense a = Dense::Zero(c + chain, c + chain);
+  for (int j = 0; j < modes; ++j) {
+    a(j, j) = 1e3;
+    a(j, p + j) = -1;
+    for (int k = 0; k < modes; ++k) {
+      a(p + j, p + k) = (j == k ? 3 : 0) + .1 * number();
+      a(p + j, k) = (j == k ? 400 : 0) + number();
+    }
+    for (int k = 0; k < border; ++k) {
+      a(p + j, b + k) = number();
+      a(b + k, p + j) = number();
+    }
+  }
+  for (int k = 0; k < border / 2; ++k) a(b + k, b + k) = 1e5 * number();
+  for (int k = 0; k < chain; ++k) {
+    const int next = k + 1 < chain ? c + k + 1 : b;
+    a(c + k, c + k) = 4;
+    a(c + k, next) = a(next, c + k) = -1;
+  }
+  return a;
+}
+
+TEST(LinearSolver, SolvesMatricesThatAreFullInParts) {
+  std::mt19937 random(11);
+  Sparse reference(modal_matrix(random));
+  const int n = static_cast<int>(reference.column_start.size()) - 1;
+  LinearSolver solver(n, reference.column_start, reference.row_index);
+  ASSERT_EQ(solver.analyze(reference.values.data()), LinearSolver::Outcome::ok);
+  for (int k = 0; k < 3; ++k) {
+    const Dense a = modal_matrix(random);
+    ASSERT_EQ(solver.factor(Sparse(a).values.data()), LinearSolver::Outcome::ok);
+    const Vector b = Vector::Random(n);
+    Vector x = b;
+    solver.solve(x.data());
+    EXPECT_LT((a * x - b).norm(), 1e-11 * b.norm());
+    EXPECT_LT((x - a.partialPivLu().solve(b)).norm(), 1e-9 * x.norm());
+  }
+  std::vector<double> zeros(reference.values.size(), 0.0);
+  EXPECT_EQ(solver.factor(zeros.data()), LinearSolver::Outcome::singular);
 }
 
 }  // namespace

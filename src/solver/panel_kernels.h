@@ -1,0 +1,47 @@
+/// Work of the LU factorization on the panel of a supernode, for several columns of the matrix side
+/// by side, compiled for several processors. All versions do the same operations in the same order
+/// without fused multiply and add: their numbers are the same bit by bit, whatever the number of
+/// columns.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace mbcosim {
+
+/// Columns of L that begin in row `first`: own rows, then those of a list, `stride` numbers apart.
+struct Panel {
+  const double* numbers;  ///< of the first column, at row `first` itself, which is not read
+  std::ptrdiff_t stride;
+  int first;        ///< position
+  int width;        ///< columns
+  int own;          ///< rows first + width .. are the supernode's own, without a list
+  const int* rows;  ///< positions of the rows below
+  int below;        ///< their count
+};
+
+constexpr int kMostColumns = 8;  ///< side by side, in any version
+
+/// For one number of columns side by side: X is row by row, `columns` numbers each.
+struct PanelKernels {
+  int columns;
+  /// Rows first .. first + width − 1 of X := L⁻¹ X, the rows below minus L times them.
+  void (*eliminate)(const Panel& panel, double* x);
+  /// The column of L below row `first` := column `place` of X / pivot; X −= it times `u` (columns).
+  void (*finish)(const Panel& panel, double* column, int place, double pivot, const double* u,
+                 double* x);
+};
+
+struct PanelVersion {
+  const char* processor;      ///< "x86-64-v3"
+  PanelKernels narrow, wide;  ///< for a few columns, and for all that come together
+  const PanelKernels& of(int columns) const { return columns > narrow.columns ? wide : narrow; }
+};
+
+/// The versions that this processor can run, the plainest first.
+const std::vector<const PanelVersion*>& panel_versions();
+
+/// The version of the build; null where the compiler has none for that processor.
+extern const PanelVersion* const kPanelVersionV3;
+
+}  // namespace mbcosim
