@@ -63,7 +63,9 @@ if [ -n "$hostile" ]; then
   exec /usr/bin/python3 tests/hostile/hostile.py $folder/bin --seconds "$hostile" --seed "$(date +%s)" "${arguments[@]}"
 fi
 if [ -n "$soak" ]; then
-  /usr/bin/python3 tests/soak/soak.py "${minutes[@]}" --seed "$(date +%s)"
+  sanitized=()
+  [ $preset = release ] || sanitized=(--sanitized)
+  /usr/bin/python3 tests/soak/soak.py "${minutes[@]}" "${sanitized[@]}" --seed "$(date +%s)"
   exec /usr/bin/python3 tests/soak/kills.py "${minutes[@]}" --seed "$(date +%s)"
 fi
 exec ctest --test-dir $folder --output-on-failure --parallel "$jobs" "${arguments[@]}"

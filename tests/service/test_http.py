@@ -468,7 +468,8 @@ def test_a_reader_that_stops_reading_holds_neither_steps_nor_memory(http_daemon,
         link, _ = open_stream(door, simulation.name, [variable.handle for variable in simulation.variables.values()])
         assert simulation.step(50_000).reply.step == 50_000  # some 25 MB of samples, which nobody takes
         assert simulation.step(50_000).reply.step == 100_000
-        assert resident() - before < 150
+        kept = 450 if is_sanitized() else 150  # a sanitizer keeps 256 MB of what was freed, and space around it
+        assert resident() - before < kept
         link.close()
 
 

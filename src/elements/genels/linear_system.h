@@ -35,7 +35,8 @@ LinearSystem companion_system(CanonicalForm form, const std::vector<double>& den
 /// Rows of the states: B u + A x − E ẋ; of each output dof: C x + D u − y.
 class LinearSystemElement : public GeneralElement {
  public:
-  LinearSystemElement(LinearSystem system, std::vector<NodeDof> outputs, std::vector<ScalarValue> inputs)
+  LinearSystemElement(LinearSystem system, std::vector<NodeDof> outputs,
+                      std::vector<ScalarValue> inputs)
       : system_(std::move(system)), outputs_(std::move(outputs)), inputs_(std::move(inputs)) {}
   /// Start values of the states and their rates; empty: zero.
   void set_start(VecX x, VecX xp) {
