@@ -2,8 +2,6 @@
 /// against the size of a cantilever of three-node beams, as a table with fitted exponents.
 ///
 ///   newton_cost [elements ...]          default 10 100 1000 10000
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,43 +10,17 @@
 #include <vector>
 
 #include "benchmark_models.h"
-#include "simulation/simulation.h"
-#include "solver/system.h"
+#include "newton_parts.h"
 
 namespace mbcosim::benchmarks {
 namespace {
 
-constexpr int kParts = 4;
-constexpr const char* kNames[kParts] = {"residual", "matrix", "factor", "solve"};
-
 struct Cost {
   int elements = 0, unknowns = 0;
-  double part[kParts] = {};  ///< [s]
+  std::array<double, kNewtonParts> part{};  ///< [s]
   double assembly() const { return part[0] + part[1]; }
   double total() const { return assembly() + part[2] + part[3]; }
 };
-
-/// Processor time of this thread [s]: unlike wall time it does not count other processes.
-double now() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-/// Median time of one call [s]. The shortest would flatter small models: a short call finds a
-/// moment in which nobody else uses the caches, a long one never does.
-double typical(const std::function<void()>& call) {
-  std::vector<double> times;
-  const double end = now() + 1;
-  while (times.size() < 7 || (times.size() < 100000 && now() < end)) {
-    const double start = now();
-    call();
-    times.push_back(now() - start);
-  }
-  const auto middle = times.begin() + times.size() / 2;
-  std::nth_element(times.begin(), middle, times.end());
-  return *middle;
-}
 
 bool measure(int elements, Cost& cost) {
   const LoadReport report = load_deck(BundleSource(cantilever(elements)), "deck.mbd");
@@ -56,22 +28,9 @@ bool measure(int elements, Cost& cost) {
   auto simulation = Simulation::create(report.model);
   if (!simulation) return false;
   if ((*simulation)->step_many(3).error) return false;
-  const Model& model = *report.model;
-  State state = (*simulation)->state();
-  Workspace workspace(model);
-  const double c = 0.5e-3;
-  const EvalContext context = model.context(state, Phase::step, c, c);
-  compute_jacobian(context, workspace);
-  if (workspace.solver.analyze(workspace.values.data()) != LinearSolver::Outcome::ok) return false;
-  cost.elements = elements;
-  cost.unknowns = model.unknowns;
-  cost.part[0] = typical([&] { compute_residual(context, workspace.scratch, workspace.residual); });
-  cost.part[1] = typical([&] { compute_jacobian(context, workspace); });
-  cost.part[2] = typical([&] { (void)workspace.solver.factor(workspace.values.data()); });
-  cost.part[3] = typical([&] {
-    std::copy(workspace.residual.begin(), workspace.residual.end(), workspace.delta.begin());
-    workspace.solver.solve(workspace.delta.data());
-  });
+  const auto parts = newton_parts(**simulation, 1);
+  if (!parts) return false;
+  cost = {elements, report.model->unknowns, *parts};
   return true;
 }
 
@@ -94,7 +53,7 @@ int run(int argc, char** argv) {
   for (int k = 1; k < argc; ++k) sizes.push_back(std::atoi(argv[k]));
   if (sizes.empty()) sizes = {10, 100, 1000, 10000};
   std::printf("%9s %9s", "elements", "unknowns");
-  for (const char* name : kNames) std::printf(" %11s", name);
+  for (const char* name : kNewtonPartNames) std::printf(" %11s", name);
   std::printf(" %11s %18s\n", "iteration", "assembly / factor");
   std::vector<Cost> costs;
   for (const int n : sizes) {
@@ -110,7 +69,7 @@ int run(int argc, char** argv) {
   }
   if (costs.size() < 2) return 0;
   std::printf("%9s %9s", "exponent", "");
-  for (int k = 0; k < kParts; ++k)
+  for (int k = 0; k < kNewtonParts; ++k)
     std::printf(" %11.3f", exponent(costs, [k](const Cost& c) { return c.part[k]; }));
   std::printf(" %11.3f\n", exponent(costs, [](const Cost& c) { return c.total(); }));
   return 0;

@@ -5,7 +5,9 @@ usage: run.sh [--build FOLDER] [--peer "REF -s -f {deck} -o {prefix}"] [--decks 
 
   tutorials   whole processes on MBDyn's tutorials with their text files, and without output (`none`); those of this project use `for:`,
               which other solvers do not read: --decks names others
-  start, read of a process; the rest of the rigid body's time is its 1000 steps and its text
+  process     start and read of a process
+  parts       of the tutorials' runs, by the engine alone: reading, initial phases, residuals, matrices, factorizations, solutions, the rest
+              of the steps, text of the results [ms], allocations, memory [MB]
   beams       cantilevers of three-node beams and grids of two-node beams: one Newton iteration of a process, and its memory;
               of the cantilevers also the parts of an iteration, by the engine alone
   remote      a step over a stream and its empty echo (remote_step, when it is built)
@@ -136,6 +138,16 @@ def parts_of_a_process(table, binary, folder, repeat):
         table.add(name, "ms", 1e3 * statistics.median(measured([str(binary), *words], folder)[0] for _ in range(4 * repeat)))
 
 
+def parts_of_runs(table, build, decks):
+    program = build / "bin" / "run_parts"
+    if not program.exists():
+        return
+    for deck in decks:
+        parts = json.loads(subprocess.run([program, deck], capture_output=True, text=True, check=True).stdout)
+        whole = sum(parts[name] for name in ("read", "initial", "residual", "matrix", "factor", "solve", "rest", "output"))
+        table.add(f"{deck.stem}, engine", "ms", whole, **parts)
+
+
 def beams(table, solvers, folder, repeat, small):
     sizes = [10, 100] if small else [100, 1000, 10000]
     models = [(f"cantilever of {n}", lambda steps, n=n: beam_models.cantilever(n, steps)) for n in sizes]
@@ -191,7 +203,7 @@ def main():
     parser.add_argument("--decks", type=pathlib.Path, nargs="+", default=[MODELS / f"{name}.mbd" for name in TUTORIALS])
     parser.add_argument("--small", action="store_true")
     parser.add_argument("--repeat", type=int, default=0)
-    parser.add_argument("--only", default="", help="some of tutorials,process,beams,engine,remote,reduce")
+    parser.add_argument("--only", default="", help="some of tutorials,process,parts,beams,engine,remote,reduce")
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--compare", type=pathlib.Path)
     options = parser.parse_args()
@@ -203,6 +215,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         sections = {"tutorials": lambda: tutorials(table, solvers, [deck.resolve() for deck in options.decks], folder, repeat),
                     "process": lambda: parts_of_a_process(table, binary, folder, repeat),
+                    "parts": lambda: parts_of_runs(table, build, [deck.resolve() for deck in options.decks]),
                     "beams": lambda: beams(table, solvers, folder, 1 if options.small else 3, options.small),
                     "engine": lambda: engine_parts(table, build, options.small),
                     "remote": lambda: remote(table, build, options.small),
