@@ -78,10 +78,14 @@ bool TextFile::cut(std::int64_t size) {
     used_ = static_cast<std::size_t>(size - size_);
     return true;
   }
+  if (ftruncate(fileno(file_), size) != 0) {
+    fail();
+    return false;
+  }
   if (budget_) budget_->give_back(size_ - size);
   size_ = size;
   used_ = 0;
-  if (ftruncate(fileno(file_), size_) != 0 || std::fseek(file_, size_, SEEK_SET) != 0) fail();
+  if (std::fseek(file_, size_, SEEK_SET) != 0) fail();
   return bool(problem_);
 }
 

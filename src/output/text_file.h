@@ -61,7 +61,8 @@ class TextFile {
     return file_ || used_ > 0 ? size_ + static_cast<std::int64_t>(used_) : kNone;
   }
   std::int64_t waiting() const { return static_cast<std::int64_t>(used_); }
-  /// Ends the file after so many bytes, and goes on there. False: it has not as many.
+  /// Ends the file after so many bytes, and goes on there. False: it has not as many, or cannot be
+  /// cut, as `status` tells; then it stays as it is.
   bool cut(std::int64_t size);
   /// Goes on with a file that another TextFile wrote, if it is there.
   void reopen();

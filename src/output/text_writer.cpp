@@ -130,7 +130,7 @@ class TextWriter : public ResultWriter, private OutputRow {
     samples_.go_back(*context.state);
     other_ = ok();
     forget_eigenanalyses_after(context.state->time);
-    if (whole) return status();
+    if (const Status now = status(); whole || !now) return now;
     return make_error(ErrorKind::data_loss, "RESULTS_CUT_SHORT",
                       "the result files end before step " + std::to_string(context.state->step));
   }
