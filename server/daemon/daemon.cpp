@@ -396,11 +396,13 @@ void Daemon::end_server() {
   std::promise<void> ended;
   std::thread cutter([this, end = ended.get_future()] {
     run_caught("shutdown", [&] {
-      if (end.wait_for(config_.shutdown_grace + kLastWords) == std::future_status::ready) return;
+      if (end.wait_for(config_.shutdown_grace) == std::future_status::ready) return;
+      gate_.abandon();
+      if (end.wait_for(kLastWords) == std::future_status::ready) return;
       for (const auto& listener : listeners_) listener->cut();
     });
   });
-  server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace);
+  server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace + kLastWords);
   ended.set_value();
   cutter.join();
   listeners_.clear();
@@ -411,6 +413,7 @@ bool Daemon::shut_down() {
   constexpr std::chrono::seconds kLastJobs(1);
   spdlog::info("shutting down");
   health_.stop();
+  store_.note_end_of_server();
   gate_.close();
   eager_resume_.stop();
   for (const auto& listener : listeners_) listener->stop();

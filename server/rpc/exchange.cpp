@@ -10,10 +10,6 @@ namespace {
 
 constexpr std::chrono::seconds kLinger{10};  // that long an ended call waits for its client to read
 
-Refusal shutting_down() {
-  return Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
-}
-
 /// Refuses a call when there is not even memory to look at it.
 class RefusedCall final : public grpc::ServerGenericBidiReactor {
  public:
@@ -92,7 +88,9 @@ void Exchange::guarded(const std::function<void()>& body) noexcept {
     try {
       body();
     } catch (...) {
-      finish(status_of_exception(runtime_, method_, caller_.identity));
+      grpc::Status status = status_of_exception(runtime_, method_, caller_.identity);
+      const bool by_us = gate_.closing() && status.error_code() == grpc::StatusCode::CANCELLED;
+      finish(by_us ? shutting_down().status() : std::move(status));
     }
   } catch (...) {  // no memory for a status either
     hang_up();
@@ -185,6 +183,8 @@ void Exchange::shut_down() {
   closing_ = true;
   if (jobs_ == 0) want_finish(shutting_down().status());
 }
+
+void Exchange::abandon() { finish(shutting_down().status()); }
 
 // ------------------------------------------------------------------ writing
 
@@ -308,16 +308,23 @@ void Gate::forget(Exchange* exchange) {
   calls_.erase(exchange);
 }
 
-void Gate::close() {
+std::vector<std::shared_ptr<Exchange>> Gate::open_calls() {
   std::vector<std::shared_ptr<Exchange>> calls;
-  {
-    Guard guard(mutex_);
-    closing_.store(true);
-    for (const auto& [exchange, weak] : calls_)
-      if (auto call = weak.lock()) calls.push_back(std::move(call));
-  }
+  Guard guard(mutex_);
+  for (const auto& [exchange, weak] : calls_)
+    if (auto call = weak.lock()) calls.push_back(std::move(call));
+  return calls;
+}
+
+void Gate::close() {
+  closing_.store(true);
+  const auto calls = open_calls();
   for (const auto& call : calls) call->call().cancel();  // first: a step ends before its peers do
   for (const auto& call : calls) call->shut_down();
+}
+
+void Gate::abandon() {
+  for (const auto& call : open_calls()) call->abandon();
 }
 
 }  // namespace mbcosim::server

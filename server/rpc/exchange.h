@@ -87,6 +87,8 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
   void start(const Method* method);
   /// The server ends: work is interrupted, idle streams end with SHUTTING_DOWN.
   void shut_down() TS_EXCLUDES(mutex_);
+  /// Ends with SHUTTING_DOWN, whatever work goes on.
+  void abandon() TS_EXCLUDES(mutex_);
 
   // --- for handlers
   const Caller& caller() const { return caller_; }
@@ -164,11 +166,14 @@ class Gate final : public grpc::CallbackGenericService {
       grpc::GenericCallbackServerContext* context) override;
   /// Refuses new calls, ends idle ones and interrupts the others.
   void close() TS_EXCLUDES(mutex_);
+  /// After `close`: ends what is open still.
+  void abandon() TS_EXCLUDES(mutex_);
   bool closing() const { return closing_.load(); }
 
  private:
   friend class Exchange;
   void forget(Exchange* exchange) TS_EXCLUDES(mutex_);
+  std::vector<std::shared_ptr<Exchange>> open_calls() TS_EXCLUDES(mutex_);
 
   const Runtime& runtime_;
   std::map<std::string, Method> methods_;

@@ -316,8 +316,19 @@ void Advance::interrupt() {
   end_ = End::unsolved;
 }
 
+// Where the simulation outlives the server, a call that the server's end interrupts is broken off:
+// its repeat goes on from there. Rows that were sent cannot be sent again.
+void Advance::leave_rest_to_repeat() {
+  if (!parts_.server_ends.load() || !parts_.storage.keeping() || !turn_.has_id() || table_ ||
+      account_.reply().outcome() != v1::STEP_OUTCOME_INTERRUPTED)
+    return;
+  journal_.settle(parts_.simulation);
+  throw shutting_down();
+}
+
 // The reply is complete.
 void Advance::conclude() {
+  leave_rest_to_repeat();
   if (table_) table_->finish(parts_.simulation);
   account_.finish(parts_.variables, parts_.simulation);
   parts_.storage.rest();

@@ -1,6 +1,7 @@
 /// One call of `Step`.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <optional>
 #include <string>
@@ -34,10 +35,11 @@ class Advance {
     TelemetryHub& telemetry;
     SessionStorage& storage;
     Coupler& coupler;
-    SessionResults* results;    ///< null: none are written
-    DeckSockets* deck_sockets;  ///< null: none are served
-    Recorder* recorder;         ///< null: nothing is recorded
-    double pace;                ///< see StepPace
+    SessionResults* results;               ///< null: none are written
+    DeckSockets* deck_sockets;             ///< null: none are served
+    Recorder* recorder;                    ///< null: nothing is recorded
+    double pace;                           ///< see StepPace
+    const std::atomic<bool>& server_ends;  ///< what is interrupted was not the caller's wish
   };
   /// The request has been checked. `turn`: keeps the reply, and knows what an earlier call has done
   /// of it. `table`: of rows on the way; null: none are wanted.
@@ -77,6 +79,7 @@ class Advance {
   void fail(v1::StepOutcome outcome, v1::Reason reason, const std::string& why)
       TS_REQUIRES(parts_.lock);
   void interrupt() TS_REQUIRES(parts_.lock);
+  void leave_rest_to_repeat() TS_REQUIRES(parts_.lock);
   void conclude() TS_REQUIRES(parts_.lock);
   void tell_end() TS_REQUIRES(parts_.lock);
   StepSlot take_slot() const;

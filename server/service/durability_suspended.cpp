@@ -121,7 +121,7 @@ void Durability::expire() {
 void Durability::await_waking(const std::string& simulation, const Call& call) {
   constexpr std::chrono::milliseconds kLook(20);
   while (waking_.count(simulation) > 0 && !call.cancelled()) {
-    if (stop_) throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down");
+    if (stop_) throw shutting_down();
     changed_.wait_for(mutex_, kLook);
   }
   if (call.cancelled()) throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");

@@ -250,8 +250,17 @@ void Session::require_way_back() const {
                   "the codes at the sockets that the deck names cannot go back");
 }
 
+Refusal Session::gone() const {
+  if (server_ends_.load()) return shutting_down();
+  return Refusal(v1::REASON_NO_SUCH_SIMULATION, identity_.id + " was deleted or its lease is over");
+}
+
+void Session::require_there() const {
+  if (lease_.ended()) throw gone();
+}
+
 void Session::require_usable() const {
-  if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
+  require_there();
   if (status_.failed())
     throw Refusal(v1::REASON_SIMULATION_FAILED,
                   "the simulation has failed; restore a snapshot or delete it");
@@ -319,7 +328,8 @@ Advance::Parts Session::advance_parts() {
           .results = results_.get(),
           .deck_sockets = deck_sockets_.get(),
           .recorder = recorder_.get(),
-          .pace = pace_};
+          .pace = pace_,
+          .server_ends = server_ends_};
 }
 
 void Session::step(const v1::StepRequest& request, const Caller& caller, Call& call,
@@ -419,8 +429,7 @@ void Session::close() {
   lease_.end();
   status_.interrupt();
   telemetry_->close();
-  const Refusal gone(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
-  for (const auto& port : coupler_.ports()) port->end(gone);
+  for (const auto& port : coupler_.ports()) port->end(gone());
 }
 
 // At once, not when the last stream lets go of the session: another simulation may want the paths.
@@ -431,9 +440,7 @@ void Session::close_deck_sockets() {
 }
 
 Session::Use::Use(Session& session) : lease_(session.lease_) {
-  if (!lease_.take())
-    throw Refusal(v1::REASON_NO_SUCH_SIMULATION,
-                  session.identity_.id + " was deleted or its lease is over");
+  if (!lease_.take()) throw session.gone();
 }
 
 }  // namespace mbcosim::server

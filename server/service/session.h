@@ -1,6 +1,7 @@
 /// One simulation on the server: who owns it, who advances it, what is saved of it.
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <optional>
@@ -172,6 +173,8 @@ class Session {
 
   /// Interrupts, ends subscriptions and the streams of peers; later calls find the session gone.
   void close();
+  /// From now on what ends a call is the end of the server: callers are told to come again.
+  void note_end_of_server() { server_ends_.store(true); }
   /// After `close`: the sockets of the deck are closed. Waits for the end of a step.
   void close_deck_sockets();
 
@@ -231,6 +234,8 @@ class Session {
   void check_grants(const Grants::List& grants) const;
   void fill_stored(const Simulation& simulation, v1::SimulationInfo* out) const
       TS_NO_THREAD_SAFETY_ANALYSIS;  // called by the storage, under the lock
+  Refusal gone() const;
+  void require_there() const;
   void require_usable() const;
   void require_at_rest() const;
   void require_way_back() const;
@@ -248,6 +253,7 @@ class Session {
   // Thread-safe by themselves.
   Grants grants_;
   Lease lease_;
+  std::atomic<bool> server_ends_{false};
   SessionStatus status_;
   SnapshotShelf snapshots_;
   KeptReplies kept_;

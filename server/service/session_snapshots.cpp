@@ -49,7 +49,7 @@ void Session::save(const std::string& display_name, const Change& change,
 }
 
 void Session::restore(int snapshot, const Change& change, v1::RestoreSnapshotReply* reply) {
-  if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
+  require_there();
   require_way_back();
   const State state = snapshots_.get(snapshot);
   go_to({state, snapshot, 0, *reply, reply->mutable_simulation()}, change);
@@ -60,7 +60,7 @@ void Session::restore(int snapshot, const Change& change, v1::RestoreSnapshotRep
 void Session::reset(const Change& change, const CancelToken& cancel,
                     v1::ResetSimulationReply* reply) {
   constexpr std::int64_t kNothing = -1, kInitialSolution = 0;
-  if (lease_.ended()) throw Refusal(v1::REASON_NO_SUCH_SIMULATION, "the simulation was deleted");
+  require_there();
   require_way_back();
   MemoryShare share;
   const auto fresh = within(shared_.memory, &cancel, &share, [&] {

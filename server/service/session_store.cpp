@@ -231,12 +231,19 @@ void SessionStore::park(const SessionPtr& session) {
   if (!keeper_.suspend(*session)) return session->lease().renew();
   if (!session->lease().expire(std::chrono::steady_clock::now())) return keeper_.unsuspend(id);
   session->keeping()->end();
+  // Nobody brings it back before it is taken out: what is told of that comes later.
+  log_.state_changed(session->subject(), v1::SIMULATION_STATE_SUSPENDED, session->step_number());
   take_out(id);
   session->close();
-  log_.state_changed(session->subject(), v1::SIMULATION_STATE_SUSPENDED, session->step_number());
+}
+
+void SessionStore::note_end_of_server() {
+  Guard guard(mutex_);
+  for (const auto& [id, session] : sessions_) session->note_end_of_server();
 }
 
 void SessionStore::close_all() {
+  note_end_of_server();  // also those that came back meanwhile
   Guard guard(mutex_);
   for (const auto& [id, session] : sessions_) session->close();
 }

@@ -101,7 +101,9 @@ class SessionStore {
   void discard(const std::string& id);
   /// Ends a session; nothing when it is gone already.
   void drop(const std::string& id, v1::DeletionCause cause = v1::DELETION_CAUSE_ASKED);
-  void close_all();
+  /// What ends calls from now on is the end of the server.
+  void note_end_of_server() TS_EXCLUDES(mutex_);
+  void close_all() TS_EXCLUDES(mutex_);
 
  private:
   SessionPtr find_request(const Request& request) const TS_REQUIRES(mutex_);

@@ -133,8 +133,7 @@ class SharedMemoryStream : public PeerLink {
       throw_refusal();
       if (look(message)) return true;  // what the peer sent before its end still counts
       if (ended || channel_.closed()) return false;
-      if (is_closing())
-        throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
+      if (is_closing()) throw shutting_down();
       if (heart.needed() && !heart.beat()) return false;
     }
   }
@@ -282,8 +281,7 @@ void SharedMemoryService::serve(shm::Descriptor socket, Call& call) {
 }
 
 void SharedMemoryService::serve_peer(shm::Channel& channel, const Caller& caller, Call& call) {
-  if (parts_.gate.closing())
-    throw Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
+  if (parts_.gate.closing()) throw shutting_down();
   SharedMemoryStream stream(channel, parts_.gate, stop_);
   v1::PeerMessage message;
   if (!stream.read_hello(&message) || !message.has_hello())

@@ -241,6 +241,10 @@ Refusal::Refusal(const Error& error) : reason_(reason_of(error.kind)), message_(
     to_proto(error.diagnostics, diagnostics_.emplace().mutable_diagnostics());
 }
 
+Refusal shutting_down() {
+  return Refusal(v1::REASON_SHUTTING_DOWN, "the server is shutting down; try again later");
+}
+
 Refusal limit_refusal(const std::string& limit, long long maximum, const std::string& message) {
   return Refusal(v1::REASON_LIMIT_EXCEEDED, message,
                  {{"limit", limit}, {"maximum", std::to_string(maximum)}});

@@ -36,6 +36,9 @@ class Refusal : public std::exception {
   std::optional<v1::DeckDiagnostics> diagnostics_;
 };
 
+/// Refusal of a server that ends.
+Refusal shutting_down();
+
 /// Refusal for an exceeded limit.
 Refusal limit_refusal(const std::string& limit, long long maximum, const std::string& message);
 

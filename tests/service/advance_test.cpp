@@ -33,7 +33,8 @@ class Advancing : public testing::Test {
             .results = nullptr,
             .deck_sockets = nullptr,
             .recorder = &recorder_,
-            .pace = 0};
+            .pace = 0,
+            .server_ends = server_ends_};
   }
   v1::StepReply advance(const Advance::Progress& progress = {}, RowTable* table = nullptr) {
     KeptReplies::Turn turn(kept_, Caller{owner_, Role::control}, request_.request_id(), 7, call_);
@@ -96,6 +97,7 @@ class Advancing : public testing::Test {
   Coupler coupler_;
   v1::StepRequest request_;
   Call call_;
+  std::atomic<bool> server_ends_{false};
 };
 
 TEST_F(Advancing, TakesTheStepsThatAreAskedFor) {
@@ -137,6 +139,30 @@ TEST_F(Advancing, OfASimulationAtAnotherStepIsRefusedAndChangesNothing) {
   EXPECT_EQ(reason_of_refusal(), v1::REASON_WRONG_STEP);
   EXPECT_EQ(simulation_->step_number(), 0);
   EXPECT_EQ(storage_.changes(), 0);
+}
+
+TEST_F(Advancing, IsLeftToItsRepeatWhenTheServerEndsAndTheSimulationOutlivesIt) {
+  const auto interrupted = [&](const std::string& id) {
+    KeptReplies::Turn turn(kept_, Caller{owner_, Role::control}, id, 7, call_);
+    v1::StepReply reply;
+    Advance advance(parts(), request_, reply, turn);
+    advance.token().cancel();
+    try {
+      advance.run({});
+    } catch (const Refusal& refusal) {
+      return refusal.reason();
+    }
+    EXPECT_EQ(reply.outcome(), v1::STEP_OUTCOME_INTERRUPTED);
+    return v1::REASON_UNSPECIFIED;
+  };
+  server_ends_ = true;
+  EXPECT_EQ(interrupted("fleeting"), v1::REASON_UNSPECIFIED);
+  storage_.set_keeping(std::make_unique<Keeping>(v1::CreateOptions(), 1h));
+  EXPECT_EQ(interrupted("run"), v1::REASON_SHUTTING_DOWN);
+  EXPECT_EQ(interrupted(""), v1::REASON_UNSPECIFIED) << "nobody could repeat it";
+  server_ends_ = false;
+  EXPECT_EQ(interrupted("run"), v1::REASON_UNSPECIFIED) << "somebody wanted it so";
+  EXPECT_TRUE(lock_is_free());
 }
 
 TEST_F(Advancing, ThatIsInterruptedTellsSoAndFreesItsSlot) {

@@ -1,4 +1,5 @@
 """Simulations that outlive the daemon: bit for bit from their last checkpoint, whatever happens in between."""
+import contextlib
 import os
 import random
 import shutil
@@ -15,8 +16,8 @@ import pytest
 import decks
 import http2
 import mbcosim
-from conftest import BIN, TIME_FACTOR, wait_for
-from mbcosim.v1 import events_pb2, simulations_pb2 as pb
+from conftest import BIN, TIME_FACTOR, Daemon, wait_for
+from mbcosim.v1 import events_pb2, events_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
 
 KILLS = int(os.environ.get("MBCOSIM_KILLS", "6"))  # 1000 for the long form
 X, R = "node.structural.1.X", "node.structural.1.R"
@@ -135,6 +136,58 @@ def on_disk(folder, name):
             return checkpoints_pb2.CheckpointPoint.FromString(data[at + 16:at + 16 + length]).info.step
         at += 16 + length
     raise AssertionError("the file has no point")
+
+
+@pytest.mark.parametrize("durability", ["checkpoint", "journal"])
+def test_an_orderly_restart_is_a_pause_to_who_reconnects(folder, tmp_path, durability):
+    """The call that it interrupts goes on where it was."""
+    def begin():
+        return Daemon(str(tmp_path), "--state-dir", str(folder), "--checkpoint-interval", "3600")
+
+    steps, results = 200_000, []
+    daemon = begin()
+    try:
+        with daemon.connect(reconnect=60 * TIME_FACTOR) as server:
+            simulation = server.load_text(decks.endless(), durability=durability)
+            stepping = threading.Thread(target=lambda: results.append(simulation.step(steps)))
+            stepping.start()
+            for _ in range(2):
+                before = simulation.refresh().step
+                wait_for(lambda: simulation.refresh().step > before or results, 30)
+                daemon.stop()
+                daemon = begin()
+                simulation.read(["step"])  # others come back, too
+            stepping.join(120 * TIME_FACTOR)
+            (result,) = results
+            assert (result.outcome, result.steps_done, result.step) == ("ACCEPTED", steps, steps)
+            with server.load_text(decks.endless(), durability="none") as straight:
+                straight.step(steps)
+                assert bits(straight) == bits(simulation)
+    finally:
+        daemon.stop()
+
+
+def test_who_is_connected_when_the_daemon_ends_is_told_to_come_again(start):
+    silent, reasons = threading.Event(), {}
+    daemon = start()
+    with daemon.connect() as server, grpc.insecure_channel(daemon.address) as channel:
+        simulation = server.load_text(deck(), ports=[mbcosim.structural_port("spring", nodes=[1])])
+        peer = simulation.couple("spring", lambda motion: silent.wait(30 * TIME_FACTOR), mode="tight", peer_timeout=60 * TIME_FACTOR)
+        simulations = simulations_pb2_grpc.SimulationsStub(channel)
+        calls = {"step": simulations.Step.future(pb.StepRequest(simulation=simulation.name, request_id="step")),
+                 "events": events_pb2_grpc.EventsStub(channel).WatchEvents(events_pb2.WatchEventsRequest()),
+                 "samples": telemetry_pb2_grpc.TelemetryStub(channel).Subscribe(telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=[0]))}
+        wait_for(lambda: "port spring since" in simulation.refresh().waiting_for)
+        daemon.stop()
+        silent.set()
+        for name, call in calls.items():
+            with contextlib.suppress(grpc.RpcError):  # what has come before
+                call.exception() if name == "step" else list(call)
+            details = dict(call.trailing_metadata()).get("grpc-status-details-bin", b"")
+            reasons[name] = call.code(), b"google.rpc.RetryInfo" in details, mbcosim.errors.from_rpc_error(call).reason
+        assert reasons == {name: (grpc.StatusCode.UNAVAILABLE, True, "SHUTTING_DOWN") for name in calls}
+        wait_for(lambda: peer.error is not None)
+        assert peer.error.reason == "SHUTTING_DOWN"
 
 
 def test_the_last_replies_are_kept_for_who_asks_again(start):
