@@ -132,8 +132,7 @@ void check_tail(std::string_view rest, std::int64_t number, std::size_t at) {
 
 }  // namespace
 
-std::size_t read_journal(std::string_view bytes, const std::string& file,
-                         const EntryHandler& handler) {
+void read_journal(std::string_view bytes, const std::string& file, const EntryHandler& handler) {
   std::size_t at = 0;
   std::int64_t number = 1;
   while (const auto record = record_at(bytes.substr(at))) {
@@ -147,7 +146,6 @@ std::size_t read_journal(std::string_view bytes, const std::string& file,
     ++number;
   }
   if (at < bytes.size()) check_tail(bytes.substr(at), number, at);
-  return at;
 }
 
 }  // namespace mbcosim::server

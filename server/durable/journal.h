@@ -50,10 +50,9 @@ struct StoredEntry {
 };
 using EntryHandler = std::function<void(StoredEntry)>;
 
-/// Reads the bytes of a journal's file, whose name is `file`. Returns where its last whole entry
-/// ends: what follows was being written when the daemon was killed, and nobody was told of it.
+/// Reads the bytes of a journal's file, whose name is `file`. The start of an entry that follows
+/// the last whole one was being written when the daemon was killed, and nobody was told of it.
 /// Throws DamagedFile that names the record when anything else is damaged.
-std::size_t read_journal(std::string_view bytes, const std::string& file,
-                         const EntryHandler& handler);
+void read_journal(std::string_view bytes, const std::string& file, const EntryHandler& handler);
 
 }  // namespace mbcosim::server

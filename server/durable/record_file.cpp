@@ -150,14 +150,14 @@ void read_pieces(const std::string& path, const ByteSink& sink) {
 }
 
 AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
-  file_ = ::open((path_ + ".new").c_str(), O_WRONLY | O_CREAT | O_TRUNC | kOpenOwn, 0600);
+  file_ = ::open((path_ + kUnnamed).c_str(), O_WRONLY | O_CREAT | O_TRUNC | kOpenOwn, 0600);
   if (file_ < 0) fail_storage("a file cannot be made");
 }
 
 AtomicFile::~AtomicFile() {
   if (file_ < 0) return;
   ::close(file_);
-  ::unlink((path_ + ".new").c_str());
+  ::unlink((path_ + kUnnamed).c_str());
 }
 
 void AtomicFile::write(std::string_view bytes) {
@@ -172,7 +172,7 @@ void AtomicFile::write(std::string_view bytes) {
 
 void AtomicFile::commit() {
   if (::fsync(file_) != 0) fail_storage("a file cannot be written");
-  if (::rename((path_ + ".new").c_str(), path_.c_str()) != 0)
+  if (::rename((path_ + kUnnamed).c_str(), path_.c_str()) != 0)
     fail_storage("a file cannot get its name");
   ::close(file_);
   file_ = -1;

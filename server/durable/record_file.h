@@ -140,6 +140,8 @@ class ReadFile {
 /// Hands over the bytes of a regular file in pieces. Throws StorageError.
 void read_pieces(const std::string& path, const ByteSink& sink);
 
+inline const std::string kUnnamed = ".new";  ///< ending of a file that has not got its name yet
+
 /// A file that is there whole or not at all: under another name until `commit`.
 class AtomicFile {
  public:

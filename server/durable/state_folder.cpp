@@ -40,14 +40,24 @@ void make_folder(const std::string& path) {
     throw StorageError(std::string("a folder cannot be made: ") + std::strerror(errno));
 }
 
-/// What a daemon that was killed had begun to remove.
-void remove_gone(const std::string& path) {
-  std::error_code error, none;
-  std::vector<fs::path> gone;
-  for (fs::directory_iterator entry(path, error), end; !error && entry != end;
+std::vector<fs::path> entries_of(const fs::path& folder) {
+  std::error_code error;
+  std::vector<fs::path> entries;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error))
-    if (entry->path().extension() == kGone) gone.push_back(entry->path());
-  for (const fs::path& each : gone) fs::remove_all(each, none);
+    entries.push_back(entry->path());
+  return entries;
+}
+
+/// What a daemon that was killed had begun to remove, or to write.
+void remove_leftovers(const std::string& path) {
+  std::error_code none;
+  for (const fs::path& folder : entries_of(path)) {
+    if (folder.extension() == kGone) fs::remove_all(folder, none);
+    if (!folder.extension().empty()) continue;
+    for (const fs::path& file : entries_of(folder))
+      if (file.extension() == kUnnamed) fs::remove(file, none);
+  }
 }
 
 }  // namespace
@@ -59,11 +69,12 @@ StateFolder::StateFolder(const std::string& path, std::int64_t most) : path_(pat
   if (!fs::is_directory(path_, error))
     throw std::runtime_error("the state folder " + path_ + " is no folder that can be read");
   lock_ = take_lock(path_);
-  fs::create_directory(path_ + "/simulations", error);
+  const bool made = fs::create_directory(path_ + "/simulations", error);
   if (error)
     throw std::runtime_error("the state folder " + path_ +
                              " cannot be written: " + error.message());
-  remove_gone(path_ + "/simulations");
+  if (made) named("the state folder " + path_, [&] { sync_path(path_); });
+  remove_leftovers(path_ + "/simulations");
   used_ = bytes_in(path_ + "/simulations");
 }
 
@@ -260,14 +271,19 @@ void StateFolder::remove_snapshot(const std::string& id, int number) {
   if (::unlink(path.c_str()) == 0) give_back(size);
 }
 
-void StateFolder::remove(const std::string& id) {
+bool StateFolder::remove(const std::string& id) {
   const std::int64_t size = bytes_in(folder(id));
   const std::string gone = folder(id) + kGone;
   std::error_code failed, none;
   fs::rename(folder(id), gone, failed);  // at once, should the daemon be killed now
   if (failed) fs::remove_all(folder(id), none);
+  try {
+    sync_path(path_ + "/simulations");
+  } catch (const StorageError&) {  // it may be there again after a power failure
+  }
   fs::remove_all(gone, none);
-  give_back(size);
+  give_back(size - bytes_in(folder(id)) - bytes_in(gone));
+  return !fs::exists(folder(id), none);
 }
 
 std::string StateFolder::put_aside(const std::string& id) { return renamed(folder(id), kDamaged); }
@@ -323,18 +339,14 @@ std::vector<int> StateFolder::journals(const std::string& id) const {
   return numbered(id, kJournalFile);
 }
 
-void StateFolder::read_journals(const std::string& id, const EntryHandler& handler) {
+void StateFolder::read_journals(const std::string& id, const EntryHandler& handler) const {
   for (const int number : journals(id)) {
     const std::string name = kJournalFile + std::to_string(number);
     const std::string path = journal_path(id, number);
     named(id + "/" + name, [&] {
       std::string bytes;
       read_pieces(path, [&](std::string_view piece) { bytes += piece; });
-      const std::size_t whole = read_journal(bytes, name, handler);
-      if (whole == bytes.size()) return;
-      if (::truncate(path.c_str(), static_cast<off_t>(whole)) != 0)
-        fail_storage("it cannot be cut");
-      give_back(static_cast<std::int64_t>(bytes.size() - whole));
+      read_journal(bytes, name, handler);
     });
   }
 }

@@ -64,8 +64,9 @@ class StateFolder {
     return folder(id) + "/" + kJournalFile + std::to_string(number);
   }
   std::vector<int> journals(const std::string& id) const;
-  /// All entries, the oldest first. What was being written when the daemon was killed is cut off.
-  void read_journals(const std::string& id, const EntryHandler& handler);
+  /// All entries, the oldest first. What was being written when the daemon was killed is left out:
+  /// it stays at the end of its file, to which nothing is added any more.
+  void read_journals(const std::string& id, const EntryHandler& handler) const;
   /// Those before file `end`.
   void remove_journals(const std::string& id, int end);
   /// The names of its files are on the disk.
@@ -76,8 +77,9 @@ class StateFolder {
 
   /// When it was written last [s since 1970].
   std::int64_t written_at(const std::string& id) const;
-  /// Nothing when there is none.
-  void remove(const std::string& id);
+  /// Nothing when there is none. False: what the system does not let be removed stays, and the next
+  /// start finds it.
+  bool remove(const std::string& id);
   /// Keeps what is damaged where nobody takes it for a simulation; its new name. Throws
   /// StorageError when it must stay where it is.
   std::string put_aside(const std::string& id);

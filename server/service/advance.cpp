@@ -22,7 +22,8 @@ Advance::Advance(const Parts& parts, const v1::StepRequest& request, v1::StepRep
       account_(request, reply),
       pace_(parts.pace),
       news_({parts.subject, parts.shared.log, parts.status, parts.telemetry, parts.recorder}),
-      journal_({parts.storage, parts.results, parts.status, parts.shared.memory}, turn, account_),
+      journal_({parts.storage, parts.results, parts.status, news_, parts.shared.memory}, turn,
+               account_),
       solver_(parts.shared.memory, token_) {
   if (turn.begun()) account_.go_on_from(*turn.begun());
 }
@@ -272,7 +273,7 @@ std::optional<StepReport> Advance::attempt() {
   } catch (const Refusal&) {
     throw;
   } catch (const std::exception& error) {
-    news_.broken(error.what(), parts_.simulation);
+    news_.broken(error.what(), "internal error while stepping", parts_.simulation.step_number());
     throw Refusal(v1::REASON_INTERNAL,
                   "internal error while stepping; restore a snapshot or delete the simulation");
   }

@@ -298,8 +298,8 @@ void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoin
   try {
     write_snapshots(session, keeping, id, captured.point);
     session.sync_results();
-    state = captured.failed ? put_stored_state(id, keeping, captured.point)
-                            : session.bytes_of(captured.state);
+    state =
+        captured.failed ? put_stored_state(id, captured.point) : session.bytes_of(captured.state);
     if (captured.reply)
       KeptReplies::put_last(*captured.reply, captured.point.mutable_kept_replies());
   } catch (...) {
@@ -312,7 +312,8 @@ void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoin
   try {
     folder_->write_point(id, {std::move(captured.point), std::move(state)});
   } catch (const NotSynced&) {
-    throw;  // it may need them
+    keeping.doubted();
+    throw;  // it may need the snapshots
   } catch (...) {
     remove_snapshots_but(id, keeping, before);
     throw;
@@ -337,14 +338,9 @@ void Durability::remove_snapshots_but(const std::string& id, Keeping& keeping,
 }
 
 // Of a simulation that has failed the last stored state stays. Its bytes.
-std::string Durability::put_stored_state(const std::string& id, const Keeping& keeping,
-                                         v1::CheckpointPoint& point) const {
+std::string Durability::put_stored_state(const std::string& id, v1::CheckpointPoint& point) const {
   StoredPoint stored = read_latest(id);
-  SessionStorage::take_settings(point, &stored.point);
-  if (keeping.journal) {  // else the replies to the calls that made or deleted them would be lost
-    *stored.point.mutable_snapshots() = point.snapshots();
-    stored.point.set_next_snapshot(point.next_snapshot());
-  }
+  SessionStorage::take_stateless(point, &stored.point);
   point = std::move(stored.point);
   return std::move(stored.state);
 }
@@ -447,7 +443,15 @@ void Durability::store_removal(const std::string& simulation, const std::string&
 void Durability::forget(Session& session) {
   Guard guard(session.keeping()->mutex);  // no checkpoint is under way
   session.keeping()->over = true;
-  folder_->remove(id_of(session.identity().id));
+  remove_files(session.identity().id);
+}
+
+void Durability::remove_files(const std::string& simulation) {
+  if (!folder_->remove(id_of(simulation)))
+    spdlog::error(
+        "state folder: {} is deleted, but its files cannot be removed: it is there again "
+        "when the daemon is started anew",
+        simulation);
 }
 
 }  // namespace mbcosim::server

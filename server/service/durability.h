@@ -88,6 +88,7 @@ class Durability {
   bool suspend(Session& session);
   void unsuspend(const std::string& simulation) TS_EXCLUDES(mutex_);
   void forget(Session& session);
+  void remove_files(const std::string& simulation);
   void store_removal(const std::string& simulation, const std::string& identity,
                      const std::string& request_id) TS_EXCLUDES(removing_);
   void check_readable(const std::string& simulation) const TS_REQUIRES(mutex_);
@@ -100,8 +101,7 @@ class Durability {
   void write_held(Session& session, Keeping& keeping) TS_REQUIRES(keeping.mutex);
   void write_captured(Session& session, Keeping& keeping, CapturedPoint captured)
       TS_REQUIRES(keeping.mutex);
-  std::string put_stored_state(const std::string& id, const Keeping& keeping,
-                               v1::CheckpointPoint& point) const;
+  std::string put_stored_state(const std::string& id, v1::CheckpointPoint& point) const;
   void remove_snapshots_but(const std::string& id, Keeping& keeping, const std::set<int>& kept)
       TS_REQUIRES(keeping.mutex);
   void put_in_folder(const std::string& simulation, const StoredBundle& bundle);

@@ -78,7 +78,7 @@ bool Durability::remove(const std::string& simulation, const Caller& caller, con
     parts_->store.note_removal(simulation, {caller.identity, request_id});
   }
   store_removal(simulation, caller.identity, request_id);
-  folder_->remove(id_of(simulation));
+  remove_files(simulation);
   parts_->results.remove(simulation);
   log_.deleted({simulation, owner}, v1::DELETION_CAUSE_ASKED);
   return true;
@@ -110,7 +110,7 @@ void Durability::expire() {
     for (const auto& [name, owner] : over) suspended_.erase(name);
   }
   for (const auto& [name, owner] : over) {
-    folder_->remove(id_of(name));
+    remove_files(name);
     parts_->results.remove(name);
     log_.deleted({name, owner}, v1::DELETION_CAUSE_LEASE_OVER);
   }

@@ -12,6 +12,7 @@ void JournalTurn::begin(const Simulation& simulation) {
 
 void JournalTurn::remember(const Simulation& simulation) {
   before_ = simulation.state();
+  finished_before_ = simulation.finished();
   told_before_ = account_.reply();
 }
 
@@ -32,12 +33,15 @@ void JournalTurn::settle(Simulation& simulation, bool whole) {
 
 void JournalTurn::go_back(Simulation& simulation) {
   if (parts_.results) parts_.results->expect(before_->step);
-  const Status status = simulation.restore(*before_);
+  const Status back = simulation.restore(*before_, finished_before_);
   if (parts_.results) parts_.results->restored();
-  if (!status) parts_.status.fail(status.error().message);
   account_.go_back(told_before_);
   unsettled_ = false;
-  parts_.status.publish(simulation);
+  if (back) return parts_.status.publish(simulation);
+  const Error told = parts_.results ? parts_.results->without_paths(back.error()) : back.error();
+  parts_.news.broken(back.error().message,
+                     "steps that are not stored cannot be taken back: " + told.message,
+                     before_->step);
 }
 
 }  // namespace mbcosim::server

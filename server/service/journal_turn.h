@@ -6,6 +6,7 @@
 #include "service/session_status.h"
 #include "service/session_storage.h"
 #include "service/step_account.h"
+#include "service/step_news.h"
 
 namespace mbcosim::server {
 
@@ -17,6 +18,7 @@ class JournalTurn {
     SessionStorage& storage;
     SessionResults* results;  ///< null: none are written
     SessionStatus& status;
+    StepNews& news;
     MemoryBudget& memory;
   };
   /// All outlive this.
@@ -30,7 +32,8 @@ class JournalTurn {
   void note() { unsettled_ = true; }
   bool has_unsettled() const { return unsettled_; }
   /// All so far is on the disk, and the status tells of it. Throws STORAGE_FULL, LIMIT_EXCEEDED:
-  /// simulation and reply stand at what is there. `whole`: the reply is complete.
+  /// simulation and reply stand at what is there; a simulation whose result files cannot be cut
+  /// has failed. `whole`: the reply is complete.
   void settle(Simulation& simulation, bool whole = false);
 
  private:
@@ -43,7 +46,8 @@ class JournalTurn {
   bool unsettled_ = false;  ///< something was done that is not on the disk
   MemoryShare share_;       ///< of the state below
   std::optional<State> before_;
-  v1::StepReply told_before_;  ///< that goes with it
+  bool finished_before_ = false;  ///< the run was over there
+  v1::StepReply told_before_;     ///< that goes with it
 };
 
 }  // namespace mbcosim::server

@@ -34,8 +34,9 @@ Keeping::Keeping(const v1::CreateOptions& options, std::chrono::milliseconds usu
 bool Keeping::due(std::int64_t changes, std::int64_t step, Clock::time_point now) const {
   Guard guard(look_);
   if (changes == changes_) return false;
-  const bool long_journal = journal && journal->bytes() > kLongestJournal && now - last_ >= kPause;
-  return now - last_ >= interval_ || (steps_ && step - step_ >= *steps_) || long_journal;
+  const bool long_journal = journal && journal->bytes() > kLongestJournal;
+  return now - last_ >= interval_ || (steps_ && step - step_ >= *steps_) ||
+         ((long_journal || doubted_) && now - last_ >= kPause);
 }
 
 bool Keeping::stale(std::int64_t changes) const {
@@ -48,6 +49,12 @@ void Keeping::done(std::int64_t changes, std::int64_t step) {
   changes_ = changes;
   step_ = step;
   last_ = Clock::now();
+  doubted_ = false;
+}
+
+void Keeping::doubted() {
+  Guard guard(look_);
+  doubted_ = true;
 }
 
 void Keeping::failed() {

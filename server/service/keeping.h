@@ -29,6 +29,8 @@ class Keeping {
   void done(std::int64_t changes, std::int64_t step) TS_REQUIRES(mutex);
   /// It was tried in vain: the next attempt comes after a while.
   void failed() TS_EXCLUDES(mutex);
+  /// What was refused may be on the disk: the next one, which sets that right, comes soon.
+  void doubted() TS_REQUIRES(mutex);
 
   /// Waits for the end of one that is under way; none is written after it.
   void end() TS_EXCLUDES(mutex) {
@@ -50,6 +52,7 @@ class Keeping {
   mutable Mutex look_;
   std::int64_t changes_ TS_GUARDED_BY(look_) = -1, step_ TS_GUARDED_BY(look_) = 0;
   Clock::time_point last_ TS_GUARDED_BY(look_) = Clock::now();
+  bool doubted_ TS_GUARDED_BY(look_) = false;
 };
 
 }  // namespace mbcosim::server

@@ -45,8 +45,12 @@ void refuse_other_request(const std::string& id) {
 // ------------------------------------------------------------------ one request
 
 KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::string& request_id,
-                        std::uint64_t digest, const Call& call)
-    : kept_(kept), identity_(caller.identity), id_(request_id), digest_(digest) {
+                        std::uint64_t digest, const Call& call, bool of_state)
+    : kept_(kept),
+      identity_(caller.identity),
+      id_(request_id),
+      digest_(digest),
+      of_state_(of_state) {
   constexpr std::chrono::milliseconds kLook(20);  // how soon the end of the call is noticed
   if (id_.empty()) return;
   check_request_id(id_);
@@ -69,7 +73,7 @@ KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::stri
     if (Entry* still = kept_.find(identity_, id_)) still->awaited = false;
     throw Refusal(v1::REASON_CANCELLED, "the call was cancelled");
   }
-  kept_.entries_.push_back({identity_, id_, digest_, true, false, {}, false, false});
+  kept_.entries_.push_back({identity_, id_, digest_, of_state_});
 }
 
 KeptReplies::Turn::~Turn() {
@@ -117,6 +121,7 @@ v1::KeptReply KeptReplies::Turn::described(const google::protobuf::MessageLite& 
   kept.set_request_digest(digest_);
   kept.set_reply(reply.SerializeAsString());
   kept.set_begun(begun);
+  kept.set_of_state(of_state_);
   return kept;
 }
 
@@ -149,6 +154,7 @@ void KeptReplies::describe(const Entry& entry, v1::KeptReply* out) {
   out->set_request_digest(entry.digest);
   out->set_reply(entry.reply);
   out->set_begun(entry.begun);
+  out->set_of_state(entry.of_state);
 }
 
 void KeptReplies::describe_unstored(Messages* out) const {
@@ -177,8 +183,14 @@ void KeptReplies::take_over(const Messages& kept) {
   Guard guard(mutex_);
   for (const v1::KeptReply& reply : kept)
     if (make_room(std::ssize(reply.reply())))
-      entries_.push_back({reply.identity(), reply.request_id(), reply.request_digest(), false,
-                          false, reply.reply(), reply.begun(), /*stored=*/true});
+      entries_.push_back({.identity = reply.identity(),
+                          .id = reply.request_id(),
+                          .digest = reply.request_digest(),
+                          .of_state = reply.of_state(),
+                          .at_work = false,
+                          .reply = reply.reply(),
+                          .begun = reply.begun(),
+                          .stored = true});
 }
 
 bool KeptReplies::drop_oldest() {

@@ -44,8 +44,9 @@ class KeptReplies {
     /// Waits while the same request is at work. Without an id nothing is kept. Throws BAD_ARGUMENT
     /// when the id is too long or was another request's, SIMULATION_BUSY when another repeat waits
     /// already, CANCELLED when the call ends first.
+    /// `of_state`: without the state that it leads to the request was not done.
     Turn(KeptReplies& kept, const Caller& caller, const std::string& request_id,
-         std::uint64_t digest, const Call& call);
+         std::uint64_t digest, const Call& call, bool of_state = true);
     ~Turn();
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
@@ -66,6 +67,7 @@ class KeptReplies {
     KeptReplies& kept_;
     const std::string identity_, id_;
     const std::uint64_t digest_;
+    const bool of_state_;
     std::optional<std::string> known_, begun_;
   };
 
@@ -73,8 +75,9 @@ class KeptReplies {
   struct Entry {
     std::string identity, id;
     std::uint64_t digest;
+    bool of_state;
     bool at_work = true, awaited = false;
-    std::string reply;
+    std::string reply = {};
     bool begun = false;   ///< and broken off
     bool stored = false;  ///< in a journal, or need not be
   };

@@ -65,6 +65,18 @@ void once(Session& session, const CallFrame& frame, const Request& request, Repl
   session.note_change();
 }
 
+/// Without the state that it leads to, was the request not done? Snapshots and settings stand by
+/// themselves.
+template <class Request>
+bool is_of_state(const Request& request) {
+  if constexpr (requires { request.restore(); })
+    return request.restore();
+  else
+    return !std::is_same_v<Request, v1::CreateSnapshotRequest> &&
+           !std::is_same_v<Request, v1::DeleteSnapshotRequest> &&
+           !std::is_same_v<Request, v1::UpdateSimulationRequest>;
+}
+
 /// The same for what changes a durable session: no checkpoint is taken between the change and its
 /// reply.
 template <class Request, class Reply, class Body>
@@ -73,7 +85,8 @@ void change_once(const SessionStore& store, Session& session, const CallFrame& f
   const std::string& id = request.request_id();
   const std::uint64_t digest =
       id.empty() ? 0 : digest_of(Request::descriptor()->name().c_str(), request);
-  KeptReplies::Turn turn(session.kept(), frame.caller, id, digest, frame.call);
+  KeptReplies::Turn turn(session.kept(), frame.caller, id, digest, frame.call,
+                         is_of_state(request));
   if (turn.known()) {
     reply->ParseFromString(*turn.known());
     return;

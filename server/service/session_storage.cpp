@@ -31,7 +31,7 @@ void SessionStorage::capture(const Simulation& simulation, v1::CheckpointPoint* 
   *journal_end = keeping_->journal->next();
 }
 
-void SessionStorage::take_settings(const v1::CheckpointPoint& from, v1::CheckpointPoint* to) {
+void SessionStorage::take_stateless(const v1::CheckpointPoint& from, v1::CheckpointPoint* to) {
   const v1::SimulationInfo& now = from.info();
   v1::SimulationInfo& info = *to->mutable_info();
   info.set_display_name(now.display_name());
@@ -39,6 +39,10 @@ void SessionStorage::take_settings(const v1::CheckpointPoint& from, v1::Checkpoi
   info.clear_minimum_step_size();
   if (now.has_minimum_step_size()) info.set_minimum_step_size(now.minimum_step_size());
   *info.mutable_grants() = now.grants();
+  *to->mutable_snapshots() = from.snapshots();
+  to->set_next_snapshot(from.next_snapshot());
+  for (const v1::KeptReply& reply : from.kept_replies())
+    if (!reply.of_state()) KeptReplies::put_last(reply, to->mutable_kept_replies());
   to->set_changes(from.changes());
 }
 

@@ -58,8 +58,9 @@ class SessionStorage {
   /// a new file: `*journal_end` is its number.
   void capture(const Simulation& simulation, v1::CheckpointPoint* out, int* journal_end);
 
-  /// What callers set by UpdateSimulation, and nothing that goes with a state.
-  static void take_settings(const v1::CheckpointPoint& from, v1::CheckpointPoint* to);
+  /// All that callers set or made and that stands without the state: settings, snapshots, and the
+  /// replies that tell of them.
+  static void take_stateless(const v1::CheckpointPoint& from, v1::CheckpointPoint* to);
 
   /// The state, and replies since the last time, are on the disk. Throws STORAGE_FULL,
   /// LIMIT_EXCEEDED.

@@ -47,10 +47,10 @@ void StepNews::failed(const v1::StepReply& reply, const Simulation& simulation) 
   parts_.log.step_failed(parts_.subject, reply.outcome(), reply.failure());
 }
 
-void StepNews::broken(const std::string& what, const Simulation& simulation) {
+void StepNews::broken(const std::string& what, const std::string& told, std::int64_t step) {
   spdlog::error("{}: {}", parts_.subject.name, what);
-  parts_.status.fail("internal error while stepping");
-  parts_.log.state_changed(parts_.subject, v1::SIMULATION_STATE_FAILED, simulation.step_number());
+  parts_.status.fail(told);
+  parts_.log.state_changed(parts_.subject, v1::SIMULATION_STATE_FAILED, step);
 }
 
 }  // namespace mbcosim::server

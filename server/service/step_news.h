@@ -36,8 +36,9 @@ class StepNews {
   void unsolved(const Simulation& simulation);
   /// It ended without being solved, for the reason that the reply has.
   void failed(const v1::StepReply& reply, const Simulation& simulation);
-  /// The server failed in it: the simulation cannot be used any more. `what`: for the log.
-  void broken(const std::string& what, const Simulation& simulation);
+  /// The server failed in it: the simulation, which all know at `step`, cannot be used any more.
+  /// `what`: for the log, `told`: for callers.
+  void broken(const std::string& what, const std::string& told, std::int64_t step);
 
  private:
   const Parts parts_;

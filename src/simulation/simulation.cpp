@@ -488,13 +488,13 @@ Status Simulation::set(int handle, std::span<const double> values) {
   return all.set(*impl_->model, impl_->state, handle, values);
 }
 
-Status Simulation::restore(const State& state) {
+Status Simulation::restore(const State& state, bool finished) {
   if (!same_layout(state, impl_->state)) return another_model();
   State before = state;
   std::swap(before, impl_->state);
   const Status cut = impl_->writer ? impl_->writer->restored(impl_->context()) : ok();
   if (cut)
-    impl_->ended = false;
+    impl_->ended = finished;
   else
     impl_->state = std::move(before);
   return cut;

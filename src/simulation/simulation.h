@@ -177,8 +177,9 @@ class Simulation {
 
   State snapshot() const { return state(); }
   /// ErrorKind::precondition when `state` has another model's layout. The writer is told; when it
-  /// cannot follow, nothing changes.
-  Status restore(const State& state);
+  /// cannot follow, nothing changes. `finished`: the run was over there, be it before its final
+  /// time; else a drive that ended it is asked anew.
+  Status restore(const State& state, bool finished = false);
   /// Stands at `state` while `look` runs, and then where it was. Results are not told. The same
   /// error as `restore`.
   Status look_from(const State& state, const std::function<void()>& look);

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "durable/state_folder.h"
+#include "rpc/workers.h"
 #include "thrown_mass.h"
 #include "wire/refusal.h"
 
@@ -48,7 +49,10 @@ class JournaledCall : public testing::Test {
   StateFolder folder_;
   std::unique_ptr<Simulation> simulation_ = thrown_mass();
   Metrics metrics_;
+  EventLog log_;
   MemoryBudget memory_{1 << 20};
+  Workers workers_{1, 1};
+  TelemetryHub telemetry_{memory_, workers_.lanes, workers_.timer};
   KeptReplies kept_{memory_};
   SessionStatus status_;
   SessionStorage storage_{{nullptr, kept_, memory_, metrics_},
@@ -60,7 +64,8 @@ class JournaledCall : public testing::Test {
   Call call_;
   KeptReplies::Turn turn_{kept_, Caller{"ann", Role::control}, "run", 7, call_};
   StepAccount account_{request_, reply_};
-  JournalTurn journal_{{storage_, nullptr, status_, memory_}, turn_, account_};
+  StepNews news_{{{"simulations/id", "ann"}, log_, status_, telemetry_, nullptr}};
+  JournalTurn journal_{{storage_, nullptr, status_, news_, memory_}, turn_, account_};
 };
 
 TEST_F(JournaledCall, WhatItHasDoneIsOnTheDiskWithItsReplySoFarBeforeItIsTold) {
@@ -153,23 +158,37 @@ TEST_F(JournaledCall, AChangeIsStoredWithItsWholeReply) {
   EXPECT_EQ(stored[1].kept_replies_size(), 0);
 }
 
-TEST(StoredPoints, OfAFailedSimulationKeepTheirStateAndTakeWhatCallersSet) {
+TEST(StoredPoints, OfAFailedSimulationKeepTheirStateAndTakeWhatCallersSetAndMade) {
   v1::CheckpointPoint now, stored;
   now.set_changes(9);
   now.mutable_info()->set_step(12);
   now.mutable_info()->set_display_name("new");
-  now.add_kept_replies()->set_request_id("of steps that are lost");
+  now.add_snapshots()->set_number(2);
+  now.set_next_snapshot(3);
+  const auto reply = [](v1::CheckpointPoint& point, const char* id, bool of_state) {
+    point.add_kept_replies()->set_request_id(id);
+    point.mutable_kept_replies()->rbegin()->set_of_state(of_state);
+  };
+  reply(now, "of steps that are lost", true);
+  reply(now, "of snapshot 2", false);
   stored.set_changes(5);
   stored.set_results_until_step(7);
   stored.mutable_info()->set_step(10);
   stored.mutable_info()->set_minimum_step_size(1e-3);
   stored.mutable_info()->add_grants()->set_identity("token:eve");
-  stored.add_kept_replies()->set_request_id("of steps that are there");
-  SessionStorage::take_settings(now, &stored);
+  stored.add_snapshots()->set_number(1);
+  stored.set_next_snapshot(2);
+  reply(stored, "of steps that are there", true);
+  SessionStorage::take_stateless(now, &stored);
   EXPECT_EQ(stored.changes(), 9);
   EXPECT_EQ(stored.info().step(), 10);
   EXPECT_EQ(stored.results_until_step(), 7);
+  ASSERT_EQ(stored.kept_replies_size(), 2);
   EXPECT_EQ(stored.kept_replies(0).request_id(), "of steps that are there");
+  EXPECT_EQ(stored.kept_replies(1).request_id(), "of snapshot 2");
+  ASSERT_EQ(stored.snapshots_size(), 1) << "the other was deleted";
+  EXPECT_EQ(stored.snapshots(0).number(), 2);
+  EXPECT_EQ(stored.next_snapshot(), 3);
   EXPECT_EQ(stored.info().display_name(), "new");
   EXPECT_FALSE(stored.info().has_minimum_step_size());
   EXPECT_EQ(stored.info().grants_size(), 0) << "who lost a right does not get it back";

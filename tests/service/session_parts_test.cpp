@@ -186,6 +186,19 @@ TEST_F(Replies, ARequestThatDidNothingMayBeTriedAnew) {
   EXPECT_FALSE(again.known() || again.begun());
 }
 
+TEST_F(Replies, TellWhetherTheyAreOfTheState) {
+  const v1::StepReply reply;
+  KeptReplies::Turn(replies_, ann_, "run", 7, call_).keep(reply);
+  KeptReplies::Turn(replies_, ann_, "save", 8, call_, /*of_state=*/false).keep(reply);
+  KeptReplies later(memory_);
+  later.take_over(kept());
+  KeptReplies::Messages messages;
+  later.describe(&messages);
+  ASSERT_EQ(messages.size(), 2);
+  EXPECT_TRUE(messages[0].of_state());
+  EXPECT_FALSE(messages[1].of_state());
+}
+
 TEST_F(Replies, ALaterOneTakesThePlaceOfOneOfTheSameRequest) {
   KeptReplies::Messages messages;
   for (const char* id : {"a", "b", "a"}) {

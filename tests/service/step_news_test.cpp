@@ -87,11 +87,13 @@ TEST_F(News, OfTheEndOfARunAreAnEvent) {
 }
 
 TEST_F(News, OfAMistakeOfTheServerFailTheSimulation) {
-  news().broken("a check failed", *simulation_);
+  news().broken("a check failed", "internal error", 7);
   EXPECT_TRUE(status_.failed());
+  EXPECT_EQ(status_.view().last_failure, "internal error");
   const auto told = events();
   ASSERT_EQ(told.size(), 1u);
   EXPECT_EQ(told[0].state_changed().state(), v1::SIMULATION_STATE_FAILED);
+  EXPECT_EQ(told[0].state_changed().step(), 7);
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ import http2
 import mbcosim
 from conftest import BIN, TIME_FACTOR, Daemon, wait_for
 from mbcosim.v1 import events_pb2, events_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc
+from test_operation import metrics
 
 KILLS = int(os.environ.get("MBCOSIM_KILLS", "6"))  # 1000 for the long form
 X, R = "node.structural.1.X", "node.structural.1.R"
@@ -127,13 +128,17 @@ def test_kills_at_random_moments_lose_nothing_of_a_checkpoint(start, folder, tmp
 
 def on_disk(folder, name):
     """Number of the step of the last checkpoint, read without the daemon."""
+    return point_on_disk(folder, name).info.step
+
+
+def point_on_disk(folder, name):
     from mbcosim.v1 import checkpoints_pb2
     data = (folder / name / "point").read_bytes()
     at = 0
     while at < len(data):
         kind, length = int.from_bytes(data[at:at + 4], "little"), int.from_bytes(data[at + 4:at + 12], "little")
         if kind == 5:
-            return checkpoints_pb2.CheckpointPoint.FromString(data[at + 16:at + 16 + length]).info.step
+            return checkpoints_pb2.CheckpointPoint.FromString(data[at + 16:at + 16 + length])
         at += 16 + length
     raise AssertionError("the file has no point")
 
@@ -636,6 +641,20 @@ def test_what_was_being_made_or_removed_when_the_daemon_was_killed_is_removed(st
         assert server.attach(names[1]).step().step == 4
     assert "was not yet made when the daemon ended" in daemon.log() and "put aside" not in daemon.log()
     assert os.listdir(stored.parent) == [os.path.basename(names[1])]
+
+
+def test_what_was_being_written_when_the_daemon_was_killed_is_removed_and_not_counted(start, folder):
+    daemon = start()
+    with daemon.connect() as server:
+        simulation = server.load_text(deck())
+    daemon.stop()
+    stored, damaged = folder / simulation.name, folder / "simulations" / "0123456789abcdef.damaged"
+    damaged.mkdir()
+    for path in (stored / "point.new", stored / "snapshot-1.new", damaged / "point.new"):
+        path.write_bytes(1000 * b"x")
+    daemon = start("--http", "127.0.0.1:0")
+    assert sorted(os.listdir(stored)) == ["model", "point"] and os.listdir(damaged) == ["point.new"]
+    assert metrics(daemon)["mbcosim_state_bytes"] == 1000 + sum((stored / name).stat().st_size for name in ("model", "point"))
 
 
 def test_a_damaged_snapshot_is_named_when_it_is_needed(start, folder):

@@ -465,6 +465,30 @@ def test_a_full_disk_takes_steps_back_and_loses_nothing(start):
         assert bits(server.attach(name)) == after
 
 
+# The last value of its force is for a time shortly after 0.2 s: the run ends there, before its final time.
+ENDING = """begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: .04; tolerance: 1e-9; max iterations: 20; end: initial value;
+begin: control data; structural nodes: 1; rigid bodies: 1; forces: 1; file drivers: 1; end: control data;
+begin: nodes; structural: 1, dynamic, 0.,0.,0., eye, null, 0.,0.,1.; end: nodes;
+begin: drivers; file: 1, fixed step, count, 1, initial time, -1e-6, time step, .100001, bailout, upper, "ending.drv"; end: drivers;
+begin: elements; body: 1, 1, 2., null, diag, 1.,2.,3.; force: 1, absolute, 1, position, null, 1.,0.,0., file, 1, 1; end: elements;
+"""
+
+
+def test_a_run_that_its_deck_has_ended_stays_so_when_an_input_cannot_be_stored(start):
+    daemon = start("--checkpoint-interval", "3600")
+    limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
+    with daemon.connect() as server:
+        simulation = server.load_bundle("deck", {"deck": ENDING.encode(), "ending.drv": b"0.\n1.\n3.\n"}, durability="journal")
+        simulation.run_until(1.0)
+        before = simulation.refresh()
+        assert (before.state, before.step) == (pb.SIMULATION_STATE_FINISHED, 5)
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (100, limits[1]))
+        with pytest.raises(mbcosim.LimitExceeded):
+            simulation.step(inputs={"node.structural.1.load": [1, 0, 0, 0, 0, 0]})
+        assert simulation.refresh() == before
+
+
 def test_an_update_that_cannot_be_stored_changes_nothing(start):
     daemon = start("--checkpoint-interval", "3600")
     limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
