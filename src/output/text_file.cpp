@@ -2,9 +2,25 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 
 namespace mbcosim {
+
+namespace {
+
+constexpr std::size_t kBuffer = 1 << 15;
+
+}  // namespace
+
+void TextFile::make_room(std::size_t count) {
+  flush();
+  if (used_ + count <= capacity_) return;
+  capacity_ = std::max(kBuffer, 2 * (used_ + count));
+  auto larger = std::make_unique_for_overwrite<char[]>(capacity_);
+  std::memcpy(larger.get(), text_.get(), used_);
+  text_ = std::move(larger);
+}
 
 void TextFile::fail() {
   if (!problem_) return;
@@ -35,7 +51,7 @@ bool TextFile::flush() {
 }
 
 void TextFile::write() {
-  const std::size_t written = std::fwrite(text_.data(), 1, used_, file_);
+  const std::size_t written = std::fwrite(text_.get(), 1, used_, file_);
   size_ += static_cast<std::int64_t>(written);
   if (written == used_) {
     used_ = 0;
@@ -46,12 +62,12 @@ void TextFile::write() {
 }
 
 void TextFile::end_at_last_line(std::size_t written) {
-  const std::size_t line = std::string_view(text_.data(), written).rfind('\n');
+  const std::size_t line = std::string_view(text_.get(), written).rfind('\n');
   const std::size_t whole = line == std::string_view::npos ? 0 : line + 1;
   size_ -= static_cast<std::int64_t>(written - whole);
   if (budget_) budget_->give_back(static_cast<std::int64_t>(used_ - whole));
   used_ -= whole;
-  std::memmove(text_.data(), text_.data() + whole, used_);
+  std::memmove(text_.get(), text_.get() + whole, used_);
   if (ftruncate(fileno(file_), size_) != 0 || std::fseek(file_, size_, SEEK_SET) != 0) fail();
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -16,7 +17,6 @@ namespace mbcosim {
 /// cannot be written whole ends after its last whole line; the rest is kept and can be tried again.
 class TextFile {
  public:
-  static constexpr std::size_t kBuffer = 1 << 16;
   static constexpr std::int64_t kNone = -1;  ///< size of a file that is not there
 
   TextFile() = default;
@@ -33,12 +33,10 @@ class TextFile {
   }
   /// Room for `count` more bytes at the end; `commit` tells how far it was used.
   char* room(std::size_t count) {
-    if (text_.empty()) text_.resize(kBuffer);
-    if (used_ + count > text_.size()) flush();
-    if (used_ + count > text_.size()) text_.resize(2 * (used_ + count));
-    return text_.data() + used_;
+    if (used_ + count > capacity_) make_room(count);
+    return text_.get() + used_;
   }
-  void commit(char* end) { used_ = static_cast<std::size_t>(end - text_.data()); }
+  void commit(char* end) { used_ = static_cast<std::size_t>(end - text_.get()); }
   void text(std::string_view s) {
     char* p = room(s.size());
     std::memcpy(p, s.data(), s.size());
@@ -71,6 +69,7 @@ class TextFile {
   const Status& status() const { return problem_; }
 
  private:
+  void make_room(std::size_t count);
   void fail();
   void fail_budget();
   void write();
@@ -79,8 +78,8 @@ class TextFile {
 
   std::string path_;
   ResultBudget* budget_ = nullptr;
-  std::string text_;
-  std::size_t used_ = 0;
+  std::unique_ptr<char[]> text_;
+  std::size_t capacity_ = 0, used_ = 0;
   std::int64_t size_ = 0;  ///< bytes in the file
   std::FILE* file_ = nullptr;
   Status problem_ = ok();

@@ -72,7 +72,7 @@ class TextWriter : public ResultWriter, private OutputRow {
     };
     const auto number = [&](double v) {
       *p++ = ' ';
-      p = std::to_chars(p, p + 40, v, std::chars_format::general, precision_).ptr;
+      p = write_general(p, v, precision_);
     };
     put("Step ");
     p = std::to_chars(p, p + 24, s.step).ptr;
@@ -148,8 +148,9 @@ class TextWriter : public ResultWriter, private OutputRow {
   }
 
  private:
-  static constexpr std::size_t kField =
-      48;  ///< bytes of one field, with margin for the largest precision used
+  static constexpr std::size_t kField = 64;  ///< room for a number of any precision
+  static constexpr int kAtOnce = 16;
+  static constexpr int kLabel = 8;  ///< columns
 
   void know(const Model& model) {
     model_ = &model;
@@ -200,21 +201,21 @@ class TextWriter : public ResultWriter, private OutputRow {
   }
   std::string general(double v) const {
     char buffer[64];
-    return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, v,
-                                             std::chars_format::general, precision_)
-                                   .ptr);
+    return std::string(buffer, write_general(buffer, v, precision_));
   }
 
   // OutputRow
   void begin(OutputFile file, int label) override {
     current_ = &files_[static_cast<std::size_t>(file)];
-    char digits[16];
+    char digits[16] = {};
     const auto end = std::to_chars(digits, digits + sizeof digits, label).ptr;
     const int count = static_cast<int>(end - digits);
     char* p = current_->room(32);
-    if (file != OutputFile::frc && file != OutputFile::trc)
-      for (int k = count; k < 8; ++k) *p++ = ' ';
-    std::memcpy(p, digits, count);
+    if (count < kLabel && file != OutputFile::frc && file != OutputFile::trc) {
+      std::memset(p, ' ', kLabel);
+      p += kLabel - count;
+    }
+    std::memcpy(p, digits, sizeof digits);  // all of it: as many bytes each time
     current_->commit(p + count);
   }
   void begin_text(OutputFile file, std::string_view label) override {
@@ -226,19 +227,19 @@ class TextWriter : public ResultWriter, private OutputRow {
     *p++ = ' ';
     current_->commit(std::to_chars(p, p + 15, value).ptr);
   }
-  void number(double value) {
-    char* p = current_->room(kField + precision_);
-    *p++ = ' ';
-    current_->commit(write_scientific(p, value, precision_));
-  }
-  void scalar(const char*, const char*, double value) override { number(value); }
-  void vec3(const char*, const char*, const Vec3& v) override {
-    number(v(0));
-    number(v(1));
-    number(v(2));
-  }
+  void scalar(const char*, const char*, double value) override { numbers(&value, 1); }
+  void vec3(const char*, const char*, const Vec3& v) override { numbers(v.data(), 3); }
   void values(const char*, const char*, const double* data, int count) override {
-    for (int k = 0; k < count; ++k) number(data[k]);
+    for (; count > kAtOnce; data += kAtOnce, count -= kAtOnce) numbers(data, kAtOnce);
+    numbers(data, count);
+  }
+  void numbers(const double* data, int count) {
+    char* p = current_->room(kField * count);
+    for (int k = 0; k < count; ++k) {
+      *p++ = ' ';
+      p = write_scientific(p, data[k], precision_);
+    }
+    current_->commit(p);
   }
   void end() override {
     char* p = current_->room(1);

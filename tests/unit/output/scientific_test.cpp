@@ -18,10 +18,17 @@ std::string written(double v, int precision) {
   return std::string(text, write_scientific(text, v, precision));
 }
 
+std::string general(double v, int precision) {
+  char text[64];
+  return std::string(text, write_general(text, v, precision));
+}
+
 void expect_as_printf(double v, int precision) {
   char text[64];
   std::snprintf(text, sizeof text, "%.*e", precision, v);
   ASSERT_EQ(written(v, precision), text) << "precision " << precision;
+  std::snprintf(text, sizeof text, "%.*g", precision, v);
+  ASSERT_EQ(general(v, precision), text) << "precision " << precision;
 }
 
 constexpr int kPrecisions[] = {0, 1, 2, 5, 6, 7, 12, 15, 16, 17, 20};
@@ -65,6 +72,17 @@ TEST(Scientific, KeepsTheNumberOfDigitsAtPowersOfTen) {
                            power * (1 - 5e-8), power * 9.9999995})
       for (const int precision : kPrecisions) expect_as_printf(v, precision);
   }
+}
+
+/// Numbers with zeros to leave out, fixed and with an exponent.
+TEST(Scientific, WritesShortNumbersAsPrintf) {
+  EXPECT_EQ(general(.001, 6), "0.001");
+  EXPECT_EQ(general(1e-5, 6), "1e-05");
+  EXPECT_EQ(general(120000, 6), "120000");
+  EXPECT_EQ(general(999999.5, 6), "1e+06");
+  for (int k = -3000; k < 3000; ++k)
+    for (const double unit : {1e-7, 1e-5, 1e-3, .1, 1., 500., 1e4})
+      for (const int precision : kPrecisions) expect_as_printf(k * unit, precision);
 }
 
 TEST(Scientific, WritesWhatIsNoUsualNumber) {
