@@ -3,8 +3,9 @@
 namespace mbcosim {
 
 const Registry& full_registry() {
-  static const Registry registry = [] {
-    Registry r;
+  // Never destroyed: the end of a process need not take it apart.
+  static const Registry& registry = *[] {
+    auto& r = *new Registry;
     register_bodies(r);
     register_joints(r);
     register_beams(r);
@@ -22,7 +23,7 @@ const Registry& full_registry() {
     register_drives(r);
     register_laws(r);
     register_unsupported(r);
-    return r;
+    return &r;
   }();
   return registry;
 }

@@ -124,7 +124,7 @@ void register_scalar_genels(Registry& registry) {
   genel({"spring support"}, read_spring_support);
   genel({"cross spring support"}, read_cross_spring_support);
   genel({"mass"}, read_mass);
-  genel({"swashplate"}, read_swashplate);
+  genel({"swash plate"}, read_swashplate);
   registry.unsupported("genel", "rotor trim", "trim of aerodynamic rotors");
 }
 

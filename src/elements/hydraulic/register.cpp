@@ -17,7 +17,7 @@ void register_hydraulics(Registry& registry) {
   type({"minor loss"}, hydraulic::read_minor_loss);
   type({"three way minor loss"}, hydraulic::read_three_way_minor_loss);
   type({"control valve"}, hydraulic::read_control_valve);
-  type({"control valve 2"}, hydraulic::read_control_valve2);
+  type({"control valve2"}, hydraulic::read_control_valve2);
   type({"dynamic control valve"}, hydraulic::read_dynamic_control_valve);
   type({"pressure flow control", "pressure flow control valve"},
        hydraulic::read_pressure_flow_control);
