@@ -1,9 +1,12 @@
 #include "input/sources.h"
 
+#include <sys/stat.h>
+
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <system_error>
 
 namespace mbcosim {
@@ -42,6 +45,16 @@ bool is_below(const fs::path& path, const fs::path& folder) {
   return true;
 }
 
+/// The same for all names of a file: its device and its number there.
+using FileIdentity = std::pair<dev_t, ino_t>;
+
+/// Without a value: there is no such file.
+std::optional<FileIdentity> identity_of(const std::string& path) {
+  struct stat found;
+  if (::stat(path.c_str(), &found) != 0) return std::nullopt;
+  return FileIdentity(found.st_dev, found.st_ino);
+}
+
 }  // namespace
 
 FolderSource::FolderSource(std::string folder, bool unrestricted)
@@ -75,10 +88,12 @@ Result<std::string> FolderSource::read(const std::string& name) const {
 
 std::string file_in_both(const std::vector<std::string>& inputs,
                          const std::vector<std::string>& outputs) {
-  std::error_code unknown;  // of a path that does not exist
+  std::map<FileIdentity, std::string> found;
+  for (const std::string& input : inputs)
+    if (const auto identity = identity_of(input)) found.emplace(*identity, input);
   for (const std::string& output : outputs)
-    for (const std::string& input : inputs)
-      if (fs::equivalent(output, input, unknown)) return input;
+    if (const auto identity = identity_of(output))
+      if (const auto same = found.find(*identity); same != found.end()) return same->second;
   return {};
 }
 
