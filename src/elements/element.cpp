@@ -71,4 +71,13 @@ void PlacedElements::scatter(const Place& p, const Residual<double>& local, doub
   if (traits_.momentum) add(local.momentum_rows[0], 6 * c.node_count);
 }
 
+void PlacedElements::add_matrix(const Place& p, const double* matrix, double* values) const {
+  const Run* const first = runs_.data() + p.first_run;
+  for (const Run* run = first; run != first + p.run_count; ++run) {
+    const double* const __restrict from = matrix + run->local;
+    double* const __restrict to = values + run->position;
+    for (int k = 0; k < run->count; ++k) to[k] += from[k];
+  }
+}
+
 }  // namespace mbcosim

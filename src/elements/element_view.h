@@ -252,6 +252,7 @@ class Tangent {
   void add_rotation(int row, int k, const Mat3& dtheta, const Mat3& dw) {
     block(row, col_node(k) + 3) -= dtheta * seeds[k].A + dw * seeds[k].B;
   }
+  void add_velocity(int row, int k, const Mat3& dv) { block(row, col_node(k)) -= dv; }
   void add_position(int row, int k, const Mat3& dx) { block(row, col_node(k)) -= c * dx; }
   void add_orientation(int row, int k, const Mat3& dtheta) {
     block(row, col_node(k) + 3) -= dtheta * seeds[k].A;

@@ -79,11 +79,7 @@ class PlacedElements : public ElementSet {
   void inactive_residual(const EvalContext& context, const Place& p, double* r) const;
   void inactive_matrix(const EvalContext& context, const Place& p, double* matrix) const;
   /// Adds a local matrix to the sparse values.
-  void add_matrix(const Place& p, const double* matrix, double* values) const {
-    const Run* const first = runs_.data() + p.first_run;
-    for (const Run* run = first; run != first + p.run_count; ++run)
-      for (int k = 0; k < run->count; ++k) values[run->position + k] += matrix[run->local + k];
-  }
+  void add_matrix(const Place& p, const double* matrix, double* values) const;
 
  private:
   /// Consecutive entries of a local matrix and their places among the sparse values.

@@ -15,13 +15,13 @@ namespace mbcosim {
 
 /// d(g) = 4 / (4 + g·g).
 template <class T>
-T cgr_d(const Vec<T>& g) {
+inline T cgr_d(const Vec<T>& g) {
   return T(4.0) / (g.dot(g) + 4.0);
 }
 
 /// R(g) = I + d g× + (d/2) g× g×.
 template <class T>
-Mat<T> cgr_rotation(const Vec<T>& g) {
+inline Mat<T> cgr_rotation(const Vec<T>& g) {
   const T d = cgr_d(g);
   const Mat<T> gx = cross(g);
   const Mat<T> gxx = gx * gx;
@@ -32,7 +32,7 @@ Mat<T> cgr_rotation(const Vec<T>& g) {
 
 /// G(g) = d (I + ½ g×): δθ = G δg and ω = G ġ (global components).
 template <class T>
-Mat<T> cgr_g(const Vec<T>& g) {
+inline Mat<T> cgr_g(const Vec<T>& g) {
   const T d = cgr_d(g);
   Mat<T> m = cross(g) * T(d * 0.5);
   for (int i = 0; i < 3; ++i) m(i, i) += d;

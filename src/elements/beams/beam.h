@@ -117,8 +117,9 @@ struct Beam {
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     if (is_unloaded(u)) return;
+    const Line<T> along = line(u);
     for (int a = 0; a < points; ++a) {
-      const Section<T> s = section(u, a);
+      const Section<T> s = section(u, along, a);
       const Eigen::Matrix<T, 6, 1> local = internal_force(u, a, s);
       const Vec<T> f = s.R * Vec<T>(local.template head<3>());
       const Vec<T> m = s.R * Vec<T>(local.template tail<3>());
@@ -127,9 +128,18 @@ struct Beam {
     }
   }
 
+  /// What evaluation points interpolate, at the nodes.
+  template <class T>
+  struct Line {
+    Vec<T> x[Nodes], v[Nodes];   ///< reference line point, global [m], and its velocity [m/s]
+    Vec<T> g[Nodes], gp[Nodes];  ///< rotation parameters of the step and their rates
+  };
+  /// Rates are there for viscoelastic beams only.
+  template <class T>
+  Line<T> line(const Local<T>& u) const;
   /// Kinematics of evaluation point `a`.
   template <class T>
-  Section<T> section(const Local<T>& u, int a) const;
+  Section<T> section(const Local<T>& u, const Line<T>& along, int a) const;
   /// Section-frame force and moment (F, M) at point `a` [N, N·m].
   template <class T>
   Eigen::Matrix<T, 6, 1> internal_force(const Local<T>& u, int a, const Section<T>& s) const;
@@ -155,16 +165,21 @@ struct Beam {
     Vec<T> r, dr, rp, drp;
   };
   template <class T>
-  Increment<T> increment(const Local<T>& u, int a) const;
+  Increment<T> increment(const Vec<T> (&g)[Nodes], const Vec<T> (&gp)[Nodes], bool with_rates,
+                         int a) const;
+  template <class T>
+  Increment<T> increment(const Line<T>& along, bool assembling, int a) const {
+    return increment(along.g, along.gp, viscoelastic && !assembling, a);
+  }
   /// Rotation parameters from the orientation as read to the current one, during the initial
   /// assembly.
   template <class T>
   static Vec<T> total_parameters(const Local<T>& u, int k);
-  Increment<double> predicted_increment(const Local<double>& u, const State& state, int a) const;
   void restart(const Local<double>& u, State& state) const;
 
   struct PointTangent;
-  PointTangent point_tangent(const Local<double>& u, const Tangent& t, int a) const;
+  PointTangent point_tangent(const Local<double>& u, const Tangent& t, const Line<double>& along,
+                             int a) const;
   void add_rate(const Local<double>& u, const Tangent& t, int a, const Increment<double>& i,
                 const Mat6& damping, PointTangent& p) const;
   Mat6 force_by_node(const Local<double>& u, const Tangent& t, const PointTangent& p, int a,
@@ -180,6 +195,9 @@ struct Beam {
     return u.context->phase != Phase::assembly && u.memory(kMemory - 1) == 0;
   }
 };
+
+extern template void Beam<2>::residual(const Local<double>&, Residual<double>&) const;  // beam.cpp
+extern template void Beam<3>::residual(const Local<double>&, Residual<double>&) const;
 
 using Beam2 = Beam<2>;
 using Beam3 = Beam<3>;

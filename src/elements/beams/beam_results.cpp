@@ -47,7 +47,7 @@ void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
   row.begin(OutputFile::act, u.label());
   for (int a = 0; a < points; ++a) {
     const std::string suffix = Nodes == 2 ? "" : a == 0 ? "_I" : "_II";
-    const Section<double> s = section(u, a);
+    const Section<double> s = section(u, line(u), a);
     const Vec6 f = is_unloaded(u) ? Vec6(Vec6::Zero()) : internal_force(u, a, s);
     const auto vector = [&](Field field, const char* name, const char* unit, const Vec3& value) {
       if (chosen & field) row.vec3((name + suffix).c_str(), unit, value);
@@ -104,7 +104,7 @@ int Beam<Nodes>::private_datum(std::string_view name) const {
 template <int Nodes>
 double Beam<Nodes>::private_value(const Local<double>& u, int datum) const {
   const int axis = datum % 3, group = datum / 3 % kGroups, a = datum / 3 / kGroups;
-  const Section<double> s = section(u, a);
+  const Section<double> s = section(u, line(u), a);
   switch (group) {
     case kStrain:
       return s.strain(axis);

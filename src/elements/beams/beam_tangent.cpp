@@ -1,5 +1,5 @@
 // Closed-form linearization of beams.
-#include "elements/beams/beam.h"
+#include "elements/beams/beam_section.h"
 #include "math/rotation_derivative.h"
 
 namespace mbcosim {
@@ -58,15 +58,17 @@ struct Beam<Nodes>::PointTangent {
 
 template <int Nodes>
 typename Beam<Nodes>::PointTangent Beam<Nodes>::point_tangent(const Local<double>& u,
-                                                              const Tangent& t, int a) const {
+                                                              const Tangent& t,
+                                                              const Line<double>& along,
+                                                              int a) const {
   const double c = t.c;
   PointTangent p;
-  p.s = section(u, a);
+  p.s = section(u, along, a);
   Law<6>::Response law;
   point[a].law->respond(*u.context, p.s.strain, p.s.rate, true, law);
   for (int j = 0; j < static_cast<int>(actuators.size()); ++j)
     law.f += u.scalar(j) * point[a].actuation.col(j);
-  const Increment<double> i = increment(u, a);
+  const Increment<double> i = increment(along, u.context->phase == Phase::assembly, a);
   const Mat3& R = p.s.R;
   p.force << R * law.f.template head<3>(), R * law.f.template tail<3>();
   p.F = cross<double>(p.force.template head<3>());
@@ -128,8 +130,9 @@ Mat6 Beam<Nodes>::force_by_node(const Local<double>& u, const Tangent& t, const 
 /// has not been loaded yet is stiff nonetheless: modes about the initial state need it.
 template <int Nodes>
 void Beam<Nodes>::tangent(const Local<double>& u, Tangent& t) const {
+  const Line<double> along = line(u);
   for (int a = 0; a < points; ++a) {
-    const PointTangent p = point_tangent(u, t, a);
+    const PointTangent p = point_tangent(u, t, along, a);
     const Vec3 reach[2] = {p.s.p - u.x(a), p.s.p - u.x(a + 1)};
     const auto add = [&](int column, const Vec6& f) {
       for (int side = 0; side < 2; ++side) {

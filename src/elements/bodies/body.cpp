@@ -4,22 +4,25 @@
 
 namespace mbcosim {
 
+template void Body::residual(const Local<double>&, Residual<double>&) const;
+
 void Body::tangent(const Local<double>& u, Tangent& t) const {
   const Vec3 S = u.R(0) * S0;
   const Mat3 J = u.R(0) * J0 * u.R(0).transpose();
   const Vec3 w = u.w(0);
   const Mat3 Sx = cross<double>(S), wx = cross<double>(w), vx = cross<double>(u.v(0));
   const int b = t.row_momentum(0), g = b + 3;
-  t.add_translation(b, 0, Mat3::Zero(), -m * Mat3::Identity());
+  t.add_velocity(b, 0, -m * Mat3::Identity());
   t.add_rotation(b, 0, wx * Sx, Sx);
-  t.add_translation(g, 0, Mat3::Zero(), -Sx);
+  t.add_velocity(g, 0, -Sx);
   t.add_rotation(g, 0, cross<double>(J * w) - J * wx - vx * Sx, -J);
   if (!u.model().gravity) return;
   const Vec3 a = u.model().gravity_at(*u.context, u.x(0));
+  t.add_orientation(t.row_node(0) + 3, 0, cross<double>(a) * Sx);
+  if (u.model().gravity->uniform) return;
   const Mat3 da = u.model().gravity_gradient(*u.context, u.x(0));
   t.add_position(t.row_node(0), 0, m * da);
   t.add_position(t.row_node(0) + 3, 0, Sx * da);
-  t.add_orientation(t.row_node(0) + 3, 0, cross<double>(a) * Sx);
 }
 
 void Body::add_inertia(const Local<double>& u, int node_index, Inertia& inertia) const {
@@ -49,7 +52,7 @@ double Body::private_value(const Local<double>& u, int datum) const {
 }
 
 void PointMass::tangent(const Local<double>& u, Tangent& t) const {
-  t.add_translation(t.row_momentum(0), 0, Mat3::Zero(), -m * Mat3::Identity());
+  t.add_velocity(t.row_momentum(0), 0, -m * Mat3::Identity());
   if (u.model().gravity)
     t.add_position(t.row_node(0), 0, m * u.model().gravity_gradient(*u.context, u.x(0)));
 }

@@ -43,6 +43,8 @@ struct Body {
   double private_value(const Local<double>& u, int datum) const;
 };
 
+extern template void Body::residual(const Local<double>&, Residual<double>&) const;  // body.cpp
+
 /// Point mass on a displacement node: momentum definition −m v, balance m a_g.
 struct PointMass {
   int node = -1;
