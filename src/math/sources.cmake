@@ -1,1 +1,1 @@
-set(SOURCES decompositions.cpp processor.cpp rotation.cpp sparse_lu.cpp)
+set(SOURCES decompositions.cpp processor.cpp rotation.cpp sparse_lu.cpp thread_team.cpp)

@@ -20,13 +20,22 @@ struct BlockKernels {
   /// targets); `scaled`: scratch (columns × targets).
   void (*contribute)(const double* lower, int rows, int columns, int height, int targets,
                      const double* pivots, double* scaled, double* update);
-  /// Forward substitution with a block: own = L⁻¹ own, below = L_below own; `own` is part of a
-  /// matrix of `order` rows with `sides` columns, `below` has (rows − columns) × sides numbers.
-  void (*forward)(const double* block, int rows, int columns, double* own, int order, int sides,
-                  double* below);
-  /// Backward substitution: own = L⁻ᵀ (own − L_belowᵀ below).
-  void (*backward)(const double* block, int rows, int columns, double* own, int order, int sides,
-                   const double* below);
+  // Substitution with a block for `sides` right sides: `own` has its `columns` rows of a matrix of
+  // `order` rows.
+  /// own = L⁻¹ own
+  void (*solve_lower)(const double* block, int rows, int columns, double* own, int order,
+                      int sides);
+  /// below = L_below own for `height` rows of the block from `lower` on; `below` is part of a
+  /// matrix of `stride` rows.
+  void (*reach_down)(const double* lower, int rows, int columns, int height, const double* own,
+                     int order, int sides, double* below, int stride);
+  /// own −= L_belowᵀ below for `columns` columns of the block from `lower` on, all with `height`
+  /// rows.
+  void (*reach_up)(const double* lower, int rows, int columns, int height, double* own, int order,
+                   int sides, const double* below);
+  /// own = L⁻ᵀ own
+  void (*solve_upper)(const double* block, int rows, int columns, double* own, int order,
+                      int sides);
 };
 
 /// The versions that this processor can run, the plainest first.

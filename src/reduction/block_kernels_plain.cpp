@@ -4,7 +4,7 @@
 namespace mbcosim {
 
 namespace {
-constexpr BlockKernels kKernels{"plain", eliminate, contribute, forward, backward};
+constexpr BlockKernels kKernels = kernels("plain");
 }
 
 const BlockKernels* const kPlainKernels = &kKernels;

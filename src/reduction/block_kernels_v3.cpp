@@ -6,7 +6,7 @@ namespace mbcosim {
 
 #ifdef __AVX2__
 namespace {
-constexpr BlockKernels kKernels{"x86-64-v3", eliminate, contribute, forward, backward};
+constexpr BlockKernels kKernels = kernels("x86-64-v3");
 }
 const BlockKernels* const kKernelsV3 = &kKernels;
 #else

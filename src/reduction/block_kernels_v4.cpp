@@ -6,7 +6,7 @@ namespace mbcosim {
 
 #ifdef __AVX512F__
 namespace {
-constexpr BlockKernels kKernels{"x86-64-v4", eliminate, contribute, forward, backward};
+constexpr BlockKernels kKernels = kernels("x86-64-v4");
 }
 const BlockKernels* const kKernelsV4 = &kKernels;
 #else

@@ -63,23 +63,34 @@ void contribute(const double* lower, int rows, int columns, int height, int targ
   Part(update, height, targets, Eigen::OuterStride<>(height)).noalias() = source * right;
 }
 
-void forward(const double* block, int rows, int columns, double* own, int order, int sides,
-             double* below) {
+void solve_lower(const double* block, int rows, int columns, double* own, int order, int sides) {
   const ConstPart square(block, columns, columns, Eigen::OuterStride<>(rows));
-  const ConstPart lower(block + columns, rows - columns, columns, Eigen::OuterStride<>(rows));
   Part x(own, columns, sides, Eigen::OuterStride<>(order));
   square.triangularView<Eigen::UnitLower>().solveInPlace(x);
-  Part(below, rows - columns, sides, Eigen::OuterStride<>(rows - columns)).noalias() = lower * x;
 }
 
-void backward(const double* block, int rows, int columns, double* own, int order, int sides,
-              const double* below) {
+void reach_down(const double* lower, int rows, int columns, int height, const double* own,
+                int order, int sides, double* below, int stride) {
+  Part(below, height, sides, Eigen::OuterStride<>(stride)).noalias() =
+      ConstPart(lower, height, columns, Eigen::OuterStride<>(rows)) *
+      ConstPart(own, columns, sides, Eigen::OuterStride<>(order));
+}
+
+void reach_up(const double* lower, int rows, int columns, int height, double* own, int order,
+              int sides, const double* below) {
+  Part(own, columns, sides, Eigen::OuterStride<>(order)).noalias() -=
+      ConstPart(lower, height, columns, Eigen::OuterStride<>(rows)).transpose() *
+      ConstPart(below, height, sides, Eigen::OuterStride<>(height));
+}
+
+void solve_upper(const double* block, int rows, int columns, double* own, int order, int sides) {
   const ConstPart square(block, columns, columns, Eigen::OuterStride<>(rows));
-  const ConstPart lower(block + columns, rows - columns, columns, Eigen::OuterStride<>(rows));
   Part x(own, columns, sides, Eigen::OuterStride<>(order));
-  x.noalias() -= lower.transpose() *
-                 ConstPart(below, rows - columns, sides, Eigen::OuterStride<>(rows - columns));
   square.transpose().triangularView<Eigen::UnitUpper>().solveInPlace(x);
+}
+
+constexpr BlockKernels kernels(const char* processor) {
+  return {processor, eliminate, contribute, solve_lower, reach_down, reach_up, solve_upper};
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <thread>
 
 namespace mbcosim {
 
@@ -61,16 +60,10 @@ void Factorization::tell(double share) const {
 
 void Factorization::run() {
   tell(0);
-  {
-    std::vector<std::jthread> others;
-    try {
-      for (int k = 1; k < std::min(settings_.threads, pattern_.count()); ++k)
-        others.emplace_back([this] { work(false); });
-    } catch (const std::system_error&) {  // as many threads as there may be
-    }
+  if (factor_.team_)
+    factor_.team_->run([this](int thread) { work(/*tells=*/thread == 0); });
+  else
     work(true);
-  }
-  if (error_) std::rethrow_exception(error_);
   if (end_ < pattern_.count()) {
     const int s = order_[end_], first = pattern_.first[s];
     for (int k = first; k < pattern_.first[s + 1]; ++k)  // the first pivot that is missing
@@ -79,12 +72,6 @@ void Factorization::run() {
         return;
       }
   }
-}
-
-void Factorization::stop_with(std::exception_ptr error) {
-  const std::lock_guard lock(mutex_);
-  if (!error_) error_ = std::move(error);
-  stopped_ = true;
 }
 
 /// What `tells` also reports progress, and hears that it should stop.
@@ -112,7 +99,8 @@ void Factorization::work(bool tells) {
       }
     }
   } catch (...) {
-    stop_with(std::current_exception());
+    stopped_ = true;
+    throw;
   }
 }
 

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <atomic>
-#include <exception>
-#include <mutex>
 #include <vector>
 
 #include "reduction/sparse_factor.h"
@@ -33,7 +31,6 @@ class Factorization {
   void compute(int s, Scratch& scratch);
   void load(int s, const std::vector<int>& local);
   void gather(const Reach& reach, int s, Scratch& scratch);
-  void stop_with(std::exception_ptr error);
 
   const SparseMatrix& matrix_;
   const FactorSettings& settings_;
@@ -47,8 +44,6 @@ class Factorization {
   std::atomic<int> next_{0};
   std::atomic<int> end_;  ///< position in `order_` of the first block that cannot be eliminated
   std::atomic<bool> stopped_{false};
-  std::mutex mutex_;
-  std::exception_ptr error_;
 };
 
 }  // namespace mbcosim

@@ -8,6 +8,7 @@
 
 #include "reduction/block_kernels.h"
 #include "reduction/error.h"
+#include "reduction/substitution.h"
 #include "reduction/supernodes.h"
 
 namespace mbcosim {
@@ -36,7 +37,7 @@ class SparseFactor {
   static int count_negative(const SparseMatrix& matrix, const RowPlaces& places,
                             const FactorSettings& settings = {}, Pattern pattern = nullptr);
 
-  /// A⁻¹ f, column by column.
+  /// A⁻¹ f; by one caller at a time.
   MatX solve(const MatX& f) const;
   long nonzeros() const { return static_cast<long>(size_); }
   const Pattern& pattern() const { return pattern_; }
@@ -47,16 +48,16 @@ class SparseFactor {
                Pattern pattern);
   double* block(int s) { return values_.get() + from_[s]; }
   const double* block(int s) const { return values_.get() + from_[s]; }
-  void solve_lower(MatX& x) const;
-  void solve_upper(MatX& x) const;
 
   Pattern pattern_;
+  SubstitutionPlan plan_;
   const BlockKernels* kernels_;
   std::size_t size_ = 0;
   std::vector<std::size_t> from_;     ///< of each block, in `values_`
   std::unique_ptr<double[]> values_;  ///< L below the diagonal
   VecX pivots_;                       ///< D, in the order of elimination
   int broken_ = -1;                   ///< row of the matrix whose pivot is zero
+  std::unique_ptr<ThreadTeam> team_;  ///< null for one thread
 };
 
 }  // namespace mbcosim

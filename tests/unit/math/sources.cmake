@@ -1,1 +1,1 @@
-set(SOURCES rotation_test.cpp)
+set(SOURCES rotation_test.cpp thread_team_test.cpp)

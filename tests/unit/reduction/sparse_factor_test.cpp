@@ -117,24 +117,53 @@ TEST(SparseFactor, NamesTheRowOfALargeSingularMatrix) {
   EXPECT_EQ(SparseFactor::count_negative(s.matrix, s.places), 1);
 }
 
+/// Large enough for blocks that threads share and for subtrees below them.
+TEST(SparseFactor, AnyNumberOfThreadsGivesTheSameBits) {
+  const Solid s = solid(14, 13, 12, 3);
+  const MatX f = MatX::Random(s.matrix.rows(), 35);
+  const auto solved = [&](int threads, const MatX& load) {
+    FactorSettings settings;
+    settings.threads = threads;
+    const SparseFactor factor = SparseFactor::positive(s.matrix, s.places, row_text, settings);
+    const SubstitutionPlan plan(*factor.pattern());
+    EXPECT_GT(plan.subtrees().size(), 16u);
+    EXPECT_GT(plan.top().size(), 4u);
+    return factor.solve(load);
+  };
+  const MatX one = solved(1, f), single = solved(1, f.col(2));
+  EXPECT_LT((s.matrix * one - f).cwiseAbs().maxCoeff(), 1e-10);
+  for (const int threads : {2, 3, 8}) {
+    EXPECT_TRUE((solved(threads, f).array() == one.array()).all()) << threads;
+    EXPECT_TRUE((solved(threads, f.col(2)).array() == single.array()).all()) << threads;
+  }
+}
+
+/// Every block is in one task, and what a subtree reaches outside stands below its root.
+TEST(SubstitutionPlan, SubtreesAndTheTopAreAllBlocks) {
+  for (const Solid& s : {solid(1, 1, 1, 1), solid(40, 1, 1, 2), solid(9, 8, 7, 3)}) {
+    const Supernodes pattern = find_supernodes(s.matrix, s.places);
+    const SubstitutionPlan plan(pattern);
+    std::vector<int> seen(pattern.count(), 0);
+    for (const int b : plan.top()) ++seen[b];
+    for (const auto& [first, end] : plan.subtrees()) {
+      const int* const root = pattern.rows_of(end - 1);
+      for (int b = first; b < end; ++b) {
+        ++seen[b];
+        for (int k = 0; k < pattern.height(b); ++k)
+          if (const int row = pattern.rows_of(b)[k]; row >= pattern.first[end])
+            EXPECT_TRUE(std::binary_search(root, root + pattern.height(end - 1), row));
+      }
+    }
+    EXPECT_EQ(seen, std::vector<int>(pattern.count(), 1));
+  }
+}
+
 TEST(SparseFactor, TheSameMatrixGivesTheSameBits) {
   const Solid s = solid(9, 9, 9, 3);
   const VecX f = VecX::LinSpaced(s.matrix.rows(), -1, 2);
   const MatX first = SparseFactor::positive(s.matrix, s.places, row_text).solve(f);
   const MatX second = SparseFactor::positive(s.matrix, s.places, row_text).solve(f);
   EXPECT_TRUE((first.array() == second.array()).all());
-}
-
-TEST(SparseFactor, AnyNumberOfThreadsGivesTheSameBits) {
-  const Solid s = solid(10, 9, 9, 3);
-  const VecX f = VecX::LinSpaced(s.matrix.rows(), -1, 2);
-  const MatX alone = SparseFactor::positive(s.matrix, s.places, row_text).solve(f);
-  for (const int threads : {2, 3, 8}) {
-    FactorSettings settings;
-    settings.threads = threads;
-    const MatX x = SparseFactor::positive(s.matrix, s.places, row_text, settings).solve(f);
-    EXPECT_TRUE((x.array() == alone.array()).all()) << threads << " threads";
-  }
 }
 
 TEST(SparseFactor, EveryVersionOfTheKernelsSolvesAndCounts) {

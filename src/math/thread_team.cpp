@@ -1,0 +1,58 @@
+#include "math/thread_team.h"
+
+#include <system_error>
+
+namespace mbcosim {
+
+ThreadTeam::ThreadTeam(int threads) {
+  try {
+    for (int k = 1; k < threads; ++k) others_.emplace_back([this, k] { serve(k); });
+  } catch (const std::system_error&) {  // as many as there may be
+  }
+}
+
+ThreadTeam::~ThreadTeam() {
+  ended_ = true;
+  ++round_;
+  round_.notify_all();
+}
+
+void ThreadTeam::run(Function function, void* work) {
+  First first;
+  function_ = function;
+  work_ = work;
+  first_ = &first;
+  busy_ = static_cast<int>(others_.size());
+  ++round_;
+  round_.notify_all();
+  take_part(0, first);
+  for (int busy; (busy = busy_.load(std::memory_order_acquire)) > 0;) wait_while(busy_, busy);
+  first.rethrow();
+}
+
+void ThreadTeam::take_part(int thread, First& first) {
+  try {
+    function_(work_, thread);
+  } catch (...) {
+    first.keep(thread);
+  }
+}
+
+void ThreadTeam::serve(int thread) {
+  for (unsigned round = 0;;) {
+    wait_while(round_, round);
+    if (ended_) return;
+    ++round;
+    take_part(thread, *first_);
+    if (--busy_ == 0) busy_.notify_all();
+  }
+}
+
+void ThreadTeam::First::keep(int place) {
+  const std::lock_guard lock(mutex_);
+  if (error_ && place_ < place) return;
+  error_ = std::current_exception();
+  place_ = place;
+}
+
+}  // namespace mbcosim
