@@ -149,9 +149,11 @@ TEST(SubstitutionPlan, SubtreesAndTheTopAreAllBlocks) {
       const int* const root = pattern.rows_of(end - 1);
       for (int b = first; b < end; ++b) {
         ++seen[b];
-        for (int k = 0; k < pattern.height(b); ++k)
-          if (const int row = pattern.rows_of(b)[k]; row >= pattern.first[end])
-            EXPECT_TRUE(std::binary_search(root, root + pattern.height(end - 1), row));
+        for (int k = 0; k < pattern.height(b); ++k) {
+          const int row = pattern.rows_of(b)[k];
+          EXPECT_TRUE(row < pattern.first[end] ||
+                      std::binary_search(root, root + pattern.height(end - 1), row));
+        }
       }
     }
     EXPECT_EQ(seen, std::vector<int>(pattern.count(), 1));
