@@ -1,13 +1,17 @@
 #include "math/thread_team.h"
 
+#include <algorithm>
+#include <new>
 #include <system_error>
 
 namespace mbcosim {
 
 ThreadTeam::ThreadTeam(int threads) {
+  others_.reserve(std::max(0, threads - 1));
   try {
     for (int k = 1; k < threads; ++k) others_.emplace_back([this, k] { serve(k); });
   } catch (const std::system_error&) {  // as many as there may be
+  } catch (const std::bad_alloc&) {     // likewise: those that are there wait for work
   }
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <atomic>
-#include <cstdint>
 #include <exception>
 #include <mutex>
 #include <thread>
@@ -93,15 +92,6 @@ template <class Work>
 void each_task(ThreadTeam* team, int count, Work&& work) {
   if (team && count > 1) return team->each(count, work);
   for (int task = 0; task < count; ++task) work(task, 0);
-}
-
-/// Calls work(first, last) for pieces of 0 … count − 1.
-template <class Work>
-void each_piece(ThreadTeam* team, int count, Work&& work) {
-  if (!team) return work(0, count);
-  const int pieces = team->size();
-  const auto place = [&](int k) { return static_cast<int>(std::int64_t{count} * k / pieces); };
-  team->run([&](int thread) { work(place(thread), place(thread + 1)); });
 }
 
 }  // namespace mbcosim

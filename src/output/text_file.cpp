@@ -18,7 +18,7 @@ void TextFile::make_room(std::size_t count) {
   if (used_ + count <= capacity_) return;
   capacity_ = std::max(kBuffer, 2 * (used_ + count));
   auto larger = std::make_unique_for_overwrite<char[]>(capacity_);
-  std::memcpy(larger.get(), text_.get(), used_);
+  std::copy_n(text_.get(), used_, larger.get());
   text_ = std::move(larger);
 }
 

@@ -63,7 +63,7 @@ struct ReductionOptions {
   double shift = 0;  ///< [1/s²] of the Lanczos process, at most 0; 0: a determinate set of rows is
                      ///< held instead
   std::string processor = "auto";  ///< version of the kernels: auto, plain, x86-64-v3, x86-64-v4
-  int threads = 1;                 ///< of the factorizations; does not change the results
+  int threads = 1;                 ///< of factorizations and solutions; does not change results
   bool check_completeness = true;  ///< count the eigenvalues below the highest normal mode
 };
 

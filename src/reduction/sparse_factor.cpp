@@ -30,7 +30,8 @@ SparseFactor::SparseFactor(const SparseMatrix& matrix, const RowPlaces& places,
     size_ += std::size_t(pattern_->height(s)) * pattern_->width(s);
   }
   values_.reset(new double[size_]);  // each block is cleared when its turn comes
-  if (settings.threads > 1) team_ = std::make_unique<ThreadTeam>(settings.threads);
+  if (const int threads = std::min(settings.threads, pattern_->count()); threads > 1)
+    team_ = std::make_unique<ThreadTeam>(threads);
   Factorization(matrix, settings, *this).run();
 }
 

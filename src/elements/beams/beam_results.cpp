@@ -45,9 +45,10 @@ void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
   const OrientationDescription description =
       fields.description.value_or(u.model().control.orientation);
   row.begin(OutputFile::act, u.label());
+  const Line<double> along = line(u);
   for (int a = 0; a < points; ++a) {
     const std::string suffix = Nodes == 2 ? "" : a == 0 ? "_I" : "_II";
-    const Section<double> s = section(u, line(u), a);
+    const Section<double> s = section(u, along, a);
     const Vec6 f = is_unloaded(u) ? Vec6(Vec6::Zero()) : internal_force(u, a, s);
     const auto vector = [&](Field field, const char* name, const char* unit, const Vec3& value) {
       if (chosen & field) row.vec3((name + suffix).c_str(), unit, value);

@@ -33,14 +33,6 @@ TEST_P(Team, EveryTaskIsDoneOnce) {
   EXPECT_EQ(done, std::vector<int>(1000, 1));
 }
 
-TEST_P(Team, PiecesCoverTheWhole) {
-  std::vector<int> done(1001, 0);
-  each_piece(&team_, 1001, [&](int first, int last) {
-    for (int k = first; k < last; ++k) ++done[k];
-  });
-  EXPECT_EQ(done, std::vector<int>(1001, 1));
-}
-
 TEST_P(Team, TheFirstExceptionInTheOrderOfTasksIsThrownAndTheOthersAreDone) {
   for (int call = 0; call < 50; ++call) {
     std::vector<int> done(100, 0);
