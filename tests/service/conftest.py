@@ -17,6 +17,13 @@ MODELS = os.path.join(os.path.dirname(__file__), "..", "..", "client_examples", 
 TIME_FACTOR = float(os.environ.get("MBCOSIM_TIME_FACTOR", "1"))
 
 
+def is_listening(path):
+    """Does somebody accept connections at this Unix socket? Its file is there a moment before, and after a SIGKILL."""
+    accepts = "00010000"  # __SO_ACCEPTCON of the kernel
+    with open("/proc/net/unix") as sockets:
+        return any(words[3] == accepts and words[-1] == path for words in map(str.split, sockets))
+
+
 class Daemon:
     """A daemon on a socket of its own. Ends with SIGTERM and must then exit with 0."""
 
@@ -28,7 +35,7 @@ class Daemon:
         command = [os.path.join(BIN, "mbcosimd"), "--listen", self.address, "--shutdown-grace", "1", *options]
         with open(self._output_path, "wb") as output:
             self.process = subprocess.Popen(command, stdout=output, stderr=self._log, stdin=subprocess.DEVNULL)
-        wait_for(lambda: os.path.exists(self.address[len("unix:"):]) or not self.alive(), 30)
+        wait_for(lambda: is_listening(self.address[len("unix:"):]) or not self.alive(), 30)
 
     def connect(self, **options):
         return mbcosim.connect(self.address, timeout=30, **options)
