@@ -50,6 +50,10 @@ def pull(motion):
     return [np.sin(0.03 * motion.step) - 10.0 * motion.x[0] - motion.v[0]]
 
 
+def twig_of(name):
+    return f"twig of {name}"
+
+
 class User:
     """What one client does with one simulation."""
 
@@ -124,7 +128,7 @@ class User:
                 first = bits
 
     def fork(self):
-        with self.simulation.fork() as twig:
+        with self.simulation.fork(name=twig_of(self.name)) as twig:
             twig.step(self.some())
 
     def push(self):
@@ -167,7 +171,7 @@ def serve(address, name, coupled, seed):
 
 class Worker:
     def __init__(self, address, name, coupled, seed):
-        self.arguments = [address, name, str(coupled)]
+        self.name, self.arguments = name, [address, name, str(coupled)]
         self.start(seed)
 
     def start(self, seed):
@@ -182,7 +186,7 @@ class Worker:
         """Steps that it has done."""
         line = self.process.stdout.readline()
         if not line:
-            raise AssertionError(f"the client of {self.arguments[1]} failed")
+            raise AssertionError(f"the client of {self.name} failed")
         return int(line)
 
     def end(self):
@@ -193,17 +197,17 @@ class Worker:
             code = self.process.wait(30 * TIME_FACTOR)
         except subprocess.TimeoutExpired:
             return self.stuck()
-        return f"the client of {self.arguments[1]} ended with {code}" if code not in (0, -signal.SIGKILL) else None
+        return f"the client of {self.name} ended with {code}" if code not in (0, -signal.SIGKILL) else None
 
     def stuck(self):
         """It does not end: where its threads stand goes to the standard error, by Python and by the kernel."""
         pid = self.process.pid
-        print(f"threads of the client of {self.arguments[1]}:", *where(pid), sep="\n", file=sys.stderr, flush=True)
+        print(f"threads of the client of {self.name}:", *where(pid), sep="\n", file=sys.stderr, flush=True)
         self.process.send_signal(signal.SIGUSR1)
         time.sleep(1)
         self.process.kill()
         self.process.wait()
-        return f"the client of {self.arguments[1]} had done its work and did not end"
+        return f"the client of {self.name} had done its work and did not end"
 
     def die(self, seed):
         self.process.kill()
@@ -267,7 +271,20 @@ def phase(workers, steps, rolls):
     victim = rolls.choice(workers)
     victim.die(rolls.randrange(1 << 30))
     victim.tell(steps)
-    return sum(worker.done() for worker in workers)
+    return sum(worker.done() for worker in workers), victim.name
+
+
+def left_over(server, names, victims):
+    """Simulations that are lost or that nobody should have left. A client that is killed within `fork` cannot delete its twig."""
+    twigs = [twig_of(name) for name in victims]
+    listed = server.list()
+    for name in set(names) - {info.name for info in listed}:
+        yield f"{name} is lost"
+    for info in listed:
+        if info.display_name in twigs:
+            twigs.remove(info.display_name)
+        elif info.name not in names:
+            yield f"{info.name} ({info.display_name or 'without a name'}) is left over"
 
 
 def faults_of(measures, sanitized):
@@ -281,19 +298,20 @@ def faults_of(measures, sanitized):
 
 
 def soak(daemon, options):
-    rolls, total, measures, start = random.Random(options.seed), 0, [], time.monotonic()
+    rolls, total, measures, victims, start = random.Random(options.seed), 0, [], [], time.monotonic()
     with daemon.connect() as server:
         workers = [Worker(daemon.address, name, coupled, rolls.randrange(1 << 30)) for name, coupled in create(server)]
         steps = -(-options.steps // PHASES // len(workers))
         while len(measures) < PHASES or time.monotonic() - start - 60 * options.minutes < 0:
-            total += phase(workers, steps, rolls)
+            done, victim = phase(workers, steps, rolls)
+            total += done
+            victims.append(victim)
             measures.append(measure(daemon.process.pid))
             memory, threads, descriptors = measures[-1]
             print(f"{time.monotonic() - start:7.0f} s {total:9} steps {memory >> 10:8} kB {threads:4} threads {descriptors:4} descriptors",
                   flush=True)
         faults = [fault for fault in [worker.end() for worker in workers] if fault]
-        if len(server.list()) != len(SESSIONS):
-            faults.append("simulations are left over, or lost")
+        faults += left_over(server, [worker.name for worker in workers], victims)
     return faults + list(faults_of(measures, options.sanitized))
 
 
