@@ -391,8 +391,10 @@ class SimulationCalls(Generic[SnapshotKind]):
 
     def split(self, names: Iterable[str], values: Any) -> dict[str, Any]:
         """Numbers of several variables, one after the other, as arrays by name."""
-        numbers, at = np.fromiter(values, float, len(values)), 0
         found: dict[str, Any] = {}
+        if not names:
+            return found
+        numbers, at = np.fromiter(values, float, len(values)), 0
         for name in names:
             variable = self._variable(name)
             part = numbers[at:at + variable.size]

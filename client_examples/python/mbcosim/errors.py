@@ -1,8 +1,8 @@
 """Server errors as exceptions with the server's details."""
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Mapping
+import functools
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Optional
 
 import grpc
@@ -102,6 +102,7 @@ _REASONS: dict[str, type[Error]] = {
 }
 
 
+@functools.lru_cache(maxsize=1024)
 def enum_name(kind: Any, value: int, prefix: str) -> str:
     """Name of a value without its prefix; one that this client does not know: "UNKNOWN_17"."""
     return str(kind.Name(value))[len(prefix):] if value in kind.values() else f"UNKNOWN_{value}"
@@ -161,10 +162,12 @@ def bad_argument(field: str, message: str) -> Error:
     return error
 
 
-@contextlib.contextmanager
-def translated() -> Iterator[None]:
-    """Turns grpc errors raised inside into exceptions of this module."""
-    try:
-        yield
-    except grpc.RpcError as error:
-        raise from_rpc_error(error) from None
+class translated:
+    """Context manager that turns grpc errors raised inside into exceptions of this module."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: Optional[BaseException], trace: object) -> None:
+        if isinstance(error, grpc.RpcError):
+            raise from_rpc_error(error) from None

@@ -238,11 +238,11 @@ class Connection(Address):
                 self._await_connection(left, error)
 
     def _once(self, call: Call) -> Any:
+        if call.through is not None and call.timeout is None and (reply := call.through(call.request)) is not None:
+            return reply
         method = self.stubs.method(call.method)
         if call.each is not None:
             return self._stream(method, call)
-        if call.through is not None and call.timeout is None and (reply := call.through(call.request)) is not None:
-            return reply
         if not callable(call.request):  # one message: this thread does it all, and gRPC ends it at its deadline
             return method(call.request, metadata=self.metadata_of(call), timeout=call.timeout)
         return self._bounded(method, call)
@@ -278,17 +278,23 @@ def blocking(function: Callable[..., Calls[T]]) -> Callable[..., T]:
     return method
 
 
-@contextlib.contextmanager
-def bounded(seconds: Optional[float], cancel: Callable[[], object], what: str) -> Iterator[None]:
+_UNBOUNDED: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
+
+
+def bounded(seconds: Optional[float], cancel: Callable[[], object], what: str) -> contextlib.AbstractContextManager[None]:
     """Calls `cancel` when the block takes longer than `seconds` (None: never); then TimedOut is raised."""
+    if seconds is None:
+        return _UNBOUNDED
     try:
         checked_timeout(seconds)
     except Error:
         cancel()
         raise
-    if seconds is None:
-        yield
-        return
+    return _bounded(seconds, cancel, what)
+
+
+@contextlib.contextmanager
+def _bounded(seconds: float, cancel: Callable[[], object], what: str) -> Iterator[None]:
     over = threading.Event()
 
     def stop() -> None:
