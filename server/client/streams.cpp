@@ -1,6 +1,8 @@
 /// Steps on an open stream, and samples as they come.
 #include <grpcpp/client_context.h>
 
+#include <algorithm>
+
 #include "client/convert.h"
 #include "client/reading.h"
 #include "client/simulation.h"
@@ -31,7 +33,7 @@ struct Stepper::Impl {
         stream(server->simulations->StepStream(&context)) {}
   ~Impl() { close(); }
 
-  v1::StepReply exchange(double timeout) {
+  const v1::StepReply& exchange(double timeout) {
     const Deadline deadline(timeout, [this] { context.TryCancel(); });
     if (!over && stream->Write(request) && stream->Read(&reply)) return reply.step();
     over = true;
@@ -75,12 +77,18 @@ StepResult Stepper::step(const std::vector<double>& inputs, std::int64_t count,
   if (step_size) request.set_step_size(*step_size);
   if (request.has_inputs())
     request.mutable_inputs()->mutable_values()->Assign(inputs.begin(), inputs.end());
-  const v1::StepReply reply = impl_->exchange(timeout);
+  const v1::StepReply& reply = impl_->exchange(timeout);
   StepResult result = to_result(reply);
-  int at = 0;
-  for (const auto& [name, size] : impl_->outputs)
-    for (int i = 0; i < size && at < reply.outputs_size(); ++i)
-      result.values[name].push_back(reply.outputs(at++));
+  const double* value = reply.outputs().data();
+  const double* const end = value + reply.outputs_size();
+  for (const auto& [name, size] : impl_->outputs) {
+    const double* const next = value + std::min<std::ptrdiff_t>(size, end - value);
+    if (value != next) {
+      std::vector<double>& numbers = result.values[name];
+      numbers.insert(numbers.end(), value, next);
+    }
+    value = next;
+  }
   return result;
 }
 
