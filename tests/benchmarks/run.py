@@ -10,7 +10,8 @@ usage: run.sh [--build FOLDER] [--peer "REF -s -f {deck} -o {prefix}"] [--decks 
               of the steps, text of the results [ms], allocations, memory [MB]
   beams       cantilevers of three-node beams and grids of two-node beams: one Newton iteration of a process, and its memory;
               of the cantilevers also the parts of an iteration, by the engine alone
-  remote      a step over a stream and its empty echo (remote_step, when it is built)
+  remote      a step over a stream beside an empty echo, Unix socket and TCP, and 1000 simulations in turn (remote_step, when it is
+              built)
   reduce      `mbcosim reduce` on a cube of bricks
 
 Times are those of the processor (user and system), the median of the repeated runs, in which both solvers alternate; ratios are
@@ -179,14 +180,16 @@ def engine_parts(table, build, small):
         table.add(f"cantilever of {words[0]}, engine", "ms", whole, residual=residual, matrix=matrix, factor=factor, solve=solve)
 
 
-def remote(table, build, small):
-    if not (build / "bin" / "remote_step").exists():
+def remote(table, build, folder, small):
+    benchmark = build / "bin" / "remote_step"  # starts the daemon beside it
+    if not benchmark.exists() or not (build / "bin" / "mbcosimd").exists():
         return
-    options = ["--benchmark_format=json", f"--benchmark_min_time={0.05 if small else 1}"]
-    text = subprocess.run([HERE / "remote_step.sh", build, *options], capture_output=True, text=True, check=True).stdout
-    for row in json.loads(text[text.index("{"):])["benchmarks"]:
-        scale = {"ns": 1e-3, "us": 1, "ms": 1e3}[row["time_unit"]]
-        table.add(row["name"], "us", scale * row["real_time"])
+    figures = pathlib.Path(folder, "remote_step.json")
+    options = ["--turns", "2", "--exchanges", "50", "--many", "10"] if small else []
+    subprocess.run([benchmark, "--json", figures, *options], stdout=subprocess.DEVNULL, check=True)
+    for name, row in json.loads(figures.read_text()).items():
+        more = {"over_base": row["ratio"]} if "ratio" in row else {}
+        table.add(f"remote: {name}", "us", row["median"], p99=row["p99"], **more)
 
 
 def reduction(table, binary, small):
@@ -218,7 +221,7 @@ def main():
                     "parts": lambda: parts_of_runs(table, build, [deck.resolve() for deck in options.decks]),
                     "beams": lambda: beams(table, solvers, folder, 1 if options.small else 3, options.small),
                     "engine": lambda: engine_parts(table, build, options.small),
-                    "remote": lambda: remote(table, build, options.small),
+                    "remote": lambda: remote(table, build, folder, options.small),
                     "reduce": lambda: reduction(table, binary, options.small)}
         wanted = options.only.split(",") if options.only else list(sections)
         print(f"{'':38} {'ours':>12} {'':8} {'peer':>12} {'ratio':>7}")
