@@ -171,6 +171,15 @@ void Exchange::post(Lane lane, std::function<void()> work) {
   });
 }
 
+void Exchange::do_at_once(const std::function<void()>& work) {
+  {
+    Guard guard(mutex_);
+    ++jobs_;
+  }
+  guarded(work);
+  end_job();
+}
+
 void Exchange::end_job() {
   Guard guard(mutex_);
   --jobs_;

@@ -114,6 +114,8 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
   void hang_up() TS_EXCLUDES(mutex_);
   /// Does work in a lane, unless the call is over by then. What it throws ends the call.
   void post(Lane lane, std::function<void()> work) TS_EXCLUDES(mutex_);
+  /// Does work, which takes but a moment, on this thread. What it throws ends the call.
+  void do_at_once(const std::function<void()>& work) TS_EXCLUDES(mutex_);
   /// Calls `body`; what it throws ends the call.
   void guarded(const std::function<void()>& body) noexcept;
 

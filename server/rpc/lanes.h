@@ -1,4 +1,4 @@
-/// Where the work of calls is done; never on gRPC's own threads.
+/// Where the work of calls is done; on gRPC's own threads only what takes but a moment.
 #pragma once
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "threads/mutex.h"
 #include "threads/work_pool.h"
 
 namespace mbcosim::server {
@@ -41,6 +42,9 @@ class Lanes {
     if (on_start_) job = timed(lane, std::move(job));
     pool(lane).post(owner, std::move(job));
   }
+  /// Who has it may work on a thread of gRPC. There is one, and gRPC has two threads at least: the
+  /// others go on with all other calls, however long that work turns out to be. Try it, never wait.
+  Mutex& at_once() { return at_once_; }
   /// Drops what has not started. True: what had started has ended within `wait`.
   bool stop(std::chrono::milliseconds wait) {
     const auto end = std::chrono::steady_clock::now() + wait;
@@ -77,6 +81,7 @@ class Lanes {
   }
 
   OnStart on_start_;
+  Mutex at_once_;
   WorkPool quick_, work_, advance_, heavy_;
 };
 

@@ -1,5 +1,6 @@
 #include "service/advance.h"
 
+#include "model/check.h"
 #include "wire/convert.h"
 #include "wire/refusal.h"
 
@@ -35,6 +36,21 @@ void Advance::run(const Progress& progress) {
     break_off();
     throw;
   }
+}
+
+bool Advance::run_at_once(SolverSlots::Slot slot) {
+  if (!parts_.lock.try_lock()) return false;
+  first_slot_.emplace(std::move(slot));
+  try {
+    const Guard lock(parts_.lock, std::adopt_lock);
+    if (!parts_.telemetry.empty()) return false;
+    const bool ended = run_slice_held();
+    MBCOSIM_CHECK(ended, "one step is one slice");
+  } catch (...) {
+    break_off();
+    throw;
+  }
+  return true;
 }
 
 void Advance::run_slices(const Progress& progress) {
@@ -118,6 +134,10 @@ bool Advance::may_write() {
 // Steps for a while with lock and slot held. True: the advance has ended and the reply is complete.
 bool Advance::run_slice() {
   const Guard lock(parts_.lock);
+  return run_slice_held();
+}
+
+bool Advance::run_slice_held() {
   try {
     return step_and_settle();
   } catch (...) {
@@ -149,7 +169,13 @@ bool Advance::step_and_settle() {
   return true;
 }
 
-StepSlot Advance::take_slot() const {
+StepSlot Advance::take_slot() {
+  if (first_slot_) {
+    SolverSlots::Slot slot = std::move(*first_slot_);
+    first_slot_.reset();
+    return {std::move(slot), parts_.shared.slots, parts_.subject.owner, token_,
+            parts_.shared.metrics};
+  }
   return {parts_.shared.slots, parts_.subject.owner, token_, parts_.shared.metrics};
 }
 

@@ -49,6 +49,9 @@ class Advance {
   CancelToken& token() { return token_; }  ///< interrupts it
   /// Throws Refusal: what was done stays, and a repeat of the request goes on from there.
   void run(const Progress& progress) TS_EXCLUDES(parts_.lock);
+  /// The same for one step without ports, journal and pace that has its slot: waits for nobody.
+  /// False: it would have to, and nothing has been done.
+  bool run_at_once(SolverSlots::Slot slot) TS_EXCLUDES(parts_.lock);
   std::int64_t factorizations() const { return solver_.factorizations(); }
 
  private:
@@ -64,6 +67,7 @@ class Advance {
   bool choose() TS_REQUIRES(parts_.lock);
   bool may_write() TS_REQUIRES(parts_.lock);
   bool run_slice();
+  bool run_slice_held() TS_REQUIRES(parts_.lock);
   bool step_and_settle() TS_REQUIRES(parts_.lock);
   void settle_before_failure() TS_REQUIRES(parts_.lock);
   bool step_for_a_while() TS_REQUIRES(parts_.lock);
@@ -82,7 +86,7 @@ class Advance {
   void leave_rest_to_repeat() TS_REQUIRES(parts_.lock);
   void conclude() TS_REQUIRES(parts_.lock);
   void tell_end() TS_REQUIRES(parts_.lock);
-  StepSlot take_slot() const;
+  StepSlot take_slot();
 
   const Parts parts_;
   const v1::StepRequest& request_;
@@ -94,7 +98,8 @@ class Advance {
   StepNews news_;
   JournalTurn journal_;
   CountedSolver solver_;
-  StepChoice choice_;  ///< of the next step
+  StepChoice choice_;                            ///< of the next step
+  std::optional<SolverSlots::Slot> first_slot_;  ///< that it begins with, where it has one
   bool started_ = false;
   End end_ = End::solved;  ///< of the last step; told when all before it is on the disk
 };

@@ -35,6 +35,7 @@ struct ServiceLimits {
   std::int64_t results_bytes = 1LL << 30;        ///< of the result files of one simulation
   std::int64_t results_root_bytes = 64LL << 30;  ///< of all that is in the folder of results
   std::chrono::seconds lease{3600};              ///< default and longest
+  double quick_step = 50e-6;  ///< about what it takes to wake a thread for a step [s]
   mbcosim::Limits engine;
 };
 

@@ -37,10 +37,20 @@ bool SolverSlots::take(const std::string& owner) {
   return true;
 }
 
+// Without standing in line.
+bool SolverSlots::take_first(const std::string& owner) {
+  const bool first = waiting_.empty() || held_.count(owner) == 0;
+  return first && take(owner);
+}
+
+SolverSlots::Slot SolverSlots::try_acquire(const std::string& owner) {
+  const Guard guard(mutex_);
+  return take_first(owner) ? Slot(this, owner) : Slot();
+}
+
 SolverSlots::Slot SolverSlots::acquire(const std::string& owner, const CancelToken& cancel) {
   const Guard guard(mutex_);
-  const bool first = waiting_.empty() || held_.count(owner) == 0;
-  if (first && take(owner)) return {this, owner};
+  if (take_first(owner)) return {this, owner};
   Waiter waiter{owner, {}, false};
   waiting_.push_back(&waiter);
   while (!waiter.granted) {

@@ -93,6 +93,8 @@ class SolverSlots {
 
   /// `owner` outlives the slot.
   Slot acquire(const std::string& owner, const CancelToken& cancel) TS_EXCLUDES(mutex_);
+  /// Empty when there is none at the moment.
+  Slot try_acquire(const std::string& owner) TS_EXCLUDES(mutex_);
   std::size_t waiting() TS_EXCLUDES(mutex_) {
     const Guard guard(mutex_);
     return waiting_.size();
@@ -104,6 +106,7 @@ class SolverSlots {
     Condition granted_signal;
     bool granted = false;
   };
+  bool take_first(const std::string& owner) TS_REQUIRES(mutex_);
   bool take(const std::string& owner) TS_REQUIRES(mutex_);
   void release(const std::string& owner) TS_EXCLUDES(mutex_);
 

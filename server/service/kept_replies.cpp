@@ -45,7 +45,7 @@ void refuse_other_request(const std::string& id) {
 // ------------------------------------------------------------------ one request
 
 KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::string& request_id,
-                        std::uint64_t digest, const Call& call, bool of_state)
+                        std::uint64_t digest, const Call& call, bool of_state, Repeat repeat)
     : kept_(kept),
       identity_(caller.identity),
       id_(request_id),
@@ -64,6 +64,8 @@ KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::stri
       entry->awaited = false;
       return;
     }
+    must_wait_ = repeat == Repeat::leaves;
+    if (must_wait_) return;
     if (entry->awaited && !waits)
       throw Refusal(v1::REASON_SIMULATION_BUSY,
                     "this request is at work, and another repeat waits for it already");
@@ -77,7 +79,7 @@ KeptReplies::Turn::Turn(KeptReplies& kept, const Caller& caller, const std::stri
 }
 
 KeptReplies::Turn::~Turn() {
-  if (id_.empty() || known_) return;
+  if (id_.empty() || known_ || must_wait_) return;
   Guard guard(kept_.mutex_);
   Entry* entry = kept_.find(identity_, id_);
   if (entry && entry->at_work) {

@@ -37,6 +37,9 @@ class KeptReplies {
   void describe_unstored(Messages* out) const TS_EXCLUDES(mutex_);
   void all_stored() TS_EXCLUDES(mutex_);
 
+  /// What a request does while the same is at work.
+  enum class Repeat { waits, leaves };
+
   /// One request at work. What went well is kept by `keep`; without it the request may be tried
   /// anew.
   class Turn {
@@ -46,10 +49,13 @@ class KeptReplies {
     /// already, CANCELLED when the call ends first.
     /// `of_state`: without the state that it leads to the request was not done.
     Turn(KeptReplies& kept, const Caller& caller, const std::string& request_id,
-         std::uint64_t digest, const Call& call, bool of_state = true);
+         std::uint64_t digest, const Call& call, bool of_state = true,
+         Repeat repeat = Repeat::waits);
     ~Turn();
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
+    /// The same request is at work and was not waited for: nothing else is known.
+    bool must_wait() const { return must_wait_; }
     /// The reply of the first, serialized; null: this is the first.
     const std::string* known() const { return known_ ? &*known_ : nullptr; }
     /// `stored`: it is on the disk already, or need not be.
@@ -68,6 +74,7 @@ class KeptReplies {
     const std::string identity_, id_;
     const std::uint64_t digest_;
     const bool of_state_;
+    bool must_wait_ = false;
     std::optional<std::string> known_, begun_;
   };
 

@@ -2,6 +2,7 @@
 
 #include <google/protobuf/util/time_util.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "model/model_part.h"
@@ -346,8 +347,61 @@ void Session::step(const v1::StepRequest& request, const Caller& caller, Call& c
   const SteppingClaim claim(status_, lease_, call, advance.token());
   require_usable();  // still
   advance.run(progress);
-  shared_.metrics.count_advance(*reply, advance.factorizations());
-  if (reply->has_failure()) shared_.metrics.count_failure(reply->failure().reason());
+  count(advance, *reply);
+}
+
+namespace {
+
+/// One step that took no longer than to wake a thread for it, and with all its iterations would not
+/// have taken long either?
+bool was_quick(const v1::StepReply& reply, double quick, int most_iterations) {
+  constexpr double kLongest = 100;  // times as long
+  const double each = reply.total_seconds() / std::max(1, reply.iterations());
+  return !reply.has_failure() && reply.steps_done() == 1 && reply.total_seconds() <= quick &&
+         each * most_iterations <= kLongest * quick;
+}
+
+/// Is it solved once? What is cut, or shortened by the deck, may be solved often.
+bool is_one_step(const v1::StepRequest& request, const StepPolicy& policy, const Model& model) {
+  return !request.has_until_time() && !request.has_until() && request.steps() <= 1 &&
+         policy.kind != StepPolicy::cut && model.initial_value.strategy == StepStrategy::no_change;
+}
+
+}  // namespace
+
+void Session::count(const Advance& advance, const v1::StepReply& reply) {
+  shared_.metrics.count_advance(reply, advance.factorizations());
+  if (reply.has_failure()) shared_.metrics.count_failure(reply.failure().reason());
+  is_quick_ = never_waits() &&
+              was_quick(reply, shared_.limits.quick_step, model_->initial_value.max_iterations);
+}
+
+// For a disk, a clock or a code?
+bool Session::never_waits() const {
+  return coupler_.ports().empty() && !deck_sockets_ && !results_ && !storage_.has_journal() &&
+         pace_ == 0;
+}
+
+bool Session::step_at_once(const v1::StepRequest& request, const Caller& caller, Call& call,
+                           v1::StepReply* reply) {
+  if (!is_quick() || !is_one_step(request, status_.policy(), *model_)) return false;
+  if (!shared_.lanes.at_once().try_lock()) return false;
+  const Guard alone(shared_.lanes.at_once(), std::adopt_lock);
+  SolverSlots::Slot slot = shared_.slots.try_acquire(identity_.owner);
+  if (!slot) return false;
+  KeptReplies::Turn turn(kept_, caller, request.request_id(),
+                         request.request_id().empty() ? 0 : digest_of("Step", request), call,
+                         /*of_state=*/true, KeptReplies::Repeat::leaves);
+  if (turn.must_wait() || turn.begun()) return false;
+  if (turn.known()) return reply->ParseFromString(*turn.known());
+  require_usable();
+  check(request);
+  Advance advance(advance_parts(), request, *reply, turn);
+  const SteppingClaim claim(status_, lease_, call, advance.token());
+  require_usable();  // still
+  if (!advance.run_at_once(std::move(slot))) return false;
+  count(advance, *reply);
+  return true;
 }
 
 bool Session::interrupt() { return status_.interrupt(); }

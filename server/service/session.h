@@ -97,6 +97,12 @@ class Session {
   /// Advances as asked, once for each request id; see `Simulations.Step`.
   void step(const v1::StepRequest& request, const Caller& caller, Call& call, v1::StepReply* reply,
             const Progress& progress = {}, RowTable* table = nullptr);
+  /// The same when it takes but a moment and waits for nobody, as far as the call before tells.
+  /// False: it might not, and nothing has been done.
+  bool step_at_once(const v1::StepRequest& request, const Caller& caller, Call& call,
+                    v1::StepReply* reply);
+  /// Is it worth asking for that?
+  bool is_quick() const { return is_quick_.load(std::memory_order_relaxed); }
   bool interrupt();  ///< was anything advancing?
   /// Throws NOT_GRANTED when the caller must not change grants.
   void update(const v1::UpdateSimulationRequest& request, const Change& change,
@@ -192,6 +198,8 @@ class Session {
   Lease& lease() { return lease_; }
 
  private:
+  bool never_waits() const;
+  void count(const Advance& advance, const v1::StepReply& reply);
   Advance::Parts advance_parts() TS_NO_THREAD_SAFETY_ANALYSIS;
   struct Goal {
     const State& state;
@@ -259,6 +267,7 @@ class Session {
   KeptReplies kept_;
   const std::shared_ptr<TelemetryHub> telemetry_;
   Analysis analysis_;
+  std::atomic<bool> is_quick_{false};
 
   FairMutex lock_;                                 // protects all below
   const std::unique_ptr<SessionResults> results_;  // null: none are written; outlives its writer

@@ -35,6 +35,10 @@ class SessionStatus {
   void fail(const std::string& why);  ///< the server failed in it
   void recover();                     ///< it was restored
   bool failed() const;
+  StepPolicy policy() const {
+    const Guard guard(mutex_);
+    return view_.policy;
+  }
 
   // --- one call at a time advances
   bool stepping() const;

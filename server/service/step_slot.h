@@ -18,6 +18,13 @@ class StepSlot {
       : slots_(slots), owner_(owner), token_(token), metrics_(metrics) {
     take();
   }
+  /// One that is taken already.
+  StepSlot(SolverSlots::Slot slot, SolverSlots& slots, const std::string& owner,
+           const CancelToken& token, Metrics& metrics)
+      : slots_(slots), owner_(owner), token_(token), metrics_(metrics) {
+    slot_.emplace(std::move(slot));
+    metrics_.count_slot_wait(0);
+  }
   /// False: it is given up, or the wait was cancelled.
   explicit operator bool() const { return slot_ && *slot_; }
   /// Until `take`: nobody waits for this one while it does something else.

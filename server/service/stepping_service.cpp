@@ -26,12 +26,24 @@ class StepStreamHandler final : public Handler {
   // Clients open the stream before they know when they will step.
   void start(Exchange& exchange) override { exchange.read(Exchange::kIdleStream); }
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
+    constexpr std::size_t kShort = 4096;  // bytes
+    if (session_ && (*session_)->is_quick() && message.Length() <= kShort)
+      return exchange.do_at_once([&] { step_at_once(exchange, message); });
     exchange.post(Lane::advance, [this, &exchange, bytes = std::move(message)]() mutable {
-      parse(exchange.memory(), bytes, &request_, &share_);
+      take(exchange, bytes);
       step(exchange);
     });
   }
-  void step(Exchange& exchange) {
+  // Another thread would take as long to wake as a small model to step.
+  void step_at_once(Exchange& exchange, grpc::ByteBuffer& message) {
+    take(exchange, message);
+    if ((*session_)->step_at_once(request_, exchange.caller(), exchange.call(),
+                                  reply_.mutable_step()))
+      return send(exchange);
+    exchange.post(Lane::advance, [this, &exchange] { step(exchange); });
+  }
+  void take(Exchange& exchange, grpc::ByteBuffer& message) {
+    parse(exchange.memory(), message, &request_, &share_);
     if (!session_) {
       name_ = request_.simulation();
       session_.emplace(parts_.store, name_, exchange.caller(), exchange.call(), Access::control);
@@ -44,7 +56,12 @@ class StepStreamHandler final : public Handler {
     reply_.Clear();
     outputs_share_ =
         MemoryShare(exchange.memory(), (*session_)->variable_access().bytes_of(request_.outputs()));
+  }
+  void step(Exchange& exchange) {
     (*session_)->step(request_, exchange.caller(), exchange.call(), reply_.mutable_step());
+    send(exchange);
+  }
+  void send(Exchange& exchange) {
     const bool taken = exchange.all_written();  // the last reply, by the client
     wants_next_.store(true);
     exchange.write(serialized(reply_));
