@@ -59,6 +59,8 @@ decltype(Event::content) to_content(const v1::Event& from) {
       return Event::LeaseEnding{from.lease_ending().seconds_left()};
     case Case::kCheckpointFailed:
       return Event::CheckpointFailed{from.checkpoint_failed().message()};
+    case Case::kCheckpoint:
+      return Event::CheckpointWritten{from.checkpoint().step(), from.checkpoint().bytes()};
     default:
       return Event::Unknown{};
   }

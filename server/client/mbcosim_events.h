@@ -46,6 +46,10 @@ struct Event {
   struct LeaseEnding {
     double seconds_left = 0;
   };
+  struct CheckpointWritten {
+    std::int64_t step = 0;
+    std::int64_t bytes = 0;  ///< snapshots and journals apart
+  };
   struct CheckpointFailed {
     std::string message;
   };
@@ -57,7 +61,7 @@ struct Event {
   std::string simulation;
   std::string identity, method, trace_id;  ///< of who made it happen; empty: the server
   std::variant<Unknown, Missed, Created, Deleted, StateChanged, StepFailed, Peer, Snapshot,
-               LeaseEnding, CheckpointFailed>
+               LeaseEnding, CheckpointFailed, CheckpointWritten>
       content;
 };
 

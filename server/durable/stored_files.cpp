@@ -115,6 +115,7 @@ v1::JournalEntry message_of(const StoredEntry& entry) {
 bool go_on(const v1::JournalEntry& entry, std::string state, StoredPoint* point) {
   if (entry.changes() <= point->point.changes()) return false;
   point->point.set_changes(entry.changes());
+  point->point.set_finished(entry.finished());
   *point->point.mutable_info() = entry.info();
   *point->point.mutable_ports() = entry.ports();
   point->point.clear_results_until_step();

@@ -321,6 +321,7 @@ void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoin
   remove_snapshots_but(id, keeping, kept);
   folder_->remove_journals(id, captured.journal_end);
   keeping.done(captured.changes, captured.state.step);
+  log_.checkpoint(session.subject(), captured.state.step, bytes);
   metrics_.count_checkpoint(
       bytes, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
 }

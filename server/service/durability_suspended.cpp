@@ -265,7 +265,8 @@ std::unique_ptr<Simulation> Durability::simulation_at(const ModelPtr& model,
                                                       SessionResults* results, bool has_files) {
   auto simulation = Simulation::create(model, nullptr, nullptr, time_keeping);
   if (!simulation) throw Refusal(simulation.error());
-  if (const Status status = (*simulation)->import_state(stored.state); !status)
+  if (const Status status = (*simulation)->import_state(stored.state, stored.point.finished());
+      !status)
     throw Refusal(status.error());
   if (!results) return std::move(*simulation);
   const auto writer = results->start(*model);

@@ -2,7 +2,9 @@
 
 #include <google/protobuf/util/time_util.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <random>
 #include <utility>
 #include <vector>
@@ -32,17 +34,29 @@ void EventJournal::add(v1::Event event, const std::string& owner) {
   {
     Guard guard(mutex_);
     event.set_sequence(++last_);
+    if (event.has_checkpoint()) drop_checkpoint_before(event);
     const std::size_t bytes = event.ByteSizeLong() + sizeof(Kept) + owner.size();
     kept_.push_back({std::move(event), owner, bytes});
     bytes_ += bytes;
     while (kept_.size() > kMostEvents || bytes_ > kMostBytes) {
       bytes_ -= kept_.front().bytes;
+      gone_ = kept_.front().event.sequence();
       kept_.pop_front();
     }
     for (const ReaderPtr& reader : readers_)
       if (std::exchange(reader->waits, false)) wakes.push_back(reader->wake);
   }
   for (const auto& wake : wakes) wake();
+}
+
+// There are many of them, and what else has happened must not make room for them.
+void EventJournal::drop_checkpoint_before(const v1::Event& event) {
+  const auto last = std::find_if(kept_.rbegin(), kept_.rend(), [&](const Kept& kept) {
+    return kept.event.has_checkpoint() && kept.event.simulation() == event.simulation();
+  });
+  if (last == kept_.rend()) return;
+  bytes_ -= last->bytes;
+  kept_.erase(std::prev(last.base()));
 }
 
 void EventJournal::enter(const ReaderPtr& reader) {
@@ -58,15 +72,18 @@ void EventJournal::leave(const ReaderPtr& reader) {
 bool EventJournal::next(Reader& reader, v1::Event* out) {
   Guard guard(mutex_);
   out->Clear();
-  const std::int64_t first = last_ - static_cast<std::int64_t>(kept_.size()) + 1;
-  if (reader.next < first) {
-    out->mutable_missed()->set_count(first - std::exchange(reader.next, first));
+  if (reader.next <= gone_) {
+    out->mutable_missed()->set_count(gone_ + 1 - std::exchange(reader.next, gone_ + 1));
     return true;
   }
-  while (reader.next <= last_) {
-    const Kept& kept = kept_[static_cast<std::size_t>(reader.next++ - first)];
-    if (!reader.wants(kept.event, kept.owner)) continue;
-    *out = kept.event;
+  auto kept = std::lower_bound(
+      kept_.begin(), kept_.end(), reader.next,
+      [](const Kept& each, std::int64_t number) { return each.event.sequence() < number; });
+  reader.next = last_ + 1;
+  for (; kept != kept_.end(); ++kept) {
+    if (!reader.wants(kept->event, kept->owner)) continue;
+    reader.next = kept->event.sequence() + 1;
+    *out = kept->event;
     return true;
   }
   reader.waits = true;

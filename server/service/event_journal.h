@@ -13,7 +13,8 @@
 
 namespace mbcosim::server {
 
-/// Thread-safe. Keeps so many events and bytes; the oldest make room.
+/// Thread-safe. Keeps so many events and bytes; the oldest make room. Of the
+/// checkpoints of a simulation it keeps the latest.
 class EventJournal {
  public:
   EventJournal();
@@ -48,8 +49,10 @@ class EventJournal {
 
   const std::string name_;
   mutable Mutex mutex_;
-  std::deque<Kept> kept_ TS_GUARDED_BY(mutex_);  ///< numbered without a gap up to `last_`
+  void drop_checkpoint_before(const v1::Event& event) TS_REQUIRES(mutex_);
+  std::deque<Kept> kept_ TS_GUARDED_BY(mutex_);  ///< by their numbers
   std::size_t bytes_ TS_GUARDED_BY(mutex_) = 0;
+  std::int64_t gone_ TS_GUARDED_BY(mutex_) = 0;  ///< up to here they have made room
   std::int64_t last_ TS_GUARDED_BY(mutex_) = 0;
   std::list<ReaderPtr> readers_ TS_GUARDED_BY(mutex_);
 };

@@ -143,6 +143,18 @@ void EventLog::snapshot(const Subject& subject, v1::SnapshotChange change, const
   add(subject, std::move(event));
 }
 
+void EventLog::checkpoint(const Subject& subject, std::int64_t step, std::int64_t bytes) {
+  if (spdlog::should_log(spdlog::level::debug))  // many, and each as expected
+    write(lives_,
+          subject.name + ": checkpoint of step " + std::to_string(step) + ", " +
+              std::to_string(bytes) + " bytes",
+          {{"session", subject.name}});
+  v1::Event event;
+  event.mutable_checkpoint()->set_step(step);
+  event.mutable_checkpoint()->set_bytes(bytes);
+  add(subject, std::move(event));
+}
+
 void EventLog::checkpoint_failed(const Subject& subject, const std::string& why) {
   write(failures_, subject.name + ": no checkpoint: " + why, {{"session", subject.name}});
   v1::Event event;

@@ -52,6 +52,7 @@ class EventLog {
             const std::string& peer, const std::string& why = "");
   void snapshot(const Subject& subject, v1::SnapshotChange change, const std::string& name,
                 std::int64_t step);
+  void checkpoint(const Subject& subject, std::int64_t step, std::int64_t bytes);
   void checkpoint_failed(const Subject& subject, const std::string& why);
   void lease_ending(const Subject& subject, double seconds_left);
 

@@ -19,6 +19,7 @@ void SessionStorage::take_over(const v1::CheckpointPoint& point) {
 void SessionStorage::capture(const Simulation& simulation, v1::CheckpointPoint* out,
                              int* journal_end) {
   out->set_changes(changes());
+  out->set_finished(simulation.finished());
   describe_(simulation, out->mutable_info());
   parts_.kept.describe(out->mutable_kept_replies());
   const auto& [turn, reply] = at_work_;
@@ -50,6 +51,7 @@ v1::JournalEntry SessionStorage::next_entry(const Simulation& simulation,
                                             const std::optional<v1::KeptReply>& reply) {
   v1::JournalEntry entry;
   entry.set_changes(++changes_);
+  entry.set_finished(simulation.finished());
   describe_(simulation, entry.mutable_info());
   *entry.mutable_ports() = peers_;
   parts_.kept.describe_unstored(entry.mutable_kept_replies());

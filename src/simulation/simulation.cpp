@@ -560,10 +560,10 @@ Result<State> Simulation::state_of(std::string_view bytes) const {
   return state;
 }
 
-Status Simulation::import_state(std::string_view bytes) {
+Status Simulation::import_state(std::string_view bytes, bool finished) {
   auto state = state_of(bytes);
   if (!state) return state.error();
-  return restore(*state);
+  return restore(*state, finished);
 }
 
 std::unique_ptr<Simulation> Simulation::fork(const CancelToken* cancel) const try {

@@ -190,7 +190,8 @@ class Simulation {
   /// Versioned bytes with the model's digest and a checksum.
   std::string export_state() const;
   /// ErrorKind::data_loss for damaged bytes, ErrorKind::precondition for another model's.
-  Status import_state(std::string_view bytes);
+  /// `finished`: as in `restore`.
+  Status import_state(std::string_view bytes, bool finished = false);
   /// The state that `import_state` would take; the simulation stays as it is.
   Result<State> state_of(std::string_view bytes) const;
   /// A new simulation at the same state, sharing the model. Without a writer. It chooses pivots of

@@ -35,6 +35,47 @@ TEST(Log, TextsOfClientsCannotBeginALineNorColourIt) {
             "arm?2026 error??[31mred? \xc3\xa9");
 }
 
+/// What somebody reads who comes back.
+std::vector<v1::Event> read_from(EventLog& log, std::int64_t next) {
+  EventJournal::Reader reader;
+  reader.wants = [](const v1::Event&, const std::string&) { return true; };
+  reader.next = next;
+  std::vector<v1::Event> all;
+  for (v1::Event event; log.journal().next(reader, &event);) all.push_back(event);
+  return all;
+}
+
+TEST(Events, OfCheckpointsTheLatestOfEachSimulationIsKept) {
+  EventLog log;
+  const std::string one = "simulations/1", other = "simulations/2", owner = "ann";
+  log.created({one, owner}, "", "");
+  log.checkpoint({other, owner}, 0, 1);
+  for (int step = 0; step < 20000; ++step) log.checkpoint({one, owner}, step, 2);
+  log.deleted({one, owner}, v1::DELETION_CAUSE_ASKED);
+  const std::vector<v1::Event> all = read_from(log, 1);
+  ASSERT_EQ(all.size(), 4U);
+  EXPECT_TRUE(all[0].has_created());
+  EXPECT_EQ(all[1].checkpoint().bytes(), 1);
+  EXPECT_EQ(all[2].checkpoint().step(), 19999);
+  EXPECT_EQ(all[2].sequence(), 20002);
+  EXPECT_EQ(all[3].sequence(), 20003);
+  EXPECT_EQ(read_from(log, 20002).size(), 2U);
+  EXPECT_TRUE(read_from(log, 20004).empty());
+}
+
+TEST(Events, ThatHaveMadeRoomAreCounted) {
+  EventLog log;
+  const std::string one = "simulations/1", owner = "ann";
+  log.checkpoint({one, owner}, 0, 1);
+  for (int i = 0; i < 20000; ++i) log.state_changed({one, owner}, v1::SIMULATION_STATE_READY, i);
+  log.checkpoint({one, owner}, 1, 1);
+  const std::vector<v1::Event> all = read_from(log, 1);
+  ASSERT_TRUE(all.front().has_missed());
+  EXPECT_EQ(all.front().missed().count() + 1, all[1].sequence());
+  EXPECT_EQ(all.back().sequence(), 20002);
+  EXPECT_EQ(static_cast<std::int64_t>(all.size()), 20002 - all.front().missed().count() + 1);
+}
+
 /// Takes the place of the daemon's log.
 class LogOfLibraries : public testing::Test {
  protected:

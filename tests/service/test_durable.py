@@ -683,6 +683,17 @@ def test_one_folder_has_one_daemon(start, folder, tmp_path):
     assert second.stdout.splitlines()[-1] == f"mbcosimd: error: another daemon uses the state folder {folder}"
 
 
+def test_checkpoints_are_told(start):
+    with start("--checkpoint-interval", "3600").connect() as server, server.events() as watcher:
+        simulation = server.load_text(deck())
+        simulation.step(7)
+        simulation.export_checkpoint()
+        written = [event for _, event in zip(range(3), watcher) if event.WhichOneof("content") == "checkpoint"]
+        assert [event.simulation for event in written] == 2 * [simulation.name]
+        assert [event.checkpoint.step for event in written] == [0, 7]
+        assert all(event.checkpoint.bytes > 500 for event in written)
+
+
 def test_a_full_folder_refuses_and_loses_nothing(start, folder):
     with start("--limit-state-bytes", "60000", "--checkpoint-interval", "0.05").connect() as server, server.events() as watcher:
         simulation = server.load_text(deck())

@@ -489,6 +489,25 @@ def test_a_run_that_its_deck_has_ended_stays_so_when_an_input_cannot_be_stored(s
         assert simulation.refresh() == before
 
 
+@pytest.mark.parametrize("durability", ["journal", "checkpoint"])
+def test_a_run_that_its_deck_has_ended_stays_so_when_the_daemon_starts_again(start, durability):
+    daemon = start("--checkpoint-interval", "3600")
+    with daemon.connect() as server:
+        simulation = server.load_bundle("deck", {"deck": ENDING.encode(), "ending.drv": b"0.\n1.\n3.\n"}, durability=durability)
+        early = simulation.snapshot()
+        simulation.run_until(1.0)
+        before = simulation.refresh()
+    daemon.kill() if durability == "journal" else daemon.stop()
+    with start().connect() as server:
+        again = server.attach(simulation.name)
+        again.read(["step"])
+        assert again.refresh() == before and before.state == pb.SIMULATION_STATE_FINISHED
+        assert again.step().outcome == "FINISHED" and again.refresh().step == 5
+        again.snapshots()[0].restore()
+        assert again.refresh().state == pb.SIMULATION_STATE_READY
+        assert again.step(3).step == early.step + 3
+
+
 def test_an_update_that_cannot_be_stored_changes_nothing(start):
     daemon = start("--checkpoint-interval", "3600")
     limits = resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE)
