@@ -1,13 +1,26 @@
 #include "solver/elimination_program.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 
 namespace mbcosim {
 
 namespace {
 
-EliminationProgram::Place place(std::size_t at) {
-  return static_cast<EliminationProgram::Place>(at);
+std::uint16_t place(std::size_t at) { return static_cast<std::uint16_t>(at); }
+
+template <int N>
+using Numbers = Eigen::Map<Eigen::Array<double, N, 1>>;
+template <int N>
+using NumbersRead = Eigen::Map<const Eigen::Array<double, N, 1>>;
+
+/// Two at a time. Wider ones would wait for each other: what two narrow ones have stored cannot be
+/// loaded at once before it is in the cache.
+template <class Use>
+inline void for_run(int count, Use use) {
+  int i = 0;
+  for (; i + 2 <= count; i += 2) use.template operator()<2>(i);
+  if (i < count) use.template operator()<1>(i);
 }
 
 /// Those of each level behind each other, within a level in the order in which they were given.
@@ -23,61 +36,76 @@ void EliminationProgram::set(std::size_t target, int value, double scale) {
   entries_.push_back({value, place(target), scale});
 }
 
-void EliminationProgram::subtract_product(std::size_t target, std::size_t factor,
-                                          std::size_t other) {
-  const int level = std::max({ready_[target], read_[target], ready_[factor], ready_[other]});
-  ready_[target] = level;
-  read_[factor] = std::max(read_[factor], level);
-  read_[other] = std::max(read_[other], level);
-  ordered_updates_.push_back({level, {place(target), place(factor), place(other)}});
+/// The first one after which none of them changes the order of what is done with them.
+int EliminationProgram::level_of_targets(std::size_t target, std::size_t count) const {
+  int level = 0;
+  for (std::size_t i = target; i < target + count; ++i)
+    level = std::max({level, ready_[i], read_[i]});
+  return level;
 }
 
-void EliminationProgram::divide(std::size_t target, std::size_t pivot) {
-  const int level = std::max({ready_[target], read_[target], ready_[pivot]});
-  ready_[target] = level + 1;
+void EliminationProgram::subtract_products(std::size_t target, std::size_t factor,
+                                           std::size_t count, std::size_t other) {
+  int level = std::max(level_of_targets(target, count), ready_[other]);
+  for (std::size_t i = factor; i < factor + count; ++i) level = std::max(level, ready_[i]);
+  std::fill_n(ready_.begin() + static_cast<std::ptrdiff_t>(target), count, level);
+  for (std::size_t i = factor; i < factor + count; ++i) read_[i] = std::max(read_[i], level);
+  read_[other] = std::max(read_[other], level);
+  ordered_products_.push_back({level, {place(target), place(factor), place(other), place(count)}});
+}
+
+void EliminationProgram::divide(std::size_t target, std::size_t count, std::size_t pivot) {
+  const int level = std::max(level_of_targets(target, count), ready_[pivot]);
+  std::fill_n(ready_.begin() + static_cast<std::ptrdiff_t>(target), count, level + 1);
   read_[pivot] = std::max(read_[pivot], level + 1);
-  ordered_divisions_.push_back({level, {place(target), place(pivot)}});
+  ordered_quotients_.push_back({level, {place(target), place(pivot), place(count)}});
 }
 
 void EliminationProgram::finish() {
-  sort_by_level(ordered_updates_);
-  sort_by_level(ordered_divisions_);
+  sort_by_level(ordered_products_);
+  sort_by_level(ordered_quotients_);
   const int levels = ready_.empty() ? 0 : *std::max_element(ready_.begin(), ready_.end()) + 1;
   ends_.resize(levels);
-  for (const auto& update : ordered_updates_) {
-    updates_.push_back(update.operation);
-    ends_[update.level].updates = updates_.size();
+  for (const auto& product : ordered_products_) {
+    products_.push_back(product.operation);
+    ends_[product.level].products = products_.size();
   }
-  for (const auto& division : ordered_divisions_) {
-    divisions_.push_back(division.operation);
-    ends_[division.level].divisions = divisions_.size();
+  for (const auto& quotient : ordered_quotients_) {
+    quotients_.push_back(quotient.operation);
+    ends_[quotient.level].quotients = quotients_.size();
   }
   for (int k = 1; k < levels; ++k) {
-    ends_[k].updates = std::max(ends_[k].updates, ends_[k - 1].updates);
-    ends_[k].divisions = std::max(ends_[k].divisions, ends_[k - 1].divisions);
+    ends_[k].products = std::max(ends_[k].products, ends_[k - 1].products);
+    ends_[k].quotients = std::max(ends_[k].quotients, ends_[k - 1].quotients);
   }
-  ordered_updates_ = {};
-  ordered_divisions_ = {};
+  ordered_products_ = {};
+  ordered_quotients_ = {};
   ready_ = {};
   read_ = {};
 }
 
 void EliminationProgram::run(const double* values, double* numbers) const {
   for (const Entry& entry : entries_) numbers[entry.target] = values[entry.value] * entry.scale;
-  const Update* update = updates_.data();
-  const Division* division = divisions_.data();
+  const Products* products = products_.data();
+  const Quotients* quotients = quotients_.data();
   for (const Range& end : ends_) {
-    for (const Update* const last = updates_.data() + end.updates; update != last; ++update)
-      numbers[update->target] -= numbers[update->factor] * numbers[update->other];
-    for (const Division* const last = divisions_.data() + end.divisions; division != last;
-         ++division)
-      numbers[division->target] /= numbers[division->pivot];
+    for (const Products* const last = products_.data() + end.products; products != last; ++products)
+      for_run(products->count, [to = numbers + products->target, from = numbers + products->factor,
+                                other = numbers[products->other]]<int N>(int i) {
+        Numbers<N>(to + i) -= NumbersRead<N>(from + i) * other;
+      });
+    for (const Quotients* const last = quotients_.data() + end.quotients; quotients != last;
+         ++quotients)
+      for_run(quotients->count,
+              [to = numbers + quotients->target, pivot = numbers[quotients->pivot]]<int N>(int i) {
+                Numbers<N>(to + i) /= pivot;
+              });
   }
 }
 
 std::size_t EliminationProgram::bytes() const {
-  return sizeof(Entry) * entries_.size() + sizeof(Update) * updates_.size() +
-         sizeof(Division) * divisions_.size() + sizeof(Range) * ends_.size();
+  return sizeof(Entry) * entries_.size() + sizeof(Products) * products_.size() +
+         sizeof(Quotients) * quotients_.size() + sizeof(Range) * ends_.size();
 }
 
 }  // namespace mbcosim

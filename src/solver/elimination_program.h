@@ -1,6 +1,7 @@
 /// The elimination of a small matrix as a list of operations.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -8,25 +9,26 @@ namespace mbcosim {
 
 /// What has to be done with an array of numbers F, for every matrix of one pattern:
 ///
-///   F[target] = value · scale          first
-///   F[target] −= F[factor] F[other]    level by level; at the end of a level
-///   F[target] /= F[pivot]
+///   F[target] = value · scale                         first
+///   F[target + i] −= F[factor + i] F[other]           level by level; at the end of a level
+///   F[target + i] /= F[pivot]
 ///
-/// Operations are given in the order in which they would be done one after the other. Levels keep
-/// the order of all that touch the same number, so that the results are the same bits. In small
-/// matrices it is loops of a few rounds that cost time, not arithmetic; here there are two for each
-/// level.
+/// each for a run of neighbours i. Operations are given in the order in which they would be done
+/// one after the other. Levels keep the order of all that touch the same number, so that the
+/// results are the same bits. In small matrices it is loops of a few rounds that cost time, not
+/// arithmetic; here there are two for each level.
 class EliminationProgram {
  public:
-  using Place = std::uint16_t;  ///< in F
   static constexpr std::size_t kMostNumbers = 1 << 16;
 
   /// `numbers`: of F.
   explicit EliminationProgram(std::size_t numbers) : ready_(numbers, 0), read_(numbers, 0) {}
   /// `value`: which of those that `run` gets.
   void set(std::size_t target, int value, double scale);
-  void subtract_product(std::size_t target, std::size_t factor, std::size_t other);
-  void divide(std::size_t target, std::size_t pivot);
+  /// Of `count` numbers each, none of which is `other`; runs do not overlap.
+  void subtract_products(std::size_t target, std::size_t factor, std::size_t count,
+                         std::size_t other);
+  void divide(std::size_t target, std::size_t count, std::size_t pivot);
   void finish();  ///< after the last operation
 
   /// Divisions by zero give numbers that are not finite.
@@ -36,14 +38,14 @@ class EliminationProgram {
  private:
   struct Entry {
     int value;
-    Place target;
+    std::uint16_t target;
     double scale;
   };
-  struct Update {
-    Place target, factor, other;
+  struct Products {
+    std::uint16_t target, factor, other, count;
   };
-  struct Division {
-    Place target, pivot;
+  struct Quotients {
+    std::uint16_t target, pivot, count;
   };
   template <class Operation>
   struct Ordered {
@@ -51,19 +53,20 @@ class EliminationProgram {
     Operation operation;
   };
   struct Range {
-    std::size_t updates = 0, divisions = 0;  ///< ends
+    std::size_t products = 0, quotients = 0;  ///< ends
   };
+  int level_of_targets(std::size_t target, std::size_t count) const;
 
   std::vector<Entry> entries_;
-  std::vector<Update> updates_;
-  std::vector<Division> divisions_;
+  std::vector<Products> products_;
+  std::vector<Quotients> quotients_;
   std::vector<Range> ends_;
 
   // until `finish`
   std::vector<int> ready_;  ///< by number: the level in which it can be used
   std::vector<int> read_;   ///< the last one in which it is needed as it is
-  std::vector<Ordered<Update>> ordered_updates_;
-  std::vector<Ordered<Division>> ordered_divisions_;
+  std::vector<Ordered<Products>> ordered_products_;
+  std::vector<Ordered<Quotients>> ordered_quotients_;
 };
 
 }  // namespace mbcosim

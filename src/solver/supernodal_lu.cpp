@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "solver/panel_kernels_version.h"
 
@@ -23,7 +24,7 @@ double reciprocal(double x) {
 
 SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
                            const double* values, const FactorPattern& factors,
-                           const PanelVersion& version)
+                           const PanelVersion& version, std::size_t small)
     : n_(static_cast<int>(factors.row_of.size())),
       row_of_(factors.row_of),
       column_of_(factors.column_of),
@@ -39,13 +40,17 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
   find_segments(factors);
   find_groups();
   place_matrix(column_start, row_index);
-  const std::ptrdiff_t panels = panel_start_.back();
-  numbers_.resize(static_cast<std::size_t>(panels) + upper_row_.size() + n_ + above_row_.size());
+  const auto panels = static_cast<std::size_t>(panel_start_.back());
+  const std::size_t count = panels + upper_row_.size() + n_ + above_row_.size();
+  const bool listed = is_small(count, small);
+  numbers_.resize(count + (listed ? n_ : 0));
   panels_ = numbers_.data();
   upper_ = panels_ + panels;
   pivots_ = upper_ + upper_row_.size();
   above_ = pivots_ + n_;
-  make_program();
+  if (!listed) return;
+  make_elimination();
+  make_substitution(count);
 }
 
 void SupernodalLu::find_supernodes(const FactorPattern& factors) {
@@ -140,6 +145,11 @@ std::ptrdiff_t SupernodalLu::below_diagonal(int k) const {
   return panel_start_[s] + (k - first) * (stride + 1) + 1;
 }
 
+std::size_t SupernodalLu::count_below(int k) const {
+  const int s = supernode_of_[k];
+  return static_cast<std::size_t>(first_[s + 1] - k - 1 + rows_start_[s + 1] - rows_start_[s]);
+}
+
 /// Calls with the row and the place of each number of L in column k.
 template <class Use>
 void SupernodalLu::for_column_below(int k, Use use) const {
@@ -149,30 +159,79 @@ void SupernodalLu::for_column_below(int k, Use use) const {
   for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) use(rows_[p], at++);
 }
 
-/// Where the list is short.
-void SupernodalLu::make_program() {
-  constexpr std::size_t kMost = 4096;  // operations; beyond, panels are as fast
-  if (numbers_.size() > EliminationProgram::kMostNumbers) return;
-  EliminationProgram elimination(numbers_.size());
+/// Calls with the row and the place of the first number and with the count of each run of numbers
+/// of L in column k that have neighbours in the rows of another list as well: `place` by row.
+template <class Use>
+void SupernodalLu::for_runs_below(int k, const std::vector<std::size_t>& place, Use use) const {
+  int first = -1;
+  std::size_t at = 0, count = 0;
+  for_column_below(k, [&](int row, std::ptrdiff_t number) {
+    if (count > 0 && place[row] == place[first] + count) {
+      ++count;
+      return;
+    }
+    if (count > 0) use(first, at, count);
+    first = row;
+    at = static_cast<std::size_t>(number);
+    count = 1;
+  });
+  if (count > 0) use(first, at, count);
+}
+
+/// `count`: of the numbers of the factors; `most`: products.
+bool SupernodalLu::is_small(std::size_t count, std::size_t most) const {
+  if (count + n_ > EliminationProgram::kMostNumbers) return false;
+  std::size_t products = 0;
+  for (const int row : upper_row_) products += count_below(row);
+  return products <= most;
+}
+
+void SupernodalLu::make_elimination() {
+  EliminationProgram& program = elimination_.emplace(numbers_.size());
   std::vector<std::size_t> place(n_);  // of the numbers of one column, by row
-  std::size_t operations = 0;
   for (int k = 0; k < n_; ++k) {
     for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
       place[upper_row_[p]] = place_of(upper_ + p);
     place[k] = place_of(pivots_ + k);
     for_column_below(k, [&](int row, std::ptrdiff_t at) { place[row] = at; });
-    set_column(k, place, elimination);
+    set_column(k, place, program);
     for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-      for_column_below(upper_row_[p], [&](int row, std::ptrdiff_t at) {
-        elimination.subtract_product(place[row], at, place_of(upper_ + p));
-        ++operations;
+      for_runs_below(upper_row_[p], place, [&](int row, std::size_t at, std::size_t count) {
+        program.subtract_products(place[row], at, count, place_of(upper_ + p));
       });
-    for_column_below(
-        k, [&](int, std::ptrdiff_t at) { elimination.divide(at, place_of(pivots_ + k)); });
-    if (operations > kMost) return;
+    if (const std::size_t count = count_below(k); count > 0)
+      program.divide(static_cast<std::size_t>(below_diagonal(k)), count, place_of(pivots_ + k));
   }
-  elimination.finish();
-  elimination_ = std::move(elimination);
+  program.finish();
+}
+
+/// The operations of `solve`, with what is solved for from place `x` on.
+void SupernodalLu::make_substitution(std::size_t x) {
+  EliminationProgram& program = substitution_.emplace(numbers_.size());
+  std::vector<std::size_t> place(n_);
+  std::iota(place.begin(), place.end(), x);
+  const auto subtract = [&](const std::vector<int>& start, const std::vector<int>& row,
+                            const double* numbers, int k) {
+    for (int p = start[k], first = p; p < start[k + 1]; first = p) {
+      while (++p < start[k + 1] && row[p] == row[p - 1] + 1) {
+      }
+      program.subtract_products(place[row[first]], place_of(numbers + first), p - first, place[k]);
+    }
+  };
+  for (int k = 0; k < n_; ++k) program.set(place[k], row_of_[k], inverse_scale_[k]);
+  for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
+    const int begin = block_start_[block], end = block_start_[block + 1];
+    for (int k = begin; k < end; ++k)
+      for_runs_below(k, place, [&](int row, std::size_t at, std::size_t count) {
+        program.subtract_products(place[row], at, count, place[k]);
+      });
+    for (int k = end - 1; k >= begin; --k) {
+      program.divide(place[k], 1, place_of(pivots_ + k));
+      subtract(upper_start_, upper_row_, upper_, k);
+    }
+    for (int k = begin; k < end; ++k) subtract(above_start_, above_row_, above_, k);
+  }
+  program.finish();
 }
 
 /// The matrix's entries, among the numbers of the column or above its diagonal block.
@@ -307,6 +366,12 @@ bool SupernodalLu::factor(const double* values, const Watch& watch) {
 }
 
 void SupernodalLu::solve(double* b) {
+  if (substitution_) {
+    substitution_->run(b, numbers_.data());
+    const double* const x = numbers_.data() + numbers_.size() - n_;
+    for (int k = 0; k < n_; ++k) b[column_of_[k]] = x[k];
+    return;
+  }
   double* const x = work_.data();
   for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]] * inverse_scale_[k];
   for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
@@ -329,7 +394,8 @@ void SupernodalLu::solve(double* b) {
 }
 
 std::size_t SupernodalLu::bytes() const {
-  return sizeof(double) * numbers_.size() + (elimination_ ? elimination_->bytes() : 0) +
+  return sizeof(double) * numbers_.size() +
+         (elimination_ ? elimination_->bytes() + substitution_->bytes() : 0) +
          sizeof(int) * (rows_.size() + upper_row_.size() + entry_row_.size() + above_row_.size()) +
          sizeof(Segment) * segments_.size();
 }

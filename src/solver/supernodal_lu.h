@@ -11,8 +11,8 @@
 /// to arithmetic operations", SIAM J. Sci. Stat. Comput. 9(5), 1988; supernodes: Demmel et al., "A
 /// supernodal approach to sparse partial pivoting", SIAM J. Matrix Anal. Appl. 20(3), 1999). L and
 /// U lie apart, each in the order in which it is read: large factors do not fit into the caches,
-/// and a solution costs what reading them costs. Small matrices are factored by a list of
-/// operations, with the same bits.
+/// and a solution costs what reading them costs. Small matrices are factored and
+/// solved by lists of operations, with the same bits.
 #pragma once
 
 #include <cstddef>
@@ -35,10 +35,12 @@ struct FactorPattern {
 
 class SupernodalLu {
  public:
-  /// The matrix's pattern in compressed columns; `values`: those of the reference matrix.
+  static constexpr std::size_t kSmall = 16384;  ///< products; with more, panels are as fast
+  /// The matrix's pattern in compressed columns; `values`: those of the reference matrix. With at
+  /// most `small` products of numbers it is factored and solved by lists of operations.
   SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
                const double* values, const FactorPattern& factors,
-               const PanelVersion& version = *panel_versions().back());
+               const PanelVersion& version = *panel_versions().back(), std::size_t small = kSmall);
   SupernodalLu(const SupernodalLu&) = delete;
   SupernodalLu& operator=(const SupernodalLu&) = delete;
 
@@ -73,7 +75,12 @@ class SupernodalLu {
   template <class Use>
   void for_column_below(int k, Use use) const;
   std::size_t place_of(const double* number) const { return number - numbers_.data(); }
-  void make_program();
+  template <class Use>
+  void for_runs_below(int k, const std::vector<std::size_t>& place, Use use) const;
+  std::size_t count_below(int k) const;  ///< numbers of L in column k
+  bool is_small(std::size_t count, std::size_t most) const;
+  void make_elimination();
+  void make_substitution(std::size_t x);
   void set_column(int k, const std::vector<std::size_t>& place, EliminationProgram& program) const;
   bool run_program(const double* values);
   std::ptrdiff_t below_diagonal(int k) const;  ///< of column k, its first number in panels_
@@ -102,9 +109,9 @@ class SupernodalLu {
   std::vector<int> above_start_, above_row_;  ///< by position
   double* above_ = nullptr;
 
-  std::vector<double> numbers_;                    ///< panels, U, pivots, above
-  std::optional<EliminationProgram> elimination_;  ///< of small matrices
-  std::vector<double> work_;                       ///< by position; zero between calls
+  std::vector<double> numbers_;  ///< panels, U, pivots, above; in small matrices the solution
+  std::optional<EliminationProgram> elimination_, substitution_;  ///< of small matrices
+  std::vector<double> work_;  ///< by position; zero between calls
 
   // neighbours in a supernode with the same rows of U before them are updated together
   std::vector<int> group_start_;  ///< first column of each group, then n

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <vector>
 
@@ -13,7 +14,7 @@ namespace {
 TEST(EliminationProgram, GivesTheBitsOfOneOperationAfterTheOther) {
   for (unsigned seed = 1; seed <= 200; ++seed) {
     std::mt19937 generator(seed);
-    const std::size_t size = 3 + seed % 12;
+    const std::size_t size = 3 + seed % 20;
     const auto any = [&] {
       return std::uniform_int_distribution<std::size_t>(0, size - 1)(generator);
     };
@@ -28,14 +29,22 @@ TEST(EliminationProgram, GivesTheBitsOfOneOperationAfterTheOther) {
     }
     for (int k = 0; k < 40; ++k) {
       const std::size_t target = any(), other = any(), factor = any();
-      if (target == other || target == factor) continue;
-      if (generator() % 3 == 0) {
-        expected[target] /= expected[other];
-        program.divide(target, other);
-      } else {
-        expected[target] -= expected[factor] * expected[other];
-        program.subtract_product(target, factor, other);
-      }
+      const std::size_t count =
+          1 + generator() % std::min<std::size_t>(5, size - std::max(target, factor));
+      const auto within = [count](std::size_t at, std::size_t first) {
+        return first <= at && at < first + count;
+      };
+      if (within(other, target) || within(factor, target) || within(target, factor)) continue;
+      const bool divides = generator() % 3 == 0;
+      for (std::size_t i = 0; i < count; ++i)
+        if (divides)
+          expected[target + i] /= expected[other];
+        else
+          expected[target + i] -= expected[factor + i] * expected[other];
+      if (divides)
+        program.divide(target, count, other);
+      else
+        program.subtract_products(target, factor, count, other);
     }
     program.finish();
     program.run(values.data(), found.data());

@@ -163,7 +163,7 @@ TEST(SupernodalLu, ColumnsTogetherHaveTheBitsOfEachAlone) {
       const Vector b = family.vector();
       const auto solution = [&](const PanelVersion& version) {
         SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
-                        family.pattern(reference), version);
+                        family.pattern(reference), version, /*small=*/0);
         Vector x = b;
         EXPECT_TRUE(lu.factor(Sparse(a).values.data()));
         lu.solve(x.data());
@@ -176,15 +176,36 @@ TEST(SupernodalLu, ColumnsTogetherHaveTheBitsOfEachAlone) {
     }
 }
 
+/// Lists of operations and panels are orders of the same operations.
+TEST(SupernodalLu, SmallMatricesHaveTheBitsOfLargeOnes) {
+  for (unsigned seed = 1; seed <= 30; ++seed)
+    for (const double density : {.03, .1, .4, 1.}) {
+      const int n = 5 + static_cast<int>(seed);
+      Family family(n, density, {0, 1, 4, n}, seed);
+      const Dense reference = family.matrix(), a = family.matrix();
+      const Sparse sparse(reference);
+      const Vector b = family.vector();
+      const auto solution = [&](std::size_t small) {
+        SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
+                        family.pattern(reference), *panel_versions().back(), small);
+        Vector x = b;
+        EXPECT_TRUE(lu.factor(Sparse(a).values.data()));
+        lu.solve(x.data());
+        return x;
+      };
+      EXPECT_EQ(solution(SupernodalLu::kSmall), solution(0)) << n << ", " << density;
+    }
+}
+
 TEST(SupernodalLu, AGroupWithAVanishingPivotLeavesNothingBehind) {
   Family family(90, 1, {0, 90}, 1);
   const Dense a = family.matrix();
   const Sparse sparse(a);
   for (const PanelVersion* version : panel_versions()) {
     SupernodalLu fresh(sparse.column_start, sparse.row_index, sparse.values.data(),
-                       family.pattern(a), *version);
+                       family.pattern(a), *version, /*small=*/0);
     SupernodalLu used(sparse.column_start, sparse.row_index, sparse.values.data(),
-                      family.pattern(a), *version);
+                      family.pattern(a), *version, /*small=*/0);
     Dense singular = a, invalid = a;
     singular.row(41) = singular.row(40);
     invalid(50, 50) = NAN;
