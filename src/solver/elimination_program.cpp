@@ -7,7 +7,7 @@ namespace mbcosim {
 
 namespace {
 
-std::uint16_t place(std::size_t at) { return static_cast<std::uint16_t>(at); }
+std::uint32_t place(std::size_t at) { return static_cast<std::uint32_t>(at); }
 
 template <int N>
 using Numbers = Eigen::Map<Eigen::Array<double, N, 1>>;

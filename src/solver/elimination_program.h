@@ -1,4 +1,4 @@
-/// The elimination of a small matrix as a list of operations.
+/// The elimination of a matrix as a list of operations.
 #pragma once
 
 #include <cstddef>
@@ -15,12 +15,10 @@ namespace mbcosim {
 ///
 /// each for a run of neighbours i. Operations are given in the order in which they would be done
 /// one after the other. Levels keep the order of all that touch the same number, so that the
-/// results are the same bits. In small matrices it is loops of a few rounds that cost time, not
-/// arithmetic; here there are two for each level.
+/// results are the same bits. Where columns are short it is loops of a few rounds that cost time,
+/// not arithmetic; here there are two for each level.
 class EliminationProgram {
  public:
-  static constexpr std::size_t kMostNumbers = 1 << 16;
-
   /// `numbers`: of F.
   explicit EliminationProgram(std::size_t numbers) : ready_(numbers, 0), read_(numbers, 0) {}
   /// `value`: which of those that `run` gets.
@@ -38,14 +36,14 @@ class EliminationProgram {
  private:
   struct Entry {
     int value;
-    std::uint16_t target;
+    std::uint32_t target;
     double scale;
   };
   struct Products {
-    std::uint16_t target, factor, other, count;
+    std::uint32_t target, factor, other, count;
   };
   struct Quotients {
-    std::uint16_t target, pivot, count;
+    std::uint32_t target, pivot, count;
   };
   template <class Operation>
   struct Ordered {

@@ -24,7 +24,7 @@ double reciprocal(double x) {
 
 SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
                            const double* values, const FactorPattern& factors,
-                           const PanelVersion& version, std::size_t small)
+                           const PanelVersion& version, std::size_t listed)
     : n_(static_cast<int>(factors.row_of.size())),
       row_of_(factors.row_of),
       column_of_(factors.column_of),
@@ -42,13 +42,13 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
   place_matrix(column_start, row_index);
   const auto panels = static_cast<std::size_t>(panel_start_.back());
   const std::size_t count = panels + upper_row_.size() + n_ + above_row_.size();
-  const bool listed = is_small(count, small);
-  numbers_.resize(count + (listed ? n_ : 0));
+  const bool lists = is_listed(count, listed);
+  numbers_.resize(count + (lists ? n_ : 0));
   panels_ = numbers_.data();
   upper_ = panels_ + panels;
   pivots_ = upper_ + upper_row_.size();
   above_ = pivots_ + n_;
-  if (!listed) return;
+  if (!lists) return;
   make_elimination();
   make_substitution(count);
 }
@@ -178,12 +178,13 @@ void SupernodalLu::for_runs_below(int k, const std::vector<std::size_t>& place, 
   if (count > 0) use(first, at, count);
 }
 
-/// `count`: of the numbers of the factors; `most`: products.
-bool SupernodalLu::is_small(std::size_t count, std::size_t most) const {
-  if (count + n_ > EliminationProgram::kMostNumbers) return false;
+/// `count`: of the numbers of the factors; `most`: products. A cantilever of beams has four for
+/// each number, a grid of 6 x 6 beams ten, and there panels are faster.
+bool SupernodalLu::is_listed(std::size_t count, std::size_t most) const {
+  constexpr std::size_t kFew = 6, kAlways = 4096;
   std::size_t products = 0;
   for (const int row : upper_row_) products += count_below(row);
-  return products <= most;
+  return products <= std::min(most, std::max(kAlways, kFew * count));
 }
 
 void SupernodalLu::make_elimination() {

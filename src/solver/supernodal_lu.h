@@ -11,8 +11,8 @@
 /// to arithmetic operations", SIAM J. Sci. Stat. Comput. 9(5), 1988; supernodes: Demmel et al., "A
 /// supernodal approach to sparse partial pivoting", SIAM J. Matrix Anal. Appl. 20(3), 1999). L and
 /// U lie apart, each in the order in which it is read: large factors do not fit into the caches,
-/// and a solution costs what reading them costs. Small matrices are factored and
-/// solved by lists of operations, with the same bits.
+/// and a solution costs what reading them costs. Where panels are narrow,
+/// matrices are factored and solved by lists of operations, with the same bits.
 #pragma once
 
 #include <cstddef>
@@ -35,12 +35,14 @@ struct FactorPattern {
 
 class SupernodalLu {
  public:
-  static constexpr std::size_t kSmall = 16384;  ///< products; with more, panels are as fast
+  static constexpr std::size_t kMostListed = 1 << 22;  ///< products: 30 MB of lists
   /// The matrix's pattern in compressed columns; `values`: those of the reference matrix. With at
-  /// most `small` products of numbers it is factored and solved by lists of operations.
+  /// most `listed` products of numbers, and few for each of its numbers, it is factored and solved
+  /// by lists of operations.
   SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
                const double* values, const FactorPattern& factors,
-               const PanelVersion& version = *panel_versions().back(), std::size_t small = kSmall);
+               const PanelVersion& version = *panel_versions().back(),
+               std::size_t listed = kMostListed);
   SupernodalLu(const SupernodalLu&) = delete;
   SupernodalLu& operator=(const SupernodalLu&) = delete;
 
@@ -78,7 +80,7 @@ class SupernodalLu {
   template <class Use>
   void for_runs_below(int k, const std::vector<std::size_t>& place, Use use) const;
   std::size_t count_below(int k) const;  ///< numbers of L in column k
-  bool is_small(std::size_t count, std::size_t most) const;
+  bool is_listed(std::size_t count, std::size_t most) const;
   void make_elimination();
   void make_substitution(std::size_t x);
   void set_column(int k, const std::vector<std::size_t>& place, EliminationProgram& program) const;
@@ -109,8 +111,8 @@ class SupernodalLu {
   std::vector<int> above_start_, above_row_;  ///< by position
   double* above_ = nullptr;
 
-  std::vector<double> numbers_;  ///< panels, U, pivots, above; in small matrices the solution
-  std::optional<EliminationProgram> elimination_, substitution_;  ///< of small matrices
+  std::vector<double> numbers_;  ///< panels, U, pivots, above; with lists the solution
+  std::optional<EliminationProgram> elimination_, substitution_;  ///< both or none
   std::vector<double> work_;  ///< by position; zero between calls
 
   // neighbours in a supernode with the same rows of U before them are updated together

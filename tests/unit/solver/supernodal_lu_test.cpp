@@ -163,7 +163,7 @@ TEST(SupernodalLu, ColumnsTogetherHaveTheBitsOfEachAlone) {
       const Vector b = family.vector();
       const auto solution = [&](const PanelVersion& version) {
         SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
-                        family.pattern(reference), version, /*small=*/0);
+                        family.pattern(reference), version, /*listed=*/0);
         Vector x = b;
         EXPECT_TRUE(lu.factor(Sparse(a).values.data()));
         lu.solve(x.data());
@@ -176,8 +176,8 @@ TEST(SupernodalLu, ColumnsTogetherHaveTheBitsOfEachAlone) {
     }
 }
 
-/// Lists of operations and panels are orders of the same operations.
-TEST(SupernodalLu, SmallMatricesHaveTheBitsOfLargeOnes) {
+/// They are orders of the same operations.
+TEST(SupernodalLu, ListsHaveTheBitsOfPanels) {
   for (unsigned seed = 1; seed <= 30; ++seed)
     for (const double density : {.03, .1, .4, 1.}) {
       const int n = 5 + static_cast<int>(seed);
@@ -185,15 +185,15 @@ TEST(SupernodalLu, SmallMatricesHaveTheBitsOfLargeOnes) {
       const Dense reference = family.matrix(), a = family.matrix();
       const Sparse sparse(reference);
       const Vector b = family.vector();
-      const auto solution = [&](std::size_t small) {
+      const auto solution = [&](std::size_t listed) {
         SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
-                        family.pattern(reference), *panel_versions().back(), small);
+                        family.pattern(reference), *panel_versions().back(), listed);
         Vector x = b;
         EXPECT_TRUE(lu.factor(Sparse(a).values.data()));
         lu.solve(x.data());
         return x;
       };
-      EXPECT_EQ(solution(SupernodalLu::kSmall), solution(0)) << n << ", " << density;
+      EXPECT_EQ(solution(SupernodalLu::kMostListed), solution(0)) << n << ", " << density;
     }
 }
 
@@ -203,9 +203,9 @@ TEST(SupernodalLu, AGroupWithAVanishingPivotLeavesNothingBehind) {
   const Sparse sparse(a);
   for (const PanelVersion* version : panel_versions()) {
     SupernodalLu fresh(sparse.column_start, sparse.row_index, sparse.values.data(),
-                       family.pattern(a), *version, /*small=*/0);
+                       family.pattern(a), *version, /*listed=*/0);
     SupernodalLu used(sparse.column_start, sparse.row_index, sparse.values.data(),
-                      family.pattern(a), *version, /*small=*/0);
+                      family.pattern(a), *version, /*listed=*/0);
     Dense singular = a, invalid = a;
     singular.row(41) = singular.row(40);
     invalid(50, 50) = NAN;
