@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <numeric>
 
 namespace mbcosim {
 
@@ -24,10 +25,18 @@ inline void for_run(int count, Use use) {
 }
 
 /// Those of each level behind each other, within a level in the order in which they were given.
-template <class Ordered>
-void sort_by_level(std::vector<Ordered>& all) {
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Ordered& a, const Ordered& b) { return a.level < b.level; });
+/// Where each level ends.
+template <class Operation>
+std::vector<std::size_t> sort_by_level(std::vector<Operation>& all, std::vector<int>& level,
+                                       std::size_t levels) {
+  std::vector<std::size_t> at(levels + 1, 0);
+  for (const int each : level) ++at[each + 1];
+  std::partial_sum(at.begin(), at.end(), at.begin());
+  std::vector<Operation> sorted(all.size());
+  for (std::size_t k = 0; k < all.size(); ++k) sorted[at[level[k]]++] = all[k];
+  all = std::move(sorted);
+  level = {};
+  return at;
 }
 
 }  // namespace
@@ -51,35 +60,24 @@ void EliminationProgram::subtract_products(std::size_t target, std::size_t facto
   std::fill_n(ready_.begin() + static_cast<std::ptrdiff_t>(target), count, level);
   for (std::size_t i = factor; i < factor + count; ++i) read_[i] = std::max(read_[i], level);
   read_[other] = std::max(read_[other], level);
-  ordered_products_.push_back({level, {place(target), place(factor), place(other), place(count)}});
+  products_.push_back({place(target), place(factor), place(other), place(count)});
+  level_of_products_.push_back(level);
 }
 
 void EliminationProgram::divide(std::size_t target, std::size_t count, std::size_t pivot) {
   const int level = std::max(level_of_targets(target, count), ready_[pivot]);
   std::fill_n(ready_.begin() + static_cast<std::ptrdiff_t>(target), count, level + 1);
   read_[pivot] = std::max(read_[pivot], level + 1);
-  ordered_quotients_.push_back({level, {place(target), place(pivot), place(count)}});
+  quotients_.push_back({place(target), place(pivot), place(count)});
+  level_of_quotients_.push_back(level);
 }
 
 void EliminationProgram::finish() {
-  sort_by_level(ordered_products_);
-  sort_by_level(ordered_quotients_);
-  const int levels = ready_.empty() ? 0 : *std::max_element(ready_.begin(), ready_.end()) + 1;
-  ends_.resize(levels);
-  for (const auto& product : ordered_products_) {
-    products_.push_back(product.operation);
-    ends_[product.level].products = products_.size();
-  }
-  for (const auto& quotient : ordered_quotients_) {
-    quotients_.push_back(quotient.operation);
-    ends_[quotient.level].quotients = quotients_.size();
-  }
-  for (int k = 1; k < levels; ++k) {
-    ends_[k].products = std::max(ends_[k].products, ends_[k - 1].products);
-    ends_[k].quotients = std::max(ends_[k].quotients, ends_[k - 1].quotients);
-  }
-  ordered_products_ = {};
-  ordered_quotients_ = {};
+  const std::size_t levels =
+      ready_.empty() ? 0 : *std::max_element(ready_.begin(), ready_.end()) + 1;
+  const auto products = sort_by_level(products_, level_of_products_, levels);
+  const auto quotients = sort_by_level(quotients_, level_of_quotients_, levels);
+  for (std::size_t k = 0; k < levels; ++k) ends_.push_back({products[k], quotients[k]});
   ready_ = {};
   read_ = {};
 }

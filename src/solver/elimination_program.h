@@ -45,11 +45,6 @@ class EliminationProgram {
   struct Quotients {
     std::uint32_t target, pivot, count;
   };
-  template <class Operation>
-  struct Ordered {
-    int level;
-    Operation operation;
-  };
   struct Range {
     std::size_t products = 0, quotients = 0;  ///< ends
   };
@@ -63,8 +58,7 @@ class EliminationProgram {
   // until `finish`
   std::vector<int> ready_;  ///< by number: the level in which it can be used
   std::vector<int> read_;   ///< the last one in which it is needed as it is
-  std::vector<Ordered<Products>> ordered_products_;
-  std::vector<Ordered<Quotients>> ordered_quotients_;
+  std::vector<int> level_of_products_, level_of_quotients_;
 };
 
 }  // namespace mbcosim
