@@ -11,6 +11,14 @@
 
 namespace mbcosim::client {
 
+/// Did the call get lost on its way? gRPC answers one that comes while its server is being shut
+/// down with CANCELLED and the code's name as text; nothing has been done then.
+inline bool is_lost(const grpc::Status& status) {
+  return status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+         (status.error_code() == grpc::StatusCode::CANCELLED &&
+          status.error_message() == "CANCELLED");
+}
+
 /// The attempts of one call: as many as come into the connection's `reconnect` seconds, by which
 /// the bound on the call grows.
 class Attempts {
@@ -27,8 +35,7 @@ class Attempts {
   /// Was the call lost on its way, and is there time for another? Waits a while, and until the
   /// server is there.
   bool again(const grpc::Status& status) {
-    if (status.error_code() != grpc::StatusCode::UNAVAILABLE || server_.reconnect <= 0)
-      return false;
+    if (!is_lost(status) || server_.reconnect <= 0) return false;
     const Clock::time_point now = Clock::now();
     if (!end_) end_ = now + duration(server_.reconnect);
     if (now >= *end_) return false;

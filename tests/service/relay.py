@@ -112,6 +112,8 @@ class Unreliable(grpc.GenericRpcHandler):
             dice = self._random.random() if call.method.endswith("/Step") else 1.0
             if dice < self._part:
                 self.lost += 1
+                if self.lost % 2:
+                    context.abort(grpc.StatusCode.CANCELLED, "CANCELLED")  # as gRPC answers while its server is being shut down
                 context.abort(grpc.StatusCode.UNAVAILABLE, "the request is lost")
             try:
                 if dice > 1 - self._part:

@@ -30,7 +30,7 @@ from . import access, events, exchange
 from .access import Attempts, default_address
 from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepResult, Values
 from .coupling import Answer, open_stream
-from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, from_rpc_error, translated
+from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
 from .histories import History
 from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, checked_timeout, metadata, parting,
                   runs_calls)
@@ -446,7 +446,7 @@ class Peer(exchange.Course):
             if motion is not None:
                 yield motion
         status = await status_of(self._stream)
-        if status.code() not in (grpc.StatusCode.OK, grpc.StatusCode.CANCELLED):
+        if status.code() != grpc.StatusCode.OK and not cancelled_here(status):
             self.error = self.error or from_rpc_error(status)
 
     async def answer(self, value: Any) -> None:

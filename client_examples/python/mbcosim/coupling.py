@@ -22,7 +22,7 @@ import numpy.typing as npt
 from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 
 from . import exchange
-from .errors import Unavailable, from_rpc_error, translated
+from .errors import Unavailable, cancelled_here, from_rpc_error, translated
 from .rpc import PARTING, USUAL, bounded, end_with
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ class Peer(exchange.Course):
                 if motion is not None:
                     yield motion
         except grpc.RpcError as error:
-            if error.code() != grpc.StatusCode.CANCELLED:
+            if not cancelled_here(error):
                 self.error = self.error or from_rpc_error(error)
 
     def answer(self, value: Any) -> None:

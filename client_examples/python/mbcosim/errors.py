@@ -130,9 +130,17 @@ def _first_text(data: bytes) -> bytes:
     return b""
 
 
+def cancelled_here(rpc_error: Any) -> bool:
+    """Was it this side that cancelled the call? gRPC answers one that comes while its server is being shut down with CANCELLED, too; its text is
+    the code's name then, and nothing has been done."""
+    return bool(rpc_error.code() == grpc.StatusCode.CANCELLED) and rpc_error.details() != "CANCELLED"
+
+
 def from_rpc_error(rpc_error: Any) -> Error:
     """The exception that tells what a grpc.RpcError carries."""
     code = rpc_error.code()
+    if code == grpc.StatusCode.CANCELLED and not cancelled_here(rpc_error):
+        return Unavailable("the server is shutting down", grpc.StatusCode.UNAVAILABLE)
     status = common_pb2.ErrorStatus()
     for key, value in rpc_error.trailing_metadata() or ():
         if key == "grpc-status-details-bin":

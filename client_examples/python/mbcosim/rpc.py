@@ -16,7 +16,7 @@ import grpc
 from mbcosim.v1 import (common_pb2, coupling_pb2_grpc, events_pb2_grpc, geometry_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
                         telemetry_pb2_grpc)
 
-from .errors import Error, TimedOut, Unavailable, bad_argument, translated
+from .errors import Error, TimedOut, Unavailable, bad_argument, cancelled_here, translated
 
 if TYPE_CHECKING:
     from typing_extensions import Concatenate, ParamSpec
@@ -325,7 +325,7 @@ def until_cancelled(messages: Any) -> Iterator[Any]:
     try:
         yield from messages
     except grpc.RpcError as error:
-        if error.code() != grpc.StatusCode.CANCELLED:
+        if not cancelled_here(error):
             with translated():
                 raise
 
