@@ -244,7 +244,9 @@ void Durability::begin(Session& session, const KeptDeck& deck, const v1::CreateO
   store_new(*folder_, id, [&] {
     session.set_keeping(make_keeping(session.identity().id, options));
     folder_->write_model(id, model);
-    write(session);
+    Keeping& keeping = *session.keeping();
+    Guard guard(keeping.mutex);
+    write_captured(session, keeping, session.capture());  // nobody knows of it yet
   });
 }
 
@@ -277,17 +279,23 @@ void Durability::write(Session& session) {
 
 void Durability::store(Session& session, CapturedPoint captured) try {
   Keeping& keeping = *session.keeping();
-  if (!keeping.over) write_captured(session, keeping, std::move(captured));
+  if (!keeping.over) write_and_tell(session, keeping, std::move(captured));
 } catch (const StorageError& error) {
   session.note_change();  // should it be there all the same, the next checkpoint sets it right
   refuse_storage("what was asked cannot be stored", error);
 }
 
 void Durability::write_held(Session& session, Keeping& keeping) {
-  if (!keeping.over) write_captured(session, keeping, session.capture());
+  if (!keeping.over) write_and_tell(session, keeping, session.capture());
 }
 
-void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoint captured) {
+void Durability::write_and_tell(Session& session, Keeping& keeping, CapturedPoint captured) {
+  const std::int64_t step = captured.state.step;
+  log_.checkpoint(session.subject(), step, write_captured(session, keeping, std::move(captured)));
+}
+
+std::int64_t Durability::write_captured(Session& session, Keeping& keeping,
+                                        CapturedPoint captured) {
   const auto begin = std::chrono::steady_clock::now();
   const std::string id = id_of(session.identity().id);
   const MemoryShare share(
@@ -321,9 +329,9 @@ void Durability::write_captured(Session& session, Keeping& keeping, CapturedPoin
   remove_snapshots_but(id, keeping, kept);
   folder_->remove_journals(id, captured.journal_end);
   keeping.done(captured.changes, captured.state.step);
-  log_.checkpoint(session.subject(), captured.state.step, bytes);
   metrics_.count_checkpoint(
       bytes, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  return bytes;
 }
 
 void Durability::remove_snapshots_but(const std::string& id, Keeping& keeping,

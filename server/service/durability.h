@@ -99,7 +99,10 @@ class Durability {
                                             const StoredPoint& stored, SessionResults* results,
                                             bool has_files);
   void write_held(Session& session, Keeping& keeping) TS_REQUIRES(keeping.mutex);
-  void write_captured(Session& session, Keeping& keeping, CapturedPoint captured)
+  void write_and_tell(Session& session, Keeping& keeping, CapturedPoint captured)
+      TS_REQUIRES(keeping.mutex);
+  /// Its size [bytes].
+  std::int64_t write_captured(Session& session, Keeping& keeping, CapturedPoint captured)
       TS_REQUIRES(keeping.mutex);
   std::string put_stored_state(const std::string& id, v1::CheckpointPoint& point) const;
   void remove_snapshots_but(const std::string& id, Keeping& keeping, const std::set<int>& kept)

@@ -20,6 +20,24 @@ double reciprocal(double x) {
   return r;
 }
 
+/// `list` calls with the row and the place of each of its numbers. Calls with the first places and
+/// the count of each run of neighbours whose places by row are neighbours as well.
+template <class List, class Use>
+void for_runs(const std::vector<std::size_t>& place, List list, Use use) {
+  std::size_t target = 0, factor = 0, count = 0;
+  list([&](int row, std::size_t at) {
+    if (count > 0 && place[row] == target + count && at == factor + count) {
+      ++count;
+      return;
+    }
+    if (count > 0) use(target, factor, count);
+    target = place[row];
+    factor = at;
+    count = 1;
+  });
+  if (count > 0) use(target, factor, count);
+}
+
 }  // namespace
 
 SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
@@ -159,25 +177,6 @@ void SupernodalLu::for_column_below(int k, Use use) const {
   for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) use(rows_[p], at++);
 }
 
-/// Calls with the row and the place of the first number and with the count of each run of numbers
-/// of L in column k that have neighbours in the rows of another list as well: `place` by row.
-template <class Use>
-void SupernodalLu::for_runs_below(int k, const std::vector<std::size_t>& place, Use use) const {
-  int first = -1;
-  std::size_t at = 0, count = 0;
-  for_column_below(k, [&](int row, std::ptrdiff_t number) {
-    if (count > 0 && place[row] == place[first] + count) {
-      ++count;
-      return;
-    }
-    if (count > 0) use(first, at, count);
-    first = row;
-    at = static_cast<std::size_t>(number);
-    count = 1;
-  });
-  if (count > 0) use(first, at, count);
-}
-
 /// `count`: of the numbers of the factors; `most`: products. A cantilever of beams has four for
 /// each number, a grid of 6 x 6 beams ten, and there panels are faster.
 bool SupernodalLu::is_listed(std::size_t count, std::size_t most) const {
@@ -197,9 +196,11 @@ void SupernodalLu::make_elimination() {
     for_column_below(k, [&](int row, std::ptrdiff_t at) { place[row] = at; });
     set_column(k, place, program);
     for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-      for_runs_below(upper_row_[p], place, [&](int row, std::size_t at, std::size_t count) {
-        program.subtract_products(place[row], at, count, place_of(upper_ + p));
-      });
+      for_runs(
+          place, [&](auto see) { for_column_below(upper_row_[p], see); },
+          [&](std::size_t target, std::size_t factor, std::size_t count) {
+            program.subtract_products(target, factor, count, place_of(upper_ + p));
+          });
     if (const std::size_t count = count_below(k); count > 0)
       program.divide(static_cast<std::size_t>(below_diagonal(k)), count, place_of(pivots_ + k));
   }
@@ -211,26 +212,26 @@ void SupernodalLu::make_substitution(std::size_t x) {
   EliminationProgram& program = substitution_.emplace(numbers_.size());
   std::vector<std::size_t> place(n_);
   std::iota(place.begin(), place.end(), x);
-  const auto subtract = [&](const std::vector<int>& start, const std::vector<int>& row,
-                            const double* numbers, int k) {
-    for (int p = start[k], first = p; p < start[k + 1]; first = p) {
-      while (++p < start[k + 1] && row[p] == row[p - 1] + 1) {
-      }
-      program.subtract_products(place[row[first]], place_of(numbers + first), p - first, place[k]);
-    }
+  const auto subtract = [&](int k, auto list) {  // x -= numbers of a list times x[k]
+    for_runs(place, list, [&](std::size_t target, std::size_t factor, std::size_t count) {
+      program.subtract_products(target, factor, count, place[k]);
+    });
+  };
+  const auto subtract_column = [&](int k, const std::vector<int>& start,
+                                   const std::vector<int>& row, const double* numbers) {
+    subtract(k, [&](auto see) {
+      for (int p = start[k]; p < start[k + 1]; ++p) see(row[p], place_of(numbers + p));
+    });
   };
   for (int k = 0; k < n_; ++k) program.set(place[k], row_of_[k], inverse_scale_[k]);
   for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
     const int begin = block_start_[block], end = block_start_[block + 1];
-    for (int k = begin; k < end; ++k)
-      for_runs_below(k, place, [&](int row, std::size_t at, std::size_t count) {
-        program.subtract_products(place[row], at, count, place[k]);
-      });
+    for (int k = begin; k < end; ++k) subtract(k, [&](auto see) { for_column_below(k, see); });
     for (int k = end - 1; k >= begin; --k) {
       program.divide(place[k], 1, place_of(pivots_ + k));
-      subtract(upper_start_, upper_row_, upper_, k);
+      subtract_column(k, upper_start_, upper_row_, upper_);
     }
-    for (int k = begin; k < end; ++k) subtract(above_start_, above_row_, above_, k);
+    for (int k = begin; k < end; ++k) subtract_column(k, above_start_, above_row_, above_);
   }
   program.finish();
 }

@@ -77,8 +77,6 @@ class SupernodalLu {
   template <class Use>
   void for_column_below(int k, Use use) const;
   std::size_t place_of(const double* number) const { return number - numbers_.data(); }
-  template <class Use>
-  void for_runs_below(int k, const std::vector<std::size_t>& place, Use use) const;
   std::size_t count_below(int k) const;  ///< numbers of L in column k
   bool is_listed(std::size_t count, std::size_t most) const;
   void make_elimination();

@@ -1049,6 +1049,15 @@ TEST(AServerThatIsKilledAndComesBack, DoesEachCallOnce) {
   EXPECT_EQ(server.find(simulation.name()).step().step, taken + 1);
 }
 
+TEST(AnUnreliableLine, LosesNoStepAndRepeatsNone) {
+  const char* line = std::getenv("MBCOSIM_LINE");
+  if (!line) GTEST_SKIP() << "only with a relay";
+  Simulation near = connect().load_text(endless());
+  Server server = Server::connect(line, 10, {}, 30 * time_factor());
+  Simulation far = server.find(near.name());
+  for (int step = 1; step <= 100; ++step) ASSERT_EQ(far.step().step, step);
+}
+
 TEST(AServerThatIsKilledAndComesBack, IsNotWaitedForWithoutWish) {
   const char* kill = std::getenv("MBCOSIM_KILL");
   if (!kill) GTEST_SKIP() << "only with a daemon of its own";

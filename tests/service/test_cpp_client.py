@@ -6,6 +6,7 @@ import subprocess
 import pytest
 
 from conftest import BIN, Daemon, TIME_FACTOR, wait_for
+from relay import Unreliable
 
 
 def test_the_library(start_daemon, tmp_path):
@@ -54,6 +55,16 @@ def test_calls_wait_for_a_daemon_that_comes_back(tmp_path, test, kills):
         run.kill()
         daemon.stop()
     assert run.returncode == 0, output
+
+
+def test_a_line_that_loses_and_repeats_messages(daemon, tmp_path):
+    relay = Unreliable(str(tmp_path), daemon.address, part=0.4, seed=4)
+    run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1", "--gtest_filter=AnUnreliableLine.*"], timeout=200 * TIME_FACTOR, text=True,
+                         env={**os.environ, "MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_LINE": relay.address}, stdout=subprocess.PIPE,
+                         stderr=subprocess.STDOUT)
+    relay.close()
+    assert run.returncode == 0, run.stdout
+    assert relay.lost > 20 and relay.repeated > 10
 
 
 def test_tokens(start_daemon, tmp_path):

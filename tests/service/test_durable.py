@@ -686,12 +686,14 @@ def test_one_folder_has_one_daemon(start, folder, tmp_path):
 def test_checkpoints_are_told(start):
     with start("--checkpoint-interval", "3600").connect() as server, server.events() as watcher:
         simulation = server.load_text(deck())
-        simulation.step(7)
-        simulation.export_checkpoint()
-        written = [event for _, event in zip(range(3), watcher) if event.WhichOneof("content") == "checkpoint"]
-        assert [event.simulation for event in written] == 2 * [simulation.name]
-        assert [event.checkpoint.step for event in written] == [0, 7]
-        assert all(event.checkpoint.bytes > 500 for event in written)
+        for _ in range(2):
+            simulation.step(7)
+            simulation.export_checkpoint()
+        told = [event for _, event in zip(range(3), watcher)]
+        assert [event.WhichOneof("content") for event in told] == ["created", "checkpoint", "checkpoint"]
+        assert [event.simulation for event in told] == 3 * [simulation.name]
+        assert [event.checkpoint.step for event in told[1:]] == [7, 14]
+        assert all(event.checkpoint.bytes > 500 for event in told[1:])
 
 
 def test_a_full_folder_refuses_and_loses_nothing(start, folder):
