@@ -2,12 +2,12 @@
 """What durability CHECKPOINT costs beside NONE. usage: durability_cost.py BIN [--turns N] [--seconds S] [--simulations N] [--steps N] [--folder DIR]
 
 Four daemons with as many simulations each and clients that ask for steps without pause: NONE, NONE once more, CHECKPOINT every 10 s and CHECKPOINT
-every 0.1 s. They run by turns, the others being stopped (SIGSTOP), in an order that changes; what else the machine does counts alike
-on neighbours in time. A turn gives steps per second of the wall clock and of the daemon's processor time; its cost is what is missing
-to the mean of the turns of NONE before and after it. Told are the median of the costs with the interval that holds it with 95 %, the same of NONE beside NONE,
+every 0.1 s. They run by turns, the others being stopped (SIGSTOP), once a round and in an order that changes: what else the machine does counts
+alike on them, and all stand still as long. A turn gives steps per second of the wall clock and of the daemon's processor time; its cost is
+what is missing to the turn of NONE in the same round. Told are the median of the costs with the interval that holds it with 95 %, the same of NONE beside NONE,
 which is what the figures can tell apart, and the checkpoints that there were and that there should have been.
 
-A stopped daemon's clock runs on: the interval of 10 s is counted in seconds in which it runs, which are one in six.
+A stopped daemon's clock runs on: the interval of 10 s is counted in seconds in which it runs, which are one in four.
 Simulations are created spread over the interval, so that each turn has its share of checkpoints. --folder: where they are stored; the disk
 matters. Of the time in the kernel only what the daemon's own calls take is counted.
 """
@@ -27,7 +27,6 @@ from many_simulations import Clients, Daemon, pendulum
 from mbcosim.v1 import simulations_pb2 as pb
 
 KINDS = {"NONE": None, "NONE once more": None, "CHECKPOINT every 10 s": 10.0, "CHECKPOINT every 0.1 s": 0.1}
-SHARE = 2 * (len(KINDS) - 1)  # turns of all from one of a kind to the next; NONE stands between any two
 
 
 def free_port():
@@ -53,7 +52,7 @@ class Side:
         how, pause = {"durability": pb.DURABILITY_NONE}, 0.0
         if self.interval:
             longer = self.interval > options.seconds  # than a turn
-            told = self.interval * SHARE if longer else self.interval
+            told = self.interval * len(KINDS) if longer else self.interval
             pause = told / self.count if longer else 0.0
             how = {"durability": pb.DURABILITY_CHECKPOINT, "checkpoint_interval": {"seconds": int(told), "nanos": int(told % 1 * 1e9)}}
         for _ in range(self.count):
@@ -95,26 +94,22 @@ def median_within(values):
 
 
 def measure(options, sides):
-    """Rates (wall, processor) of NONE, turn by turn; of the others with the number of the turn of NONE before."""
-    rolls, rates = random.Random(1), {side.name: [] for side in sides}
-    none, *others = sides
+    """Rates (wall, processor) of each side, round by round."""
+    rolls, rates, order = random.Random(1), {side.name: [] for side in sides}, list(sides)
     for side in sides:
         side.turn(options.seconds)  # to be warm
     for _ in range(options.turns):
-        rolls.shuffle(others)
-        for other in others:
-            rates["NONE"].append(none.turn(options.seconds))
-            rates[other.name].append((len(rates["NONE"]) - 1, other.turn(options.seconds)))
-    rates["NONE"].append(none.turn(options.seconds))
+        rolls.shuffle(order)
+        for side in order:
+            rates[side.name].append(side.turn(options.seconds))
     return rates
 
 
 def tell(sides, rates):
-    none = rates["NONE"]
     for side in sides[1:]:
         found = []
         for what in (0, 1):
-            lacks = [1 - rate[what] / (0.5 * (none[at][what] + none[at + 1][what])) for at, rate in rates[side.name]]
+            lacks = [1 - rate[what] / none[what] for rate, none in zip(rates[side.name], rates["NONE"])]
             found.append("{:+.2%} ({:+.2%} to {:+.2%})".format(*median_within(lacks)))
         due = side.count * side.ran / side.interval if side.interval else 0
         print(f"{side.name}: wall {found[0]}, processor {found[1]}; {side.stored:.0f} checkpoints, at most {due:.0f} due in {side.ran:.0f} s", flush=True)
@@ -123,7 +118,7 @@ def tell(sides, rates):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("bin")
-    parser.add_argument("--turns", type=int, default=60, help="of each kind")
+    parser.add_argument("--turns", type=int, default=90, help="of each kind")
     parser.add_argument("--seconds", type=float, default=0.5, help="of a turn")
     parser.add_argument("--simulations", type=int, default=64, help="of each kind")
     parser.add_argument("--steps", type=int, default=300, help="of a call")
