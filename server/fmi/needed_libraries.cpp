@@ -17,7 +17,7 @@ constexpr std::array<const char*, 8> kOfTheSystem = {"libc.so",  "libm.so",     
 
 /// A second namespace would have a second sanitizer, which ends the process. FMUs of such builds
 /// are for tests on this machine, which has the libraries.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef MBCOSIM_SANITIZED
 constexpr bool kSanitized = true;
 #else
 constexpr bool kSanitized = false;

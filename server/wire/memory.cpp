@@ -88,7 +88,7 @@ MemoryPause::~MemoryPause() { scope_of_thread = scope_; }
 
 // ------------------------------------------------------------------ what is counted
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifndef MBCOSIM_SANITIZED
 
 // The C library's own, behind `malloc` and its like.
 extern "C" {

@@ -351,15 +351,15 @@ TEST_P(Coupled, APortWithoutAReferenceNodeTellsNone) {
   PeerOptions options = this->options();
   options.accelerations = true;
   Motion seen;
-  const Peer peer = simulation.couple(
-      "spring",
-      [&](const Motion& motion) {
-        seen = motion;
-        return spring(motion);
-      },
-      options);
-  EXPECT_FALSE(peer.layout().reference_node);
-  ASSERT_TRUE(simulation.step().ok());
+  const auto answer = [&](const Motion& motion) {
+    seen = motion;
+    return spring(motion);
+  };
+  {
+    const Peer peer = simulation.couple("spring", answer, options);
+    EXPECT_FALSE(peer.layout().reference_node);
+    ASSERT_TRUE(simulation.step().ok());
+  }
   ASSERT_EQ(seen.a.size(), 3u);
   const Motion::Reference& none = seen.reference;
   for (const auto& numbers : {none.x, none.R, none.v, none.w, none.a, none.wp})

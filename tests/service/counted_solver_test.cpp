@@ -104,8 +104,7 @@ TEST_F(Counted, MemoryFollowsWhatFactorizationsTake) {
   EXPECT_EQ(budget_.used(), 0);
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // there `new` is the sanitizer's
+#ifndef MBCOSIM_SANITIZED  // there `new` is the sanitizer's
 
 TEST_F(Counted, BeyondTheBudgetStopsWithTheStateAsItWas) {
   const auto cube = rod_cube(), free = rod_cube();

@@ -15,8 +15,7 @@
 namespace mbcosim::server {
 namespace {
 
-#if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // there `new` is the sanitizer's
+#ifndef MBCOSIM_SANITIZED  // there `new` is the sanitizer's
 
 template <class Body>
 std::string limit_of_refusal(Body&& body) {

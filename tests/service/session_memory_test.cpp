@@ -10,8 +10,7 @@
 namespace mbcosim::server {
 namespace {
 
-#if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // there `new` is the sanitizer's
+#ifndef MBCOSIM_SANITIZED  // there `new` is the sanitizer's
 
 class SessionMemory : public testing::Test {
  protected:
