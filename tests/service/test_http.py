@@ -13,7 +13,7 @@ import time
 import urllib.parse
 
 import pytest
-from conftest import BIN, TIME_FACTOR, wait_for
+from conftest import BIN, TIME_FACTOR, counts_memory, is_sanitized, wait_for
 from google.protobuf import json_format
 
 from mbcosim.v1 import common_pb2, coupling_pb2, reduction_pb2, simulations_pb2, telemetry_pb2
@@ -280,12 +280,6 @@ def test_a_body_over_the_limit_is_refused_with_its_name(door):
     assert error["details"][0]["debug"]["metadata"] == {"limit": "message_bytes", "maximum": "1000000"}
 
 
-def is_sanitized():
-    """A sanitizer has an allocator of its own, which counts nothing."""
-    listed = subprocess.run(["ldd", os.path.join(BIN, "mbcosimd")], stdout=subprocess.PIPE, text=True, check=True).stdout
-    return "libasan" in listed or "libtsan" in listed
-
-
 def field(number, content):
     """Of bytes, as protobuf writes it."""
     length, digits = len(content), b""
@@ -294,7 +288,7 @@ def field(number, content):
     return bytes([number << 3 | 2]) + digits + bytes([length]) + content
 
 
-@pytest.mark.skipif(is_sanitized(), reason="memory is counted by the daemon's own allocator")
+@counts_memory
 @pytest.mark.parametrize("kind, body", [
     ("application/proto", field(1, field(3, b"\x32\x00" * (15 << 19)))),
     ("application/json", b'{"header":{"options":{"ports":[' + b"{}," * (5 << 20) + b"{}]}}}")], ids=["binary", "json"])
@@ -388,7 +382,6 @@ def test_a_proxy_in_front_is_named_by_its_origin(start_daemon):
 ])
 def test_bad_options_are_refused_at_start(options, complaint, tmp_path):
     import os
-    import subprocess
     from conftest import BIN
     done = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/s", *options], capture_output=True, text=True,
                           timeout=20 * TIME_FACTOR)

@@ -15,7 +15,7 @@ sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "
 import decks
 import mbcosim
 import reduce_scaling
-from conftest import BIN, TIME_FACTOR, wait_for
+from conftest import BIN, TIME_FACTOR, counts_memory, wait_for
 from http2 import HalfMessages, reset_at_once
 from mbcosim import bundle
 from mbcosim.v1 import (coupling_pb2_grpc, reduction_pb2, reduction_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2,
@@ -526,6 +526,7 @@ def test_the_work_of_a_cancelled_analysis_ends_within_a_second(daemon, long_chai
 LOOPS = "set: real x = 0.; " + "".join(f"for: integer i{n} = 1, 900000; set: x = sin(i{n}) * cos(i{n}); endfor; " for n in range(10))
 
 
+@counts_memory
 def test_a_deck_is_read_no_longer_than_a_second_after_its_deadline(daemon, server):
     for seconds in (0.2, 0.6, 1.2):
         wait_for(lambda: is_at_rest(daemon), 30)
@@ -534,6 +535,7 @@ def test_a_deck_is_read_no_longer_than_a_second_after_its_deadline(daemon, serve
         assert rests_within_a_second(daemon)
 
 
+@counts_memory
 @pytest.mark.parametrize("ask", ["CreateSimulation", "ValidateModel"])
 def test_a_deck_is_read_no_longer_than_a_second_after_its_call_is_cancelled(daemon, ask):
     with grpc.insecure_channel(daemon.address) as channel:
