@@ -381,8 +381,6 @@ def test_a_proxy_in_front_is_named_by_its_origin(start_daemon):
     (["--http", "127.0.0.1:0", "--http-origin", "sim.example"], "is not of the form https://HOST"),
 ])
 def test_bad_options_are_refused_at_start(options, complaint, tmp_path):
-    import os
-    from conftest import BIN
     done = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/s", *options], capture_output=True, text=True,
                           timeout=20 * TIME_FACTOR)
     assert done.returncode == 4 and complaint in done.stderr
