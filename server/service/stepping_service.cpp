@@ -61,11 +61,13 @@ class StepStreamHandler final : public Handler {
     (*session_)->step(request_, exchange.caller(), exchange.call(), reply_.mutable_step());
     send(exchange);
   }
+  // The next message may come, on another thread, as soon as it is wanted: nothing here is touched
+  // from then on.
   void send(Exchange& exchange) {
     const bool taken = exchange.all_written();  // the last reply, by the client
-    wants_next_.store(true);
     exchange.write(serialized(reply_));
-    if (taken) read_next(exchange);
+    wants_next_.store(true);
+    if (taken || exchange.all_written()) read_next(exchange);
   }
   void read_next(Exchange& exchange) {
     if (wants_next_.exchange(false)) exchange.read();

@@ -44,6 +44,26 @@ def test_stream_equals_calls(server, tumbling, reference):
         assert b"".join(v.tobytes() for v in result.values.values()) == reference
 
 
+def test_steps_that_are_sent_ahead_are_answered_one_by_one(server):
+    """Whoever sends the next request before the reply is read gets every reply, each of its own step."""
+    count = 1000
+
+    def ahead(found):
+        with server.load_text(decks.endless()) as simulation:
+            request = pb.StepRequest(simulation=simulation.name, outputs=100 * simulation.handles(NAMES))
+            requests = (request for _ in range(count))
+            for reply in server.simulations.StepStream(requests, metadata=server.metadata):
+                found.append(reply.step.step)
+
+    all_found = [[] for _ in range(6)]
+    threads = [threading.Thread(target=ahead, args=(found,)) for found in all_found]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(found == list(range(1, count + 1)) for found in all_found)
+
+
 def test_until_time_equals_steps(server, tumbling, reference):
     with server.load(tumbling) as simulation:
         result = simulation.run_until(2.0)
