@@ -143,6 +143,12 @@ void GeneralElementSet::collect_pattern(PatternSink& sink) const {
   }
 }
 
+void GeneralElementSet::append_rows(const Model&, int i, std::vector<int>& rows) const {
+  const std::vector<int>& own = slots_[i].connection.rows_;
+  rows.insert(rows.end(), own.begin(), own.end());
+  slots_[i].element->other_rows(rows);
+}
+
 void GeneralElementSet::set_positions(const PositionSource& source) {
   for (Slot& s : slots_) {
     const GeneralConnection& c = s.connection;

@@ -133,7 +133,7 @@ class GeneralResidual {
   void add3(int row, const Vec3& value) {
     for (int i = 0; i < 3; ++i) add(row + i, value(i));
   }
-  /// An equation of another element, by the model's number.
+  /// An equation of another element, by the model's number; one of GeneralElement::other_rows.
   void add_to_equation(int equation, double value) { r_[equation] += value; }
   /// Force [N] and moment about the node [N·m] on the equilibrium rows that start at `row`.
   void load(int row, const Vec3& f, const Vec3& m) {
@@ -197,6 +197,8 @@ class GeneralElement {
   virtual ~GeneralElement() = default;
   virtual void connect(GeneralConnection& c) = 0;
   virtual void pattern(GeneralPattern& p) const { p.dense(); }
+  /// Appends the equations of other elements that it adds to.
+  virtual void other_rows(std::vector<int>& /*rows*/) const {}
   virtual void residual(const GeneralView& u, GeneralResidual& r) const = 0;
   virtual void jacobian(const GeneralView& u, GeneralJacobian& j) const = 0;
 
@@ -245,6 +247,7 @@ class GeneralElementSet final : public ElementSet, public SampledTableSource {
   int first_own(int i) const override { return slots_[i].connection.first_own_; }
   void bind(const Model& model, int i, int first_own) override;
   void collect_pattern(PatternSink& sink) const override;
+  void append_rows(const Model& model, int i, std::vector<int>& rows) const override;
   void set_positions(const PositionSource& positions) override;
   void start(const EvalContext& context, State& state, int i) const override;
   void residual(const EvalContext& context, double* r, ElementRange range) const override;

@@ -83,6 +83,11 @@ void PlacedElements::find_structure(const std::vector<StructureProbe>& probes) {
   }
 }
 
+void PlacedElements::append_rows(const Model&, int i, std::vector<int>& rows) const {
+  const Place& p = place(i);
+  rows.insert(rows.end(), rows_.begin() + p.first_row, rows_.begin() + p.first_row + p.row_count);
+}
+
 /// Entries of the local matrix that vanish at all probes, other than those of an inactive element.
 /// Empty: a drive of the element has no value there, nothing is known.
 std::vector<bool> PlacedElements::vanishing(int i,

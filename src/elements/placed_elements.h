@@ -39,6 +39,7 @@ class PlacedElements : public ElementSet {
   void bind(const Model& model, int i, int first_own) override;
   void find_structure(const std::vector<StructureProbe>& probes) override;
   void collect_pattern(PatternSink& sink) const override;
+  void append_rows(const Model& model, int i, std::vector<int>& rows) const override;
   /// Entries that follow each other in the local matrix and among the sparse values become one run.
   void set_positions(const PositionSource& source) override;
 

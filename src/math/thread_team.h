@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <exception>
 #include <mutex>
 #include <thread>
@@ -92,6 +93,15 @@ template <class Work>
 void each_task(ThreadTeam* team, int count, Work&& work) {
   if (team && count > 1) return team->each(count, work);
   for (int task = 0; task < count; ++task) work(task, 0);
+}
+
+/// Calls work(first, last) for pieces of 0 … count − 1, at the same time.
+template <class Work>
+void each_piece(ThreadTeam* team, int count, Work&& work) {
+  if (!team) return work(0, count);
+  const std::int64_t pieces = team->size();
+  const auto start = [&](std::int64_t piece) { return static_cast<int>(count * piece / pieces); };
+  team->run([&](int thread) { work(start(thread), start(thread + 1)); });
 }
 
 }  // namespace mbcosim

@@ -114,6 +114,8 @@ class ElementSet {
   /// pattern. Without probes none is left out.
   virtual void find_structure(const std::vector<StructureProbe>& probes);
   virtual void collect_pattern(PatternSink& sink) const = 0;
+  /// All rows that element i adds to, once it is bound; −1 stands for none.
+  virtual void append_rows(const Model& model, int i, std::vector<int>& rows) const = 0;
   virtual void set_positions(const PositionSource& positions) = 0;
 
   // --- evaluation

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "model/assembly_plan.h"
 #include "model/context.h"
 #include "model/diagnostic.h"
 #include "model/drive.h"
@@ -123,6 +124,7 @@ class Model {
   std::vector<int> diagonal;      ///< position of each diagonal entry, -1 if absent (n)
   std::vector<NodePlace> places;  ///< (structural nodes)
   NodeEquations node_equations;   ///< rows that nodes contribute themselves
+  AssemblyPlan assembly;          ///< in which order elements are evaluated
   std::vector<std::vector<ElementRef>> node_bodies;  ///< bodies attached to each structural node
   std::vector<ElementSpan> stage_order;              ///< all elements by the rank of their family
   std::vector<ElementSpan> accumulation;             ///< those of them that add to sums

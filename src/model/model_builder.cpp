@@ -264,6 +264,7 @@ Result<ModelPtr> ModelBuilder::finish() {
     if (e.set->info(e.index).family == Family::body)
       for (const int node : e.set->nodes(e.index)) model.node_bodies[node].push_back(e);
   order_stages(model);
+  model.assembly = AssemblyPlan(model);
   sets_.clear();
   return ModelPtr(std::move(model_));
 }

@@ -29,6 +29,11 @@ void NodeEquations::collect_pattern(PatternSink& sink) const {
   }
 }
 
+void NodeEquations::append_rows(int k, std::vector<int>& rows) const {
+  const int count = rows_[k].rotation ? 12 : 6;
+  for (int i = 0; i < count; ++i) rows.push_back(rows_[k].first + i);
+}
+
 void NodeEquations::set_positions(const PositionSource& source) {
   positions_.clear();
   for (Row& row : rows_) {

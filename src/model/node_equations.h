@@ -22,6 +22,7 @@ class NodeEquations {
  public:
   void bind(const std::vector<StructuralNode>& nodes);
   void collect_pattern(PatternSink& sink) const;
+  void append_rows(int k, std::vector<int>& rows) const;  ///< those of the k-th node that has any
   void set_positions(const PositionSource& source);
   int size() const { return static_cast<int>(rows_.size()); }
   void residual(const EvalContext& context, double* r, ElementRange range) const;

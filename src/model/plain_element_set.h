@@ -16,6 +16,7 @@ class PlainElementSet : public ElementSet {
   int first_own(int) const override { return -1; }
   void bind(const Model&, int, int) override {}
   void collect_pattern(PatternSink&) const override {}
+  void append_rows(const Model&, int, std::vector<int>&) const override {}
   void set_positions(const PositionSource&) override {}
   void start(const EvalContext&, State&, int) const override {}
   void residual(const EvalContext&, double*, ElementRange) const override {}

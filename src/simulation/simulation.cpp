@@ -63,6 +63,7 @@ struct Simulation::Impl {
   std::unique_ptr<InverseDynamics> inverse;  ///< of an inverse dynamics problem
   StepController controller;
   double final_time;  ///< [s]
+  int threads = 1;
   std::shared_ptr<ResultWriter> writer;
   TimeKeeping time_keeping = TimeKeeping::summed;
   const CancelToken* cancel = nullptr;  ///< of the call that is under way
@@ -351,6 +352,10 @@ Status Simulation::start(const CancelToken* cancel) {
   return status;
 }
 
+void Simulation::set_threads(int threads) {
+  impl_->threads = threads;
+  impl_->stepper.set_threads(threads);
+}
 void Simulation::set_final_time(double time) { impl_->final_time = time; }
 
 const Model& Simulation::model() const { return *impl_->model; }
@@ -568,6 +573,8 @@ Status Simulation::import_state(std::string_view bytes, bool finished) {
 
 std::unique_ptr<Simulation> Simulation::fork(const CancelToken* cancel) const try {
   auto impl = std::make_unique<Impl>(impl_->model);
+  impl->threads = impl_->threads;
+  impl->stepper.set_threads(impl->threads);
   impl->state = impl_->state;
   // The pivots are chosen on the matrix of the derivatives phase, as in every simulation of this
   // model.

@@ -102,6 +102,10 @@ class Simulation {
   static std::unique_ptr<Simulation> prepare(ModelPtr model,
                                              std::shared_ptr<ResultWriter> writer = nullptr,
                                              TimeKeeping time_keeping = TimeKeeping::summed);
+  /// How many threads may work on the steps of a large model, the caller's among them, also in
+  /// simulations forked from this one; before `start`, at first one. Small models are done by the
+  /// caller alone. Results are the same bits for every number.
+  void set_threads(int threads);
   /// Initial assembly, derivatives phase, dummy steps; once, after `prepare`.
   Status start(const CancelToken* cancel = nullptr);
   ~Simulation();

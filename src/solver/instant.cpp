@@ -9,7 +9,7 @@
 namespace mbcosim {
 
 void InstantSystem::compute_residual() {
-  mbcosim::compute_residual(context(), ws_.scratch, ws_.residual);
+  mbcosim::compute_residual(context(), ws_.scratch, ws_.residual, ws_.evaluators.get());
 }
 
 double InstantSystem::error(const NewtonSettings& settings) const {
@@ -47,7 +47,7 @@ double InstantSystem::gradient(int i) const {
 }
 
 void InstantSystem::correct(const std::vector<double>& delta) {
-  apply_correction(model_, delta, c_, ca_, state_);
+  apply_correction(model_, delta, c_, ca_, state_, ws_.team());
 }
 
 double InstantSystem::magnitude(int i) const {

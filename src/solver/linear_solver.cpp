@@ -8,6 +8,7 @@
 #include <new>
 #include <utility>
 
+#include "solver/bisected_order.h"
 #include "solver/supernodal_lu.h"
 
 namespace mbcosim {
@@ -18,6 +19,7 @@ constexpr double kPoorGrowth =
     1e-9;  ///< reciprocal pivot growth below which the kept pivots are given up
 constexpr double kSuspicious =
     1e-3;  ///< ratio of pivots, against the reference matrix, below which growth is looked at
+constexpr int kLarge = 6000;   ///< unknowns of a matrix that several threads may factor
 constexpr double kLong = 1e9;  ///< operations of a factorization that may have to be stopped
 
 SparsePattern united(int n, const std::vector<int>& column_start, const std::vector<int>& row_index,
@@ -59,10 +61,36 @@ struct LinearSolver::Klu {
     klu_symbolic* wide =
         klu_analyze(n, couplings.column_start.data(), couplings.row_index.data(), &common);
     if (!wide) return;
+    if (n >= kLarge) bisect(couplings, *wide);
     symbolic =
         klu_analyze_given(n, column_start.data(), row_index.data(), wide->P, wide->Q, &common);
     if (wide->est_flops > kLong) common.memgrow = 1.02;  // KLU can be stopped where it allocates
     klu_free_symbolic(&wide, &common);
+  }
+  /// Orders the largest block for two threads, where that costs nothing. The order depends on the
+  /// pattern alone, not on how many threads there are.
+  static void bisect(const SparsePattern& pattern, klu_symbolic& s) {
+    int block = 0;
+    const auto size_of = [&](int b) { return s.R[b + 1] - s.R[b]; };
+    for (int b = 1; b < s.nblocks; ++b)
+      if (size_of(b) > size_of(block)) block = b;
+    const int first = s.R[block], size = size_of(block);
+    std::vector<int> position(s.n);
+    for (int k = 0; k < s.n; ++k) position[s.P[k]] = k - first;
+    SparsePattern own;
+    own.column_start.push_back(0);
+    for (int k = first; k < first + size; ++k) {
+      for (int p = pattern.column_start[s.Q[k]]; p < pattern.column_start[s.Q[k] + 1]; ++p)
+        if (const int row = position[pattern.row_index[p]]; row >= 0 && row < size)
+          own.row_index.push_back(row);
+      own.column_start.push_back(static_cast<int>(own.row_index.size()));
+    }
+    const auto order = bisected_order(own, s.est_flops);
+    if (!order) return;
+    for (int* const all : {s.P, s.Q}) {
+      const std::vector<int> before(all + first, all + first + size);
+      for (int k = 0; k < size; ++k) all[first + k] = before[(*order)[k]];
+    }
   }
   double operations(klu_symbolic* s, klu_numeric* n) {
     return klu_flops(s, n, &common) ? common.flops : HUGE_VAL;
@@ -180,8 +208,9 @@ LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values) {
   k.choose_ordering(n_, column_start_.data(), row_index_.data(), values, factors.get());
   watch_.look();
   k.kept =
-      std::make_unique<SupernodalLu>(column_start_, row_index_, values, k.pattern(factors.get()));
-  if (!k.kept->factor(values, watch_)) return Outcome::failed;
+      std::make_unique<SupernodalLu>(column_start_, row_index_, values, k.pattern(factors.get()),
+                                     LuOptions{.threads = team_ ? team_->size() : 1});
+  if (!k.kept->factor(values, watch_, team_)) return Outcome::failed;
   k.kept_ratio = k.kept->pivot_ratio();
   k.current = Klu::Current::kept;
   return Outcome::ok;
@@ -211,7 +240,7 @@ LinearSolver::Outcome LinearSolver::factor(double* values) {
   if (n_ == 0) return Outcome::ok;
   Klu& k = *klu_;
   k.current = Klu::Current::none;
-  if (!k.kept || !k.kept->factor(values, watch_) || !k.pivots_are_good(values))
+  if (!k.kept || !k.kept->factor(values, watch_, team_) || !k.pivots_are_good(values))
     return factor_alone(values);
   k.current = Klu::Current::kept;
   return Outcome::ok;

@@ -16,6 +16,7 @@
 #include <memory>
 #include <vector>
 
+#include "math/thread_team.h"
 #include "model/sparse_pattern.h"
 #include "solver/watch.h"
 
@@ -38,6 +39,9 @@ class LinearSolver {
 
   /// Asked while factoring.
   void set_watch(const Watch& watch) { watch_ = watch; }
+  /// Threads that share the work on matrices that are analyzed from now on, for as long as there is
+  /// no other team; null: the caller alone. Results are the same bits.
+  void set_team(ThreadTeam* team) { team_ = team; }
   /// Memory that the factorizations take [bytes].
   std::size_t bytes() const;
 
@@ -69,6 +73,7 @@ class LinearSolver {
   Outcome without_factors(const Klu& k);
 
   Watch watch_;
+  ThreadTeam* team_ = nullptr;
   std::vector<Kind> kinds_;
   Klu* klu_;  ///< of the current kind
   int n_;

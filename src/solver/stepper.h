@@ -54,6 +54,8 @@ class Stepper final : public StepSystem {
   PhaseReport attempt(State& state, const StepAttempt& attempt) override;
   void explain(PhaseReport& report, const State& state) override;
 
+  /// As Workspace::set_threads.
+  void set_threads(int threads) { workspace_.set_threads(threads); }
   Workspace& workspace() { return workspace_; }
   std::size_t factor_bytes() const;     ///< memory of the factorizations
   std::int64_t factorizations() const;  ///< by iterations so far

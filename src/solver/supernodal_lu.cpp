@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "solver/forest_parts.h"
 #include "solver/panel_kernels_version.h"
 
 namespace mbcosim {
@@ -42,14 +43,13 @@ void for_runs(const std::vector<std::size_t>& place, List list, Use use) {
 
 SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
                            const double* values, const FactorPattern& factors,
-                           const PanelVersion& version, std::size_t listed)
+                           const LuOptions& options)
     : n_(static_cast<int>(factors.row_of.size())),
       row_of_(factors.row_of),
       column_of_(factors.column_of),
       block_start_(factors.block_start),
       inverse_scale_(n_),
-      work_(n_, 0.0),
-      version_(version) {
+      version_(options.version) {
   std::vector<double> largest(n_, 0.0);
   for (std::size_t p = 0; p < row_index.size(); ++p)
     largest[row_index[p]] = std::max(largest[row_index[p]], std::abs(values[p]));
@@ -57,18 +57,25 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
   find_supernodes(factors);
   find_segments(factors);
   find_groups();
+  find_parts(options.threads);
   place_matrix(column_start, row_index);
   const auto panels = static_cast<std::size_t>(panel_start_.back());
   const std::size_t count = panels + upper_row_.size() + n_ + above_row_.size();
-  const bool lists = is_listed(count, listed);
+  const bool lists = is_listed(count, options.listed);
   numbers_.resize(count + (lists ? n_ : 0));
   panels_ = numbers_.data();
   upper_ = panels_ + panels;
   pivots_ = upper_ + upper_row_.size();
   above_ = pivots_ + n_;
-  if (!lists) return;
-  make_elimination();
-  make_substitution(count);
+  if (lists) {
+    make_elimination();
+    make_substitution(count);
+    return;
+  }
+  const auto of_group =
+      static_cast<std::size_t>(has_wide_groups() ? n_ : 0) * version_.wide.columns;
+  work_.assign(std::max(1, parts_),
+               {std::vector<double>(n_, 0.0), std::vector<double>(of_group, 0.0)});
 }
 
 void SupernodalLu::find_supernodes(const FactorPattern& factors) {
@@ -125,15 +132,58 @@ void SupernodalLu::find_groups() {
     return supernode_of_[k] == supernode_of_[first] && rows_of(k) == rows_of(first) + k - first &&
            own[rows_of(first)] == first && std::equal(rows, rows + rows_of(first), own);
   };
-  bool wide = false;
   for (int k = 0; k < n_;) {
     group_start_.push_back(k);
     const int first = k++;
     while (k < n_ && k - first < version_.wide.columns && joins(k, first)) ++k;
-    wide = wide || k - first > 1;
   }
   group_start_.push_back(n_);
-  if (wide) together_.assign(static_cast<std::size_t>(n_) * version_.wide.columns, 0.0);
+}
+
+bool SupernodalLu::has_wide_groups() const { return static_cast<int>(group_start_.size()) <= n_; }
+
+/// Calls with the columns that those of group g need, its own among them.
+template <class Use>
+void SupernodalLu::for_needed(int g, Use use) const {
+  for (int p = upper_start_[group_start_[g]]; p < upper_start_[group_start_[g + 1]]; ++p)
+    use(upper_row_[p]);
+}
+
+/// The forest: a group's parent is the first one that needs it. As many parts as threads, or as the
+/// forest falls into.
+void SupernodalLu::find_parts(int threads) {
+  const int groups = static_cast<int>(group_start_.size()) - 1;
+  group_part_.assign(groups, 0);
+  if (threads < 2) return;
+  std::vector<int> group_of(n_), parent(groups, -1);
+  std::vector<double> work(groups, 0.0);
+  for (int g = 0; g < groups; ++g) {
+    std::fill(group_of.begin() + group_start_[g], group_of.begin() + group_start_[g + 1], g);
+    for_needed(g, [&](int row) {
+      work[g] += static_cast<double>(count_below(row));
+      if (const int needed = group_of[row]; needed != g && parent[needed] < 0) parent[needed] = g;
+    });
+  }
+  for (int parts = threads; parts > 1 && parts_ == 0; parts = parts > 4 ? parts / 2 : parts - 1) {
+    group_part_ = forest_parts(parent, work, parts);
+    if (take_parts(group_of, parts)) parts_ = parts;
+  }
+  if (parts_ == 0) group_part_.assign(groups, 0);
+}
+
+/// With pivots off the diagonal a group may need others than those below it: what needs some of
+/// several parts comes into the last one. False when all are there.
+bool SupernodalLu::take_parts(const std::vector<int>& group_of, int parts) {
+  bool shared = false;
+  for (std::size_t g = 0; g < group_part_.size(); ++g) {
+    int& part = group_part_[g];
+    for_needed(static_cast<int>(g), [&](int row) {
+      const int needed = group_of[row];
+      if (needed != static_cast<int>(g) && group_part_[needed] != part) part = parts;
+    });
+    shared = shared || part != parts;
+  }
+  return shared;
 }
 
 void SupernodalLu::place_matrix(const std::vector<int>& column_start,
@@ -187,24 +237,31 @@ bool SupernodalLu::is_listed(std::size_t count, std::size_t most) const {
 }
 
 void SupernodalLu::make_elimination() {
-  EliminationProgram& program = elimination_.emplace(numbers_.size());
   std::vector<std::size_t> place(n_);  // of the numbers of one column, by row
-  for (int k = 0; k < n_; ++k) {
-    for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-      place[upper_row_[p]] = place_of(upper_ + p);
-    place[k] = place_of(pivots_ + k);
-    for_column_below(k, [&](int row, std::ptrdiff_t at) { place[row] = at; });
-    set_column(k, place, program);
-    for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-      for_runs(
-          place, [&](auto see) { for_column_below(upper_row_[p], see); },
-          [&](std::size_t target, std::size_t factor, std::size_t count) {
-            program.subtract_products(target, factor, count, place_of(upper_ + p));
-          });
-    if (const std::size_t count = count_below(k); count > 0)
-      program.divide(static_cast<std::size_t>(below_diagonal(k)), count, place_of(pivots_ + k));
+  for (int part = 0; part <= parts_; ++part) {
+    EliminationProgram& program = elimination_.emplace_back(numbers_.size());
+    for (std::size_t g = 0; g < group_part_.size(); ++g)
+      for (int k = group_start_[g]; k < group_start_[g + 1] && group_part_[g] == part; ++k)
+        eliminate_column(k, place, program);
+    program.finish();
   }
-  program.finish();
+}
+
+void SupernodalLu::eliminate_column(int k, std::vector<std::size_t>& place,
+                                    EliminationProgram& program) const {
+  for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
+    place[upper_row_[p]] = place_of(upper_ + p);
+  place[k] = place_of(pivots_ + k);
+  for_column_below(k, [&](int row, std::ptrdiff_t at) { place[row] = at; });
+  set_column(k, place, program);
+  for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
+    for_runs(
+        place, [&](auto see) { for_column_below(upper_row_[p], see); },
+        [&](std::size_t target, std::size_t factor, std::size_t count) {
+          program.subtract_products(target, factor, count, place_of(upper_ + p));
+        });
+  if (const std::size_t count = count_below(k); count > 0)
+    program.divide(static_cast<std::size_t>(below_diagonal(k)), count, place_of(pivots_ + k));
 }
 
 /// The operations of `solve`, with what is solved for from place `x` on.
@@ -248,9 +305,12 @@ void SupernodalLu::set_column(int k, const std::vector<std::size_t>& place,
   }
 }
 
-bool SupernodalLu::run_program(const double* values) {
-  std::fill(panels_, above_, 0.0);
-  elimination_->run(values, numbers_.data());
+bool SupernodalLu::run_program(const double* values, ThreadTeam* team) {
+  const auto zeros = above_ - panels_;
+  each_piece(team, static_cast<int>(zeros),
+             [&](int first, int last) { std::fill(panels_ + first, panels_ + last, 0.0); });
+  each_task(team, parts_, [&](int part, int) { elimination_[part].run(values, numbers_.data()); });
+  elimination_[parts_].run(values, numbers_.data());
   return std::all_of(pivots_, pivots_ + n_,
                      [](double pivot) { return std::isfinite(pivot) && pivot != 0; });
 }
@@ -268,8 +328,7 @@ Panel SupernodalLu::panel_of(const Segment& segment) const {
           below};
 }
 
-bool SupernodalLu::finish_column(int k, int supernode) {
-  double* const x = work_.data();
+bool SupernodalLu::finish_column(int k, int supernode, double* x) {
   for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p) {
     upper_[p] = x[upper_row_[p]];
     x[upper_row_[p]] = 0;
@@ -304,18 +363,17 @@ void SupernodalLu::scatter(int k, const double* values, double* x, std::ptrdiff_
   }
 }
 
-bool SupernodalLu::factor_column(int k, const double* values) {
-  scatter(k, values, work_.data(), 1);
+bool SupernodalLu::factor_column(int k, const double* values, double* x) {
+  scatter(k, values, x, 1);
   for (int q = segment_start_[k]; q < segment_start_[k + 1]; ++q)
-    eliminate<1>(panel_of(segments_[q]), work_.data());
-  return finish_column(k, supernode_of_[k]);
+    eliminate<1>(panel_of(segments_[q]), x);
+  return finish_column(k, supernode_of_[k], x);
 }
 
 /// Columns first .. end − 1, with the operations of factor_column for each of their numbers in the
 /// same order.
-bool SupernodalLu::factor_group(int first, int end, const double* values) {
+bool SupernodalLu::factor_group(int first, int end, const double* values, double* x) {
   const PanelKernels& kernels = version_.of(end - first);
-  double* const x = together_.data();
   const auto row_of = [&](int k) { return x + static_cast<std::ptrdiff_t>(k) * kernels.columns; };
   const auto clear = [&](int k) { std::fill_n(row_of(k), kernels.columns, 0.0); };
   for (int k = first; k < end; ++k) scatter(k, values, x + (k - first), kernels.columns);
@@ -328,7 +386,7 @@ bool SupernodalLu::factor_group(int first, int end, const double* values) {
     clear(upper_row_[p]);
   }
   bool fine = true;
-  for (int k = first; k < end; ++k) fine = finish_of_group(k, first, end, kernels) && fine;
+  for (int k = first; k < end; ++k) fine = finish_of_group(k, first, end, kernels, x) && fine;
   const int s = supernode_of_[first];
   for (int k = first; k < first_[s + 1]; ++k) clear(k);
   for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) clear(rows_[p]);
@@ -336,35 +394,48 @@ bool SupernodalLu::factor_group(int first, int end, const double* values) {
 }
 
 /// Column k of a group, and its part in the columns that follow.
-bool SupernodalLu::finish_of_group(int k, int first, int end, const PanelKernels& kernels) {
+bool SupernodalLu::finish_of_group(int k, int first, int end, const PanelKernels& kernels,
+                                   double* x) {
   const int place = k - first;
-  const double* const diagonal =
-      together_.data() + static_cast<std::ptrdiff_t>(k) * kernels.columns;
+  const double* const diagonal = x + static_cast<std::ptrdiff_t>(k) * kernels.columns;
   const double pivot = pivots_[k] = diagonal[place];
   std::array<double, kMostColumns> u{};
   for (int c = place + 1; c < end - first; ++c)  // the group's rows of U are its last ones
     u[c] = upper_[upper_start_[first + c + 1] - c + place] = diagonal[c];
   kernels.finish(panel_of({supernode_of_[k], k, k + 1}), panels_ + below_diagonal(k), place, pivot,
-                 u.data(), together_.data());
+                 u.data(), x);
   return std::isfinite(pivot) && pivot != 0;
 }
 
-bool SupernodalLu::factor(const double* values, const Watch& watch) {
-  if (elimination_) {
-    watch.look();
-    return run_program(values);
-  }
+bool SupernodalLu::factor_part(int part, const double* values, const Watch& watch) {
   constexpr int kLook = 16;  // columns between two looks at the watch
-  bool fine = true;
-  for (int g = 0, next = 0; fine && group_start_[g] < n_; ++g) {
+  Work& work = work_[part < parts_ ? part : 0];
+  int unseen = kLook;
+  for (std::size_t g = 0; g < group_part_.size(); ++g) {
+    if (group_part_[g] != part) continue;
     const int first = group_start_[g], end = group_start_[g + 1];
-    if (first >= next) {
+    if (unseen >= kLook) {
       watch.look();
-      next = first + kLook;
+      unseen = 0;
     }
-    fine = end - first == 1 ? factor_column(first, values) : factor_group(first, end, values);
+    unseen += end - first;
+    if (!(end - first == 1 ? factor_column(first, values, work.column.data())
+                           : factor_group(first, end, values, work.group.data())))
+      return false;
   }
-  return fine;
+  return true;
+}
+
+bool SupernodalLu::factor(const double* values, const Watch& watch, ThreadTeam* team) {
+  if (parts_ == 0) team = nullptr;
+  if (!elimination_.empty()) {
+    watch.look();
+    return run_program(values, team);
+  }
+  std::vector<char> fine(parts_ + 1, 0);
+  each_task(team, parts_, [&](int part, int) { fine[part] = factor_part(part, values, watch); });
+  const bool all = std::all_of(fine.begin(), fine.end() - 1, [](char each) { return each; });
+  return all && factor_part(parts_, values, watch);
 }
 
 void SupernodalLu::solve(double* b) {
@@ -374,7 +445,7 @@ void SupernodalLu::solve(double* b) {
     for (int k = 0; k < n_; ++k) b[column_of_[k]] = x[k];
     return;
   }
-  double* const x = work_.data();
+  double* const x = work_[0].column.data();
   for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]] * inverse_scale_[k];
   for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
     const int begin = block_start_[block], end = block_start_[block + 1];
@@ -396,8 +467,10 @@ void SupernodalLu::solve(double* b) {
 }
 
 std::size_t SupernodalLu::bytes() const {
-  return sizeof(double) * numbers_.size() +
-         (elimination_ ? elimination_->bytes() + substitution_->bytes() : 0) +
+  std::size_t lists = substitution_ ? substitution_->bytes() : 0, work = 0;
+  for (const EliminationProgram& program : elimination_) lists += program.bytes();
+  for (const Work& w : work_) work += w.column.size() + w.group.size();
+  return sizeof(double) * (numbers_.size() + work) + lists +
          sizeof(int) * (rows_.size() + upper_row_.size() + entry_row_.size() + above_row_.size()) +
          sizeof(Segment) * segments_.size();
 }

@@ -12,13 +12,16 @@
 /// supernodal approach to sparse partial pivoting", SIAM J. Matrix Anal. Appl. 20(3), 1999). L and
 /// U lie apart, each in the order in which it is read: large factors do not fit into the caches,
 /// and a solution costs what reading them costs. Where panels are narrow,
-/// matrices are factored and solved by lists of operations, with the same bits.
+/// matrices are factored and solved by lists of operations, with the same bits. Threads take the
+/// columns of subtrees of the elimination forest, which do not need each other; those above the
+/// subtrees come after them.
 #pragma once
 
 #include <cstddef>
 #include <optional>
 #include <vector>
 
+#include "math/thread_team.h"
 #include "solver/elimination_program.h"
 #include "solver/panel_kernels.h"
 #include "solver/watch.h"
@@ -33,28 +36,34 @@ struct FactorPattern {
   std::vector<int> block_start;        ///< first position of each diagonal block, then n
 };
 
+struct LuOptions {
+  static constexpr std::size_t kMostListed = 1 << 22;  ///< products: 30 MB of lists
+
+  const PanelVersion& version = *panel_versions().back();
+  /// With at most so many products of numbers, and few for each of its numbers, a matrix is
+  /// factored and solved by lists of operations.
+  std::size_t listed = kMostListed;
+  int threads = 1;  ///< that may share the columns
+};
+
 class SupernodalLu {
  public:
-  static constexpr std::size_t kMostListed = 1 << 22;  ///< products: 30 MB of lists
-  /// The matrix's pattern in compressed columns; `values`: those of the reference matrix. With at
-  /// most `listed` products of numbers, and few for each of its numbers, it is factored and solved
-  /// by lists of operations.
+  /// The matrix's pattern in compressed columns; `values`: those of the reference matrix.
   SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
-               const double* values, const FactorPattern& factors,
-               const PanelVersion& version = *panel_versions().back(),
-               std::size_t listed = kMostListed);
+               const double* values, const FactorPattern& factors, const LuOptions& options = {});
   SupernodalLu(const SupernodalLu&) = delete;
   SupernodalLu& operator=(const SupernodalLu&) = delete;
 
   /// False when a pivot vanishes or is not a number: there are no factors then. Throws Stopped, and
-  /// there are none, either.
-  bool factor(const double* values, const Watch& watch = Watch());
+  /// there are none, either. A team shares the parts.
+  bool factor(const double* values, const Watch& watch = Watch(), ThreadTeam* team = nullptr);
   /// Solves A x = b in place with the last factorization.
   void solve(double* b);
 
   double pivot_ratio() const;  ///< smallest over largest pivot
   /// Reciprocal pivot growth: smallest over all columns of max|R⁻¹ A| / max|U|.
   double pivot_growth(const double* values) const;
+  int parts() const { return parts_; }  ///< that threads share; 0: one thread does it all
   int supernodes() const { return static_cast<int>(first_.size()) - 1; }
   std::size_t bytes() const;  ///< of memory, all but some for each column
 
@@ -69,20 +78,27 @@ class SupernodalLu {
   void place_matrix(const std::vector<int>& column_start, const std::vector<int>& row_index);
   void find_groups();
   Panel panel_of(const Segment& segment) const;
+  void find_parts(int threads);
+  bool take_parts(const std::vector<int>& group_of, int parts);
+  template <class Use>
+  void for_needed(int g, Use use) const;
   void scatter(int k, const double* values, double* x, std::ptrdiff_t stride);
-  bool factor_column(int k, const double* values);
-  bool finish_column(int k, int supernode);
-  bool factor_group(int first, int end, const double* values);
-  bool finish_of_group(int k, int first, int end, const PanelKernels& kernels);
+  bool factor_column(int k, const double* values, double* x);
+  bool finish_column(int k, int supernode, double* x);
+  bool factor_group(int first, int end, const double* values, double* x);
+  bool finish_of_group(int k, int first, int end, const PanelKernels& kernels, double* x);
+  bool factor_part(int part, const double* values, const Watch& watch);
   template <class Use>
   void for_column_below(int k, Use use) const;
   std::size_t place_of(const double* number) const { return number - numbers_.data(); }
   std::size_t count_below(int k) const;  ///< numbers of L in column k
   bool is_listed(std::size_t count, std::size_t most) const;
+  bool has_wide_groups() const;
   void make_elimination();
+  void eliminate_column(int k, std::vector<std::size_t>& place, EliminationProgram& program) const;
   void make_substitution(std::size_t x);
   void set_column(int k, const std::vector<std::size_t>& place, EliminationProgram& program) const;
-  bool run_program(const double* values);
+  bool run_program(const double* values, ThreadTeam* team);
   std::ptrdiff_t below_diagonal(int k) const;  ///< of column k, its first number in panels_
 
   int n_;
@@ -110,13 +126,24 @@ class SupernodalLu {
   double* above_ = nullptr;
 
   std::vector<double> numbers_;  ///< panels, U, pivots, above; with lists the solution
-  std::optional<EliminationProgram> elimination_, substitution_;  ///< both or none
-  std::vector<double> work_;  ///< by position; zero between calls
+  std::vector<EliminationProgram> elimination_;     ///< with lists: by part
+  std::optional<EliminationProgram> substitution_;  ///< with lists
+
+  /// Of one thread; zero between calls.
+  struct Work {
+    std::vector<double> column;  ///< by position
+    std::vector<double> group;   ///< row by row, for the widest group
+  };
+  std::vector<Work> work_;  ///< by thread
 
   // neighbours in a supernode with the same rows of U before them are updated together
   std::vector<int> group_start_;  ///< first column of each group, then n
   const PanelVersion& version_;
-  std::vector<double> together_;  ///< row by row, for the widest group; zero between calls
+
+  // Columns of different parts do not need each other, those of the last part come after all
+  // others.
+  int parts_ = 0;                ///< but for the last one; 0: that is all
+  std::vector<int> group_part_;  ///< by group
 };
 
 }  // namespace mbcosim

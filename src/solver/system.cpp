@@ -1,7 +1,7 @@
 #include "solver/system.h"
 
 #include <algorithm>
-#include <cstdint>
+#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -21,31 +21,43 @@ void add_external_loads(const EvalContext& context, std::vector<double>& r) {
   }
 }
 
-/// Calls action(part, range) for the node equations and all sets, in tiles that fit into a cache:
-/// elements that are close in the deck are close in the model, and what one set has just touched
-/// the next one needs. Small models are one tile.
+/// Calls action(part, range, context) for the node equations and all sets, in the tiles and waves
+/// of the model's plan.
 template <class Action>
-void each_tile(const Model& model, Action action) {
-  constexpr std::size_t kEntries = 32768;  // of the matrix in one tile: 256 kB
-  const auto tiles = static_cast<std::int64_t>(1 + model.row_index.size() / kEntries);
-  for (std::int64_t tile = 0; tile < tiles; ++tile) {
-    const auto range = [&](std::int64_t size) {
-      return ElementRange{static_cast<int>(size * tile / tiles),
-                          static_cast<int>(size * (tile + 1) / tiles)};
-    };
-    action(model.node_equations, range(model.node_equations.size()));
-    for (const auto& set : model.sets) action(std::as_const(*set), range(set->size()));
+void each_tile(const EvalContext& context, Evaluators* evaluators, Action action) {
+  const Model& model = *context.model;
+  const AssemblyPlan& plan = model.assembly;
+  const auto evaluate = [&](int tile, const EvalContext& own) {
+    action(model.node_equations, plan.elements(tile, model.node_equations.size()), own);
+    for (const auto& set : model.sets)
+      action(std::as_const(*set), plan.elements(tile, set->size()), own);
+  };
+  if (evaluators)
+    for (Scratch& scratch : evaluators->scratch) scratch.sums = context.scratch->sums;
+  for (int w = 0; w < plan.waves(); ++w) {
+    const std::span<const int> wave = plan.wave(w);
+    if (!evaluators || wave.size() == 1) {
+      for (const int tile : wave) evaluate(tile, context);
+      continue;
+    }
+    evaluators->team.each(static_cast<int>(wave.size()), [&](int k, int thread) {
+      EvalContext own = context;
+      own.scratch = &evaluators->scratch[thread];
+      evaluate(wave[k], own);
+    });
   }
 }
 
 }  // namespace
 
-void compute_residual(EvalContext context, Scratch& scratch, std::vector<double>& r) {
+void compute_residual(EvalContext context, Scratch& scratch, std::vector<double>& r,
+                      Evaluators* evaluators) {
   context.scratch = &scratch;
   accumulate(context);
   std::fill(r.begin(), r.end(), 0.0);
-  each_tile(*context.model,
-            [&](const auto& part, ElementRange range) { part.residual(context, r.data(), range); });
+  each_tile(context, evaluators, [&](const auto& part, ElementRange range, const EvalContext& own) {
+    part.residual(own, r.data(), range);
+  });
   add_external_loads(context, r);
 }
 
@@ -59,61 +71,70 @@ NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c)
   return s;
 }
 
-void compute_seeds(const EvalContext& context, std::vector<NodeSeeds>& seeds) {
+void compute_seeds(const EvalContext& context, std::vector<NodeSeeds>& seeds, ThreadTeam* team) {
   const Model& model = *context.model;
   const State& state = *context.state;
-  for (std::size_t k = 0; k < model.places.size(); ++k) {
-    const NodePlace& n = model.places[k];
-    if (!n.has_rotation()) {
-      seeds[k] = {Mat3::Zero(), Mat3::Zero()};
-      continue;
+  each_piece(team, static_cast<int>(model.places.size()), [&](int first, int last) {
+    for (int k = first; k < last; ++k) {
+      const NodePlace& n = model.places[k];
+      if (!n.has_rotation()) {
+        seeds[k] = {Mat3::Zero(), Mat3::Zero()};
+        continue;
+      }
+      const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
+      seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]),
+                            state.rotation_history[k].w_ref, context.seed);
     }
-    const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
-    seeds[k] = node_seeds(Vec3(y[0], y[1], y[2]), Vec3(yp[0], yp[1], yp[2]),
-                          state.rotation_history[k].w_ref, context.seed);
-  }
+  });
 }
 
 void compute_jacobian(EvalContext context, Workspace& workspace) {
   context.scratch = &workspace.scratch;
   accumulate(context);
-  compute_seeds(context, workspace.seeds);
-  std::fill(workspace.values.begin(), workspace.values.end(), 0.0);
-  each_tile(*context.model, [&](const auto& part, ElementRange range) {
-    if constexpr (std::is_same_v<decltype(part), const NodeEquations&>)
-      part.jacobian(context, workspace.values.data(), range);
-    else
-      part.jacobian(context, workspace.seeds.data(), workspace.values.data(), range);
+  compute_seeds(context, workspace.seeds, workspace.team());
+  double* const values = workspace.values.data();
+  each_piece(workspace.team(), static_cast<int>(workspace.values.size()),
+             [&](int first, int last) { std::fill(values + first, values + last, 0.0); });
+  each_tile(context, workspace.evaluators.get(),
+            [&](const auto& part, ElementRange range, const EvalContext& own) {
+              if constexpr (std::is_same_v<decltype(part), const NodeEquations&>)
+                part.jacobian(own, values, range);
+              else
+                part.jacobian(own, workspace.seeds.data(), values, range);
+            });
+}
+
+void update_rotations(const Model& model, State& state, ThreadTeam* team) {
+  each_piece(team, static_cast<int>(model.places.size()), [&](int first, int last) {
+    for (int k = first; k < last; ++k) {
+      const NodePlace& n = model.places[k];
+      if (!n.has_rotation()) continue;
+      NodeRotation& q = state.rotation[k];
+      const NodeRotationHistory& past = state.rotation_history[k];
+      const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
+      const Vec3 g(y[0], y[1], y[2]), gp(yp[0], yp[1], yp[2]);
+      const Mat3 r = cgr_rotation(g);
+      q.R = r * past.R_ref;
+      q.w = cgr_g(g) * gp + r * past.w_ref;
+    }
   });
 }
 
-void update_rotations(const Model& model, State& state) {
-  for (std::size_t k = 0; k < model.places.size(); ++k) {
-    const NodePlace& n = model.places[k];
-    if (!n.has_rotation()) continue;
-    NodeRotation& q = state.rotation[k];
-    const NodeRotationHistory& past = state.rotation_history[k];
-    const double *y = &state.y[n.first + 3], *yp = &state.yp[n.first + 3];
-    const Vec3 g(y[0], y[1], y[2]), gp(yp[0], yp[1], yp[2]);
-    const Mat3 r = cgr_rotation(g);
-    q.R = r * past.R_ref;
-    q.w = cgr_g(g) * gp + r * past.w_ref;
-  }
-}
-
 void apply_correction(const Model& model, const std::vector<double>& delta, double c,
-                      double c_algebraic, State& state) {
-  for (int i = 0; i < model.unknowns; ++i) {
-    const double d = delta[i];
-    if (model.kinds[i] == UnknownKind::differential) {
-      state.yp[i] += d;
-      state.y[i] += c * d;
-    } else {
-      state.y[i] += d;
-      state.yp[i] += c_algebraic * d;
+                      double c_algebraic, State& state, ThreadTeam* team) {
+  each_piece(team, model.unknowns, [&](int first, int last) {
+    for (int i = first; i < last; ++i) {
+      const double d = delta[i];
+      if (model.kinds[i] == UnknownKind::differential) {
+        state.yp[i] += d;
+        state.y[i] += c * d;
+      } else {
+        state.y[i] += d;
+        state.yp[i] += c_algebraic * d;
+      }
     }
-  }
-  update_rotations(model, state);
+  });
+  update_rotations(model, state, team);
 }
 
 void update_activity(const EvalContext& context, State& state, bool restart) {

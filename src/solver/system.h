@@ -7,8 +7,9 @@
 
 namespace mbcosim {
 
-/// r = −F at the state in `context` (n).
-void compute_residual(EvalContext context, Scratch& scratch, std::vector<double>& r);
+/// r = −F at the state in `context` (n); by the caller alone when `evaluators` is null.
+void compute_residual(EvalContext context, Scratch& scratch, std::vector<double>& r,
+                      Evaluators* evaluators = nullptr);
 
 /// J = −∂r/∂δ into workspace.values; also computes the node seeds.
 void compute_jacobian(EvalContext context, Workspace& workspace);
@@ -17,14 +18,15 @@ void compute_jacobian(EvalContext context, Workspace& workspace);
 NodeSeeds node_seeds(const Vec3& g, const Vec3& gp, const Vec3& w_ref, double c);
 
 /// The seeds of all structural nodes at the state in `context`.
-void compute_seeds(const EvalContext& context, std::vector<NodeSeeds>& seeds);
+void compute_seeds(const EvalContext& context, std::vector<NodeSeeds>& seeds,
+                   ThreadTeam* team = nullptr);
 
 /// Refreshes R and w of every node from g, ġ and the references.
-void update_rotations(const Model& model, State& state);
+void update_rotations(const Model& model, State& state, ThreadTeam* team = nullptr);
 
 /// Adds δ: differential ẏ += δ, y += c δ; algebraic y += δ, ẏ += c_a δ; then the rotations.
 void apply_correction(const Model& model, const std::vector<double>& delta, double c,
-                      double c_algebraic, State& state);
+                      double c_algebraic, State& state, ThreadTeam* team = nullptr);
 
 /// Evaluates the drives of `driven` elements; with `restart`, elements that become active get their
 /// start values.

@@ -75,8 +75,11 @@ void TwoStageSystem::predict_stage() {
 void TwoStageSystem::compute_residual() {
   stage_.external_loads = end_->external_loads;  // which the exchange may have changed
   stage_.memory = end_->memory;
-  mbcosim::compute_residual(model_.context(*end_, Phase::step), ws_.scratch, ws_.residual);
-  mbcosim::compute_residual(model_.context(stage_, Phase::step), ws_.scratch, stage_residual_);
+  Evaluators* const evaluators = ws_.evaluators.get();
+  mbcosim::compute_residual(model_.context(*end_, Phase::step), ws_.scratch, ws_.residual,
+                            evaluators);
+  mbcosim::compute_residual(model_.context(stage_, Phase::step), ws_.scratch, stage_residual_,
+                            evaluators);
   std::copy(ws_.residual.begin(), ws_.residual.end(), scratch_.residual.begin());
   std::copy(stage_residual_.begin(), stage_residual_.end(), scratch_.residual.begin() + n_);
 }

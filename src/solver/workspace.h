@@ -1,4 +1,4 @@
-/// Scratch of one thread: residual, matrix, factorization. Never saved; results never depend on
+/// Scratch of one simulation: residual, matrix, factorization. Never saved; results never depend on
 /// what it held before.
 #pragma once
 
@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "math/thread_team.h"
 #include "model/model.h"
 #include "solver/linear_solver.h"
 #include "solver/load_tangent.h"
@@ -27,6 +28,15 @@ struct NewtonScratch {
   std::int64_t factorizations = 0;       ///< of the matrix, by iterations so far
 };
 
+/// Threads that evaluate the elements of a large model, each with scratch of its own.
+struct Evaluators {
+  /// `own`: that of the caller.
+  Evaluators(int threads, const Scratch& own) : team(threads), scratch(team.size(), own) {}
+
+  ThreadTeam team;
+  std::vector<Scratch> scratch;
+};
+
 /// Of the model's equations at one instant.
 struct Workspace : NewtonScratch {
   explicit Workspace(const Model& model)
@@ -36,9 +46,15 @@ struct Workspace : NewtonScratch {
         solver(model.unknowns, model.column_start, model.row_index, model.couplings,
                LinearSolver::kNewtonPivots) {}
 
-  std::vector<NodeSeeds> seeds;  ///< (structural nodes)
-  Scratch scratch;               ///< of elements
-  State start;                   ///< from which a search along a line tries its steps
+  /// How many threads may work on a large model, before its first matrix is factored; at first one.
+  /// Results are the same bits for every number.
+  void set_threads(int threads);
+  ThreadTeam* team() const { return evaluators ? &evaluators->team : nullptr; }
+
+  std::unique_ptr<Evaluators> evaluators;  ///< null: the caller alone
+  std::vector<NodeSeeds> seeds;            ///< (structural nodes)
+  Scratch scratch;                         ///< of elements
+  State start;                             ///< from which a search along a line tries its steps
   LinearSolver solver;
   std::unique_ptr<TangentSolver>
       tangents;  ///< takes the place of `solver` when external codes give derivatives

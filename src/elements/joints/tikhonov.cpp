@@ -31,6 +31,10 @@ void TikhonovSet::collect_pattern(PatternSink& sink) const {
     for (const int row : s.rows) sink.block(&row, 1, &row, 1);
 }
 
+void TikhonovSet::append_rows(const Model&, int i, std::vector<int>& rows) const {
+  rows.insert(rows.end(), slots_[i].rows.begin(), slots_[i].rows.end());
+}
+
 void TikhonovSet::set_positions(const PositionSource& positions) {
   for (Slot& s : slots_) {
     s.positions.clear();

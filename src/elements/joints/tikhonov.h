@@ -25,6 +25,7 @@ class TikhonovSet final : public PlainElementSet {
   ElementInfo& info(int i) override { return slots_[i].info; }
   void bind(const Model& model, int i, int first_own) override;
   void collect_pattern(PatternSink& sink) const override;
+  void append_rows(const Model& model, int i, std::vector<int>& rows) const override;
   void set_positions(const PositionSource& positions) override;
 
   void residual(const EvalContext& context, double* r, ElementRange range) const override;

@@ -35,6 +35,14 @@ void ModalForceSet::collect_pattern(PatternSink& sink) const {
     if (orientation_block(s, rows, columns)) sink.block(rows, 6, columns, 3);
 }
 
+void ModalForceSet::append_rows(const Model& model, int i, std::vector<int>& rows) const {
+  const ModalForce& force = slots_[i].force;
+  const int first = force.joints->first_mode_row(force.joint);
+  for (const ModalForce::Term& t : force.terms) rows.push_back(first + t.mode);
+  if (force.node < 0) return;
+  for (int k = 0; k < 6; ++k) rows.push_back(model.structural[force.node].equilibrium + k);
+}
+
 void ModalForceSet::set_positions(const PositionSource& positions) {
   int rows[6], columns[3];
   for (Slot& s : slots_) {

@@ -42,6 +42,7 @@ class ModalForceSet final : public PlainElementSet {
   std::vector<int> nodes(int i) const override;
   void bind(const Model& model, int, int) override { structural_ = &model.structural; }
   void collect_pattern(PatternSink& sink) const override;
+  void append_rows(const Model& model, int i, std::vector<int>& rows) const override;
   void set_positions(const PositionSource& positions) override;
   void residual(const EvalContext& context, double* r, ElementRange range) const override;
   void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,

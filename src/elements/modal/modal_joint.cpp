@@ -56,6 +56,18 @@ std::vector<int> ModalJointSet::nodes(int i) const {
   return r;
 }
 
+/// All of its nodes and its own.
+void ModalJointSet::append_rows(const Model& model, int i, std::vector<int>& rows) const {
+  const auto append = [&](int first, int count) {
+    for (int k = 0; k < count; ++k) rows.push_back(first + k);
+  };
+  append(slots_[i].own, unknowns(i));
+  for (const int node : nodes(i)) {
+    const StructuralNode& n = model.structural[node];
+    if (n.first >= 0) append(n.first, n.unknowns());
+  }
+}
+
 ModalUnknowns ModalJointSet::unknowns(const EvalContext& context, int i) const {
   const Slot& s = slots_[i];
   const int m = s.joint.body->modes;

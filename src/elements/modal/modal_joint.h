@@ -103,6 +103,7 @@ class ModalJointSet final : public ElementSet {
   int first_own(int i) const override { return slots_[i].own; }
   void bind(const Model& model, int i, int first_own) override;
   void collect_pattern(PatternSink& sink) const override;
+  void append_rows(const Model& model, int i, std::vector<int>& rows) const override;
   void set_positions(const PositionSource& positions) override;
 
   void start(const EvalContext& context, State& state, int i) const override;

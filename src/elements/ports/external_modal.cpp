@@ -20,6 +20,10 @@ void ExternalModal::connect(GeneralConnection& c) {
   if (has_node()) row_ = c.node(port_.nodes.front());
 }
 
+void ExternalModal::other_rows(std::vector<int>& rows) const {
+  for (int k = 0; k < modes(); ++k) rows.push_back(first_mode_row() + k);
+}
+
 void ExternalModal::residual(const GeneralView& u, GeneralResidual& r) const {
   if (has_node()) {
     const double* load = &u.state().memory[port_.memory];

@@ -26,6 +26,7 @@ class ExternalModal : public GeneralElement, public PortElement {
 
   void connect(GeneralConnection& c) override;
   void pattern(GeneralPattern&) const override {}
+  void other_rows(std::vector<int>& rows) const override;
   void residual(const GeneralView& u, GeneralResidual& r) const override;
   void jacobian(const GeneralView&, GeneralJacobian&) const override {}
   void output(const GeneralView& u, OutputRow& row) const override;

@@ -131,6 +131,32 @@ TEST_P(RegisteredElement, HasAMatrixUnlessItIsKnownForNone) {
   EXPECT_EQ(J.isZero(0), kConstant.count(GetParam().word) > 0) << GetParam().word;
 }
 
+/// On which it rests that elements can be evaluated at the same time.
+TEST_P(RegisteredElement, AddsToNoRowsButThoseItTells) {
+  const ModelPtr model = read(GetParam());
+  ASSERT_NE(model, nullptr);
+  const State state = general_state(*model);
+  Scratch scratch(model->scratch);
+  EvalContext context = model->context(state, Phase::step, kC, kC);
+  context.scratch = &scratch;
+  accumulate(context);
+  std::vector<NodeSeeds> seeds(model->structural.size());
+  compute_seeds(context, seeds);
+  for (const ElementRef& e : model->elements) {
+    std::vector<int> rows;
+    e.set->append_rows(*model, e.index, rows);
+    const auto tells = [&](int row) { return std::count(rows.begin(), rows.end(), row) > 0; };
+    std::vector<double> r(model->unknowns, 0.0), values(model->row_index.size(), 0.0);
+    e.set->residual(context, r.data(), {e.index, e.index + 1});
+    e.set->jacobian(context, seeds.data(), values.data(), {e.index, e.index + 1});
+    for (int row = 0; row < model->unknowns; ++row)
+      EXPECT_TRUE(r[row] == 0 || tells(row)) << GetParam().word << ", row " << row;
+    for (std::size_t k = 0; k < values.size(); ++k)
+      EXPECT_TRUE(values[k] == 0 || tells(model->row_index[k]))
+          << GetParam().word << ", row " << model->row_index[k];
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Named, RegisteredElement, ::testing::ValuesIn(testing::element_cards()),
                          [](const auto& info) { return testing::test_name(info.param); });
 

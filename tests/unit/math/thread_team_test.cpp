@@ -50,6 +50,16 @@ TEST_P(Team, TheFirstExceptionInTheOrderOfTasksIsThrownAndTheOthersAreDone) {
   }
 }
 
+TEST_P(Team, PiecesCoverAllOnce) {
+  for (const int count : {0, 1, 3, 1000}) {
+    std::vector<int> done(count, 0);
+    each_piece(&team_, count, [&](int first, int last) {
+      for (int k = first; k < last; ++k) ++done[k];
+    });
+    EXPECT_EQ(done, std::vector<int>(count, 1));
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(OfAnySize, Team, testing::Values(1, 2, 4));
 
 }  // namespace

@@ -163,7 +163,7 @@ TEST(SupernodalLu, ColumnsTogetherHaveTheBitsOfEachAlone) {
       const Vector b = family.vector();
       const auto solution = [&](const PanelVersion& version) {
         SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
-                        family.pattern(reference), version, /*listed=*/0);
+                        family.pattern(reference), {.version = version, .listed = 0});
         Vector x = b;
         EXPECT_TRUE(lu.factor(Sparse(a).values.data()));
         lu.solve(x.data());
@@ -187,13 +187,64 @@ TEST(SupernodalLu, ListsHaveTheBitsOfPanels) {
       const Vector b = family.vector();
       const auto solution = [&](std::size_t listed) {
         SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
-                        family.pattern(reference), *panel_versions().back(), listed);
+                        family.pattern(reference), {.listed = listed});
         Vector x = b;
         EXPECT_TRUE(lu.factor(Sparse(a).values.data()));
         lu.solve(x.data());
         return x;
       };
-      EXPECT_EQ(solution(SupernodalLu::kMostListed), solution(0)) << n << ", " << density;
+      EXPECT_EQ(solution(LuOptions::kMostListed), solution(0)) << n << ", " << density;
+    }
+}
+
+/// Two bands that meet in the last rows and columns, as an order for two threads leaves them.
+Dense two_bands(int half, int band, std::mt19937& generator) {
+  std::uniform_real_distribution<double> number(-1, 1);
+  const int n = 2 * half + band;
+  Dense a = Dense::Zero(n, n);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const bool same = i / half == j / half || std::max(i, j) >= 2 * half;
+      const bool at_end = std::max(i, j) >= 2 * half && std::min(i, j) % half >= half - band;
+      if (same && (at_end || std::abs(i - j) <= band)) a(i, j) = number(generator);
+      if (i == j) a(i, j) = 2 * band + number(generator);
+    }
+  return a;
+}
+
+TEST(SupernodalLu, SeveralThreadsGiveTheBitsOfOne) {
+  std::mt19937 generator(7);
+  for (const std::size_t listed : {LuOptions::kMostListed, std::size_t{0}})
+    for (const int half : {40, 150}) {
+      const Dense reference = two_bands(half, 4, generator);
+      const Dense matrices[] = {two_bands(half, 4, generator), two_bands(half, 4, generator)};
+      const int n = static_cast<int>(reference.rows());
+      std::vector<int> order(n);
+      std::iota(order.begin(), order.end(), 0);
+      const Sparse sparse(reference);
+      const FactorPattern pattern = factor_pattern(reference, order, order, {0, n});
+      std::vector<Vector> solutions;
+      for (const int threads : {1, 2, 3}) {
+        ThreadTeam team(threads), larger(threads + 1);
+        SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(), pattern,
+                        {.listed = listed, .threads = threads});
+        EXPECT_EQ(lu.parts(), threads == 1 ? 0 : 2);  // three do not come out even
+        for (ThreadTeam* each : {&team, &larger, static_cast<ThreadTeam*>(nullptr)}) {
+          Vector both(2 * n);
+          for (int k = 0; k < 2; ++k) {
+            EXPECT_TRUE(lu.factor(Sparse(matrices[k]).values.data(), Watch(), each));
+            Vector x = Vector::LinSpaced(n, 1, 2);
+            lu.solve(x.data());
+            EXPECT_LT((matrices[k] * x - Vector::LinSpaced(n, 1, 2)).norm(), 1e-12);
+            both.segment(k * n, n) = x;
+          }
+          solutions.push_back(both);
+        }
+        Dense invalid = matrices[0];
+        invalid(half / 2, half / 2) = NAN;
+        EXPECT_FALSE(lu.factor(Sparse(invalid).values.data(), Watch(), &team));
+      }
+      for (const Vector& x : solutions) EXPECT_EQ(x, solutions[0]) << half;
     }
 }
 
@@ -203,9 +254,9 @@ TEST(SupernodalLu, AGroupWithAVanishingPivotLeavesNothingBehind) {
   const Sparse sparse(a);
   for (const PanelVersion* version : panel_versions()) {
     SupernodalLu fresh(sparse.column_start, sparse.row_index, sparse.values.data(),
-                       family.pattern(a), *version, /*listed=*/0);
+                       family.pattern(a), {.version = *version, .listed = 0});
     SupernodalLu used(sparse.column_start, sparse.row_index, sparse.values.data(),
-                      family.pattern(a), *version, /*listed=*/0);
+                      family.pattern(a), {.version = *version, .listed = 0});
     Dense singular = a, invalid = a;
     singular.row(41) = singular.row(40);
     invalid(50, 50) = NAN;

@@ -1,0 +1,141 @@
+/// Large models on several threads: the same bits and the same errors as on one.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "beam_line.h"
+#include "simulation/simulation.h"
+
+namespace mbcosim {
+namespace {
+
+ModelPtr model_of(const std::string& deck) {
+  const LoadReport report = load_deck(BundleSource({{"deck.mbd", deck}}), "deck.mbd");
+  for (const Diagnostic& d : report.diagnostics) ADD_FAILURE() << d.text();
+  return report.model;
+}
+
+/// A cantilever of 1000 beams, 12 018 unknowns, whose tip is drawn along by a spring, with a
+/// follower force that comes and goes.
+Line long_line() {
+  Line line;
+  line.nodes_per_beam = 2;
+  line.stiffness = vec6(1e6, 1e6, 1e6, 1e3, 1e3, 1e3);
+  line.mass = 1;
+  line.polar = line.rotary = 1e-3;
+  line.straight(1000, 10);
+  line.step = 1e-3;
+  line.initial = "tolerance: 1e-5;";
+  line.forces = 2;
+  line.loads =
+      " driven: 1, ramp, 1., .0015, forever, 0., force: 1, follower, " +
+      std::to_string(line.tip()) +
+      ", position, null, 0., 0., 1., const, 50.;\n"
+      " force: 2, absolute, 500, position, null, 0., 1., 0., sine, 0., 30., 20., forever, 0.;\n";
+  return line;
+}
+
+std::unique_ptr<Simulation> started(const ModelPtr& model, int threads) {
+  auto simulation = Simulation::prepare(model);
+  simulation->set_threads(threads);
+  const Status status = simulation->start();
+  EXPECT_TRUE(status) << status.error().message;
+  return simulation;
+}
+
+TEST(Threads, GiveTheSameBits) {
+  const ModelPtr model = model_of(long_line().deck());
+  ASSERT_TRUE(model);
+  std::string expected;
+  for (const int threads : {1, 2, 3, 4}) {
+    const auto simulation = started(model, threads);
+    const StepReport report = simulation->step_many(4);
+    ASSERT_FALSE(report.error) << report.error->message;
+    EXPECT_GT(report.total_iterations, 4);
+    if (threads == 1) expected = simulation->export_state();
+    EXPECT_TRUE(simulation->export_state() == expected) << threads;
+  }
+}
+
+TEST(Threads, GiveTheSameBitsWithTheThirdOrderMethod) {
+  Line line = long_line();
+  line.initial = "method: third order, .6; tolerance: 1e-5;";
+  const ModelPtr model = model_of(line.deck());
+  ASSERT_TRUE(model);
+  std::string expected;
+  for (const int threads : {1, 3}) {
+    const auto simulation = started(model, threads);
+    const StepReport report = simulation->step_many(2);
+    ASSERT_FALSE(report.error) << report.error->message;
+    if (threads == 1) expected = simulation->export_state();
+    EXPECT_TRUE(simulation->export_state() == expected) << threads;
+  }
+}
+
+/// The first in the order of evaluation, whoever comes upon it.
+TEST(Threads, GiveTheSameError) {
+  Line line = long_line();
+  line.forces = 102;
+  for (int k = 0; k < 100; ++k)
+    line.loads += " force: " + std::to_string(10 + k) + ", absolute, " + std::to_string(10 * k) +
+                  ", position, null, 0., 1., 0., string, \"1e-3*sqrt(.0025 - Time)*" +
+                  std::to_string(k) + "\";\n";
+  const ModelPtr model = model_of(line.deck());
+  ASSERT_TRUE(model);
+  std::string expected, state;
+  for (const int threads : {1, 2, 4}) {
+    const auto simulation = started(model, threads);
+    const StepReport report = simulation->step_many(4);
+    ASSERT_TRUE(report.error);
+    EXPECT_EQ(report.step, 2) << report.error->message;
+    if (threads == 1) expected = report.error->message, state = simulation->export_state();
+    EXPECT_EQ(report.error->message, expected);
+    EXPECT_TRUE(simulation->export_state() == state) << threads;
+  }
+}
+
+TEST(AssemblyPlan, TilesOfAWaveAddToDifferentRows) {
+  const ModelPtr model = model_of(long_line().deck());
+  ASSERT_TRUE(model);
+  const AssemblyPlan& plan = model->assembly;
+  std::vector<int> tiles;
+  for (int w = 0; w < plan.waves(); ++w) {
+    std::vector<int> taken(model->unknowns, -1);
+    for (const int tile : plan.wave(w)) {
+      tiles.push_back(tile);
+      std::vector<int> rows;
+      const ElementRange nodes = plan.elements(tile, model->node_equations.size());
+      for (int k = nodes.first; k < nodes.last; ++k) model->node_equations.append_rows(k, rows);
+      for (const auto& set : model->sets) {
+        const ElementRange range = plan.elements(tile, set->size());
+        for (int i = range.first; i < range.last; ++i) set->append_rows(*model, i, rows);
+      }
+      for (const int row : rows) {
+        if (row < 0) continue;
+        EXPECT_TRUE(taken[row] == -1 || taken[row] == tile) << row;
+        taken[row] = tile;
+      }
+    }
+  }
+  std::sort(tiles.begin(), tiles.end());
+  ASSERT_GT(tiles.size(), 10u);
+  for (std::size_t k = 0; k < tiles.size(); ++k) EXPECT_EQ(tiles[k], static_cast<int>(k));
+  EXPECT_LT(plan.waves(), 5);
+}
+
+TEST(AssemblyPlan, SmallModelsAreOneTile) {
+  Line line = long_line();
+  line.straight(20, 10);
+  line.loads = "";
+  line.forces = 0;
+  const ModelPtr model = model_of(line.deck());
+  ASSERT_TRUE(model);
+  EXPECT_EQ(model->assembly.waves(), 1);
+  EXPECT_EQ(model->assembly.wave(0).size(), 1u);
+}
+
+}  // namespace
+}  // namespace mbcosim
