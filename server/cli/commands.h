@@ -31,6 +31,7 @@ struct RunOptions {
   double peer_timeout = 60;  ///< longest wait for a code behind them [s]
   bool pads_labels = false;  ///< the codes pad labels of an odd number of points
   bool real_time = false;    ///< a second of the model lasts a second
+  int threads = 0;           ///< 0: as many as there are
 };
 
 struct ReduceCommand {

@@ -285,6 +285,12 @@ int main(int argc, char** argv) {
                     "use its client library, which misreads them");
   run_app->add_flag("--real-time", run_options.real_time,
                     "Hold the run back to the wall clock; steps that end late are counted");
+  run_app
+      ->add_option(
+          "--threads", run_options.threads,
+          "Threads that work on a large model, one for each 3000 unknowns at most; results "
+          "do not depend on it; default: all of the machine")
+      ->check(CLI::Range(1, 1024));
   run_app->callback([&] { exit_code = run(run_options); });
 
   OtherCommands others;

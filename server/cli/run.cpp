@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <thread>
 
 #include "cli/commands.h"
 #include "cli/deck_report.h"
@@ -49,11 +50,17 @@ ExitCode complain(const Error& error) {
   return exit_code_of(error);
 }
 
+int threads_of(const RunOptions& options) {
+  return options.threads > 0 ? options.threads
+                             : static_cast<int>(std::thread::hardware_concurrency());
+}
+
 ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& writer,
                   const CancelToken* cancel, const RunOptions& options) {
-  auto simulation = Simulation::create(model, cancel, writer);
-  if (!simulation) return complain(simulation.error());
-  if ((*simulation)->finished()) {
+  const auto simulation = Simulation::prepare(model, writer);
+  simulation->set_threads(threads_of(options));
+  if (const auto started = simulation->start(cancel); !started) return complain(started.error());
+  if (simulation->finished()) {
     std::fprintf(stderr,
                  "note: no step was made: the final time, %g s (0 without the card `final time`), "
                  "is not after the initial one\n"
@@ -61,7 +68,7 @@ ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& wr
                  model->initial_value.final_time);
     return kDone;
   }
-  const StepReport done = run_to_end(**simulation, cancel, options);
+  const StepReport done = run_to_end(*simulation, cancel, options);
   if (done.error) return complain(*done.error);
   if (done.outcome == StepOutcome::finished && done.time < model->initial_value.final_time)
     std::fprintf(stderr, "note: the run ended at t = %.9g; the reason stands in its .out file\n",
@@ -78,6 +85,7 @@ ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWri
                           const InterruptGuard& interrupt, const RunOptions& options) try {
   const CancelToken* cancel = interrupt.token();
   const auto simulation = Simulation::prepare(model, writer);
+  simulation->set_threads(threads_of(options));
   mbdyn::Patience patience;
   patience.time = std::chrono::milliseconds(std::llround(1000 * options.peer_timeout));
   patience.cancelled = [cancel] { return cancel->cancelled(); };

@@ -211,6 +211,13 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--workers", config.workers, "Simulations that step at once; 0: one per core")
       ->capture_default_str()
       ->check(CLI::Range(0, 4096));
+  app.add_option(
+         "--threads", config.threads,
+         "Threads that work on a step of one large simulation, one for each 3000 unknowns at "
+         "most; results do not depend on it. More than one pays where fewer simulations "
+         "step than there are cores")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1024));
   app.add_option("--metrics", config.metrics, "HOST:PORT of Prometheus metrics");
   app.add_option("--http", config.http,
                  "HOST:PORT of the page, of calls over HTTP (Connect, gRPC-Web) and of /metrics");

@@ -49,6 +49,7 @@ struct Config {
   std::string results_root;     ///< folder of result files; empty: none are written
   std::string deck_sockets;  ///< folder of the sockets that decks may name; empty: none are opened
   int workers = 0;           ///< simulations that step at once; 0: one per core
+  int threads = 1;           ///< that work on the steps of one large simulation
   std::string tls_certificate, tls_key, tls_client_ca;  ///< PEM files
   std::vector<std::string> certificate_roles;           ///< "NAME=ROLE" of client certificates
   std::string tokens_file;                              ///< see Authenticator::from_file

@@ -148,10 +148,12 @@ void check_eigenanalyses(const Model& model) {
 /// The model of a deck at its initial solution, with the codes at its sockets where the options ask
 /// for them.
 Made initial_solution(const Session::Origin& origin, const v1::CreateOptions& options,
-                      SessionResults* results, DeckSocketFolder& folder, const CancelToken& token) {
+                      SessionResults* results, DeckSocketFolder& folder, int threads,
+                      const CancelToken& token) {
   if (results) check_eigenanalyses(*origin.model);
   Made made{Simulation::prepare(origin.model, results ? results->start(*origin.model) : nullptr,
                                 origin.time_keeping)};
+  made.simulation->set_threads(threads);
   if (options.has_deck_sockets()) {
     if (options.record_ports())
       throw Refusal(v1::REASON_BAD_ARGUMENT,
@@ -224,7 +226,8 @@ class Creation {
                  false,
                  std::move(report.files),
                  std::move(report.attached)};
-      return initial_solution(*origin, options, results, parts_.deck_sockets, token);
+      return initial_solution(*origin, options, results, parts_.deck_sockets, parts_.config.threads,
+                              token);
     };
     fresh_.add(options, digest, exchange, kept, make)
         ->fill(reply->mutable_simulation(), exchange.caller());

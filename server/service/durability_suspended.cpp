@@ -263,19 +263,20 @@ std::unique_ptr<Simulation> Durability::simulation_at(const ModelPtr& model,
                                                       TimeKeeping time_keeping,
                                                       const StoredPoint& stored,
                                                       SessionResults* results, bool has_files) {
-  auto simulation = Simulation::create(model, nullptr, nullptr, time_keeping);
-  if (!simulation) throw Refusal(simulation.error());
-  if (const Status status = (*simulation)->import_state(stored.state, stored.point.finished());
+  auto simulation = Simulation::prepare(model, /*writer=*/nullptr, time_keeping);
+  simulation->set_threads(config_.threads);
+  if (const Status status = simulation->start(); !status) throw Refusal(status.error());
+  if (const Status status = simulation->import_state(stored.state, stored.point.finished());
       !status)
     throw Refusal(status.error());
-  if (!results) return std::move(*simulation);
+  if (!results) return simulation;
   const auto writer = results->start(*model);
   if (has_files && stored.point.has_results_until_step())
     results->expect(stored.point.results_until_step());
   const Status goes_on =
-      has_files ? (*simulation)->resume_writing(writer) : (*simulation)->write_to(writer);
+      has_files ? simulation->resume_writing(writer) : simulation->write_to(writer);
   if (!goes_on) throw Refusal(results->without_paths(goes_on.error()));
-  return std::move(*simulation);
+  return simulation;
 }
 
 // ------------------------------------------------------------------ from server to server

@@ -1,12 +1,15 @@
 /// Where the time of a Newton iteration goes: residual and matrix (assembly), factorization, solve,
 /// against the size of a cantilever of three-node beams, as a table with fitted exponents.
 ///
-///   newton_cost [elements ...]          default 10 100 1000 10000
+///   newton_cost [--threads N] [elements ...]          default 10 100 1000 10000
+///
+/// With several threads the times are wall time, else processor time.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <string_view>
 #include <vector>
 
 #include "benchmark_models.h"
@@ -22,13 +25,13 @@ struct Cost {
   double total() const { return assembly() + part[2] + part[3]; }
 };
 
-bool measure(int elements, Cost& cost) {
+bool measure(int elements, int threads, Cost& cost) {
   const LoadReport report = load_deck(BundleSource(cantilever(elements)), "deck.mbd");
   if (!report.ok()) return false;
   auto simulation = Simulation::create(report.model);
   if (!simulation) return false;
   if ((*simulation)->step_many(3).error) return false;
-  const auto parts = newton_parts(**simulation, 1);
+  const auto parts = newton_parts(**simulation, 1, threads);
   if (!parts) return false;
   cost = {elements, report.model->unknowns, *parts};
   return true;
@@ -50,7 +53,9 @@ double exponent(const std::vector<Cost>& costs, const std::function<double(const
 
 int run(int argc, char** argv) {
   std::vector<int> sizes;
-  for (int k = 1; k < argc; ++k) sizes.push_back(std::atoi(argv[k]));
+  int first = 1, threads = 1;
+  if (argc > 2 && std::string_view(argv[1]) == "--threads") threads = std::atoi(argv[2]), first = 3;
+  for (int k = first; k < argc; ++k) sizes.push_back(std::atoi(argv[k]));
   if (sizes.empty()) sizes = {10, 100, 1000, 10000};
   std::printf("%9s %9s", "elements", "unknowns");
   for (const char* name : kNewtonPartNames) std::printf(" %11s", name);
@@ -58,7 +63,7 @@ int run(int argc, char** argv) {
   std::vector<Cost> costs;
   for (const int n : sizes) {
     Cost cost;
-    if (n < 1 || !measure(n, cost)) {
+    if (n < 1 || !measure(n, threads, cost)) {
       std::fprintf(stderr, "newton_cost: no model of %d elements\n", n);
       return 1;
     }

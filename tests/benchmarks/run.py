@@ -10,6 +10,7 @@ usage: run.sh [--build FOLDER] [--peer "REF -s -f {deck} -o {prefix}"] [--decks 
               of the steps, text of the results [ms], allocations, memory [MB]
   beams       cantilevers of three-node beams and grids of two-node beams: one Newton iteration of a process, and its memory;
               of the cantilevers also the parts of an iteration, by the engine alone
+  cores       wall time of a Newton iteration of a process on all cores of the machine, beside that on one
   remote      a step over a stream beside an empty echo, Unix socket and TCP, and 1000 simulations in turn (remote_step, when it is
               built)
   reduce      `mbcosim reduce` on a cube of bricks
@@ -73,10 +74,10 @@ def measured(command, folder):
 
 
 class Solvers:
-    """Ours, and the peer where there is one: each a command for a deck and a prefix."""
+    """Ours on one thread, and the peer where there is one: each a command for a deck and a prefix."""
 
-    def __init__(self, binary, peer):
-        self.commands = [[str(binary), "run", "{deck}", "-o", "{prefix}", "-q"]]
+    def __init__(self, binary, peer=None, more=()):
+        self.commands = [[str(binary), "run", "{deck}", "-o", "{prefix}", "-q", "--threads", str(threads)] for threads in (1, *more)]
         if peer:
             words = shlex.split(peer)
             self.commands.append(words if any("{deck}" in word for word in words) else sys.exit("--peer: a command with {deck} and {prefix}"))
@@ -149,21 +150,37 @@ def parts_of_runs(table, build, decks):
         table.add(f"{deck.stem}, engine", "ms", whole, **parts)
 
 
+def iteration_costs(solvers, model, folder, repeat, clock=0):
+    """Of each solver a Newton iteration [ms] by `clock` (0: processor, 1: wall), the runs of the longer one, and the iterations."""
+    runs = []
+    for steps in (5, 25):
+        deck = pathlib.Path(folder) / "beams.mbd"
+        deck.write_text(model(steps))
+        runs.append(solvers.run(deck, folder, repeat))
+    (first, few), (second, many) = runs
+    costs = [(b[clock] - a[clock]) / max(1, m - f) * 1e3 for a, b, f, m in zip(first, second, few, many)]
+    return costs, second, many[0] - few[0]
+
+
+def cantilevers(sizes):
+    return [(f"cantilever of {n}", lambda steps, n=n: beam_models.cantilever(n, steps)) for n in sizes]
+
+
+def all_cores(table, binary, folder, repeat, small):
+    cores = os.cpu_count() or 1
+    for name, model in cantilevers([10] if small else [250, 1000, 10000]):
+        (one, all_of_them), *_ = iteration_costs(Solvers(binary, more=[cores]), model, folder, repeat, clock=1)
+        table.add(f"{name}, on {cores} threads", "ms", all_of_them, on_one=one, speedup=one / all_of_them)
+
+
 def beams(table, solvers, folder, repeat, small):
-    sizes = [10, 100] if small else [100, 1000, 10000]
-    models = [(f"cantilever of {n}", lambda steps, n=n: beam_models.cantilever(n, steps)) for n in sizes]
+    models = cantilevers([10, 100] if small else [100, 1000, 10000])
     for shape in ([(5, 5)] if small else [(100, 100), (20, 20, 20)]):
         models.append((f"grid of {' x '.join(map(str, shape))}", lambda steps, shape=shape: beam_models.grid(shape, steps)))
     for name, model in models:
-        runs = []
-        for steps in (5, 25):
-            deck = pathlib.Path(folder) / "beams.mbd"
-            deck.write_text(model(steps))
-            runs.append(solvers.run(deck, folder, repeat))
-        (first, few), (second, many) = runs
-        costs = [(b[0] - a[0]) / max(1, m - f) * 1e3 for a, b, f, m in zip(first, second, few, many)]
-        memory = {f"{who}_MB": run[2] for who, run in zip(("ours", "peer"), second)}
-        table.add(f"{name}, an iteration", "ms", costs[0], *costs[1:], iterations=many[0] - few[0], **memory)
+        costs, runs, iterations = iteration_costs(solvers, model, folder, repeat)
+        memory = {f"{who}_MB": run[2] for who, run in zip(("ours", "peer"), runs)}
+        table.add(f"{name}, an iteration", "ms", costs[0], *costs[1:], iterations=iterations, **memory)
 
 
 def engine_parts(table, build, small):
@@ -206,7 +223,7 @@ def main():
     parser.add_argument("--decks", type=pathlib.Path, nargs="+", default=[MODELS / f"{name}.mbd" for name in TUTORIALS])
     parser.add_argument("--small", action="store_true")
     parser.add_argument("--repeat", type=int, default=0)
-    parser.add_argument("--only", default="", help="some of tutorials,process,parts,beams,engine,remote,reduce")
+    parser.add_argument("--only", default="", help="some of tutorials,process,parts,beams,cores,engine,remote,reduce")
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--compare", type=pathlib.Path)
     options = parser.parse_args()
@@ -220,6 +237,7 @@ def main():
                     "process": lambda: parts_of_a_process(table, binary, folder, repeat),
                     "parts": lambda: parts_of_runs(table, build, [deck.resolve() for deck in options.decks]),
                     "beams": lambda: beams(table, solvers, folder, 1 if options.small else 3, options.small),
+                    "cores": lambda: all_cores(table, binary, folder, 1 if options.small else 3, options.small),
                     "engine": lambda: engine_parts(table, build, options.small),
                     "remote": lambda: remote(table, build, folder, options.small),
                     "reduce": lambda: reduction(table, binary, options.small)}

@@ -1,11 +1,14 @@
 """A model of ten thousand bodies is of use to clients with the limits that their libraries have by default."""
 import asyncio
+import os
+import subprocess
 
 import numpy as np
 import pytest
 
 import mbcosim
 import mbcosim.aio
+from conftest import BIN, Daemon
 from test_geometry import CHAIN
 
 BODIES = 10_000
@@ -46,3 +49,41 @@ def test_from_asyncio(default_limits, daemon):
             look_at(await simulation.describe(), await simulation.geometry(), linear, result.values[X])
 
     asyncio.run(main())
+
+
+MOVING = CHAIN.format(n=1000).replace("real(k), 0., 0.", "1.01*real(k), 0., 0.").replace("final time: 1.", "final time: 3.e-3")
+
+
+def test_threads_of_a_daemon_change_no_bit(tmp_path):
+    names = [f"node.structural.{k}.{what}" for k in (2, 500, 1000) for what in ("X", "XP", "R")]
+
+    def moved(threads):
+        folder = tmp_path / str(threads)
+        folder.mkdir()
+        running = Daemon(str(folder), "--threads", str(threads))
+        try:
+            with running.connect() as server, server.load_text(MOVING) as simulation:
+                values = simulation.step(3, outputs=names).values
+                assert abs(values["node.structural.2.XP"][0]) > 0
+                return b"".join(values[name].tobytes() for name in names)
+        finally:
+            running.stop()
+
+    assert moved(1) == moved(2) == moved(3)
+
+
+def test_threads_of_a_run_change_no_byte(tmp_path):
+    (tmp_path / "deck.mbd").write_text(MOVING)
+
+    def run(*options):
+        return subprocess.run([os.path.join(BIN, "mbcosim"), "run", "deck.mbd", *options], cwd=tmp_path, capture_output=True, text=True, timeout=300,
+                              check=False)
+
+    for prefix, options in (("one", ["--threads", "1"]), ("two", ["--threads", "2"]), ("all", [])):
+        done = run("-o", prefix, *options)
+        assert done.returncode == 0, done.stderr
+    for ending in ("mov", "jnt", "ine"):
+        assert (tmp_path / f"one.{ending}").read_bytes() == (tmp_path / f"two.{ending}").read_bytes() == (tmp_path / f"all.{ending}").read_bytes()
+    refused = run("-o", "none", "--threads", "0")
+    assert refused.returncode != 0 and "--threads" in refused.stderr
+    assert not (tmp_path / "none.mov").exists()
