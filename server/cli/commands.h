@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -20,6 +21,11 @@ enum ExitCode {
   kInternalError = 6,  ///< a mistake of this program
   kInterrupted = 130
 };
+
+/// 0: as many as the machine has.
+inline int threads_or_all(int wanted) {
+  return wanted > 0 ? wanted : static_cast<int>(std::thread::hardware_concurrency());
+}
 
 struct RunOptions {
   std::string deck;  ///< path of the main file

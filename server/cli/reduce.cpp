@@ -1,7 +1,6 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <thread>
 
 #include "cli/commands.h"
 #include "cli/fem_file.h"
@@ -80,8 +79,7 @@ int reduce_model(const ReduceCommand& command) {
   Error error;
   try {
     ReductionJob job = read_command(command);
-    job.options.threads =
-        command.threads > 0 ? command.threads : int(std::thread::hardware_concurrency());
+    job.options.threads = threads_or_all(command.threads);
     const std::string folder = fs::path(command.job).parent_path().string();
     const FeModel model = load_model(job, [&](const std::string& name) {
       return read_file(folder.empty() ? "." : folder, name);

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <thread>
 
 #include "cli/commands.h"
 #include "cli/deck_report.h"
@@ -50,15 +49,10 @@ ExitCode complain(const Error& error) {
   return exit_code_of(error);
 }
 
-int threads_of(const RunOptions& options) {
-  return options.threads > 0 ? options.threads
-                             : static_cast<int>(std::thread::hardware_concurrency());
-}
-
 ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& writer,
                   const CancelToken* cancel, const RunOptions& options) {
   const auto simulation = Simulation::prepare(model, writer);
-  simulation->set_threads(threads_of(options));
+  simulation->set_threads(threads_or_all(options.threads));
   if (const auto started = simulation->start(cancel); !started) return complain(started.error());
   if (simulation->finished()) {
     std::fprintf(stderr,
@@ -85,7 +79,7 @@ ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWri
                           const InterruptGuard& interrupt, const RunOptions& options) try {
   const CancelToken* cancel = interrupt.token();
   const auto simulation = Simulation::prepare(model, writer);
-  simulation->set_threads(threads_of(options));
+  simulation->set_threads(threads_or_all(options.threads));
   mbdyn::Patience patience;
   patience.time = std::chrono::milliseconds(std::llround(1000 * options.peer_timeout));
   patience.cancelled = [cancel] { return cancel->cancelled(); };

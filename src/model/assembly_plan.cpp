@@ -1,5 +1,6 @@
 #include "model/assembly_plan.h"
 
+#include <algorithm>
 #include <bit>
 #include <numeric>
 
@@ -51,10 +52,9 @@ AssemblyPlan::AssemblyPlan(const Model& model) {
       const ElementRange range = elements(tile, set->size());
       for (int i = range.first; i < range.last; ++i) set->append_rows(model, i, rows);
     }
-    const int wave = wave_of[tile] = waves.of(rows);
-    if (wave + 2 > static_cast<int>(wave_start_.size())) wave_start_.resize(wave + 2, 0);
+    wave_of[tile] = waves.of(rows);
   }
-  wave_start_.assign(wave_start_.size(), 0);
+  wave_start_.assign(*std::max_element(wave_of.begin(), wave_of.end()) + 2, 0);
   for (const int wave : wave_of) ++wave_start_[wave + 1];
   std::partial_sum(wave_start_.begin(), wave_start_.end(), wave_start_.begin());
   std::vector<int> next(wave_start_.begin(), wave_start_.end() - 1);

@@ -94,7 +94,7 @@ int narrowest(const Levels& levels) {
 
 std::optional<std::vector<int>> bisected_order(const SparsePattern& pattern, double operations) {
   constexpr double kNarrow = 0.02;  // operations at the cut, of all: they are done by one thread
-  constexpr double kMore = 1.1;     // operations that are worth it
+  constexpr double kMore = 1.1;     // times the operations
   const Graph graph(pattern);
   const int n = graph.size();
   if (n == 0) return std::nullopt;

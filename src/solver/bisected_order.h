@@ -11,8 +11,9 @@ namespace mbcosim {
 /// Cuts the graph of A + Aᵀ (n, square, without a hole) at its narrowest place near the middle,
 /// and orders by minimum degree such that those at the cut come last: the halves can then be
 /// eliminated at the same time. Position k of the result: what is eliminated k-th. Nothing where
-/// there is no narrow place (chains have one, solids have none), or where more than `operations`
-/// multiplications and divisions and some would be needed.
+/// there is no narrow place (chains have one, solids have none), or where the elimination would
+/// take more than 1.1 `operations`: two for a multiplication and subtraction, one for a division,
+/// as KLU counts them.
 ///
 /// Levels of a breadth-first search from an end of the graph: George and Liu, "Computer Solution of
 /// Large Sparse Positive Definite Systems", 1981, chapters 4 and 8. Order under constraints: CAMD

@@ -19,7 +19,6 @@ constexpr double kPoorGrowth =
     1e-9;  ///< reciprocal pivot growth below which the kept pivots are given up
 constexpr double kSuspicious =
     1e-3;  ///< ratio of pivots, against the reference matrix, below which growth is looked at
-constexpr int kLarge = 6000;   ///< unknowns of a matrix that several threads may factor
 constexpr double kLong = 1e9;  ///< operations of a factorization that may have to be stopped
 
 SparsePattern united(int n, const std::vector<int>& column_start, const std::vector<int>& row_index,
@@ -61,7 +60,7 @@ struct LinearSolver::Klu {
     klu_symbolic* wide =
         klu_analyze(n, couplings.column_start.data(), couplings.row_index.data(), &common);
     if (!wide) return;
-    if (n >= kLarge) bisect(couplings, *wide);
+    if (n >= 2 * kUnknownsPerThread) bisect(couplings, *wide);
     symbolic =
         klu_analyze_given(n, column_start.data(), row_index.data(), wide->P, wide->Q, &common);
     if (wide->est_flops > kLong) common.memgrow = 1.02;  // KLU can be stopped where it allocates

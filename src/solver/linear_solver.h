@@ -37,6 +37,10 @@ class LinearSolver {
   /// the next residual shows, and the factors have fewer entries.
   static constexpr double kAccuratePivots = 0.1, kNewtonPivots = 1e-3;
 
+  /// Unknowns for each thread of a team: with fewer, threads would wait for each other. Smaller
+  /// matrices than of two threads are not ordered for them.
+  static constexpr int kUnknownsPerThread = 3000;
+
   /// Asked while factoring.
   void set_watch(const Watch& watch) { watch_ = watch; }
   /// Threads that share the work on matrices that are analyzed from now on, for as long as there is

@@ -5,8 +5,8 @@
 namespace mbcosim {
 
 void Workspace::set_threads(int threads) {
-  constexpr int kUnknowns = 3000;  // for each thread: with fewer they wait for each other
-  const int most = std::min(threads, static_cast<int>(residual.size()) / kUnknowns);
+  const int worth = static_cast<int>(residual.size()) / LinearSolver::kUnknownsPerThread;
+  const int most = std::min(threads, worth);
   evaluators = most > 1 ? std::make_unique<Evaluators>(most, scratch) : nullptr;
   solver.set_team(team());
 }

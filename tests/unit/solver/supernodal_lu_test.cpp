@@ -243,6 +243,14 @@ TEST(SupernodalLu, SeveralThreadsGiveTheBitsOfOne) {
         Dense invalid = matrices[0];
         invalid(half / 2, half / 2) = NAN;
         EXPECT_FALSE(lu.factor(Sparse(invalid).values.data(), Watch(), &team));
+        CancelToken cancelled;
+        cancelled.cancel();
+        const Sparse values(matrices[1]);
+        EXPECT_THROW(lu.factor(values.values.data(), Watch(&cancelled), &team), Stopped);
+        ASSERT_TRUE(lu.factor(values.values.data(), Watch(), &team));  // nothing was left behind
+        Vector x = Vector::LinSpaced(n, 1, 2);
+        lu.solve(x.data());
+        EXPECT_EQ(x, solutions[0].tail(n));
       }
       for (const Vector& x : solutions) EXPECT_EQ(x, solutions[0]) << half;
     }
