@@ -726,25 +726,23 @@ def test_only_the_owner_may_block_and_is_named(guarded):
 
 
 def test_450_idle_subscribers_do_not_stop_a_run(daemon):
-    """How little they cost is a matter of benchmarks (idle_subscribers.py); when each sample went to each of them the same steps took
-    two hundred times as long as without."""
+    """What they do not read is dropped and counted, not waited for. How little that costs is a matter of benchmarks
+    (idle_subscribers.py)."""
     with grpc.insecure_channel(daemon.address) as channel:
         stub = simulations_pb2_grpc.SimulationsStub(channel)
         name = stub.CreateSimulation(iter(upload(decks.body(final_time="1.e9")))).simulation.name
-
-        def seconds():
-            begun = time.monotonic()
-            assert stub.Step(pb.StepRequest(simulation=name, steps=20000), timeout=60 * TIME_FACTOR).steps_done == 20000
-            return time.monotonic() - begun
-
-        before = seconds()
         request = telemetry_pb2.SubscribeRequest(simulation=name, handles=list(range(6)))
         watchers = [telemetry_pb2_grpc.TelemetryStub(channel).Subscribe(request) for _ in range(450)]
         for watcher in watchers:
             next(watcher)
-        watched = min(seconds() for _ in range(3))  # the first one fills the subscribers' windows
+        assert stub.Step(pb.StepRequest(simulation=name, steps=60000), timeout=60 * TIME_FACTOR).steps_done == 60000
+        for watcher in watchers[::50]:
+            received, step = 0, 0
+            while step < 60000:
+                reply = next(watcher)
+                received += len(reply.samples)
+                step = reply.samples[-1].step if reply.samples else step
+            assert received + reply.total_dropped == 60000 and reply.total_dropped > 30000
         for watcher in watchers:
             watcher.cancel()
-        without = max(before, seconds())
-        assert watched < 4 * without
         stub.DeleteSimulation(pb.DeleteSimulationRequest(simulation=name))
