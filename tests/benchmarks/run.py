@@ -9,7 +9,8 @@ usage: run.sh [--build FOLDER] [--peer "REF -s -f {deck} -o {prefix}"] [--decks 
   parts       of the tutorials' runs, by the engine alone: reading, initial phases, residuals, matrices, factorizations, solutions, the rest
               of the steps, text of the results [ms], allocations, memory [MB]
   beams       cantilevers of three-node beams and grids of two-node beams: one Newton iteration of a process, and its memory;
-              of the cantilevers also the parts of an iteration, by the engine alone
+              of the cantilevers also the parts of an iteration, by the engine alone; of the grids the process without its iterations,
+              where the order of elimination and pivots are chosen
   cores       wall time of a Newton iteration of a process on all cores of the machine, beside that on one
   remote      a step over a stream beside an empty echo, Unix socket and TCP, and 1000 simulations in turn (remote_step, when it is
               built)
@@ -151,7 +152,8 @@ def parts_of_runs(table, build, decks):
 
 
 def iteration_costs(solvers, model, folder, repeat, clock=0):
-    """Of each solver a Newton iteration [ms] by `clock` (0: processor, 1: wall), the runs of the longer one, and the iterations."""
+    """Of each solver a Newton iteration [ms] by `clock` (0: processor, 1: wall), the rest of a process [ms], the runs of the longer
+    one, and the iterations between both."""
     runs = []
     for steps in (5, 25):
         deck = pathlib.Path(folder) / "beams.mbd"
@@ -159,7 +161,7 @@ def iteration_costs(solvers, model, folder, repeat, clock=0):
         runs.append(solvers.run(deck, folder, repeat))
     (first, few), (second, many) = runs
     costs = [(b[clock] - a[clock]) / max(1, m - f) * 1e3 for a, b, f, m in zip(first, second, few, many)]
-    return costs, second, many[0] - few[0]
+    return costs, [a[clock] * 1e3 - f * cost for a, f, cost in zip(first, few, costs)], second, many[0] - few[0]
 
 
 def cantilevers(sizes):
@@ -178,9 +180,11 @@ def beams(table, solvers, folder, repeat, small):
     for shape in ([(5, 5)] if small else [(100, 100), (20, 20, 20)]):
         models.append((f"grid of {' x '.join(map(str, shape))}", lambda steps, shape=shape: beam_models.grid(shape, steps)))
     for name, model in models:
-        costs, runs, iterations = iteration_costs(solvers, model, folder, repeat)
+        costs, rest, runs, iterations = iteration_costs(solvers, model, folder, repeat)
         memory = {f"{who}_MB": run[2] for who, run in zip(("ours", "peer"), runs)}
         table.add(f"{name}, an iteration", "ms", costs[0], *costs[1:], iterations=iterations, **memory)
+        if name.startswith("grid"):
+            table.add(f"{name}, rest of a process", "ms", *rest)
 
 
 def engine_parts(table, build, small):
