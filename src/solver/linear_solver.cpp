@@ -44,13 +44,18 @@ struct LinearSolver::Klu {
   std::unique_ptr<SupernodalLu> kept;  ///< with the kept pivots
   klu_numeric* fresh = nullptr;        ///< of the last matrix, when the kept pivots were poor
   enum class Current { none, kept, fresh } current = Current::none;
-  double kept_ratio = 0;  ///< smallest to largest pivot of the reference matrix
-  bool ordered = false;   ///< both orderings were compared
+  double kept_ratio = 0;      ///< smallest to largest pivot of the reference matrix
+  double expected_flops = 0;  ///< operations of AMD's order, with all pivots on the diagonal
+  bool ordered = false;       ///< both orderings were compared
 
   explicit Klu(double pivot_tolerance) {
     klu_defaults(&common);
     common.tol = pivot_tolerance;
     common.halt_if_singular = 1;
+  }
+  void expect(double flops) {
+    expected_flops = flops;
+    if (flops > kLong) common.memgrow = 1.02;  // KLU can be stopped where it allocates
   }
   /// Orders by AMD of A + Aᵀ with `couplings` in the place of A. AMD of the matrix itself would
   /// take multipliers, which have few entries, first, and as their diagonals vanish the pivots
@@ -63,7 +68,7 @@ struct LinearSolver::Klu {
     if (n >= 2 * kUnknownsPerThread) bisect(couplings, *wide);
     symbolic =
         klu_analyze_given(n, column_start.data(), row_index.data(), wide->P, wide->Q, &common);
-    if (wide->est_flops > kLong) common.memgrow = 1.02;  // KLU can be stopped where it allocates
+    expect(wide->est_flops);
     klu_free_symbolic(&wide, &common);
   }
   /// Orders the largest block for two threads, where that costs nothing. The order depends on the
@@ -96,20 +101,23 @@ struct LinearSolver::Klu {
   }
   /// Looks once whether COLAMD orders the columns for fewer operations than AMD of A + Aᵀ, which
   /// `numeric` was made with, when that filled the factors: chains suit AMD, mechanisms with many
-  /// loops COLAMD.
+  /// loops COLAMD. COLAMD bears pivots anywhere, which is of use where those found have spoilt the
+  /// order of AMD; where they have not, a long factorization is not done a second time.
   void choose_ordering(int n, int* column_start, int* row_index, double* values,
                        klu_numeric*& numeric) {
     constexpr double kFilled = 20,
                      kWorthwhile = 0.8;  // operations an entry of the factors; chains have 10 to 14
     if (ordered) return;
     ordered = true;
-    if (operations(symbolic, numeric) < kFilled * entries(numeric)) return;
+    const double found = operations(symbolic, numeric);
+    if (found < kFilled * entries(numeric)) return;
+    if (found > kLong && kWorthwhile * found <= expected_flops) return;
     common.ordering = 1;
     klu_symbolic* other = klu_analyze(n, column_start, row_index, &common);
     common.ordering = 0;
     klu_numeric* factors =
         other ? klu_factor(column_start, row_index, values, other, &common) : nullptr;
-    if (factors && operations(other, factors) < kWorthwhile * operations(symbolic, numeric)) {
+    if (factors && operations(other, factors) < kWorthwhile * found) {
       std::swap(symbolic, other);
       std::swap(numeric, factors);
     }
@@ -227,6 +235,7 @@ bool LinearSolver::select(const std::vector<bool>& kind) {
 void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
   const Klu& first = *kinds_[0].klu;
   auto klu = std::make_unique<Klu>(pivot_tolerance_);
+  klu->expect(first.expected_flops);
   if (n_ > 0 && first.symbolic)
     klu->symbolic = klu_analyze_given(n_, column_start_.data(), row_index_.data(),
                                       first.symbolic->P, first.symbolic->Q, &klu->common);
