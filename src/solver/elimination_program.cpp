@@ -24,62 +24,67 @@ inline void for_run(int count, Use use) {
   if (i < count) use.template operator()<1>(i);
 }
 
-/// Those of each level behind each other, within a level in the order in which they were given.
-/// Where each level ends.
+/// `all` level by level, within a level in the order in which they were given. Where each level
+/// ends.
 template <class Operation>
-std::vector<std::size_t> sort_by_level(std::vector<Operation>& all, std::vector<int>& level,
-                                       std::size_t levels) {
+std::vector<std::size_t> sort_by_level(const std::deque<Operation>& all,
+                                       const std::deque<int>& level, std::size_t levels,
+                                       std::vector<Operation>& sorted) {
   std::vector<std::size_t> at(levels + 1, 0);
   for (const int each : level) ++at[each + 1];
   std::partial_sum(at.begin(), at.end(), at.begin());
-  std::vector<Operation> sorted(all.size());
-  for (std::size_t k = 0; k < all.size(); ++k) sorted[at[level[k]]++] = all[k];
-  all = std::move(sorted);
-  level = {};
+  sorted.resize(all.size());
+  auto of = level.begin();
+  for (const Operation& each : all) sorted[at[*of++]++] = each;
   return at;
 }
 
 }  // namespace
 
 void EliminationProgram::set(std::size_t target, int value, double scale) {
-  entries_.push_back({value, place(target), scale});
+  draft_->entries.push_back({value, place(target), scale});
 }
 
 /// The first one after which none of them changes the order of what is done with them.
 int EliminationProgram::level_of_targets(std::size_t target, std::size_t count) const {
   int level = 0;
   for (std::size_t i = target; i < target + count; ++i)
-    level = std::max({level, ready_[i], read_[i]});
+    level = std::max({level, draft_->uses[i].ready, draft_->uses[i].read});
   return level;
 }
 
 void EliminationProgram::subtract_products(std::size_t target, std::size_t factor,
                                            std::size_t count, std::size_t other) {
-  int level = std::max(level_of_targets(target, count), ready_[other]);
-  for (std::size_t i = factor; i < factor + count; ++i) level = std::max(level, ready_[i]);
-  std::fill_n(ready_.begin() + static_cast<std::ptrdiff_t>(target), count, level);
-  for (std::size_t i = factor; i < factor + count; ++i) read_[i] = std::max(read_[i], level);
-  read_[other] = std::max(read_[other], level);
-  products_.push_back({place(target), place(factor), place(other), place(count)});
-  level_of_products_.push_back(level);
+  std::vector<Uses>& uses = draft_->uses;
+  int level = std::max(level_of_targets(target, count), uses[other].ready);
+  for (std::size_t i = factor; i < factor + count; ++i) level = std::max(level, uses[i].ready);
+  for (std::size_t i = target; i < target + count; ++i) uses[i].ready = level;
+  for (std::size_t i = factor; i < factor + count; ++i)
+    uses[i].read = std::max(uses[i].read, level);
+  uses[other].read = std::max(uses[other].read, level);
+  draft_->products.push_back({place(target), place(factor), place(other), place(count)});
+  draft_->level_of_products.push_back(level);
 }
 
 void EliminationProgram::divide(std::size_t target, std::size_t count, std::size_t pivot) {
-  const int level = std::max(level_of_targets(target, count), ready_[pivot]);
-  std::fill_n(ready_.begin() + static_cast<std::ptrdiff_t>(target), count, level + 1);
-  read_[pivot] = std::max(read_[pivot], level + 1);
-  quotients_.push_back({place(target), place(pivot), place(count)});
-  level_of_quotients_.push_back(level);
+  std::vector<Uses>& uses = draft_->uses;
+  const int level = std::max(level_of_targets(target, count), uses[pivot].ready);
+  for (std::size_t i = target; i < target + count; ++i) uses[i].ready = level + 1;
+  uses[pivot].read = std::max(uses[pivot].read, level + 1);
+  draft_->quotients.push_back({place(target), place(pivot), place(count)});
+  draft_->level_of_quotients.push_back(level);
 }
 
 void EliminationProgram::finish() {
-  const std::size_t levels =
-      ready_.empty() ? 0 : *std::max_element(ready_.begin(), ready_.end()) + 1;
-  const auto products = sort_by_level(products_, level_of_products_, levels);
-  const auto quotients = sort_by_level(quotients_, level_of_quotients_, levels);
+  std::size_t levels = 0;
+  for (const Uses& each : draft_->uses) levels = std::max<std::size_t>(levels, each.ready + 1);
+  entries_.assign(draft_->entries.begin(), draft_->entries.end());
+  const auto products =
+      sort_by_level(draft_->products, draft_->level_of_products, levels, products_);
+  const auto quotients =
+      sort_by_level(draft_->quotients, draft_->level_of_quotients, levels, quotients_);
   for (std::size_t k = 0; k < levels; ++k) ends_.push_back({products[k], quotients[k]});
-  ready_ = {};
-  read_ = {};
+  draft_.reset();
 }
 
 void EliminationProgram::run(const double* values, double* numbers) const {

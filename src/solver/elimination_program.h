@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <optional>
 #include <vector>
 
 namespace mbcosim {
@@ -20,7 +22,7 @@ namespace mbcosim {
 class EliminationProgram {
  public:
   /// `numbers`: of F.
-  explicit EliminationProgram(std::size_t numbers) : ready_(numbers, 0), read_(numbers, 0) {}
+  explicit EliminationProgram(std::size_t numbers) { draft_.emplace().uses.resize(numbers); }
   /// `value`: which of those that `run` gets.
   void set(std::size_t target, int value, double scale);
   /// Of `count` numbers each, none of which is `other`; runs do not overlap.
@@ -48,17 +50,26 @@ class EliminationProgram {
   struct Range {
     std::size_t products = 0, quotients = 0;  ///< ends
   };
+  /// Of a number, as levels.
+  struct Uses {
+    int ready = 0;  ///< in which it can be used
+    int read = 0;   ///< the last one in which it is needed as it is
+  };
+  /// Until `finish`. What grows is not moved: for a large matrix that would take most of the time.
+  struct Draft {
+    std::vector<Uses> uses;  ///< by number
+    std::deque<Entry> entries;
+    std::deque<Products> products;
+    std::deque<Quotients> quotients;
+    std::deque<int> level_of_products, level_of_quotients;
+  };
   int level_of_targets(std::size_t target, std::size_t count) const;
 
   std::vector<Entry> entries_;
   std::vector<Products> products_;
   std::vector<Quotients> quotients_;
   std::vector<Range> ends_;
-
-  // until `finish`
-  std::vector<int> ready_;  ///< by number: the level in which it can be used
-  std::vector<int> read_;   ///< the last one in which it is needed as it is
-  std::vector<int> level_of_products_, level_of_quotients_;
+  std::optional<Draft> draft_;
 };
 
 }  // namespace mbcosim

@@ -136,10 +136,12 @@ struct LinearSolver::Klu {
     p.block_start.resize(symbolic->nblocks + 1);
     p.lower_row.resize(numeric->lnz);
     p.upper_row.resize(numeric->unz);
-    std::vector<double> lower(numeric->lnz), upper(numeric->unz);
+    // Not looked at, and KLU gives no pattern without them.
+    const auto lower = std::make_unique_for_overwrite<double[]>(numeric->lnz),
+               upper = std::make_unique_for_overwrite<double[]>(numeric->unz);
     klu_sort(symbolic, numeric, &common);
-    klu_extract(numeric, symbolic, p.lower_start.data(), p.lower_row.data(), lower.data(),
-                p.upper_start.data(), p.upper_row.data(), upper.data(), nullptr, nullptr, nullptr,
+    klu_extract(numeric, symbolic, p.lower_start.data(), p.lower_row.data(), lower.get(),
+                p.upper_start.data(), p.upper_row.data(), upper.get(), nullptr, nullptr, nullptr,
                 p.row_of.data(), p.column_of.data(), nullptr, p.block_start.data(), &common);
     return p;
   }
@@ -197,13 +199,13 @@ LinearSolver::Outcome LinearSolver::without_factors(const Klu& k) {
   return Outcome::singular;
 }
 
-LinearSolver::Outcome LinearSolver::analyze(double* values) {
+LinearSolver::Outcome LinearSolver::analyze(double* values, Matrices matrices) {
   if (n_ == 0) return Outcome::ok;
   if (klu_ == kinds_[0].klu.get()) kinds_.resize(1);  // others belong to another first matrix
-  return analyze(*klu_, values);
+  return analyze(*klu_, values, matrices);
 }
 
-LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values) {
+LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values, Matrices matrices) {
   singular_column_ = -1;
   k.kept.reset();
   k.current = Klu::Current::none;
@@ -214,9 +216,11 @@ LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values) {
   watch_.look();
   k.choose_ordering(n_, column_start_.data(), row_index_.data(), values, factors.get());
   watch_.look();
-  k.kept =
-      std::make_unique<SupernodalLu>(column_start_, row_index_, values, k.pattern(factors.get()),
-                                     LuOptions{.threads = team_ ? team_->size() : 1});
+  LuOptions options;
+  if (matrices == Matrices::few) options.listed = 0;
+  if (team_) options.threads = team_->size();
+  k.kept = std::make_unique<SupernodalLu>(column_start_, row_index_, values,
+                                          k.pattern(factors.get()), options);
   if (!k.kept->factor(values, watch_, team_)) return Outcome::failed;
   k.kept_ratio = k.kept->pivot_ratio();
   k.current = Klu::Current::kept;
@@ -239,7 +243,7 @@ void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
   if (n_ > 0 && first.symbolic)
     klu->symbolic = klu_analyze_given(n_, column_start_.data(), row_index_.data(),
                                       first.symbolic->P, first.symbolic->Q, &klu->common);
-  if (!values || analyze(*klu, values) != Outcome::ok) klu = nullptr;
+  if (!values || analyze(*klu, values, Matrices::many) != Outcome::ok) klu = nullptr;
   kinds_.push_back({kind, std::move(klu)});
   select(kind);
 }

@@ -50,8 +50,10 @@ class LinearSolver {
   std::size_t bytes() const;
 
   enum class Outcome { ok, singular, failed };
+  /// How many matrices the pivots are for: what makes each of many faster costs as much as dozens.
+  enum class Matrices { few, many };
   /// Chooses the pivots on these values; for the first kind, all others are forgotten.
-  Outcome analyze(double* values);
+  Outcome analyze(double* values, Matrices matrices = Matrices::many);
   /// Matrices may be of several kinds that do not share pivots, each named by a sequence of flags;
   /// the empty one is the first. Makes a kind current; false when it is not known.
   bool select(const std::vector<bool>& kind);
@@ -73,7 +75,7 @@ class LinearSolver {
     std::vector<bool> flags;
     std::unique_ptr<Klu> klu;  ///< null: that of the first kind
   };
-  Outcome analyze(Klu& k, double* values);
+  Outcome analyze(Klu& k, double* values, Matrices matrices);
   Outcome without_factors(const Klu& k);
 
   Watch watch_;

@@ -193,7 +193,7 @@ PhaseReport Stepper::solve_derivatives(State& state) {
     state = start;
     const EvalContext context = model_.context(state, Phase::derivatives, c, c);
     compute_jacobian(context, workspace_);
-    workspace_.solver.analyze(workspace_.values.data());
+    workspace_.solver.analyze(workspace_.values.data(), LinearSolver::Matrices::few);
     InstantSystem system(model_, Phase::derivatives, c, c, state, workspace_);
     report.newton = solve_newton(system, settings, hooks);
     if (report.newton.outcome == NewtonOutcome::converged)

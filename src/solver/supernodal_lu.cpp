@@ -106,6 +106,7 @@ void SupernodalLu::find_supernodes(const FactorPattern& factors) {
 
 /// A row of U within a supernode implies all later ones of it, as they are in its column of L.
 void SupernodalLu::find_segments(const FactorPattern& factors) {
+  upper_row_.reserve(factors.upper_row.size());
   segment_start_.push_back(0);
   upper_start_.push_back(0);
   for (int k = 0; k < n_; ++k) {

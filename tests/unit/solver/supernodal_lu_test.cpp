@@ -341,6 +341,27 @@ TEST(LinearSolver, KeepsPivotsForMatricesOfOnePattern) {
   }
 }
 
+TEST(LinearSolver, GivesTheSameBitsForFewMatricesAsForMany) {
+  const int n = 60;
+  Family family(n, .05, {0, 1, 20, 21, n}, 3);
+  Sparse reference(family.matrix());
+  LinearSolver few(n, reference.column_start, reference.row_index),
+      many(n, reference.column_start, reference.row_index);
+  ASSERT_EQ(few.analyze(reference.values.data(), LinearSolver::Matrices::few),
+            LinearSolver::Outcome::ok);
+  ASSERT_EQ(many.analyze(reference.values.data()), LinearSolver::Outcome::ok);
+  EXPECT_LT(few.bytes(), many.bytes()) << "nothing is listed";
+  for (int k = 0; k < 3; ++k) {
+    Sparse sparse(family.matrix());
+    ASSERT_EQ(few.factor(sparse.values.data()), LinearSolver::Outcome::ok);
+    ASSERT_EQ(many.factor(sparse.values.data()), LinearSolver::Outcome::ok);
+    Vector x = family.vector(), y = x;
+    few.solve(x.data());
+    many.solve(y.data());
+    EXPECT_EQ(x, y);
+  }
+}
+
 /// As of a modal body: `modes` unknowns q with p − q̇ = 0, a full block between p, a border of full
 /// rows and columns of which the last have no diagonal, and a chain of sparse unknowns.
 Dense modal_matrix(std::mt19937& random) {
