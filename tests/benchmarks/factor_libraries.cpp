@@ -15,71 +15,20 @@
 ///
 /// Debian's packages are libmumps-seq-5.5 libmumps-headers-dev libmetis5 libarpack2; MUMPS is as
 /// fast as its BLAS, such as that of libopenblas0-serial.
-#include <dlfcn.h>
-#include <sys/resource.h>
-
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <numeric>
 
+#include "libraries.h"
+#include "mumps.h"
 #include "reduction/job.h"
 #include "reduction/structure.h"
 
-#if __has_include(<dmumps_c.h>)
-#include <dmumps_c.h>
-#define HAS_MUMPS
-#endif
-
 using namespace mbcosim;
+using namespace mbcosim::benchmarks;
 
 namespace {
-
-double processor_time() {
-  rusage u;
-  getrusage(RUSAGE_SELF, &u);
-  return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
-         1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
-long memory_mb() {
-  rusage u;
-  getrusage(RUSAGE_SELF, &u);
-  return u.ru_maxrss / 1024;
-}
-
-[[noreturn]] void give_up(const std::string& message) {
-  std::fprintf(stderr, "%s\n", message.c_str());
-  std::exit(1);
-}
-
-template <class Function>
-Function* loaded(const char* library, const char* name) {
-  void* const handle = dlopen(library, RTLD_NOW | RTLD_LOCAL);
-  void* const function = handle ? dlsym(handle, name) : nullptr;
-  if (!function) give_up(dlerror());
-  return reinterpret_cast<Function*>(function);
-}
-
-/// One line of JSON.
-class Report {
- public:
-  void add(const char* name, double value) {
-    std::printf("%s\"%s\": %.4g", first_ ? "{" : ", ", name, value);
-    first_ = false;
-  }
-  template <class Work>
-  void time(const char* name, const Work& work) {
-    const double before = processor_time();
-    work();
-    add(name, processor_time() - before);
-  }
-  void end() const { std::printf("}\n"); }
-
- private:
-  bool first_ = true;
-};
 
 FeModel read_model(const std::string& folder) {
   ReductionJob job;
@@ -174,23 +123,12 @@ void measure_ours(const std::string& processor, const SparseMatrix& matrix, cons
 #ifdef HAS_MUMPS
 void measure_mumps(const std::string& method, const SparseMatrix& matrix, const RowPlaces& places,
                    Report& report) {
-  const auto call = loaded<void(DMUMPS_STRUC_C*)>("libdmumps_seq-5.5.so", "dmumps_c");
   const VecX one = VecX::Ones(matrix.rows());
   VecX x = matrix * one;
   MatX many = x.replicate(1, 12);
   const long before = memory_mb();
-  DMUMPS_STRUC_C id;
-  std::memset(&id, 0, sizeof id);
-  const auto run = [&](int job) {
-    id.job = job;
-    call(&id);
-    if (id.infog[0] < 0) give_up("MUMPS: error " + std::to_string(id.infog[0]));
-  };
-  id.par = 1;
-  id.sym = 1;  // positive definite
-  id.comm_fortran = -987654;
-  run(-1);
-  for (int k = 0; k < 4; ++k) id.icntl[k] = 0;  // prints nothing
+  Mumps mumps(1);
+  DMUMPS_STRUC_C& id = mumps.id;
   std::vector<int> i, j, place(matrix.rows());
   std::vector<double> a;
   for (int c = 0; c < matrix.outerSize(); ++c)
@@ -210,20 +148,18 @@ void measure_mumps(const std::string& method, const SparseMatrix& matrix, const 
     for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<int>(k) + 1;
     id.icntl[6] = 1;  // the order is given
     id.perm_in = place.data();
-    run(1);
+    mumps.run(1);
   });
-  report.time("factor", [&] { run(2); });
+  report.time("factor", [&] { mumps.run(2); });
   report.add("entries", id.infog[28] < 0 ? -1e6 * id.infog[28] : id.infog[28]);
-  id.nrhs = 1;
   id.lrhs = id.n;
   id.rhs = x.data();
-  report.time("solve", [&] { run(3); });
+  report.time("solve", [&] { mumps.run(3); });
   id.nrhs = 12;
   id.rhs = many.data();
-  report.time("solve 12", [&] { run(3); });
+  report.time("solve 12", [&] { mumps.run(3); });
   report.add("memory", double(memory_mb() - before));
   report.add("error", (x - one).cwiseAbs().maxCoeff());
-  run(-2);
 }
 #endif
 
