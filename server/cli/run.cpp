@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "cli/commands.h"
 #include "cli/deck_report.h"
+#include "cli/heap.h"
 #include "cli/pace.h"
 #include "cli/progress.h"
 #include "input/sources.h"
@@ -128,10 +130,22 @@ Status check_inputs(const std::vector<std::string>& read, const std::vector<std:
   return ok();
 }
 
+// Of a small model, clearing one huge page takes longer than all of its memory.
+constexpr std::uintmax_t kLongDeck = 32 << 10;  ///< [bytes]
+constexpr int kManyUnknowns = 500;
+
+std::uintmax_t size_of(const std::string& file) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  return error ? 0 : size;
+}
+
 }  // namespace
 
 int run(const RunOptions& options) {
   InterruptGuard interrupt;
+  const bool is_long = size_of(options.deck) > kLongDeck;
+  if (is_long) keep_heap();
   std::vector<std::string> read;
   const LoadReport report = load_path(options.deck, options.symbols, &read);
   std::fputs(report.printed.c_str(), stdout);
@@ -141,6 +155,7 @@ int run(const RunOptions& options) {
     print_nothing_to_run(options.deck, Severity::error, stderr);
     return kDeckRefused;
   }
+  if (!is_long && report.model->unknowns > kManyUnknowns) keep_heap();
   const std::vector<const DeckChannel*> channels = deck_channels(*report.model);
   const bool coupled = options.deck_sockets && !channels.empty();
   for (const StructuralPort& port : report.model->structural_ports)

@@ -2,12 +2,11 @@
 """Processor time of rigid mechanisms, whole processes: small decks with all text files, then chains of growing length with
 the time of one Newton iteration and of the start against the number of bodies and the fitted exponents.
 
-usage: rigid_scaling.py BINARY [--sizes 10,100,1000,10000] [--repeat 3] [--limit 1.05] [--huge-pages]
+usage: rigid_scaling.py BINARY [--sizes 10,100,1000,10000] [--repeat 3] [--limit 1.05]
 
 The iterations of a step depend on the size only through the norm of the residual, which is not divided by the number of
 equations; hence the time of an iteration. The time is that of the processor (user and system), the best of the repeated
-runs; exponents are fitted on the sizes of 100 bodies and more. Fails when that of the iteration exceeds the limit. --huge-pages
-asks the C library for huge pages: without them large models also pay for looking up pages.
+runs; exponents are fitted on the sizes of 100 bodies and more. Fails when that of the iteration exceeds the limit.
 """
 import argparse
 import math
@@ -67,10 +66,7 @@ def main():
     parser.add_argument("--sizes", default="10,100,1000,10000")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--limit", type=float, default=1.05)
-    parser.add_argument("--huge-pages", action="store_true")
     options = parser.parse_args()
-    if options.huge_pages:
-        os.environ["GLIBC_TUNABLES"] = "glibc.malloc.hugetlb=1"
     sizes = [int(size) for size in options.sizes.split(",")]
     with tempfile.TemporaryDirectory() as folder:
         print(f"{'model':>14} {'process (ms)':>12} {'steps':>6} {'us a step':>10}")

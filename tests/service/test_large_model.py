@@ -8,7 +8,7 @@ import pytest
 
 import mbcosim
 import mbcosim.aio
-from conftest import BIN, Daemon
+from conftest import BIN, Daemon, counts_memory
 from test_geometry import CHAIN
 
 BODIES = 10_000
@@ -87,3 +87,14 @@ def test_threads_of_a_run_change_no_byte(tmp_path):
     refused = run("-o", "none", "--threads", "0")
     assert refused.returncode != 0 and "--threads" in refused.stderr
     assert not (tmp_path / "none.mov").exists()
+
+
+@counts_memory
+def test_a_run_keeps_the_memory_that_it_frees(tmp_path):
+    """Each page is asked for once: what the system gives comes near the largest memory, in huge pages even less often."""
+    (tmp_path / "deck.mbd").write_text(MOVING)
+    process = subprocess.Popen([os.path.join(BIN, "mbcosim"), "run", "deck.mbd", "--threads", "1"], cwd=tmp_path, stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0
+    assert used.ru_minflt * os.sysconf("SC_PAGESIZE") < 1.3 * used.ru_maxrss * 1024
