@@ -15,7 +15,6 @@
 ///
 /// Debian's packages are libmumps-seq-5.5 libmumps-headers-dev libmetis5 libarpack2; MUMPS is as
 /// fast as its BLAS, such as that of libopenblas0-serial.
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <numeric>
