@@ -6,7 +6,8 @@ namespace mbcosim::cli {
 /// Memory that is freed stays with the process, and it comes in huge pages where the kernel gives
 /// them on request (`madvise` in /sys/kernel/mm/transparent_hugepage/enabled): getting pages of
 /// 4 KB one by one takes longer than the first iterations of a model of some thousand unknowns.
-/// Nothing happens with another allocator than glibc's.
+/// Under a limit on addresses or data (setrlimit) pages stay small: the heap is not made wide
+/// enough beforehand. Nothing happens with another allocator than glibc's.
 void keep_heap();
 
 }  // namespace mbcosim::cli

@@ -1,6 +1,7 @@
 """A model of ten thousand bodies is of use to clients with the limits that their libraries have by default."""
 import asyncio
 import os
+import resource
 import subprocess
 
 import numpy as np
@@ -90,10 +91,13 @@ def test_threads_of_a_run_change_no_byte(tmp_path):
 
 
 @counts_memory
-def test_a_run_keeps_the_memory_that_it_frees(tmp_path):
-    """Each page is asked for once: what the system gives comes near the largest memory, in huge pages even less often."""
+@pytest.mark.parametrize("limit", [resource.RLIM_INFINITY, 4 << 30])
+def test_a_run_keeps_the_memory_that_it_frees(tmp_path, limit):
+    """Each page is asked for once: what the system gives comes near the largest memory, in huge pages, which a limit on addresses
+    forbids, even less often."""
     (tmp_path / "deck.mbd").write_text(MOVING)
-    process = subprocess.Popen([os.path.join(BIN, "mbcosim"), "run", "deck.mbd", "--threads", "1"], cwd=tmp_path, stdout=subprocess.DEVNULL)
+    process = subprocess.Popen([os.path.join(BIN, "mbcosim"), "run", "deck.mbd", "--threads", "1"], cwd=tmp_path, stdout=subprocess.DEVNULL,
+                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     assert process.returncode == 0
