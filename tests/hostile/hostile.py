@@ -196,10 +196,12 @@ def watch_both(bystander, attackers, seconds):
 
 
 def attack(kinds, places, seed, seconds):
+    """Each in a process group of its own, for `send`; not in a session of its own: Linux gives each session a share of the processor
+    (sched(7), autogroup), whatever the nice values in it."""
     rng = random.Random(seed)
     return {kind: subprocess.Popen([sys.executable, os.path.join(HERE, "attacks.py"), kind, *places, f"{kind}-token",
                                     str(rng.randrange(1 << 30)), str(seconds)], stdout=subprocess.PIPE, text=True,
-                                   start_new_session=True)
+                                   process_group=0)
             for kind in kinds}
 
 
