@@ -8,11 +8,12 @@ namespace mbcosim {
 namespace {
 
 // Two: one register of two numbers; six: three of them, the unknowns of a node.
-constexpr PanelVersion kPlain{"plain", kernels<2>(), kernels<6>()};
+constexpr PanelVersion kPlain{"plain", kernels<2>(), kernels<6>(), 2};
 
 std::vector<const PanelVersion*> versions_for_this_processor() {
   std::vector<const PanelVersion*> found = {&kPlain};
   if (kPanelVersionV3 && processor_level() >= 3) found.push_back(kPanelVersionV3);
+  if (kPanelVersionV4 && processor_level() >= 4) found.push_back(kPanelVersionV4);
   return found;
 }
 

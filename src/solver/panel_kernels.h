@@ -35,13 +35,20 @@ struct PanelKernels {
 struct PanelVersion {
   const char* processor;      ///< "x86-64-v3"
   PanelKernels narrow, wide;  ///< for a few columns, and for all that come together
+  int lanes;                  ///< numbers in a register
   const PanelKernels& of(int columns) const { return columns > narrow.columns ? wide : narrow; }
+  /// Of a product of a panel with so many columns, in operations on registers: those on X, and what
+  /// goes with them.
+  double cost_of(int columns) const {
+    constexpr double kOther = 0.5;
+    return columns == 1 ? 1 + kOther : kOther + (of(columns).columns + lanes - 1) / lanes;
+  }
 };
 
 /// The versions that this processor can run, the plainest first.
 const std::vector<const PanelVersion*>& panel_versions();
 
 /// The version of the build; null where the compiler has none for that processor.
-extern const PanelVersion* const kPanelVersionV3;
+extern const PanelVersion *const kPanelVersionV3, *const kPanelVersionV4;
 
 }  // namespace mbcosim

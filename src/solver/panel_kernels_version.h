@@ -14,6 +14,23 @@ namespace {
 template <int Columns>
 using Numbers = Eigen::Array<double, Columns, 1>;
 
+/// Columns of a panel between two looks at X: they stay in registers.
+#ifdef __AVX512F__
+constexpr int kDeep = 8;
+#else
+constexpr int kDeep = 4;
+#endif
+
+/// U := L⁻¹ U for the unit lower triangle that starts at `panel` (Width × Width).
+template <int Columns, int Width>
+inline void solve_triangle(const double* panel, std::ptrdiff_t stride, double* u) {
+  Numbers<Columns> of[Width];
+  for (int q = 0; q < Width; ++q) of[q] = Eigen::Map<const Numbers<Columns>>(u + q * Columns);
+  for (int q = 0; q < Width; ++q)
+    for (int p = q + 1; p < Width; ++p) of[p] -= panel[q * stride + p] * of[q];
+  for (int q = 1; q < Width; ++q) Eigen::Map<Numbers<Columns>>(u + q * Columns) = of[q];
+}
+
 /// X[row(i)] −= Σ_q panel(i, q) U[q] for count rows: each number of the panel is read once for all
 /// columns.
 template <int Columns, int Width, class Row>
@@ -29,39 +46,35 @@ inline void subtract_product(const double* panel, std::ptrdiff_t stride, int cou
   }
 }
 
-template <int Columns, class Row>
-inline void subtract_product(const double* panel, std::ptrdiff_t stride, int count, const double* u,
-                             int width, double* x, Row row) {
-  for (; width >= 4; width -= 4, panel += 4 * stride, u += 4 * Columns)
-    subtract_product<Columns, 4>(panel, stride, count, u, x, row);
-  if (width == 3) subtract_product<Columns, 3>(panel, stride, count, u, x, row);
-  if (width == 2) subtract_product<Columns, 2>(panel, stride, count, u, x, row);
-  if (width == 1) subtract_product<Columns, 1>(panel, stride, count, u, x, row);
-}
-
-/// U := L⁻¹ U for the unit lower triangle that starts at `panel` (width × width).
-template <int Columns>
-inline void solve_triangle(const double* panel, std::ptrdiff_t stride, double* u, int width) {
-  for (int q = 0; q + 1 < width; ++q, panel += stride + 1, u += Columns) {
-    const Numbers<Columns> of = Eigen::Map<const Numbers<Columns>>(u);
-    for (int p = 1; p < width - q; ++p)
-      Eigen::Map<Numbers<Columns>>(u + p * Columns) -= panel[p] * of;
-  }
-}
-
-template <int Columns>
+/// The first Width columns of the panel; of its own rows those after these columns.
+template <int Columns, int Width>
 inline void eliminate(const Panel& panel, double* x) {
   double* const u = x + std::ptrdiff_t{panel.first} * Columns;
-  if (panel.width > 1) solve_triangle<Columns>(panel.numbers, panel.stride, u, panel.width);
-  const double* below = panel.numbers + panel.width;
-  if (panel.own > 0)
-    subtract_product<Columns>(below, panel.stride, panel.own, u, panel.width,
-                              u + std::ptrdiff_t{panel.width} * Columns,
-                              [](int i) { return std::ptrdiff_t{i} * Columns; });
-  below += panel.own;
-  subtract_product<Columns>(
-      below, panel.stride, panel.below, u, panel.width, x,
+  solve_triangle<Columns, Width>(panel.numbers, panel.stride, u);
+  const int own = panel.width - Width + panel.own;
+  const double* const after = panel.numbers + Width;
+  subtract_product<Columns, Width>(after, panel.stride, own, u, u + std::ptrdiff_t{Width} * Columns,
+                                   [](int i) { return std::ptrdiff_t{i} * Columns; });
+  subtract_product<Columns, Width>(
+      after + own, panel.stride, panel.below, u, x,
       [rows = panel.rows](int i) { return std::ptrdiff_t{rows[i]} * Columns; });
+}
+
+template <int Columns>
+inline void eliminate(const Panel& whole, double* x) {
+  Panel panel = whole;
+  const auto take = [&]<int Width>() {
+    eliminate<Columns, Width>(panel, x);
+    panel.numbers += Width * (panel.stride + 1);
+    panel.first += Width;
+    panel.width -= Width;
+  };
+  while (panel.width >= kDeep) take.template operator()<kDeep>();
+  if constexpr (kDeep > 4)
+    if (panel.width >= 4) take.template operator()<4>();
+  if (panel.width == 3) take.template operator()<3>();
+  if (panel.width == 2) take.template operator()<2>();
+  if (panel.width == 1) take.template operator()<1>();
 }
 
 template <int Columns>

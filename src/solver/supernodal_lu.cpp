@@ -55,8 +55,7 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
     largest[row_index[p]] = std::max(largest[row_index[p]], std::abs(values[p]));
   for (int k = 0; k < n_; ++k) inverse_scale_[k] = reciprocal(largest[row_of_[k]]);
   find_supernodes(factors);
-  find_segments(factors);
-  find_groups();
+  find_groups(factors);
   find_parts(options.threads);
   place_matrix(column_start, row_index);
   const auto panels = static_cast<std::size_t>(panel_start_.back());
@@ -76,6 +75,11 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
       static_cast<std::size_t>(has_wide_groups() ? n_ : 0) * version_.wide.columns;
   work_.assign(std::max(1, parts_),
                {std::vector<double>(n_, 0.0), std::vector<double>(of_group, 0.0)});
+  if (options.threads < 2 || of_group == 0) return;
+  constexpr std::size_t kShare = 8;  // of the factors' memory, for groups at the same time
+  at_once_ = static_cast<int>(
+      std::clamp<std::size_t>(count / kShare / of_group, 1, std::size_t{4} * options.threads));
+  work_[0].groups.resize(at_once_ * of_group);
 }
 
 void SupernodalLu::find_supernodes(const FactorPattern& factors) {
@@ -104,10 +108,12 @@ void SupernodalLu::find_supernodes(const FactorPattern& factors) {
   first_.push_back(n_);
 }
 
-/// A row of U within a supernode implies all later ones of it, as they are in its column of L.
-void SupernodalLu::find_segments(const FactorPattern& factors) {
+/// Of each column. A row of U within a supernode implies all later ones of it, as they are in its
+/// column of L.
+SupernodalLu::Segments SupernodalLu::find_segments(const FactorPattern& factors) {
+  Segments found;
   upper_row_.reserve(factors.upper_row.size());
-  segment_start_.push_back(0);
+  found.start.push_back(0);
   upper_start_.push_back(0);
   for (int k = 0; k < n_; ++k) {
     int last = -1;
@@ -115,30 +121,87 @@ void SupernodalLu::find_segments(const FactorPattern& factors) {
       const int row = factors.upper_row[p];
       if (supernode_of_[row] == last) continue;
       last = supernode_of_[row];
-      segments_.push_back({last, row, std::min(k, first_[last + 1])});
+      found.all.push_back({last, row, std::min(k, first_[last + 1])});
     }
-    segment_start_.push_back(static_cast<int>(segments_.size()));
+    found.start.push_back(static_cast<int>(found.all.size()));
     upper_row_.insert(upper_row_.end(), factors.upper_row.begin() + factors.upper_start[k],
                       factors.upper_row.begin() + factors.upper_start[k + 1] - 1);
     upper_start_.push_back(static_cast<int>(upper_row_.size()));
   }
+  return found;
 }
 
-/// A group's columns have the rows of U of its first one and those of the group itself.
-void SupernodalLu::find_groups() {
-  const auto rows_of = [this](int k) { return upper_start_[k + 1] - upper_start_[k]; };
-  const auto joins = [&](int k, int first) {
-    const int* const rows = upper_row_.data() + upper_start_[first];
-    const int* const own = upper_row_.data() + upper_start_[k];
-    return supernode_of_[k] == supernode_of_[first] && rows_of(k) == rows_of(first) + k - first &&
-           own[rows_of(first)] == first && std::equal(rows, rows + rows_of(first), own);
-  };
-  for (int k = 0; k < n_;) {
-    group_start_.push_back(k);
-    const int first = k++;
-    while (k < n_ && k - first < version_.wide.columns && joins(k, first)) ++k;
-  }
+double SupernodalLu::products_of(const Segment& segment) const {
+  const int s = segment.supernode;
+  const double width = segment.end - segment.first;
+  const double rows = first_[s + 1] - segment.end + rows_start_[s + 1] - rows_start_[s];
+  return width * (rows + (width - 1) / 2);
+}
+
+void SupernodalLu::find_groups(const FactorPattern& factors) {
+  const Segments of_columns = find_segments(factors);
+  std::vector<int> row(supernodes(), n_);
+  for (int s = 0; s < supernodes(); ++s) choose_groups(s, of_columns, row);
   group_start_.push_back(n_);
+  unite_segments(of_columns);
+}
+
+/// Of a supernode's columns: as to make the sum of all groups' costs least. A group costs what its
+/// kernels take for all segments that any of its columns needs. `row`: n for all supernodes.
+void SupernodalLu::choose_groups(int s, const Segments& of_columns, std::vector<int>& row) {
+  const int first = first_[s], end = first_[s + 1], below = rows_start_[s + 1] - rows_start_[s];
+  std::vector<double> least(end - first + 1, HUGE_VAL);  // of the columns before each
+  std::vector<int> begin(end - first + 1, first);        // of the last group before each
+  std::vector<int> seen;                                 // supernodes, of which row is the first
+  least[0] = 0;
+  for (int k = first; k < end; ++k) {
+    double products = 0;
+    for (int last = k + 1; last <= std::min(end, k + version_.wide.columns); ++last) {
+      for (int q = of_columns.start[last - 1]; q < of_columns.start[last]; ++q) {
+        const Segment segment = of_columns.all[q].before(k);
+        int& known = row[segment.supernode];
+        if (segment.first >= std::min(known, segment.end)) continue;
+        if (known == n_)
+          seen.push_back(segment.supernode);
+        else
+          products -= products_of({segment.supernode, known, segment.end});
+        products += products_of(segment);
+        known = segment.first;
+      }
+      const double own = static_cast<double>(last - k) * (end - k + below);
+      const double cost = least[k - first] + version_.cost_of(last - k) * (products + own);
+      if (cost >= least[last - first]) continue;
+      least[last - first] = cost;
+      begin[last - first] = k;
+    }
+    for (const int each : seen) row[each] = n_;
+    seen.clear();
+  }
+  const auto before = static_cast<std::ptrdiff_t>(group_start_.size());
+  for (int last = end; last > first; last = group_start_.back())
+    group_start_.push_back(begin[last - first]);
+  std::reverse(group_start_.begin() + before, group_start_.end());
+}
+
+/// What any of a group's columns needs of those before the group.
+void SupernodalLu::unite_segments(const Segments& of_columns) {
+  segments_.start.push_back(0);
+  for (std::size_t g = 0; g + 1 < group_start_.size(); ++g) {
+    const int first = group_start_[g];
+    const auto before = static_cast<std::ptrdiff_t>(segments_.all.size());
+    for (int q = of_columns.start[first]; q < of_columns.start[group_start_[g + 1]]; ++q) {
+      const Segment segment = of_columns.all[q].before(first);
+      if (segment.first < segment.end) segments_.all.push_back(segment);
+    }
+    const auto begin = segments_.all.begin() + before;
+    std::sort(begin, segments_.all.end(),
+              [](const Segment& a, const Segment& b) { return a.first < b.first; });
+    segments_.all.erase(
+        std::unique(begin, segments_.all.end(),
+                    [](const Segment& a, const Segment& b) { return a.supernode == b.supernode; }),
+        segments_.all.end());
+    segments_.start.push_back(static_cast<int>(segments_.all.size()));
+  }
 }
 
 bool SupernodalLu::has_wide_groups() const { return static_cast<int>(group_start_.size()) <= n_; }
@@ -353,90 +416,137 @@ bool SupernodalLu::finish_column(int k, int supernode, double* x) {
 }
 
 /// The matrix's column k into every `stride`-th number of x; what lies above its diagonal block
-/// into above_.
+/// into above_. A zero becomes +0: no difference of numbers, none of which is −0, is −0.
 void SupernodalLu::scatter(int k, const double* values, double* x, std::ptrdiff_t stride) {
   const double* value = values + value_start_[k];
   for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value)
-    x[entry_row_[p] * stride] = *value * inverse_scale_[entry_row_[p]];
+    x[entry_row_[p] * stride] = *value * inverse_scale_[entry_row_[p]] + 0.0;
   for (int p = above_start_[k]; p < above_start_[k + 1]; ++p) {
     above_[p] = x[above_row_[p] * stride];
     x[above_row_[p] * stride] = 0;
   }
 }
 
-bool SupernodalLu::factor_column(int k, const double* values, double* x) {
+bool SupernodalLu::factor_column(int g, const double* values, double* x) {
+  const int k = group_start_[g];
   scatter(k, values, x, 1);
-  for (int q = segment_start_[k]; q < segment_start_[k + 1]; ++q)
-    eliminate<1>(panel_of(segments_[q]), x);
+  for (int q = segments_.start[g]; q < segments_.start[g + 1]; ++q)
+    eliminate<1>(panel_of(segments_.all[q]), x);
   return finish_column(k, supernode_of_[k], x);
 }
 
-/// Columns first .. end − 1, with the operations of factor_column for each of their numbers in the
-/// same order.
-bool SupernodalLu::factor_group(int first, int end, const double* values, double* x) {
-  const PanelKernels& kernels = version_.of(end - first);
-  const auto row_of = [&](int k) { return x + static_cast<std::ptrdiff_t>(k) * kernels.columns; };
-  const auto clear = [&](int k) { std::fill_n(row_of(k), kernels.columns, 0.0); };
-  for (int k = first; k < end; ++k) scatter(k, values, x + (k - first), kernels.columns);
-  for (int q = segment_start_[first]; q < segment_start_[first + 1]; ++q)
-    kernels.eliminate(panel_of(segments_[q]), x);
-  for (int p = upper_start_[first]; p < upper_start_[first + 1]; ++p) {
-    const double* const row = row_of(upper_row_[p]);
-    for (int k = first; k < end; ++k)
-      upper_[upper_start_[k] + p - upper_start_[first]] = row[k - first];
-    clear(upper_row_[p]);
+/// `x`: for this one.
+SupernodalLu::Group SupernodalLu::group_of(int g, double* x) const {
+  const int first = group_start_[g], end = group_start_[g + 1];
+  return {g, first, end, version_.of(end - first), x};
+}
+
+/// By the columns begin .. end − 1, with the operations of factor_column for each of the group's
+/// numbers in the same order.
+void SupernodalLu::update(const Group& group, int begin, int end) const {
+  for (int q = segments_.start[group.number]; q < segments_.start[group.number + 1]; ++q) {
+    Segment segment = segments_.all[q].before(end);
+    segment.first = std::max(segment.first, begin);
+    if (segment.first < segment.end) group.kernels.eliminate(panel_of(segment), group.x);
   }
+}
+
+/// Into U and L what has been updated by all columns before the group.
+bool SupernodalLu::finish(const Group& group) {
   bool fine = true;
-  for (int k = first; k < end; ++k) fine = finish_of_group(k, first, end, kernels, x) && fine;
-  const int s = supernode_of_[first];
-  for (int k = first; k < first_[s + 1]; ++k) clear(k);
-  for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) clear(rows_[p]);
+  for (int k = group.first; k < group.end; ++k) fine = finish_of_group(k, group) && fine;
+  for (int k = group.first; k < group.end; ++k)
+    for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
+      upper_[p] = group.row(upper_row_[p])[k - group.first];
+  for (int q = segments_.start[group.number]; q < segments_.start[group.number + 1]; ++q)
+    for (int k = segments_.all[q].first; k < segments_.all[q].end; ++k) group.clear(k);
+  const int s = supernode_of_[group.first];
+  for (int k = group.first; k < first_[s + 1]; ++k) group.clear(k);
+  for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) group.clear(rows_[p]);
   return fine;
 }
 
-/// Column k of a group, and its part in the columns that follow.
-bool SupernodalLu::finish_of_group(int k, int first, int end, const PanelKernels& kernels,
-                                   double* x) {
-  const int place = k - first;
-  const double* const diagonal = x + static_cast<std::ptrdiff_t>(k) * kernels.columns;
+/// Column k of a group, and its part in the columns that follow there.
+bool SupernodalLu::finish_of_group(int k, const Group& group) {
+  const int place = k - group.first;
+  const double* const diagonal = group.row(k);
   const double pivot = pivots_[k] = diagonal[place];
   std::array<double, kMostColumns> u{};
-  for (int c = place + 1; c < end - first; ++c)  // the group's rows of U are its last ones
-    u[c] = upper_[upper_start_[first + c + 1] - c + place] = diagonal[c];
-  kernels.finish(panel_of({supernode_of_[k], k, k + 1}), panels_ + below_diagonal(k), place, pivot,
-                 u.data(), x);
+  std::copy(diagonal + place + 1, diagonal + (group.end - group.first), u.begin() + place + 1);
+  group.kernels.finish(panel_of({supernode_of_[k], k, k + 1}), panels_ + below_diagonal(k), place,
+                       pivot, u.data(), group.x);
   return std::isfinite(pivot) && pivot != 0;
 }
 
-bool SupernodalLu::factor_part(int part, const double* values, const Watch& watch) {
+/// Of the groups that a team updates at the same time, from group g on: neighbours in its
+/// supernode.
+int SupernodalLu::end_of_run(int g, const ThreadTeam* team) const {
+  constexpr double kMuch = 2e5;  // products of numbers that are worth the others' attention
+  double products = 0;
+  for (int q = segments_.start[g]; team && q < segments_.start[g + 1]; ++q)
+    products += products_of(segments_.all[q]);
+  int last = g + 1;
+  if (products * version_.wide.columns < kMuch) return last;
+  const int end = first_[supernode_of_[group_start_[g]] + 1];
+  while (last - g < at_once_ && group_start_[last] < end && group_part_[last] == group_part_[g])
+    ++last;
+  return last;
+}
+
+bool SupernodalLu::factor_run(int g, int last, const double* values, Work& work, ThreadTeam* team) {
+  const int first = group_start_[g];
+  const auto group = [&](int each) {
+    return group_of(each,
+                    work.groups.data() + std::ptrdiff_t{each - g} * n_ * version_.wide.columns);
+  };
+  each_task(team, last - g, [&](int task, int) {
+    const Group of = group(g + task);
+    for (int k = of.first; k < of.end; ++k)
+      scatter(k, values, of.x + (k - of.first), of.kernels.columns);
+    update(of, 0, first);
+  });
+  bool fine = true;
+  for (int each = g; each < last; ++each) {
+    const Group of = group(each);
+    update(of, first, of.first);
+    fine = finish(of) && fine;
+  }
+  return fine;
+}
+
+bool SupernodalLu::factor_part(int part, const double* values, const Watch& watch,
+                               ThreadTeam* team) {
   constexpr int kLook = 16;  // columns between two looks at the watch
   Work& work = work_[part < parts_ ? part : 0];
   int unseen = kLook;
-  for (std::size_t g = 0; g < group_part_.size(); ++g) {
+  const int groups = static_cast<int>(group_part_.size());
+  for (int g = 0, last; g < groups; g = last) {
+    last = g + 1;
     if (group_part_[g] != part) continue;
-    const int first = group_start_[g], end = group_start_[g + 1];
     if (unseen >= kLook) {
       watch.look();
       unseen = 0;
     }
-    unseen += end - first;
-    if (!(end - first == 1 ? factor_column(first, values, work.column.data())
-                           : factor_group(first, end, values, work.group.data())))
+    last = end_of_run(g, team);
+    unseen += group_start_[last] - group_start_[g];
+    if (!(group_start_[last] - group_start_[g] == 1 ? factor_column(g, values, work.column.data())
+                                                    : factor_run(g, last, values, work, team)))
       return false;
   }
   return true;
 }
 
 bool SupernodalLu::factor(const double* values, const Watch& watch, ThreadTeam* team) {
-  if (parts_ == 0) team = nullptr;
   if (!elimination_.empty()) {
     watch.look();
-    return run_program(values, team);
+    return run_program(values, parts_ > 0 ? team : nullptr);
   }
   std::vector<char> fine(parts_ + 1, 0);
-  each_task(team, parts_, [&](int part, int) { fine[part] = factor_part(part, values, watch); });
+  each_task(parts_ > 0 ? team : nullptr, parts_,
+            [&](int part, int) { fine[part] = factor_part(part, values, watch, nullptr); });
   const bool all = std::all_of(fine.begin(), fine.end() - 1, [](char each) { return each; });
-  return all && factor_part(parts_, values, watch);
+  const ThreadTeam::Awake awake(at_once_ > 1 ? team : nullptr);
+  return all && factor_part(parts_, values, watch, team);
 }
 
 void SupernodalLu::solve(double* b) {
@@ -470,10 +580,10 @@ void SupernodalLu::solve(double* b) {
 std::size_t SupernodalLu::bytes() const {
   std::size_t lists = substitution_ ? substitution_->bytes() : 0, work = 0;
   for (const EliminationProgram& program : elimination_) lists += program.bytes();
-  for (const Work& w : work_) work += w.column.size() + w.group.size();
+  for (const Work& w : work_) work += w.column.size() + w.groups.size();
   return sizeof(double) * (numbers_.size() + work) + lists +
          sizeof(int) * (rows_.size() + upper_row_.size() + entry_row_.size() + above_row_.size()) +
-         sizeof(Segment) * segments_.size();
+         sizeof(Segment) * segments_.all.size();
 }
 
 double SupernodalLu::pivot_ratio() const {

@@ -14,9 +14,10 @@
 /// and a solution costs what reading them costs. Where panels are narrow,
 /// matrices are factored and solved by lists of operations, with the same bits. Threads take the
 /// columns of subtrees of the elimination forest, which do not need each other; those above the
-/// subtrees come after them.
+/// subtrees come after them, and of these neighbours are updated at the same time.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -72,22 +73,51 @@ class SupernodalLu {
   /// diagonal.
   struct Segment {
     int supernode, first, end;
+    /// Those of them above row k.
+    Segment before(int k) const { return {supernode, first, std::min(end, k)}; }
+  };
+  /// Of columns or groups, rows ascending.
+  struct Segments {
+    std::vector<int> start;  ///< of each, then all
+    std::vector<Segment> all;
+  };
+  /// Columns that are updated together.
+  struct Group {
+    int number, first, end;
+    const PanelKernels& kernels;
+    double* x;  ///< row by row, kernels.columns numbers each; zero between the uses
+
+    double* row(int k) const { return x + std::ptrdiff_t{k} * kernels.columns; }
+    void clear(int k) const { std::fill_n(row(k), kernels.columns, 0.0); }
+  };
+  /// Of one thread; zero between calls.
+  struct Work {
+    std::vector<double> column;  ///< by position
+    std::vector<double> groups;  ///< one after the other, for as many as are updated at once
   };
   void find_supernodes(const FactorPattern& factors);
-  void find_segments(const FactorPattern& factors);
+  Segments find_segments(const FactorPattern& factors);
   void place_matrix(const std::vector<int>& column_start, const std::vector<int>& row_index);
-  void find_groups();
+  /// Products of a number of one column with a panel.
+  double products_of(const Segment& segment) const;
+  void find_groups(const FactorPattern& factors);
+  void choose_groups(int s, const Segments& of_columns, std::vector<int>& row);
+  void unite_segments(const Segments& of_columns);
   Panel panel_of(const Segment& segment) const;
   void find_parts(int threads);
   bool take_parts(const std::vector<int>& group_of, int parts);
   template <class Use>
   void for_needed(int g, Use use) const;
   void scatter(int k, const double* values, double* x, std::ptrdiff_t stride);
-  bool factor_column(int k, const double* values, double* x);
+  bool factor_column(int g, const double* values, double* x);
   bool finish_column(int k, int supernode, double* x);
-  bool factor_group(int first, int end, const double* values, double* x);
-  bool finish_of_group(int k, int first, int end, const PanelKernels& kernels, double* x);
-  bool factor_part(int part, const double* values, const Watch& watch);
+  Group group_of(int g, double* x) const;
+  void update(const Group& group, int begin, int end) const;
+  bool finish(const Group& group);
+  bool finish_of_group(int k, const Group& group);
+  int end_of_run(int g, const ThreadTeam* team) const;
+  bool factor_run(int g, int last, const double* values, Work& work, ThreadTeam* team);
+  bool factor_part(int part, const double* values, const Watch& watch, ThreadTeam* team);
   template <class Use>
   void for_column_below(int k, Use use) const;
   std::size_t place_of(const double* number) const { return number - numbers_.data(); }
@@ -113,8 +143,6 @@ class SupernodalLu {
   double* panels_ = nullptr;
 
   // U by columns, without the pivots
-  std::vector<int> segment_start_;  ///< (n + 1)
-  std::vector<Segment> segments_;
   std::vector<int> upper_start_, upper_row_;
   double* upper_ = nullptr;
   double* pivots_ = nullptr;  ///< (n)
@@ -129,16 +157,16 @@ class SupernodalLu {
   std::vector<EliminationProgram> elimination_;     ///< with lists: by part
   std::optional<EliminationProgram> substitution_;  ///< with lists
 
-  /// Of one thread; zero between calls.
-  struct Work {
-    std::vector<double> column;  ///< by position
-    std::vector<double> group;   ///< row by row, for the widest group
-  };
   std::vector<Work> work_;  ///< by thread
 
-  // neighbours in a supernode with the same rows of U before them are updated together
+  // Neighbours in a supernode are updated together, by all that any of them needs. What one does
+  // not need is zero there, and subtracting products of zeros changes no bit: `scatter` leaves no
+  // negative zeros.
   std::vector<int> group_start_;  ///< first column of each group, then n
+  Segments segments_;             ///< by group
   const PanelVersion& version_;
+
+  int at_once_ = 1;  ///< groups that a team may update at the same time
 
   // Columns of different parts do not need each other, those of the last part come after all
   // others.

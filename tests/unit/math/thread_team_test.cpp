@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace mbcosim {
@@ -22,6 +24,25 @@ TEST_P(Team, EveryThreadDoesItsPartOnceInEachCall) {
     team_.run([&](int thread) { ++done[thread]; });
     EXPECT_EQ(done, std::vector<int>(team_.size(), 1));
   }
+}
+
+/// Whether they wait awake or sleep, and when that changes.
+TEST_P(Team, CallsMayComeLate) {
+  std::vector<int> done(team_.size(), 0);
+  const auto call_late = [&] {
+    for (int call = 0; call < 20; ++call) {
+      std::this_thread::sleep_for(std::chrono::microseconds(300));
+      team_.run([&](int thread) { ++done[thread]; });
+    }
+  };
+  call_late();
+  {
+    const ThreadTeam::Awake awake(&team_);
+    call_late();
+  }
+  call_late();
+  EXPECT_EQ(done, std::vector<int>(team_.size(), 60));
+  const ThreadTeam::Awake nobody(nullptr);
 }
 
 TEST_P(Team, EveryTaskIsDoneOnce) {
