@@ -283,15 +283,19 @@ class Attacker:
         while self.going():
             calls.append(open_one(self.random.choice(paths), self.metadata if self.random.random() < 0.8 else None))
             time.sleep(0.01)
-            if len(calls) >= 650:
-                done = [call for call in calls if call.done()]
-                for call in done:
-                    self.count(call if call.code() is not grpc.StatusCode.OK else None)
-                    calls.remove(call)
-                if not done:
-                    calls.pop(0).cancel()
+            if len(calls) >= 650 and not self.count_done(calls):
+                calls.pop(0).cancel()
+        self.count_done(calls)  # also where there was no time for so many
         for call in calls:
             call.cancel()
+
+    def count_done(self, calls):
+        """Takes out those that have ended; how many they were."""
+        done = [call for call in calls if call.done()]
+        for call in done:
+            self.count(call if call.code() is not grpc.StatusCode.OK else None)
+            calls.remove(call)
+        return len(done)
 
     def half_open(self):
         """Connections that never come to their point, or talk nonsense."""
