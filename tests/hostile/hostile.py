@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The daemon under attack. usage: hostile.py BIN [--seconds N] [--seed N] [--kinds a,b] [--sanitized]
 
-Starts a daemon with tokens, lets hostile clients do their worst from one core at nice 19 (attacks.py), and watches a
+Starts a daemon with tokens, lets hostile clients do their worst from one core at nice 10 (attacks.py), and watches a
 bystander with a token of its own. Every few seconds they are stopped for a moment: the bystander's quiet times are taken then,
 so that what else the machine does counts on both sides. Fails on: the daemon's death or hang, INTERNAL from its code, a thread, a
 descriptor or memory that stays, a probe that finds no healthy daemon, attacks that come to nothing, a bystander's p99 above 5 times its quiet
