@@ -416,7 +416,8 @@ bool SupernodalLu::finish_column(int k, int supernode, double* x) {
 }
 
 /// The matrix's column k into every `stride`-th number of x; what lies above its diagonal block
-/// into above_. A zero becomes +0: no difference of numbers, none of which is −0, is −0.
+/// into above_. A zero becomes +0 and stays it: a difference is −0 only where −0 is subtracted
+/// from.
 void SupernodalLu::scatter(int k, const double* values, double* x, std::ptrdiff_t stride) {
   const double* value = values + value_start_[k];
   for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value)

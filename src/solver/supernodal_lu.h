@@ -11,9 +11,9 @@
 /// to arithmetic operations", SIAM J. Sci. Stat. Comput. 9(5), 1988; supernodes: Demmel et al., "A
 /// supernodal approach to sparse partial pivoting", SIAM J. Matrix Anal. Appl. 20(3), 1999). L and
 /// U lie apart, each in the order in which it is read: large factors do not fit into the caches,
-/// and a solution costs what reading them costs. Where panels are narrow,
-/// matrices are factored and solved by lists of operations, with the same bits. Threads take the
-/// columns of subtrees of the elimination forest, which do not need each other; those above the
+/// and a solution costs what reading them costs. Where panels are narrow, matrices are factored and
+/// solved by lists of operations, with the same numbers (zeros may have another sign). Threads take
+/// the columns of subtrees of the elimination forest, which do not need each other; those above the
 /// subtrees come after them, and of these neighbours are updated at the same time.
 #pragma once
 
