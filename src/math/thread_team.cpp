@@ -30,8 +30,7 @@ void ThreadTeam::run(Function function, void* work) {
   ++round_;
   round_.notify_all();
   take_part(0, first);
-  for (int busy; (busy = busy_.load(std::memory_order_acquire)) > 0;)
-    wait_while(busy_, busy, awake_);
+  for (int busy; (busy = busy_.load(std::memory_order_acquire)) > 0;) wait_while(busy_, busy);
   first.rethrow();
 }
 
@@ -45,7 +44,7 @@ void ThreadTeam::take_part(int thread, First& first) {
 
 void ThreadTeam::serve(int thread) {
   for (unsigned round = 0;;) {
-    wait_while(round_, round, awake_);
+    wait_while(round_, round);
     if (ended_) return;
     ++round;
     take_part(thread, *first_);

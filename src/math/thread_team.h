@@ -11,19 +11,31 @@
 
 namespace mbcosim {
 
+/// Between two looks at what another thread does.
+inline void pause_briefly() {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#endif
+}
+
+/// Waits until `is_so()`, which another thread is about to make true.
+template <class Is>
+void wait_until(Is is_so) {
+  constexpr int kTries = 1000;  // before the processor is left to others
+  for (int k = 1; !is_so(); ++k) {
+    pause_briefly();
+    if (k % kTries == 0) std::this_thread::yield();
+  }
+}
+
 /// Waits until `value` is no longer `old`. The parts of one computation follow each other within
-/// microseconds, in which it is not worth going to sleep; while `awake` nobody does.
+/// microseconds, in which it is not worth going to sleep.
 template <class T>
-void wait_while(const std::atomic<T>& value, T old, const std::atomic<bool>& awake) {
+void wait_while(const std::atomic<T>& value, T old) {
   constexpr int kTries = 2000;
   for (int k = 0; k < kTries; ++k) {
     if (value.load(std::memory_order_acquire) != old) return;
-#if defined(__x86_64__)
-    __builtin_ia32_pause();
-#endif
-    if (k + 1 < kTries || !awake.load(std::memory_order_relaxed)) continue;
-    k = 0;
-    std::this_thread::yield();
+    pause_briefly();
   }
   value.wait(old, std::memory_order_acquire);
 }
@@ -38,22 +50,6 @@ class ThreadTeam {
   ThreadTeam& operator=(const ThreadTeam&) = delete;
 
   int size() const { return static_cast<int>(others_.size()) + 1; }
-
-  /// While it lives the threads wait awake between calls: for many that follow each other after
-  /// more than the time that a thread takes to wake. The team may be null; one at a time.
-  class Awake {
-   public:
-    explicit Awake(ThreadTeam* team) : team_(team) { set(true); }
-    ~Awake() { set(false); }
-    Awake(const Awake&) = delete;
-    Awake& operator=(const Awake&) = delete;
-
-   private:
-    void set(bool awake) {
-      if (team_) team_->awake_.store(awake, std::memory_order_relaxed);
-    }
-    ThreadTeam* team_;
-  };
 
   /// Calls work(thread) once in every thread, 0 is the caller's, and waits for all. What they throw
   /// is thrown again, that of the lowest number.
@@ -103,7 +99,7 @@ class ThreadTeam {
   First* first_ = nullptr;
   std::atomic<unsigned> round_{0};  ///< counts the calls
   std::atomic<int> busy_{0};        ///< threads that have not yet done their part of it
-  std::atomic<bool> ended_{false}, awake_{false};
+  std::atomic<bool> ended_{false};
   std::vector<std::jthread> others_;
 };
 

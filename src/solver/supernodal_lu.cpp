@@ -1,12 +1,11 @@
 #include "solver/supernodal_lu.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 
 #include "solver/forest_parts.h"
-#include "solver/panel_kernels_version.h"
+#include "solver/task_order.h"
 
 namespace mbcosim {
 
@@ -71,15 +70,11 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
     make_substitution(count);
     return;
   }
+  order_groups(options.threads);
   const auto of_group =
       static_cast<std::size_t>(has_wide_groups() ? n_ : 0) * version_.wide.columns;
-  work_.assign(std::max(1, parts_),
+  work_.assign(std::max({1, parts_, sharers_}),
                {std::vector<double>(n_, 0.0), std::vector<double>(of_group, 0.0)});
-  if (options.threads < 2 || of_group == 0) return;
-  constexpr std::size_t kShare = 8;  // of the factors' memory, for groups at the same time
-  at_once_ = static_cast<int>(
-      std::clamp<std::size_t>(count / kShare / of_group, 1, std::size_t{4} * options.threads));
-  work_[0].groups.resize(at_once_ * of_group);
 }
 
 void SupernodalLu::find_supernodes(const FactorPattern& factors) {
@@ -219,35 +214,100 @@ void SupernodalLu::find_parts(int threads) {
   const int groups = static_cast<int>(group_start_.size()) - 1;
   group_part_.assign(groups, 0);
   if (threads < 2) return;
-  std::vector<int> group_of(n_), parent(groups, -1);
+  group_of_.resize(n_);
+  std::vector<int> parent(groups, -1);
   std::vector<double> work(groups, 0.0);
   for (int g = 0; g < groups; ++g) {
-    std::fill(group_of.begin() + group_start_[g], group_of.begin() + group_start_[g + 1], g);
+    std::fill(group_of_.begin() + group_start_[g], group_of_.begin() + group_start_[g + 1], g);
     for_needed(g, [&](int row) {
       work[g] += static_cast<double>(count_below(row));
-      if (const int needed = group_of[row]; needed != g && parent[needed] < 0) parent[needed] = g;
+      if (const int needed = group_of_[row]; needed != g && parent[needed] < 0) parent[needed] = g;
     });
   }
   for (int parts = threads; parts > 1 && parts_ == 0; parts = parts > 4 ? parts / 2 : parts - 1) {
     group_part_ = forest_parts(parent, work, parts);
-    if (take_parts(group_of, parts)) parts_ = parts;
+    if (take_parts(parts)) parts_ = parts;
   }
   if (parts_ == 0) group_part_.assign(groups, 0);
 }
 
 /// With pivots off the diagonal a group may need others than those below it: what needs some of
 /// several parts comes into the last one. False when all are there.
-bool SupernodalLu::take_parts(const std::vector<int>& group_of, int parts) {
+bool SupernodalLu::take_parts(int parts) {
   bool shared = false;
   for (std::size_t g = 0; g < group_part_.size(); ++g) {
     int& part = group_part_[g];
     for_needed(static_cast<int>(g), [&](int row) {
-      const int needed = group_of[row];
+      const int needed = group_of_[row];
       if (needed != static_cast<int>(g) && group_part_[needed] != part) part = parts;
     });
     shared = shared || part != parts;
   }
   return shared;
+}
+
+/// Of the last part; `group`: of each task. All other groups are done before. In operations on
+/// registers.
+struct SupernodalLu::GroupTasks {
+  TaskGraph graph;
+  std::vector<int> group;
+};
+
+SupernodalLu::GroupTasks SupernodalLu::tasks_of_groups() const {
+  constexpr double kOfColumn = 500;  // to get the matrix's numbers and to put away the factors'
+  GroupTasks tasks;
+  TaskGraph& graph = tasks.graph;
+  std::vector<int> task_of(group_part_.size(), -1);
+  for (std::size_t g = 0; g < group_part_.size(); ++g) {
+    if (group_part_[g] != parts_) continue;
+    const int first = group_start_[g], columns = group_start_[g + 1] - first;
+    const double cost = version_.cost_of(columns);
+    double own = columns * (kOfColumn + cost * static_cast<double>(1 + count_below(first)));
+    for (int q = segments_.start[g]; q < segments_.start[g + 1]; ++q)
+      for (Segment rest = segments_.all[q]; rest.first < rest.end;) {
+        const int needed = group_of_[rest.first];
+        const Segment piece = rest.before(group_start_[needed + 1]);
+        rest.first = piece.end;
+        if (task_of[needed] < 0) {
+          own += cost * products_of(piece);
+          continue;
+        }
+        graph.needed.push_back(task_of[needed]);
+        graph.work.push_back(cost * products_of(piece));
+      }
+    graph.start.push_back(static_cast<int>(graph.needed.size()));
+    graph.own.push_back(own);
+    task_of[g] = static_cast<int>(tasks.group.size());
+    tasks.group.push_back(static_cast<int>(g));
+  }
+  return tasks;
+}
+
+/// As they come, which finds panels in the caches, or by the time at which each could be done,
+/// where that is faster; for as many threads as are of use.
+void SupernodalLu::order_groups(int threads) {
+  if (threads < 2) return;
+  constexpr double kHandOver = 1e3, kStart = 1e5;  // of a group, of all
+  constexpr double kWorth = 1.1;
+  const GroupTasks tasks = tasks_of_groups();
+  std::vector<int> order(tasks.group.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::vector<int> by_end = order;
+  const std::vector<double> end = earliest_ends(tasks.graph, kHandOver);
+  std::stable_sort(by_end.begin(), by_end.end(), [&](int a, int b) { return end[a] < end[b]; });
+  const auto time = [&](const std::vector<int>& in_order, int sharers) {
+    return time_of(tasks.graph, in_order, sharers, kHandOver) + (sharers > 1 ? kStart : 0);
+  };
+  if (time(order, threads) > kWorth * time(by_end, threads)) order.swap(by_end);
+  sharers_ = threads;
+  for (const double least = time(order, threads); sharers_ > 1;) {
+    const int fewer = sharers_ > 4 ? sharers_ / 2 : sharers_ - 1;
+    if (time(order, fewer) > kWorth * least) break;
+    sharers_ = fewer;
+  }
+  if (sharers_ == 1) return;
+  for (const int task : order) order_.push_back(tasks.group[task]);
+  done_ = std::vector<std::atomic<std::uint64_t>>(group_part_.size());
 }
 
 void SupernodalLu::place_matrix(const std::vector<int>& column_start,
@@ -369,250 +429,13 @@ void SupernodalLu::set_column(int k, const std::vector<std::size_t>& place,
   }
 }
 
-bool SupernodalLu::run_program(const double* values, ThreadTeam* team) {
-  const auto zeros = above_ - panels_;
-  each_piece(team, static_cast<int>(zeros),
-             [&](int first, int last) { std::fill(panels_ + first, panels_ + last, 0.0); });
-  each_task(team, parts_, [&](int part, int) { elimination_[part].run(values, numbers_.data()); });
-  elimination_[parts_].run(values, numbers_.data());
-  return std::all_of(pivots_, pivots_ + n_,
-                     [](double pivot) { return std::isfinite(pivot) && pivot != 0; });
-}
-
-/// The columns of L of a segment.
-Panel SupernodalLu::panel_of(const Segment& segment) const {
-  const int s = segment.supernode, first = first_[s], below = rows_start_[s + 1] - rows_start_[s];
-  const std::ptrdiff_t stride = first_[s + 1] - first + below;
-  return {panels_ + panel_start_[s] + (segment.first - first) * (stride + 1),
-          stride,
-          segment.first,
-          segment.end - segment.first,
-          first_[s + 1] - segment.end,
-          rows_.data() + rows_start_[s],
-          below};
-}
-
-bool SupernodalLu::finish_column(int k, int supernode, double* x) {
-  for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p) {
-    upper_[p] = x[upper_row_[p]];
-    x[upper_row_[p]] = 0;
-  }
-  const double pivot = x[k];
-  x[k] = 0;
-  pivots_[k] = pivot;
-  const int end = first_[supernode + 1];
-  const int below = rows_start_[supernode + 1] - rows_start_[supernode];
-  double* column = panels_ + below_diagonal(k);
-  for (int i = k + 1; i < end; ++i, ++column) {
-    *column = x[i] / pivot;
-    x[i] = 0;
-  }
-  const int* const rows = rows_.data() + rows_start_[supernode];
-  for (int i = 0; i < below; ++i, ++column) {
-    *column = x[rows[i]] / pivot;
-    x[rows[i]] = 0;
-  }
-  return std::isfinite(pivot) && pivot != 0;
-}
-
-/// The matrix's column k into every `stride`-th number of x; what lies above its diagonal block
-/// into above_. A zero becomes +0 and stays it: a difference is −0 only where −0 is subtracted
-/// from.
-void SupernodalLu::scatter(int k, const double* values, double* x, std::ptrdiff_t stride) {
-  const double* value = values + value_start_[k];
-  for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value)
-    x[entry_row_[p] * stride] = *value * inverse_scale_[entry_row_[p]] + 0.0;
-  for (int p = above_start_[k]; p < above_start_[k + 1]; ++p) {
-    above_[p] = x[above_row_[p] * stride];
-    x[above_row_[p] * stride] = 0;
-  }
-}
-
-bool SupernodalLu::factor_column(int g, const double* values, double* x) {
-  const int k = group_start_[g];
-  scatter(k, values, x, 1);
-  for (int q = segments_.start[g]; q < segments_.start[g + 1]; ++q)
-    eliminate<1>(panel_of(segments_.all[q]), x);
-  return finish_column(k, supernode_of_[k], x);
-}
-
-/// `x`: for this one.
-SupernodalLu::Group SupernodalLu::group_of(int g, double* x) const {
-  const int first = group_start_[g], end = group_start_[g + 1];
-  return {g, first, end, version_.of(end - first), x};
-}
-
-/// By the columns begin .. end − 1, with the operations of factor_column for each of the group's
-/// numbers in the same order.
-void SupernodalLu::update(const Group& group, int begin, int end) const {
-  for (int q = segments_.start[group.number]; q < segments_.start[group.number + 1]; ++q) {
-    Segment segment = segments_.all[q].before(end);
-    segment.first = std::max(segment.first, begin);
-    if (segment.first < segment.end) group.kernels.eliminate(panel_of(segment), group.x);
-  }
-}
-
-/// Into U and L what has been updated by all columns before the group.
-bool SupernodalLu::finish(const Group& group) {
-  bool fine = true;
-  for (int k = group.first; k < group.end; ++k) fine = finish_of_group(k, group) && fine;
-  for (int k = group.first; k < group.end; ++k)
-    for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-      upper_[p] = group.row(upper_row_[p])[k - group.first];
-  for (int q = segments_.start[group.number]; q < segments_.start[group.number + 1]; ++q)
-    for (int k = segments_.all[q].first; k < segments_.all[q].end; ++k) group.clear(k);
-  const int s = supernode_of_[group.first];
-  for (int k = group.first; k < first_[s + 1]; ++k) group.clear(k);
-  for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) group.clear(rows_[p]);
-  return fine;
-}
-
-/// Column k of a group, and its part in the columns that follow there.
-bool SupernodalLu::finish_of_group(int k, const Group& group) {
-  const int place = k - group.first;
-  const double* const diagonal = group.row(k);
-  const double pivot = pivots_[k] = diagonal[place];
-  std::array<double, kMostColumns> u{};
-  std::copy(diagonal + place + 1, diagonal + (group.end - group.first), u.begin() + place + 1);
-  group.kernels.finish(panel_of({supernode_of_[k], k, k + 1}), panels_ + below_diagonal(k), place,
-                       pivot, u.data(), group.x);
-  return std::isfinite(pivot) && pivot != 0;
-}
-
-/// Of the groups that a team updates at the same time, from group g on: neighbours in its
-/// supernode.
-int SupernodalLu::end_of_run(int g, const ThreadTeam* team) const {
-  constexpr double kMuch = 2e5;  // products of numbers that are worth the others' attention
-  double products = 0;
-  for (int q = segments_.start[g]; team && q < segments_.start[g + 1]; ++q)
-    products += products_of(segments_.all[q]);
-  int last = g + 1;
-  if (products * version_.wide.columns < kMuch) return last;
-  const int end = first_[supernode_of_[group_start_[g]] + 1];
-  while (last - g < at_once_ && group_start_[last] < end && group_part_[last] == group_part_[g])
-    ++last;
-  return last;
-}
-
-bool SupernodalLu::factor_run(int g, int last, const double* values, Work& work, ThreadTeam* team) {
-  const int first = group_start_[g];
-  const auto group = [&](int each) {
-    return group_of(each,
-                    work.groups.data() + std::ptrdiff_t{each - g} * n_ * version_.wide.columns);
-  };
-  each_task(team, last - g, [&](int task, int) {
-    const Group of = group(g + task);
-    for (int k = of.first; k < of.end; ++k)
-      scatter(k, values, of.x + (k - of.first), of.kernels.columns);
-    update(of, 0, first);
-  });
-  bool fine = true;
-  for (int each = g; each < last; ++each) {
-    const Group of = group(each);
-    update(of, first, of.first);
-    fine = finish(of) && fine;
-  }
-  return fine;
-}
-
-bool SupernodalLu::factor_part(int part, const double* values, const Watch& watch,
-                               ThreadTeam* team) {
-  constexpr int kLook = 16;  // columns between two looks at the watch
-  Work& work = work_[part < parts_ ? part : 0];
-  int unseen = kLook;
-  const int groups = static_cast<int>(group_part_.size());
-  for (int g = 0, last; g < groups; g = last) {
-    last = g + 1;
-    if (group_part_[g] != part) continue;
-    if (unseen >= kLook) {
-      watch.look();
-      unseen = 0;
-    }
-    last = end_of_run(g, team);
-    unseen += group_start_[last] - group_start_[g];
-    if (!(group_start_[last] - group_start_[g] == 1 ? factor_column(g, values, work.column.data())
-                                                    : factor_run(g, last, values, work, team)))
-      return false;
-  }
-  return true;
-}
-
-bool SupernodalLu::factor(const double* values, const Watch& watch, ThreadTeam* team) {
-  if (!elimination_.empty()) {
-    watch.look();
-    return run_program(values, parts_ > 0 ? team : nullptr);
-  }
-  std::vector<char> fine(parts_ + 1, 0);
-  each_task(parts_ > 0 ? team : nullptr, parts_,
-            [&](int part, int) { fine[part] = factor_part(part, values, watch, nullptr); });
-  const bool all = std::all_of(fine.begin(), fine.end() - 1, [](char each) { return each; });
-  const ThreadTeam::Awake awake(at_once_ > 1 ? team : nullptr);
-  return all && factor_part(parts_, values, watch, team);
-}
-
-void SupernodalLu::solve(double* b) {
-  if (substitution_) {
-    substitution_->run(b, numbers_.data());
-    const double* const x = numbers_.data() + numbers_.size() - n_;
-    for (int k = 0; k < n_; ++k) b[column_of_[k]] = x[k];
-    return;
-  }
-  double* const x = work_[0].column.data();
-  for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]] * inverse_scale_[k];
-  for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
-    const int begin = block_start_[block], end = block_start_[block + 1];
-    for (int s = supernode_of_[begin]; s < supernodes() && first_[s] < end; ++s)
-      eliminate<1>(panel_of({s, first_[s], first_[s + 1]}), x);
-    for (int k = end - 1; k >= begin; --k) {
-      const double xk = x[k] /= pivots_[k];
-      for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-        x[upper_row_[p]] -= upper_[p] * xk;
-    }
-    for (int k = begin; k < end; ++k)
-      for (int p = above_start_[k]; p < above_start_[k + 1]; ++p)
-        x[above_row_[p]] -= above_[p] * x[k];
-  }
-  for (int k = 0; k < n_; ++k) {
-    b[column_of_[k]] = x[k];
-    x[k] = 0;
-  }
-}
-
 std::size_t SupernodalLu::bytes() const {
   std::size_t lists = substitution_ ? substitution_->bytes() : 0, work = 0;
   for (const EliminationProgram& program : elimination_) lists += program.bytes();
-  for (const Work& w : work_) work += w.column.size() + w.groups.size();
+  for (const Work& w : work_) work += w.column.size() + w.group.size();
   return sizeof(double) * (numbers_.size() + work) + lists +
          sizeof(int) * (rows_.size() + upper_row_.size() + entry_row_.size() + above_row_.size()) +
          sizeof(Segment) * segments_.all.size();
-}
-
-double SupernodalLu::pivot_ratio() const {
-  double smallest = HUGE_VAL, largest = 0;
-  for (int k = 0; k < n_; ++k) {
-    const double pivot = std::abs(pivots_[k]);
-    smallest = std::min(smallest, pivot);
-    largest = std::max(largest, pivot);
-  }
-  return n_ > 0 ? smallest / largest : 1;
-}
-
-double SupernodalLu::pivot_growth(const double* values) const {
-  double growth = 1;
-  for (std::size_t block = 0; block + 1 < block_start_.size(); ++block)
-    for (int k = block_start_[block]; k < block_start_[block + 1]; ++k) {
-      double of_matrix = 0, of_factor = std::abs(pivots_[k]);
-      for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p) {
-        const int row = entry_row_[p];
-        const double value = values[value_start_[k] + p - entry_start_[k]];
-        if (row >= block_start_[block])
-          of_matrix = std::max(of_matrix, std::abs(value * inverse_scale_[row]));
-      }
-      for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-        of_factor = std::max(of_factor, std::abs(upper_[p]));
-      growth = std::min(growth, of_matrix / of_factor);
-    }
-  return growth;
 }
 
 }  // namespace mbcosim

@@ -14,11 +14,16 @@
 /// and a solution costs what reading them costs. Where panels are narrow, matrices are factored and
 /// solved by lists of operations, with the same numbers (zeros may have another sign). Threads take
 /// the columns of subtrees of the elimination forest, which do not need each other; those above the
-/// subtrees come after them, and of these neighbours are updated at the same time.
+/// subtrees come after them. Of these each thread takes the next group of columns and updates it by
+/// what others have done already, waiting for what they have not (Demmel, Gilbert and Li, "An
+/// asynchronous parallel supernodal algorithm for sparse Gaussian elimination", SIAM J. Matrix
+/// Anal. Appl. 20(4), 1999).
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -56,7 +61,7 @@ class SupernodalLu {
   SupernodalLu& operator=(const SupernodalLu&) = delete;
 
   /// False when a pivot vanishes or is not a number: there are no factors then. Throws Stopped, and
-  /// there are none, either. A team shares the parts.
+  /// there are none, either. A team shares the work.
   bool factor(const double* values, const Watch& watch = Watch(), ThreadTeam* team = nullptr);
   /// Solves A x = b in place with the last factorization.
   void solve(double* b);
@@ -64,7 +69,8 @@ class SupernodalLu {
   double pivot_ratio() const;  ///< smallest over largest pivot
   /// Reciprocal pivot growth: smallest over all columns of max|R⁻¹ A| / max|U|.
   double pivot_growth(const double* values) const;
-  int parts() const { return parts_; }  ///< that threads share; 0: one thread does it all
+  int parts() const { return parts_; }      ///< that threads take; 0: the last one is all
+  int sharers() const { return sharers_; }  ///< threads that share the last part
   int supernodes() const { return static_cast<int>(first_.size()) - 1; }
   std::size_t bytes() const;  ///< of memory, all but some for each column
 
@@ -93,7 +99,7 @@ class SupernodalLu {
   /// Of one thread; zero between calls.
   struct Work {
     std::vector<double> column;  ///< by position
-    std::vector<double> groups;  ///< one after the other, for as many as are updated at once
+    std::vector<double> group;   ///< by position and column
   };
   void find_supernodes(const FactorPattern& factors);
   Segments find_segments(const FactorPattern& factors);
@@ -105,19 +111,26 @@ class SupernodalLu {
   void unite_segments(const Segments& of_columns);
   Panel panel_of(const Segment& segment) const;
   void find_parts(int threads);
-  bool take_parts(const std::vector<int>& group_of, int parts);
+  bool take_parts(int parts);
   template <class Use>
   void for_needed(int g, Use use) const;
   void scatter(int k, const double* values, double* x, std::ptrdiff_t stride);
-  bool factor_column(int g, const double* values, double* x);
+  void order_groups(int threads);
+  struct GroupTasks;
+  GroupTasks tasks_of_groups() const;
+  bool is_done(int g) const { return done_[g].load(std::memory_order_acquire) == round_; }
+  template <class Use>
+  void for_done(Segment segment, Use use) const;
+  template <class Use>
+  void for_updates(int g, bool shared, Use use) const;
+  bool factor_column(int g, const double* values, bool shared, double* x);
   bool finish_column(int k, int supernode, double* x);
-  Group group_of(int g, double* x) const;
-  void update(const Group& group, int begin, int end) const;
+  bool factor_columns(const Group& group, const double* values, bool shared);
   bool finish(const Group& group);
   bool finish_of_group(int k, const Group& group);
-  int end_of_run(int g, const ThreadTeam* team) const;
-  bool factor_run(int g, int last, const double* values, Work& work, ThreadTeam* team);
-  bool factor_part(int part, const double* values, const Watch& watch, ThreadTeam* team);
+  bool factor_group(int g, const double* values, bool shared, Work& work);
+  bool factor_part(int part, const double* values, const Watch& watch);
+  bool factor_in_order(const double* values, const Watch& watch, ThreadTeam& team);
   template <class Use>
   void for_column_below(int k, Use use) const;
   std::size_t place_of(const double* number) const { return number - numbers_.data(); }
@@ -166,12 +179,17 @@ class SupernodalLu {
   Segments segments_;             ///< by group
   const PanelVersion& version_;
 
-  int at_once_ = 1;  ///< groups that a team may update at the same time
-
   // Columns of different parts do not need each other, those of the last part come after all
   // others.
   int parts_ = 0;                ///< but for the last one; 0: that is all
   std::vector<int> group_part_;  ///< by group
+
+  // How a team shares the groups of the last part; nothing where one thread is as fast
+  std::vector<int> order_;                        ///< groups, each after those that it needs
+  int sharers_ = 1;                               ///< threads
+  std::vector<int> group_of_;                     ///< by column (n)
+  std::vector<std::atomic<std::uint64_t>> done_;  ///< by group: the round in which it was
+  std::uint64_t round_ = 0;                       ///< counts the factorizations
 };
 
 }  // namespace mbcosim

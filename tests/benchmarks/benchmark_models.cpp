@@ -1,7 +1,12 @@
 #include "benchmark_models.h"
 
+#include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
+
+#include "input/sources.h"
+#include "simulation/load.h"
 
 namespace mbcosim::benchmarks {
 
@@ -125,6 +130,21 @@ Bundle modal_body(int modes) {
   return {
       {"deck.mbd", blocks("structural nodes: 3; rigid bodies: 1; joints: 2; ", nodes, elements)},
       {"body.fem", fem}};
+}
+
+std::unique_ptr<Simulation> after_three_steps(const std::string& model) {
+  int elements = 0;
+  const auto [end, error] = std::from_chars(model.data(), model.data() + model.size(), elements);
+  const bool is_number = error == std::errc() && end == model.data() + model.size();
+  if (is_number && elements < 1) return nullptr;
+  const std::filesystem::path path(model);
+  const LoadReport report = is_number ? load_deck(BundleSource(cantilever(elements)), "deck.mbd")
+                                      : load_deck(FolderSource(path.parent_path().string(), true),
+                                                  path.filename().string());
+  if (!report.ok()) return nullptr;
+  auto simulation = Simulation::create(report.model);
+  if (!simulation || (*simulation)->step_many(3).error) return nullptr;
+  return std::move(*simulation);
 }
 
 }  // namespace mbcosim::benchmarks

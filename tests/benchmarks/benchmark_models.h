@@ -1,8 +1,11 @@
-/// Decks of a chosen size, as text.
+/// Decks of a chosen size, as text, and simulations.
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
+
+#include "simulation/simulation.h"
 
 namespace mbcosim::benchmarks {
 
@@ -16,5 +19,8 @@ Bundle rigid_chain(int links);
 Bundle cantilever(int elements);
 /// A modal body with `modes` modes, clamped at one interface node and driven by its spin.
 Bundle modal_body(int modes);
+
+/// Of the cantilever of so many elements or of a deck's file; null where it is refused or fails.
+std::unique_ptr<Simulation> after_three_steps(const std::string& model);
 
 }  // namespace mbcosim::benchmarks

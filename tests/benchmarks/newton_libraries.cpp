@@ -21,9 +21,7 @@
 #include <suitesparse/klu.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <filesystem>
 
 #include "benchmark_models.h"
 #include "libraries.h"
@@ -189,20 +187,6 @@ void measure_ours(const Simulation& simulation, const Matrix& matrix, Report& re
   report.add("iteration", iteration);
 }
 
-std::unique_ptr<Simulation> third_step(const std::string& deck) {
-  int elements = 0;
-  const auto [end, error] = std::from_chars(deck.data(), deck.data() + deck.size(), elements);
-  const bool is_number = error == std::errc() && end == deck.data() + deck.size();
-  const std::filesystem::path path(deck);
-  const LoadReport report = is_number ? load_deck(BundleSource(cantilever(elements)), "deck.mbd")
-                                      : load_deck(FolderSource(path.parent_path().string(), true),
-                                                  path.filename().string());
-  if (!report.ok()) give_up(deck + " is refused");
-  auto simulation = Simulation::create(report.model);
-  if (!simulation || (*simulation)->step_many(3).error) give_up(deck + " fails");
-  return std::move(*simulation);
-}
-
 Matrix matrix_of(const Simulation& simulation) {
   const Model& model = simulation.model();
   Workspace workspace(model);
@@ -220,7 +204,8 @@ Matrix matrix_of(const Simulation& simulation) {
 
 int main(int argc, char** argv) {
   if (argc != 3) give_up("usage: newton_libraries DECK METHOD");
-  const auto simulation = third_step(argv[1]);
+  const auto simulation = after_three_steps(argv[1]);
+  if (!simulation) give_up(std::string(argv[1]) + " is refused or fails");
   Matrix matrix = matrix_of(*simulation);
   const std::string method = argv[2], what = method.substr(0, method.find(':')),
                     how = what == method ? "" : method.substr(what.size() + 1);

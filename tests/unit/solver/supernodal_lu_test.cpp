@@ -262,32 +262,48 @@ TEST(SupernodalLu, SeveralThreadsGiveTheBitsOfOne) {
     }
 }
 
-/// Groups of a wide border are updated at the same time.
-TEST(SupernodalLu, SeveralThreadsOnABorderGiveTheBitsOfOne) {
-  std::mt19937 generator(11);
-  const Dense reference = two_bands(40, 360, generator);
-  const Sparse sparse(reference), matrix(two_bands(40, 360, generator));
-  const int n = static_cast<int>(reference.rows());
-  std::vector<int> order(n);
-  std::iota(order.begin(), order.end(), 0);
-  const FactorPattern pattern = factor_pattern(reference, order, order, {0, n});
+/// Matrices of one pattern whose columns do not fall into parts: threads follow each other.
+void expect_same_bits(const Sparse& reference, const Sparse& matrix, const FactorPattern& pattern) {
+  const int n = static_cast<int>(pattern.row_of.size());
   for (const PanelVersion* version : panel_versions()) {
     std::vector<Vector> solutions;
-    for (const int threads : {1, 2, 3}) {
-      ThreadTeam team(threads);
-      SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(), pattern,
+    for (const int threads : {1, 2, 3, 5}) {
+      ThreadTeam team(threads), smaller(2);
+      SupernodalLu lu(reference.column_start, reference.row_index, reference.values.data(), pattern,
                       {.version = *version, .listed = 0, .threads = threads});
-      for (int k = 0; k < 2; ++k) {
+      EXPECT_EQ(lu.sharers() > 1, threads > 1);
+      for (ThreadTeam* each : {&team, &smaller, static_cast<ThreadTeam*>(nullptr)}) {
         Vector x = Vector::LinSpaced(n, 1, 2);
-        ASSERT_TRUE(lu.factor(matrix.values.data(), Watch(), &team));
+        ASSERT_TRUE(lu.factor(matrix.values.data(), Watch(), each));
         lu.solve(x.data());
         solutions.push_back(x);
         std::vector<double> invalid = matrix.values;
         invalid[invalid.size() / 2] = NAN;
-        EXPECT_FALSE(lu.factor(invalid.data(), Watch(), &team));
+        EXPECT_FALSE(lu.factor(invalid.data(), Watch(), each));
+        CancelToken cancelled;
+        cancelled.cancel();
+        EXPECT_THROW(lu.factor(matrix.values.data(), Watch(&cancelled), each), Stopped);
       }
     }
     for (const Vector& x : solutions) EXPECT_EQ(x, solutions[0]) << version->processor;
+  }
+}
+
+TEST(SupernodalLu, SeveralThreadsOnABorderGiveTheBitsOfOne) {
+  std::mt19937 generator(11);
+  const Dense reference = two_bands(40, 360, generator);
+  const int n = static_cast<int>(reference.rows());
+  std::vector<int> order(n);
+  std::iota(order.begin(), order.end(), 0);
+  expect_same_bits(Sparse(reference), Sparse(two_bands(40, 360, generator)),
+                   factor_pattern(reference, order, order, {0, n}));
+}
+
+TEST(SupernodalLu, SeveralThreadsOnAnyPatternGiveTheBitsOfOne) {
+  for (const double density : {.015, .05, 1.}) {
+    Family family(300, density, {0, 1, 20, 300}, 5);
+    const Dense reference = family.matrix();
+    expect_same_bits(Sparse(reference), Sparse(family.matrix()), family.pattern(reference));
   }
 }
 
