@@ -5,11 +5,12 @@
 /// kept pivots are poor gets a factorization of its own. Results are thus the same bits wherever a
 /// state is continued.
 ///
-/// A factorization of a large matrix may take minutes. It stops soon after the token of `set_watch`
-/// is cancelled and throws Stopped; while KLU chooses pivots only its allocations can be looked at,
-/// so the program's allocator has to refuse what is asked for then (that of the daemon does).
-/// Without memory std::bad_alloc is thrown. In both cases there is no factorization afterwards, and
-/// nothing else has changed.
+/// A factorization of a large matrix may take minutes; its pivots are found without KLU where it
+/// can be told which KLU would choose (solver/diagonal_pattern.h). It stops soon after the token of
+/// `set_watch` is cancelled and throws Stopped; while KLU chooses pivots only its allocations can
+/// be looked at, so the program's allocator has to refuse what is asked for then (that of the
+/// daemon does). Without memory std::bad_alloc is thrown. In both cases there is no factorization
+/// afterwards, and nothing else has changed.
 #pragma once
 
 #include <cstddef>
@@ -21,6 +22,9 @@
 #include "solver/watch.h"
 
 namespace mbcosim {
+
+struct FactorPattern;
+struct LuOptions;
 
 class LinearSolver {
  public:
@@ -76,6 +80,8 @@ class LinearSolver {
     std::unique_ptr<Klu> klu;  ///< null: that of the first kind
   };
   Outcome analyze(Klu& k, double* values, Matrices matrices);
+  bool keep_diagonal(Klu& k, const double* values, const LuOptions& options);
+  bool keep(Klu& k, const double* values, const FactorPattern& pattern, const LuOptions& options);
   Outcome without_factors(const Klu& k);
 
   Watch watch_;

@@ -253,6 +253,11 @@ double SupernodalLu::pivot_ratio() const {
   return n_ > 0 ? smallest / largest : 1;
 }
 
+bool SupernodalLu::pivots_dominate(double bound) const {
+  return std::all_of(panels_, panels_ + panel_start_.back(),
+                     [bound](double number) { return std::abs(number) <= bound; });
+}
+
 double SupernodalLu::pivot_growth(const double* values) const {
   double growth = 1;
   for (std::size_t block = 0; block + 1 < block_start_.size(); ++block)

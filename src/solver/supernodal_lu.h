@@ -67,6 +67,9 @@ class SupernodalLu {
   void solve(double* b);
 
   double pivot_ratio() const;  ///< smallest over largest pivot
+  /// Whether no number of L is beyond the bound: whether each pivot is at least its reciprocal
+  /// times what stands below it.
+  bool pivots_dominate(double bound) const;
   /// Reciprocal pivot growth: smallest over all columns of max|R⁻¹ A| / max|U|.
   double pivot_growth(const double* values) const;
   int parts() const { return parts_; }      ///< that threads take; 0: the last one is all
