@@ -8,7 +8,7 @@
 #include "thrown_mass.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::advance_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -269,4 +269,4 @@ TEST_F(AdvancingWithAPeer, ThatIsInterruptedWhileItComputesIsNoFailure) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::advance_test

@@ -10,7 +10,7 @@
 #include "deck_simulation.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::analysis_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -313,4 +313,4 @@ TEST_F(Analysed, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::analysis_test

@@ -15,7 +15,7 @@
 
 #include "../time_factor.h"
 
-namespace mbcosim::client {
+namespace mbcosim::client::client_test {
 namespace {
 
 constexpr double kStiffness = 400;
@@ -1193,4 +1193,4 @@ TEST(ASilentServer, KeepsNoDestructorOfAPeer) {
 }
 
 }  // namespace
-}  // namespace mbcosim::client
+}  // namespace mbcosim::client::client_test

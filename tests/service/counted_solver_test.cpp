@@ -4,7 +4,7 @@
 #include "thrown_mass.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::counted_solver_test {
 namespace {
 
 /// Two masses that a rod holds together, the first with 1 m/s across it: each step iterates.
@@ -139,4 +139,4 @@ TEST_F(Counted, BeyondAnIdentitysPartNamesThat) {
 #endif
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::counted_solver_test

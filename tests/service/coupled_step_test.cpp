@@ -5,7 +5,7 @@
 #include "direct_peer.h"
 #include "thrown_mass.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::coupled_step_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -180,4 +180,4 @@ TEST_F(Coupled, WaitsForPeersAreCountedAndAreNotTheSolversTime) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::coupled_step_test

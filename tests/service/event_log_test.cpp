@@ -9,7 +9,7 @@
 
 #include "service/library_log.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::event_log_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -121,4 +121,4 @@ TEST_F(LogOfLibraries, OfWhatNobodySeesHoldsNothingBack) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::event_log_test

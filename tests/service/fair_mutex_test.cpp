@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace mbcosim::server {
+namespace mbcosim::server::fair_mutex_test {
 namespace {
 
 const std::string kOwner = "local";
@@ -136,4 +136,4 @@ TEST(SolverSlots, AWaiterGetsTheSlotThatItsOwnerGivesBack) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::fair_mutex_test

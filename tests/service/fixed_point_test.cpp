@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace mbcosim::server {
+namespace mbcosim::server::fixed_point_test {
 namespace {
 
 /// Iterations until |S(x) − x| < 1e-10 for S(x) = A x + b, or −1 after 200.
@@ -47,4 +47,4 @@ TEST(FixedPoint, AZeroStartStaysZero) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::fixed_point_test

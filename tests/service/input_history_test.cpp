@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace mbcosim::server {
+namespace mbcosim::server::input_history_test {
 namespace {
 
 double value(const InputHistory& history, double time) { return history.at(time)[0]; }
@@ -37,4 +37,4 @@ TEST(InputHistory, ForgetsAFutureThatWasUndone) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::input_history_test

@@ -11,7 +11,7 @@
 
 #include "durable/state_folder.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::journal_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -176,4 +176,4 @@ TEST_F(JournalTest, DeletionsComeBackInTheirOrderAndCountNothing) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::journal_test

@@ -7,7 +7,7 @@
 #include "thrown_mass.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::journal_turn_test {
 namespace {
 
 /// A call of Step of a session with a journal in a folder of so many bytes.
@@ -223,4 +223,4 @@ TEST_F(JournaledCallOnASmallDisk, GoesBackToWhatIsThere) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::journal_turn_test

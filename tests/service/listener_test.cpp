@@ -9,7 +9,7 @@
 #include <future>
 #include <mutex>
 
-namespace mbcosim::server {
+namespace mbcosim::server::listener_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -94,4 +94,4 @@ TEST_F(ListenerTurns, WhoHasGoneMeanwhileTakesNoTime) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::listener_test

@@ -12,7 +12,7 @@
 #include "wire/control_group.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::memory_test {
 namespace {
 
 #ifndef MBCOSIM_SANITIZED  // there `new` is the sanitizer's
@@ -157,4 +157,4 @@ TEST_F(ControlGroups, OfTheOlderVersionTheGroupOfMemoryHolds) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::memory_test

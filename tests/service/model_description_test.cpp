@@ -6,7 +6,7 @@
 #include "thrown_mass.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::model_description_test {
 namespace {
 
 using google::protobuf::util::MessageDifferencer;
@@ -153,4 +153,4 @@ TEST_F(Description, RefusesPagesOfNothing) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::model_description_test

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace mbcosim::server {
+namespace mbcosim::server::record_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -171,4 +171,4 @@ TEST_F(Atomic, AFullDiskIsTold) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::record_file_test

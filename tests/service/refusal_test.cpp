@@ -5,7 +5,7 @@
 
 #include "wire/convert.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::refusal_test {
 namespace {
 
 TEST(Refusal, EveryReasonHasACodeOtherThanUnknown) {
@@ -167,4 +167,4 @@ TEST(Durations, ThatNoClockCouldTakeAreRefused) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::refusal_test

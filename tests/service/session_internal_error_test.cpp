@@ -8,7 +8,7 @@
 #include "shared_parts.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::session_internal_error_test {
 namespace {
 
 /// Row −λ; from `until` on a check of the element fails.
@@ -96,4 +96,4 @@ TEST(ExitCode, OfAnInternalErrorIsItsOwn) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::session_internal_error_test

@@ -7,7 +7,7 @@
 #include "rpc/workers.h"
 #include "service/session.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::session_memory_test {
 namespace {
 
 #ifndef MBCOSIM_SANITIZED  // there `new` is the sanitizer's
@@ -59,4 +59,4 @@ TEST_F(SessionMemory, AStepBeyondTheBudgetEndsAtItsStart) {
 #endif
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::session_memory_test

@@ -11,7 +11,7 @@
 #include "service/variable_access.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::session_parts_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -268,4 +268,4 @@ TEST(PeerPlaces, WhoIsAloneHasAllOfThem) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::session_parts_test

@@ -8,7 +8,7 @@
 #include "mbcosim/v1/coupling.pb.h"
 #include "shared_memory/channel.h"
 
-namespace mbcosim::shm {
+namespace mbcosim::shm::shared_memory_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -166,4 +166,4 @@ TEST(SharedMemory, Addresses) {
 }
 
 }  // namespace
-}  // namespace mbcosim::shm
+}  // namespace mbcosim::shm::shared_memory_test

@@ -2,7 +2,7 @@
 
 #include "thrown_mass.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::step_account_test {
 namespace {
 
 class Account : public testing::Test {
@@ -195,4 +195,4 @@ TEST_F(Account, GoesBackToWhatWasTold) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::step_account_test

@@ -14,7 +14,7 @@
 #include "thrown_mass.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::step_at_once_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -285,4 +285,4 @@ TEST_F(AtOnceWithoutEnd, IsTheOnlyOne) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::step_at_once_test

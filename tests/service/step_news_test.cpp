@@ -3,7 +3,7 @@
 #include "rpc/workers.h"
 #include "thrown_mass.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::step_news_test {
 namespace {
 
 class News : public testing::Test {
@@ -97,4 +97,4 @@ TEST_F(News, OfAMistakeOfTheServerFailTheSimulation) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::step_news_test

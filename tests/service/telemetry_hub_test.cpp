@@ -7,7 +7,7 @@
 #include "rpc/workers.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::telemetry_hub_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -273,4 +273,4 @@ TEST_F(Telemetry, ALaterSubscriberWithALongerBufferLosesNobodysSamples) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::telemetry_hub_test

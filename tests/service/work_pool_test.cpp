@@ -9,7 +9,7 @@
 #include "threads/timer.h"
 #include "wire/refusal.h"
 
-namespace mbcosim::server {
+namespace mbcosim::server::work_pool_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -117,4 +117,4 @@ TEST(Admission, NothingIsKeptOfARefusedCall) {
 }
 
 }  // namespace
-}  // namespace mbcosim::server
+}  // namespace mbcosim::server::work_pool_test

@@ -6,7 +6,7 @@
 #include "elements/conformance.h"
 #include "model/laws/linear.h"
 
-namespace mbcosim::conformance {
+namespace mbcosim::conformance::beam_test {
 namespace {
 
 /// A law with full, not symmetric matrices, so that no entry is zero by chance.
@@ -212,4 +212,4 @@ TEST_F(StraightBeam, LogLine) {
 }
 
 }  // namespace
-}  // namespace mbcosim::conformance
+}  // namespace mbcosim::conformance::beam_test

@@ -4,7 +4,7 @@
 #include "elements/bodies/body.h"
 #include "elements/conformance.h"
 
-namespace mbcosim::conformance {
+namespace mbcosim::conformance::body_tangent_test {
 namespace {
 
 template <class Element>
@@ -56,4 +56,4 @@ TEST(BodyTangent, ClosedFormMatchesDual) {
 }
 
 }  // namespace
-}  // namespace mbcosim::conformance
+}  // namespace mbcosim::conformance::body_tangent_test

@@ -6,7 +6,7 @@
 
 #include "model/output_row.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 
 /// What an element prints, as numbers.
 class Columns : public OutputRow {
@@ -27,4 +27,4 @@ class Columns : public OutputRow {
   std::vector<double> v;
 };
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

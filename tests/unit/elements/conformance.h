@@ -377,8 +377,8 @@ constexpr bool holonomic() {
 
 template <class Test, class Case>
 void add_test(const std::string& suite, const char* name) {
-  ::testing::RegisterTest(suite.c_str(), name, nullptr, nullptr, __FILE__, __LINE__,
-                          []() -> ElementConformance<Case>* { return new Test; });
+  testing::RegisterTest(suite.c_str(), name, nullptr, nullptr, __FILE__, __LINE__,
+                        []() -> ElementConformance<Case>* { return new Test; });
 }
 
 template <class Case>
@@ -396,7 +396,7 @@ void add_case(const std::string& suite) {
 }
 
 template <class... Cases>
-bool add_cases(const std::string& name, ::testing::Types<Cases...>) {
+bool add_cases(const std::string& name, testing::Types<Cases...>) {
   int index = 0;
   (add_case<Cases>(name + "/ElementConformance/" + std::to_string(index++)), ...);
   return true;

@@ -6,7 +6,7 @@
 #include "deck_run.h"
 #include "elements/conformance.h"
 
-namespace mbcosim {
+namespace mbcosim::external_structural_test {
 namespace {
 
 /// Two points on the first node, one on the second, a third node as reference.
@@ -168,4 +168,4 @@ TEST(ExternalStructuralCard, RefusesWhatItDoesNotServe) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::external_structural_test

@@ -5,10 +5,10 @@
 #include "elements/modal/modal_body.h"
 #include "elements/modal_bodies.h"
 
-namespace mbcosim {
+namespace mbcosim::fem_data_test {
 namespace {
 
-using ::testing::HasSubstr;
+using testing::HasSubstr;
 
 /// The text of a body with one node and two modes; groups can be replaced or left out ("").
 std::string body_text(const std::map<int, std::string>& changes = {}) {
@@ -125,7 +125,7 @@ TEST(FemText, ChecksCountsBeforeItTakesMemory) {
 }
 
 TEST(FemText, RefusesDuplicateLabels) {
-  FemData d = testing::hand_made(true);
+  FemData d = decks::hand_made(true);
   d.labels[2] = "1001";
   EXPECT_EQ(refusal(write_fem_text(d, {})),
             "body.fem:0: record group 2: node label 1001 appears twice");
@@ -147,7 +147,7 @@ void expect_same(const FemData& a, const FemData& b) {
 }
 
 TEST(FemData, WhatIsWrittenIsReadBack) {
-  FemData d = testing::generic_body();
+  FemData d = decks::generic_body();
   d.initial_amplitudes << .1, 1.0 / 3, 0;
   d.damping = MatX::Random(3, 3);
   d.rigid = FemRigidInertia{2, Vec3(1, 2, 3), Mat3::Random()};
@@ -156,11 +156,11 @@ TEST(FemData, WhatIsWrittenIsReadBack) {
 }
 
 TEST(FemBinary, HasTheSizeOfTheReferenceFile) {
-  EXPECT_EQ(write_fem_binary(testing::hand_made(true)).size(), 652u);
+  EXPECT_EQ(write_fem_binary(decks::hand_made(true)).size(), 652u);
 }
 
 TEST(FemBinary, RefusesTruncatedAndInflatedFiles) {
-  const std::string bytes = write_fem_binary(testing::hand_made(true));
+  const std::string bytes = write_fem_binary(decks::hand_made(true));
   for (std::size_t size = 4; size < bytes.size(); size += 7)
     EXPECT_NE(refusal(bytes.substr(0, size)), "accepted") << size;
   std::string huge = bytes;
@@ -169,7 +169,7 @@ TEST(FemBinary, RefusesTruncatedAndInflatedFiles) {
 }
 
 TEST(FemBinary, WarnsOfBytesAfterTheEnd) {
-  const std::string bytes = write_fem_binary(testing::hand_made(true));
+  const std::string bytes = write_fem_binary(decks::hand_made(true));
   EXPECT_TRUE(parse_fem_data("body.bin", bytes).notes.empty());
   const FemData d = parse_fem_data("body.bin", bytes + "xyz");
   ASSERT_EQ(d.notes.size(), 1u);
@@ -177,7 +177,7 @@ TEST(FemBinary, WarnsOfBytesAfterTheEnd) {
 }
 
 TEST(ModalBody, InvariantsOfTheHandMadeBody) {
-  const auto b = testing::make_body(testing::hand_made(true), true);
+  const auto b = decks::make_body(decks::hand_made(true), true);
   EXPECT_EQ(b->m, 3);
   EXPECT_TRUE(b->S0.isZero());
   EXPECT_TRUE(b->J0.isApprox(Mat3(Vec3(11, 3, 11).asDiagonal())));
@@ -203,7 +203,7 @@ TEST(ModalBody, InvariantsOfTheHandMadeBody) {
 }
 
 TEST(ModalBody, RigidInvariantsOfTheGenericBody) {
-  const auto b = testing::make_body(testing::generic_body());
+  const auto b = decks::make_body(decks::generic_body());
   EXPECT_NEAR(b->m, 5.3, 1e-14);
   EXPECT_TRUE((b->S0 / b->m).isApprox(Vec3(0.698113, 0.00943396, 0.0716981), 1e-6));
   Mat3 j;
@@ -213,8 +213,8 @@ TEST(ModalBody, RigidInvariantsOfTheGenericBody) {
 
 /// The modes move the nodes; the moments of the moved nodes are what the invariants give.
 TEST(ModalBody, MomentsFollowTheDeformation) {
-  const FemData d = testing::generic_body();
-  const auto b = testing::make_body(d, true, Vec3(.1, -.2, .3));
+  const FemData d = decks::generic_body();
+  const auto b = decks::make_body(d, true, Vec3(.1, -.2, .3));
   const Vec3 q(.3, -.2, .5);
   Vec3 s = Vec3::Zero();
   Mat3 j = Mat3::Zero();
@@ -230,17 +230,17 @@ TEST(ModalBody, MomentsFollowTheDeformation) {
 
 TEST(ModalBody, WarnsOfInconsistentMasses) {
   std::vector<std::string> warnings;
-  testing::make_body(testing::generic_body(), false, Vec3::Zero(), &warnings);
+  decks::make_body(decks::generic_body(), false, Vec3::Zero(), &warnings);
   EXPECT_TRUE(warnings.empty());
-  FemData d = testing::generic_body();
+  FemData d = decks::generic_body();
   d.mass *= 2;
-  testing::make_body(d, false, Vec3::Zero(), &warnings);
+  decks::make_body(d, false, Vec3::Zero(), &warnings);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_THAT(warnings[0], HasSubstr("record groups 9 and 11 disagree"));
 }
 
 TEST(ModalBody, DampingRules) {
-  const FemData d = testing::hand_made(true);
+  const FemData d = decks::hand_made(true);
   ModalSelection s;
   s.modes = {1, 2};
   std::vector<std::string> warnings;
@@ -255,4 +255,4 @@ TEST(ModalBody, DampingRules) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::fem_data_test

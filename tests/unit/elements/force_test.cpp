@@ -7,7 +7,7 @@
 #include "model/drive.h"
 #include "model/drives/closed_form_drives.h"
 
-namespace mbcosim::conformance {
+namespace mbcosim::conformance::force_test {
 namespace {
 
 /// direction · (1 + 2 t): a load with a rate.
@@ -212,4 +212,4 @@ TEST(AbstractForce, AddsToTheRowsOfItsDofs) {
 }
 
 }  // namespace
-}  // namespace mbcosim::conformance
+}  // namespace mbcosim::conformance::force_test

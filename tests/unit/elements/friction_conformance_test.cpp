@@ -6,7 +6,7 @@
 #include "model/drive.h"
 #include "model/scalar_function.h"
 
-namespace mbcosim::conformance {
+namespace mbcosim::conformance::friction_conformance_test {
 namespace {
 
 /// Steady friction that falls with the speed.
@@ -120,4 +120,4 @@ using Frictional =
 MBCOSIM_CONFORMANCE(Frictional, Frictional);
 
 }  // namespace
-}  // namespace mbcosim::conformance
+}  // namespace mbcosim::conformance::friction_conformance_test

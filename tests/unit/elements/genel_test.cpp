@@ -11,7 +11,7 @@
 #include "elements/general_element.h"
 #include "model/drive.h"
 
-namespace mbcosim::conformance {
+namespace mbcosim::conformance::genel_test {
 namespace {
 
 NodeDof scalar_dof(Bench& bench, bool differential = true, int order = 0) {
@@ -284,4 +284,4 @@ TEST(LinearSystemElement, BalancingScalesByPowersOfTwoAndKeepsTheTransferFunctio
 }
 
 }  // namespace
-}  // namespace mbcosim::conformance
+}  // namespace mbcosim::conformance::genel_test

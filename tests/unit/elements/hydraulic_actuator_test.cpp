@@ -4,14 +4,14 @@
 
 #include "elements/hydraulic_bench.h"
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_actuator_test {
 namespace {
 
-using testing::expect_close;
-using testing::HydraulicBench;
+using decks::expect_close;
+using decks::HydraulicBench;
 
 /// Two bodies in general motion.
-class ActuatorInMotion : public ::testing::Test {
+class ActuatorInMotion : public testing::Test {
  protected:
   void SetUp() override { build(bench, Vec3(.01, .02, .03)); }
   static void build(HydraulicBench& bench, const Vec3& f1) {
@@ -147,4 +147,4 @@ TEST_F(ActuatorInMotion, ChamberPressuresStartFromTheDeclaredOnes) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_actuator_test

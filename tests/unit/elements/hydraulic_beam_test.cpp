@@ -10,7 +10,7 @@
 #include "elements/hydraulic_circuit.h"
 #include "source_dir.h"
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_beam_test {
 namespace {
 
 std::string model_text(const std::string& name) {
@@ -65,7 +65,7 @@ void follow(DeckRun& run, const std::vector<Instant>& table) {
   for (const Instant& at : table) {
     const int wanted = static_cast<int>(std::lround(at.t * 1e3));
     run.step(wanted - step);
-    if (::testing::Test::HasFatalFailure()) return;
+    if (testing::Test::HasFatalFailure()) return;
     step = wanted;
     expect_instant(run, at);
   }
@@ -160,7 +160,7 @@ TEST(ActuatedBeam, WithItsPipeTwentyMetresLongMatchesReference) {
 /// 1998 on.
 TEST(ActuatedBeam, OrificeAndPipeTakeMBDynsBranches) {
   const std::string text = replaced(short_pipe(), "final time: 5.;", "final time: 2.1;");
-  const testing::CircuitRun run(text);
+  const decks::CircuitRun run(text);
   ASSERT_GE(run.recorder->records.size(), 2101u);
   double largest = 0;
   for (std::size_t n = 0; n <= 2100; ++n) {
@@ -174,4 +174,4 @@ TEST(ActuatedBeam, OrificeAndPipeTakeMBDynsBranches) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_beam_test

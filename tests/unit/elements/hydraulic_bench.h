@@ -13,7 +13,7 @@
 #include "jacobian_check.h"
 #include "model/fluids/fluids.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 
 /// `linear compressible, density, 870., 1.7052e9, 101325., viscosity, 0.0696`.
 inline FluidPtr oil(double viscosity = 0.0696) {
@@ -123,4 +123,4 @@ inline double HydraulicBench::jacobian_error(double c, double step) {
   return error;
 }
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

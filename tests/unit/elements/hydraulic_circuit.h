@@ -17,7 +17,7 @@
 #include "output/result_writer.h"
 #include "simulation/simulation.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 
 /// All columns of all lines of a run, by record.
 class Recorder : public ResultWriter, public OutputRow {
@@ -151,4 +151,4 @@ inline CircuitRun::CircuitRun(const std::string& text) {
   EXPECT_EQ(report.outcome, StepOutcome::finished) << (report.error ? report.error->message : "");
 }
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

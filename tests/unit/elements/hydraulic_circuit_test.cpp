@@ -4,14 +4,14 @@
 #include <cmath>
 #include <limits>
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_circuit_test {
 namespace {
 
-using testing::CircuitDeck;
-using testing::CircuitRun;
-using testing::expect_close;
-using testing::expect_table;
-using testing::kOilText;
+using decks::CircuitDeck;
+using decks::CircuitRun;
+using decks::expect_close;
+using decks::expect_table;
+using decks::kOilText;
 
 const std::string kOil = kOilText;
 const std::string kThinOil =
@@ -434,7 +434,7 @@ CircuitDeck accumulator_deck(const std::string& extra) {
   deck.steps = 100;
   return deck;
 }
-const std::vector<testing::TableColumn> kAccumulatorColumns = {
+const std::vector<decks::TableColumn> kAccumulatorColumns = {
     {"hyd", 7, 0}, {"hyd", 7, 1}, {"hyd", 7, 2}, {"hyd", 7, 3}, {"hyd", 7, 4}};
 
 TEST(AccumulatorDeck, GasMatchesReference) {
@@ -463,7 +463,7 @@ CircuitDeck tank_deck(const std::string& element, const std::string& p2) {
   deck.h = 1e-2;
   return deck;
 }
-const std::vector<testing::TableColumn> kTankColumns = {
+const std::vector<decks::TableColumn> kTankColumns = {
     {"hyd", 7, 0}, {"hyd", 7, 1}, {"hyd", 7, 2}, {"hyd", 7, 3}};
 
 TEST(TankDeck, LevelMatchesReference) {
@@ -524,4 +524,4 @@ TEST(MinorLossDeck, FlowIntoAZeroPressureDrop) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_circuit_test

@@ -4,10 +4,10 @@
 #include "elements/hydraulic_bench.h"
 #include "model/fluids/fluids.h"
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_fluid_test {
 namespace {
 
-using testing::expect_close;
+using decks::expect_close;
 
 constexpr double kRho = 870, kBeta = 1.2e9, kRef = 1e5, kMu = 0.07, kSaturation = 2e4;
 
@@ -104,4 +104,4 @@ TEST(HydraulicLaws, EndStopsActOnlyAtTheEnds) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_fluid_test

@@ -4,12 +4,12 @@
 
 #include "elements/hydraulic_bench.h"
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_orifice_test {
 namespace {
 
-using testing::expect_close;
-using testing::HydraulicBench;
-using testing::oil;
+using decks::expect_close;
+using decks::HydraulicBench;
+using decks::oil;
 
 Orifice make(int n1, int n2, Orifice::Dimensions d, FluidPtr fluid, double declared) {
   const double cd = Orifice::discharge_coefficient(d);
@@ -123,4 +123,4 @@ TEST(Orifice, JacobianMatchesCentralDifferences) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_orifice_test

@@ -4,12 +4,12 @@
 
 #include "elements/hydraulic_circuit.h"
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_physics_test {
 namespace {
 
-using testing::CircuitDeck;
-using testing::CircuitRun;
-using testing::expect_close;
+using decks::CircuitDeck;
+using decks::CircuitRun;
+using decks::expect_close;
 
 constexpr double kDensity = 870, kModulus = 1.7052e9;
 const double kCelerity = std::sqrt(kModulus / kDensity);  // 1400 m/s
@@ -174,4 +174,4 @@ TEST(ActuatorWork, IsPressureTimesVolume) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_physics_test

@@ -3,14 +3,14 @@
 #include "elements/hydraulic/dynamic_pipe.h"
 #include "elements/hydraulic_bench.h"
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_pipe_test {
 namespace {
 
+using decks::expect_close;
+using decks::HydraulicBench;
+using decks::oil;
 using hydraulic::PipeGeometry;
 using hydraulic::Regime;
-using testing::expect_close;
-using testing::HydraulicBench;
-using testing::oil;
 
 const PipeGeometry kPipe{.012, M_PI * 36e-6, 2};
 
@@ -126,4 +126,4 @@ TEST(DynamicPipe, WithoutViscosityAndFlowItIsFinite) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_pipe_test

@@ -1,11 +1,11 @@
 /// What hydraulic decks are refused for, and how circuits fail that have no solution.
 #include "elements/hydraulic_circuit.h"
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_refusal_test {
 namespace {
 
-using testing::CircuitDeck;
-using testing::kOilText;
+using decks::CircuitDeck;
+using decks::kOilText;
 
 /// A deck with two nodes at 1 bar, both clamped, and `elements` between them.
 CircuitDeck two_nodes(const std::string& elements, int count = 1) {
@@ -337,4 +337,4 @@ TEST(RegimeJumps, EndCleanly) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_refusal_test

@@ -10,12 +10,12 @@
 #include "elements/hydraulic_bench.h"
 #include "model/drive.h"
 
-namespace mbcosim {
+namespace mbcosim::hydraulic_valve_test {
 namespace {
 
-using testing::expect_close;
-using testing::HydraulicBench;
-using testing::oil;
+using decks::expect_close;
+using decks::HydraulicBench;
+using decks::oil;
 
 class Constant : public Drive {
  public:
@@ -265,4 +265,4 @@ TEST(Pipe, JacobianMatchesCentralDifferencesInAllRegimes) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::hydraulic_valve_test

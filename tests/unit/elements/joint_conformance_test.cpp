@@ -13,7 +13,7 @@
 #include "elements/joints/velocity.h"
 #include "model/drive.h"
 
-namespace mbcosim::conformance {
+namespace mbcosim::conformance::joint_conformance_test {
 namespace {
 
 /// A joint between two nodes that only needs its attachments.
@@ -312,4 +312,4 @@ using Deformables =
 MBCOSIM_CONFORMANCE(Deformables, Deformables);
 
 }  // namespace
-}  // namespace mbcosim::conformance
+}  // namespace mbcosim::conformance::joint_conformance_test

@@ -3,7 +3,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::joint_input_test {
 namespace {
 
 using testing::HasSubstr;
@@ -173,4 +173,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::joint_input_test

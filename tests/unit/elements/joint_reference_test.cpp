@@ -6,7 +6,7 @@
 #include "deck_run.h"
 #include "elements/columns.h"
 
-namespace mbcosim {
+namespace mbcosim::joint_reference_test {
 namespace {
 
 struct ReferenceCase {
@@ -203,7 +203,7 @@ const ReferenceCase kCases[] = {
       2.85455089, 1.96469789, 0.145217616, -1.40636332, 1.35192613}},
 };
 
-class JointReference : public ::testing::TestWithParam<ReferenceCase> {};
+class JointReference : public testing::TestWithParam<ReferenceCase> {};
 
 std::string reference_deck(const ReferenceCase& c) {
   return std::string(R"(begin: data; problem: initial value; end: data;
@@ -233,7 +233,7 @@ TEST_P(JointReference, AgreesAfterAQuarterOfASecond) {
   DeckRun run(reference_deck(c));
   ASSERT_TRUE(run.ready());
   const auto columns = [&] {
-    testing::Columns row;
+    decks::Columns row;
     const ElementRef e = run.model().find_element(Family::joint, 1);
     e.set->output(run.context(), e.index, row);
     return row.v;
@@ -267,7 +267,7 @@ TEST_P(JointReference, PrivateReactionsAreThePrintedOnes) {
   DeckRun run(reference_deck(GetParam()));
   ASSERT_TRUE(run.ready());
   run.step(51);
-  testing::Columns row;
+  decks::Columns row;
   const ElementRef e = run.model().find_element(Family::joint, 1);
   e.set->output(run.context(), e.index, row);
   const std::vector<std::string> names = e.set->data_names(e.index);
@@ -284,8 +284,8 @@ TEST_P(JointReference, PrivateReactionsAreThePrintedOnes) {
   EXPECT_EQ(e.set->private_datum(e.index, "Fw"), -1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Joints, JointReference, ::testing::ValuesIn(kCases),
+INSTANTIATE_TEST_SUITE_P(Joints, JointReference, testing::ValuesIn(kCases),
                          [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::joint_reference_test

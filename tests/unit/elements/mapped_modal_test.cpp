@@ -8,7 +8,7 @@
 #include "deck_run.h"
 #include "elements/conformance.h"
 
-namespace mbcosim {
+namespace mbcosim::mapped_modal_test {
 namespace {
 
 struct Form {
@@ -16,7 +16,7 @@ struct Form {
   bool reference, rigid, rotate;
 };
 
-class MappedModes : public ::testing::TestWithParam<Form> {
+class MappedModes : public testing::TestWithParam<Form> {
  protected:
   static constexpr int kModes = 3;
 
@@ -146,7 +146,7 @@ TEST(MappedModesCard, ReadsSparseAndFullMatrices) {
 }
 
 TEST(MappedModesCard, SaysWhatItCannotTake) {
-  using ::testing::HasSubstr;
+  using testing::HasSubstr;
   const std::string nodes = "nodes number, 2, 1, 2, ", one = "1 1 1.\n";
   EXPECT_THAT(
       first_error(load("type, all, " + nodes + "modes number, 1, sparse mapping file, \"H\"", one)),
@@ -168,11 +168,11 @@ TEST(MappedModesCard, SaysWhatItCannotTake) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Forms, MappedModes,
-                         ::testing::Values(Form{"Global", false, false, false},
-                                           Form{"Relative", true, false, false},
-                                           Form{"Rigid", true, true, true},
-                                           Form{"RigidUnturned", true, true, false}),
+                         testing::Values(Form{"Global", false, false, false},
+                                         Form{"Relative", true, false, false},
+                                         Form{"Rigid", true, true, true},
+                                         Form{"RigidUnturned", true, true, false}),
                          [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::mapped_modal_test

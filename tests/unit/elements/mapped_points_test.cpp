@@ -5,10 +5,10 @@
 #include "elements/ports/port_element.h"
 #include "simulation/simulation.h"
 
-namespace mbcosim {
+namespace mbcosim::mapped_points_test {
 namespace {
 
-using ::testing::HasSubstr;
+using testing::HasSubstr;
 
 /// `points` points on a node.
 LoadReport load(int points, const std::string& mapping,
@@ -77,4 +77,4 @@ TEST(MappedPoints, HaveWholeNumbersForLabels) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::mapped_points_test

@@ -7,7 +7,7 @@
 #include "elements/modal/fem_data.h"
 #include "elements/modal/modal_body.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 
 /// Three nodes 1001, 1002, 1003 at y = −2, 0, 2 and two modes (uz, ux of the outer nodes).
 /// `dynamic`: modal masses 2 and lumped unit masses; else no modal mass and a rigid inertia.
@@ -66,4 +66,4 @@ inline std::shared_ptr<const ModalBody> make_body(const FemData& data, bool seco
   return make_modal_body(data, s, warnings ? *warnings : ignored);
 }
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

@@ -9,7 +9,7 @@
 #include "elements/modal_bodies.h"
 #include "math/rotation.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 
 using mbcosim::digits;
 inline std::string digits(const Mat3& m) {
@@ -86,4 +86,4 @@ class ModalRun : public DeckRun {
   int done_ = 0;
 };
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

@@ -3,15 +3,15 @@
 
 #include "elements/modal_deck.h"
 
-namespace mbcosim {
+namespace mbcosim::modal_deck_test {
 namespace {
 
-using testing::digits;
-using testing::generic_body;
-using testing::hand_made;
-using testing::ModalDeck;
-using testing::ModalRun;
-using testing::Placement;
+using decks::digits;
+using decks::generic_body;
+using decks::hand_made;
+using decks::ModalDeck;
+using decks::ModalRun;
+using decks::Placement;
 
 const std::string kHalfSine = ", sine, 0., pi/.1, 1., one, 0.;\n";
 
@@ -646,4 +646,4 @@ TEST(ModalDecks, ModalForces) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::modal_deck_test

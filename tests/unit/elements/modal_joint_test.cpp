@@ -8,7 +8,7 @@
 #include "elements/modal_bodies.h"
 #include "jacobian_check.h"
 
-namespace mbcosim {
+namespace mbcosim::modal_joint_test {
 namespace {
 
 /// One modal joint with its nodes in a generic state.
@@ -108,7 +108,7 @@ void check_jacobian(ModalBench& bench) {
 
 ModalJoint generic_joint(ModalBench& bench, bool second_order, bool clamped, int interfaces) {
   ModalJoint joint;
-  joint.body = testing::make_body(testing::generic_body(), second_order);
+  joint.body = decks::make_body(decks::generic_body(), second_order);
   if (clamped) {
     joint.x0 = bench.vec();
     joint.R0 = rotation_of_vector<double>(bench.vec());
@@ -158,7 +158,7 @@ TEST(ModalJoint, JacobianOfAClampedBodyIsExact) {
 TEST(ModalJoint, JacobianOfACoarseBodyIsExact) {
   ModalBench bench;
   ModalJoint joint;
-  joint.body = testing::make_body(testing::hand_made(false));
+  joint.body = decks::make_body(decks::hand_made(false));
   joint.node = bench.node(StructuralKind::modal);
   joint.interfaces.push_back(bench.interface(*joint.body, bench.node(StructuralKind::static_), 2));
   bench.add(std::move(joint));
@@ -280,7 +280,7 @@ TEST(ModalJoint, PrivateDataAreKinematicsOfTheFemNodes) {
 TEST(ModalJoint, LogLineHasMassCentreAndInertia) {
   ModalBench bench;
   ModalJoint joint;
-  joint.body = testing::make_body(testing::hand_made(true));
+  joint.body = decks::make_body(decks::hand_made(true));
   joint.node = bench.node(StructuralKind::modal);
   bench.add(std::move(joint));
   bench.finish();
@@ -289,4 +289,4 @@ TEST(ModalJoint, LogLineHasMassCentreAndInertia) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::modal_joint_test

@@ -3,18 +3,18 @@
 
 #include "elements/modal_deck.h"
 
-namespace mbcosim {
+namespace mbcosim::modal_refusal_test {
 namespace {
 
-using testing::ModalDeck;
+using decks::ModalDeck;
 
 const std::string kCard =
     "joint: 1, modal, 1, 2, 3, no damping, \"dynamic.fem\", 1, 1003, 2, null;";
 
 ModalDeck deck_with(const std::string& card, double height = 0) {
   ModalDeck deck;
-  deck.files = {{"dynamic.fem", write_fem_text(testing::hand_made(true), {})},
-                {"static.fem", write_fem_text(testing::hand_made(false), {})}};
+  deck.files = {{"dynamic.fem", write_fem_text(decks::hand_made(true), {})},
+                {"static.fem", write_fem_text(decks::hand_made(false), {})}};
   deck.node(1, "modal");
   deck.node(2, "static", {Vec3(0, 2, height)});
   deck.joints = card + "\n";
@@ -126,7 +126,7 @@ TEST(ModalCard, WarnsOfWhatIsLikelyWrong) {
 
 TEST(ModalCard, WarnsOfMatricesThatSingleFactorDampingIgnores) {
   ModalDeck deck = deck_with("");
-  FemData data = testing::hand_made(true);
+  FemData data = decks::hand_made(true);
   data.stiffness(0, 1) = data.stiffness(1, 0) = 3;
   deck.files["full.fem"] = write_fem_text(data, {});
   deck.joints =
@@ -152,7 +152,7 @@ TEST(ModalCard, AcceptsLabelsAsExpressionsAndOptionsInBothPlaces) {
 
 /// The same shape twice: modes that no equation can tell apart.
 TEST(ModalCard, WarnsOfDuplicatedModes) {
-  FemData data = testing::hand_made(true);
+  FemData data = decks::hand_made(true);
   data.shapes.col(1) = data.shapes.col(0);
   data.mass.setConstant(2);
   data.stiffness.setConstant(1);
@@ -204,4 +204,4 @@ TEST(ModalPrivateData, NamesWhatItRefuses) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::modal_refusal_test

@@ -5,7 +5,7 @@
 #include "elements/conformance.h"
 #include "elements/ports/imposed_motion.h"
 
-namespace mbcosim {
+namespace mbcosim::ports_test {
 namespace {
 
 class Imposed : public testing::TestWithParam<bool> {
@@ -223,4 +223,4 @@ TEST(Attachments, AreRefusedWithTheirReason) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::ports_test

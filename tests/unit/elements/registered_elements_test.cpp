@@ -14,7 +14,7 @@
 #include "solver/stages.h"
 #include "solver/system.h"
 
-namespace mbcosim {
+namespace mbcosim::registered_elements_test {
 namespace {
 
 /// Nothing that they add to the equations depends on the state; of peers there is none here, their
@@ -39,14 +39,14 @@ const std::set<std::string> kConstant = {"automatic structural",
                                          "stream output",
                                          "thermal: source"};
 
-ModelPtr read(const testing::WordCard& card) {
+ModelPtr read(const decks::WordCard& card) {
   const LoadReport report =
-      load_deck(BundleSource(word_deck(card, testing::Bench::bare)), "deck.mbd");
+      load_deck(BundleSource(word_deck(card, decks::Bench::bare)), "deck.mbd");
   for (const Diagnostic& d : report.diagnostics) EXPECT_NE(d.severity, Severity::error) << d.text();
   return report.model;
 }
 
-class RegisteredElement : public ::testing::TestWithParam<testing::WordCard> {
+class RegisteredElement : public testing::TestWithParam<decks::WordCard> {
  protected:
   static constexpr double kC = .02;
 
@@ -157,13 +157,13 @@ TEST_P(RegisteredElement, AddsToNoRowsButThoseItTells) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Named, RegisteredElement, ::testing::ValuesIn(testing::element_cards()),
-                         [](const auto& info) { return testing::test_name(info.param); });
+INSTANTIATE_TEST_SUITE_P(Named, RegisteredElement, testing::ValuesIn(decks::element_cards()),
+                         [](const auto& info) { return decks::test_name(info.param); });
 
 TEST(RegisteredWords, AreAllHeldByName) {
   std::set<std::string> held;
-  for (const testing::WordCard& c : testing::word_cards()) held.insert(normalized(c.word));
-  const std::set<std::string> wanted = testing::registered_words();
+  for (const decks::WordCard& c : decks::word_cards()) held.insert(normalized(c.word));
+  const std::set<std::string> wanted = decks::registered_words();
   for (const std::string& word : wanted)
     EXPECT_EQ(held.count(word), 1u) << "no card for \"" << word
                                     << "\": add one to the tests' "
@@ -173,4 +173,4 @@ TEST(RegisteredWords, AreAllHeldByName) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::registered_elements_test

@@ -11,7 +11,7 @@
 #include "elements/user/wheel.h"
 #include "model/drive.h"
 
-namespace mbcosim::conformance {
+namespace mbcosim::conformance::user_conformance_test {
 namespace {
 
 /// 0.7 + 0.3 x + 0.2 x².
@@ -208,4 +208,4 @@ using UserElements =
 MBCOSIM_CONFORMANCE(UserElements, UserElements);
 
 }  // namespace
-}  // namespace mbcosim::conformance
+}  // namespace mbcosim::conformance::user_conformance_test

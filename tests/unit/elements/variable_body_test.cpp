@@ -4,7 +4,7 @@
 #include "model/drives/closed_form_drives.h"
 #include "model/drives/template_drives.h"
 
-namespace mbcosim::conformance {
+namespace mbcosim::conformance::variable_body_test {
 namespace {
 
 DrivePtr linear(double value, double rate) {
@@ -69,4 +69,4 @@ using VariableBodyCases =
 MBCOSIM_CONFORMANCE(VariableBodies, VariableBodyCases);
 
 }  // namespace
-}  // namespace mbcosim::conformance
+}  // namespace mbcosim::conformance::variable_body_test

@@ -9,7 +9,7 @@
 #include "deck_fixture.h"
 #include "word_cards.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::bad_arguments_test {
 namespace {
 
 struct GoodCard {
@@ -90,7 +90,7 @@ DeckText deck(const GoodCard& c, const std::string& card) {
   return d;
 }
 
-class BadArguments : public ::testing::TestWithParam<GoodCard> {
+class BadArguments : public testing::TestWithParam<GoodCard> {
  protected:
   /// Refused, at a place of the card.
   void expect_refused(const std::string& card) {
@@ -139,7 +139,7 @@ TEST_P(BadArguments, AreOfAnotherKindOrNotFinite) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Cards, BadArguments, ::testing::ValuesIn(kCards),
+INSTANTIATE_TEST_SUITE_P(Cards, BadArguments, testing::ValuesIn(kCards),
                          [](const auto& info) { return std::string(info.param.name); });
 
 struct OutOfRange {
@@ -212,4 +212,4 @@ TEST(OutOfRangeArguments, AreNamedWithWhatIsAccepted) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::bad_arguments_test

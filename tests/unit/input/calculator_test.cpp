@@ -6,7 +6,7 @@
 
 #include <fstream>
 
-namespace mbcosim {
+namespace mbcosim::calculator_test {
 namespace {
 
 struct Row {
@@ -37,4 +37,4 @@ TEST_P(ExpressionTable, PrintsAsTheReference) {
 INSTANTIATE_TEST_SUITE_P(Reference, ExpressionTable, testing::ValuesIn(read_table()));
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::calculator_test

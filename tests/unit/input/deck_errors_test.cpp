@@ -3,7 +3,7 @@
 
 #include "deck_fixture.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::deck_errors_test {
 namespace {
 
 const char* const kDynamic = "structural: 1, dynamic, null, eye, null, null;";
@@ -14,7 +14,7 @@ struct Malformed {
   const char* expected;
 };
 
-class MalformedDeck : public ::testing::TestWithParam<Malformed> {};
+class MalformedDeck : public testing::TestWithParam<Malformed> {};
 
 TEST_P(MalformedDeck, IsNamed) {
   EXPECT_EQ(findings(load(GetParam().deck).diagnostics), GetParam().expected);
@@ -47,7 +47,7 @@ DeckText elements(const std::string& cards, const std::string& node_cards = kDyn
 
 INSTANTIATE_TEST_SUITE_P(
     Nodes, MalformedDeck,
-    ::testing::Values(
+    testing::Values(
         Malformed{"kind", nodes("structural: 1, null, eye, null, null;"),
                   "error: structural node 1: kind expected (static, dynamic, modal, static "
                   "displacement, dynamic displacement, "
@@ -98,7 +98,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Settings, MalformedDeck,
-    ::testing::Values(
+    testing::Values(
         Malformed{"count", control("rigid bodies: -1;"),
                   "error: count must not be negative, got -1"},
         Malformed{"realCount", control("rigid bodies: 0.9;"), "warning: count 0.9 truncated to 0"},
@@ -135,7 +135,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Elements, MalformedDeck,
-    ::testing::Values(
+    testing::Values(
         Malformed{"node", elements("body: 1, 2, 1., null, eye;"),
                   "error: body 1: structural node 2 is not defined"},
         Malformed{"bodies", elements("", kDynamic, "rigid bodies: 2;"),
@@ -371,4 +371,4 @@ TEST(NodeDof, AsksForTheOrderOfDifferentialOnes) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::deck_errors_test

@@ -11,7 +11,7 @@
 #include "model/card.h"
 #include "simulation/simulation.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 
 /// The four blocks around the given cards.
 struct DeckText {
@@ -65,4 +65,4 @@ inline std::string probe(DeckText deck, const std::string& arguments,
   return findings(reading.diagnostics());
 }
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

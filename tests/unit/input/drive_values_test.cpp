@@ -3,7 +3,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::drive_values_test {
 namespace {
 
 struct Row {
@@ -111,4 +111,4 @@ TEST(RodLength, IsKnownToItsLawAsCurrent) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::drive_values_test

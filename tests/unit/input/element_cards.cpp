@@ -1,6 +1,6 @@
 #include "word_cards.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 namespace {
 
 constexpr const char* kFluid =
@@ -372,4 +372,4 @@ std::vector<WordCard> element_cards() {
   return all;
 }
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

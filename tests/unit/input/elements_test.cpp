@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::elements_test {
 namespace {
 
 const char* const kNodes =
@@ -87,14 +87,14 @@ TEST(Driven, RefusesHintsThatCannotBeRead) {
     return report.diagnostics.empty() ? "" : report.diagnostics[0].message;
   };
   const std::string distance = "joint: 7, distance, 1, position, 1.,0.,0., 2, 3.;";
-  EXPECT_THAT(message("drive", distance), ::testing::HasSubstr("<name>{<arguments>}"));
-  EXPECT_THAT(message("drive{}", distance), ::testing::HasSubstr("empty expression"));
+  EXPECT_THAT(message("drive", distance), testing::HasSubstr("<name>{<arguments>}"));
+  EXPECT_THAT(message("drive{}", distance), testing::HasSubstr("empty expression"));
   EXPECT_THAT(message("drive{random, 1., 2., 0., forever, steps, 5, seed, 1}", distance),
-              ::testing::HasSubstr("a hint cannot have a drive that remembers its past"));
-  EXPECT_THAT(message("drive{ramp, 1.}", distance), ::testing::HasSubstr("number expected"));
-  EXPECT_THAT(message("drive{1., 2.}", distance), ::testing::HasSubstr("2."));
-  EXPECT_THAT(message("drive{model::nothing(1)}", distance), ::testing::HasSubstr("nothing"));
-  EXPECT_THAT(message("drive{1.}", "existing: joint, 7;"), ::testing::HasSubstr("existing"));
+              testing::HasSubstr("a hint cannot have a drive that remembers its past"));
+  EXPECT_THAT(message("drive{ramp, 1.}", distance), testing::HasSubstr("number expected"));
+  EXPECT_THAT(message("drive{1., 2.}", distance), testing::HasSubstr("2."));
+  EXPECT_THAT(message("drive{model::nothing(1)}", distance), testing::HasSubstr("nothing"));
+  EXPECT_THAT(message("drive{1.}", "existing: joint, 7;"), testing::HasSubstr("existing"));
 }
 
 TEST(Counts, AcceptExactNumbers) {
@@ -225,4 +225,4 @@ TEST(Describe, KnowsTheUnitsOfPrivateData) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::elements_test

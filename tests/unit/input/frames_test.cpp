@@ -2,7 +2,7 @@
 
 #include "deck_fixture.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::frames_test {
 namespace {
 
 Mat3 rows(std::initializer_list<double> v) {
@@ -17,7 +17,7 @@ struct RotationCase {
   Mat3 expected;
 };
 
-class OrientationForm : public ::testing::TestWithParam<RotationCase> {};
+class OrientationForm : public testing::TestWithParam<RotationCase> {};
 
 TEST_P(OrientationForm, GivesTheMatrixOfTheReference) {
   const ModelPtr model = model_of("reference: 1, null, " + std::string(GetParam().text) + ";");
@@ -28,7 +28,7 @@ TEST_P(OrientationForm, GivesTheMatrixOfTheReference) {
 
 INSTANTIATE_TEST_SUITE_P(
     Manual, OrientationForm,
-    ::testing::Values(
+    testing::Values(
         RotationCase{"1, 1.,1.,0., 2, 0.,1.,0.",
                      rows({.707106781, -.707106781, 0, .707106781, .707106781, 0, 0, 0, 1})},
         RotationCase{"3, 1.,2.,3., 1, 1.,0.,0.",
@@ -158,7 +158,7 @@ struct RelativeCase {
   Mat3 orientation;
 };
 
-class RelativeData : public ::testing::TestWithParam<RelativeCase> {};
+class RelativeData : public testing::TestWithParam<RelativeCase> {};
 
 TEST_P(RelativeData, OfTheSecondNodeIsInItsFrame) {
   const std::string found = probe(two_nodes(), GetParam().text, [](Card& card) {
@@ -174,7 +174,7 @@ TEST_P(RelativeData, OfTheSecondNodeIsInItsFrame) {
 
 INSTANTIATE_TEST_SUITE_P(
     Manual, RelativeData,
-    ::testing::Values(
+    testing::Values(
         RelativeCase{"reference, global, 1.,2.,3., orientation, reference, global, eye",
                      Vec3(.0724851634, .526457506, 3.563367564),
                      rows({.7243001434, .3659823932, -.5843339715, -.4955203884, .8656015533,
@@ -242,4 +242,4 @@ TEST(AbsolutePosition, MayBeGivenInANodesFrame) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::frames_test

@@ -2,7 +2,7 @@
 
 #include "word_cards.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 namespace {
 
 constexpr const char* kShared =
@@ -142,4 +142,4 @@ std::vector<WordCard> law_cards() {
   return all;
 }
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

@@ -6,7 +6,7 @@
 #include "model/model.h"
 #include "simulation/describe.h"
 
-namespace mbcosim {
+namespace mbcosim::loop_model_test {
 namespace {
 
 const char* const kNodes =
@@ -98,4 +98,4 @@ TEST(LoopCantilever, HasTheChainOfTheTutorial) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::loop_model_test

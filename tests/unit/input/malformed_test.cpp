@@ -5,7 +5,7 @@
 #include "../time_factor.h"
 #include "input/calculator.h"
 
-namespace mbcosim {
+namespace mbcosim::malformed_test {
 namespace {
 
 using testing::ElementsAre;
@@ -364,4 +364,4 @@ TEST(ReaderLimits, Strings) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::malformed_test

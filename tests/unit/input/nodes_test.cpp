@@ -3,7 +3,7 @@
 #include "deck_fixture.h"
 #include "elements/modal_bodies.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::nodes_test {
 namespace {
 
 ModelPtr nodes(const std::string& cards, const std::string& control = "",
@@ -199,4 +199,4 @@ TEST(PrivateData, OfStructuralNodesMatchTheReferenceSolver) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::nodes_test

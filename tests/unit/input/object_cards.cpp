@@ -1,6 +1,6 @@
 #include "word_cards.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 namespace {
 
 /// Drives: node 1 moves, joint 80 is a rod, drive 81 the time, file driver 82 two columns.
@@ -141,4 +141,4 @@ std::vector<WordCard> file_driver_cards() {
   return all;
 }
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

@@ -12,7 +12,7 @@
 #include "model/model.h"
 #include "model/scalar_function.h"
 
-namespace mbcosim {
+namespace mbcosim::run_strings_test {
 namespace {
 
 using testing::ElementsAre;
@@ -284,4 +284,4 @@ TEST_F(RunStrings, ExpressionsTakeAtMostTwelveNames) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::run_strings_test

@@ -4,7 +4,7 @@
 
 #include "deck_fixture.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::settings_test {
 namespace {
 
 InitialValueSettings initial_value(const std::string& cards) {
@@ -267,4 +267,4 @@ TEST(Digest, ChangesWithAnyFile) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::settings_test

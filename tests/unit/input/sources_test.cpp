@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace mbcosim {
+namespace mbcosim::sources_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -80,4 +80,4 @@ TEST(BundleSource, KnowsItsFilesOnly) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::sources_test

@@ -6,7 +6,7 @@
 
 #include "input/calculator.h"
 
-namespace mbcosim {
+namespace mbcosim::statements_test {
 namespace {
 
 using testing::ElementsAre;
@@ -188,4 +188,4 @@ TEST(Condition, OpensAndClosesInOneFile) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::statements_test

@@ -2,7 +2,7 @@
 
 #include "deck_fixture.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::structured_values_test {
 namespace {
 
 Mat6 read_mat6(const std::string& text) {
@@ -119,4 +119,4 @@ TEST(TemplateDrive, CombinesEntitiesAndDrives) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::structured_values_test

@@ -6,7 +6,7 @@
 #include "input/symbol_values.h"
 #include "simulation/load.h"
 
-namespace mbcosim {
+namespace mbcosim::symbols_test {
 namespace {
 
 using Files = std::map<std::string, std::string>;
@@ -143,4 +143,4 @@ TEST(ParseSymbol, TellsNumbersBoolsAndTexts) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::symbols_test

@@ -6,7 +6,7 @@
 #include "elements/families.h"
 #include "input/grammar/grammar.h"
 
-namespace mbcosim {
+namespace mbcosim::vocabulary_test {
 namespace {
 
 const VocabularyWord* find(const std::vector<VocabularyGroup>& groups, const std::string& group,
@@ -174,4 +174,4 @@ TEST(Grammar, TellsNumbersWithTheirUnits) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::vocabulary_test

@@ -4,7 +4,7 @@
 #include "deck_fixture.h"
 #include "elements/families.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::warnings_test {
 namespace {
 
 const char* const kNode = "structural: 1, dynamic, null, eye, null, null;";
@@ -251,4 +251,4 @@ TEST(C81Data, IsReadWithoutEffect) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::warnings_test

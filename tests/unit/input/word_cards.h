@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 
 struct WordCard {
   std::string word;  ///< "joint: clamp", "body", "drive: ramp", "law 3: linear elastic"
@@ -46,4 +46,4 @@ enum class Bench {
 /// The files of a deck, "deck.mbd" the first of them, in which `card` stands on a line of its own.
 std::map<std::string, std::string> word_deck(const WordCard& word, Bench bench);
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

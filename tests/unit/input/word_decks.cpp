@@ -6,7 +6,7 @@
 #include "elements/modal_bodies.h"
 #include "word_cards.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks {
 namespace {
 
 bool contains(const std::string& text, const std::string& part) {
@@ -162,4 +162,4 @@ std::map<std::string, std::string> word_deck(const WordCard& word, Bench bench) 
           {"generic.fem", modal_body}};
 }
 
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks

@@ -11,7 +11,7 @@
 #include "deck_fixture.h"
 #include "word_cards.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::words_refused_test {
 namespace {
 
 /// Begin what may be left out of a card.
@@ -277,7 +277,7 @@ const Numbers kSigned = {
     {"file driver: variable step 1", "2"},
 };
 
-class RefusedWord : public ::testing::TestWithParam<WordCard> {
+class RefusedWord : public testing::TestWithParam<WordCard> {
  protected:
   static void add(std::string& list, const std::string& item) {
     list += (list.empty() ? "" : " ") + item;
@@ -348,8 +348,8 @@ TEST_P(RefusedWord, TakesNegativeNumbersWhereTheyMeanSomething) {
   EXPECT_EQ(refused_numbers, of_word(kSigned)) << "refused with the other sign";
 }
 
-INSTANTIATE_TEST_SUITE_P(Named, RefusedWord, ::testing::ValuesIn(numbered_word_cards()),
+INSTANTIATE_TEST_SUITE_P(Named, RefusedWord, testing::ValuesIn(numbered_word_cards()),
                          [](const auto& info) { return test_name(info.param); });
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::words_refused_test

@@ -5,7 +5,7 @@
 #include "deck_fixture.h"
 #include "simulation/load.h"
 
-namespace mbcosim::testing {
+namespace mbcosim::decks::written_card_test {
 namespace {
 
 const char* const kNodes = "structural: 1, dynamic, null, eye, null, null;";
@@ -81,4 +81,4 @@ TEST(WrittenCard, IsNoneWhereTheDeckHasNone) {
 }
 
 }  // namespace
-}  // namespace mbcosim::testing
+}  // namespace mbcosim::decks::written_card_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace mbcosim {
+namespace mbcosim::rotation_test {
 namespace {
 
 TEST(Rotation, CgrParametersInvertTheRotation) {
@@ -61,4 +61,4 @@ TEST(Dual, FollowsTheChainRule) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::rotation_test

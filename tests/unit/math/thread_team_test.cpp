@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-namespace mbcosim {
+namespace mbcosim::thread_team_test {
 namespace {
 
 class Team : public testing::TestWithParam<int> {
@@ -75,4 +75,4 @@ TEST_P(Team, PiecesCoverAllOnce) {
 INSTANTIATE_TEST_SUITE_P(OfAnySize, Team, testing::Values(1, 2, 4));
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::thread_team_test

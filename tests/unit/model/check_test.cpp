@@ -8,10 +8,10 @@
 
 #include "elements/element.h"
 
-namespace mbcosim {
+namespace mbcosim::check_test {
 namespace {
 
-using ::testing::HasSubstr;
+using testing::HasSubstr;
 
 std::string message_of(const std::function<void(Connector&)>& connect) {
   ModelBuilder builder;
@@ -60,11 +60,11 @@ TEST(Check, AnElementWithMoreUnknownsThanThereIsRoomForIsRefused) {
 
 TEST(Check, TheMessageNamesConditionAndPlaceWithoutFoldersOfTheBuild) {
   const std::string text = message_of([](Connector& c) { c.algebraic(kMaxOwn + 1); });
-  EXPECT_THAT(text, ::testing::StartsWith("internal error: an element has more unknowns"));
+  EXPECT_THAT(text, testing::StartsWith("internal error: an element has more unknowns"));
   EXPECT_THAT(text, HasSubstr("(src/elements/element_view.h:"));
   EXPECT_THAT(text, HasSubstr("kMaxOwn"));
   EXPECT_THAT(text, HasSubstr("please report it"));
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::check_test

@@ -5,7 +5,7 @@
 #include "deck_run.h"
 #include "output/model_log.h"
 
-namespace mbcosim {
+namespace mbcosim::deck_channel_test {
 namespace {
 
 std::string deck(const std::string& counts, const std::string& drivers, const std::string& cards) {
@@ -120,4 +120,4 @@ TEST(DeckChannel, PortsOfTheDaemonAreNone) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::deck_channel_test

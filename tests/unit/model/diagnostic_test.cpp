@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace mbcosim {
+namespace mbcosim::diagnostic_test {
 namespace {
 
 Diagnostic at(std::string line, int column, int length = 1) {
@@ -46,4 +46,4 @@ TEST(DiagnosticText, PutsDotsForBytesThatAreNoText) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::diagnostic_test

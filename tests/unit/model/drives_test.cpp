@@ -17,7 +17,7 @@
 #include "model/functions/scalar_functions.h"
 #include "model/model.h"
 
-namespace mbcosim {
+namespace mbcosim::drives_test {
 namespace {
 
 constexpr double kForever = std::numeric_limits<double>::infinity();
@@ -64,7 +64,7 @@ FileDriverPtr file2(bool linear = true, bool pad = false) {
 }
 
 /// Runs steps of equal length and lets step-driven drives advance.
-class DriveTable : public ::testing::Test {
+class DriveTable : public testing::Test {
  protected:
   template <class D>
   std::shared_ptr<D> listen(std::shared_ptr<D> drive) {
@@ -515,4 +515,4 @@ TEST_F(DriveTable, PostponedDrivesInACircleAreRefused) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::drives_test

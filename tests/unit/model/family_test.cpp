@@ -7,7 +7,7 @@
 
 #include "elements/families.h"
 
-namespace mbcosim {
+namespace mbcosim::family_test {
 namespace {
 
 TEST(Family, EveryWordOfADeckLeadsToOneFamily) {
@@ -47,4 +47,4 @@ TEST(Family, UnknownWordsLeadToNone) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::family_test

@@ -11,7 +11,7 @@
 #include "elements/joints/deformable.h"
 #include "input/word_cards.h"
 
-namespace mbcosim {
+namespace mbcosim::law_derivatives_test {
 namespace {
 
 template <class Element>
@@ -52,9 +52,9 @@ void expect_exact_tangent_in(const std::map<std::string, std::string>& files, Fa
   expect_exact_tangent<N>(*law_in<Element>(run.model(), family, 90), run.context());
 }
 
-void check(const testing::WordCard& card) {
+void check(const decks::WordCard& card) {
   SCOPED_TRACE(card.card);
-  const auto files = word_deck(card, testing::Bench::moving);
+  const auto files = word_deck(card, decks::Bench::moving);
   switch (card.word[4]) {  // "law 3: ..."
     case '1':
       return expect_exact_tangent_in<GenelSpringSupport, 1>(files, Family::genel);
@@ -66,14 +66,14 @@ void check(const testing::WordCard& card) {
 }
 
 TEST(LawDerivatives, OfEveryRegisteredLaw) {
-  for (const testing::WordCard& card : testing::law_cards()) check(card);
+  for (const decks::WordCard& card : decks::law_cards()) check(card);
 }
 TEST(LawDerivatives, OfALawThatIsANumber) {
-  testing::WordCard card;
+  decks::WordCard card;
   card.word = "law 1: number";
   card.card = "genel: 90, spring support, 11, abstract, algebraic, 5.";
   check(card);
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::law_derivatives_test

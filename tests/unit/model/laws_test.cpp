@@ -5,7 +5,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::laws_test {
 namespace {
 
 constexpr const char* kFunctions =
@@ -177,4 +177,4 @@ TEST(Laws, ThreeDimensionalForces) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::laws_test

@@ -12,7 +12,7 @@
 
 #include "model/diagnostic.h"
 
-namespace mbcosim {
+namespace mbcosim::scalar_functions_test {
 namespace {
 
 using Operation = CombinedFunction::Operation;
@@ -151,4 +151,4 @@ TEST(ScalarFunctions, SplineThroughFourPointsIsTheirCubic) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::scalar_functions_test

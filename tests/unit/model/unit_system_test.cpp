@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace mbcosim {
+namespace mbcosim::unit_system_test {
 namespace {
 
 const UnitSystem kSi{"m", "kg", "", "s"}, kTonne{"mm", "t", "", "s"}, kByForce{"mm", "", "N", "s"},
@@ -102,4 +102,4 @@ TEST(UnitSystem, WrongNamesAreToldByMember) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::unit_system_test

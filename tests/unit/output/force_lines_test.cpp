@@ -8,7 +8,7 @@
 #include "deck_run.h"
 #include "output/result_files.h"
 
-namespace mbcosim {
+namespace mbcosim::force_lines_test {
 namespace {
 
 /// Runs a deck to its end and keeps the last line of each label.
@@ -130,4 +130,4 @@ end: elements;
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::force_lines_test

@@ -11,7 +11,7 @@
 #include "deck_run.h"
 #include "output/result_files.h"
 
-namespace mbcosim {
+namespace mbcosim::netcdf_test {
 namespace {
 
 const char* const kDeck = R"(begin: data; problem: initial value; end: data;
@@ -41,7 +41,7 @@ class NetcdfResults : public testing::Test {
   virtual std::string deck() const { return kDeck; }
   void SetUp() override {
     prefix_ = testing::TempDir() + "mbcosim_netcdf_" +
-              std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "_" +
+              std::to_string(testing::UnitTest::GetInstance()->random_seed()) + "_" +
               std::to_string(reinterpret_cast<std::uintptr_t>(this));
     const LoadReport report = load_deck(BundleSource({{"deck.mbd", deck()}}), "deck.mbd");
     for (const Diagnostic& d : report.diagnostics)
@@ -332,4 +332,4 @@ TEST_F(NetcdfResults, StandBesideTheTextFiles) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::netcdf_test

@@ -11,7 +11,7 @@
 #include "deck_run.h"
 #include "output/result_files.h"
 
-namespace mbcosim {
+namespace mbcosim::result_history_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -267,4 +267,4 @@ TEST(TextFile, KeepsWhatABudgetRefuses) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::result_history_test

@@ -9,7 +9,7 @@
 #include "deck_run.h"
 #include "output/result_files.h"
 
-namespace mbcosim {
+namespace mbcosim::result_writer_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -73,4 +73,4 @@ TEST_F(ResultFilesTest, AFolderInTheWayIsToldBeforeAnythingIsCreated) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::result_writer_test

@@ -10,7 +10,7 @@
 #include <random>
 #include <string>
 
-namespace mbcosim {
+namespace mbcosim::scientific_test {
 namespace {
 
 std::string written(double v, int precision) {
@@ -94,4 +94,4 @@ TEST(Scientific, WritesWhatIsNoUsualNumber) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::scientific_test

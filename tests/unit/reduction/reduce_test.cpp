@@ -10,12 +10,12 @@
 #include "reduction/job.h"
 #include "reduction/structure.h"
 
-namespace mbcosim {
+namespace mbcosim::reduce_test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::Not;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
@@ -493,4 +493,4 @@ TEST(FeModelFilesTest, RoundTripAndRefusals) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::reduce_test

@@ -11,7 +11,7 @@
 #include "fe_models.h"
 #include "reduction/error.h"
 
-namespace mbcosim {
+namespace mbcosim::sparse_factor_test {
 namespace {
 
 std::string row_text(int k) { return "row " + std::to_string(k); }
@@ -95,8 +95,7 @@ TEST(SparseFactor, ZeroPivotsAreReported) {
     SparseFactor::positive(singular, {}, row_text);
     FAIL();
   } catch (const ReductionError& e) {
-    EXPECT_THAT(e.what(),
-                ::testing::ContainsRegex("singular or not positive definite at row [12]"));
+    EXPECT_THAT(e.what(), testing::ContainsRegex("singular or not positive definite at row [12]"));
   }
 }
 
@@ -112,7 +111,7 @@ TEST(SparseFactor, NamesTheRowOfALargeSingularMatrix) {
     SparseFactor::positive(s.matrix, s.places, row_text);
     FAIL();
   } catch (const ReductionError& e) {
-    EXPECT_THAT(e.what(), ::testing::HasSubstr("not positive definite at row 1000 "));
+    EXPECT_THAT(e.what(), testing::HasSubstr("not positive definite at row 1000 "));
   }
   EXPECT_EQ(SparseFactor::count_negative(s.matrix, s.places), 1);
 }
@@ -212,7 +211,7 @@ TEST(SparseFactor, NamesTheSameRowWithAnyNumberOfThreads) {
       messages.push_back(e.what());
     }
   }
-  EXPECT_THAT(messages, ::testing::Each(messages[0]));
+  EXPECT_THAT(messages, testing::Each(messages[0]));
 }
 
 /// At once with any number of threads; with one also on the way.
@@ -275,4 +274,4 @@ TEST(EliminationTree, CountsTheEntriesOfTheFactor) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::sparse_factor_test

@@ -12,7 +12,7 @@
 #include "output/text_writer.h"
 #include "simulation/restored_runs.h"
 
-namespace mbcosim {
+namespace mbcosim::adaptive_control_test {
 namespace {
 
 using namespace control_decks;
@@ -347,4 +347,4 @@ TEST(AdaptiveControl, BadCardsAreRefusedAtTheirPlace) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::adaptive_control_test

@@ -6,7 +6,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::beam_decks_test {
 namespace {
 
 void expect_near(const Vec3& value, const Vec3& expected, double tolerance, const char* what) {
@@ -358,4 +358,4 @@ TEST(BeamDecks, RollsUpToACircle) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::beam_decks_test

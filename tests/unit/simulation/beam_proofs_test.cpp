@@ -9,7 +9,7 @@
 #include "simulation/beam_line.h"
 #include "simulation/exact_cantilever.h"
 
-namespace mbcosim {
+namespace mbcosim::beam_proofs_test {
 namespace {
 
 // --- constant states of strain -----------------------------------------------------------------
@@ -425,4 +425,4 @@ end: elements;
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::beam_proofs_test

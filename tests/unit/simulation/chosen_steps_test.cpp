@@ -5,7 +5,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::chosen_steps_test {
 namespace {
 
 using testing::HasSubstr;
@@ -247,4 +247,4 @@ TEST(Events, RefuseATolerance) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::chosen_steps_test

@@ -7,7 +7,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::deck_details_test {
 namespace {
 
 std::string deck(const std::string& initial, const std::string& counts, const std::string& body) {
@@ -338,4 +338,4 @@ end: elements;
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::deck_details_test

@@ -11,7 +11,7 @@
 #include "deck_run.h"
 #include "simulation/restored_runs.h"
 
-namespace mbcosim {
+namespace mbcosim::discrete_control_test {
 namespace {
 
 using Files = std::map<std::string, std::string>;
@@ -321,4 +321,4 @@ TEST(DiscreteControl, BadCardsAreRefusedAtTheirPlace) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::discrete_control_test

@@ -4,7 +4,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::dry_friction_test {
 namespace {
 
 constexpr double kMass = 2, kWeight = 10, kMu = .3;
@@ -334,4 +334,4 @@ TEST(ThreadFriction, MatchesTheReferenceSolver) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::dry_friction_test

@@ -9,7 +9,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::electric_decks_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -254,4 +254,4 @@ TEST(Electric, BadCardsAreRefused) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::electric_decks_test

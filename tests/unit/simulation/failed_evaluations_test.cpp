@@ -6,7 +6,7 @@
 #include "deck_run.h"
 #include "output/result_writer.h"
 
-namespace mbcosim {
+namespace mbcosim::failed_evaluations_test {
 namespace {
 
 using testing::HasSubstr;
@@ -119,4 +119,4 @@ TEST(FailedEvaluation, OfTheOutputMeterEndsTheRun) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::failed_evaluations_test

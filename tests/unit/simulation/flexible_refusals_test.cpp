@@ -7,7 +7,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::flexible_refusals_test {
 namespace {
 
 constexpr const char* kShared =
@@ -256,4 +256,4 @@ TEST(BeamRefusals, SectionsActuatorsAndOutput) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::flexible_refusals_test

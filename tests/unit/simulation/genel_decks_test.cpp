@@ -6,7 +6,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::genel_decks_test {
 namespace {
 
 /// One of each linear genel: filter, state space, spring support, mass, spring, distance.
@@ -142,4 +142,4 @@ TEST(SteadyLoads, ActFromTheFirstStepInTightCoupling) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::genel_decks_test

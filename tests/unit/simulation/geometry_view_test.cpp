@@ -5,7 +5,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::geometry_view_test {
 namespace {
 
 const char* const kHead =
@@ -37,7 +37,7 @@ const char* const kOthers =
     "beam3: 7, 1, null, 2, 0., 0., 0.5, 3, null, eye, linear elastic generic, eye, same, same;\n"
     "body: 8, 3, 1., null, eye;\n";
 
-class Geometry : public ::testing::Test {
+class Geometry : public testing::Test {
  protected:
   Geometry() : run_(deck(std::string(kJoints) + kOthers)) {}
   GeometryView view() { return GeometryView(run_.model(), run_.simulation().state()); }
@@ -176,4 +176,4 @@ TEST(GeometryOfAnActuator, IsItsTwoChambersWithTheirPressures) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::geometry_view_test

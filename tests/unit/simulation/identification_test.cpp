@@ -11,7 +11,7 @@
 #include "output/result_files.h"
 #include "simulation/restored_runs.h"
 
-namespace mbcosim {
+namespace mbcosim::identification_test {
 namespace {
 
 using namespace control_decks;
@@ -402,4 +402,4 @@ TEST(Identification, ElementsDoNotShareAFile) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::identification_test

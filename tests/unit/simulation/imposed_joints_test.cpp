@@ -2,7 +2,7 @@
 #include "deck_run.h"
 #include "elements/columns.h"
 
-namespace mbcosim {
+namespace mbcosim::imposed_joints_test {
 namespace {
 
 std::string deck(const std::string& joint) {
@@ -26,7 +26,7 @@ struct OldName {
   const char *old, *total;
 };
 
-class ImposedJoints : public ::testing::TestWithParam<OldName> {};
+class ImposedJoints : public testing::TestWithParam<OldName> {};
 
 TEST_P(ImposedJoints, MoveAsTheTotalJoint) {
   const std::string drive = "single, 1.,0.,2., sine, 0., 10., .01, forever, 0.";
@@ -46,7 +46,7 @@ TEST(AngularAcceleration, WritesTheCoupleAlongTheDirectionAsRead) {
   DeckRun run(text);
   ASSERT_TRUE(run.ready());
   run.step(199);
-  testing::Columns row;
+  decks::Columns row;
   const ElementRef e = run.model().find_element(Family::joint, 2);
   e.set->output(run.context(), e.index, row);
   const std::vector<double> reference = {-1.522358e-02, 0, 0, 0, 0, 0,           -6.808191e-03,
@@ -57,17 +57,17 @@ TEST(AngularAcceleration, WritesTheCoupleAlongTheDirectionAsRead) {
 
 INSTANTIATE_TEST_SUITE_P(
     Names, ImposedJoints,
-    ::testing::Values(OldName{"imposed displacement, 1, .3,.1,-.2, 2, null, ",
-                              "total joint, 1, position, .3,.1,-.2, 2, position, null, position "
-                              "constraint, active, active, active, "},
-                      OldName{"imposed displacement pin, 2, null, .3,.1,-.2, ",
-                              "total pin joint, 2, position, null, position, .3,.1,-.2, position "
-                              "constraint, active, active, active, "},
-                      OldName{"imposed orientation, 1, eye, 2, reference, global, eye, ",
-                              "total joint, 1, rotation orientation, eye, 2, rotation orientation, "
-                              "reference, global, eye, orientation constraint, active, active, "
-                              "active, "}),
+    testing::Values(OldName{"imposed displacement, 1, .3,.1,-.2, 2, null, ",
+                            "total joint, 1, position, .3,.1,-.2, 2, position, null, position "
+                            "constraint, active, active, active, "},
+                    OldName{"imposed displacement pin, 2, null, .3,.1,-.2, ",
+                            "total pin joint, 2, position, null, position, .3,.1,-.2, position "
+                            "constraint, active, active, active, "},
+                    OldName{"imposed orientation, 1, eye, 2, reference, global, eye, ",
+                            "total joint, 1, rotation orientation, eye, 2, rotation orientation, "
+                            "reference, global, eye, orientation constraint, active, active, "
+                            "active, "}),
     [](const auto& info) { return std::to_string(info.index); });
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::imposed_joints_test

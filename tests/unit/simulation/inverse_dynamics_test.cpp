@@ -5,7 +5,7 @@
 #include "deck_run.h"
 #include "elements/columns.h"
 
-namespace mbcosim {
+namespace mbcosim::inverse_dynamics_test {
 namespace {
 
 constexpr double kDigits = 2e-12;
@@ -15,7 +15,7 @@ void expect_near(const Vec3& found, const Vec3& expected, double tolerance = kDi
 }
 
 std::vector<double> printed(const DeckRun& run, Family family, int label) {
-  testing::Columns row;
+  decks::Columns row;
   const ElementRef e = run.model().find_element(family, label);
   e.set->output(run.context(), e.index, row);
   return row.v;
@@ -244,11 +244,11 @@ TEST(InverseDynamics, NamesTheJointAndTheRemedyWhenItDoesNotConverge) {
   EXPECT_EQ(simulation.error().kind, ErrorKind::not_converged);
   EXPECT_THAT(
       simulation.error().message,
-      ::testing::MatchesRegex("inverse dynamics at t = 0 \\(record 0\\): no convergence of the "
-                              "positions in 1 iterations, residual 0.24.*, tolerance 1e-12\n"
-                              "  joint 2 \\(total joint\\), equation .: farthest from its "
-                              "prescribed motion\n  hint: the iteration comes nearer: allow more "
-                              "`max iterations` \\(1 when the card is missing\\)"));
+      testing::MatchesRegex("inverse dynamics at t = 0 \\(record 0\\): no convergence of the "
+                            "positions in 1 iterations, residual 0.24.*, tolerance 1e-12\n"
+                            "  joint 2 \\(total joint\\), equation .: farthest from its "
+                            "prescribed motion\n  hint: the iteration comes nearer: allow more "
+                            "`max iterations` \\(1 when the card is missing\\)"));
   EXPECT_EQ(simulation.error().failure.residual_history.size(), 2u);
 }
 
@@ -270,7 +270,7 @@ std::string refusal(const std::string& what, const std::string& instead) {
 }
 
 TEST(InverseDynamics, RefusesWhatCannotTakePart) {
-  using ::testing::HasSubstr;
+  using testing::HasSubstr;
   EXPECT_THAT(refusal("structural: 1, static", "structural: 1, dynamic"),
               HasSubstr("structural node 1: a dynamic node in inverse dynamics"));
   EXPECT_THAT(refusal("joint: 1, total pin joint, 1, position, .05,.02,-.03, position, .2,.1,.3,",
@@ -352,9 +352,9 @@ TEST(InverseDynamicsClauses, AreRefusedAtTheArgument) {
   };
   for (const auto& [clause, message] : cases)
     EXPECT_THAT(refusal("0.6,0.,0.8, const, 1.", std::string("0.6,0.,0.8, const, 1.") + clause),
-                ::testing::HasSubstr(message))
+                testing::HasSubstr(message))
         << clause;
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::inverse_dynamics_test

@@ -25,7 +25,7 @@
 #include "simulation/beam_line.h"
 #include "simulation/exact_cantilever.h"
 
-namespace mbcosim {
+namespace mbcosim::measured_beams_test {
 namespace {
 
 constexpr double kLength = .55, kStation = .5, kGravity = 9.80665;
@@ -278,4 +278,4 @@ TEST(CompositeCantilever, AsMeasured) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::measured_beams_test

@@ -6,7 +6,7 @@
 
 #include "simulation/reference_motion.h"
 
-namespace mbcosim {
+namespace mbcosim::mechanisms_test {
 namespace {
 
 using reference::extrapolated;
@@ -367,4 +367,4 @@ TEST(Bricard, MovesWithARegularizedHinge) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::mechanisms_test

@@ -3,7 +3,7 @@
 
 #include "simulation/reference_motion.h"
 
-namespace mbcosim {
+namespace mbcosim::pendulums_test {
 namespace {
 
 using reference::extrapolated;
@@ -151,4 +151,4 @@ TEST(DoublePendulum, AgreesWithRungeKutta) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::pendulums_test

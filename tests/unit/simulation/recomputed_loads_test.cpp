@@ -9,11 +9,11 @@
 #include "deck_run.h"
 #include "elements/columns.h"
 
-namespace mbcosim {
+namespace mbcosim::recomputed_loads_test {
 namespace {
 
 std::vector<double> printed(const DeckRun& run, Family family, int label) {
-  testing::Columns row;
+  decks::Columns row;
   const ElementRef e = run.model().find_element(family, label);
   e.set->output(run.context(), e.index, row);
   return row.v;
@@ -256,4 +256,4 @@ TEST(PointContact, PushesAgainstATiltedPlane) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::recomputed_loads_test

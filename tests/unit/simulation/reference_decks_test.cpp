@@ -3,12 +3,12 @@
 #include "deck_run.h"
 #include "elements/columns.h"
 
-namespace mbcosim {
+namespace mbcosim::reference_decks_test {
 namespace {
 
 /// The line of a joint as it is printed.
 std::vector<double> printed(const DeckRun& run, int label) {
-  testing::Columns row;
+  decks::Columns row;
   const ElementRef e = run.model().find_element(Family::joint, label);
   e.set->output(run.context(), e.index, row);
   return row.v;
@@ -193,4 +193,4 @@ begin: elements; body: 1, 1, 2., .1,0.,0., diag, 1.,1.1,1.2; gravity: uniform, 0
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::reference_decks_test

@@ -6,7 +6,7 @@
 #include "deck_run.h"
 #include "elements/modal_deck.h"
 
-namespace mbcosim {
+namespace mbcosim::reference_differences_test {
 namespace {
 
 std::string initial_value(const std::string& cards) {
@@ -189,7 +189,7 @@ end: elements;
 
 /// A slender flexible bar along the axis of a spin, hinged to the spinning node at its lower end.
 /// Upright it is in unstable balance: a tilt θ about the hinge grows as θ'' = Ω² sin θ cos θ.
-testing::ModalDeck spinning_bar(double tilt, double tolerance) {
+decks::ModalDeck spinning_bar(double tilt, double tolerance) {
   FemData bar;
   bar.name = "bar.fem";
   bar.labels = {"foot", "middle", "tip"};
@@ -202,7 +202,7 @@ testing::ModalDeck spinning_bar(double tilt, double tolerance) {
   bar.mass = 1.09e-3 * MatX::Identity(2, 2);
   bar.stiffness = 1e2 * MatX::Identity(2, 2);
   bar.initial_amplitudes = bar.initial_velocities = VecX::Zero(2);
-  testing::ModalDeck deck;
+  decks::ModalDeck deck;
   deck.h = 5e-2;
   deck.final_time = 40;
   deck.tolerance = tolerance;
@@ -210,7 +210,7 @@ testing::ModalDeck spinning_bar(double tilt, double tolerance) {
       "method: ms, .6; derivatives tolerance: 1e-6; derivatives max iterations: 20;";
   deck.control = "structural nodes: 4; joints: 4;";
   deck.files["bar.fem"] = write_fem_text(bar, {});
-  testing::Placement ground, spin, tilted;
+  decks::Placement ground, spin, tilted;
   spin.w = tilted.w = Vec3(0, 0, 2);
   tilted.R = Eigen::AngleAxisd(tilt, Vec3::UnitX()).toRotationMatrix();
   deck.node(1, "static", ground);
@@ -228,7 +228,7 @@ testing::ModalDeck spinning_bar(double tilt, double tolerance) {
 
 /// Tilt of the bar at time t.
 double tilt_of_spinning_bar(double start, double tolerance, double t) {
-  testing::ModalRun run(spinning_bar(start, tolerance));
+  decks::ModalRun run(spinning_bar(start, tolerance));
   if (!run.ready()) return NAN;
   run.to(t);
   return std::asin(run.node(3).R.col(2).head<2>().norm());
@@ -255,4 +255,4 @@ TEST(ReferenceDifferences, UnstableSpinOfModalBodiesAmplifiesTheTolerance) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::reference_differences_test

@@ -12,7 +12,7 @@
 #include "simulation/simulation.h"
 #include "source_dir.h"
 
-namespace mbcosim {
+namespace mbcosim::reference_rules_test {
 namespace {
 
 using Line = std::vector<double>;
@@ -149,4 +149,4 @@ INSTANTIATE_TEST_SUITE_P(Decks, ReferenceRules,
                          [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::reference_rules_test

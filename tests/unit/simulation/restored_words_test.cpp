@@ -5,13 +5,13 @@
 #include "input/word_cards.h"
 #include "simulation/simulation.h"
 
-namespace mbcosim {
+namespace mbcosim::restored_words_test {
 namespace {
 
-using testing::Bench;
-using testing::WordCard;
+using decks::Bench;
+using decks::WordCard;
 
-class RestoredWord : public ::testing::TestWithParam<WordCard> {
+class RestoredWord : public testing::TestWithParam<WordCard> {
  protected:
   static std::unique_ptr<Simulation> start() {
     LoadReport report = load_deck(BundleSource(word_deck(GetParam(), Bench::moving)), "deck.mbd");
@@ -46,8 +46,8 @@ TEST_P(RestoredWord, GoesOnWithTheSameBits) {
   EXPECT_TRUE(after(*other, 4) == expected) << "from the bytes, in another simulation";
 }
 
-INSTANTIATE_TEST_SUITE_P(Named, RestoredWord, ::testing::ValuesIn(testing::numbered_word_cards()),
-                         [](const auto& info) { return testing::test_name(info.param); });
+INSTANTIATE_TEST_SUITE_P(Named, RestoredWord, testing::ValuesIn(decks::numbered_word_cards()),
+                         [](const auto& info) { return decks::test_name(info.param); });
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::restored_words_test

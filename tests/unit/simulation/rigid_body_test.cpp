@@ -6,7 +6,7 @@
 #include "elements/bodies/body.h"
 #include "simulation/simulation.h"
 
-namespace mbcosim {
+namespace mbcosim::rigid_body_test {
 namespace {
 
 struct BodyCase {
@@ -237,4 +237,4 @@ TEST(Simulation, StopsBetweenIterationsWhenCancelled) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::rigid_body_test

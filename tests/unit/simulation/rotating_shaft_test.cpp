@@ -15,7 +15,7 @@
 
 #include "simulation/beam_line.h"
 
-namespace mbcosim {
+namespace mbcosim::rotating_shaft_test {
 namespace {
 
 constexpr double kLength = 6, kLineMass = 11.64, kDiscMass = 70.573, kGravity = 9.81;
@@ -144,4 +144,4 @@ TEST(RotatingShaft, ConvergesWithStepAndMesh) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::rotating_shaft_test

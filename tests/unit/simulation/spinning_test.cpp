@@ -4,7 +4,7 @@
 
 #include "simulation/reference_motion.h"
 
-namespace mbcosim {
+namespace mbcosim::spinning_test {
 namespace {
 
 using reference::extrapolated;
@@ -134,4 +134,4 @@ begin: nodes; structural: 1, dynamic, null, eye, null, )" +
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::spinning_test

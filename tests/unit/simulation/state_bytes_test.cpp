@@ -10,7 +10,7 @@
 #include "deck_run.h"
 #include "math/hash.h"
 
-namespace mbcosim {
+namespace mbcosim::state_bytes_test {
 namespace {
 
 constexpr std::size_t kVersionAt = 8;                // after the magic
@@ -121,4 +121,4 @@ TEST(StateBytes, WithAnArrayOfAnotherLengthDoNotBecomeTheState) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::state_bytes_test

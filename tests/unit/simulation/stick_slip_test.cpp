@@ -5,7 +5,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::stick_slip_test {
 namespace {
 
 constexpr double kNormal = 5, kStatic = .55, kSliding = .25, kStiffness = 130, kSpeed = .08;
@@ -63,4 +63,4 @@ TEST(StickSlip, GoesThroughManyTransitions) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::stick_slip_test

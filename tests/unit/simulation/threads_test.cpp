@@ -9,7 +9,7 @@
 #include "beam_line.h"
 #include "simulation/simulation.h"
 
-namespace mbcosim {
+namespace mbcosim::threads_test {
 namespace {
 
 ModelPtr model_of(const std::string& deck) {
@@ -138,4 +138,4 @@ TEST(AssemblyPlan, SmallModelsAreOneTile) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::threads_test

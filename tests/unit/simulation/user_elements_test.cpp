@@ -7,7 +7,7 @@
 #include "deck_run.h"
 #include "elements/columns.h"
 
-namespace mbcosim {
+namespace mbcosim::user_elements_test {
 namespace {
 
 std::string deck(double h, double final_time, const std::string& settings,
@@ -72,7 +72,7 @@ TEST(Wheel, HasTheForceOfTheReference) {
                    ".1765, .065, .3, 343350., 1.25, 10.;"));
   ASSERT_TRUE(run.ready());
   const State input = make_initial_state(run.model());  // moving, before the clamps hold it
-  testing::Columns row;
+  decks::Columns row;
   const ElementRef e = run.model().find_element(Family::loadable, 3);
   e.set->output(run.model().context(input, Phase::step), e.index, row);
   ASSERT_GE(row.v.size(), 9u);
@@ -103,7 +103,7 @@ struct MovingCase {
   const char* elements;
 };
 
-class MovingElements : public ::testing::TestWithParam<MovingCase> {};
+class MovingElements : public testing::TestWithParam<MovingCase> {};
 
 TEST_P(MovingElements, ContinueBitForBitFromASnapshot) {
   const MovingCase& c = GetParam();
@@ -171,8 +171,8 @@ const MovingCase kMoving[] = {
     {"bulk", "structural: 1, dynamic, .5,0.,0., eye, 1.,0.,0., null;",
      "body: 1, 1, 1., null, eye; bulk: 1, spring support, 1, structural, 1, 5.;"},
 };
-INSTANTIATE_TEST_SUITE_P(Decks, MovingElements, ::testing::ValuesIn(kMoving),
+INSTANTIATE_TEST_SUITE_P(Decks, MovingElements, testing::ValuesIn(kMoving),
                          [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::user_elements_test

@@ -8,10 +8,10 @@
 #include "deck_run.h"
 #include "elements/columns.h"
 
-namespace mbcosim {
+namespace mbcosim::variable_mass_test {
 namespace {
 
-using ::testing::HasSubstr;
+using testing::HasSubstr;
 
 const char* const kTight =
     "max iterations: 20; tolerance: 1e-10; derivatives tolerance: 1e-5; derivatives max "
@@ -285,7 +285,7 @@ end: elements;
                            -0.682766423835, 0.179553682718}}) {
     run.step(r.steps);
     const ElementRef e = run.model().find_element(Family::joint, 1);
-    testing::Columns row;
+    decks::Columns row;
     e.set->output(run.context(), e.index, row);
     const Vec6 p = momentum(run, 1);
     EXPECT_NEAR(run.node(1).w(1), r.w, 1e-9);
@@ -410,4 +410,4 @@ TEST(VariableMass, RunsOutOfMass) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::variable_mass_test

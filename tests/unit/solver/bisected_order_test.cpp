@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-namespace mbcosim {
+namespace mbcosim::bisected_order_test {
 namespace {
 
 using Edges = std::set<std::pair<int, int>>;  ///< row, column
@@ -119,4 +119,4 @@ TEST(BisectedOrder, OfNothingOrOfPartsThatDoNotTouchIsNone) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::bisected_order_test

@@ -5,7 +5,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::divergence_test {
 namespace {
 
 using testing::HasSubstr;
@@ -59,4 +59,4 @@ TEST(RemedyByUnits, IsSilentWhenNodesMeet) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::divergence_test

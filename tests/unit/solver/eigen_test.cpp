@@ -9,7 +9,7 @@
 #include "output/eigen_text.h"
 #include "solver/eigenanalysis.h"
 
-namespace mbcosim {
+namespace mbcosim::eigen_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -276,4 +276,4 @@ begin: elements; body: 1, 1, 1., null, eye; end: elements;
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::eigen_test

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace mbcosim {
+namespace mbcosim::elimination_program_test {
 namespace {
 
 /// Any operations on a few numbers, so that nearly all depend on each other.
@@ -61,4 +61,4 @@ TEST(EliminationProgram, OfNothingDoesNothing) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::elimination_program_test

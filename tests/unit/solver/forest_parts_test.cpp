@@ -6,7 +6,7 @@
 #include <numeric>
 #include <random>
 
-namespace mbcosim {
+namespace mbcosim::forest_parts_test {
 namespace {
 
 /// Nodes of a part have their children in it; those above have them anywhere.
@@ -64,4 +64,4 @@ TEST(ForestParts, AnyTreeGivesSubtreesOfAboutTheSameWork) {
 TEST(ForestParts, OfNothingIsNothing) { EXPECT_TRUE(forest_parts({}, {}, 2).empty()); }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::forest_parts_test

@@ -3,7 +3,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::initial_assembly_test {
 namespace {
 
 using testing::AllOf;
@@ -127,4 +127,4 @@ TEST(InitialAssembly, StiffNodesMoveLess) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::initial_assembly_test

@@ -6,7 +6,7 @@
 #include "simulation/reference_motion.h"
 #include "solver/integrator.h"
 
-namespace mbcosim {
+namespace mbcosim::integrator_orders_test {
 namespace {
 
 using reference::runge_kutta;
@@ -246,4 +246,4 @@ TEST(SpectralRadius, OrdersTheEnergyLost) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::integrator_orders_test

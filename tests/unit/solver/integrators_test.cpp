@@ -7,7 +7,7 @@
 #include "deck_digits.h"
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::integrators_test {
 namespace {
 
 /// Two bodies, revolute pin and spherical hinge.
@@ -269,4 +269,4 @@ TEST(ThirdOrder, BothStagesTakeTheLoadsOfAnExchange) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::integrators_test

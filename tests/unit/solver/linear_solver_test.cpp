@@ -9,7 +9,7 @@
 
 #include "math/thread_team.h"
 
-namespace mbcosim {
+namespace mbcosim::linear_solver_test {
 namespace {
 
 using Values = std::vector<double>;
@@ -131,4 +131,4 @@ TEST(LinearSolver, SolvesWhatIsLongWithTheSameBitsOnAllThreads) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::linear_solver_test

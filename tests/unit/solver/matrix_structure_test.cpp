@@ -10,7 +10,7 @@
 #include "simulation/simulation.h"
 #include "solver/system.h"
 
-namespace mbcosim {
+namespace mbcosim::matrix_structure_test {
 namespace {
 
 /// Every element type with a constant structure, each with offsets, hinges turned in general and
@@ -60,7 +60,7 @@ begin: elements;
 end: elements;
 )deck";
 
-class MatrixStructure : public ::testing::Test {
+class MatrixStructure : public testing::Test {
  protected:
   MatrixStructure()
       : report_(load_deck(BundleSource(std::map<std::string, std::string>{{"deck.mbd", kDeck}}),
@@ -138,4 +138,4 @@ TEST_F(MatrixStructure, LeavesOutWhatVanishes) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::matrix_structure_test

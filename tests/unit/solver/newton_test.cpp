@@ -5,7 +5,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::newton_test {
 namespace {
 
 using testing::HasSubstr;
@@ -414,4 +414,4 @@ TEST(StepControl, RefusesContradictions) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::newton_test

@@ -4,7 +4,7 @@
 
 #include "deck_run.h"
 
-namespace mbcosim {
+namespace mbcosim::singular_mechanism_test {
 namespace {
 
 using testing::AllOf;
@@ -154,4 +154,4 @@ TEST(RedundantConstraints, AreNamedInLargeModels) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::singular_mechanism_test

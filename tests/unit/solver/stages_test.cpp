@@ -14,7 +14,7 @@
 #include "solver/stepper.h"
 #include "solver/system.h"
 
-namespace mbcosim {
+namespace mbcosim::stages_test {
 namespace {
 
 constexpr double kSpring = 40;    ///< of a blade's own load [N/m]
@@ -222,4 +222,4 @@ TEST(Stages, SumsReadWhereThereIsNoScratchAreAnInternalError) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::stages_test

@@ -5,7 +5,7 @@
 #include "deck_run.h"
 #include "simulation/linearize.h"
 
-namespace mbcosim {
+namespace mbcosim::state_space_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -81,4 +81,4 @@ TEST(StateSpace, RefusesWhatIsNoInput) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::state_space_test

@@ -7,7 +7,7 @@
 #include "solver/advance_time.h"
 #include "solver/step_controller.h"
 
-namespace mbcosim {
+namespace mbcosim::step_controller_test {
 namespace {
 
 using testing::ElementsAre;
@@ -320,4 +320,4 @@ TEST_F(StepControllerTest, GoesBackWhenATrialFails) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::step_controller_test

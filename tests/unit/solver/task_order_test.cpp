@@ -6,7 +6,7 @@
 #include <numeric>
 #include <vector>
 
-namespace mbcosim {
+namespace mbcosim::task_order_test {
 namespace {
 
 constexpr double kHandOver = .5;
@@ -80,4 +80,4 @@ TEST(TaskOrder, ChainsGoSideBySideByTheirEnds) {
 }
 
 }  // namespace
-}  // namespace mbcosim
+}  // namespace mbcosim::task_order_test
