@@ -233,7 +233,8 @@ LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values, Matrices mat
 }
 
 /// The pivots that KLU would choose, where these can be told without it: its first factorization
-/// takes dozens of times as long as ours. False, and there are none, where they cannot.
+/// of a solid takes more than ten times as long as ours. False, and there are none, where they
+/// cannot.
 bool LinearSolver::keep_diagonal(Klu& k, const double* values, const LuOptions& options) {
   const std::optional<FactorPattern> pattern = diagonal_pattern(
       column_start_, row_index_, values, pivot_tolerance_, k.diagonal_order(), watch_);

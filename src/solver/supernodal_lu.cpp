@@ -70,9 +70,12 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
     make_substitution(count);
     return;
   }
-  order_groups(options.threads);
   const auto of_group =
       static_cast<std::size_t>(has_wide_groups() ? n_ : 0) * version_.wide.columns;
+  // Each who shares has numbers of its own: all together no more than the factors have.
+  const auto most = static_cast<int>(std::min<std::size_t>(
+      options.threads, std::max<std::size_t>(1, count / std::max<std::size_t>(1, n_ + of_group))));
+  order_groups(most);
   work_.assign(std::max({1, parts_, sharers_}),
                {std::vector<double>(n_, 0.0), std::vector<double>(of_group, 0.0)});
 }

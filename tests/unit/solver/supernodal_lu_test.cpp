@@ -10,6 +10,7 @@
 #include <numeric>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "solver/linear_solver.h"
@@ -217,6 +218,28 @@ TEST(SupernodalLu, SeveralThreadsOnAnyPatternGiveTheBitsOfOne) {
     const Dense reference = family.matrix();
     expect_same_bits(Sparse(reference), Sparse(family.matrix()), family.pattern(reference));
   }
+}
+
+/// Each has numbers for all unknowns, of which most are in no wide column here: three times these
+/// are as many as the factors have.
+TEST(SupernodalLu, ManyThreadsTakeNoMoreMemoryThanTheFactors) {
+  const int n = 3000, wide = 300;
+  Dense a = Dense::Identity(n, n);
+  a.bottomRightCorner(wide, wide).array() += 1. / n;
+  std::vector<int> order(n);
+  std::iota(order.begin(), order.end(), 0);
+  const Sparse sparse(a);
+  const FactorPattern pattern = factor_pattern(a, order, order, {0, n});
+  const auto with = [&](int threads) {
+    const SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(), pattern,
+                          {.listed = 0, .threads = threads});
+    return std::pair(lu.sharers(), lu.bytes());
+  };
+  const auto [one, bytes] = with(1);
+  const auto [several, bytes_of_several] = with(64);
+  EXPECT_EQ(one, 1);
+  EXPECT_GT(several, 1);
+  EXPECT_LE(bytes_of_several, 2 * bytes);
 }
 
 TEST(SupernodalLu, AGroupWithAVanishingPivotLeavesNothingBehind) {
