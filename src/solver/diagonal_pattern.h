@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "solver/supernodal_lu.h"
+#include "solver/factor_pattern.h"
 #include "solver/watch.h"
 
 namespace mbcosim {

@@ -1,6 +1,5 @@
 #include "solver/elimination_program.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <numeric>
 
@@ -10,105 +9,110 @@ namespace {
 
 std::uint32_t place(std::size_t at) { return static_cast<std::uint32_t>(at); }
 
-template <int N>
-using Numbers = Eigen::Map<Eigen::Array<double, N, 1>>;
-template <int N>
-using NumbersRead = Eigen::Map<const Eigen::Array<double, N, 1>>;
-
-/// Two at a time. Wider ones would wait for each other: what two narrow ones have stored cannot be
-/// loaded at once before it is in the cache.
-template <class Use>
-inline void for_run(int count, Use use) {
-  int i = 0;
-  for (; i + 2 <= count; i += 2) use.template operator()<2>(i);
-  if (i < count) use.template operator()<1>(i);
-}
-
-/// `all` level by level, within a level in the order in which they were given. Where each level
-/// ends.
-template <class Operation>
-std::vector<std::size_t> sort_by_level(const std::deque<Operation>& all,
-                                       const std::deque<int>& level, std::size_t levels,
-                                       std::vector<Operation>& sorted) {
-  std::vector<std::size_t> at(levels + 1, 0);
-  for (const int each : level) ++at[each + 1];
-  std::partial_sum(at.begin(), at.end(), at.begin());
-  sorted.resize(all.size());
-  auto of = level.begin();
-  for (const Operation& each : all) sorted[at[*of++]++] = each;
-  return at;
-}
-
 }  // namespace
 
 void EliminationProgram::set(std::size_t target, int value, double scale) {
   draft_->entries.push_back({value, place(target), scale});
 }
 
-/// The first one after which none of them changes the order of what is done with them.
-int EliminationProgram::level_of_targets(std::size_t target, std::size_t count) const {
-  int level = 0;
-  for (std::size_t i = target; i < target + count; ++i)
-    level = std::max({level, draft_->uses[i].ready, draft_->uses[i].read});
-  return level;
+void EliminationProgram::begin(std::size_t target, int count) {
+  draft_->open = {
+      {place(target), 0, 0, static_cast<std::uint16_t>(count), false}, draft_->products.size(), 0};
 }
 
-void EliminationProgram::subtract_products(std::size_t target, std::size_t factor,
-                                           std::size_t count, std::size_t other) {
-  std::vector<Uses>& uses = draft_->uses;
-  int level = std::max(level_of_targets(target, count), uses[other].ready);
-  for (std::size_t i = factor; i < factor + count; ++i) level = std::max(level, uses[i].ready);
-  for (std::size_t i = target; i < target + count; ++i) uses[i].ready = level;
-  for (std::size_t i = factor; i < factor + count; ++i)
-    uses[i].read = std::max(uses[i].read, level);
-  uses[other].read = std::max(uses[other].read, level);
-  draft_->products.push_back({place(target), place(factor), place(other), place(count)});
-  draft_->level_of_products.push_back(level);
+void EliminationProgram::subtract_product(std::size_t factor, std::size_t other) {
+  draft_->products.push_back({place(factor), place(other)});
 }
 
-void EliminationProgram::divide(std::size_t target, std::size_t count, std::size_t pivot) {
-  std::vector<Uses>& uses = draft_->uses;
-  const int level = std::max(level_of_targets(target, count), uses[pivot].ready);
-  for (std::size_t i = target; i < target + count; ++i) uses[i].ready = level + 1;
-  uses[pivot].read = std::max(uses[pivot].read, level + 1);
-  draft_->quotients.push_back({place(target), place(pivot), place(count)});
-  draft_->level_of_quotients.push_back(level);
+void EliminationProgram::end(std::optional<std::size_t> pivot) {
+  Draft& d = *draft_;
+  Update& update = d.open;
+  NumberUpdate& what = update.what;
+  what.products = place(d.products.size() - update.first);
+  if (what.products == 0 && !pivot) return;
+  what.divides = pivot.has_value();
+  what.pivot = place(pivot.value_or(0));
+  const Uses& of_target = uses_of(what.target);
+  update.level = std::max(of_target.ready, of_target.read + 1);
+  if (pivot) update.level = std::max(update.level, uses_of(*pivot).ready);
+  for (std::size_t p = update.first; p < d.products.size(); ++p)
+    for (const std::size_t needed : {d.products[p].factor, d.products[p].other})
+      update.level = std::max(update.level, uses_of(needed).ready);
+  if (extends_last(update)) {
+    Update& last = d.updates.back();
+    last.level = std::max(last.level, update.level);
+    last.what.count = static_cast<std::uint16_t>(last.what.count + kBlock);
+    mark(last);
+    d.products.resize(update.first);
+    return;
+  }
+  mark(update);
+  d.updates.push_back(update);
 }
 
+/// Blocks side by side for which the same is done with neighbours.
+bool EliminationProgram::extends_last(const Update& update) const {
+  const Draft& d = *draft_;
+  if (d.updates.empty() || update.what.count != kBlock) return false;
+  const NumberUpdate &last = d.updates.back().what, &what = update.what;
+  if (last.count % kBlock != 0 || last.count >= NumberUpdate::kMost ||
+      last.target + last.count != what.target || last.products != what.products ||
+      last.divides != what.divides || last.pivot != what.pivot)
+    return false;
+  const auto of_last = d.products.begin() + static_cast<std::ptrdiff_t>(d.updates.back().first);
+  return std::equal(of_last, of_last + what.products,
+                    d.products.begin() + static_cast<std::ptrdiff_t>(update.first),
+                    [&](const NumberProduct& a, const NumberProduct& b) {
+                      return a.factor + last.count == b.factor && a.other == b.other;
+                    });
+}
+
+void EliminationProgram::mark(const Update& update) {
+  const NumberUpdate& what = update.what;
+  const auto read = [&](std::size_t at) {
+    Uses& uses = uses_of(at);
+    uses.read = std::max(uses.read, update.level);
+  };
+  for (std::size_t p = update.first; p < update.first + what.products; ++p) {
+    const NumberProduct& product = draft_->products[p];
+    for (std::size_t i = 0; i < what.count; i += kBlock) read(product.factor + i);
+    read(product.other);
+  }
+  if (what.divides) read(what.pivot);
+  for (std::size_t i = 0; i < what.count; i += kBlock)
+    uses_of(what.target + i).ready = update.level + 1;
+}
+
+/// Level by level, within a level as they were given.
 void EliminationProgram::finish() {
-  std::size_t levels = 0;
-  for (const Uses& each : draft_->uses) levels = std::max<std::size_t>(levels, each.ready + 1);
-  entries_.assign(draft_->entries.begin(), draft_->entries.end());
-  const auto products =
-      sort_by_level(draft_->products, draft_->level_of_products, levels, products_);
-  const auto quotients =
-      sort_by_level(draft_->quotients, draft_->level_of_quotients, levels, quotients_);
-  for (std::size_t k = 0; k < levels; ++k) ends_.push_back({products[k], quotients[k]});
+  const Draft& d = *draft_;
+  entries_.assign(d.entries.begin(), d.entries.end());
+  int levels = 0;
+  for (const Update& update : d.updates) levels = std::max(levels, update.level + 1);
+  std::vector<std::size_t> at(levels + 1, 0);
+  for (const Update& update : d.updates) ++at[update.level + 1];
+  std::partial_sum(at.begin(), at.end(), at.begin());
+  std::vector<const Update*> sorted(d.updates.size());
+  for (const Update& update : d.updates) sorted[at[update.level]++] = &update;
+  updates_.reserve(sorted.size());
+  products_.reserve(d.products.size());
+  for (const Update* update : sorted) {
+    updates_.push_back(update->what);
+    const auto first = d.products.begin() + static_cast<std::ptrdiff_t>(update->first);
+    products_.insert(products_.end(), first, first + update->what.products);
+  }
   draft_.reset();
 }
 
-void EliminationProgram::run(const double* values, double* numbers) const {
+void EliminationProgram::run(const PanelVersion& version, const double* values,
+                             double* numbers) const {
   for (const Entry& entry : entries_) numbers[entry.target] = values[entry.value] * entry.scale;
-  const Products* products = products_.data();
-  const Quotients* quotients = quotients_.data();
-  for (const Range& end : ends_) {
-    for (const Products* const last = products_.data() + end.products; products != last; ++products)
-      for_run(products->count, [to = numbers + products->target, from = numbers + products->factor,
-                                other = numbers[products->other]]<int N>(int i) {
-        Numbers<N>(to + i) -= NumbersRead<N>(from + i) * other;
-      });
-    for (const Quotients* const last = quotients_.data() + end.quotients; quotients != last;
-         ++quotients)
-      for_run(quotients->count,
-              [to = numbers + quotients->target, pivot = numbers[quotients->pivot]]<int N>(int i) {
-                Numbers<N>(to + i) /= pivot;
-              });
-  }
+  version.update(updates_.data(), updates_.size(), products_.data(), numbers);
 }
 
 std::size_t EliminationProgram::bytes() const {
-  return sizeof(Entry) * entries_.size() + sizeof(Products) * products_.size() +
-         sizeof(Quotients) * quotients_.size() + sizeof(Range) * ends_.size();
+  return sizeof(Entry) * entries_.size() + sizeof(NumberUpdate) * updates_.size() +
+         sizeof(NumberProduct) * products_.size();
 }
 
 }  // namespace mbcosim

@@ -1,10 +1,11 @@
-/// Work of the LU factorization on the panel of a supernode, for several columns of the matrix side
-/// by side, compiled for several processors. All versions do the same operations in the same order
-/// without fused multiply and add: their numbers are the same bit by bit, whatever the number of
-/// columns.
+/// Work of the LU factorization, compiled for several processors: on the panel of a supernode, for
+/// several columns of the matrix side by side, and by lists of operations. All versions do the same
+/// operations in the same order without fused multiply and add: their numbers are the same bit by
+/// bit, whatever the number of columns.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace mbcosim {
@@ -32,10 +33,28 @@ struct PanelKernels {
                  double* x);
 };
 
+/// Of an array F, to numbers from `target` on: minus products, then divided where it `divides`.
+struct NumberUpdate {
+  static constexpr int kBlock = 4;  ///< numbers that are loaded and stored together
+  static constexpr int kMost = 3 * kBlock;
+
+  std::uint32_t target, pivot, products;
+  std::uint16_t count;  ///< 1 or some blocks
+  bool divides;
+};
+
+/// F[factor], and its neighbours for those of the target, times F[other].
+struct NumberProduct {
+  std::uint32_t factor, other;
+};
+
 struct PanelVersion {
   const char* processor;      ///< "x86-64-v3"
   PanelKernels narrow, wide;  ///< for a few columns, and for all that come together
   int lanes;                  ///< numbers in a register
+  /// All of a list one after the other, each with as many products as it has.
+  void (*update)(const NumberUpdate* updates, std::size_t count, const NumberProduct* products,
+                 double* numbers);
   const PanelKernels& of(int columns) const { return columns > narrow.columns ? wide : narrow; }
   /// Of a product of a panel with so many columns, in operations on registers: those on X, and what
   /// goes with them.

@@ -89,6 +89,46 @@ inline void finish(const Panel& panel, double* column, int place, double pivot, 
   for (int i = 0; i < panel.below; ++i) take(x + std::ptrdiff_t{panel.rows[i]} * Columns);
 }
 
+/// With the next products; returns those after them.
+template <int Count, bool Divides>
+inline const NumberProduct* take_update(const NumberUpdate& update, const NumberProduct* product,
+                                        double* f) {
+  constexpr int kWide = Count < NumberUpdate::kBlock ? Count : NumberUpdate::kBlock;
+  constexpr int kBlocks = Count / kWide;
+  using Block = Numbers<kWide>;
+  Block of[kBlocks];
+  double* const to = f + update.target;
+  for (int b = 0; b < kBlocks; ++b) of[b] = Eigen::Map<const Block>(to + b * kWide);
+  for (const NumberProduct* const end = product + update.products; product != end; ++product) {
+    const double* const from = f + product->factor;
+    const double other = f[product->other];
+    for (int b = 0; b < kBlocks; ++b) of[b] -= Eigen::Map<const Block>(from + b * kWide) * other;
+  }
+  if constexpr (Divides)
+    for (int b = 0; b < kBlocks; ++b) of[b] /= f[update.pivot];
+  for (int b = 0; b < kBlocks; ++b) Eigen::Map<Block>(to + b * kWide) = of[b];
+  return product;
+}
+
+inline void update(const NumberUpdate* updates, std::size_t count, const NumberProduct* product,
+                   double* f) {
+  constexpr int kBlock = NumberUpdate::kBlock;
+  const auto take = [&]<int Count>(const NumberUpdate& each) {
+    product = each.divides ? take_update<Count, true>(each, product, f)
+                           : take_update<Count, false>(each, product, f);
+  };
+  for (const NumberUpdate* const end = updates + count; updates != end; ++updates) {
+    if (updates->count == 1)
+      take.template operator()<1>(*updates);
+    else if (updates->count == kBlock)
+      take.template operator()<kBlock>(*updates);
+    else if (updates->count == 2 * kBlock)
+      take.template operator()<2 * kBlock>(*updates);
+    else
+      take.template operator()<3 * kBlock>(*updates);
+  }
+}
+
 template <int Columns>
 constexpr PanelKernels kernels() {
   return {Columns, eliminate<Columns>, finish<Columns>};

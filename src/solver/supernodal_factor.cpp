@@ -29,16 +29,6 @@ class Looks {
 
 }  // namespace
 
-bool SupernodalLu::run_program(const double* values, ThreadTeam* team) {
-  const auto zeros = above_ - panels_;
-  each_piece(team, static_cast<int>(zeros),
-             [&](int first, int last) { std::fill(panels_ + first, panels_ + last, 0.0); });
-  each_task(team, parts_, [&](int part, int) { elimination_[part].run(values, numbers_.data()); });
-  elimination_[parts_].run(values, numbers_.data());
-  return std::all_of(pivots_, pivots_ + n_,
-                     [](double pivot) { return std::isfinite(pivot) && pivot != 0; });
-}
-
 /// The columns of L of a segment.
 Panel SupernodalLu::panel_of(const Segment& segment) const {
   const int s = segment.supernode, first = first_[s], below = rows_start_[s + 1] - rows_start_[s];
@@ -79,12 +69,12 @@ bool SupernodalLu::finish_column(int k, int supernode, double* x) {
 /// into above_. A zero becomes +0 and stays it: a difference is −0 only where −0 is subtracted
 /// from.
 void SupernodalLu::scatter(int k, const double* values, double* x, std::ptrdiff_t stride) {
-  const double* value = values + value_start_[k];
-  for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p, ++value)
-    x[entry_row_[p] * stride] = *value * inverse_scale_[entry_row_[p]] + 0.0;
-  for (int p = above_start_[k]; p < above_start_[k + 1]; ++p) {
-    above_[p] = x[above_row_[p] * stride];
-    x[above_row_[p] * stride] = 0;
+  const double* value = values + matrix_.value_start[k];
+  for (int p = matrix_.entry_start[k]; p < matrix_.entry_start[k + 1]; ++p, ++value)
+    x[matrix_.entry_row[p] * stride] = *value * matrix_.inverse_scale[matrix_.entry_row[p]] + 0.0;
+  for (int p = matrix_.above_start[k]; p < matrix_.above_start[k + 1]; ++p) {
+    above_[p] = x[matrix_.above_row[p] * stride];
+    x[matrix_.above_row[p] * stride] = 0;
   }
 }
 
@@ -203,9 +193,9 @@ bool SupernodalLu::factor_in_order(const double* values, const Watch& watch, Thr
 }
 
 bool SupernodalLu::factor(const double* values, const Watch& watch, ThreadTeam* team) {
-  if (!elimination_.empty()) {
+  if (listed_) {
     watch.look();
-    return run_program(values, parts_ > 0 ? team : nullptr);
+    return listed_->factor(values, parts_ > 0 ? team : nullptr);
   }
   ++round_;
   std::vector<char> fine(parts_ + 1, 0);
@@ -216,14 +206,9 @@ bool SupernodalLu::factor(const double* values, const Watch& watch, ThreadTeam* 
 }
 
 void SupernodalLu::solve(double* b) {
-  if (substitution_) {
-    substitution_->run(b, numbers_.data());
-    const double* const x = numbers_.data() + numbers_.size() - n_;
-    for (int k = 0; k < n_; ++k) b[column_of_[k]] = x[k];
-    return;
-  }
+  if (listed_) return listed_->solve(b);
   double* const x = work_[0].column.data();
-  for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]] * inverse_scale_[k];
+  for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]] * matrix_.inverse_scale[k];
   for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
     const int begin = block_start_[block], end = block_start_[block + 1];
     for (int s = supernode_of_[begin]; s < supernodes() && first_[s] < end; ++s)
@@ -234,8 +219,8 @@ void SupernodalLu::solve(double* b) {
         x[upper_row_[p]] -= upper_[p] * xk;
     }
     for (int k = begin; k < end; ++k)
-      for (int p = above_start_[k]; p < above_start_[k + 1]; ++p)
-        x[above_row_[p]] -= above_[p] * x[k];
+      for (int p = matrix_.above_start[k]; p < matrix_.above_start[k + 1]; ++p)
+        x[matrix_.above_row[p]] -= above_[p] * x[k];
   }
   for (int k = 0; k < n_; ++k) {
     b[column_of_[k]] = x[k];
@@ -246,14 +231,15 @@ void SupernodalLu::solve(double* b) {
 double SupernodalLu::pivot_ratio() const {
   double smallest = HUGE_VAL, largest = 0;
   for (int k = 0; k < n_; ++k) {
-    const double pivot = std::abs(pivots_[k]);
-    smallest = std::min(smallest, pivot);
-    largest = std::max(largest, pivot);
+    const double size = std::abs(pivot(k));
+    smallest = std::min(smallest, size);
+    largest = std::max(largest, size);
   }
   return n_ > 0 ? smallest / largest : 1;
 }
 
 bool SupernodalLu::pivots_dominate(double bound) const {
+  if (listed_) return listed_->pivots_dominate(bound);
   return std::all_of(panels_, panels_ + panel_start_.back(),
                      [bound](double number) { return std::abs(number) <= bound; });
 }
@@ -262,15 +248,15 @@ double SupernodalLu::pivot_growth(const double* values) const {
   double growth = 1;
   for (std::size_t block = 0; block + 1 < block_start_.size(); ++block)
     for (int k = block_start_[block]; k < block_start_[block + 1]; ++k) {
-      double of_matrix = 0, of_factor = std::abs(pivots_[k]);
-      for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p) {
-        const int row = entry_row_[p];
-        const double value = values[value_start_[k] + p - entry_start_[k]];
+      double of_matrix = 0, of_factor = std::abs(pivot(k));
+      for (int p = matrix_.entry_start[k]; p < matrix_.entry_start[k + 1]; ++p) {
+        const int row = matrix_.entry_row[p];
+        const double value = values[matrix_.value_start[k] + p - matrix_.entry_start[k]];
         if (row >= block_start_[block])
-          of_matrix = std::max(of_matrix, std::abs(value * inverse_scale_[row]));
+          of_matrix = std::max(of_matrix, std::abs(value * matrix_.inverse_scale[row]));
       }
       for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-        of_factor = std::max(of_factor, std::abs(upper_[p]));
+        of_factor = std::max(of_factor, std::abs(upper(p)));
       growth = std::min(growth, of_matrix / of_factor);
     }
   return growth;

@@ -20,24 +20,6 @@ double reciprocal(double x) {
   return r;
 }
 
-/// `list` calls with the row and the place of each of its numbers. Calls with the first places and
-/// the count of each run of neighbours whose places by row are neighbours as well.
-template <class List, class Use>
-void for_runs(const std::vector<std::size_t>& place, List list, Use use) {
-  std::size_t target = 0, factor = 0, count = 0;
-  list([&](int row, std::size_t at) {
-    if (count > 0 && place[row] == target + count && at == factor + count) {
-      ++count;
-      return;
-    }
-    if (count > 0) use(target, factor, count);
-    target = place[row];
-    factor = at;
-    count = 1;
-  });
-  if (count > 0) use(target, factor, count);
-}
-
 }  // namespace
 
 SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vector<int>& row_index,
@@ -47,29 +29,27 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
       row_of_(factors.row_of),
       column_of_(factors.column_of),
       block_start_(factors.block_start),
-      inverse_scale_(n_),
       version_(options.version) {
   std::vector<double> largest(n_, 0.0);
   for (std::size_t p = 0; p < row_index.size(); ++p)
     largest[row_index[p]] = std::max(largest[row_index[p]], std::abs(values[p]));
-  for (int k = 0; k < n_; ++k) inverse_scale_[k] = reciprocal(largest[row_of_[k]]);
+  matrix_.inverse_scale.resize(n_);
+  for (int k = 0; k < n_; ++k) matrix_.inverse_scale[k] = reciprocal(largest[row_of_[k]]);
   find_supernodes(factors);
   find_groups(factors);
   find_parts(options.threads);
   place_matrix(column_start, row_index);
   const auto panels = static_cast<std::size_t>(panel_start_.back());
-  const std::size_t count = panels + upper_row_.size() + n_ + above_row_.size();
-  const bool lists = is_listed(count, options.listed);
-  numbers_.resize(count + (lists ? n_ : 0));
+  const std::size_t count = panels + upper_row_.size() + n_ + matrix_.above_row.size();
+  if (is_listed(count, options.listed)) {
+    make_lists(factors);
+    return;
+  }
+  numbers_.resize(count);
   panels_ = numbers_.data();
   upper_ = panels_ + panels;
   pivots_ = upper_ + upper_row_.size();
   above_ = pivots_ + n_;
-  if (lists) {
-    make_elimination();
-    make_substitution(count);
-    return;
-  }
   const auto of_group =
       static_cast<std::size_t>(has_wide_groups() ? n_ : 0) * version_.wide.columns;
   // Each who shares has numbers of its own: all together no more than the factors have.
@@ -320,17 +300,18 @@ void SupernodalLu::place_matrix(const std::vector<int>& column_start,
   for (std::size_t b = 0; b + 1 < block_start_.size(); ++b)
     std::fill(block_first.begin() + block_start_[b], block_first.begin() + block_start_[b + 1],
               block_start_[b]);
-  entry_start_.push_back(0);
-  above_start_.push_back(0);
+  matrix_.entry_start.push_back(0);
+  matrix_.above_start.push_back(0);
   for (int k = 0; k < n_; ++k) {
     const int column = column_of_[k];
-    value_start_.push_back(column_start[column]);
+    matrix_.value_start.push_back(column_start[column]);
     for (int p = column_start[column]; p < column_start[column + 1]; ++p) {
-      entry_row_.push_back(position[row_index[p]]);
-      if (entry_row_.back() < block_first[k]) above_row_.push_back(entry_row_.back());
+      matrix_.entry_row.push_back(position[row_index[p]]);
+      if (matrix_.entry_row.back() < block_first[k])
+        matrix_.above_row.push_back(matrix_.entry_row.back());
     }
-    entry_start_.push_back(static_cast<int>(entry_row_.size()));
-    above_start_.push_back(static_cast<int>(above_row_.size()));
+    matrix_.entry_start.push_back(static_cast<int>(matrix_.entry_row.size()));
+    matrix_.above_start.push_back(static_cast<int>(matrix_.above_row.size()));
   }
 }
 
@@ -345,99 +326,30 @@ std::size_t SupernodalLu::count_below(int k) const {
   return static_cast<std::size_t>(first_[s + 1] - k - 1 + rows_start_[s + 1] - rows_start_[s]);
 }
 
-/// Calls with the row and the place of each number of L in column k.
-template <class Use>
-void SupernodalLu::for_column_below(int k, Use use) const {
-  const int s = supernode_of_[k];
-  std::ptrdiff_t at = below_diagonal(k);
-  for (int i = k + 1; i < first_[s + 1]; ++i) use(i, at++);
-  for (int p = rows_start_[s]; p < rows_start_[s + 1]; ++p) use(rows_[p], at++);
-}
-
 /// `count`: of the numbers of the factors; `most`: products. A cantilever of beams has four for
-/// each number, a grid of 6 x 6 beams ten, and there panels are faster.
+/// each number, a grid of 6 x 6 beams ten; of 10 x 10 beams they are fifteen, and panels are as
+/// fast.
 bool SupernodalLu::is_listed(std::size_t count, std::size_t most) const {
-  constexpr std::size_t kFew = 6, kAlways = 4096;
+  constexpr std::size_t kFew = 12, kAlways = 4096;
   std::size_t products = 0;
   for (const int row : upper_row_) products += count_below(row);
   return products <= std::min(most, std::max(kAlways, kFew * count));
 }
 
-void SupernodalLu::make_elimination() {
-  std::vector<std::size_t> place(n_);  // of the numbers of one column, by row
-  for (int part = 0; part <= parts_; ++part) {
-    EliminationProgram& program = elimination_.emplace_back(numbers_.size());
-    for (std::size_t g = 0; g < group_part_.size(); ++g)
-      for (int k = group_start_[g]; k < group_start_[g + 1] && group_part_[g] == part; ++k)
-        eliminate_column(k, place, program);
-    program.finish();
-  }
-}
-
-void SupernodalLu::eliminate_column(int k, std::vector<std::size_t>& place,
-                                    EliminationProgram& program) const {
-  for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-    place[upper_row_[p]] = place_of(upper_ + p);
-  place[k] = place_of(pivots_ + k);
-  for_column_below(k, [&](int row, std::ptrdiff_t at) { place[row] = at; });
-  set_column(k, place, program);
-  for (int p = upper_start_[k]; p < upper_start_[k + 1]; ++p)
-    for_runs(
-        place, [&](auto see) { for_column_below(upper_row_[p], see); },
-        [&](std::size_t target, std::size_t factor, std::size_t count) {
-          program.subtract_products(target, factor, count, place_of(upper_ + p));
-        });
-  if (const std::size_t count = count_below(k); count > 0)
-    program.divide(static_cast<std::size_t>(below_diagonal(k)), count, place_of(pivots_ + k));
-}
-
-/// The operations of `solve`, with what is solved for from place `x` on.
-void SupernodalLu::make_substitution(std::size_t x) {
-  EliminationProgram& program = substitution_.emplace(numbers_.size());
-  std::vector<std::size_t> place(n_);
-  std::iota(place.begin(), place.end(), x);
-  const auto subtract = [&](int k, auto list) {  // x -= numbers of a list times x[k]
-    for_runs(place, list, [&](std::size_t target, std::size_t factor, std::size_t count) {
-      program.subtract_products(target, factor, count, place[k]);
-    });
-  };
-  const auto subtract_column = [&](int k, const std::vector<int>& start,
-                                   const std::vector<int>& row, const double* numbers) {
-    subtract(k, [&](auto see) {
-      for (int p = start[k]; p < start[k + 1]; ++p) see(row[p], place_of(numbers + p));
-    });
-  };
-  for (int k = 0; k < n_; ++k) program.set(place[k], row_of_[k], inverse_scale_[k]);
-  for (std::size_t block = block_start_.size() - 1; block-- > 0;) {
-    const int begin = block_start_[block], end = block_start_[block + 1];
-    for (int k = begin; k < end; ++k) subtract(k, [&](auto see) { for_column_below(k, see); });
-    for (int k = end - 1; k >= begin; --k) {
-      program.divide(place[k], 1, place_of(pivots_ + k));
-      subtract_column(k, upper_start_, upper_row_, upper_);
-    }
-    for (int k = begin; k < end; ++k) subtract_column(k, above_start_, above_row_, above_);
-  }
-  program.finish();
-}
-
-/// The matrix's entries, among the numbers of the column or above its diagonal block.
-void SupernodalLu::set_column(int k, const std::vector<std::size_t>& place,
-                              EliminationProgram& program) const {
-  int above = above_start_[k];
-  for (int p = entry_start_[k]; p < entry_start_[k + 1]; ++p) {
-    const int row = entry_row_[p];
-    const bool is_above = above < above_start_[k + 1] && above_row_[above] == row;
-    program.set(is_above ? place_of(above_ + above++) : place[row],
-                value_start_[k] + p - entry_start_[k], inverse_scale_[row]);
-  }
+void SupernodalLu::make_lists(const FactorPattern& factors) {
+  ListedLu::Parts parts{std::vector<int>(n_), parts_};
+  for (std::size_t g = 0; g < group_part_.size(); ++g)
+    std::fill(parts.of_column.begin() + group_start_[g],
+              parts.of_column.begin() + group_start_[g + 1], group_part_[g]);
+  listed_.emplace(factors, matrix_, first_, parts, version_);
 }
 
 std::size_t SupernodalLu::bytes() const {
-  std::size_t lists = substitution_ ? substitution_->bytes() : 0, work = 0;
-  for (const EliminationProgram& program : elimination_) lists += program.bytes();
+  std::size_t work = 0;
   for (const Work& w : work_) work += w.column.size() + w.group.size();
-  return sizeof(double) * (numbers_.size() + work) + lists +
-         sizeof(int) * (rows_.size() + upper_row_.size() + entry_row_.size() + above_row_.size()) +
+  return sizeof(double) * (numbers_.size() + work) + (listed_ ? listed_->bytes() : 0) +
+         sizeof(int) * (rows_.size() + upper_row_.size() + matrix_.entry_row.size() +
+                        matrix_.above_row.size()) +
          sizeof(Segment) * segments_.all.size();
 }
 

@@ -12,12 +12,12 @@
 /// supernodal approach to sparse partial pivoting", SIAM J. Matrix Anal. Appl. 20(3), 1999). L and
 /// U lie apart, each in the order in which it is read: large factors do not fit into the caches,
 /// and a solution costs what reading them costs. Where panels are narrow, matrices are factored and
-/// solved by lists of operations, with the same numbers (zeros may have another sign). Threads take
-/// the columns of subtrees of the elimination forest, which do not need each other; those above the
-/// subtrees come after them. Of these each thread takes the next group of columns and updates it by
-/// what others have done already, waiting for what they have not (Demmel, Gilbert and Li, "An
-/// asynchronous parallel supernodal algorithm for sparse Gaussian elimination", SIAM J. Matrix
-/// Anal. Appl. 20(4), 1999).
+/// solved by lists of operations (listed_lu.h), with the same numbers (zeros may have another
+/// sign). Threads take the columns of subtrees of the elimination forest, which do not need each
+/// other; those above the subtrees come after them. Of these each thread takes the next group of
+/// columns and updates it by what others have done already, waiting for what they have not (Demmel,
+/// Gilbert and Li, "An asynchronous parallel supernodal algorithm for sparse Gaussian elimination",
+/// SIAM J. Matrix Anal. Appl. 20(4), 1999).
 #pragma once
 
 #include <algorithm>
@@ -28,19 +28,12 @@
 #include <vector>
 
 #include "math/thread_team.h"
-#include "solver/elimination_program.h"
+#include "solver/factor_pattern.h"
+#include "solver/listed_lu.h"
 #include "solver/panel_kernels.h"
 #include "solver/watch.h"
 
 namespace mbcosim {
-
-/// Pattern of the factors of a reference matrix: compressed columns, rows ascending, with the
-/// diagonals of L and of U, within diagonal blocks only.
-struct FactorPattern {
-  std::vector<int> lower_start, lower_row, upper_start, upper_row;
-  std::vector<int> row_of, column_of;  ///< P, Q: row and column of the matrix by position (n)
-  std::vector<int> block_start;        ///< first position of each diagonal block, then n
-};
 
 struct LuOptions {
   static constexpr std::size_t kMostListed = 1 << 22;  ///< products: 30 MB of lists
@@ -134,22 +127,17 @@ class SupernodalLu {
   bool factor_group(int g, const double* values, bool shared, Work& work);
   bool factor_part(int part, const double* values, const Watch& watch);
   bool factor_in_order(const double* values, const Watch& watch, ThreadTeam& team);
-  template <class Use>
-  void for_column_below(int k, Use use) const;
-  std::size_t place_of(const double* number) const { return number - numbers_.data(); }
   std::size_t count_below(int k) const;  ///< numbers of L in column k
   bool is_listed(std::size_t count, std::size_t most) const;
   bool has_wide_groups() const;
-  void make_elimination();
-  void eliminate_column(int k, std::vector<std::size_t>& place, EliminationProgram& program) const;
-  void make_substitution(std::size_t x);
-  void set_column(int k, const std::vector<std::size_t>& place, EliminationProgram& program) const;
-  bool run_program(const double* values, ThreadTeam* team);
+  void make_lists(const FactorPattern& factors);
+  double pivot(int k) const { return listed_ ? listed_->pivot(k) : pivots_[k]; }
+  double upper(int p) const { return listed_ ? listed_->upper(p) : upper_[p]; }
   std::ptrdiff_t below_diagonal(int k) const;  ///< of column k, its first number in panels_
 
   int n_;
   std::vector<int> row_of_, column_of_, block_start_;
-  std::vector<double> inverse_scale_;  ///< R⁻¹ by position (n)
+  MatrixPlaces matrix_;
 
   // L: panels by columns, leading dimension width + rows below
   std::vector<int> first_;              ///< first column of each supernode, then n
@@ -163,15 +151,10 @@ class SupernodalLu {
   double* upper_ = nullptr;
   double* pivots_ = nullptr;  ///< (n)
 
-  // the matrix: rows of the entries of each column, and entries above its diagonal block
-  std::vector<int> value_start_;              ///< of each column among the matrix's values (n)
-  std::vector<int> entry_start_, entry_row_;  ///< by position
-  std::vector<int> above_start_, above_row_;  ///< by position
-  double* above_ = nullptr;
+  double* above_ = nullptr;  ///< of the matrix, above its diagonal blocks
 
-  std::vector<double> numbers_;  ///< panels, U, pivots, above; with lists the solution
-  std::vector<EliminationProgram> elimination_;     ///< with lists: by part
-  std::optional<EliminationProgram> substitution_;  ///< with lists
+  std::vector<double> numbers_;     ///< panels, U, pivots, above
+  std::optional<ListedLu> listed_;  ///< instead of these
 
   std::vector<Work> work_;  ///< by thread
 

@@ -1,0 +1,290 @@
+#include "solver/listed_lu.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace mbcosim {
+
+namespace {
+
+constexpr int kWorthAligning = 8;  ///< columns of a supernode, or of a diagonal block
+
+int rounded_up(int slot, int to) { return (slot + to - 1) / to * to; }
+
+/// Calls use(k, p) for each number of L below the diagonal, by columns.
+template <class Use>
+void each_lower(const FactorPattern& f, Use use) {
+  for (int k = 0; k < static_cast<int>(f.row_of.size()); ++k)
+    for (int p = f.lower_start[k] + 1; p < f.lower_start[k + 1]; ++p) use(k, f.lower_row[p]);
+}
+
+/// Calls use(k, row) for each number of U above the diagonal, by columns.
+template <class Use>
+void each_upper(const FactorPattern& f, Use use) {
+  for (int k = 0; k < static_cast<int>(f.row_of.size()); ++k)
+    for (int p = f.upper_start[k]; p + 1 < f.upper_start[k + 1]; ++p) use(k, f.upper_row[p]);
+}
+
+}  // namespace
+
+void ListedLu::Blocks::add(int slot) {
+  if (static_cast<int>(block.size()) > start.back() && block.back() == slot / kBlock) {
+    last.back() = slot;
+    return;
+  }
+  block.push_back(slot / kBlock);
+  last.push_back(slot);
+}
+
+int ListedLu::Blocks::find(int line, int of) const {
+  const auto begin = block.begin() + start[line], end = block.begin() + start[line + 1];
+  const auto found = std::lower_bound(begin, end, of);
+  return found != end && *found == of ? static_cast<int>(found - block.begin()) : -1;
+}
+
+/// The programs, of what the constructor has placed.
+struct ListedLu::Builder {
+  const ListedLu& lu;
+  const FactorPattern& factors;
+  const MatrixPlaces& matrix;
+  const Parts& parts;
+  Lines lower = lines_of([&](auto use) {  // columns by row of L
+    each_lower(factors, [&](int k, int row) { use(row, k); });
+  });
+
+  /// `all` calls with lines and what they get.
+  template <class All>
+  Lines lines_of(All all) const {
+    Lines lines;
+    lines.start.assign(lu.n_ + 1, 0);
+    all([&](int line, int) { ++lines.start[line + 1]; });
+    std::partial_sum(lines.start.begin(), lines.start.end(), lines.start.begin());
+    lines.of.resize(lines.start.back());
+    std::vector<int> next(lines.start.begin(), lines.start.end() - 1);
+    all([&](int line, int of) { lines.of[next[line]++] = of; });
+    return lines;
+  }
+
+  std::size_t place(const Blocks& blocks, int line, int position) const {
+    const int slot = lu.slot_[position];
+    return blocks.place(blocks.find(line, slot / kBlock)) + slot % kBlock;
+  }
+  std::size_t pivot(int k) const {
+    return lu.rows_.place(lu.rows_.start[k]) + lu.slot_[k] % kBlock;
+  }
+
+  /// Row or column k: `inputs` calls with the earlier ones that update it and with the place of the
+  /// number by which they are multiplied. The slots that count are those from `first` on.
+  template <class Inputs, class Program>
+  void update(const Blocks& blocks, int k, int first, std::optional<std::size_t> pivot,
+              Inputs inputs, Program program_of) const {
+    for (int q = blocks.start[k]; q < blocks.start[k + 1]; ++q) {
+      EliminationProgram& program = program_of(blocks.block[q]);
+      program.begin(blocks.place(q), kBlock);
+      inputs([&](int i, auto other) {
+        const int from = blocks.find(i, blocks.block[q]);
+        if (from >= 0 && blocks.last[from] >= first)
+          program.subtract_product(blocks.place(from), other());
+      });
+      program.end(pivot);
+    }
+  }
+
+  void set_column(int k, EliminationProgram& program) const {
+    int above = matrix.above_start[k];
+    for (int p = matrix.entry_start[k]; p < matrix.entry_start[k + 1]; ++p) {
+      const int row = matrix.entry_row[p];
+      const bool is_above = above < matrix.above_start[k + 1] && matrix.above_row[above] == row;
+      program.set(is_above   ? lu.above_ + above++
+                  : row <= k ? place(lu.rows_, row, k)
+                             : place(lu.columns_, k, row),
+                  matrix.value_start[k] + p - matrix.entry_start[k], matrix.inverse_scale[row]);
+    }
+  }
+
+  /// A part's own are its columns of L and what U has in them.
+  std::vector<EliminationProgram> elimination() const {
+    std::vector<EliminationProgram> programs(parts.count + 1,
+                                             EliminationProgram(lu.numbers_.size()));
+    std::vector<int> part_of(lu.slots_ / kBlock);
+    for (int k = 0; k < lu.n_; ++k) part_of[lu.slot_[k] / kBlock] = parts.of_column[k];
+    for (int k = 0; k < lu.n_; ++k) {
+      EliminationProgram& own = programs[parts.of_column[k]];
+      set_column(k, own);
+      update(
+          lu.rows_, k, lu.slot_[k], {},
+          [&](auto use) {
+            for (int p = lower.start[k]; p < lower.start[k + 1]; ++p)
+              use(lower.of[p], [&] { return place(lu.columns_, lower.of[p], k); });
+          },
+          [&](int block) -> EliminationProgram& { return programs[part_of[block]]; });
+      update(
+          lu.columns_, k, lu.slot_[k] + 1, pivot(k),
+          [&](auto use) {
+            for (int p = factors.upper_start[k]; p + 1 < factors.upper_start[k + 1]; ++p)
+              use(factors.upper_row[p], [&] { return place(lu.rows_, factors.upper_row[p], k); });
+          },
+          [&](int) -> EliminationProgram& { return own; });
+    }
+    for (EliminationProgram& program : programs) program.finish();
+    return programs;
+  }
+
+  EliminationProgram substitution() const {
+    EliminationProgram program(lu.numbers_.size());
+    const Lines upper = lines_of([&](auto use) {  // columns by row of U, the last one first
+      for (int k = lu.n_ - 1; k >= 0; --k)
+        for (int p = factors.upper_start[k]; p + 1 < factors.upper_start[k + 1]; ++p)
+          use(factors.upper_row[p], k);
+    });
+    std::vector<int> column_above(matrix.above_row.size());
+    const Lines above = lines_of([&](auto use) {  // numbers by row, those of later blocks first
+      for (std::size_t b = factors.block_start.size() - 1; b-- > 0;)
+        for (int k = factors.block_start[b]; k < factors.block_start[b + 1]; ++k)
+          for (int p = matrix.above_start[k]; p < matrix.above_start[k + 1]; ++p) {
+            column_above[p] = k;
+            use(matrix.above_row[p], p);
+          }
+    });
+    const auto x = [&](int k) { return lu.x_ + lu.slot_[k]; };
+    for (int k = 0; k < lu.n_; ++k) program.set(x(k), factors.row_of[k], matrix.inverse_scale[k]);
+    for (std::size_t b = factors.block_start.size() - 1; b-- > 0;) {
+      const int begin = factors.block_start[b], end = factors.block_start[b + 1];
+      for (int k = begin; k < end; ++k) {
+        program.begin(x(k), 1);
+        for (int p = above.start[k]; p < above.start[k + 1]; ++p)
+          program.subtract_product(lu.above_ + above.of[p], x(column_above[above.of[p]]));
+        program.end();
+      }
+      for (int k = begin; k < end;) k = eliminate_block(k, end, program);
+      for (int k = end - 1; k >= begin; --k) {
+        program.begin(x(k), 1);
+        for (int p = upper.start[k]; p < upper.start[k + 1]; ++p)
+          program.subtract_product(place(lu.rows_, k, upper.of[p]), x(upper.of[p]));
+        program.end(pivot(k));
+      }
+    }
+    program.finish();
+    return program;
+  }
+
+  /// Of x := L⁻¹ x the positions of one block from k on; returns the one after them.
+  int eliminate_block(int k, int end, EliminationProgram& program) const {
+    const int block = lu.slot_[k] / kBlock;
+    int after = k;
+    std::vector<int>& needed = columns_;
+    needed.clear();
+    for (; after < end && lu.slot_[after] / kBlock == block; ++after)
+      for (int p = lower.start[after]; p < lower.start[after + 1] && lower.of[p] < k; ++p)
+        needed.push_back(lower.of[p]);
+    std::sort(needed.begin(), needed.end());
+    needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
+    program.begin(lu.x_ + static_cast<std::size_t>(block) * kBlock, kBlock);
+    for (const int i : needed)
+      program.subtract_product(lu.columns_.place(lu.columns_.find(i, block)), lu.x_ + lu.slot_[i]);
+    program.end();
+    for (int row = k; row < after; ++row) {
+      program.begin(lu.x_ + lu.slot_[row], 1);
+      for (int p = lower.start[row]; p < lower.start[row + 1]; ++p)
+        if (const int i = lower.of[p]; i >= k)
+          program.subtract_product(place(lu.columns_, i, row), lu.x_ + lu.slot_[i]);
+      program.end();
+    }
+    return after;
+  }
+
+  mutable std::vector<int> columns_{};  ///< scratch
+};
+
+ListedLu::ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
+                   const std::vector<int>& supernodes, const Parts& parts,
+                   const PanelVersion& version)
+    : n_(static_cast<int>(factors.row_of.size())),
+      column_of_(factors.column_of),
+      slot_(n_),
+      version_(version) {
+  choose_slots(factors, supernodes, parts);
+  place_factors(factors);
+  x_ = (above_ + matrix.above_row.size() + kBlock - 1) / kBlock * kBlock;
+  numbers_.resize(x_ + slots_);
+  const Builder builder{*this, factors, matrix, parts};
+  elimination_ = builder.elimination();
+  substitution_ = builder.substitution();
+}
+
+/// A block's slots belong to one part, and wide supernodes begin with a block.
+void ListedLu::choose_slots(const FactorPattern& factors, const std::vector<int>& supernodes,
+                            const Parts& parts) {
+  std::vector<char> begins(n_ + 1, 0);
+  const auto see = [&](const std::vector<int>& start) {
+    for (std::size_t k = 0; k + 1 < start.size(); ++k)
+      if (start[k + 1] - start[k] >= kWorthAligning) begins[start[k]] = begins[start[k + 1]] = 1;
+  };
+  see(supernodes);
+  see(factors.block_start);
+  for (int k = 0; k < n_; ++k) {
+    const bool other_part = k > 0 && parts.of_column[k] != parts.of_column[k - 1];
+    if (begins[k] || other_part) slots_ = rounded_up(slots_, kBlock);
+    slot_[k] = slots_++;
+  }
+  slots_ = rounded_up(slots_, kBlock);
+}
+
+void ListedLu::place_factors(const FactorPattern& factors) {
+  std::vector<std::vector<int>> columns(n_);  // by row of U
+  each_upper(factors, [&](int k, int row) { columns[row].push_back(k); });
+  for (int k = 0; k < n_; ++k) {
+    rows_.start.push_back(static_cast<int>(rows_.block.size()));
+    rows_.add(slot_[k]);
+    for (const int column : columns[k]) rows_.add(slot_[column]);
+    columns_.start.push_back(static_cast<int>(columns_.block.size()));
+    for (int p = factors.lower_start[k] + 1; p < factors.lower_start[k + 1]; ++p)
+      columns_.add(slot_[factors.lower_row[p]]);
+  }
+  rows_.start.push_back(static_cast<int>(rows_.block.size()));
+  columns_.start.push_back(static_cast<int>(columns_.block.size()));
+  columns_.first_place = rows_.place(rows_.start.back());
+  above_ = columns_.place(columns_.start.back());
+  each_upper(factors, [&](int k, int row) {
+    upper_place_.push_back(static_cast<std::uint32_t>(
+        rows_.place(rows_.find(row, slot_[k] / kBlock)) + slot_[k] % kBlock));
+  });
+}
+
+bool ListedLu::factor(const double* values, ThreadTeam* team) {
+  each_piece(team, static_cast<int>(above_), [&](int first, int last) {
+    std::fill(numbers_.begin() + first, numbers_.begin() + last, 0.0);
+  });
+  const int parts = static_cast<int>(elimination_.size()) - 1;
+  each_task(team, parts,
+            [&](int part, int) { elimination_[part].run(version_, values, numbers_.data()); });
+  elimination_[parts].run(version_, values, numbers_.data());
+  for (int k = 0; k < n_; ++k)
+    if (!std::isfinite(pivot(k)) || pivot(k) == 0) return false;
+  return true;
+}
+
+void ListedLu::solve(double* b) {
+  substitution_->run(version_, b, numbers_.data());
+  for (int k = 0; k < n_; ++k) b[column_of_[k]] = numbers_[x_ + slot_[k]];
+}
+
+bool ListedLu::pivots_dominate(double bound) const {
+  for (int k = 0; k < n_; ++k)
+    for (int q = columns_.start[k]; q < columns_.start[k + 1]; ++q)
+      for (int i = 0; i < kBlock; ++i)
+        if (columns_.block[q] * kBlock + i > slot_[k] &&
+            !(std::abs(numbers_[columns_.place(q) + i]) <= bound))
+          return false;
+  return true;
+}
+
+std::size_t ListedLu::bytes() const {
+  std::size_t lists = substitution_->bytes();
+  for (const EliminationProgram& program : elimination_) lists += program.bytes();
+  return lists + sizeof(double) * numbers_.size() + sizeof(std::uint32_t) * upper_place_.size() +
+         2 * sizeof(int) * (rows_.block.size() + columns_.block.size());
+}
+
+}  // namespace mbcosim

@@ -1,0 +1,85 @@
+/// LU of matrices of one pattern by lists of operations: where factors are narrow, loops over a few
+/// numbers cost more than arithmetic.
+///
+/// L by columns and U by rows are computed by turns (Crout): an update of a row of U takes the
+/// number of L and the row of U from each column before, an update of a column of L a number of U
+/// and the column of L, so that none of those that are updated together needs another one of them.
+/// Rows and columns of the factors are cut into blocks of four, at the same slots in all of them:
+/// what is side by side in one update has been stored together by an earlier one. Numbers that a
+/// block has for slots without a place in the pattern are padding: they take part in nothing but
+/// padding.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "math/thread_team.h"
+#include "solver/elimination_program.h"
+#include "solver/factor_pattern.h"
+
+namespace mbcosim {
+
+class ListedLu {
+ public:
+  /// Columns that threads may take apart: those of part p need others of p only, but for the last
+  /// part, which comes after all others.
+  struct Parts {
+    std::vector<int> of_column;  ///< (n)
+    int count = 0;               ///< but for the last one
+  };
+  /// `supernodes`: first column of each, then n.
+  ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
+           const std::vector<int>& supernodes, const Parts& parts, const PanelVersion& version);
+
+  /// False when a pivot vanishes or is not a number.
+  bool factor(const double* values, ThreadTeam* team);
+  /// Solves in place.
+  void solve(double* b);
+
+  double pivot(int k) const { return numbers_[rows_.place(rows_.start[k]) + slot_[k] % kBlock]; }
+  /// Number p of U, counted by columns without the pivots.
+  double upper(int p) const { return numbers_[upper_place_[p]]; }
+  /// Whether no number of L is beyond the bound.
+  bool pivots_dominate(double bound) const;
+  std::size_t bytes() const;
+
+ private:
+  static constexpr int kBlock = EliminationProgram::kBlock;
+
+  /// Blocks of the rows of U or of the columns of L.
+  struct Blocks {
+    std::vector<int> start;  ///< of each row or column, then all
+    std::vector<int> block;  ///< slot / kBlock, ascending
+    std::vector<int> last;   ///< the last slot that is in the pattern
+    std::size_t first_place = 0;
+    void add(int slot);
+    std::size_t place(int q) const { return first_place + static_cast<std::size_t>(kBlock) * q; }
+    int find(int line, int of) const;  ///< −1: it has none
+  };
+  /// Of each line some numbers.
+  struct Lines {
+    std::vector<int> start, of;
+  };
+  struct Builder;
+
+  void choose_slots(const FactorPattern& factors, const std::vector<int>& supernodes,
+                    const Parts& parts);
+  void place_factors(const FactorPattern& factors);
+
+  int n_, slots_ = 0;
+  std::vector<int> column_of_;
+  std::vector<int> slot_;  ///< by position, ascending
+  Blocks rows_;            ///< of U, with the pivots
+  Blocks columns_;         ///< of L
+  std::vector<std::uint32_t> upper_place_;
+  std::size_t above_ = 0;  ///< first place of what lies above the diagonal blocks
+  std::size_t x_ = 0;      ///< of what is solved for, by slot
+  std::vector<double> numbers_;
+  std::vector<EliminationProgram> elimination_;  ///< by part
+  std::optional<EliminationProgram> substitution_;
+  const PanelVersion& version_;
+};
+
+}  // namespace mbcosim
