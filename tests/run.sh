@@ -68,4 +68,6 @@ if [ -n "$soak" ]; then
   /usr/bin/python3 tests/soak/soak.py "${minutes[@]}" "${sanitized[@]}" --seed "$(date +%s)"
   exec /usr/bin/python3 tests/soak/kills.py "${minutes[@]}" --seed "$(date +%s)"
 fi
-exec ctest --test-dir $folder --output-on-failure --parallel "$jobs" "${arguments[@]}"
+at_once=$(((3 * jobs + 1) / 2))  # tests of the service wait most of the time
+[ $preset = release ] || at_once=$jobs
+exec ctest --test-dir $folder --output-on-failure --parallel "$at_once" "${arguments[@]}"

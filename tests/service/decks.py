@@ -55,8 +55,8 @@ OSCILLATOR_WITH_SPRING = _OSCILLATOR % (
     3, "  joint: 3, deformable displacement joint, 2, null, 1, null, linear elastic isotropic, {stiffness};")
 
 
-def cube(side):
-    """side³ masses between rods to their neighbours: the factors of its matrix are large, and take long."""
+def cube(side, held=False):
+    """side³ masses between rods to their neighbours: the factors of its matrix are large, and take long. `held`: the first two by a distance, too."""
     label = lambda i, j, k: 1 + i + side * (j + side * k)
     places = [(i, j, k) for k in range(side) for j in range(side) for i in range(side)]
     near = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 1, 1)]
@@ -66,11 +66,13 @@ def cube(side):
     masses = "".join(f"body: {label(*p)}, {label(*p)}, 1.;" for p in places)
     rods = "".join(f"joint: {n}, rod, {label(*a)}, {label(*b)}, from nodes, linear viscoelastic, 1e3, 1.;"
                    for n, (a, b) in enumerate(pairs, 1))
+    if held:
+        rods += f"joint: {len(pairs) + 1}, distance, 1, 2, from nodes;"
     return f"""
 begin: data; problem: initial value; end: data;
 begin: initial value; initial time: 0.; final time: 10.; time step: 1e-3; method: ms, .6; tolerance: 1e-6; max iterations: 30;
 derivatives tolerance: 1.; end: initial value;
-begin: control data; structural nodes: {len(places)}; rigid bodies: {len(places)}; joints: {len(pairs)}; end: control data;
+begin: control data; structural nodes: {len(places)}; rigid bodies: {len(places)}; joints: {len(pairs) + held}; end: control data;
 begin: nodes; {nodes} end: nodes;
 begin: elements; {masses} {rods} end: elements;
 """
