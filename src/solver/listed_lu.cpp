@@ -52,6 +52,7 @@ struct ListedLu::Builder {
   Lines lower = lines_of([&](auto use) {  // columns by row of L
     each_lower(factors, [&](int k, int row) { use(row, k); });
   });
+  std::vector<int> part_of = parts_of_blocks();
 
   /// `all` calls with lines and what they get.
   template <class All>
@@ -66,6 +67,11 @@ struct ListedLu::Builder {
     return lines;
   }
 
+  std::vector<int> parts_of_blocks() const {
+    std::vector<int> found(lu.slots_ / kBlock);
+    for (int k = 0; k < lu.n_; ++k) found[lu.slot_[k] / kBlock] = parts.of_column[k];
+    return found;
+  }
   std::size_t place(const Blocks& blocks, int line, int position) const {
     const int slot = lu.slot_[position];
     return blocks.place(blocks.find(line, slot / kBlock)) + slot % kBlock;
@@ -74,13 +80,14 @@ struct ListedLu::Builder {
     return lu.rows_.place(lu.rows_.start[k]) + lu.slot_[k] % kBlock;
   }
 
-  /// Row or column k: `inputs` calls with the earlier ones that update it and with the place of the
-  /// number by which they are multiplied. The slots that count are those from `first` on.
-  template <class Inputs, class Program>
+  /// Row or column k, those of its blocks that are `wanted`: `inputs` calls with the earlier ones
+  /// that update it and with the place of the number by which they are multiplied. The slots that
+  /// count are those from `first` on.
+  template <class Inputs, class Wanted>
   void update(const Blocks& blocks, int k, int first, std::optional<std::size_t> pivot,
-              Inputs inputs, Program program_of) const {
+              Inputs inputs, Wanted wanted, EliminationProgram& program) const {
     for (int q = blocks.start[k]; q < blocks.start[k + 1]; ++q) {
-      EliminationProgram& program = program_of(blocks.block[q]);
+      if (!wanted(blocks.block[q])) continue;
       program.begin(blocks.place(q), kBlock);
       inputs([&](int i, auto other) {
         const int from = blocks.find(i, blocks.block[q]);
@@ -104,31 +111,28 @@ struct ListedLu::Builder {
   }
 
   /// A part's own are its columns of L and what U has in them.
-  std::vector<EliminationProgram> elimination() const {
-    std::vector<EliminationProgram> programs(parts.count + 1,
-                                             EliminationProgram(lu.numbers_.size()));
-    std::vector<int> part_of(lu.slots_ / kBlock);
-    for (int k = 0; k < lu.n_; ++k) part_of[lu.slot_[k] / kBlock] = parts.of_column[k];
+  EliminationProgram elimination(int part) const {
+    EliminationProgram program(lu.numbers_.size());
     for (int k = 0; k < lu.n_; ++k) {
-      EliminationProgram& own = programs[parts.of_column[k]];
-      set_column(k, own);
       update(
           lu.rows_, k, lu.slot_[k], {},
           [&](auto use) {
             for (int p = lower.start[k]; p < lower.start[k + 1]; ++p)
               use(lower.of[p], [&] { return place(lu.columns_, lower.of[p], k); });
           },
-          [&](int block) -> EliminationProgram& { return programs[part_of[block]]; });
+          [&](int block) { return part_of[block] == part; }, program);
+      if (parts.of_column[k] != part) continue;
+      set_column(k, program);
       update(
           lu.columns_, k, lu.slot_[k] + 1, pivot(k),
           [&](auto use) {
             for (int p = factors.upper_start[k]; p + 1 < factors.upper_start[k + 1]; ++p)
               use(factors.upper_row[p], [&] { return place(lu.rows_, factors.upper_row[p], k); });
           },
-          [&](int) -> EliminationProgram& { return own; });
+          [](int) { return true; }, program);
     }
-    for (EliminationProgram& program : programs) program.finish();
-    return programs;
+    program.finish();
+    return program;
   }
 
   EliminationProgram substitution() const {
@@ -209,7 +213,7 @@ ListedLu::ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
   x_ = (above_ + matrix.above_row.size() + kBlock - 1) / kBlock * kBlock;
   numbers_.resize(x_ + slots_);
   const Builder builder{*this, factors, matrix, parts};
-  elimination_ = builder.elimination();
+  for (int part = 0; part <= parts.count; ++part) elimination_.push_back(builder.elimination(part));
   substitution_ = builder.substitution();
 }
 
