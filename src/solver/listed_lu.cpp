@@ -26,6 +26,24 @@ void each_upper(const FactorPattern& f, Use use) {
     for (int p = f.upper_start[k]; p + 1 < f.upper_start[k + 1]; ++p) use(k, f.upper_row[p]);
 }
 
+/// Of each line some numbers.
+struct Lines {
+  std::vector<int> start, of;
+};
+
+/// `all` calls with lines and what they get.
+template <class All>
+Lines lines_of(int count, All all) {
+  Lines lines;
+  lines.start.assign(count + 1, 0);
+  all([&](int line, int) { ++lines.start[line + 1]; });
+  std::partial_sum(lines.start.begin(), lines.start.end(), lines.start.begin());
+  lines.of.resize(lines.start.back());
+  std::vector<int> next(lines.start.begin(), lines.start.end() - 1);
+  all([&](int line, int of) { lines.of[next[line]++] = of; });
+  return lines;
+}
+
 }  // namespace
 
 void ListedLu::Blocks::add(int slot) {
@@ -49,23 +67,10 @@ struct ListedLu::Builder {
   const FactorPattern& factors;
   const MatrixPlaces& matrix;
   const Parts& parts;
-  Lines lower = lines_of([&](auto use) {  // columns by row of L
+  Lines lower = lines_of(lu.n_, [&](auto use) {  // columns by row of L
     each_lower(factors, [&](int k, int row) { use(row, k); });
   });
   std::vector<int> part_of = parts_of_blocks();
-
-  /// `all` calls with lines and what they get.
-  template <class All>
-  Lines lines_of(All all) const {
-    Lines lines;
-    lines.start.assign(lu.n_ + 1, 0);
-    all([&](int line, int) { ++lines.start[line + 1]; });
-    std::partial_sum(lines.start.begin(), lines.start.end(), lines.start.begin());
-    lines.of.resize(lines.start.back());
-    std::vector<int> next(lines.start.begin(), lines.start.end() - 1);
-    all([&](int line, int of) { lines.of[next[line]++] = of; });
-    return lines;
-  }
 
   std::vector<int> parts_of_blocks() const {
     std::vector<int> found(lu.slots_ / kBlock);
@@ -75,9 +80,6 @@ struct ListedLu::Builder {
   std::size_t place(const Blocks& blocks, int line, int position) const {
     const int slot = lu.slot_[position];
     return blocks.place(blocks.find(line, slot / kBlock)) + slot % kBlock;
-  }
-  std::size_t pivot(int k) const {
-    return lu.rows_.place(lu.rows_.start[k]) + lu.slot_[k] % kBlock;
   }
 
   /// Row or column k, those of its blocks that are `wanted`: `inputs` calls with the earlier ones
@@ -124,7 +126,7 @@ struct ListedLu::Builder {
       if (parts.of_column[k] != part) continue;
       set_column(k, program);
       update(
-          lu.columns_, k, lu.slot_[k] + 1, pivot(k),
+          lu.columns_, k, lu.slot_[k] + 1, lu.pivot_place(k),
           [&](auto use) {
             for (int p = factors.upper_start[k]; p + 1 < factors.upper_start[k + 1]; ++p)
               use(factors.upper_row[p], [&] { return place(lu.rows_, factors.upper_row[p], k); });
@@ -137,20 +139,21 @@ struct ListedLu::Builder {
 
   EliminationProgram substitution() const {
     EliminationProgram program(lu.numbers_.size());
-    const Lines upper = lines_of([&](auto use) {  // columns by row of U, the last one first
+    const Lines upper = lines_of(lu.n_, [&](auto use) {  // columns by row of U, the last one first
       for (int k = lu.n_ - 1; k >= 0; --k)
         for (int p = factors.upper_start[k]; p + 1 < factors.upper_start[k + 1]; ++p)
           use(factors.upper_row[p], k);
     });
     std::vector<int> column_above(matrix.above_row.size());
-    const Lines above = lines_of([&](auto use) {  // numbers by row, those of later blocks first
-      for (std::size_t b = factors.block_start.size() - 1; b-- > 0;)
-        for (int k = factors.block_start[b]; k < factors.block_start[b + 1]; ++k)
-          for (int p = matrix.above_start[k]; p < matrix.above_start[k + 1]; ++p) {
-            column_above[p] = k;
-            use(matrix.above_row[p], p);
-          }
-    });
+    const Lines above =
+        lines_of(lu.n_, [&](auto use) {  // numbers by row, those of later blocks first
+          for (std::size_t b = factors.block_start.size() - 1; b-- > 0;)
+            for (int k = factors.block_start[b]; k < factors.block_start[b + 1]; ++k)
+              for (int p = matrix.above_start[k]; p < matrix.above_start[k + 1]; ++p) {
+                column_above[p] = k;
+                use(matrix.above_row[p], p);
+              }
+        });
     const auto x = [&](int k) { return lu.x_ + lu.slot_[k]; };
     for (int k = 0; k < lu.n_; ++k) program.set(x(k), factors.row_of[k], matrix.inverse_scale[k]);
     for (std::size_t b = factors.block_start.size() - 1; b-- > 0;) {
@@ -166,7 +169,7 @@ struct ListedLu::Builder {
         program.begin(x(k), 1);
         for (int p = upper.start[k]; p < upper.start[k + 1]; ++p)
           program.subtract_product(place(lu.rows_, k, upper.of[p]), x(upper.of[p]));
-        program.end(pivot(k));
+        program.end(lu.pivot_place(k));
       }
     }
     program.finish();
@@ -236,12 +239,13 @@ void ListedLu::choose_slots(const FactorPattern& factors, const std::vector<int>
 }
 
 void ListedLu::place_factors(const FactorPattern& factors) {
-  std::vector<std::vector<int>> columns(n_);  // by row of U
-  each_upper(factors, [&](int k, int row) { columns[row].push_back(k); });
+  const Lines columns = lines_of(n_, [&](auto use) {  // by row of U
+    each_upper(factors, [&](int k, int row) { use(row, k); });
+  });
   for (int k = 0; k < n_; ++k) {
     rows_.start.push_back(static_cast<int>(rows_.block.size()));
     rows_.add(slot_[k]);
-    for (const int column : columns[k]) rows_.add(slot_[column]);
+    for (int p = columns.start[k]; p < columns.start[k + 1]; ++p) rows_.add(slot_[columns.of[p]]);
     columns_.start.push_back(static_cast<int>(columns_.block.size()));
     for (int p = factors.lower_start[k] + 1; p < factors.lower_start[k + 1]; ++p)
       columns_.add(slot_[factors.lower_row[p]]);

@@ -38,7 +38,7 @@ class ListedLu {
   /// Solves in place.
   void solve(double* b);
 
-  double pivot(int k) const { return numbers_[rows_.place(rows_.start[k]) + slot_[k] % kBlock]; }
+  double pivot(int k) const { return numbers_[pivot_place(k)]; }
   /// Number p of U, counted by columns without the pivots.
   double upper(int p) const { return numbers_[upper_place_[p]]; }
   /// Whether no number of L is beyond the bound.
@@ -58,12 +58,9 @@ class ListedLu {
     std::size_t place(int q) const { return first_place + static_cast<std::size_t>(kBlock) * q; }
     int find(int line, int of) const;  ///< −1: it has none
   };
-  /// Of each line some numbers.
-  struct Lines {
-    std::vector<int> start, of;
-  };
   struct Builder;
 
+  std::size_t pivot_place(int k) const { return rows_.place(rows_.start[k]) + slot_[k] % kBlock; }
   void choose_slots(const FactorPattern& factors, const std::vector<int>& supernodes,
                     const Parts& parts);
   void place_factors(const FactorPattern& factors);

@@ -35,8 +35,8 @@ struct PanelKernels {
 
 /// Of an array F, to numbers from `target` on: minus products, then divided where it `divides`.
 struct NumberUpdate {
-  static constexpr int kBlock = 4;  ///< numbers that are loaded and stored together
-  static constexpr int kMost = 3 * kBlock;
+  static constexpr int kBlock = 4;          ///< numbers that are loaded and stored together
+  static constexpr int kMost = 3 * kBlock;  ///< in one update
 
   std::uint32_t target, pivot, products;
   std::uint16_t count;  ///< 1 or some blocks

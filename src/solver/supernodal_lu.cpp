@@ -327,7 +327,7 @@ std::size_t SupernodalLu::count_below(int k) const {
 }
 
 /// `count`: of the numbers of the factors; `most`: products. A cantilever of beams has four for
-/// each number, a grid of 6 x 6 beams ten; of 10 x 10 beams they are fifteen, and panels are as
+/// each number, a grid of 6 x 6 beams ten; of 10 x 10 beams they are seventeen, and panels are as
 /// fast.
 bool SupernodalLu::is_listed(std::size_t count, std::size_t most) const {
   constexpr std::size_t kFew = 12, kAlways = 4096;

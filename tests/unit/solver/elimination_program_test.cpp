@@ -99,7 +99,8 @@ TEST(EliminationProgram, GivesTheBitsOfOneOperationAfterTheOther) {
   }
 }
 
-/// Blocks side by side: one update instead of four takes less memory; not more than three at once.
+/// Of four blocks side by side three are one update, as more would not stay in registers: two
+/// updates instead of four.
 TEST(EliminationProgram, TakesNeighboursTogether) {
   const auto bytes = [](int apart) {
     Twice twice(std::vector<double>(64, 1.0));
