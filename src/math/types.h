@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "math/eigen_storage.h"
+
 namespace mbcosim {
 
 template <class T>

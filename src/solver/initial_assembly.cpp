@@ -4,13 +4,13 @@
 #include <map>
 #include <memory>
 
-#include "math/sparse_lu.h"
 #include "model/model_part.h"
 #include "model/user_elements.h"
 #include "solver/failure.h"
 #include "solver/newton.h"
 #include "solver/null_space.h"
 #include "solver/singularity.h"
+#include "solver/sparse_factors.h"
 #include "solver/stages.h"
 
 namespace mbcosim {
@@ -179,8 +179,8 @@ class Assembly {
   }
 
   bool correct(double regularization = 0) {
-    Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix(regularization));
-    if (lu.info() != Eigen::Success) return false;
+    SparseFactors lu(matrix(regularization), Watch(cancel_));
+    if (!lu.regular()) return false;
     VecX rhs(2 * size_);
     for (int a = 0; a < size_; ++a) {
       rhs(a) = r_[rows_[a]];
@@ -273,7 +273,7 @@ class Assembly {
     }
     const std::string fight = contradictions();
     if (!fight.empty()) return fight;
-    const NullSpace null = find_null_space(matrix(0), 1e-12);
+    const NullSpace null = find_null_space(matrix(0), 1e-12, Watch(cancel_));
     if (null.rank_loss == 0) {
       return change > 1e-9 ? std::string()
                            : "the constraints can be met from here: allow more `max initial "

@@ -5,10 +5,10 @@
 #include "elements/beams/inverse_beam.h"
 #include "elements/joints/deformable.h"
 #include "elements/joints/tikhonov.h"
-#include "math/sparse_lu.h"
 #include "solver/advance_time.h"
 #include "solver/failure.h"
 #include "solver/newton.h"
+#include "solver/sparse_factors.h"
 #include "solver/stages.h"
 #include "solver/system.h"
 
@@ -440,9 +440,13 @@ InverseDynamics::Sparse InverseDynamics::matrix(const State& state, Stage stage,
 VecX InverseDynamics::solved(const Sparse& matrix, const VecX& right, const char* stage) {
   if (matrix.rows() == 0) return right;
   ++factorizations_;
-  Eigen::SparseLU<Sparse> lu(matrix);
   VecX z;
-  if (lu.info() == Eigen::Success) z = lu.solve(right);
+  try {
+    SparseFactors lu(matrix, Watch(cancel_));
+    if (lu.regular()) z = lu.solve(right);
+  } catch (const Stopped&) {
+    throw StageFailure{cancelled_error("interrupted while a matrix was factored")};
+  }
   constexpr double kLost = 1e-6;  // of the right hand side: nothing of the solution is left
   if (z.size() == 0 || !z.allFinite() || (matrix * z - right).norm() > kLost * (1 + right.norm()))
     throw StageFailure{

@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "math/sparse_lu.h"
+#include "solver/sparse_factors.h"
 
 namespace mbcosim {
 
@@ -42,47 +42,46 @@ NullSpace dense_null_space(const Sparse& a, double threshold) {
 }
 
 /// Inverse iteration with a + shift I; `growth` is the factor of the last solution.
-template <class Solve>
-VecX inverse_iteration(int n, Solve&& solve, double& growth) {
+VecX inverse_iteration(int n, SparseFactors& lu, double& growth) {
   VecX x(n);
   for (int i = 0; i < n; ++i) x(i) = std::sin(1.0 + i);  // any vector that is not special
   x.normalize();
   for (int k = 0; k < 4; ++k) {
-    x = solve(x);
+    x = lu.solve(x);
     growth = x.norm();
     x /= growth;
   }
   return x.cwiseAbs();
 }
 
-NullSpace sparse_null_space(const Sparse& a, double threshold) {
+NullSpace sparse_null_space(const Sparse& a, double threshold, const Watch& watch) {
   const double shift = 1e-2 * threshold;
   Sparse identity(a.rows(), a.cols());
   identity.setIdentity();
-  Eigen::SparseLU<Sparse> lu;
-  lu.compute(a + shift * identity);
+  const Sparse shifted = a + shift * identity;
+  SparseFactors lu(shifted, watch);
   NullSpace r;
-  if (lu.info() != Eigen::Success) return r;
+  if (!lu.regular()) return r;
   const int n = static_cast<int>(a.rows());
   double growth = 0;
-  r.right = inverse_iteration(
-      n, [&](const VecX& b) -> VecX { return lu.solve(b); }, growth);
+  r.right = inverse_iteration(n, lu, growth);
   r.rank_loss = growth * threshold > 1 ? 1 : 0;
-  if (r.rank_loss)
-    r.left = inverse_iteration(
-        n, [&](const VecX& b) -> VecX { return lu.transpose().solve(b); }, growth);
+  if (r.rank_loss == 0) return r;
+  SparseFactors transposed(Sparse(shifted.transpose()), watch);
+  if (transposed.regular()) r.left = inverse_iteration(n, transposed, growth);
   return r;
 }
 
 }  // namespace
 
-NullSpace find_null_space(const Sparse& matrix, double threshold) {
+NullSpace find_null_space(const Sparse& matrix, double threshold, const Watch& watch) {
   if (matrix.rows() == 0) return {};
   for (int j = 0; j < matrix.outerSize(); ++j)
     for (Sparse::InnerIterator e(matrix, j); e; ++e)
       if (!std::isfinite(e.value())) return {};
   const Sparse a = equilibrated(matrix);
-  return a.rows() > kDenseLimit ? sparse_null_space(a, threshold) : dense_null_space(a, threshold);
+  return a.rows() > kDenseLimit ? sparse_null_space(a, threshold, watch)
+                                : dense_null_space(a, threshold);
 }
 
 }  // namespace mbcosim

@@ -4,6 +4,7 @@
 #include <Eigen/Sparse>
 
 #include "math/types.h"
+#include "solver/watch.h"
 
 namespace mbcosim {
 
@@ -15,7 +16,8 @@ struct NullSpace {
 };
 
 /// Pivots below `threshold` times the largest one count as zero. Dense LU with full pivoting up to
-/// 1000 rows, inverse iteration with one vector above.
-NullSpace find_null_space(const Eigen::SparseMatrix<double>& matrix, double threshold);
+/// 1000 rows, inverse iteration with one vector above. Throws Stopped.
+NullSpace find_null_space(const Eigen::SparseMatrix<double>& matrix, double threshold,
+                          const Watch& watch);
 
 }  // namespace mbcosim

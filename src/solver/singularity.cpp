@@ -32,10 +32,11 @@ bool is_of_bodies(const Model& model, const VecX& share) {
   return false;
 }
 
-Singularity look(const Model& model, const std::vector<double>& values, double threshold) {
+Singularity look(const Model& model, const std::vector<double>& values, double threshold,
+                 const Watch& watch) {
   Singularity r;
   if (values.size() != model.row_index.size()) return r;
-  const NullSpace null = find_null_space(sparse(model, values), threshold);
+  const NullSpace null = find_null_space(sparse(model, values), threshold, watch);
   r.rank_loss = null.rank_loss;
   if (r.rank_loss == 0) return r;
   r.undetermined = owners_of(model, null.right, kNamed);
@@ -93,8 +94,9 @@ std::string Singularity::remedy() const {
          kRegularization;
 }
 
-Singularity find_singularity(const Model& model, const std::vector<double>& values, int column) {
-  Singularity r = look(model, values, kRankThreshold);
+Singularity find_singularity(const Model& model, const std::vector<double>& values, int column,
+                             const Watch& watch) {
+  Singularity r = look(model, values, kRankThreshold, watch);
   if (r.undetermined.empty() && column >= 0) {
     const auto [owner, equation] = model.row_text(column);
     r.undetermined.push_back({owner, equation, 1});
@@ -103,7 +105,7 @@ Singularity find_singularity(const Model& model, const std::vector<double>& valu
 }
 
 Singularity find_near_singularity(const Model& model, const std::vector<double>& values) {
-  return model.unknowns > kNearLimit ? Singularity{} : look(model, values, kNearThreshold);
+  return model.unknowns > kNearLimit ? Singularity{} : look(model, values, kNearThreshold, Watch());
 }
 
 }  // namespace mbcosim

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "model/model.h"
+#include "solver/watch.h"
 
 namespace mbcosim {
 
@@ -29,8 +30,9 @@ inline constexpr const char* kRegularization =
     "iteration does not converge)";
 
 /// Rank to rounding; `column` is the column without a pivot that the sparse factorization met (-1:
-/// unknown).
-Singularity find_singularity(const Model& model, const std::vector<double>& values, int column);
+/// unknown). Throws Stopped.
+Singularity find_singularity(const Model& model, const std::vector<double>& values, int column,
+                             const Watch& watch);
 
 /// Rank of a matrix that could be factored, with a looser threshold; full rank for models of more
 /// than 400 unknowns, for which the look would take long.

@@ -547,7 +547,8 @@ void Stepper::explain(PhaseReport& report, const State& state) {
   const bool far = has_diverged(e.failure.residual_history) && evaluate_matrix(state);
   Singularity cause;
   if (e.kind == ErrorKind::singular && !far) {
-    cause = find_singularity(model_, workspace_.values, report.newton.singular_column);
+    cause =
+        find_singularity(model_, workspace_.values, report.newton.singular_column, Watch(cancel_));
     e.failure.worst = cause.undetermined;
     e.message += cause.details();
     return;

@@ -1,1 +1,1 @@
-set(SOURCES rotation_test.cpp thread_team_test.cpp)
+set(SOURCES eigen_storage_test.cpp rotation_test.cpp thread_team_test.cpp)

@@ -1,3 +1,0 @@
-#include "math/sparse_lu.h"
-
-template class Eigen::SparseLU<Eigen::SparseMatrix<double>>;
