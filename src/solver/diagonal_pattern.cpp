@@ -149,17 +149,18 @@ class Finder {
 std::optional<FactorPattern> diagonal_pattern(const std::vector<int>& column_start,
                                               const std::vector<int>& row_index,
                                               const double* values, double tolerance,
-                                              FactorPattern order, const Watch& watch) {
-  Finder finder(column_start, row_index, values, tolerance, order);
+                                              BlockOrder order, const Watch& watch) {
+  FactorPattern factors{std::move(order), {}, {}, {}, {}};
+  Finder finder(column_start, row_index, values, tolerance, factors);
   bool found = true;
-  const auto n = static_cast<std::ptrdiff_t>(order.row_of.size());
+  const auto n = static_cast<std::ptrdiff_t>(factors.row_of.size());
   watch.columns(n, [&](std::ptrdiff_t first, std::ptrdiff_t count) {
     for (std::ptrdiff_t j = first; j < first + count && found; ++j)
       found = finder.add_column(static_cast<int>(j));
   });
   if (!found) return std::nullopt;
   finder.finish();
-  return order;
+  return factors;
 }
 
 }  // namespace mbcosim

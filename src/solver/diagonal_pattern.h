@@ -22,11 +22,11 @@ namespace mbcosim {
 /// of the pivot have in common (Eisenstat and Liu, "Exploiting structural symmetry in a sparse
 /// partial pivoting code", SIAM J. Sci. Comput. 14(1), 1993).
 ///
-/// `order`: P, Q and the diagonal blocks; its other members come with the result. Throws Stopped,
-/// and std::bad_alloc where places are no longer of the type int.
+/// `order`: P, Q and the diagonal blocks. Throws Stopped, and std::bad_alloc where places are no
+/// longer of the type int.
 std::optional<FactorPattern> diagonal_pattern(const std::vector<int>& column_start,
                                               const std::vector<int>& row_index,
                                               const double* values, double tolerance,
-                                              FactorPattern order, const Watch& watch = Watch());
+                                              BlockOrder order, const Watch& watch = Watch());
 
 }  // namespace mbcosim

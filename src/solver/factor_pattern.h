@@ -5,12 +5,16 @@
 
 namespace mbcosim {
 
-/// Pattern of the factors of a reference matrix: compressed columns, rows ascending, with the
-/// diagonals of L and of U, within diagonal blocks only.
-struct FactorPattern {
-  std::vector<int> lower_start, lower_row, upper_start, upper_row;
+/// Order of a matrix that is upper triangular by blocks.
+struct BlockOrder {
   std::vector<int> row_of, column_of;  ///< P, Q: row and column of the matrix by position (n)
   std::vector<int> block_start;        ///< first position of each diagonal block, then n
+};
+
+/// Pattern of the factors of a reference matrix: compressed columns, rows ascending, with the
+/// diagonals of L and of U, within diagonal blocks only.
+struct FactorPattern : BlockOrder {
+  std::vector<int> lower_start, lower_row, upper_start, upper_row;
 };
 
 /// Where the columns of the scaled matrix have theirs, by position.

@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "solver/bisected_order.h"
+#include "solver/constrained_order.h"
 #include "solver/diagonal_pattern.h"
 #include "solver/supernodal_lu.h"
 
@@ -38,11 +38,46 @@ SparsePattern united(int n, const std::vector<int>& column_start, const std::vec
   return p;
 }
 
+/// By column: is its diagonal nothing beside other numbers of it? Those of multipliers are, until
+/// what they act on has been eliminated.
+std::vector<bool> without_diagonal(const std::vector<int>& column_start,
+                                   const std::vector<int>& row_index, const double* values,
+                                   const BlockOrder& order) {
+  constexpr double kNothing = 1e-6;
+  std::vector<double> largest(order.row_of.size(), 0.0);  // by row
+  for (std::size_t p = 0; p < row_index.size(); ++p)
+    largest[row_index[p]] = std::max(largest[row_index[p]], std::abs(values[p]));
+  std::vector<bool> without(order.row_of.size());
+  for (std::size_t k = 0; k < without.size(); ++k) {
+    const int column = order.column_of[k];
+    double diagonal = 0, most = 0;
+    for (int p = column_start[column]; p < column_start[column + 1]; ++p) {
+      const double number = std::abs(values[p]) / largest[row_index[p]];
+      if (row_index[p] == order.row_of[k]) diagonal = number;
+      if (number > most) most = number;
+    }
+    without[column] = diagonal <= kNothing * most;
+  }
+  return without;
+}
+
+std::size_t bytes_of(const std::vector<int>& numbers) { return numbers.capacity() * sizeof(int); }
+
 }  // namespace
 
 struct LinearSolver::Klu {
   klu_common common;
   klu_symbolic* symbolic = nullptr;
+  /// Where a factorization is long: what it is ordered by, for pivots found without KLU.
+  struct Long {
+    SparsePattern couplings;
+    BlockOrder order;
+    std::size_t bytes() const {
+      return bytes_of(couplings.column_start) + bytes_of(couplings.row_index) +
+             bytes_of(order.row_of) + bytes_of(order.column_of) + bytes_of(order.block_start);
+    }
+  };
+  std::shared_ptr<const Long> lengthy;
   std::unique_ptr<SupernodalLu> kept;  ///< with the kept pivots
   klu_numeric* fresh = nullptr;        ///< of the last matrix, when the kept pivots were poor
   enum class Current { none, kept, fresh } current = Current::none;
@@ -67,36 +102,14 @@ struct LinearSolver::Klu {
     klu_symbolic* wide =
         klu_analyze(n, couplings.column_start.data(), couplings.row_index.data(), &common);
     if (!wide) return;
-    if (n >= 2 * kUnknownsPerThread) bisect(couplings, *wide);
-    symbolic =
-        klu_analyze_given(n, column_start.data(), row_index.data(), wide->P, wide->Q, &common);
     expect(wide->est_flops);
+    BlockOrder order = order_of(*wide);
     klu_free_symbolic(&wide, &common);
-  }
-  /// Orders the largest block for two threads, where that costs nothing. The order depends on the
-  /// pattern alone, not on how many threads there are.
-  static void bisect(const SparsePattern& pattern, klu_symbolic& s) {
-    int block = 0;
-    const auto size_of = [&](int b) { return s.R[b + 1] - s.R[b]; };
-    for (int b = 1; b < s.nblocks; ++b)
-      if (size_of(b) > size_of(block)) block = b;
-    const int first = s.R[block], size = size_of(block);
-    std::vector<int> position(s.n);
-    for (int k = 0; k < s.n; ++k) position[s.P[k]] = k - first;
-    SparsePattern own;
-    own.column_start.push_back(0);
-    for (int k = first; k < first + size; ++k) {
-      for (int p = pattern.column_start[s.Q[k]]; p < pattern.column_start[s.Q[k] + 1]; ++p)
-        if (const int row = position[pattern.row_index[p]]; row >= 0 && row < size)
-          own.row_index.push_back(row);
-      own.column_start.push_back(static_cast<int>(own.row_index.size()));
-    }
-    const auto order = bisected_order(own, s.est_flops);
-    if (!order) return;
-    for (int* const all : {s.P, s.Q}) {
-      const std::vector<int> before(all + first, all + first + size);
-      for (int k = 0; k < size; ++k) all[first + k] = before[(*order)[k]];
-    }
+    if (n >= 2 * kUnknownsPerThread) bisect_largest_block(couplings, expected_flops, order);
+    symbolic = klu_analyze_given(n, column_start.data(), row_index.data(), order.row_of.data(),
+                                 order.column_of.data(), &common);
+    if (expected_flops > kLong)
+      lengthy = std::make_shared<Long>(Long{std::move(couplings), std::move(order)});
   }
   double operations(klu_symbolic* s, klu_numeric* n) {
     return klu_flops(s, n, &common) ? common.flops : HUGE_VAL;
@@ -126,12 +139,8 @@ struct LinearSolver::Klu {
     klu_free_numeric(&factors, &common);
     klu_free_symbolic(&other, &common);
   }
-  FactorPattern diagonal_order() const {
-    FactorPattern p;
-    p.row_of.assign(symbolic->P, symbolic->P + symbolic->n);
-    p.column_of.assign(symbolic->Q, symbolic->Q + symbolic->n);
-    p.block_start.assign(symbolic->R, symbolic->R + symbolic->nblocks + 1);
-    return p;
+  static BlockOrder order_of(const klu_symbolic& s) {
+    return {{s.P, s.P + s.n}, {s.Q, s.Q + s.n}, {s.R, s.R + s.nblocks + 1}};
   }
   static double entries(const klu_numeric* n) { return static_cast<double>(n->lnz) + n->unz; }
   /// Pivots and pattern of factors; the rows of each column are sorted.
@@ -160,7 +169,9 @@ struct LinearSolver::Klu {
     return kept->pivot_ratio() > kSuspicious * kept_ratio ||
            kept->pivot_growth(values) > kPoorGrowth;
   }
-  std::size_t bytes() const { return common.memusage + (kept ? kept->bytes() : 0); }
+  std::size_t bytes() const {
+    return common.memusage + (kept ? kept->bytes() : 0) + (lengthy ? lengthy->bytes() : 0);
+  }
   /// Factors that nobody keeps.
   class Factors {
    public:
@@ -222,7 +233,7 @@ LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values, Matrices mat
   LuOptions options;
   if (matrices == Matrices::few) options.listed = 0;
   if (team_) options.threads = team_->size();
-  if (k.expected_flops > kLong && keep_diagonal(k, values, options)) return Outcome::ok;
+  if (k.lengthy && keep_diagonal(k, values, options)) return Outcome::ok;
   Klu::Factors factors(
       klu_factor(column_start_.data(), row_index_.data(), values, k.symbolic, &k.common), k.common);
   if (!factors.get()) return without_factors(k);
@@ -232,12 +243,22 @@ LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values, Matrices mat
   return keep(k, values, k.pattern(factors.get()), options) ? Outcome::ok : Outcome::failed;
 }
 
-/// The pivots that KLU would choose, where these can be told without it: its first factorization
-/// of a solid takes more than ten times as long as ours. False, and there are none, where they
-/// cannot.
+/// Pivots that KLU, too, would choose in that order, where these can be told without it: its first
+/// factorization of a solid takes more than ten times as long as ours. False, and there are none,
+/// where they cannot.
 bool LinearSolver::keep_diagonal(Klu& k, const double* values, const LuOptions& options) {
-  const std::optional<FactorPattern> pattern = diagonal_pattern(
-      column_start_, row_index_, values, pivot_tolerance_, k.diagonal_order(), watch_);
+  const auto& [couplings, order] = *k.lengthy;
+  const auto multipliers_last =
+      order_with_last(couplings, order, without_diagonal(column_start_, row_index_, values, order),
+                      k.expected_flops);
+  return (multipliers_last && keep_diagonal(k, values, options, *multipliers_last)) ||
+         keep_diagonal(k, values, options, Klu::order_of(*k.symbolic));
+}
+
+bool LinearSolver::keep_diagonal(Klu& k, const double* values, const LuOptions& options,
+                                 const BlockOrder& order) {
+  const std::optional<FactorPattern> pattern =
+      diagonal_pattern(column_start_, row_index_, values, pivot_tolerance_, order, watch_);
   if (!pattern) return false;
   if (keep(k, values, *pattern, options) && k.kept->pivots_dominate(1 / pivot_tolerance_))
     return true;
@@ -269,6 +290,7 @@ void LinearSolver::add_kind(const std::vector<bool>& kind, double* values) {
   const Klu& first = *kinds_[0].klu;
   auto klu = std::make_unique<Klu>(pivot_tolerance_);
   klu->expect(first.expected_flops);
+  klu->lengthy = first.lengthy;
   if (n_ > 0 && first.symbolic)
     klu->symbolic = klu_analyze_given(n_, column_start_.data(), row_index_.data(),
                                       first.symbolic->P, first.symbolic->Q, &klu->common);

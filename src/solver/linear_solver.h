@@ -5,8 +5,9 @@
 /// kept pivots are poor gets a factorization of its own. Results are thus the same bits wherever a
 /// state is continued.
 ///
-/// A factorization of a large matrix may take minutes; its pivots are found without KLU where it
-/// can be told which KLU would choose (solver/diagonal_pattern.h). It stops soon after the token of
+/// A factorization of a large matrix may take minutes; its pivots are found without KLU where they
+/// can be told (solver/diagonal_pattern.h), as they can where multipliers are few: these then come
+/// last, and have diagonals by what has been eliminated before. It stops soon after the token of
 /// `set_watch` is cancelled and throws Stopped; while KLU chooses pivots only its allocations can
 /// be looked at, so the program's allocator has to refuse what is asked for then (that of the
 /// daemon does). Without memory std::bad_alloc is thrown. In both cases there is no factorization
@@ -23,6 +24,7 @@
 
 namespace mbcosim {
 
+struct BlockOrder;
 struct FactorPattern;
 struct LuOptions;
 
@@ -81,6 +83,8 @@ class LinearSolver {
   };
   Outcome analyze(Klu& k, double* values, Matrices matrices);
   bool keep_diagonal(Klu& k, const double* values, const LuOptions& options);
+  bool keep_diagonal(Klu& k, const double* values, const LuOptions& options,
+                     const BlockOrder& order);
   bool keep(Klu& k, const double* values, const FactorPattern& pattern, const LuOptions& options);
   Outcome without_factors(const Klu& k);
 

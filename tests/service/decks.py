@@ -56,7 +56,7 @@ OSCILLATOR_WITH_SPRING = _OSCILLATOR % (
 
 
 def cube(side, held=False):
-    """side³ masses between rods to their neighbours: the factors of its matrix are large, and take long. `held`: the first two by a distance, too."""
+    """side³ masses between rods to their neighbours: the factors of its matrix are large, and take long. `held`: distances in the place of rods along x."""
     label = lambda i, j, k: 1 + i + side * (j + side * k)
     places = [(i, j, k) for k in range(side) for j in range(side) for i in range(side)]
     near = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 1, 1)]
@@ -64,15 +64,15 @@ def cube(side, held=False):
              for other in [tuple(a + b for a, b in zip(place, d))] if max(other) < side]
     nodes = "".join(f"structural: {label(*p)}, dynamic displacement, {p[0]}., {p[1]}., {p[2]}., null;" for p in places)
     masses = "".join(f"body: {label(*p)}, {label(*p)}, 1.;" for p in places)
-    rods = "".join(f"joint: {n}, rod, {label(*a)}, {label(*b)}, from nodes, linear viscoelastic, 1e3, 1.;"
-                   for n, (a, b) in enumerate(pairs, 1))
-    if held:
-        rods += f"joint: {len(pairs) + 1}, distance, 1, 2, from nodes;"
+    kind = lambda a, b: "distance" if held and a[1:] == b[1:] else "rod"
+    law = {"rod": ", linear viscoelastic, 1e3, 1.", "distance": ""}
+    joints = "".join(f"joint: {n}, {kind(a, b)}, {label(*a)}, {label(*b)}, from nodes{law[kind(a, b)]};"
+                     for n, (a, b) in enumerate(pairs, 1))
     return f"""
 begin: data; problem: initial value; end: data;
 begin: initial value; initial time: 0.; final time: 10.; time step: 1e-3; method: ms, .6; tolerance: 1e-6; max iterations: 30;
 derivatives tolerance: 1.; end: initial value;
-begin: control data; structural nodes: {len(places)}; rigid bodies: {len(places)}; joints: {len(pairs) + held}; end: control data;
+begin: control data; structural nodes: {len(places)}; rigid bodies: {len(places)}; joints: {len(pairs)}; end: control data;
 begin: nodes; {nodes} end: nodes;
-begin: elements; {masses} {rods} end: elements;
+begin: elements; {masses} {joints} end: elements;
 """

@@ -35,7 +35,7 @@ inline FactorPattern factor_pattern(const Dense& a, std::vector<int> row_of,
                                     std::vector<int> column_of, std::vector<int> block_start) {
   const int n = static_cast<int>(a.rows());
   FactorPattern f{
-      {0}, {}, {0}, {}, std::move(row_of), std::move(column_of), std::move(block_start)};
+      {std::move(row_of), std::move(column_of), std::move(block_start)}, {0}, {}, {0}, {}};
   std::vector<std::vector<bool>> filled(n, std::vector<bool>(n));
   std::vector<int> block(n);
   for (std::size_t b = 0; b + 1 < f.block_start.size(); ++b)

@@ -1,4 +1,4 @@
-#include "solver/bisected_order.h"
+#include "solver/constrained_order.h"
 
 #include <camd.h>
 
@@ -9,6 +9,8 @@
 namespace mbcosim {
 
 namespace {
+
+constexpr double kMore = 1.1;  ///< times the operations that an order may take
 
 /// Neighbours of each node of A + Aᵀ; those of A and of Aᵀ may stand twice.
 class Graph {
@@ -90,11 +92,56 @@ int narrowest(const Levels& levels) {
   return best;
 }
 
+struct CountedOrder {
+  std::vector<int> order;
+  double operations;
+};
+
+/// By minimum degree, the sets one after the other. `set` is a vector of their numbers.
+std::optional<CountedOrder> ordered(const SparsePattern& pattern, std::vector<int> set) {
+  double control[CAMD_CONTROL], info[CAMD_INFO];
+  camd_defaults(control);
+  std::vector<int> order(set.size());
+  const int status = camd_order(static_cast<int>(set.size()), pattern.column_start.data(),
+                                pattern.row_index.data(), order.data(), control, info, set.data());
+  if (status != CAMD_OK && status != CAMD_OK_BUT_JUMBLED) return std::nullopt;
+  return CountedOrder{std::move(order), 2 * info[CAMD_NMULTSUBS_LU] + info[CAMD_NDIV]};
+}
+
+/// By row.
+std::vector<int> positions(const BlockOrder& order) {
+  std::vector<int> position(order.row_of.size());
+  for (std::size_t k = 0; k < position.size(); ++k) position[order.row_of[k]] = static_cast<int>(k);
+  return position;
+}
+
+SparsePattern pattern_of_block(const SparsePattern& pattern, const BlockOrder& order,
+                               const std::vector<int>& position, std::size_t block) {
+  const int first = order.block_start[block], end = order.block_start[block + 1];
+  SparsePattern own;
+  own.column_start.push_back(0);
+  for (int k = first; k < end; ++k) {
+    const int column = order.column_of[k];
+    for (int p = pattern.column_start[column]; p < pattern.column_start[column + 1]; ++p)
+      if (const int row = position[pattern.row_index[p]]; row >= first && row < end)
+        own.row_index.push_back(row - first);
+    own.column_start.push_back(static_cast<int>(own.row_index.size()));
+  }
+  return own;
+}
+
+void permute(BlockOrder& order, std::size_t block, const std::vector<int>& by) {
+  for (std::vector<int>* const all : {&order.row_of, &order.column_of}) {
+    const auto begin = all->begin() + order.block_start[block];
+    const std::vector<int> before(begin, begin + by.size());
+    std::transform(by.begin(), by.end(), begin, [&](int k) { return before[k]; });
+  }
+}
+
 }  // namespace
 
 std::optional<std::vector<int>> bisected_order(const SparsePattern& pattern, double operations) {
   constexpr double kNarrow = 0.02;  // operations at the cut, of all: they are done by one thread
-  constexpr double kMore = 1.1;     // times the operations
   const Graph graph(pattern);
   const int n = graph.size();
   if (n == 0) return std::nullopt;
@@ -114,14 +161,39 @@ std::optional<std::vector<int>> bisected_order(const SparsePattern& pattern, dou
     at_cut += side[k] == between;
   }
   if (at_cut * at_cut * at_cut > kNarrow * operations) return std::nullopt;
-  double control[CAMD_CONTROL], info[CAMD_INFO];
-  camd_defaults(control);
-  std::vector<int> order(n);
-  const int status = camd_order(n, pattern.column_start.data(), pattern.row_index.data(),
-                                order.data(), control, info, side.data());
-  if (status != CAMD_OK && status != CAMD_OK_BUT_JUMBLED) return std::nullopt;
-  if (2 * info[CAMD_NMULTSUBS_LU] + info[CAMD_NDIV] > kMore * operations) return std::nullopt;
-  return order;
+  const auto found = ordered(pattern, side);
+  if (!found || found->operations > kMore * operations) return std::nullopt;
+  return found->order;
+}
+
+void bisect_largest_block(const SparsePattern& pattern, double operations, BlockOrder& order) {
+  const auto size_of = [&](int b) { return order.block_start[b + 1] - order.block_start[b]; };
+  const int blocks = static_cast<int>(order.block_start.size()) - 1;
+  int largest = 0;
+  for (int b = 1; b < blocks; ++b)
+    if (size_of(b) > size_of(largest)) largest = b;
+  const auto found =
+      bisected_order(pattern_of_block(pattern, order, positions(order), largest), operations);
+  if (found) permute(order, largest, *found);
+}
+
+std::optional<BlockOrder> order_with_last(const SparsePattern& pattern, const BlockOrder& order,
+                                          const std::vector<bool>& last, double operations) {
+  const std::vector<int> position = positions(order);
+  BlockOrder result = order;
+  double needed = 0;
+  for (std::size_t b = 0; b + 1 < order.block_start.size(); ++b) {
+    std::vector<int> set;
+    for (int k = order.block_start[b]; k < order.block_start[b + 1]; ++k)
+      set.push_back(last[order.column_of[k]]);
+    if (std::find(set.begin(), set.end(), 1) == set.end()) continue;
+    const auto found = ordered(pattern_of_block(pattern, order, position, b), std::move(set));
+    if (!found) return std::nullopt;
+    needed += found->operations;
+    permute(result, b, found->order);
+  }
+  if (needed == 0 || needed > kMore * operations) return std::nullopt;
+  return result;
 }
 
 }  // namespace mbcosim

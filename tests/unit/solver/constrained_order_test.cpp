@@ -1,5 +1,6 @@
-/// Orders for two threads: halves that do not touch, little more to do than by minimum degree.
-#include "solver/bisected_order.h"
+/// Orders for two threads: halves that do not touch, little more to do than by minimum degree; and
+/// with some last.
+#include "solver/constrained_order.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +10,7 @@
 #include <set>
 #include <utility>
 
-namespace mbcosim::bisected_order_test {
+namespace mbcosim::constrained_order_test {
 namespace {
 
 using Edges = std::set<std::pair<int, int>>;  ///< row, column
@@ -118,5 +119,44 @@ TEST(BisectedOrder, OfNothingOrOfPartsThatDoNotTouchIsNone) {
   EXPECT_FALSE(bisected_order(pattern_of(50, {}), 1e9));
 }
 
+/// Two blocks of lines; row k stands where column k does, but for two columns of the first block.
+BlockOrder two_blocks(int n) {
+  BlockOrder order;
+  for (int k = 0; k < n; ++k) order.column_of.push_back(k);
+  order.row_of = order.column_of;
+  std::swap(order.row_of[3], order.row_of[5]);
+  order.block_start = {0, n / 2, n};
+  return order;
+}
+
+TEST(OrderWithLast, PutsThemAtTheEndOfTheirBlocks) {
+  const int n = 60;
+  const SparsePattern p = line(20, 3);
+  const BlockOrder order = two_blocks(n);
+  std::vector<bool> last(n, false);
+  for (const int column : {0, 5, 17, 40}) last[column] = true;
+  const auto found = order_with_last(p, order, last, 1e9);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->block_start, order.block_start);
+  const std::vector<int>& columns = found->column_of;
+  EXPECT_EQ(std::set(columns.begin() + 27, columns.begin() + 30), (std::set{0, 5, 17}));
+  EXPECT_EQ(columns[59], 40);
+  for (int k = 0; k < n; ++k) {
+    const auto before = std::find(order.column_of.begin(), order.column_of.end(), columns[k]);
+    EXPECT_EQ(found->row_of[k], order.row_of[before - order.column_of.begin()]) << k;
+    EXPECT_EQ(columns[k] < n / 2, k < n / 2) << k;
+  }
+}
+
+TEST(OrderWithLast, IsThereOnlyWhereItIsOfUse) {
+  const SparsePattern p = line(20, 3);
+  const BlockOrder order = two_blocks(60);
+  EXPECT_FALSE(order_with_last(p, order, std::vector<bool>(60, false), 1e9)) << "none is last";
+  std::vector<bool> last(60, false);
+  last[7] = true;
+  EXPECT_TRUE(order_with_last(p, order, last, 1e9));
+  EXPECT_FALSE(order_with_last(p, order, last, 10)) << "too many operations";
+}
+
 }  // namespace
-}  // namespace mbcosim::bisected_order_test
+}  // namespace mbcosim::constrained_order_test
