@@ -11,6 +11,8 @@ namespace mbcosim {
 
 namespace {
 
+constexpr double kHandOver = 1e3, kStart = 1e5;  ///< of a group, of all, to another thread
+
 /// 1/x, rounded such that x times it is 1 exactly where that is possible: equations whose
 /// coefficients are all alike, as those of kinematics, are then solved without rounding.
 double reciprocal(double x) {
@@ -236,16 +238,22 @@ struct SupernodalLu::GroupTasks {
   std::vector<int> group;
 };
 
-SupernodalLu::GroupTasks SupernodalLu::tasks_of_groups() const {
+/// Of a group, without the updates by others.
+double SupernodalLu::own_cost(int g) const {
   constexpr double kOfColumn = 500;  // to get the matrix's numbers and to put away the factors'
+  const int first = group_start_[g], columns = group_start_[g + 1] - first;
+  return columns *
+         (kOfColumn + version_.cost_of(columns) * static_cast<double>(1 + count_below(first)));
+}
+
+SupernodalLu::GroupTasks SupernodalLu::tasks_of_groups() const {
   GroupTasks tasks;
   TaskGraph& graph = tasks.graph;
   std::vector<int> task_of(group_part_.size(), -1);
   for (std::size_t g = 0; g < group_part_.size(); ++g) {
     if (group_part_[g] != parts_) continue;
-    const int first = group_start_[g], columns = group_start_[g + 1] - first;
-    const double cost = version_.cost_of(columns);
-    double own = columns * (kOfColumn + cost * static_cast<double>(1 + count_below(first)));
+    const double cost = version_.cost_of(group_start_[g + 1] - group_start_[g]);
+    double own = own_cost(static_cast<int>(g));
     for (int q = segments_.start[g]; q < segments_.start[g + 1]; ++q)
       for (Segment rest = segments_.all[q]; rest.first < rest.end;) {
         const int needed = group_of_[rest.first];
@@ -270,7 +278,6 @@ SupernodalLu::GroupTasks SupernodalLu::tasks_of_groups() const {
 /// where that is faster; for as many threads as are of use.
 void SupernodalLu::order_groups(int threads) {
   if (threads < 2) return;
-  constexpr double kHandOver = 1e3, kStart = 1e5;  // of a group, of all
   constexpr double kWorth = 1.1;
   const GroupTasks tasks = tasks_of_groups();
   std::vector<int> order(tasks.group.size());
@@ -291,6 +298,32 @@ void SupernodalLu::order_groups(int threads) {
   if (sharers_ == 1) return;
   for (const int task : order) order_.push_back(tasks.group[task]);
   done_ = std::vector<std::atomic<std::uint64_t>>(group_part_.size());
+}
+
+SupernodalLu::Expected SupernodalLu::expected() const {
+  const double of_number = sizeof(double);
+  std::vector<double> part(parts_ + 1, 0.0);
+  double bytes = of_number * static_cast<double>(numbers_.size());
+  for (std::size_t g = 0; g < group_part_.size(); ++g) {
+    const double cost = version_.cost_of(group_start_[g + 1] - group_start_[g]);
+    double& time = part[group_part_[g]];
+    time += own_cost(static_cast<int>(g));
+    for (int q = segments_.start[g]; q < segments_.start[g + 1]; ++q) {
+      time += cost * products_of(segments_.all[q]);
+      bytes += of_number * products_of(segments_.all[q]);
+    }
+  }
+  double last = part.back();
+  if (sharers_ > 1) {
+    const GroupTasks tasks = tasks_of_groups();
+    std::vector<int> order;
+    for (const int group : order_)
+      order.push_back(static_cast<int>(
+          std::lower_bound(tasks.group.begin(), tasks.group.end(), group) - tasks.group.begin()));
+    last = kStart + time_of(tasks.graph, order, sharers_, kHandOver);
+  }
+  part.pop_back();
+  return {last + (part.empty() ? 0 : *std::max_element(part.begin(), part.end())), bytes};
 }
 
 void SupernodalLu::place_matrix(const std::vector<int>& column_start,

@@ -67,6 +67,12 @@ class SupernodalLu {
   double pivot_growth(const double* values) const;
   int parts() const { return parts_; }      ///< that threads take; 0: the last one is all
   int sharers() const { return sharers_; }  ///< threads that share the last part
+  /// What a factorization by panels is expected to cost.
+  struct Expected {
+    double time;   ///< with all threads, in operations on registers; waits included
+    double bytes;  ///< moved where no cache keeps anything
+  };
+  Expected expected() const;
   int supernodes() const { return static_cast<int>(first_.size()) - 1; }
   std::size_t bytes() const;  ///< of memory, all but some for each column
 
@@ -114,6 +120,7 @@ class SupernodalLu {
   void order_groups(int threads);
   struct GroupTasks;
   GroupTasks tasks_of_groups() const;
+  double own_cost(int g) const;
   bool is_done(int g) const { return done_[g].load(std::memory_order_acquire) == round_; }
   template <class Use>
   void for_done(Segment segment, Use use) const;

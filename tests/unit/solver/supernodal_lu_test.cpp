@@ -228,6 +228,34 @@ TEST(SupernodalLu, SeveralThreadsOnAnyPatternGiveTheBitsOfOne) {
   }
 }
 
+/// Halves that do not need each other take half of the time, and what follows them all of it; of a
+/// full matrix each column needs the one before.
+TEST(SupernodalLu, ExpectsWhatThreadsSave) {
+  std::mt19937 generator(3);
+  const auto expected = [&](const Dense& a, int threads) {
+    const int n = static_cast<int>(a.rows());
+    std::vector<int> order(n);
+    std::iota(order.begin(), order.end(), 0);
+    const Sparse sparse(a);
+    return SupernodalLu(sparse.column_start, sparse.row_index, sparse.values.data(),
+                        factor_pattern(a, order, order, {0, n}), {.listed = 0, .threads = threads})
+        .expected();
+  };
+  const Dense halves = two_bands(150, 4, generator), full = two_bands(1, 500, generator);
+  EXPECT_NEAR(expected(halves, 2).time, expected(halves, 1).time / 2,
+              .05 * expected(halves, 1).time);
+  const double alone = expected(full, 1).time;
+  double before = alone;
+  for (const int threads : {2, 4, 8}) {
+    const auto [time, bytes] = expected(full, threads);
+    EXPECT_LT(time, before) << threads;
+    EXPECT_GT(time, alone / threads) << threads;
+    EXPECT_EQ(bytes, expected(full, 1).bytes) << threads;
+    before = time;
+  }
+  EXPECT_GT(expected(full, 1).bytes, sizeof(double) * 500 * 500);
+}
+
 /// Each has numbers for all unknowns, of which most are in no wide column here: three times these
 /// are as many as the factors have.
 TEST(SupernodalLu, ManyThreadsTakeNoMoreMemoryThanTheFactors) {
