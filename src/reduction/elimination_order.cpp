@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 namespace mbcosim {
 
@@ -201,31 +202,98 @@ double EliminationTree::operations() const {
   return sum;
 }
 
-/// Liu's algorithm for the tree; row k of the factor are the nodes between the entries of row k of
-/// the matrix and k.
-EliminationTree elimination_tree(const SparseMatrix& matrix, const std::vector<int>& order) {
+std::vector<int> postorder(const std::vector<int>& parent) {
+  const int n = static_cast<int>(parent.size());
+  std::vector<int> child(n, -1), sibling(n, -1), roots, order;
+  for (int k = n - 1; k >= 0; --k) {
+    if (parent[k] < 0) {
+      roots.push_back(k);
+    } else {
+      sibling[k] = child[parent[k]];
+      child[parent[k]] = k;
+    }
+  }
+  std::reverse(roots.begin(), roots.end());
+  order.reserve(n);
+  for (const int root : roots) {
+    std::vector<int> path = {root};
+    while (!path.empty()) {
+      const int k = path.back();
+      if (child[k] >= 0) {
+        path.push_back(child[k]);
+        child[k] = sibling[child[k]];
+      } else {
+        order.push_back(k);
+        path.pop_back();
+      }
+    }
+  }
+  return order;
+}
+
+namespace {
+
+/// Liu's algorithm (J. W. H. Liu, "The role of elimination trees in sparse factorization", SIAM J.
+/// Matrix Anal. Appl. 11(1), 1990).
+std::vector<int> parents(const SparseMatrix& matrix, const std::vector<int>& order,
+                         const std::vector<int>& place) {
   const int n = static_cast<int>(order.size());
-  std::vector<int> place(n), ancestor(n, -1), seen(n, -1);
-  for (int k = 0; k < n; ++k) place[order[k]] = k;
-  EliminationTree tree{std::vector<int>(n, -1), std::vector<int>(n, 1)};
-  for (int k = 0; k < n; ++k) {
+  std::vector<int> parent(n, -1), ancestor(n, -1);
+  for (int k = 0; k < n; ++k)
     for (SparseMatrix::InnerIterator it(matrix, order[k]); it; ++it) {
       int j = place[it.row()];
       while (j < k && ancestor[j] != k) {
         const int next = ancestor[j];
         ancestor[j] = k;
-        if (next < 0) tree.parent[j] = k;
+        if (next < 0) parent[j] = k;
         if (next < 0) break;
         j = next;
       }
     }
-    seen[k] = k;
-    for (SparseMatrix::InnerIterator it(matrix, order[k]); it; ++it)
-      for (int j = place[it.row()]; j < k && seen[j] != k; j = tree.parent[j]) {
-        seen[j] = k;
-        ++tree.entries[j];
-      }
+  return parent;
+}
+
+int root_of(std::vector<int>& up, int k) {
+  int root = k;
+  while (up[root] != root) root = up[root];
+  while (up[k] != root) k = std::exchange(up[k], root);
+  return root;
+}
+
+}  // namespace
+
+/// The entries by the leaves of row subtrees: row i of the factor is the part of the tree between
+/// them and i. A column gets one for each leaf there, and one less where two branches meet (J. R.
+/// Gilbert, E. G. Ng, B. W. Peyton, "An efficient algorithm to compute row and column counts for
+/// sparse Cholesky factorization", SIAM J. Matrix Anal. Appl. 15(4), 1994).
+EliminationTree elimination_tree(const SparseMatrix& matrix, const std::vector<int>& order) {
+  const int n = static_cast<int>(order.size());
+  std::vector<int> place(n);
+  for (int k = 0; k < n; ++k) place[order[k]] = k;
+  EliminationTree tree{parents(matrix, order, place), std::vector<int>(n, 0)};
+  std::vector<int> first(n, -1);  // place in the postorder of the first one below each
+  const std::vector<int> post = postorder(tree.parent);
+  for (int at = 0; at < n; ++at) {
+    if (first[post[at]] < 0) tree.entries[post[at]] = 1;
+    for (int k = post[at]; k >= 0 && first[k] < 0; k = tree.parent[k]) first[k] = at;
   }
+  std::vector<int> up(n), last_leaf(n, -1), last_first(n, -1);
+  std::iota(up.begin(), up.end(), 0);
+  for (const int k : post) {
+    for (SparseMatrix::InnerIterator it(matrix, order[k]); it; ++it) {
+      const int row = place[it.row()];
+      if (row <= k || first[k] <= last_first[row]) continue;
+      last_first[row] = first[k];
+      ++tree.entries[k];
+      if (last_leaf[row] >= 0) --tree.entries[root_of(up, last_leaf[row])];
+      last_leaf[row] = k;
+    }
+    if (tree.parent[k] < 0) continue;
+    --tree.entries[tree.parent[k]];
+    up[k] = tree.parent[k];
+  }
+  for (int k = 0; k < n; ++k)
+    if (tree.parent[k] >= 0) tree.entries[tree.parent[k]] += tree.entries[k];
   return tree;
 }
 

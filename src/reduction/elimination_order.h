@@ -19,6 +19,9 @@ struct EliminationTree {
   double operations() const;  ///< of a factorization: Σ entries²
 };
 
+/// The nodes of a forest, children before parents, those of a parent side by side.
+std::vector<int> postorder(const std::vector<int>& parent);
+
 /// `order`: row of the matrix that is eliminated k-th.
 EliminationTree elimination_tree(const SparseMatrix& matrix, const std::vector<int>& order);
 

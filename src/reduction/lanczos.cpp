@@ -1,10 +1,9 @@
 /// Shift-invert Lanczos in the inner product of M, about zero, with the rigid motions projected
 /// out.
-#include <Spectra/SymGEigsShiftSolver.h>
-
 #include <optional>
 #include <random>
 
+#include "reduction/block_lanczos.h"
 #include "reduction/structure.h"
 
 namespace mbcosim {
@@ -12,13 +11,12 @@ namespace mbcosim {
 namespace {
 
 constexpr double kInverted =
-    1e-2;  ///< tolerance of the inverted eigenvalues over that of the modes
-constexpr int kRestarts = 300;
+    1e-2;                   ///< tolerance of the inverted eigenvalues over that of the modes
+constexpr int kAtOnce = 8;  ///< vectors
 
 /// y = Pᵀ K⁻ P x, or with a shift σ y = Pᵀ (K − σ M)⁻¹ P x: the elastic flexibility.
 class Flexibility {
  public:
-  using Scalar = double;
   Flexibility(Structure& structure, double shift, const ReductionProgress& progress, int expected)
       : structure_(structure), progress_(progress), expected_(expected) {
     if (shift < 0)
@@ -26,15 +24,17 @@ class Flexibility {
           structure.shifted(shift), structure.places(),
           [&](int k) { return structure.row_text(k); }, structure.factor_settings());
   }
-  Eigen::Index rows() const { return structure_.size(); }
-  Eigen::Index cols() const { return structure_.size(); }
-  void set_shift(double) {}
-  void perform_op(const double* in, double* out) const {
-    const VecX load = structure_.balanced(Eigen::Map<const VecX>(in, rows()));
-    Eigen::Map<VecX>(out, rows()) =
+  MatX operator()(const MatX& forces) {
+    const MatX load = structure_.balanced(forces);
+    MatX shapes =
         structure_.without_rigid(shifted_ ? shifted_->solve(load) : structure_.solve(load));
-    ++*done_;
-    if (progress_ && !progress_("normal modes", std::min(0.99, double(*done_) / expected_)))
+    done_ += static_cast<int>(forces.cols());
+    look();
+    return shapes;
+  }
+  /// Tells how far it has come, and ends when it is asked to.
+  void look() const {
+    if (progress_ && !progress_("normal modes", std::min(0.99, double(done_) / expected_)))
       stop_reduction();
   }
 
@@ -43,32 +43,16 @@ class Flexibility {
   const ReductionProgress& progress_;
   int expected_;
   std::optional<SparseFactor> shifted_;
-  std::unique_ptr<int> done_ = std::make_unique<int>(0);
+  int done_ = 0;  ///< vectors
 };
 
-class MassProduct {
- public:
-  using Scalar = double;
-  explicit MassProduct(const Structure& structure) : structure_(structure) {}
-  Eigen::Index rows() const { return structure_.size(); }
-  Eigen::Index cols() const { return structure_.size(); }
-  void perform_op(const double* in, double* out) const {
-    Eigen::Map<VecX>(out, rows()) = structure_.mass_times(Eigen::Map<const VecX>(in, rows()));
-  }
-
- private:
-  const Structure& structure_;
-};
-
-/// A start vector within the range of the operator, so that massless rows do no harm.
-VecX start_vector(const Structure& structure, const Flexibility& flexibility, unsigned seed) {
-  std::mt19937 random(seed);
+/// Start vectors within the range of the operator, so that massless rows do no harm.
+MatX start_vectors(const Structure& structure, Flexibility& flexibility, int count) {
+  std::mt19937 random(1);
   std::uniform_real_distribution<double> value(-0.5, 0.5);
-  VecX x(structure.size()), y(structure.size());
-  for (double& v : x) v = value(random);
-  x = structure.mass_times(x);
-  flexibility.perform_op(x.data(), y.data());
-  return y;
+  MatX x(structure.size(), count);
+  for (double& v : x.reshaped()) v = value(random);
+  return flexibility(structure.mass_times(x));
 }
 
 }  // namespace
@@ -79,21 +63,22 @@ NormalModes Structure::lanczos_modes(int count, const EigenOptions& options,
     refuse_reduction(std::to_string(count) + " normal modes of a model with " +
                          std::to_string(size()) + " unknowns are too many",
                      "at most a quarter");
-  const int basis = std::min(size(), std::max(2 * count + 1, 20));
-  Flexibility flexibility(*this, options.shift, progress, 3 * basis);
-  MassProduct product(*this);
-  Spectra::SymGEigsShiftSolver<Flexibility, MassProduct, Spectra::GEigsMode::ShiftInvert> solver(
-      flexibility, product, count, basis, options.shift);
-  const VecX start = start_vector(*this, flexibility, 1u);
-  solver.init(start.data());
-  const auto converged =
-      solver.compute(Spectra::SortRule::LargestMagn, kRestarts, kInverted * options.tolerance,
-                     Spectra::SortRule::SmallestAlge);
-  if (solver.info() != Spectra::CompInfo::Successful)
+  const int width = std::min(kAtOnce, size());
+  Flexibility flexibility(*this, options.shift, progress, 6 * (count + width));
+  const BlockLanczosProblem problem{[&](const MatX& f) { return flexibility(f); },
+                                    [&](const MatX& x) {
+                                      flexibility.look();
+                                      return mass_times(x);
+                                    },
+                                    count, kInverted * options.tolerance};
+  const BlockLanczosResult found = block_lanczos(problem, start_vectors(*this, flexibility, width),
+                                                 TallProducts(*settings_.kernels, team_.get()));
+  if (found.values.size() < count)
     throw ReductionError(ErrorKind::not_converged,
-                         "only " + std::to_string(converged) + " of " + std::to_string(count) +
+                         "only " + std::to_string(found.values.size()) + " of " +
+                             std::to_string(count) +
                              " normal modes converged (does the model have that many?)");
-  return {solver.eigenvalues(), solver.eigenvectors(), 0, 0};
+  return {options.shift + found.values.array().inverse(), found.vectors, 0, 0};
 }
 
 }  // namespace mbcosim

@@ -28,7 +28,7 @@ MatX without_dust(MatX m) {
   return m.unaryExpr([small](double v) { return std::abs(v) < small ? 0 : v; });
 }
 
-std::string number(double value) {
+std::string shown(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value);
   return text;
@@ -202,7 +202,7 @@ class Reducer {
             std::max(report_.lumping_change, std::abs(std::sqrt(squares_(j) / consistent(j)) - 1));
     if (report_.lumping_change > kLumpingChange)
       report_.warnings.push_back("lumping the mass changes a frequency by " +
-                                 number(100 * report_.lumping_change) +
+                                 shown(100 * report_.lumping_change) +
                                  " %; rigid inertia keeps the consistent mass");
   }
 
@@ -291,7 +291,7 @@ class Reducer {
                             std::to_string(r.removed_shapes) + " removed",
                         "frequencies [Hz] of the reduced body:"};
     for (std::size_t j = 0; j < r.frequencies.size(); ++j)
-      result_.comments.push_back("  " + std::to_string(j + 1) + "  " + number(r.frequencies[j]));
+      result_.comments.push_back("  " + std::to_string(j + 1) + "  " + shown(r.frequencies[j]));
   }
 
   const FeModel& original_;

@@ -48,6 +48,7 @@ Structure::Structure(const FeModel& model, const std::vector<char>& held,
     rows_.push_back(r);
   }
   if (rows_.empty()) refuse_reduction("every degree of freedom is held");
+  if (settings.threads > 1) team_ = std::make_unique<ThreadTeam>(settings.threads);
   places_.resize(3, size());
   for (int k = 0; k < size(); ++k) places_.col(k) = model.positions.col(model.dofs[rows_[k]].node);
   find_rigid_motions();
@@ -188,6 +189,49 @@ int Structure::count_modes_below(double square) const {
   const SparseMatrix matrix = shifted(square);
   const int below = SparseFactor::count_negative(matrix, places_, settings_, pattern_for(matrix));
   return below < 0 ? below : below - rigid_count();
+}
+
+namespace {
+
+/// sum = (row k of A) x; the columns of the symmetric matrix are its rows.
+template <int kColumns>
+void multiply_row(const SparseMatrix& matrix, int row, const std::vector<int>& position,
+                  const double* x, double* sum) {
+  using Row = Eigen::Matrix<double, 1, kColumns>;
+  Row total = Row::Zero();
+  for (SparseMatrix::InnerIterator it(matrix, row); it; ++it)
+    if (const int at = position[it.row()]; at >= 0)
+      total += it.value() * Eigen::Map<const Row>(x + std::ptrdiff_t{at} * kColumns);
+  Eigen::Map<Row>{sum} = total;
+}
+
+}  // namespace
+
+MatX Structure::times(const SparseMatrix& matrix, const MatX& shapes) const {
+  MatX result(size(), shapes.cols());
+  for (Eigen::Index c = 0; c < shapes.cols();) {
+    constexpr int kWide = 8;
+    const bool wide = shapes.cols() - c >= kWide;
+    const int columns = wide ? kWide : 1;
+    multiply(matrix, shapes.middleCols(c, columns), wide ? multiply_row<kWide> : multiply_row<1>,
+             result.middleCols(c, columns));
+    c += columns;
+  }
+  return result;
+}
+
+/// Some columns, one row after the other.
+void Structure::multiply(const SparseMatrix& matrix, const Eigen::Ref<const MatX>& shapes,
+                         MultiplyRow* row, Eigen::Ref<MatX> result) const {
+  constexpr int kRowsAtOnce = 1024;
+  const MatX x = shapes.transpose();
+  each_task(team_.get(), (size() + kRowsAtOnce - 1) / kRowsAtOnce, [&](int piece, int) {
+    const int from = piece * kRowsAtOnce, count = std::min(kRowsAtOnce, size() - from);
+    MatX sums(shapes.cols(), count);
+    for (int k = 0; k < count; ++k)
+      row(matrix, rows_[from + k], position_, x.data(), sums.col(k).data());
+    result.middleRows(from, count) = sums.transpose();
+  });
 }
 
 MatX Structure::embedded(const MatX& shapes) const {

@@ -86,9 +86,11 @@ class Structure {
 
  private:
   SparseMatrix part(const SparseMatrix& matrix) const;
-  MatX times(const SparseMatrix& matrix, const MatX& shapes) const {
-    return restricted(matrix * embedded(shapes));
-  }
+  MatX times(const SparseMatrix& matrix, const MatX& shapes) const;
+  using MultiplyRow = void(const SparseMatrix& matrix, int row, const std::vector<int>& position,
+                           const double* x, double* sum);
+  void multiply(const SparseMatrix& matrix, const Eigen::Ref<const MatX>& shapes, MultiplyRow* row,
+                Eigen::Ref<MatX> result) const;
   SparseFactor::Pattern pattern_for(const SparseMatrix& matrix) const;
   void find_rigid_motions();
   void hold_determinate_set();
@@ -99,6 +101,7 @@ class Structure {
   void finish(NormalModes& modes) const;
 
   const FeModel& model_;
+  std::unique_ptr<ThreadTeam> team_;  ///< null for one thread
   std::vector<int> rows_, position_;
   RowPlaces places_;
   MatX rigid_, mass_rigid_;

@@ -11,36 +11,6 @@ constexpr int kWidest = 256;  ///< columns of a block; half of its square on the
 /// Share of zeros stored in a block of `width` columns that is accepted for fewer, larger blocks.
 double accepted_zeros(int width) { return width <= 12 ? 0.6 : width <= 48 ? 0.15 : 0.05; }
 
-/// Children before parents, those of a parent side by side: position of each node.
-std::vector<int> postorder(const std::vector<int>& parent) {
-  const int n = static_cast<int>(parent.size());
-  std::vector<int> child(n, -1), sibling(n, -1), roots, order;
-  for (int k = n - 1; k >= 0; --k) {
-    if (parent[k] < 0) {
-      roots.push_back(k);
-    } else {
-      sibling[k] = child[parent[k]];
-      child[parent[k]] = k;
-    }
-  }
-  std::reverse(roots.begin(), roots.end());
-  order.reserve(n);
-  for (const int root : roots) {
-    std::vector<int> path = {root};
-    while (!path.empty()) {
-      const int k = path.back();
-      if (child[k] >= 0) {
-        path.push_back(child[k]);
-        child[k] = sibling[child[k]];
-      } else {
-        order.push_back(k);
-        path.pop_back();
-      }
-    }
-  }
-  return order;
-}
-
 /// Runs of columns of which each has the pattern of the one before without its first row; then the
 /// last child of a block joins it while few zeros are stored for that.
 class BlockFinder {

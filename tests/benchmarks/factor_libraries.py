@@ -18,7 +18,7 @@ import tempfile
 from reduce_scaling import write_model
 
 METHODS = ["ours:plain", "ours:x86-64-v3", "ours", "mumps", "mumps:ours", "order:ours", "order:metis", "order:amd",
-           "modes:spectra", "modes:arpack"]
+           "modes:ours", "modes:arpack"]
 
 
 def main():
