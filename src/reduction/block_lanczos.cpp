@@ -1,5 +1,6 @@
 #include "reduction/block_lanczos.h"
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -74,18 +75,37 @@ class BlockLanczos {
   /// block = Q · factor, Q orthonormal in M and, by one more look where little was left, orthogonal
   /// to the basis. What is there by rounding alone is dropped.
   void orthonormalize(Block& block, MatX& factor) const {
-    constexpr double kRounding = 1e-14, kSmall = 1e-6, kHalf = 0.5, kAlike = 1e-2;
+    constexpr double kRounding = 1e-14, kSmall = 1e-6, kHalf = 0.5;
     factor = MatX::Identity(block.x.cols(), block.x.cols());
+    normalize(block, factor);
+    if (block.x.cols() == 0) return;
+    const Eigen::JacobiSVD<MatX> svd(factor, Eigen::ComputeThinU);
+    const VecX& lengths = svd.singularValues();
+    const auto found = (lengths.array() > kRounding * largest_).count();
+    turn(block, factor, svd.matrixU().leftCols(found));
+    if (size_ == 0 || found == 0 || lengths(found - 1) >= kSmall * largest_) return;
+    without_basis(block.x);
     block.mx = problem_.mass(block.x);
-    Lengths lengths = keep(block, factor, kRounding * largest_);
-    if (size_ > 0 && lengths.shortest < kSmall * largest_) {
-      without_basis(block.x);
+    keep(block, factor, kHalf);
+  }
+
+  /// To these combinations of the vectors, `by` (vectors × fewer), with orthonormal columns.
+  void turn(Block& block, MatX& factor, const MatX& by) const {
+    block.x = products_.combined(block.x, by);
+    block.mx = products_.combined(block.mx, by);
+    factor = by.transpose() * factor;
+  }
+
+  /// Until the vectors are as long as each other: their products tell lengths that differ by more
+  /// than the root of the rounding error as rounding alone.
+  void normalize(Block& block, MatX& factor) const {
+    constexpr int kMost = 5;
+    constexpr double kAlike = 1e-2;
+    for (int k = 0; k < kMost; ++k) {
       block.mx = problem_.mass(block.x);
-      lengths = keep(block, factor, kHalf);
+      const Lengths lengths = keep(block, factor, 0);
+      if (lengths.shortest > kAlike * lengths.longest) return;
     }
-    if (lengths.shortest > kAlike * lengths.longest) return;
-    block.mx = problem_.mass(block.x);  // nearly dependent vectors have lost digits
-    keep(block, factor, 0);
   }
 
   struct Lengths {

@@ -74,6 +74,14 @@ TEST(BlockLanczos, FindsTheLargest) {
   }
 }
 
+/// What is left of the vectors of a block then differs by many orders of magnitude.
+TEST(BlockLanczos, FindsSmallOnesBesideLargeOnes) {
+  VecX values(300);
+  for (int k = 0; k < 300; ++k) values(k) = std::pow(10, -k / 4.);
+  const Operator a(values);
+  for (const int width : {1, 4, 8}) a.expect_found(a.largest(12, width), 12);
+}
+
 /// A slow decay needs more vectors than are kept.
 TEST(BlockLanczos, GoesOnAfterRestarts) {
   const Operator a(VecX::LinSpaced(600, 2, 1));
