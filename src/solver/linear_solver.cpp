@@ -99,12 +99,12 @@ struct LinearSolver::Klu {
   /// found off the diagonal would fill the factors beyond all measure.
   void order(int n, std::vector<int>& column_start, std::vector<int>& row_index,
              SparsePattern couplings) {
-    klu_symbolic* wide =
-        klu_analyze(n, couplings.column_start.data(), couplings.row_index.data(), &common);
+    const auto free = [this](klu_symbolic* s) { klu_free_symbolic(&s, &common); };
+    const std::unique_ptr<klu_symbolic, decltype(free)> wide(
+        klu_analyze(n, couplings.column_start.data(), couplings.row_index.data(), &common), free);
     if (!wide) return;
     expect(wide->est_flops);
     BlockOrder order = order_of(*wide);
-    klu_free_symbolic(&wide, &common);
     if (n >= 2 * kUnknownsPerThread) bisect_largest_block(couplings, expected_flops, order);
     symbolic = klu_analyze_given(n, column_start.data(), row_index.data(), order.row_of.data(),
                                  order.column_of.data(), &common);
