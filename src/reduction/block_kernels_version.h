@@ -1,6 +1,6 @@
 /// One version of the kernels: included once by each file that is compiled for a processor, which
-/// renames Eigen's namespace so that the linker cannot mix versions of its functions. Nothing else
-/// that is a template may be used here.
+/// renames Eigen's namespace so that the linker cannot mix versions of its functions. No other
+/// templates may be used here but those of its unnamed namespace.
 #pragma once
 
 #include <Eigen/Core>
