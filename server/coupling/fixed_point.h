@@ -1,8 +1,9 @@
 /// Acceleration of the interface iteration x ← S(x) of window coupling.
 #pragma once
 
-#include <Eigen/Core>
 #include <vector>
+
+#include "math/eigen_storage.h"
 
 namespace mbcosim::server {
 

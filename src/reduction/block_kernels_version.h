@@ -3,9 +3,9 @@
 /// templates may be used here but those of its unnamed namespace.
 #pragma once
 
-#include <Eigen/Core>
 #include <cmath>
 
+#include "math/eigen_storage.h"  // of the renamed namespace, too
 #include "reduction/block_kernels.h"
 
 namespace mbcosim {

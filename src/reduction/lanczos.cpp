@@ -63,16 +63,16 @@ NormalModes Structure::lanczos_modes(int count, const EigenOptions& options,
     refuse_reduction(std::to_string(count) + " normal modes of a model with " +
                          std::to_string(size()) + " unknowns are too many",
                      "at most a quarter");
-  const int width = std::min(kAtOnce, size());
-  Flexibility flexibility(*this, options.shift, progress, 6 * (count + width));
+  Flexibility flexibility(*this, options.shift, progress, 6 * (count + kAtOnce));
   const BlockLanczosProblem problem{[&](const MatX& f) { return flexibility(f); },
                                     [&](const MatX& x) {
                                       flexibility.look();
                                       return mass_times(x);
                                     },
                                     count, kInverted * options.tolerance};
-  const BlockLanczosResult found = block_lanczos(problem, start_vectors(*this, flexibility, width),
-                                                 TallProducts(*settings_.kernels, team_.get()));
+  const BlockLanczosResult found =
+      block_lanczos(problem, start_vectors(*this, flexibility, kAtOnce),
+                    TallProducts(*settings_.kernels, team_.get()));
   if (found.values.size() < count)
     throw ReductionError(ErrorKind::not_converged,
                          "only " + std::to_string(found.values.size()) + " of " +
