@@ -34,4 +34,10 @@ void keep_heap() {
 #endif
 }
 
+void trim_heap() {
+#if defined(__GLIBC__) && !defined(MBCOSIM_SANITIZED)
+  malloc_trim(0);
+#endif
+}
+
 }  // namespace mbcosim::cli

@@ -10,4 +10,7 @@ namespace mbcosim::cli {
 /// enough beforehand. Nothing happens with another allocator than glibc's.
 void keep_heap();
 
+/// Gives back what is free now, though: after a phase that took much.
+void trim_heap();
+
 }  // namespace mbcosim::cli

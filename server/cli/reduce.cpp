@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/fem_file.h"
+#include "cli/heap.h"
 #include "input/sources.h"
 #include "reduction/job.h"
 #include "threads/interrupt.h"
@@ -17,9 +18,9 @@ constexpr int kBarWidth = 30;
 
 /// A file of the user's own, relative to `folder`.
 std::string read_file(const std::string& folder, const std::string& name) {
-  const auto text = FolderSource(folder, true).read(name);
+  auto text = FolderSource(folder, true).read(name);
   if (!text) throw ReductionError(ErrorKind::io, text.error().message);
-  return *text;
+  return std::move(*text);
 }
 
 /// The job file first, then what the command line says.
@@ -76,6 +77,7 @@ ExitCode tell(const Error& error) {
 
 int reduce_model(const ReduceCommand& command) {
   InterruptGuard interrupt;
+  keep_heap();
   Error error;
   try {
     ReductionJob job = read_command(command);
@@ -84,9 +86,12 @@ int reduce_model(const ReduceCommand& command) {
     const FeModel model = load_model(job, [&](const std::string& name) {
       return read_file(folder.empty() ? "." : folder, name);
     });
+    std::string last_phase;
     PhaseBar bar(!command.quiet && ::isatty(STDERR_FILENO));
     const auto reduction =
         reduce(model, job.options, [&](const std::string& phase, double fraction) {
+          if (phase != last_phase) trim_heap();  // what reading the files or another phase took
+          last_phase = phase;
           bar.show(phase, fraction);
           return !interrupt.token()->cancelled();
         });

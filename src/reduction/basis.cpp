@@ -147,8 +147,10 @@ void BasisBuilder::add_modes(Structure& structure, BasisShapes& basis) {
                         std::to_string(modes.residual));
   basis.eigen_residual = modes.residual;
   basis.factor_nonzeros = structure.factor_nonzeros();
-  if (&structure == omitted_.get()) structure.release_factor();  // the count makes another one
-  if (options_.check_completeness && count > 0) check_count(structure, modes);
+  if (options_.check_completeness && count > 0) {
+    if (&structure == omitted_.get()) structure.release_factor();  // no longer needed
+    check_count(structure, modes);
+  }
   for (const double square : modes.squares) basis.normal_frequencies.push_back(hertz(square));
   const auto before = basis.shapes.cols();
   basis.shapes.conservativeResize(model_.rows(), before + count);

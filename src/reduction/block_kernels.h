@@ -5,21 +5,31 @@
 /// and add round differently.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
 namespace mbcosim {
 
+/// Numbers of scratch for an elimination with `columns` columns and `targets` rows.
+constexpr std::size_t elimination_scratch(int columns, int targets) {
+  constexpr std::size_t kTileRows = 24, kSquare = 32 * 33;  // of all versions the largest
+  return columns * (targets + kTileRows) + (columns / 32 + 1) * kSquare;
+}
+
 struct BlockKernels {
   const char* processor;  ///< "x86-64-v3"
 
-  /// L D Lᵀ of the square on top, in place; the rows below get L. Returns the column whose pivot is
-  /// zero or not finite, or −1.
-  int (*eliminate)(double* block, int rows, int columns, double* pivots);
-  /// update = L D Uᵀ, with U the first `targets` of the `height` rows of `lower`, (height ×
-  /// targets); `scaled`: scratch (columns × targets).
-  void (*contribute)(const double* lower, int rows, int columns, int height, int targets,
-                     const double* pivots, double* scaled, double* update);
+  /// L D Lᵀ of the square on top, in place; the rows below get L; what is above the diagonal is
+  /// undefined. Returns the column whose pivot is zero or not finite, or −1. `scratch`:
+  /// elimination_scratch(columns, columns).
+  int (*eliminate)(double* block, int rows, int columns, double* pivots, double* scratch);
+  /// Subtracts L D Uᵀ, with U the first `targets` of the `height` rows of `lower`, from another
+  /// block of `block_rows` rows: row and column r of the product belong to its row and column
+  /// place[r], ascending. `scratch`: elimination_scratch(columns, targets).
+  void (*subtract)(const double* lower, int rows, int columns, int height, int targets,
+                   const double* pivots, double* scratch, double* block, int block_rows,
+                   const int* place);
   // Substitution with a block for `sides` right sides: `own` has its `columns` rows of a matrix of
   // `order` rows.
   /// own = L⁻¹ own

@@ -3,10 +3,8 @@
 /// templates may be used here but those of its unnamed namespace.
 #pragma once
 
-#include <cmath>
-
 #include "math/eigen_storage.h"  // of the renamed namespace, too
-#include "reduction/block_kernels.h"
+#include "reduction/block_elimination_version.h"
 
 namespace mbcosim {
 
@@ -15,53 +13,6 @@ namespace {
 using Matrix = Eigen::MatrixXd;
 using Part = Eigen::Map<Matrix, 0, Eigen::OuterStride<>>;
 using ConstPart = Eigen::Map<const Matrix, 0, Eigen::OuterStride<>>;
-using ConstDiagonal = Eigen::Map<const Eigen::VectorXd>;
-
-constexpr int kPanel = 32;  ///< columns eliminated one by one
-
-/// Column after column of the square on top of `panel`.
-int eliminate_columns(Part panel, double* pivots) {
-  const int n = static_cast<int>(panel.cols());
-  for (int at = 0; at < n; ++at) {
-    const double d = panel(at, at);
-    if (d == 0 || !(std::abs(d) < HUGE_VAL)) return at;
-    pivots[at] = d;
-    for (int k = at + 1; k < n; ++k)
-      panel.col(k).tail(panel.rows() - k) -=
-          (panel(k, at) / d) * panel.col(at).tail(panel.rows() - k);
-    panel.col(at).tail(panel.rows() - at - 1) /= d;
-    panel(at, at) = 1;
-  }
-  return -1;
-}
-
-/// Panel by panel.
-int eliminate(double* block, int rows, int columns, double* pivots) {
-  Matrix scaled;
-  for (int k = 0; k < columns; k += kPanel) {
-    const int width = columns - k < kPanel ? columns - k : kPanel, after = k + width;
-    double* const corner = block + static_cast<Eigen::Index>(k) * rows;
-    const int broken = eliminate_columns(
-        Part(corner + k, rows - k, width, Eigen::OuterStride<>(rows)), pivots + k);
-    if (broken >= 0) return k + broken;
-    if (after == columns) break;
-    const ConstPart lower(corner + after, rows - after, width, Eigen::OuterStride<>(rows));
-    Part rest(block + static_cast<Eigen::Index>(after) * rows + after, rows - after,
-              columns - after, Eigen::OuterStride<>(rows));
-    scaled =
-        ConstDiagonal(pivots + k, width).asDiagonal() * lower.topRows(columns - after).transpose();
-    rest.noalias() -= lower * scaled;
-  }
-  return -1;
-}
-
-void contribute(const double* lower, int rows, int columns, int height, int targets,
-                const double* pivots, double* scaled, double* update) {
-  const ConstPart source(lower, height, columns, Eigen::OuterStride<>(rows));
-  Part right(scaled, columns, targets, Eigen::OuterStride<>(columns));
-  right = ConstDiagonal(pivots, columns).asDiagonal() * source.topRows(targets).transpose();
-  Part(update, height, targets, Eigen::OuterStride<>(height)).noalias() = source * right;
-}
 
 void solve_lower(const double* block, int rows, int columns, double* own, int order, int sides) {
   const ConstPart square(block, columns, columns, Eigen::OuterStride<>(rows));
@@ -72,19 +23,7 @@ void solve_lower(const double* block, int rows, int columns, double* own, int or
 // Eight sides at a time by hand: a general product copies the block before it uses it, which takes
 // longer than these few products. The block is read once, down its columns.
 
-#if defined(__AVX512F__)
-constexpr int kLanes = 8;  ///< numbers of a vector
-#elif defined(__AVX__)
-constexpr int kLanes = 4;
-#else
-constexpr int kLanes = 2;
-#endif
 constexpr int kSides = 8, kRowsAtOnce = 256;
-
-using Lanes = double __attribute__((vector_size(kLanes * sizeof(double)), aligned(8), may_alias));
-
-inline const Lanes& at(const double* numbers) { return *reinterpret_cast<const Lanes*>(numbers); }
-inline Lanes& at(double* numbers) { return *reinterpret_cast<Lanes*>(numbers); }
 
 /// below += the next kColumns columns times their rows of own; `own`: row by row.
 template <int kColumns>
@@ -217,7 +156,7 @@ void solve_upper(const double* block, int rows, int columns, double* own, int or
 }
 
 constexpr BlockKernels kernels(const char* processor) {
-  return {processor, eliminate, contribute, solve_lower, reach_down, reach_up, solve_upper};
+  return {processor, eliminate, subtract, solve_lower, reach_down, reach_up, solve_upper};
 }
 
 }  // namespace

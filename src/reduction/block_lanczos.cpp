@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "math/decompositions.h"
+#include "math/large_pages.h"
 
 namespace mbcosim {
 
@@ -25,7 +26,9 @@ class BlockLanczos {
         products_(products),
         kept_(problem.count + width),
         v_(rows, std::min<Eigen::Index>(rows, kept_ + std::max(kept_, 8 * width))),
-        t_(MatX::Zero(v_.cols(), v_.cols())) {}
+        t_(MatX::Zero(v_.cols(), v_.cols())) {
+    prefer_large_pages(v_.data(), v_.size() * sizeof(double));
+  }
 
   BlockLanczosResult run(MatX start) {
     Block block{std::move(start), {}};

@@ -77,7 +77,8 @@ void Factorization::run() {
 /// What `tells` also reports progress, and hears that it should stop.
 void Factorization::work(bool tells) {
   try {
-    Scratch scratch{std::vector<int>(matrix_.rows()), {}, {}};
+    Scratch scratch;
+    scratch.local.resize(matrix_.rows());
     for (;;) {
       const int position = next_++;
       if (position >= pattern_.count()) return;
@@ -92,8 +93,10 @@ void Factorization::work(bool tells) {
       if (stopped_ || position >= end_) return;
       if (tells && position > 0) tell(operations_[position - 1] / operations_.back());
       compute(s, scratch);
-      if (factor_.kernels_->eliminate(factor_.block(s), pattern_.height(s), pattern_.width(s),
-                                      factor_.pivots_.data() + pattern_.first[s]) < 0)
+      const int width = pattern_.width(s);
+      if (factor_.kernels_->eliminate(factor_.block(s), pattern_.height(s), width,
+                                      factor_.pivots_.data() + pattern_.first[s],
+                                      scratch.room(elimination_scratch(width, width))) < 0)
         continue;
       for (int end = end_; position < end && !end_.compare_exchange_weak(end, position);) {
       }
@@ -131,17 +134,12 @@ void Factorization::gather(const Reach& reach, int s, Scratch& scratch) {
   const int d = reach.from, columns = pattern_.width(d), targets = reach.end - reach.top;
   const int rows = pattern_.height(d), height = rows - reach.top;
   const int* const row = pattern_.rows_of(d) + reach.top;
-  scratch.scaled.resize(std::max(scratch.scaled.size(), std::size_t(columns) * targets));
-  scratch.update.resize(std::max(scratch.update.size(), std::size_t(height) * targets));
-  factor_.kernels_->contribute(factor_.block(d) + reach.top, rows, columns, height, targets,
-                               factor_.pivots_.data() + pattern_.first[d], scratch.scaled.data(),
-                               scratch.update.data());
-  for (int c = 0; c < targets; ++c) {
-    double* const column =
-        factor_.block(s) + std::size_t(row[c] - pattern_.first[s]) * pattern_.height(s);
-    const double* const update = scratch.update.data() + std::size_t(c) * height;
-    for (int r = c; r < height; ++r) column[scratch.local[row[r]]] -= update[r];
-  }
+  scratch.place.resize(height);
+  for (int k = 0; k < height; ++k) scratch.place[k] = scratch.local[row[k]];
+  factor_.kernels_->subtract(factor_.block(d) + reach.top, rows, columns, height, targets,
+                             factor_.pivots_.data() + pattern_.first[d],
+                             scratch.room(elimination_scratch(columns, targets)), factor_.block(s),
+                             pattern_.height(s), scratch.place.data());
 }
 
 }  // namespace mbcosim

@@ -22,7 +22,12 @@ class Factorization {
   };
   struct Scratch {
     std::vector<int> local;  ///< of rows, in the block
-    std::vector<double> scaled, update;
+    std::vector<int> place;  ///< in the block, of the rows of one that reaches it
+    std::vector<double> numbers;
+    double* room(std::size_t count) {
+      if (numbers.size() < count) numbers.resize(count);
+      return numbers.data();
+    }
   };
   void find_reaches();
   void find_order();

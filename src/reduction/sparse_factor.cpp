@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "math/large_pages.h"
 #include "reduction/factorization.h"
 
 namespace mbcosim {
@@ -19,7 +20,7 @@ constexpr int kSolvedAtOnce = 32;      ///< right sides
 }  // namespace
 
 SparseFactor::SparseFactor(const SparseMatrix& matrix, const RowPlaces& places,
-                           const FactorSettings& settings, Pattern pattern)
+                           const FactorSettings& settings, Pattern pattern, FactorMemory memory)
     : pattern_(pattern ? std::move(pattern)
                        : std::make_shared<const Supernodes>(find_supernodes(matrix, places))),
       plan_(*pattern_),
@@ -29,7 +30,12 @@ SparseFactor::SparseFactor(const SparseMatrix& matrix, const RowPlaces& places,
     from_.push_back(size_);
     size_ += std::size_t(pattern_->height(s)) * pattern_->width(s);
   }
-  values_.reset(new double[size_]);  // each block is cleared when its turn comes
+  if (memory.size < size_) {
+    memory.numbers.reset();  // before more is taken
+    memory.numbers.reset(new double[size_]);
+    prefer_large_pages(memory.numbers.get(), size_ * sizeof(double));
+  }
+  values_ = std::move(memory.numbers);  // each block is cleared when its turn comes
   if (const int threads = std::min(settings.threads, pattern_->count()); threads > 1)
     team_ = std::make_unique<ThreadTeam>(threads);
   Factorization(matrix, settings, *this).run();
@@ -49,8 +55,9 @@ SparseFactor SparseFactor::positive(const SparseMatrix& matrix, const RowPlaces&
 }
 
 int SparseFactor::count_negative(const SparseMatrix& matrix, const RowPlaces& places,
-                                 const FactorSettings& settings, Pattern pattern) {
-  const SparseFactor f(matrix, places, settings, std::move(pattern));
+                                 const FactorSettings& settings, Pattern pattern,
+                                 FactorMemory memory) {
+  const SparseFactor f(matrix, places, settings, std::move(pattern), std::move(memory));
   return f.broken_ >= 0 ? -1 : static_cast<int>((f.pivots_.array() < 0).count());
 }
 

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "reduction/block_kernels.h"
@@ -20,6 +21,12 @@ struct FactorSettings {
   ReductionProgress progress;  ///< called on the caller's thread
 };
 
+/// Memory of a factor that is no longer needed, for the next one.
+struct FactorMemory {
+  std::unique_ptr<double[]> numbers;
+  std::size_t size = 0;
+};
+
 /// Kept as dense blocks of columns with the same pattern (supernodes); the numbers are found from
 /// the leaves of the elimination tree to its roots, each block gathering the contributions of those
 /// that reach it in a fixed order: the same matrix gives the same bits.
@@ -33,19 +40,22 @@ class SparseFactor {
                                const std::function<std::string(int)>& row_text,
                                const FactorSettings& settings = {}, Pattern pattern = nullptr);
   /// Number of eigenvalues of the symmetric `matrix` below zero; -1 when the factorization breaks
-  /// down.
+  /// down. `memory` is used where it is large enough.
   static int count_negative(const SparseMatrix& matrix, const RowPlaces& places,
-                            const FactorSettings& settings = {}, Pattern pattern = nullptr);
+                            const FactorSettings& settings = {}, Pattern pattern = nullptr,
+                            FactorMemory memory = {});
 
   /// A⁻¹ f; by one caller at a time.
   MatX solve(const MatX& f) const;
   long nonzeros() const { return static_cast<long>(size_); }
   const Pattern& pattern() const { return pattern_; }
+  /// Gives its numbers away; nothing can be solved any more.
+  FactorMemory release() { return {std::move(values_), std::exchange(size_, 0)}; }
 
  private:
   friend class Factorization;
   SparseFactor(const SparseMatrix& matrix, const RowPlaces& places, const FactorSettings& settings,
-               Pattern pattern);
+               Pattern pattern, FactorMemory memory = {});
   double* block(int s) { return values_.get() + from_[s]; }
   const double* block(int s) const { return values_.get() + from_[s]; }
 

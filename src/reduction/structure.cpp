@@ -27,15 +27,16 @@ SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<int>& rows,
   std::vector<int> place(matrix.rows(), -1);
   for (std::size_t k = 0; k < rows.size(); ++k) place[rows[k]] = static_cast<int>(k);
   SparseMatrix part(rows.size(), columns.size());
-  std::vector<int> counts(columns.size(), 0);
-  for (std::size_t c = 0; c < columns.size(); ++c)
+  Eigen::Index count = 0;
+  for (const int column : columns)
+    for (SparseMatrix::InnerIterator it(matrix, column); it; ++it) count += place[it.row()] >= 0;
+  part.reserve(count);
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    part.startVec(c);
     for (SparseMatrix::InnerIterator it(matrix, columns[c]); it; ++it)
-      counts[c] += place[it.row()] >= 0;
-  part.reserve(counts);
-  for (std::size_t c = 0; c < columns.size(); ++c)
-    for (SparseMatrix::InnerIterator it(matrix, columns[c]); it; ++it)
-      if (place[it.row()] >= 0) part.insert(place[it.row()], c) = it.value();
-  part.makeCompressed();
+      if (place[it.row()] >= 0) part.insertBack(place[it.row()], c) = it.value();
+  }
+  part.finalize();
   return part;
 }
 
@@ -177,7 +178,19 @@ SparseMatrix Structure::part(const SparseMatrix& matrix) const {
 }
 
 SparseMatrix Structure::shifted(double sigma) const {
-  return part(model_.stiffness - sigma * model_.mass);
+  SparseMatrix matrix = stiffness();
+  for (int c = 0; c < size(); ++c) {
+    SparseMatrix::InnerIterator place(matrix, c);
+    for (SparseMatrix::InnerIterator it(model_.mass, rows_[c]); it; ++it) {
+      const int row = position_[it.row()];
+      if (row < 0) continue;
+      while (place && place.row() < row) ++place;
+      if (!place || place.row() != row)  // the mass has entries of its own
+        return part(model_.stiffness - sigma * model_.mass);
+      place.valueRef() -= sigma * it.value();
+    }
+  }
+  return matrix;
 }
 
 /// The pattern of the last factor if it serves `matrix`, too: K − σ M has no more entries than K.
@@ -185,9 +198,10 @@ SparseFactor::Pattern Structure::pattern_for(const SparseMatrix& matrix) const {
   return matrix.nonZeros() == pattern_entries_ ? pattern_ : nullptr;
 }
 
-int Structure::count_modes_below(double square) const {
+int Structure::count_modes_below(double square) {
   const SparseMatrix matrix = shifted(square);
-  const int below = SparseFactor::count_negative(matrix, places_, settings_, pattern_for(matrix));
+  const int below = SparseFactor::count_negative(matrix, places_, settings_, pattern_for(matrix),
+                                                 std::exchange(released_, {}));
   return below < 0 ? below : below - rigid_count();
 }
 

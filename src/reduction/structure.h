@@ -76,8 +76,12 @@ class Structure {
   /// The lowest elastic modes.
   NormalModes modes(int count, const EigenOptions& options, const ReductionProgress& progress);
   /// Number of elastic modes with ω² below `square`.
-  int count_modes_below(double square) const;
-  void release_factor() { factor_.reset(); }  ///< gives its memory back; made anew when needed
+  int count_modes_below(double square);
+  /// Leaves the memory of the factor to the next count; it is made anew when it is needed.
+  void release_factor() {
+    if (factor_) released_ = factor_->release();
+    factor_.reset();
+  }
   long factor_nonzeros() const { return factor_ ? factor_->nonzeros() : 0; }
 
   /// Shapes of this structure as shapes of the model: held rows are zero.
@@ -109,6 +113,7 @@ class Structure {
   std::vector<int> kept_;  ///< rows outside the determinate set
   FactorSettings settings_;
   std::unique_ptr<SparseFactor> factor_;
+  FactorMemory released_;
   SparseFactor::Pattern pattern_;     ///< of the last factor
   Eigen::Index pattern_entries_ = 0;  ///< of the matrix that it belongs to
 };

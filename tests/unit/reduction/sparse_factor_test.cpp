@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <limits>
+#include <memory>
 #include <numeric>
 #include <random>
 
@@ -195,6 +198,24 @@ TEST(SparseFactor, APatternServesASecondMatrix) {
   const VecX f = VecX::LinSpaced(s.matrix.rows(), -1, 2);
   const MatX x = SparseFactor::positive(twice, s.places, row_text, {}, first.pattern()).solve(f);
   EXPECT_TRUE((x.array() == 0.5 * first.solve(f).array()).all());  // powers of two round nothing
+}
+
+/// What the memory held before does not matter.
+TEST(SparseFactor, TheMemoryOfAFactorServesACount) {
+  const Solid s = solid(7, 6, 5, 3);
+  SparseMatrix one(s.matrix.rows(), s.matrix.rows());
+  one.setIdentity();
+  const VecX squares = Eigen::SelfAdjointEigenSolver<MatX>(MatX(s.matrix)).eigenvalues();
+  const SparseMatrix shifted = s.matrix - 0.5 * (squares(9) + squares(10)) * one;
+  SparseFactor first = SparseFactor::positive(s.matrix, s.places, row_text);
+  const auto pattern = first.pattern();
+  FactorMemory memory = first.release();
+  EXPECT_EQ(first.nonzeros(), 0);
+  ASSERT_GT(memory.size, 0u);
+  std::fill_n(memory.numbers.get(), memory.size, std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(SparseFactor::count_negative(shifted, s.places, {}, pattern, std::move(memory)), 10);
+  FactorMemory small{std::make_unique<double[]>(3), 3};
+  EXPECT_EQ(SparseFactor::count_negative(shifted, s.places, {}, pattern, std::move(small)), 10);
 }
 
 TEST(SparseFactor, NamesTheSameRowWithAnyNumberOfThreads) {
