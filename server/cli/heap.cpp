@@ -5,31 +5,46 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <climits>
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 
 namespace mbcosim::cli {
 
+#if defined(__GLIBC__) && !defined(MBCOSIM_SANITIZED)
+namespace {
+
+constexpr std::size_t kLeast = std::size_t{1} << 30;
+
+/// Addresses that the heap has at once; pages come when they are used.
+std::size_t addresses() {
+  const auto pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGESIZE);
+  return pages > 0 && size > 0 ? std::max(kLeast, std::size_t(pages) / 2 * std::size_t(size))
+                               : kLeast;
+}
+
+bool is_unlimited(int what) {
+  rlimit limit;
+  return getrlimit(static_cast<__rlimit_resource>(what), &limit) == 0 &&
+         limit.rlim_cur == RLIM_INFINITY;
+}
+
+}  // namespace
+#endif
+
 void keep_heap() {
 #if defined(__GLIBC__) && !defined(MBCOSIM_SANITIZED)
-  constexpr int kLargest = 32 << 20;  // of what can lie in the heap, as glibc allows
-  mallopt(M_MMAP_THRESHOLD, kLargest);
-  mallopt(M_TRIM_THRESHOLD, INT_MAX);
-  const auto is_unlimited = [](auto what) {
-    rlimit limit;
-    return getrlimit(what, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
-  };
+  constexpr int kNever = -1, kStep = 32 << 20;
+  mallopt(M_TRIM_THRESHOLD, kNever);
+  mallopt(M_TOP_PAD, kStep);
   if (!is_unlimited(RLIMIT_AS) || !is_unlimited(RLIMIT_DATA)) return;
-  constexpr int kAddresses = 1 << 30;  // that the heap has at once; pages come when they are used
+  mallopt(M_MMAP_MAX, 0);
   constexpr std::uintptr_t kPage = 2 << 20;
-  mallopt(M_TOP_PAD, kAddresses);
-  void* volatile beyond = std::malloc(kLargest / 2);  // more than is left: the heap grows
-  mallopt(M_TOP_PAD, kLargest);
+  void* volatile beyond = std::malloc(addresses());  // more than is left: the heap grows
   const auto begin = (reinterpret_cast<std::uintptr_t>(beyond) + kPage - 1) / kPage * kPage;
   const auto end = reinterpret_cast<std::uintptr_t>(sbrk(0)) / kPage * kPage;
   std::free(beyond);
-  if (begin < end && end - begin <= 2 * static_cast<std::uintptr_t>(kAddresses))
+  if (begin < end && end - begin <= 2 * addresses())
     (void)madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 #endif
 }

@@ -201,7 +201,7 @@ class ModelBuilder {
   int allocate_memory(int count, double initial = 0);  ///< offset in State::memory
   int allocate_sums(int count);                        ///< offset in Scratch::sums
   void require_scratch(int count);                     ///< of one element: Scratch::local
-  void set_memory(int offset, double value) { model_->initial_memory[offset] = value; }
+  void set_memory(int offset, double value);           ///< at the start
   void on_step(std::shared_ptr<const StepListener> listener) {
     model_->step_listeners.push_back(std::move(listener));
   }
@@ -217,7 +217,7 @@ class ModelBuilder {
   static inline char type_tag = 0;
   std::unique_ptr<Model> model_;
   std::map<const void*, ElementSet*> sets_;
-  State input_state_;
+  State input_state_;  ///< its memory is the model's initial one
   EvalContext input_context_;
 };
 

@@ -63,13 +63,16 @@ void ModelBuilder::require_scratch(int count) {
 int ModelBuilder::allocate_memory(int count, double initial) {
   const int offset = static_cast<int>(model_->initial_memory.size());
   model_->initial_memory.resize(offset + count, initial);
+  input_state_.memory.resize(offset + count, initial);
   return offset;
+}
+
+void ModelBuilder::set_memory(int offset, double value) {
+  model_->initial_memory[offset] = input_state_.memory[offset] = value;
 }
 
 const EvalContext& ModelBuilder::input_context() {
   input_state_.time = model_->initial_value.initial_time;
-  if (input_state_.memory.size() != model_->initial_memory.size())
-    input_state_.memory = model_->initial_memory;
   if (input_state_.variables.size() != model_->initial_variables.size())
     input_state_.variables = model_->initial_variables;
   input_context_ = EvalContext{};

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "math/types.h"
 #include "solver/linear_solver.h"
 #include "sparse_family.h"
 
