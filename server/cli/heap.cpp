@@ -34,8 +34,9 @@ bool is_unlimited(int what) {
 
 void keep_heap() {
 #if defined(__GLIBC__) && !defined(MBCOSIM_SANITIZED)
-  constexpr int kNever = -1, kStep = 32 << 20;
+  constexpr int kNever = -1, kStep = 32 << 20;  // the latter also the largest threshold of glibc
   mallopt(M_TRIM_THRESHOLD, kNever);
+  mallopt(M_MMAP_THRESHOLD, kStep);
   mallopt(M_TOP_PAD, kStep);
   if (!is_unlimited(RLIMIT_AS) || !is_unlimited(RLIMIT_DATA)) return;
   mallopt(M_MMAP_MAX, 0);

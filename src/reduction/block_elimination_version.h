@@ -28,7 +28,7 @@ using Lanes = double __attribute__((vector_size(kLanes * sizeof(double)), aligne
 inline const Lanes& at(const double* numbers) { return *reinterpret_cast<const Lanes*>(numbers); }
 inline Lanes& at(double* numbers) { return *reinterpret_cast<Lanes*>(numbers); }
 
-/// Where rows (and, above, columns) of a product belong in a block.
+/// Where a product belongs in a block: row and column r at its row and column place_of(r).
 struct Target {
   double* block;
   std::ptrdiff_t rows;  ///< of the block

@@ -118,7 +118,7 @@ class Structure {
   Eigen::Index pattern_entries_ = 0;  ///< of the matrix that it belongs to
 };
 
-/// The rows and columns of `matrix` that are listed.
+/// The rows (ascending) and columns of `matrix` that are listed.
 SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<int>& rows,
                        const std::vector<int>& columns);
 

@@ -26,11 +26,9 @@ COLUMNS = {"first": ("first [ms]", 1e3), "factor": ("factor [ms]", 1e3), "solve"
 
 
 def model_of(text, folder):
-    """The program's argument: a number of beams, or a deck of a grid."""
-    if "x" not in text:
-        return text
+    """The program's argument: a deck."""
     path = folder / f"{text}.mbd"
-    path.write_text(beam_models.grid(tuple(map(int, text.split("x"))), 3))
+    path.write_text(beam_models.grid(tuple(map(int, text.split("x"))), 3) if "x" in text else beam_models.cantilever(int(text), 3))
     return str(path)
 
 

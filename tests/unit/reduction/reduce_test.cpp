@@ -219,6 +219,22 @@ TEST(ReducePlate, LanczosFindsDoubleModes) {  // a square plate has pairs of equ
   EXPECT_LT((gram - MatX::Identity(8, 8)).norm(), 1e-8);
 }
 
+/// Also where the mass couples rows that the stiffness does not.
+TEST(Structure, ShiftedMatricesHaveTheEntriesOfBoth) {
+  const FeModel square = plate(1, 1, 5, 4, true);
+  FeModel coupled = square;
+  const int last = coupled.rows() - 1;
+  coupled.mass.coeffRef(0, last) = coupled.mass.coeffRef(last, 0) = 1e-3;
+  for (const FeModel* model : std::initializer_list<const FeModel*>{&square, &coupled}) {
+    std::vector<char> held(model->rows(), 0);
+    held[3] = held[7] = 1;
+    const Structure structure(*model, held);
+    const double sigma = 250;
+    const MatX expected = MatX(structure.stiffness()) - sigma * MatX(structure.mass());
+    EXPECT_LT((MatX(structure.shifted(sigma)) - expected).norm(), 1e-14 * expected.norm());
+  }
+}
+
 /// K − σ M is regular for a body that can move, too; the modes are the same.
 TEST(ReducePlate, ShiftedEigensolutionFindsTheSameModes) {
   for (const bool supported : {true, false}) {
