@@ -1,13 +1,14 @@
 #include "cli/heap.h"
 
 #include <malloc.h>
-#include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdint>
+#include <cstddef>
 #include <cstdlib>
+
+#include "math/large_pages.h"
 
 namespace mbcosim::cli {
 
@@ -40,13 +41,13 @@ void keep_heap() {
   mallopt(M_TOP_PAD, kStep);
   if (!is_unlimited(RLIMIT_AS) || !is_unlimited(RLIMIT_DATA)) return;
   mallopt(M_MMAP_MAX, 0);
-  constexpr std::uintptr_t kPage = 2 << 20;
-  void* volatile beyond = std::malloc(addresses());  // more than is left: the heap grows
-  const auto begin = (reinterpret_cast<std::uintptr_t>(beyond) + kPage - 1) / kPage * kPage;
-  const auto end = reinterpret_cast<std::uintptr_t>(sbrk(0)) / kPage * kPage;
+  const std::size_t wanted = addresses();
+  char* volatile beyond = static_cast<char*>(std::malloc(wanted));  // more than is left: it grows
+  char* const begin = beyond;
+  const char* const end = static_cast<char*>(sbrk(0));
   std::free(beyond);
-  if (begin < end && end - begin <= 2 * addresses())
-    (void)madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+  if (begin && begin < end && static_cast<std::size_t>(end - begin) <= 2 * wanted)
+    prefer_large_pages(begin, end - begin);
 #endif
 }
 
