@@ -143,6 +143,7 @@ std::uintmax_t size_of(const std::string& file) {
 }  // namespace
 
 int run(const RunOptions& options) {
+  begin_heap();
   InterruptGuard interrupt;
   const bool is_long = size_of(options.deck) > kLongDeck;
   if (is_long) keep_heap();

@@ -329,7 +329,7 @@ void LinearSolver::solve(double* rhs) {
     case Klu::Current::none:
       break;
     case Klu::Current::kept:
-      k.kept->solve(rhs);
+      k.kept->solve(rhs, team_);
       break;
     case Klu::Current::fresh:
       klu_solve(k.symbolic, k.fresh, n_, 1, rhs, &k.common);

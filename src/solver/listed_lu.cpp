@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace mbcosim {
 
@@ -72,6 +73,32 @@ struct ListedLu::Builder {
   });
   std::vector<int> part_of = parts_of_blocks();
 
+  /// In which order sums of a substitution are taken.
+  struct Substitution {
+    Lines upper;                    ///< columns by row of U, the last one first
+    std::vector<int> column_above;  ///< by number above the diagonal blocks
+    Lines above;                    ///< such numbers by row, those of later blocks first
+
+    explicit Substitution(const Builder& builder)
+        : upper(lines_of(builder.lu.n_,
+                         [&f = builder.factors](auto use) {
+                           for (int k = static_cast<int>(f.row_of.size()) - 1; k >= 0; --k)
+                             for (int p = f.upper_start[k]; p + 1 < f.upper_start[k + 1]; ++p)
+                               use(f.upper_row[p], k);
+                         })),
+          column_above(builder.matrix.above_row.size()),
+          above(lines_of(builder.lu.n_, [&](auto use) {
+            const std::vector<int>& block = builder.factors.block_start;
+            const MatrixPlaces& matrix = builder.matrix;
+            for (std::size_t b = block.size() - 1; b-- > 0;)
+              for (int k = block[b]; k < block[b + 1]; ++k)
+                for (int p = matrix.above_start[k]; p < matrix.above_start[k + 1]; ++p) {
+                  column_above[p] = k;
+                  use(matrix.above_row[p], p);
+                }
+          })) {}
+  };
+
   std::vector<int> parts_of_blocks() const {
     std::vector<int> found(lu.slots_ / kBlock);
     for (int k = 0; k < lu.n_; ++k) found[lu.slot_[k] / kBlock] = parts.of_column[k];
@@ -137,44 +164,109 @@ struct ListedLu::Builder {
     return program;
   }
 
-  EliminationProgram substitution() const {
-    EliminationProgram program(lu.numbers_.size());
-    const Lines upper = lines_of(lu.n_, [&](auto use) {  // columns by row of U, the last one first
-      for (int k = lu.n_ - 1; k >= 0; --k)
-        for (int p = factors.upper_start[k]; p + 1 < factors.upper_start[k + 1]; ++p)
-          use(factors.upper_row[p], k);
-    });
-    std::vector<int> column_above(matrix.above_row.size());
-    const Lines above =
-        lines_of(lu.n_, [&](auto use) {  // numbers by row, those of later blocks first
-          for (std::size_t b = factors.block_start.size() - 1; b-- > 0;)
-            for (int k = factors.block_start[b]; k < factors.block_start[b + 1]; ++k)
-              for (int p = matrix.above_start[k]; p < matrix.above_start[k + 1]; ++p) {
-                column_above[p] = k;
-                use(matrix.above_row[p], p);
-              }
-        });
-    const auto x = [&](int k) { return lu.x_ + lu.slot_[k]; };
-    for (int k = 0; k < lu.n_; ++k) program.set(x(k), factors.row_of[k], matrix.inverse_scale[k]);
+  std::vector<Stage> substitution() const {
+    const Substitution order(*this);
+    std::vector<Stage> stages;
+    std::optional<EliminationProgram> alone;  // diagonal blocks that one thread does
+    const auto close = [&] {
+      if (!alone) return;
+      alone->finish();
+      stages.emplace_back().push_back(*std::exchange(alone, std::nullopt));
+    };
+    const auto all = [](int) { return true; };
     for (std::size_t b = factors.block_start.size() - 1; b-- > 0;) {
       const int begin = factors.block_start[b], end = factors.block_start[b + 1];
-      for (int k = begin; k < end; ++k) {
-        program.begin(x(k), 1);
-        for (int p = above.start[k]; p < above.start[k + 1]; ++p)
-          program.subtract_product(lu.above_ + above.of[p], x(column_above[above.of[p]]));
-        program.end();
+      if (!is_shared(begin, end)) {
+        if (!alone) alone.emplace(lu.numbers_.size());
+        eliminate(order, begin, end, all, *alone);
+        substitute(order, begin, end, all, *alone);
+        continue;
       }
-      for (int k = begin; k < end;) k = eliminate_block(k, end, program);
-      for (int k = end - 1; k >= begin; --k) {
-        program.begin(x(k), 1);
-        for (int p = upper.start[k]; p < upper.start[k + 1]; ++p)
-          program.subtract_product(place(lu.rows_, k, upper.of[p]), x(upper.of[p]));
-        program.end(lu.pivot_place(k));
-      }
+      close();
+      const std::vector<int> owner = owners(begin, end);
+      const auto each_part = [&](auto of_part) {
+        Stage& stage = stages.emplace_back();
+        for (int part = 0; part < parts.count; ++part) {
+          of_part(part, stage.emplace_back(lu.numbers_.size()));
+          stage.back().finish();
+        }
+      };
+      each_part([&](int part, EliminationProgram& program) {
+        eliminate(
+            order, begin, end, [&](int k) { return owner[k - begin] == part; }, program);
+      });
+      alone.emplace(lu.numbers_.size());
+      eliminate(
+          order, begin, end, [&](int k) { return owner[k - begin] == parts.count; }, *alone);
+      substitute(
+          order, begin, end, [&](int k) { return parts.of_column[k] == parts.count; }, *alone);
+      close();
+      each_part([&](int part, EliminationProgram& program) {
+        substitute(
+            order, begin, end, [&](int k) { return parts.of_column[k] == part; }, program);
+      });
     }
-    program.finish();
-    return program;
+    close();
+    return stages;
   }
+
+  /// Does a diagonal block have columns of several parts, beside the last?
+  bool is_shared(int begin, int end) const {
+    std::optional<int> seen;
+    for (int k = begin; k < end; ++k) {
+      const int part = parts.of_column[k];
+      if (part == parts.count) continue;
+      if (seen && *seen != part) return true;
+      seen = part;
+    }
+    return false;
+  }
+
+  /// Of each position of a diagonal block the part that can take it in x := L⁻¹ x: its own, but the
+  /// last one where it needs positions of others. Those of one block of slots go together.
+  std::vector<int> owners(int begin, int end) const {
+    std::vector<int> owner(end - begin);
+    for (int k = begin, after; k < end; k = after) {
+      int part = parts.of_column[k];
+      for (after = k; after < end && lu.slot_[after] / kBlock == lu.slot_[k] / kBlock; ++after)
+        for (int p = lower.start[after]; p < lower.start[after + 1] && lower.of[p] < k; ++p)
+          if (owner[lower.of[p] - begin] != part) part = parts.count;
+      std::fill(owner.begin() + (k - begin), owner.begin() + (after - begin), part);
+    }
+    return owner;
+  }
+
+  /// Of a diagonal block the positions that are `wanted`: their right sides, minus what lies above
+  /// the diagonal blocks times what has been solved for, then L⁻¹.
+  template <class Wanted>
+  void eliminate(const Substitution& order, int begin, int end, Wanted wanted,
+                 EliminationProgram& program) const {
+    for (int k = begin; k < end; ++k) {
+      if (!wanted(k)) continue;
+      program.set(x(k), factors.row_of[k], matrix.inverse_scale[k]);
+      program.begin(x(k), 1);
+      for (int p = order.above.start[k]; p < order.above.start[k + 1]; ++p)
+        program.subtract_product(lu.above_ + order.above.of[p],
+                                 x(order.column_above[order.above.of[p]]));
+      program.end();
+    }
+    for (int k = begin; k < end;) k = wanted(k) ? eliminate_block(k, end, program) : k + 1;
+  }
+
+  /// x := U⁻¹ x.
+  template <class Wanted>
+  void substitute(const Substitution& order, int begin, int end, Wanted wanted,
+                  EliminationProgram& program) const {
+    for (int k = end - 1; k >= begin; --k) {
+      if (!wanted(k)) continue;
+      program.begin(x(k), 1);
+      for (int p = order.upper.start[k]; p < order.upper.start[k + 1]; ++p)
+        program.subtract_product(place(lu.rows_, k, order.upper.of[p]), x(order.upper.of[p]));
+      program.end(lu.pivot_place(k));
+    }
+  }
+
+  std::size_t x(int k) const { return lu.x_ + lu.slot_[k]; }
 
   /// Of x := L⁻¹ x the positions of one block from k on; returns the one after them.
   int eliminate_block(int k, int end, EliminationProgram& program) const {
@@ -273,8 +365,10 @@ bool ListedLu::factor(const double* values, ThreadTeam* team) {
   return true;
 }
 
-void ListedLu::solve(double* b) {
-  substitution_->run(version_, b, numbers_.data());
+void ListedLu::solve(double* b, ThreadTeam* team) {
+  for (const Stage& stage : substitution_)
+    each_task(team, static_cast<int>(stage.size()),
+              [&](int program, int) { stage[program].run(version_, b, numbers_.data()); });
   for (int k = 0; k < n_; ++k) b[column_of_[k]] = numbers_[x_ + slot_[k]];
 }
 
@@ -289,8 +383,10 @@ bool ListedLu::pivots_dominate(double bound) const {
 }
 
 std::size_t ListedLu::bytes() const {
-  std::size_t lists = substitution_->bytes();
+  std::size_t lists = 0;
   for (const EliminationProgram& program : elimination_) lists += program.bytes();
+  for (const Stage& stage : substitution_)
+    for (const EliminationProgram& program : stage) lists += program.bytes();
   return lists + sizeof(double) * numbers_.size() + sizeof(std::uint32_t) * upper_place_.size() +
          2 * sizeof(int) * (rows_.block.size() + columns_.block.size());
 }

@@ -12,7 +12,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "math/thread_team.h"
@@ -36,7 +35,7 @@ class ListedLu {
   /// False when a pivot vanishes or is not a number.
   bool factor(const double* values, ThreadTeam* team);
   /// Solves in place.
-  void solve(double* b);
+  void solve(double* b, ThreadTeam* team);
 
   double pivot(int k) const { return numbers_[pivot_place(k)]; }
   /// Number p of U, counted by columns without the pivots.
@@ -58,6 +57,7 @@ class ListedLu {
     std::size_t place(int q) const { return first_place + static_cast<std::size_t>(kBlock) * q; }
     int find(int line, int of) const;  ///< −1: it has none
   };
+  using Stage = std::vector<EliminationProgram>;  ///< at the same time
   struct Builder;
 
   std::size_t pivot_place(int k) const { return rows_.place(rows_.start[k]) + slot_[k] % kBlock; }
@@ -75,7 +75,7 @@ class ListedLu {
   std::size_t x_ = 0;      ///< of what is solved for, by slot
   std::vector<double> numbers_;
   std::vector<EliminationProgram> elimination_;  ///< by part
-  std::optional<EliminationProgram> substitution_;
+  std::vector<Stage> substitution_;              ///< one after the other
   const PanelVersion& version_;
 };
 

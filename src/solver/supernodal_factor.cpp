@@ -205,8 +205,8 @@ bool SupernodalLu::factor(const double* values, const Watch& watch, ThreadTeam* 
                               : factor_part(parts_, values, watch);
 }
 
-void SupernodalLu::solve(double* b) {
-  if (listed_) return listed_->solve(b);
+void SupernodalLu::solve(double* b, ThreadTeam* team) {
+  if (listed_) return listed_->solve(b, team);
   double* const x = work_[0].column.data();
   for (int k = 0; k < n_; ++k) x[k] = b[row_of_[k]] * matrix_.inverse_scale[k];
   for (std::size_t block = block_start_.size() - 1; block-- > 0;) {

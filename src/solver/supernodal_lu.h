@@ -56,8 +56,9 @@ class SupernodalLu {
   /// False when a pivot vanishes or is not a number: there are no factors then. Throws Stopped, and
   /// there are none, either. A team shares the work.
   bool factor(const double* values, const Watch& watch = Watch(), ThreadTeam* team = nullptr);
-  /// Solves A x = b in place with the last factorization.
-  void solve(double* b);
+  /// Solves A x = b in place with the last factorization. A team shares the work where the matrix
+  /// is factored by lists.
+  void solve(double* b, ThreadTeam* team = nullptr);
 
   double pivot_ratio() const;  ///< smallest over largest pivot
   /// Whether no number of L is beyond the bound: whether each pivot is at least its reciprocal

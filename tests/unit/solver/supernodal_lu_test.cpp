@@ -162,7 +162,7 @@ TEST(SupernodalLu, SeveralThreadsGiveTheBitsOfOne) {
           for (int k = 0; k < 2; ++k) {
             EXPECT_TRUE(lu.factor(Sparse(matrices[k]).values.data(), Watch(), each));
             Vector x = Vector::LinSpaced(n, 1, 2);
-            lu.solve(x.data());
+            lu.solve(x.data(), each);
             EXPECT_LT((matrices[k] * x - Vector::LinSpaced(n, 1, 2)).norm(), 1e-12);
             both.segment(k * n, n) = x;
           }
@@ -182,6 +182,62 @@ TEST(SupernodalLu, SeveralThreadsGiveTheBitsOfOne) {
       }
       for (const Vector& x : solutions) EXPECT_EQ(x, solutions[0]) << half;
     }
+}
+
+/// Diagonal blocks that fall into parts, with small ones around them, coupled above. The first
+/// columns stand alone, but rows of both halves need them.
+Dense two_bands_in_blocks(int half, int band, const std::vector<int>& block_start,
+                          std::mt19937& generator) {
+  std::uniform_real_distribution<double> number(-1, 1);
+  const int n = block_start.back(), few = 3;
+  Dense a = Dense::Zero(n, n);
+  for (std::size_t b = 0; b + 1 < block_start.size(); ++b) {
+    const int begin = block_start[b], count = block_start[b + 1] - begin;
+    Dense block = Dense::Identity(count, count) * 3 * band;
+    if (count > 1) {
+      block = two_bands(half, band, generator);
+      block.topRightCorner(few, count - few).setZero();
+      block.bottomLeftCorner(count - few, few).setZero();
+      for (const int row : {half / 2, half + half / 2}) block(row, few - 1) = number(generator);
+    }
+    a.block(begin, begin, count, count) = block;
+    for (int k = 0; k < count; k += 3)
+      for (int i = k % 5; i < begin; i += 11) a(i, begin + k) = number(generator);
+  }
+  return a;
+}
+
+TEST(SupernodalLu, SeveralThreadsSolveCoupledBlocks) {
+  std::mt19937 generator(3);
+  const int half = 150, band = 4, size = 2 * half + band;
+  const std::vector<int> alone{0, 1, 2, size + 2, size + 3},
+      two{0, 1, 2, size + 2, size + 3, 2 * size + 3, 2 * size + 4};  // one for each thread
+  for (const std::vector<int>& block_start : {alone, two}) {
+    const Dense reference = two_bands_in_blocks(half, band, block_start, generator);
+    const Dense matrix = two_bands_in_blocks(half, band, block_start, generator);
+    const int n = static_cast<int>(reference.rows());
+    std::vector<int> order(n);
+    std::iota(order.begin(), order.end(), 0);
+    const Sparse sparse(reference), values(matrix);
+    const FactorPattern pattern = factor_pattern(reference, order, order, block_start);
+    const Vector b = Vector::LinSpaced(n, 1, 2);
+    std::vector<Vector> solutions;
+    for (const std::size_t listed : {LuOptions::kMostListed, std::size_t{0}})
+      for (const int threads : {1, 2, 4}) {
+        ThreadTeam team(threads);
+        SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(), pattern,
+                        {.listed = listed, .threads = threads});
+        EXPECT_EQ(lu.parts() > 1, threads > 1);
+        for (ThreadTeam* each : {&team, static_cast<ThreadTeam*>(nullptr)}) {
+          ASSERT_TRUE(lu.factor(values.values.data(), Watch(), each));
+          Vector x = b;
+          lu.solve(x.data(), each);
+          solutions.push_back(x);
+        }
+      }
+    EXPECT_LT((matrix * solutions[0] - b).norm(), 1e-12 * b.norm());
+    for (const Vector& x : solutions) EXPECT_EQ(x, solutions[0]) << block_start.size();
+  }
 }
 
 /// Matrices of one pattern whose columns do not fall into parts: threads follow each other.
