@@ -21,7 +21,7 @@ struct Panel {
   int below;        ///< their count
 };
 
-constexpr int kMostColumns = 8;  ///< side by side, in any version
+constexpr int kMostColumns = 16;  ///< side by side, in any version
 
 /// For one number of columns side by side: X is row by row, `columns` numbers each.
 struct PanelKernels {
@@ -49,13 +49,20 @@ struct NumberProduct {
 };
 
 struct PanelVersion {
-  const char* processor;      ///< "x86-64-v3"
-  PanelKernels narrow, wide;  ///< for a few columns, and for all that come together
-  int lanes;                  ///< numbers in a register
+  static constexpr int kWidths = 3;
+
+  const char* processor;          ///< "x86-64-v3"
+  PanelKernels kernels[kWidths];  ///< for more and more columns; no more come together than last
+  int lanes;                      ///< numbers in a register
   /// All of a list one after the other, each with as many products as it has.
   void (*update)(const NumberUpdate* updates, std::size_t count, const NumberProduct* products,
                  double* numbers);
-  const PanelKernels& of(int columns) const { return columns > narrow.columns ? wide : narrow; }
+  const PanelKernels& of(int columns) const {
+    const PanelKernels* each = kernels;
+    while (each->columns < columns) ++each;
+    return *each;
+  }
+  int most_columns() const { return kernels[kWidths - 1].columns; }
   /// Of a product of a panel with so many columns, in operations on registers: those on X, and what
   /// goes with them.
   double cost_of(int columns) const {

@@ -6,7 +6,7 @@ namespace mbcosim {
 
 #ifdef __AVX2__
 namespace {
-constexpr PanelVersion kVersion{"x86-64-v3", kernels<4>(), kernels<8>(), 4, update};
+constexpr PanelVersion kVersion{"x86-64-v3", {kernels<2>(), kernels<4>(), kernels<8>()}, 4, update};
 }
 const PanelVersion* const kPanelVersionV3 = &kVersion;
 #else

@@ -6,7 +6,8 @@ namespace mbcosim {
 
 #ifdef __AVX512F__
 namespace {
-constexpr PanelVersion kVersion{"x86-64-v4", kernels<4>(), kernels<8>(), 8, update};
+constexpr PanelVersion kVersion{
+    "x86-64-v4", {kernels<4>(), kernels<8>(), kernels<16>()}, 8, update};
 }
 const PanelVersion* const kPanelVersionV4 = &kVersion;
 #else

@@ -53,7 +53,7 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
   pivots_ = upper_ + upper_row_.size();
   above_ = pivots_ + n_;
   const auto of_group =
-      static_cast<std::size_t>(has_wide_groups() ? n_ : 0) * version_.wide.columns;
+      static_cast<std::size_t>(has_wide_groups() ? n_ : 0) * version_.most_columns();
   // Each who shares has numbers of its own: all together no more than the factors have.
   const auto most = static_cast<int>(std::min<std::size_t>(
       options.threads, std::max<std::size_t>(1, count / std::max<std::size_t>(1, n_ + of_group))));
@@ -129,6 +129,7 @@ void SupernodalLu::find_groups(const FactorPattern& factors) {
 /// Of a supernode's columns: as to make the sum of all groups' costs least. A group costs what its
 /// kernels take for all segments that any of its columns needs. `row`: n for all supernodes.
 void SupernodalLu::choose_groups(int s, const Segments& of_columns, std::vector<int>& row) {
+  constexpr double kPass = 4;  // over the group for each of its columns: loads and stores, too
   const int first = first_[s], end = first_[s + 1], below = rows_start_[s + 1] - rows_start_[s];
   std::vector<double> least(end - first + 1, HUGE_VAL);  // of the columns before each
   std::vector<int> begin(end - first + 1, first);        // of the last group before each
@@ -136,7 +137,7 @@ void SupernodalLu::choose_groups(int s, const Segments& of_columns, std::vector<
   least[0] = 0;
   for (int k = first; k < end; ++k) {
     double products = 0;
-    for (int last = k + 1; last <= std::min(end, k + version_.wide.columns); ++last) {
+    for (int last = k + 1; last <= std::min(end, k + version_.most_columns()); ++last) {
       for (int q = of_columns.start[last - 1]; q < of_columns.start[last]; ++q) {
         const Segment segment = of_columns.all[q].before(k);
         int& known = row[segment.supernode];
@@ -148,7 +149,7 @@ void SupernodalLu::choose_groups(int s, const Segments& of_columns, std::vector<
         products += products_of(segment);
         known = segment.first;
       }
-      const double own = static_cast<double>(last - k) * (end - k + below);
+      const double own = kPass * static_cast<double>(last - k) * (end - k + below);
       const double cost = least[k - first] + version_.cost_of(last - k) * (products + own);
       if (cost >= least[last - first]) continue;
       least[last - first] = cost;
