@@ -31,6 +31,7 @@ struct PanelKernels {
   /// The column of L below row `first` := column `place` of X / pivot; X −= it times `u` (columns).
   void (*finish)(const Panel& panel, double* column, int place, double pivot, const double* u,
                  double* x);
+  void (*clear)(const int* rows, int count, double* x);  ///< rows of X
 };
 
 /// Of an array F, to numbers from `target` on: minus products, then divided where it `divides`.

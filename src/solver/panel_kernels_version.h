@@ -89,6 +89,12 @@ inline void finish(const Panel& panel, double* column, int place, double pivot, 
   for (int i = 0; i < panel.below; ++i) take(x + std::ptrdiff_t{panel.rows[i]} * Columns);
 }
 
+template <int Columns>
+inline void clear(const int* rows, int count, double* x) {
+  for (int i = 0; i < count; ++i)
+    Eigen::Map<Numbers<Columns>>(x + std::ptrdiff_t{rows[i]} * Columns) = Numbers<Columns>::Zero();
+}
+
 /// With the next products; returns those after them.
 template <int Count, bool Divides>
 inline const NumberProduct* take_update(const NumberUpdate& update, const NumberProduct* product,
@@ -131,7 +137,7 @@ inline void update(const NumberUpdate* updates, std::size_t count, const NumberP
 
 template <int Columns>
 constexpr PanelKernels kernels() {
-  return {Columns, eliminate<Columns>, finish<Columns>};
+  return {Columns, eliminate<Columns>, finish<Columns>, clear<Columns>};
 }
 
 }  // namespace

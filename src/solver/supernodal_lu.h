@@ -97,7 +97,7 @@ class SupernodalLu {
     double* x;  ///< row by row, kernels.columns numbers each; zero between the uses
 
     double* row(int k) const { return x + std::ptrdiff_t{k} * kernels.columns; }
-    void clear(int k) const { std::fill_n(row(k), kernels.columns, 0.0); }
+    void clear(int from, int to) const { std::fill(row(from), row(to), 0.0); }
   };
   /// Of one thread; zero between calls.
   struct Work {

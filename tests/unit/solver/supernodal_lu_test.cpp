@@ -69,7 +69,7 @@ TEST(SupernodalLu, JoinsColumnsWithTheSameRowsBelow) {
 /// Groups of columns are another order of the same operations, for every version of the kernels and
 /// for one column at a time.
 TEST(SupernodalLu, ColumnsTogetherHaveTheBitsOfEachAlone) {
-  const PanelKernels one{1, nullptr, nullptr};
+  const PanelKernels one{1, nullptr, nullptr, nullptr};
   const PanelVersion alone{"", {one, one, one}, 1, nullptr};
   for (unsigned seed = 1; seed <= 10; ++seed)
     for (const double density : {.03, .1, .4, 1.}) {
