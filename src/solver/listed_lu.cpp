@@ -210,8 +210,10 @@ struct ListedLu::Builder {
     return stages;
   }
 
-  /// Does a diagonal block have columns of several parts, beside the last?
+  /// Is a diagonal block a large one that has columns of several parts, beside the last?
   bool is_shared(int begin, int end) const {
+    constexpr int kLargest = 4;  // may be so many
+    if ((end - begin) * std::int64_t{kLargest} < lu.n_) return false;
     std::optional<int> seen;
     for (int k = begin; k < end; ++k) {
       const int part = parts.of_column[k];
