@@ -7,7 +7,7 @@ namespace mbcosim {
 
 namespace {
 
-// Two: one register of two numbers; six: three of them, the unknowns of a node.
+// One, two and three registers of two numbers; six are the unknowns of a node.
 constexpr PanelVersion kPlain{"plain", {kernels<2>(), kernels<4>(), kernels<6>()}, 2, update};
 
 std::vector<const PanelVersion*> versions_for_this_processor() {

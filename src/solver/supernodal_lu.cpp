@@ -53,7 +53,7 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
   pivots_ = upper_ + upper_row_.size();
   above_ = pivots_ + n_;
   const auto of_group =
-      static_cast<std::size_t>(has_wide_groups() ? n_ : 0) * version_.most_columns();
+      static_cast<std::size_t>(n_) * static_cast<std::size_t>(columns_of_groups());
   // Each who shares has numbers of its own: all together no more than the factors have.
   const auto most = static_cast<int>(std::min<std::size_t>(
       options.threads, std::max<std::size_t>(1, count / std::max<std::size_t>(1, n_ + of_group))));
@@ -185,7 +185,13 @@ void SupernodalLu::unite_segments(const Segments& of_columns) {
   }
 }
 
-bool SupernodalLu::has_wide_groups() const { return static_cast<int>(group_start_.size()) <= n_; }
+/// Side by side in the widest group; 0: all groups are single columns.
+int SupernodalLu::columns_of_groups() const {
+  int most = 1;
+  for (std::size_t g = 0; g + 1 < group_start_.size(); ++g)
+    most = std::max(most, group_start_[g + 1] - group_start_[g]);
+  return most > 1 ? version_.of(most).columns : 0;
+}
 
 /// Calls with the columns that those of group g need, its own among them.
 template <class Use>

@@ -137,7 +137,7 @@ class SupernodalLu {
   bool factor_in_order(const double* values, const Watch& watch, ThreadTeam& team);
   std::size_t count_below(int k) const;  ///< numbers of L in column k
   bool is_listed(std::size_t count, std::size_t most) const;
-  bool has_wide_groups() const;
+  int columns_of_groups() const;
   void make_lists(const FactorPattern& factors);
   double pivot(int k) const { return listed_ ? listed_->pivot(k) : pivots_[k]; }
   double upper(int p) const { return listed_ ? listed_->upper(p) : upper_[p]; }
