@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <vector>
 
@@ -13,38 +12,57 @@ namespace mbcosim {
 
 /// What has to be done with an array of numbers F, for every matrix of one pattern:
 ///
-///   F[target] = value · scale                                    first
-///   F[target + i] = (F[target + i] − Σ F[factor + i] F[other]) / F[pivot]    update by update
+///   F[target + i] = 0
+///   F[target] = value · scale
+///   F[target + i] = (F[target + i] − Σ F[factor + i] F[other]) / F[pivot]
+///   F[target] = (F[target] − Σ Σ_i F[factor + i] F[other + i]) / F[pivot]    the last i first
 ///
 /// An update is of one number or of a block: kBlock numbers, the first of them at a multiple of
-/// kBlock. Updates are given in an order in which they could be done and come, level by level, in
-/// one in which neighbours do not wait for each other; sums keep theirs, so that the results are
-/// the same bits. What has been stored as a block is loaded as one: a processor can hand it on
-/// before it is in the cache.
+/// kBlock. Operations are given in an order in which they could be done, and are cut into windows
+/// whose numbers and lists fit into the caches of a core. In each window zeros come first, then
+/// values, then updates: level by level, so that neighbours do not wait for each other. Sums keep
+/// their order, so that the results are the same bits. What has been stored as a block is loaded as
+/// one: a processor can hand it on before it is in the cache.
 class EliminationProgram {
  public:
   static constexpr int kBlock = NumberUpdate::kBlock;
+  static constexpr std::size_t kWindow = 1 << 14;  ///< products: of 2^12 to 2^16 the fastest
 
-  explicit EliminationProgram(std::size_t numbers) {
+  explicit EliminationProgram(std::size_t numbers, std::size_t window = kWindow) : window_(window) {
     draft_.emplace().uses.resize(numbers / kBlock + 1);
   }
-  /// `value`: which of those that `run` gets.
-  void set(std::size_t target, int value, double scale);
+  void clear(std::size_t target, std::size_t count);
+  /// `value`, `scale`: which of those that `run` gets.
+  void set(std::size_t target, int value, int scale);
   /// Begins an update of `count` numbers, 1 or kBlock.
   void begin(std::size_t target, int count);
   void subtract_product(std::size_t factor, std::size_t other);
+  /// Of two blocks; in an update of one number, after which it has no other products than these.
+  void subtract_dot(std::size_t factor, std::size_t other);
   void end(std::optional<std::size_t> pivot = {});
-  void finish();  ///< after the last operation
+  void require(std::size_t pivot);  ///< as it is now neither zero nor infinite nor not a number
+  void finish();                    ///< after the last operation
 
-  /// Divisions by zero give numbers that are not finite.
-  void run(const PanelVersion& version, const double* values, double* numbers) const;
+  /// False when a number is not as it is required: the rest has not been done then. Divisions by
+  /// zero give numbers that are not finite.
+  bool run(const PanelVersion& version, const double* values, const double* scales,
+           double* numbers) const;
   std::size_t bytes() const;
 
  private:
+  struct Zeros {
+    std::uint32_t target, count;
+  };
   struct Entry {
-    int value;
+    int value, scale;
     std::uint32_t target;
-    double scale;
+  };
+  struct Window {
+    std::vector<Zeros> zeros;
+    std::vector<Entry> entries;
+    std::vector<NumberUpdate> updates;
+    std::vector<NumberProduct> products;
+    std::vector<std::uint32_t> required;
   };
   /// Levels of a block's numbers.
   struct Uses {
@@ -56,21 +74,24 @@ class EliminationProgram {
     std::size_t first;  ///< product
     int level;
   };
-  /// Until `finish`. What grows is not moved: for a large matrix that would take most of the time.
+  /// Until `finish`: the window that is open.
   struct Draft {
     std::vector<Uses> uses;  ///< by block
-    std::deque<Entry> entries;
-    std::deque<Update> updates;
-    std::deque<NumberProduct> products;
+    std::vector<Zeros> zeros;
+    std::vector<Entry> entries;
+    std::vector<Update> updates;
+    std::vector<NumberProduct> products;
+    std::vector<std::uint32_t> required;
+    int first_level = 0, end_level = 0;
     Update open{};  ///< the update that has begun
   };
   Uses& uses_of(std::size_t place) { return draft_->uses[place / kBlock]; }
   bool extends_last(const Update& update) const;
   void mark(const Update& update);
+  void close_window();
 
-  std::vector<Entry> entries_;
-  std::vector<NumberUpdate> updates_;
-  std::vector<NumberProduct> products_;
+  std::size_t window_;
+  std::vector<Window> windows_;
   std::optional<Draft> draft_;
 };
 

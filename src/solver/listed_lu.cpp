@@ -1,6 +1,7 @@
 #include "solver/listed_lu.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -72,19 +73,22 @@ struct ListedLu::Builder {
     each_lower(factors, [&](int k, int row) { use(row, k); });
   });
   std::vector<int> part_of = parts_of_blocks();
+  std::vector<int> column_of{};  ///< by entry of the matrix
+  Lines entries = entries_of_lines();
 
   /// In which order sums of a substitution are taken.
   struct Substitution {
-    Lines upper;                    ///< columns by row of U, the last one first
+    Lines upper;                    ///< columns by row of U, those of its block, the last first
     std::vector<int> column_above;  ///< by number above the diagonal blocks
     Lines above;                    ///< such numbers by row, those of later blocks first
 
     explicit Substitution(const Builder& builder)
         : upper(lines_of(builder.lu.n_,
-                         [&f = builder.factors](auto use) {
-                           for (int k = static_cast<int>(f.row_of.size()) - 1; k >= 0; --k)
+                         [&f = builder.factors, &lu = builder.lu](auto use) {
+                           for (int k = lu.n_ - 1; k >= 0; --k)
                              for (int p = f.upper_start[k]; p + 1 < f.upper_start[k + 1]; ++p)
-                               use(f.upper_row[p], k);
+                               if (lu.block_of(f.upper_row[p]) == lu.block_of(k))
+                                 use(f.upper_row[p], k);
                          })),
           column_above(builder.matrix.above_row.size()),
           above(lines_of(builder.lu.n_, [&](auto use) {
@@ -101,7 +105,7 @@ struct ListedLu::Builder {
 
   std::vector<int> parts_of_blocks() const {
     std::vector<int> found(lu.slots_ / kBlock);
-    for (int k = 0; k < lu.n_; ++k) found[lu.slot_[k] / kBlock] = parts.of_column[k];
+    for (int k = 0; k < lu.n_; ++k) found[lu.block_of(k)] = parts.of_column[k];
     return found;
   }
   std::size_t place(const Blocks& blocks, int line, int position) const {
@@ -127,22 +131,56 @@ struct ListedLu::Builder {
     }
   }
 
-  void set_column(int k, EliminationProgram& program) const {
-    int above = matrix.above_start[k];
-    for (int p = matrix.entry_start[k]; p < matrix.entry_start[k + 1]; ++p) {
-      const int row = matrix.entry_row[p];
-      const bool is_above = above < matrix.above_start[k + 1] && matrix.above_row[above] == row;
-      program.set(is_above   ? lu.above_ + above++
-                  : row <= k ? place(lu.rows_, row, k)
-                             : place(lu.columns_, k, row),
-                  matrix.value_start[k] + p - matrix.entry_start[k], matrix.inverse_scale[row]);
-    }
+  /// Calls use(p) for each entry p of the matrix's column k, or above(p, number among all those)
+  /// where it is above its diagonal block.
+  template <class Use, class Above>
+  void each_entry(int k, Use use, Above above) const {
+    int next = matrix.above_start[k];
+    for (int p = matrix.entry_start[k]; p < matrix.entry_start[k + 1]; ++p)
+      if (next < matrix.above_start[k + 1] && matrix.above_row[next] == matrix.entry_row[p])
+        above(p, next++);
+      else
+        use(p);
+  }
+  Lines entries_of_lines() {
+    column_of.resize(matrix.entry_row.size());
+    return lines_of(lu.n_, [&](auto use) {
+      for (int k = 0; k < lu.n_; ++k)
+        each_entry(
+            k,
+            [&](int p) {
+              column_of[p] = k;
+              use(std::min(k, matrix.entry_row[p]), p);
+            },
+            [](int, int) {});
+    });
   }
 
-  /// A part's own are its columns of L and what U has in them.
+  /// Of the matrix what row k of U and column k of L begin with, and what lies above the diagonal
+  /// block in column k.
+  void set(int k, EliminationProgram& program) const {
+    for (const Blocks* blocks : {&lu.rows_, &lu.columns_}) {
+      const std::size_t first = blocks->place(blocks->start[k]);
+      program.clear(first, blocks->place(blocks->start[k + 1]) - first);
+    }
+    const auto set_entry = [&](std::size_t target, int p, int column) {
+      program.set(target, matrix.value_start[column] + p - matrix.entry_start[column],
+                  matrix.entry_row[p]);
+    };
+    for (int q = entries.start[k]; q < entries.start[k + 1]; ++q) {
+      const int p = entries.of[q], row = matrix.entry_row[p], column = column_of[p];
+      set_entry(row <= column ? place(lu.rows_, row, column) : place(lu.columns_, column, row), p,
+                column);
+    }
+    each_entry(
+        k, [](int) {}, [&](int p, int above) { set_entry(lu.above_ + above, p, k); });
+  }
+
+  /// A part's own are its columns of L and what U has in them. It begins its rows of U.
   EliminationProgram elimination(int part) const {
     EliminationProgram program(lu.numbers_.size());
     for (int k = 0; k < lu.n_; ++k) {
+      if (parts.of_column[k] == part) set(k, program);
       update(
           lu.rows_, k, lu.slot_[k], {},
           [&](auto use) {
@@ -151,7 +189,7 @@ struct ListedLu::Builder {
           },
           [&](int block) { return part_of[block] == part; }, program);
       if (parts.of_column[k] != part) continue;
-      set_column(k, program);
+      program.require(lu.pivot_place(k));
       update(
           lu.columns_, k, lu.slot_[k] + 1, lu.pivot_place(k),
           [&](auto use) {
@@ -230,7 +268,7 @@ struct ListedLu::Builder {
     std::vector<int> owner(end - begin);
     for (int k = begin, after; k < end; k = after) {
       int part = parts.of_column[k];
-      for (after = k; after < end && lu.slot_[after] / kBlock == lu.slot_[k] / kBlock; ++after)
+      for (after = k; after < end && lu.block_of(after) == lu.block_of(k); ++after)
         for (int p = lower.start[after]; p < lower.start[after + 1] && lower.of[p] < k; ++p)
           if (owner[lower.of[p] - begin] != part) part = parts.count;
       std::fill(owner.begin() + (k - begin), owner.begin() + (after - begin), part);
@@ -245,7 +283,10 @@ struct ListedLu::Builder {
                  EliminationProgram& program) const {
     for (int k = begin; k < end; ++k) {
       if (!wanted(k)) continue;
-      program.set(x(k), factors.row_of[k], matrix.inverse_scale[k]);
+      program.set(x(k), factors.row_of[k], k);
+      const int after = k + 1 < lu.n_ ? lu.slot_[k + 1] : lu.slots_;
+      if (const int padding = after - lu.slot_[k] - 1; padding > 0)
+        program.clear(x(k) + 1, static_cast<std::size_t>(padding));
       program.begin(x(k), 1);
       for (int p = order.above.start[k]; p < order.above.start[k + 1]; ++p)
         program.subtract_product(lu.above_ + order.above.of[p],
@@ -255,12 +296,18 @@ struct ListedLu::Builder {
     for (int k = begin; k < end;) k = wanted(k) ? eliminate_block(k, end, program) : k + 1;
   }
 
-  /// x := U⁻¹ x.
+  /// x := U⁻¹ x: a row of U by its blocks, what is padding there being zero, then by its numbers
+  /// beside the diagonal.
   template <class Wanted>
   void substitute(const Substitution& order, int begin, int end, Wanted wanted,
                   EliminationProgram& program) const {
     for (int k = end - 1; k >= begin; --k) {
       if (!wanted(k)) continue;
+      program.begin(x(k), 1);
+      for (int q = lu.rows_.start[k + 1]; --q > lu.rows_.start[k];)
+        program.subtract_dot(lu.rows_.place(q),
+                             lu.x_ + static_cast<std::size_t>(kBlock) * lu.rows_.block[q]);
+      program.end();
       program.begin(x(k), 1);
       for (int p = order.upper.start[k]; p < order.upper.start[k + 1]; ++p)
         program.subtract_product(place(lu.rows_, k, order.upper.of[p]), x(order.upper.of[p]));
@@ -272,11 +319,11 @@ struct ListedLu::Builder {
 
   /// Of x := L⁻¹ x the positions of one block from k on; returns the one after them.
   int eliminate_block(int k, int end, EliminationProgram& program) const {
-    const int block = lu.slot_[k] / kBlock;
+    const int block = lu.block_of(k);
     int after = k;
     std::vector<int>& needed = columns_;
     needed.clear();
-    for (; after < end && lu.slot_[after] / kBlock == block; ++after)
+    for (; after < end && lu.block_of(after) == block; ++after)
       for (int p = lower.start[after]; p < lower.start[after + 1] && lower.of[p] < k; ++p)
         needed.push_back(lower.of[p]);
     std::sort(needed.begin(), needed.end());
@@ -304,6 +351,7 @@ ListedLu::ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
     : n_(static_cast<int>(factors.row_of.size())),
       column_of_(factors.column_of),
       slot_(n_),
+      scales_(matrix.inverse_scale),
       version_(version) {
   choose_slots(factors, supernodes, parts);
   place_factors(factors);
@@ -355,22 +403,21 @@ void ListedLu::place_factors(const FactorPattern& factors) {
 }
 
 bool ListedLu::factor(const double* values, ThreadTeam* team) {
-  each_piece(team, static_cast<int>(above_), [&](int first, int last) {
-    std::fill(numbers_.begin() + first, numbers_.begin() + last, 0.0);
-  });
   const int parts = static_cast<int>(elimination_.size()) - 1;
-  each_task(team, parts,
-            [&](int part, int) { elimination_[part].run(version_, values, numbers_.data()); });
-  elimination_[parts].run(version_, values, numbers_.data());
-  for (int k = 0; k < n_; ++k)
-    if (!std::isfinite(pivot(k)) || pivot(k) == 0) return false;
-  return true;
+  std::atomic<bool> fine{true};
+  const auto run = [&](int part, int) {
+    if (!elimination_[part].run(version_, values, scales_.data(), numbers_.data())) fine = false;
+  };
+  each_task(team, parts, run);
+  if (fine) run(parts, 0);
+  return fine;
 }
 
 void ListedLu::solve(double* b, ThreadTeam* team) {
   for (const Stage& stage : substitution_)
-    each_task(team, static_cast<int>(stage.size()),
-              [&](int program, int) { stage[program].run(version_, b, numbers_.data()); });
+    each_task(team, static_cast<int>(stage.size()), [&](int program, int) {
+      (void)stage[program].run(version_, b, scales_.data(), numbers_.data());
+    });
   for (int k = 0; k < n_; ++k) b[column_of_[k]] = numbers_[x_ + slot_[k]];
 }
 

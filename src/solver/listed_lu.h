@@ -28,11 +28,11 @@ class ListedLu {
     std::vector<int> of_column;  ///< (n)
     int count = 0;               ///< but for the last one
   };
-  /// `supernodes`: first column of each, then n.
+  /// `matrix`: as long as this. `supernodes`: first column of each, then n.
   ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
            const std::vector<int>& supernodes, const Parts& parts, const PanelVersion& version);
 
-  /// False when a pivot vanishes or is not a number.
+  /// False when a pivot vanishes or is not a number: there are no factors then.
   bool factor(const double* values, ThreadTeam* team);
   /// Solves in place.
   void solve(double* b, ThreadTeam* team);
@@ -60,6 +60,7 @@ class ListedLu {
   using Stage = std::vector<EliminationProgram>;  ///< at the same time
   struct Builder;
 
+  int block_of(int k) const { return slot_[k] / kBlock; }
   std::size_t pivot_place(int k) const { return rows_.place(rows_.start[k]) + slot_[k] % kBlock; }
   void choose_slots(const FactorPattern& factors, const std::vector<int>& supernodes,
                     const Parts& parts);
@@ -71,8 +72,9 @@ class ListedLu {
   Blocks rows_;            ///< of U, with the pivots
   Blocks columns_;         ///< of L
   std::vector<std::uint32_t> upper_place_;
-  std::size_t above_ = 0;  ///< first place of what lies above the diagonal blocks
-  std::size_t x_ = 0;      ///< of what is solved for, by slot
+  std::size_t above_ = 0;              ///< first place of what lies above the diagonal blocks
+  std::size_t x_ = 0;                  ///< of what is solved for, by slot
+  const std::vector<double>& scales_;  ///< of the matrix's places
   std::vector<double> numbers_;
   std::vector<EliminationProgram> elimination_;  ///< by part
   std::vector<Stage> substitution_;              ///< one after the other

@@ -35,16 +35,18 @@ struct PanelKernels {
 };
 
 /// Of an array F, to numbers from `target` on: minus products, then divided where it `divides`.
+/// `dots`: one number, minus products of blocks.
 struct NumberUpdate {
   static constexpr int kBlock = 4;          ///< numbers that are loaded and stored together
   static constexpr int kMost = 3 * kBlock;  ///< in one update
 
   std::uint32_t target, pivot, products;
   std::uint16_t count;  ///< 1 or some blocks
-  bool divides;
+  bool divides, dots;
 };
 
-/// F[factor], and its neighbours for those of the target, times F[other].
+/// F[factor], and its neighbours for those of the target, times F[other]; of a dot F[factor + i]
+/// F[other + i] for a block, the last i first.
 struct NumberProduct {
   std::uint32_t factor, other;
 };

@@ -116,6 +116,23 @@ inline const NumberProduct* take_update(const NumberUpdate& update, const Number
   return product;
 }
 
+/// With the next products of blocks; returns those after them.
+template <bool Divides>
+inline const NumberProduct* take_dots(const NumberUpdate& update, const NumberProduct* product,
+                                      double* f) {
+  constexpr int kBlock = NumberUpdate::kBlock;
+  using Block = Numbers<kBlock>;
+  double of = f[update.target];
+  for (const NumberProduct* const end = product + update.products; product != end; ++product) {
+    const Block products =
+        Eigen::Map<const Block>(f + product->factor) * Eigen::Map<const Block>(f + product->other);
+    for (int i = kBlock; i-- > 0;) of -= products[i];
+  }
+  if constexpr (Divides) of /= f[update.pivot];
+  f[update.target] = of;
+  return product;
+}
+
 inline void update(const NumberUpdate* updates, std::size_t count, const NumberProduct* product,
                    double* f) {
   constexpr int kBlock = NumberUpdate::kBlock;
@@ -124,7 +141,10 @@ inline void update(const NumberUpdate* updates, std::size_t count, const NumberP
                            : take_update<Count, false>(each, product, f);
   };
   for (const NumberUpdate* const end = updates + count; updates != end; ++updates) {
-    if (updates->count == 1)
+    if (updates->dots)
+      product = updates->divides ? take_dots<true>(*updates, product, f)
+                                 : take_dots<false>(*updates, product, f);
+    else if (updates->count == 1)
       take.template operator()<1>(*updates);
     else if (updates->count == kBlock)
       take.template operator()<kBlock>(*updates);

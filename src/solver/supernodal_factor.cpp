@@ -10,11 +10,10 @@ namespace mbcosim {
 
 namespace {
 
-/// Two lines of the cache, as most columns of a matrix have.
-void prefetch(const double* numbers) {
+void prefetch([[maybe_unused]] const double* numbers, [[maybe_unused]] int count) {
 #if defined(__GNUC__)
-  __builtin_prefetch(numbers);
-  __builtin_prefetch(numbers + 8);
+  constexpr int kLine = 8;  // of the cache
+  for (int i = 0; i < count; i += kLine) __builtin_prefetch(numbers + i);
 #endif
 }
 
@@ -78,7 +77,9 @@ bool SupernodalLu::finish_column(int k, int supernode, double* x) {
 /// from.
 void SupernodalLu::scatter(int k, const double* values, double* x, std::ptrdiff_t stride) {
   constexpr int kAhead = 8;  // columns; where they lie depends on the order
-  if (k + kAhead < n_) prefetch(values + matrix_.value_start[k + kAhead]);
+  if (const int next = k + kAhead; next < n_)
+    prefetch(values + matrix_.value_start[next],
+             matrix_.entry_start[next + 1] - matrix_.entry_start[next]);
   const double* value = values + matrix_.value_start[k];
   for (int p = matrix_.entry_start[k]; p < matrix_.entry_start[k + 1]; ++p, ++value)
     x[matrix_.entry_row[p] * stride] = *value * matrix_.inverse_scale[matrix_.entry_row[p]] + 0.0;

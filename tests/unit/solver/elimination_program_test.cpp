@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <optional>
 #include <random>
 #include <vector>
@@ -15,8 +16,8 @@ constexpr int kBlock = EliminationProgram::kBlock;
 /// The same operations for a program and one after the other.
 class Twice {
  public:
-  explicit Twice(std::vector<double> numbers)
-      : program(numbers.size()), expected(std::move(numbers)) {}
+  explicit Twice(std::vector<double> numbers, std::size_t window = EliminationProgram::kWindow)
+      : program(numbers.size(), window), expected(std::move(numbers)) {}
 
   void update(std::size_t target, int count, const std::vector<NumberProduct>& products,
               std::optional<std::size_t> pivot) {
@@ -30,12 +31,24 @@ class Twice {
     for (int i = 0; pivot && i < count; ++i) expected[target + i] /= expected[*pivot];
   }
 
+  void subtract_dots(std::size_t target, const std::vector<NumberProduct>& blocks,
+                     std::optional<std::size_t> pivot) {
+    program.begin(target, 1);
+    for (const NumberProduct& each : blocks) {
+      program.subtract_dot(each.factor, each.other);
+      for (int i = kBlock; i-- > 0;)
+        expected[target] -= expected[each.factor + i] * expected[each.other + i];
+    }
+    program.end(pivot);
+    if (pivot) expected[target] /= expected[*pivot];
+  }
+
   EliminationProgram program;
   std::vector<double> expected;
 };
 
-/// Any operations on a few numbers, so that nearly all depend on each other. A target is not among
-/// what it gets.
+/// Any operations on a few numbers, so that nearly all depend on each other, in windows of one to
+/// seven products. A target is not among what it gets.
 TEST(EliminationProgram, GivesTheBitsOfOneOperationAfterTheOther) {
   for (unsigned seed = 1; seed <= 200; ++seed) {
     std::mt19937 generator(seed);
@@ -52,8 +65,9 @@ TEST(EliminationProgram, GivesTheBitsOfOneOperationAfterTheOther) {
       scales[k] = number();
       begin[k] = values[k] * scales[k];
     }
-    Twice twice(begin);
-    for (std::size_t k = 0; k < size; ++k) twice.program.set(k, static_cast<int>(k), scales[k]);
+    Twice twice(begin, 1 + seed % 7);
+    for (std::size_t k = 0; k < size; ++k)
+      twice.program.set(k, static_cast<int>(k), static_cast<int>(k));
     for (int k = 0; k < 12; ++k) {  // more would leave the range of numbers
       // neighbours that get the same from neighbours, singly, or a number alone
       const int of = below(blocks), run = below(3) == 0 ? 1 + below(3) : 1;
@@ -67,6 +81,14 @@ TEST(EliminationProgram, GivesTheBitsOfOneOperationAfterTheOther) {
       }
       std::optional<std::size_t> pivot;
       if (below(3) == 0) pivot = other_block() * kBlock + below(kBlock);
+      if (alone && below(2) == 0) {
+        for (NumberProduct& each : products) {
+          each.factor -= each.factor % kBlock;
+          each.other -= each.other % kBlock;
+        }
+        twice.subtract_dots(static_cast<std::size_t>(of * kBlock + below(kBlock)), products, pivot);
+        continue;
+      }
       if (alone) {
         twice.update(static_cast<std::size_t>(of * kBlock + below(kBlock)), 1, products, pivot);
         continue;
@@ -93,7 +115,7 @@ TEST(EliminationProgram, GivesTheBitsOfOneOperationAfterTheOther) {
     twice.program.finish();
     for (const PanelVersion* version : panel_versions()) {
       std::vector<double> found(size, 0.0);
-      twice.program.run(*version, values.data(), found.data());
+      EXPECT_TRUE(twice.program.run(*version, values.data(), scales.data(), found.data()));
       EXPECT_EQ(found, twice.expected) << version->processor << ", " << seed;
     }
   }
@@ -110,7 +132,12 @@ TEST(EliminationProgram, TakesNeighboursTogether) {
     twice.program.finish();
     return twice.program.bytes();
   };
-  EXPECT_EQ(bytes(2 * kBlock), 2 * bytes(kBlock));
+  const std::size_t none = [] {
+    EliminationProgram program(64);
+    program.finish();
+    return program.bytes();
+  }();
+  EXPECT_EQ(bytes(2 * kBlock) - none, 2 * (bytes(kBlock) - none));
 }
 
 TEST(EliminationProgram, OfNothingDoesNothing) {
@@ -118,10 +145,61 @@ TEST(EliminationProgram, OfNothingDoesNothing) {
   program.begin(0, 1);
   program.end();
   program.finish();
-  EXPECT_EQ(program.bytes(), 0u);
   std::vector<double> numbers{3, 4};
-  program.run(*panel_versions().back(), nullptr, numbers.data());
+  EXPECT_TRUE(program.run(*panel_versions().back(), nullptr, nullptr, numbers.data()));
   EXPECT_EQ(numbers, (std::vector<double>{3, 4}));
+}
+
+/// Numbers 0 to 3 become 0, 10, 0, 0 minus 2 times 4 to 7: in each run, whatever the last one left,
+/// and also where the next window has already begun.
+TEST(EliminationProgram, ClearsWhatItBeginsWith) {
+  EliminationProgram program(12, 1);
+  for (const std::size_t block : {0, 8}) {
+    program.clear(block, 1);
+    program.clear(block + 1, 3);  // both are cleared together
+    program.set(block + 1, 0, 0);
+    program.begin(block, kBlock);
+    program.subtract_product(4, 6);
+    program.end();
+  }
+  program.finish();
+  std::vector<double> numbers{9, 9, 9, 9, 1, 3, 2, 0, 9, 9, 9, 9};
+  for (const double value : {5.0, 7.0}) {
+    const double scale = 2;
+    ASSERT_TRUE(program.run(*panel_versions().back(), &value, &scale, numbers.data()));
+    EXPECT_EQ(numbers, (std::vector<double>{-2, 2 * value - 6, -4, 0, 1, 3, 2, 0, -2, 2 * value - 6,
+                                            -4, 0}));
+  }
+}
+
+/// Of the numbers that are required the first becomes the value, the second one minus it.
+TEST(EliminationProgram, StopsAtWhatIsNotAsRequired) {
+  EliminationProgram program(8, 1);
+  program.set(0, 0, 0);
+  program.require(0);
+  program.set(4, 1, 0);
+  program.begin(4, 1);
+  program.subtract_product(0, 1);
+  program.end();
+  program.require(4);
+  program.begin(5, 1);  // in another window
+  program.subtract_product(4, 1);
+  program.end();
+  program.finish();
+  const auto runs = [&](double first, double one) {
+    std::vector<double> numbers(8, 0.0);
+    numbers[1] = 1;
+    const std::vector<double> values{first, one};
+    const double scale = 1;
+    const bool fine = program.run(*panel_versions().back(), values.data(), &scale, numbers.data());
+    EXPECT_EQ(numbers[5], fine ? first - one : 0.0);
+    return fine;
+  };
+  EXPECT_TRUE(runs(.25, 1));
+  EXPECT_FALSE(runs(0, 1));
+  EXPECT_FALSE(runs(1, 1));
+  EXPECT_FALSE(runs(HUGE_VAL, 1));
+  EXPECT_FALSE(runs(.5, NAN));
 }
 
 }  // namespace

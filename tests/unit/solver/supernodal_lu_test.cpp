@@ -126,6 +126,58 @@ TEST(SupernodalLu, ListsHaveTheBitsOfPanels) {
     }
 }
 
+/// A band whose lists are cut into three windows for the factors.
+TEST(SupernodalLu, LongListsHaveTheBitsOfPanels) {
+  constexpr int n = 700, band = 16;
+  std::mt19937 generator(11);
+  std::uniform_real_distribution<double> number(-1, 1);
+  const auto matrix = [&] {
+    Dense a = Dense::Zero(n, n);
+    for (int i = 0; i < n; ++i)
+      for (int j = std::max(0, i - band); j <= std::min(n - 1, i + band); ++j)
+        a(i, j) = i == j ? 2 * band : number(generator);
+    return a;
+  };
+  const Dense reference = matrix(), a = matrix();
+  std::vector<int> order(n);
+  std::iota(order.begin(), order.end(), 0);
+  const Sparse sparse(reference), other(a);
+  const auto solution = [&](std::size_t listed) {
+    SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
+                    factor_pattern(reference, order, order, {0, n}), {.listed = listed});
+    Vector x = Vector::LinSpaced(n, 1, 2);
+    EXPECT_TRUE(lu.factor(other.values.data()));
+    lu.solve(x.data());
+    return x;
+  };
+  const Vector x = solution(LuOptions::kMostListed);
+  EXPECT_EQ(x, solution(0));
+  EXPECT_LT((a * x - Vector::LinSpaced(n, 1, 2)).norm(), 1e-13 * x.norm() * band);
+}
+
+/// The third block begins a block of the lists: what pads the one before it must not keep anything.
+TEST(SupernodalLu, ARightSideThatIsNotANumberLeavesNothingBehind) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const int n = 30;
+    SparseFamily family(n, .3, {0, 1, 3, n}, seed);
+    const Dense a = family.matrix();
+    const Sparse sparse(a);
+    for (const std::size_t listed : {LuOptions::kMostListed, std::size_t{0}}) {
+      SupernodalLu lu(sparse.column_start, sparse.row_index, sparse.values.data(),
+                      family.pattern(a), {.listed = listed});
+      ASSERT_TRUE(lu.factor(sparse.values.data()));
+      const Vector b = Vector::LinSpaced(n, 1, 2);
+      Vector expected = b, x = Vector::Constant(n, NAN);
+      lu.solve(expected.data());
+      lu.solve(x.data());
+      EXPECT_FALSE(x.allFinite());
+      x = b;
+      lu.solve(x.data());
+      EXPECT_EQ(x, expected) << seed;
+    }
+  }
+}
+
 /// Two bands that meet in the last rows and columns, as an order for two threads leaves them.
 Dense two_bands(int half, int band, std::mt19937& generator) {
   std::uniform_real_distribution<double> number(-1, 1);
