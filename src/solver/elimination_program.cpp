@@ -1,7 +1,6 @@
 #include "solver/elimination_program.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 namespace mbcosim {
@@ -151,17 +150,24 @@ void EliminationProgram::finish() {
   draft_.reset();
 }
 
-bool EliminationProgram::run(const PanelVersion& version, const double* values,
-                             const double* scales, double* numbers) const {
+std::optional<EliminationProgram::Sizes> EliminationProgram::run(const PanelVersion& version,
+                                                                 const double* values,
+                                                                 const double* scales,
+                                                                 double* numbers) const {
+  Sizes sizes;
   for (const Window& window : windows_) {
     for (const Zeros& zeros : window.zeros) std::fill_n(numbers + zeros.target, zeros.count, 0.0);
     for (const Entry& entry : window.entries)
       numbers[entry.target] = values[entry.value] * scales[entry.scale];
     version.update(window.updates.data(), window.updates.size(), window.products.data(), numbers);
-    for (const std::uint32_t required : window.required)
-      if (!std::isfinite(numbers[required]) || numbers[required] == 0) return false;
+    for (const std::uint32_t required : window.required) {
+      const double size = std::abs(numbers[required]);
+      if (!(size > 0 && size < HUGE_VAL)) return std::nullopt;
+      sizes.smallest = std::min(sizes.smallest, size);
+      sizes.largest = std::max(sizes.largest, size);
+    }
   }
-  return true;
+  return sizes;
 }
 
 std::size_t EliminationProgram::bytes() const {

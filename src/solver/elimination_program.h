@@ -1,6 +1,7 @@
 /// The elimination of a matrix as a list of operations.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -43,10 +44,14 @@ class EliminationProgram {
   void require(std::size_t pivot);  ///< as it is now neither zero nor infinite nor not a number
   void finish();                    ///< after the last operation
 
-  /// False when a number is not as it is required: the rest has not been done then. Divisions by
+  /// Of the required numbers.
+  struct Sizes {
+    double smallest = HUGE_VAL, largest = 0;
+  };
+  /// None when a number is not as it is required: the rest has not been done then. Divisions by
   /// zero give numbers that are not finite.
-  bool run(const PanelVersion& version, const double* values, const double* scales,
-           double* numbers) const;
+  std::optional<Sizes> run(const PanelVersion& version, const double* values, const double* scales,
+                           double* numbers) const;
   std::size_t bytes() const;
 
  private:

@@ -1,7 +1,6 @@
 #include "solver/listed_lu.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -359,6 +358,7 @@ ListedLu::ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
   numbers_.resize(x_ + slots_);
   const Builder builder{*this, factors, matrix, parts};
   for (int part = 0; part <= parts.count; ++part) elimination_.push_back(builder.elimination(part));
+  of_part_.resize(elimination_.size());
   substitution_ = builder.substitution();
 }
 
@@ -404,13 +404,21 @@ void ListedLu::place_factors(const FactorPattern& factors) {
 
 bool ListedLu::factor(const double* values, ThreadTeam* team) {
   const int parts = static_cast<int>(elimination_.size()) - 1;
-  std::atomic<bool> fine{true};
   const auto run = [&](int part, int) {
-    if (!elimination_[part].run(version_, values, scales_.data(), numbers_.data())) fine = false;
+    of_part_[part] = elimination_[part].run(version_, values, scales_.data(), numbers_.data());
   };
   each_task(team, parts, run);
-  if (fine) run(parts, 0);
-  return fine;
+  if (!std::all_of(of_part_.begin(), of_part_.end() - 1,
+                   [](const auto& each) { return each.has_value(); }))
+    return false;
+  run(parts, 0);
+  if (!of_part_[parts]) return false;
+  pivots_ = {};
+  for (const auto& each : of_part_) {
+    pivots_.smallest = std::min(pivots_.smallest, each->smallest);
+    pivots_.largest = std::max(pivots_.largest, each->largest);
+  }
+  return true;
 }
 
 void ListedLu::solve(double* b, ThreadTeam* team) {

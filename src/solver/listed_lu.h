@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "math/thread_team.h"
@@ -37,6 +38,7 @@ class ListedLu {
   /// Solves in place.
   void solve(double* b, ThreadTeam* team);
 
+  double pivot_ratio() const { return pivots_.smallest / pivots_.largest; }
   double pivot(int k) const { return numbers_[pivot_place(k)]; }
   /// Number p of U, counted by columns without the pivots.
   double upper(int p) const { return numbers_[upper_place_[p]]; }
@@ -76,8 +78,10 @@ class ListedLu {
   std::size_t x_ = 0;                  ///< of what is solved for, by slot
   const std::vector<double>& scales_;  ///< of the matrix's places
   std::vector<double> numbers_;
-  std::vector<EliminationProgram> elimination_;  ///< by part
-  std::vector<Stage> substitution_;              ///< one after the other
+  std::vector<EliminationProgram> elimination_;                    ///< by part
+  std::vector<std::optional<EliminationProgram::Sizes>> of_part_;  ///< pivots
+  EliminationProgram::Sizes pivots_;
+  std::vector<Stage> substitution_;  ///< one after the other
   const PanelVersion& version_;
 };
 

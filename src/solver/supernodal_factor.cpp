@@ -240,9 +240,10 @@ void SupernodalLu::solve(double* b, ThreadTeam* team) {
 }
 
 double SupernodalLu::pivot_ratio() const {
+  if (listed_ && n_ > 0) return listed_->pivot_ratio();
   double smallest = HUGE_VAL, largest = 0;
   for (int k = 0; k < n_; ++k) {
-    const double size = std::abs(pivot(k));
+    const double size = std::abs(pivots_[k]);
     smallest = std::min(smallest, size);
     largest = std::max(largest, size);
   }

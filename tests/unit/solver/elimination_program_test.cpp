@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <random>
@@ -191,11 +192,17 @@ TEST(EliminationProgram, StopsAtWhatIsNotAsRequired) {
     numbers[1] = 1;
     const std::vector<double> values{first, one};
     const double scale = 1;
-    const bool fine = program.run(*panel_versions().back(), values.data(), &scale, numbers.data());
+    const auto sizes = program.run(*panel_versions().back(), values.data(), &scale, numbers.data());
+    const bool fine = sizes.has_value();
+    if (fine) {
+      EXPECT_EQ(sizes->smallest, std::min(std::abs(first), std::abs(one - first)));
+      EXPECT_EQ(sizes->largest, std::max(std::abs(first), std::abs(one - first)));
+    }
     EXPECT_EQ(numbers[5], fine ? first - one : 0.0);
     return fine;
   };
-  EXPECT_TRUE(runs(.25, 1));
+  EXPECT_TRUE(runs(-.25, 1));
+  EXPECT_TRUE(runs(.75, 1));
   EXPECT_FALSE(runs(0, 1));
   EXPECT_FALSE(runs(1, 1));
   EXPECT_FALSE(runs(HUGE_VAL, 1));
