@@ -306,9 +306,12 @@ struct ListedLu::Builder {
       for (int q = lu.rows_.start[k + 1]; --q > lu.rows_.start[k];)
         program.subtract_dot(lu.rows_.place(q),
                              lu.x_ + static_cast<std::size_t>(kBlock) * lu.rows_.block[q]);
-      program.end();
-      program.begin(x(k), 1);
-      for (int p = order.upper.start[k]; p < order.upper.start[k + 1]; ++p)
+      const int first = order.upper.start[k], last = order.upper.start[k + 1];
+      if (first < last) {
+        program.end();
+        program.begin(x(k), 1);
+      }
+      for (int p = first; p < last; ++p)
         program.subtract_product(place(lu.rows_, k, order.upper.of[p]), x(order.upper.of[p]));
       program.end(lu.pivot_place(k));
     }

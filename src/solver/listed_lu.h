@@ -6,8 +6,9 @@
 /// and the column of L, so that none of those that are updated together needs another one of them.
 /// Rows and columns of the factors are cut into blocks of four, at the same slots in all of them:
 /// what is side by side in one update has been stored together by an earlier one. Numbers that a
-/// block has for slots without a place in the pattern are padding: they take part in nothing but
-/// padding.
+/// block has for slots without a place in the pattern are padding. They are zero, as whatever makes
+/// one of them another number would have given it a place, but for those before the diagonal in the
+/// block of the diagonal, which take part in nothing.
 #pragma once
 
 #include <cstddef>

@@ -36,7 +36,7 @@
 namespace mbcosim {
 
 struct LuOptions {
-  static constexpr std::size_t kMostListed = 1 << 25;  ///< products: 250 MB of lists
+  static constexpr std::size_t kMostListed = 1 << 25;  ///< products: 320 MB, factors and lists
 
   const PanelVersion& version = *panel_versions().back();
   /// With at most so many products of numbers, and few for each of its numbers, a matrix is

@@ -126,7 +126,7 @@ TEST(SupernodalLu, ListsHaveTheBitsOfPanels) {
     }
 }
 
-/// A band whose lists are cut into three windows for the factors.
+/// A band whose lists are longer than a window.
 TEST(SupernodalLu, LongListsHaveTheBitsOfPanels) {
   constexpr int n = 700, band = 16;
   std::mt19937 generator(11);
