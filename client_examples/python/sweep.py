@@ -16,6 +16,7 @@ from typing import Any, Iterable, Optional
 
 import distributed
 import numpy as np
+from dask import config as dask_config
 
 import example
 import mbcosim
@@ -25,6 +26,9 @@ AIRFRAME, WHEEL = "node.structural.1.X", "node.structural.2.X"
 TYRE, LENGTH = 4e5, 1.0  # as in the deck: stiffness [N/m], length of the strut [m]
 IMPACT = 0.3             # in which load and stroke are largest [s]
 AT_ONCE = 8              # simulations, where this process has the tasks
+# Dask's profiler looks at all threads a hundred times a second, at which Python 3.11 up to 3.11.8 (Debian 12) may stop for ever:
+# github.com/python/cpython/issues/106883. Workers of a cluster: DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED=False.
+PROFILE = "distributed.worker.profile.enabled"
 
 
 @dataclasses.dataclass(frozen=True, order=True)
@@ -58,6 +62,7 @@ def dask_client(scheduler: Optional[str] = None) -> Any:
     """Of a cluster that runs, or of threads in this process: the work is done by the daemons."""
     if scheduler:
         return dask.Client(scheduler)
+    dask_config.set({PROFILE: False})
     return dask.Client(n_workers=1, threads_per_worker=AT_ONCE, processes=False, dashboard_address=None)
 
 

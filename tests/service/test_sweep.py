@@ -3,6 +3,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -49,6 +50,14 @@ def test_points_spread_and_are_those_of_one_daemon(cluster, dask, alone):
     assert [numbers(drop) for drop in drops] == alone
     counts = [sum(drop.daemon == id for drop in drops) for id in IDS]
     assert sum(counts) == len(drops) and min(counts) >= len(drops) // 10, counts
+
+
+def test_nothing_looks_at_all_threads(cluster, dask, monkeypatch):
+    """Which may stop Debian 12's Python for ever: sweep.PROFILE."""
+    looks, frames = [], sys._current_frames
+    monkeypatch.setattr(sys, "_current_frames", lambda: looks.append(threading.current_thread().name) or frames())
+    dask.gather(sweep.sweep(dask, address_of(cluster), SINKS[:3], HOLES))
+    assert not looks
 
 
 def test_points_of_a_daemon_that_is_killed_are_done_again(cluster, dask, alone):
