@@ -68,6 +68,7 @@ struct ListedLu::Builder {
   const FactorPattern& factors;
   const MatrixPlaces& matrix;
   const Parts& parts;
+  const std::size_t most;
   Lines lower = lines_of(lu.n_, [&](auto use) {  // columns by row of L
     each_lower(factors, [&](int k, int row) { use(row, k); });
   });
@@ -109,7 +110,7 @@ struct ListedLu::Builder {
   }
   std::size_t place(const Blocks& blocks, int line, int position) const {
     const int slot = lu.slot_[position];
-    return blocks.place(blocks.find(line, slot / kBlock)) + slot % kBlock;
+    return blocks.place(line, blocks.find(line, slot / kBlock)) + slot % kBlock;
   }
 
   /// Row or column k, those of its blocks that are `wanted`: `inputs` calls with the earlier ones
@@ -120,11 +121,11 @@ struct ListedLu::Builder {
               Inputs inputs, Wanted wanted, EliminationProgram& program) const {
     for (int q = blocks.start[k]; q < blocks.start[k + 1]; ++q) {
       if (!wanted(blocks.block[q])) continue;
-      program.begin(blocks.place(q), kBlock);
+      program.begin(blocks.place(k, q), kBlock);
       inputs([&](int i, auto other) {
         const int from = blocks.find(i, blocks.block[q]);
         if (from >= 0 && blocks.last[from] >= first)
-          program.subtract_product(blocks.place(from), other());
+          program.subtract_product(blocks.place(i, from), other());
       });
       program.end(pivot);
     }
@@ -158,10 +159,8 @@ struct ListedLu::Builder {
   /// Of the matrix what row k of U and column k of L begin with, and what lies above the diagonal
   /// block in column k.
   void set(int k, EliminationProgram& program) const {
-    for (const Blocks* blocks : {&lu.rows_, &lu.columns_}) {
-      const std::size_t first = blocks->place(blocks->start[k]);
-      program.clear(first, blocks->place(blocks->start[k + 1]) - first);
-    }
+    for (const Blocks* blocks : {&lu.rows_, &lu.columns_})
+      program.clear(blocks->first_place[k], static_cast<std::size_t>(kBlock) * blocks->count(k));
     const auto set_entry = [&](std::size_t target, int p, int column) {
       program.set(target, matrix.value_start[column] + p - matrix.entry_start[column],
                   matrix.entry_row[p]);
@@ -172,13 +171,28 @@ struct ListedLu::Builder {
                 column);
     }
     each_entry(
-        k, [](int) {}, [&](int p, int above) { set_entry(lu.above_ + above, p, k); });
+        k, [](int) {}, [&](int p, int above) { set_entry(above_place(k, above), p, k); });
+  }
+
+  /// Of a number of column k above its diagonal block, counted among all of the matrix.
+  std::size_t above_place(int k, int above) const {
+    return lu.above_place_[k] + (above - matrix.above_start[k]);
+  }
+
+  void end_window(EliminationProgram& program) const {
+    program.end_window();
+    if (program.bytes() > most) throw TooLong();
+  }
+  void finish(EliminationProgram& program) const {
+    end_window(program);
+    program.finish();
   }
 
   /// A part's own are its columns of L and what U has in them. It begins its rows of U.
   EliminationProgram elimination(int part) const {
     EliminationProgram program(lu.numbers_.size());
     for (int k = 0; k < lu.n_; ++k) {
+      if (lu.begins_window_[k]) end_window(program);
       if (parts.of_column[k] == part) set(k, program);
       update(
           lu.rows_, k, lu.slot_[k], {},
@@ -197,7 +211,7 @@ struct ListedLu::Builder {
           },
           [](int) { return true; }, program);
     }
-    program.finish();
+    finish(program);
     return program;
   }
 
@@ -207,7 +221,7 @@ struct ListedLu::Builder {
     std::optional<EliminationProgram> alone;  // diagonal blocks that one thread does
     const auto close = [&] {
       if (!alone) return;
-      alone->finish();
+      finish(*alone);
       stages.emplace_back().push_back(*std::exchange(alone, std::nullopt));
     };
     const auto all = [](int) { return true; };
@@ -225,7 +239,7 @@ struct ListedLu::Builder {
         Stage& stage = stages.emplace_back();
         for (int part = 0; part < parts.count; ++part) {
           of_part(part, stage.emplace_back(lu.numbers_.size()));
-          stage.back().finish();
+          finish(stage.back());
         }
       };
       each_part([&](int part, EliminationProgram& program) {
@@ -280,19 +294,30 @@ struct ListedLu::Builder {
   template <class Wanted>
   void eliminate(const Substitution& order, int begin, int end, Wanted wanted,
                  EliminationProgram& program) const {
-    for (int k = begin; k < end; ++k) {
-      if (!wanted(k)) continue;
-      program.set(x(k), factors.row_of[k], k);
-      const int after = k + 1 < lu.n_ ? lu.slot_[k + 1] : lu.slots_;
-      if (const int padding = after - lu.slot_[k] - 1; padding > 0)
-        program.clear(x(k) + 1, static_cast<std::size_t>(padding));
-      program.begin(x(k), 1);
-      for (int p = order.above.start[k]; p < order.above.start[k + 1]; ++p)
-        program.subtract_product(lu.above_ + order.above.of[p],
-                                 x(order.column_above[order.above.of[p]]));
-      program.end();
+    for (int k = begin; k < end;) {
+      const int first = k;
+      for (; k < end && lu.block_of(k) == lu.block_of(first) && wanted(k); ++k) {
+        if (lu.begins_window_[k]) end_window(program);
+        right_side(order, k, program);
+      }
+      if (k > first)
+        eliminate_block(first, k, program);
+      else
+        ++k;
     }
-    for (int k = begin; k < end;) k = wanted(k) ? eliminate_block(k, end, program) : k + 1;
+  }
+
+  void right_side(const Substitution& order, int k, EliminationProgram& program) const {
+    program.set(lu.x(k), factors.row_of[k], k);
+    const int after = k + 1 < lu.n_ ? lu.slot_[k + 1] : lu.slots_;
+    if (const int padding = after - lu.slot_[k] - 1; padding > 0)
+      program.clear(lu.x(k) + 1, static_cast<std::size_t>(padding));
+    program.begin(lu.x(k), 1);
+    for (int p = order.above.start[k]; p < order.above.start[k + 1]; ++p) {
+      const int column = order.column_above[order.above.of[p]];
+      program.subtract_product(above_place(column, order.above.of[p]), lu.x(column));
+    }
+    program.end();
   }
 
   /// x := U⁻¹ x: a row of U by its blocks, what is padding there being zero, then by its numbers
@@ -302,53 +327,50 @@ struct ListedLu::Builder {
                   EliminationProgram& program) const {
     for (int k = end - 1; k >= begin; --k) {
       if (!wanted(k)) continue;
-      program.begin(x(k), 1);
+      program.begin(lu.x(k), 1);
       for (int q = lu.rows_.start[k + 1]; --q > lu.rows_.start[k];)
-        program.subtract_dot(lu.rows_.place(q),
+        program.subtract_dot(lu.rows_.place(k, q),
                              lu.x_ + static_cast<std::size_t>(kBlock) * lu.rows_.block[q]);
       const int first = order.upper.start[k], last = order.upper.start[k + 1];
       if (first < last) {
         program.end();
-        program.begin(x(k), 1);
+        program.begin(lu.x(k), 1);
       }
       for (int p = first; p < last; ++p)
-        program.subtract_product(place(lu.rows_, k, order.upper.of[p]), x(order.upper.of[p]));
+        program.subtract_product(place(lu.rows_, k, order.upper.of[p]), lu.x(order.upper.of[p]));
       program.end(lu.pivot_place(k));
+      if (lu.begins_window_[k]) end_window(program);
     }
   }
 
-  std::size_t x(int k) const { return lu.x_ + lu.slot_[k]; }
-
-  /// Of x := L⁻¹ x the positions of one block from k on; returns the one after them.
-  int eliminate_block(int k, int end, EliminationProgram& program) const {
-    const int block = lu.block_of(k);
-    int after = k;
+  /// x := L⁻¹ x of positions first .. last − 1, which are in one block.
+  void eliminate_block(int first, int last, EliminationProgram& program) const {
+    const int block = lu.block_of(first);
     std::vector<int>& needed = columns_;
     needed.clear();
-    for (; after < end && lu.block_of(after) == block; ++after)
-      for (int p = lower.start[after]; p < lower.start[after + 1] && lower.of[p] < k; ++p)
+    for (int k = first; k < last; ++k)
+      for (int p = lower.start[k]; p < lower.start[k + 1] && lower.of[p] < first; ++p)
         needed.push_back(lower.of[p]);
     std::sort(needed.begin(), needed.end());
     needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
-    program.begin(lu.x_ + static_cast<std::size_t>(block) * kBlock, kBlock);
+    program.begin(lu.x_ + static_cast<std::size_t>(kBlock) * block, kBlock);
     for (const int i : needed)
-      program.subtract_product(lu.columns_.place(lu.columns_.find(i, block)), lu.x_ + lu.slot_[i]);
+      program.subtract_product(lu.columns_.place(i, lu.columns_.find(i, block)), lu.x(i));
     program.end();
-    for (int row = k; row < after; ++row) {
-      program.begin(lu.x_ + lu.slot_[row], 1);
+    for (int row = first; row < last; ++row) {
+      program.begin(lu.x(row), 1);
       for (int p = lower.start[row]; p < lower.start[row + 1]; ++p)
-        if (const int i = lower.of[p]; i >= k)
-          program.subtract_product(place(lu.columns_, i, row), lu.x_ + lu.slot_[i]);
+        if (const int i = lower.of[p]; i >= first)
+          program.subtract_product(place(lu.columns_, i, row), lu.x(i));
       program.end();
     }
-    return after;
   }
 
   mutable std::vector<int> columns_{};  ///< scratch
 };
 
 ListedLu::ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
-                   const std::vector<int>& supernodes, const Parts& parts,
+                   const std::vector<int>& supernodes, const Parts& parts, std::size_t most,
                    const PanelVersion& version)
     : n_(static_cast<int>(factors.row_of.size())),
       column_of_(factors.column_of),
@@ -356,10 +378,14 @@ ListedLu::ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
       scales_(matrix.inverse_scale),
       version_(version) {
   choose_slots(factors, supernodes, parts);
-  place_factors(factors);
-  x_ = (above_ + matrix.above_row.size() + kBlock - 1) / kBlock * kBlock;
-  numbers_.resize(x_ + slots_);
-  const Builder builder{*this, factors, matrix, parts};
+  find_blocks(factors);
+  choose_windows(factors);
+  place(matrix);
+  each_upper(factors, [&](int k, int row) {
+    const int q = rows_.find(row, block_of(k));
+    upper_place_.push_back(static_cast<std::uint32_t>(rows_.place(row, q) + slot_[k] % kBlock));
+  });
+  const Builder builder{*this, factors, matrix, parts, most};
   for (int part = 0; part <= parts.count; ++part) elimination_.push_back(builder.elimination(part));
   of_part_.resize(elimination_.size());
   substitution_ = builder.substitution();
@@ -383,7 +409,7 @@ void ListedLu::choose_slots(const FactorPattern& factors, const std::vector<int>
   slots_ = rounded_up(slots_, kBlock);
 }
 
-void ListedLu::place_factors(const FactorPattern& factors) {
+void ListedLu::find_blocks(const FactorPattern& factors) {
   const Lines columns = lines_of(n_, [&](auto use) {  // by row of U
     each_upper(factors, [&](int k, int row) { use(row, k); });
   });
@@ -397,12 +423,55 @@ void ListedLu::place_factors(const FactorPattern& factors) {
   }
   rows_.start.push_back(static_cast<int>(rows_.block.size()));
   columns_.start.push_back(static_cast<int>(columns_.block.size()));
-  columns_.first_place = rows_.place(rows_.start.back());
-  above_ = columns_.place(columns_.start.back());
-  each_upper(factors, [&](int k, int row) {
-    upper_place_.push_back(static_cast<std::uint32_t>(
-        rows_.place(rows_.find(row, slot_[k] / kBlock)) + slot_[k] % kBlock));
-  });
+}
+
+/// Has position b the same blocks as a further on?
+bool ListedLu::is_like(int a, int b) const {
+  if (slot_[a] % kBlock != slot_[b] % kBlock) return false;
+  const int further = block_of(b) - block_of(a);
+  for (const Blocks* each : {&rows_, &columns_})
+    if (!std::equal(each->block.begin() + each->start[a], each->block.begin() + each->start[a + 1],
+                    each->block.begin() + each->start[b], each->block.begin() + each->start[b + 1],
+                    [&](int block, int other) { return block + further == other; }))
+      return false;
+  return true;
+}
+
+/// `kWork`: products of blocks that there would be if nothing were missing.
+void ListedLu::choose_windows(const FactorPattern& factors) {
+  constexpr std::int64_t kWork = 1 << 13;  // at least; twice as much at most
+  begins_window_.assign(n_, 0);
+  std::int64_t work = 0;
+  for (int k = 0, first = 0; k < n_; ++k) {
+    const bool inside = k > first && block_of(k) == block_of(k - 1);
+    if (!inside && (work >= 2 * kWork || (work >= kWork && is_like(first, k)))) {
+      begins_window_[k] = 1;
+      first = k;
+      work = 0;
+    }
+    work += std::int64_t{rows_.count(k) + columns_.count(k)} *
+            (factors.upper_start[k + 1] - factors.upper_start[k]);
+  }
+}
+
+/// In each window rows of U, columns of L and what lies above the diagonal blocks. What is solved
+/// for comes after all of them: it is short enough for a cache.
+void ListedLu::place(const MatrixPlaces& matrix) {
+  std::size_t end = 0;
+  const auto take = [&](int count) {
+    return std::exchange(end, end + static_cast<std::size_t>(rounded_up(count, kBlock)));
+  };
+  for (int first = 0, last = 0; first < n_; first = last) {
+    while (++last < n_ && !begins_window_[last]) {
+    }
+    for (Blocks* blocks : {&rows_, &columns_})
+      for (int k = first; k < last; ++k)
+        blocks->first_place.push_back(take(kBlock * blocks->count(k)));
+    for (int k = first; k < last; ++k)
+      above_place_.push_back(take(matrix.above_start[k + 1] - matrix.above_start[k]));
+  }
+  x_ = end;
+  numbers_.resize(x_ + slots_);
 }
 
 bool ListedLu::factor(const double* values, ThreadTeam* team) {
@@ -429,7 +498,7 @@ void ListedLu::solve(double* b, ThreadTeam* team) {
     each_task(team, static_cast<int>(stage.size()), [&](int program, int) {
       (void)stage[program].run(version_, b, scales_.data(), numbers_.data());
     });
-  for (int k = 0; k < n_; ++k) b[column_of_[k]] = numbers_[x_ + slot_[k]];
+  for (int k = 0; k < n_; ++k) b[column_of_[k]] = numbers_[x(k)];
 }
 
 bool ListedLu::pivots_dominate(double bound) const {
@@ -437,7 +506,7 @@ bool ListedLu::pivots_dominate(double bound) const {
     for (int q = columns_.start[k]; q < columns_.start[k + 1]; ++q)
       for (int i = 0; i < kBlock; ++i)
         if (columns_.block[q] * kBlock + i > slot_[k] &&
-            !(std::abs(numbers_[columns_.place(q) + i]) <= bound))
+            !(std::abs(numbers_[columns_.place(k, q) + i]) <= bound))
           return false;
   return true;
 }

@@ -9,6 +9,9 @@
 /// block has for slots without a place in the pattern are padding. They are zero, as whatever makes
 /// one of them another number would have given it a place, but for those before the diagonal in the
 /// block of the diagonal, which take part in nothing.
+///
+/// Positions are cut into windows whose numbers lie together. A window begins, where that can be,
+/// with a position of which the factors have the same as of the one the last window began with.
 #pragma once
 
 #include <cstddef>
@@ -30,9 +33,12 @@ class ListedLu {
     std::vector<int> of_column;  ///< (n)
     int count = 0;               ///< but for the last one
   };
-  /// `matrix`: as long as this. `supernodes`: first column of each, then n.
+  struct TooLong {};  ///< thrown
+  /// `matrix`: as long as this. `supernodes`: first column of each, then n. `most`: bytes of a
+  /// list.
   ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
-           const std::vector<int>& supernodes, const Parts& parts, const PanelVersion& version);
+           const std::vector<int>& supernodes, const Parts& parts, std::size_t most,
+           const PanelVersion& version);
 
   /// False when a pivot vanishes or is not a number: there are no factors then.
   bool factor(const double* values, ThreadTeam* team);
@@ -52,32 +58,40 @@ class ListedLu {
 
   /// Blocks of the rows of U or of the columns of L.
   struct Blocks {
-    std::vector<int> start;  ///< of each row or column, then all
-    std::vector<int> block;  ///< slot / kBlock, ascending
-    std::vector<int> last;   ///< the last slot that is in the pattern
-    std::size_t first_place = 0;
+    std::vector<int> start;                ///< of each row or column, then all
+    std::vector<int> block;                ///< slot / kBlock, ascending
+    std::vector<int> last;                 ///< the last slot that is in the pattern
+    std::vector<std::size_t> first_place;  ///< of each row or column
     void add(int slot);
-    std::size_t place(int q) const { return first_place + static_cast<std::size_t>(kBlock) * q; }
+    int count(int line) const { return start[line + 1] - start[line]; }
+    std::size_t place(int line, int q) const {  ///< of block q, one of the line's
+      return first_place[line] + static_cast<std::size_t>(kBlock) * (q - start[line]);
+    }
     int find(int line, int of) const;  ///< −1: it has none
   };
   using Stage = std::vector<EliminationProgram>;  ///< at the same time
   struct Builder;
 
   int block_of(int k) const { return slot_[k] / kBlock; }
-  std::size_t pivot_place(int k) const { return rows_.place(rows_.start[k]) + slot_[k] % kBlock; }
+  std::size_t pivot_place(int k) const { return rows_.first_place[k] + slot_[k] % kBlock; }
+  std::size_t x(int k) const { return x_ + slot_[k]; }
   void choose_slots(const FactorPattern& factors, const std::vector<int>& supernodes,
                     const Parts& parts);
-  void place_factors(const FactorPattern& factors);
+  void find_blocks(const FactorPattern& factors);
+  void choose_windows(const FactorPattern& factors);
+  bool is_like(int a, int b) const;
+  void place(const MatrixPlaces& matrix);
 
   int n_, slots_ = 0;
   std::vector<int> column_of_;
-  std::vector<int> slot_;  ///< by position, ascending
-  Blocks rows_;            ///< of U, with the pivots
-  Blocks columns_;         ///< of L
+  std::vector<int> slot_;            ///< by position, ascending
+  Blocks rows_;                      ///< of U, with the pivots
+  Blocks columns_;                   ///< of L
+  std::vector<char> begins_window_;  ///< by position
   std::vector<std::uint32_t> upper_place_;
-  std::size_t above_ = 0;              ///< first place of what lies above the diagonal blocks
-  std::size_t x_ = 0;                  ///< of what is solved for, by slot
-  const std::vector<double>& scales_;  ///< of the matrix's places
+  std::vector<std::size_t> above_place_;  ///< of each column's numbers above its diagonal block
+  std::size_t x_ = 0;                     ///< first place of what is solved for, by slot
+  const std::vector<double>& scales_;     ///< of the matrix's places
   std::vector<double> numbers_;
   std::vector<EliminationProgram> elimination_;                    ///< by part
   std::vector<std::optional<EliminationProgram::Sizes>> of_part_;  ///< pivots

@@ -34,8 +34,8 @@ struct PanelKernels {
   void (*clear)(const int* rows, int count, double* x);  ///< rows of X
 };
 
-/// Of an array F, to numbers from `target` on: minus products, then divided where it `divides`.
-/// `dots`: one number, minus products of blocks.
+/// Of arrays F and X, which may be one, to numbers of X from `target` on: minus products, then
+/// divided by F[pivot] where it `divides`. `dots`: one number, minus products of blocks.
 struct NumberUpdate {
   static constexpr int kBlock = 4;          ///< numbers that are loaded and stored together
   static constexpr int kMost = 3 * kBlock;  ///< in one update
@@ -43,12 +43,14 @@ struct NumberUpdate {
   std::uint32_t target, pivot, products;
   std::uint16_t count;  ///< 1 or some blocks
   bool divides, dots;
+  bool operator==(const NumberUpdate&) const = default;
 };
 
-/// F[factor], and its neighbours for those of the target, times F[other]; of a dot F[factor + i]
-/// F[other + i] for a block, the last i first.
+/// F[factor], and its neighbours for those of the target, times X[other]; of a dot F[factor + i]
+/// X[other + i] for a block, the last i first.
 struct NumberProduct {
   std::uint32_t factor, other;
+  bool operator==(const NumberProduct&) const = default;
 };
 
 struct PanelVersion {
@@ -57,9 +59,10 @@ struct PanelVersion {
   const char* processor;          ///< "x86-64-v3"
   PanelKernels kernels[kWidths];  ///< for more and more columns; no more come together than last
   int lanes;                      ///< numbers in a register
-  /// All of a list one after the other, each with as many products as it has.
-  void (*update)(const NumberUpdate* updates, std::size_t count, const NumberProduct* products,
-                 double* numbers);
+  /// All of a list one after the other, each with as many products as it has; returns what is
+  /// behind the last of them.
+  const NumberProduct* (*update)(const NumberUpdate* updates, std::size_t count,
+                                 const NumberProduct* products, const double* f, double* x);
   const PanelKernels& of(int columns) const {
     const PanelKernels* each = kernels;
     while (each->columns < columns) ++each;

@@ -43,9 +43,9 @@ SupernodalLu::SupernodalLu(const std::vector<int>& column_start, const std::vect
   place_matrix(column_start, row_index);
   const auto panels = static_cast<std::size_t>(panel_start_.back());
   const std::size_t count = panels + upper_row_.size() + n_ + matrix_.above_row.size();
-  if (is_listed(count, options.listed)) {
-    make_lists(factors);
-    return;
+  if (options.listed > 0 && is_listed(count)) {
+    make_lists(factors, options.listed);
+    if (listed_) return;
   }
   numbers_.resize(count);
   panels_ = numbers_.data();
@@ -366,22 +366,25 @@ std::size_t SupernodalLu::count_below(int k) const {
   return static_cast<std::size_t>(first_[s + 1] - k - 1 + rows_start_[s + 1] - rows_start_[s]);
 }
 
-/// `count`: of the numbers of the factors; `most`: products. A cantilever of beams has four for
-/// each number, a grid of 6 x 6 beams ten; of 10 x 10 beams they are seventeen, and panels are as
-/// fast.
-bool SupernodalLu::is_listed(std::size_t count, std::size_t most) const {
+/// `count`: of the numbers of the factors. A cantilever of beams has four products for each number,
+/// a grid of 6 x 6 beams ten; of 10 x 10 beams they are seventeen, and panels are as fast.
+bool SupernodalLu::is_listed(std::size_t count) const {
   constexpr std::size_t kFew = 12, kAlways = 4096;
+  constexpr std::size_t kMostNumbers = std::size_t{1} << 30;  // a list has places of 32 bits
   std::size_t products = 0;
   for (const int row : upper_row_) products += count_below(row);
-  return products <= std::min(most, std::max(kAlways, kFew * count));
+  return count <= kMostNumbers && products <= std::max(kAlways, kFew * count);
 }
 
-void SupernodalLu::make_lists(const FactorPattern& factors) {
+void SupernodalLu::make_lists(const FactorPattern& factors, std::size_t most) {
   ListedLu::Parts parts{std::vector<int>(n_), parts_};
   for (std::size_t g = 0; g < group_part_.size(); ++g)
     std::fill(parts.of_column.begin() + group_start_[g],
               parts.of_column.begin() + group_start_[g + 1], group_part_[g]);
-  listed_.emplace(factors, matrix_, first_, parts, version_);
+  try {
+    listed_.emplace(factors, matrix_, first_, parts, most, version_);
+  } catch (const ListedLu::TooLong&) {  // panels it is
+  }
 }
 
 std::size_t SupernodalLu::bytes() const {

@@ -36,11 +36,11 @@
 namespace mbcosim {
 
 struct LuOptions {
-  static constexpr std::size_t kMostListed = 1 << 25;  ///< products: 320 MB, factors and lists
+  static constexpr std::size_t kMostListed = std::size_t{128} << 20;
 
   const PanelVersion& version = *panel_versions().back();
-  /// With at most so many products of numbers, and few for each of its numbers, a matrix is
-  /// factored and solved by lists of operations.
+  /// With few products for each of its numbers a matrix is factored and solved by lists of
+  /// operations, if none takes more bytes than so many.
   std::size_t listed = kMostListed;
   int threads = 1;  ///< that may share the columns
 };
@@ -136,9 +136,9 @@ class SupernodalLu {
   bool factor_part(int part, const double* values, const Watch& watch);
   bool factor_in_order(const double* values, const Watch& watch, ThreadTeam& team);
   std::size_t count_below(int k) const;  ///< numbers of L in column k
-  bool is_listed(std::size_t count, std::size_t most) const;
+  bool is_listed(std::size_t count) const;
   int columns_of_groups() const;
-  void make_lists(const FactorPattern& factors);
+  void make_lists(const FactorPattern& factors, std::size_t most);
   double pivot(int k) const { return listed_ ? listed_->pivot(k) : pivots_[k]; }
   double upper(int p) const { return listed_ ? listed_->upper(p) : upper_[p]; }
   std::ptrdiff_t below_diagonal(int k) const;  ///< of column k, its first number in panels_

@@ -17,8 +17,9 @@ constexpr int kBlock = EliminationProgram::kBlock;
 /// The same operations for a program and one after the other.
 class Twice {
  public:
-  explicit Twice(std::vector<double> numbers, std::size_t window = EliminationProgram::kWindow)
-      : program(numbers.size(), window), expected(std::move(numbers)) {}
+  /// `window`: products after which a window ends; null: there is one window.
+  explicit Twice(std::vector<double> numbers, std::size_t window = 0)
+      : program(numbers.size()), expected(std::move(numbers)), window_(window) {}
 
   void update(std::size_t target, int count, const std::vector<NumberProduct>& products,
               std::optional<std::size_t> pivot) {
@@ -28,7 +29,7 @@ class Twice {
       for (int i = 0; i < count; ++i)
         expected[target + i] -= expected[each.factor + i] * expected[each.other];
     }
-    program.end(pivot);
+    end(products.size(), pivot);
     for (int i = 0; pivot && i < count; ++i) expected[target + i] /= expected[*pivot];
   }
 
@@ -40,12 +41,23 @@ class Twice {
       for (int i = kBlock; i-- > 0;)
         expected[target] -= expected[each.factor + i] * expected[each.other + i];
     }
-    program.end(pivot);
+    end(blocks.size(), pivot);
     if (pivot) expected[target] /= expected[*pivot];
   }
 
   EliminationProgram program;
   std::vector<double> expected;
+
+ private:
+  void end(std::size_t products, std::optional<std::size_t> pivot) {
+    program.end(pivot);
+    products_ += products;
+    if (window_ == 0 || products_ < window_) return;
+    program.end_window();
+    products_ = 0;
+  }
+
+  std::size_t window_, products_ = 0;
 };
 
 /// Any operations on a few numbers, so that nearly all depend on each other, in windows of one to
@@ -133,12 +145,51 @@ TEST(EliminationProgram, TakesNeighboursTogether) {
     twice.program.finish();
     return twice.program.bytes();
   };
-  const std::size_t none = [] {
-    EliminationProgram program(64);
-    program.finish();
-    return program.bytes();
-  }();
-  EXPECT_EQ(bytes(2 * kBlock) - none, 2 * (bytes(kBlock) - none));
+  EXPECT_EQ(bytes(2 * kBlock) - bytes(kBlock), 2 * (sizeof(NumberUpdate) + sizeof(NumberProduct)));
+}
+
+/// A row of cells of eight numbers, in windows of two cells: the first half of each cell begins
+/// with values, of which the first one is divided by the last one of the cell before. Few of them,
+/// and so many that what is ahead is fetched.
+TEST(EliminationProgram, WindowsThatRepeatShareAList) {
+  constexpr std::size_t kCell = 2 * kBlock;
+  for (const std::size_t cells : {6, 300'000}) {
+    const auto program_of = [&](std::size_t different) {
+      EliminationProgram program(cells * kCell);
+      for (std::size_t c = 0; c < cells; ++c) {
+        if (c % 2 == 0) program.end_window();
+        const std::size_t at = c * kCell, before = at < kCell ? at : at - kCell;
+        program.clear(at + 1, kCell - 1);
+        program.set(at, static_cast<int>(c), static_cast<int>(2 * c));
+        program.require(at);
+        program.begin(at + kBlock, kBlock);
+        program.subtract_product(at, c == different ? at + 1 : before);
+        program.end(at);
+      }
+      program.finish();
+      return program;
+    };
+    const EliminationProgram program = program_of(cells);
+    std::vector<double> values(cells), scales(2 * cells), numbers(cells * kCell, 7.0);
+    for (std::size_t c = 0; c < cells; ++c) values[c] = 1.0 + static_cast<double>(c % 97);
+    for (std::size_t c = 0; c < cells; ++c) scales[2 * c] = 2.0 + static_cast<double>(c % 89);
+    const auto sizes =
+        program.run(*panel_versions().back(), values.data(), scales.data(), numbers.data());
+    ASSERT_TRUE(sizes);
+    double largest = 0;
+    for (std::size_t c = 0; c < cells; ++c) {
+      const auto own = [&](std::size_t of) { return values[of] * scales[2 * of]; };
+      largest = std::max(largest, own(c));
+      ASSERT_EQ(numbers[c * kCell], own(c)) << c;
+      ASSERT_EQ(numbers[c * kCell + 1], 0) << c;
+      ASSERT_EQ(numbers[c * kCell + kBlock], -own(c == 0 ? 0 : c - 1)) << c;
+      ASSERT_EQ(numbers[c * kCell + kBlock + 1], 0) << c;
+    }
+    EXPECT_EQ(sizes->smallest, 2);
+    EXPECT_EQ(sizes->largest, largest);
+    EXPECT_LT(program.bytes(), program_of(3).bytes());
+    EXPECT_LT(program.bytes(), 1000 + 16 * cells) << "24 and more for each cell";
+  }
 }
 
 TEST(EliminationProgram, OfNothingDoesNothing) {
@@ -154,8 +205,9 @@ TEST(EliminationProgram, OfNothingDoesNothing) {
 /// Numbers 0 to 3 become 0, 10, 0, 0 minus 2 times 4 to 7: in each run, whatever the last one left,
 /// and also where the next window has already begun.
 TEST(EliminationProgram, ClearsWhatItBeginsWith) {
-  EliminationProgram program(12, 1);
+  EliminationProgram program(12);
   for (const std::size_t block : {0, 8}) {
+    program.end_window();  // before the first one there is nothing
     program.clear(block, 1);
     program.clear(block + 1, 3);  // both are cleared together
     program.set(block + 1, 0, 0);
@@ -175,7 +227,7 @@ TEST(EliminationProgram, ClearsWhatItBeginsWith) {
 
 /// Of the numbers that are required the first becomes the value, the second one minus it.
 TEST(EliminationProgram, StopsAtWhatIsNotAsRequired) {
-  EliminationProgram program(8, 1);
+  EliminationProgram program(8);
   program.set(0, 0, 0);
   program.require(0);
   program.set(4, 1, 0);
@@ -183,7 +235,8 @@ TEST(EliminationProgram, StopsAtWhatIsNotAsRequired) {
   program.subtract_product(0, 1);
   program.end();
   program.require(4);
-  program.begin(5, 1);  // in another window
+  program.end_window();
+  program.begin(5, 1);
   program.subtract_product(4, 1);
   program.end();
   program.finish();

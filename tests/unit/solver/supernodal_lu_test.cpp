@@ -452,6 +452,31 @@ TEST(SupernodalLu, JudgesPivotsAgainstTheReference) {
   }
 }
 
+/// Lists that are refused for their length leave panels, with the same numbers.
+TEST(SupernodalLu, TakesPanelsWhereListsAreTooLong) {
+  constexpr int n = 400;
+  SparseFamily family(n, .004, {0, n}, 7);
+  const Dense a = family.matrix();
+  Sparse reference(a);
+  const auto lu = [&](std::size_t listed) {
+    return SupernodalLu(reference.column_start, reference.row_index, reference.values.data(),
+                        family.pattern(a), {.listed = listed});
+  };
+  SupernodalLu listed = lu(LuOptions::kMostListed), refused = lu(1), panels = lu(0);
+  EXPECT_EQ(refused.bytes(), panels.bytes());
+  EXPECT_NE(listed.bytes(), panels.bytes());
+  const Vector b = family.vector();
+  std::vector<Vector> found;
+  for (SupernodalLu* each : {&listed, &refused, &panels}) {
+    ASSERT_TRUE(each->factor(reference.values.data()));
+    Vector x = b;
+    each->solve(x.data());
+    found.push_back(x);
+  }
+  EXPECT_EQ(found[1], found[2]);
+  EXPECT_EQ(found[0], found[2]);
+}
+
 /// Through the solver that chooses the pivots: matrices in several blocks, with zeros on the
 /// diagonal, and others of the pattern.
 TEST(LinearSolver, KeepsPivotsForMatricesOfOnePattern) {
