@@ -11,7 +11,7 @@
 /// block of the diagonal, which take part in nothing.
 ///
 /// Positions are cut into windows whose numbers lie together. A window begins, where that can be,
-/// with a position of which the factors have the same as of the one the last window began with.
+/// with a position that has the same blocks as the one with which the last window began.
 #pragma once
 
 #include <cstddef>
@@ -33,9 +33,10 @@ class ListedLu {
     std::vector<int> of_column;  ///< (n)
     int count = 0;               ///< but for the last one
   };
-  struct TooLong {};  ///< thrown
+  /// Thrown when a list takes more bytes than it may.
+  struct TooLong {};
   /// `matrix`: as long as this. `supernodes`: first column of each, then n. `most`: bytes of a
-  /// list.
+  /// list. Throws TooLong.
   ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
            const std::vector<int>& supernodes, const Parts& parts, std::size_t most,
            const PanelVersion& version);

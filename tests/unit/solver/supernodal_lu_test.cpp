@@ -126,19 +126,21 @@ TEST(SupernodalLu, ListsHaveTheBitsOfPanels) {
     }
 }
 
+/// Of 2 band + 1 diagonals.
+Dense banded(int n, int band, std::mt19937& generator) {
+  std::uniform_real_distribution<double> number(-1, 1);
+  Dense a = Dense::Zero(n, n);
+  for (int i = 0; i < n; ++i)
+    for (int j = std::max(0, i - band); j <= std::min(n - 1, i + band); ++j)
+      a(i, j) = i == j ? 2 * band : number(generator);
+  return a;
+}
+
 /// A band whose lists are longer than a window.
 TEST(SupernodalLu, LongListsHaveTheBitsOfPanels) {
   constexpr int n = 700, band = 16;
   std::mt19937 generator(11);
-  std::uniform_real_distribution<double> number(-1, 1);
-  const auto matrix = [&] {
-    Dense a = Dense::Zero(n, n);
-    for (int i = 0; i < n; ++i)
-      for (int j = std::max(0, i - band); j <= std::min(n - 1, i + band); ++j)
-        a(i, j) = i == j ? 2 * band : number(generator);
-    return a;
-  };
-  const Dense reference = matrix(), a = matrix();
+  const Dense reference = banded(n, band, generator), a = banded(n, band, generator);
   std::vector<int> order(n);
   std::iota(order.begin(), order.end(), 0);
   const Sparse sparse(reference), other(a);
@@ -153,6 +155,30 @@ TEST(SupernodalLu, LongListsHaveTheBitsOfPanels) {
   const Vector x = solution(LuOptions::kMostListed);
   EXPECT_EQ(x, solution(0));
   EXPECT_LT((a * x - Vector::LinSpaced(n, 1, 2)).norm(), 1e-13 * x.norm() * band);
+}
+
+/// Of a band, where each position is like the fourth after it; without a diagonal's number here and
+/// there the windows differ.
+TEST(SupernodalLu, WindowsOfABandShareAList) {
+  constexpr int n = 1400, band = 16;
+  std::mt19937 generator(12);
+  std::vector<int> order(n);
+  std::iota(order.begin(), order.end(), 0);
+  const auto bytes = [&](const Dense& a, std::size_t listed) {
+    const Sparse sparse(a);
+    return SupernodalLu(sparse.column_start, sparse.row_index, sparse.values.data(),
+                        factor_pattern(a, order, order, {0, n}), {.listed = listed})
+        .bytes();
+  };
+  constexpr std::size_t kHalf = std::size_t{1} << 20;  // of what lists that share nothing take
+  const Dense regular = banded(n, band, generator);
+  EXPECT_NE(bytes(regular, kHalf), bytes(regular, 0));
+  EXPECT_EQ(bytes(regular, kHalf), bytes(regular, LuOptions::kMostListed));
+  Dense irregular = regular;
+  for (int k = band; k < n; k += 10 + static_cast<int>(generator() % 10))
+    irregular(k, k - band) = irregular(k - band, k) = 0;
+  EXPECT_EQ(bytes(irregular, kHalf), bytes(irregular, 0));
+  EXPECT_NE(bytes(irregular, LuOptions::kMostListed), bytes(irregular, 0));
 }
 
 /// The third block begins a block of the lists: what pads the one before it must not keep anything.
