@@ -64,8 +64,8 @@ class EliminationProgram {
   void subtract_dot(std::size_t factor, std::size_t other);
   void end(std::optional<std::size_t> pivot = {});
   void require(std::size_t pivot);  ///< as it is now neither zero nor infinite nor not a number
-  void end_window();  ///< after an operation whose next one begins another window
-  void finish();      ///< after the last operation
+  void end_window();                ///< after an operation whose next one begins another window
+  void finish();                    ///< after the last operation
 
   /// Of the required numbers.
   struct Sizes {
