@@ -389,6 +389,7 @@ ListedLu::ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
   for (int part = 0; part <= parts.count; ++part) elimination_.push_back(builder.elimination(part));
   of_part_.resize(elimination_.size());
   substitution_ = builder.substitution();
+  rows_.last = columns_.last = {};
 }
 
 /// A block's slots belong to one part, and wide supernodes begin with a block.

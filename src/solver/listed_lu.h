@@ -59,9 +59,9 @@ class ListedLu {
 
   /// Blocks of the rows of U or of the columns of L.
   struct Blocks {
-    std::vector<int> start;                ///< of each row or column, then all
-    std::vector<int> block;                ///< slot / kBlock, ascending
-    std::vector<int> last;                 ///< the last slot that is in the pattern
+    std::vector<int> start;  ///< of each row or column, then all
+    std::vector<int> block;  ///< slot / kBlock, ascending
+    std::vector<int> last;   ///< the last slot in the pattern; until the lists are made
     std::vector<std::size_t> first_place;  ///< of each row or column
     void add(int slot);
     int count(int line) const { return start[line + 1] - start[line]; }
