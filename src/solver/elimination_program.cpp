@@ -4,7 +4,7 @@
 #include <functional>
 #include <numeric>
 #include <span>
-#include <string_view>
+#include <type_traits>
 #include <utility>
 
 #include "math/hash.h"
@@ -203,23 +203,18 @@ EliminationProgram::Window EliminationProgram::count_from_first(Operations& oper
     for (NumberProduct& each : operations.products) use(each.other);
     for (std::uint32_t& each : operations.required) use(each);
   };
-  const auto from_first = [](const auto& each_place) {
+  const auto from_first = [](const auto& each_place, std::uint32_t& first, std::size_t& end) {
     std::optional<std::uint32_t> least;
     each_place([&](std::uint32_t each) { least = std::min(least.value_or(each), each); });
-    const std::uint32_t first = least.value_or(0) / kBlock * kBlock;
-    each_place([&](std::uint32_t& each) { each -= first; });
-    return first;
+    first = least.value_or(0) / kBlock * kBlock;
+    each_place([&](std::uint32_t& each) {
+      each -= first;
+      end = std::max<std::size_t>(end, each + kBlock);
+    });
   };
   Window window{.operations = 0};
-  window.factor = from_first(each_factor);
-  window.number = from_first(each_other);
-  const auto end = [](const auto& each_place) {
-    std::size_t found = 0;
-    each_place([&](std::uint32_t each) { found = std::max<std::size_t>(found, each + kBlock); });
-    return found;
-  };
-  operations.factors_end = end(each_factor);
-  operations.numbers_end = end(each_other);
+  from_first(each_factor, window.factor, operations.factors_end);
+  from_first(each_other, window.number, operations.numbers_end);
   if (operations.entries.empty()) return window;
   window.value = operations.entries.front().value;
   window.scale = std::ranges::min(operations.entries, {}, &Entry::scale).scale;

@@ -98,20 +98,20 @@ inline void clear(const int* rows, int count, double* x) {
 /// With the next products; returns those after them.
 template <int Count, bool Divides>
 inline const NumberProduct* take_update(const NumberUpdate& update, const NumberProduct* product,
-                                        const double* factors, double* f) {
+                                        const double* f, double* x) {
   constexpr int kWide = Count < NumberUpdate::kBlock ? Count : NumberUpdate::kBlock;
   constexpr int kBlocks = Count / kWide;
   using Block = Numbers<kWide>;
   Block of[kBlocks];
-  double* const to = f + update.target;
+  double* const to = x + update.target;
   for (int b = 0; b < kBlocks; ++b) of[b] = Eigen::Map<const Block>(to + b * kWide);
   for (const NumberProduct* const end = product + update.products; product != end; ++product) {
-    const double* const from = factors + product->factor;
-    const double other = f[product->other];
+    const double* const from = f + product->factor;
+    const double other = x[product->other];
     for (int b = 0; b < kBlocks; ++b) of[b] -= Eigen::Map<const Block>(from + b * kWide) * other;
   }
   if constexpr (Divides)
-    for (int b = 0; b < kBlocks; ++b) of[b] /= factors[update.pivot];
+    for (int b = 0; b < kBlocks; ++b) of[b] /= f[update.pivot];
   for (int b = 0; b < kBlocks; ++b) Eigen::Map<Block>(to + b * kWide) = of[b];
   return product;
 }
@@ -119,31 +119,31 @@ inline const NumberProduct* take_update(const NumberUpdate& update, const Number
 /// With the next products of blocks; returns those after them.
 template <bool Divides>
 inline const NumberProduct* take_dots(const NumberUpdate& update, const NumberProduct* product,
-                                      const double* factors, double* f) {
+                                      const double* f, double* x) {
   constexpr int kBlock = NumberUpdate::kBlock;
   using Block = Numbers<kBlock>;
-  double of = f[update.target];
+  double of = x[update.target];
   for (const NumberProduct* const end = product + update.products; product != end; ++product) {
-    const Block products = Eigen::Map<const Block>(factors + product->factor) *
-                           Eigen::Map<const Block>(f + product->other);
+    const Block products =
+        Eigen::Map<const Block>(f + product->factor) * Eigen::Map<const Block>(x + product->other);
     for (int i = kBlock; i-- > 0;) of -= products[i];
   }
-  if constexpr (Divides) of /= factors[update.pivot];
-  f[update.target] = of;
+  if constexpr (Divides) of /= f[update.pivot];
+  x[update.target] = of;
   return product;
 }
 
 inline const NumberProduct* update(const NumberUpdate* updates, std::size_t count,
-                                   const NumberProduct* product, const double* factors, double* f) {
+                                   const NumberProduct* product, const double* f, double* x) {
   constexpr int kBlock = NumberUpdate::kBlock;
   const auto take = [&]<int Count>(const NumberUpdate& each) {
-    product = each.divides ? take_update<Count, true>(each, product, factors, f)
-                           : take_update<Count, false>(each, product, factors, f);
+    product = each.divides ? take_update<Count, true>(each, product, f, x)
+                           : take_update<Count, false>(each, product, f, x);
   };
   for (const NumberUpdate* const end = updates + count; updates != end; ++updates) {
     if (updates->dots)
-      product = updates->divides ? take_dots<true>(*updates, product, factors, f)
-                                 : take_dots<false>(*updates, product, factors, f);
+      product = updates->divides ? take_dots<true>(*updates, product, f, x)
+                                 : take_dots<false>(*updates, product, f, x);
     else if (updates->count == 1)
       take.template operator()<1>(*updates);
     else if (updates->count == kBlock)

@@ -36,7 +36,7 @@
 namespace mbcosim {
 
 struct LuOptions {
-  static constexpr std::size_t kMostListed = std::size_t{128} << 20;
+  static constexpr std::size_t kMostListed = std::size_t{128} << 20;  ///< bytes
 
   const PanelVersion& version = *panel_versions().back();
   /// With few products for each of its numbers a matrix is factored and solved by lists of
