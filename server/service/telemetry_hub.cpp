@@ -15,6 +15,7 @@ using Clock = std::chrono::steady_clock;
 using Wire = google::protobuf::internal::WireFormatLite;
 constexpr std::int64_t kSampleBytes = 96;       ///< of one sample, besides its values
 constexpr std::int64_t kSerialized = 64 << 10;  ///< bytes of samples kept for equal subscriptions
+constexpr std::int64_t kLookForLate = 64;       // samples between two looks at who reads too late
 constexpr std::chrono::milliseconds kRound(5);  // shortest time between two rounds of waking
 constexpr std::chrono::seconds kLastRead(10);   // that long the end waits for readers
 
@@ -116,6 +117,7 @@ void TelemetryHub::remove(const SubscriptionPtr& subscription) {
   std::erase(blockers_, subscription);
   std::erase(decimators_, subscription);
   if (std::exchange(subscription->hungry, false)) --hungry_;
+  drop_what_is_late(*subscription);
   release(*std::exchange(subscription->feed, nullptr));
   subscription->kept.clear();
   subscription->share = MemoryShare();
@@ -171,6 +173,9 @@ void TelemetryHub::publish(const Simulation& simulation) {
     work_.evaluations += track.record(simulation);
     for (const SubscriptionPtr& s : decimators_)
       if (s->feed->track == &track) keep_for(*s);
+    if (track.end() % kLookForLate == 0)
+      for (const SubscriptionPtr& s : subscriptions_)
+        if (s->feed->track == &track) drop_what_is_late(*s);
     news_ = true;
   }
   if (!blockers_.empty()) look_for_blocks();

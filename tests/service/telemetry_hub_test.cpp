@@ -94,6 +94,28 @@ TEST_F(Telemetry, DropOldestKeepsTheNewestAndCounts) {
   EXPECT_EQ(batch.samples(0).sequence(), 6);
 }
 
+// Whoever looks at /metrics while a reader stands still, or after it went, sees what it lost.
+TEST_F(Telemetry, WhatAReaderThatStandsStillLosesIsCounted) {
+  Metrics metrics;
+  hub_ = std::make_shared<TelemetryHub>(memory_, workers_.lanes, workers_.timer, &metrics);
+  const auto counted = [&] {
+    const std::string text = metrics.text(), name = "\nmbcosim_samples_dropped_total ";
+    return std::stoi(text.substr(text.find(name) + name.size()));
+  };
+  const auto s = subscribe(v1::OVERFLOW_POLICY_DROP_OLDEST, 3);
+  step(64);
+  EXPECT_EQ(counted(), 61);
+  step(70);
+  EXPECT_EQ(counted(), 128 - 3);
+  const v1::SubscribeReply batch = take(*s);
+  EXPECT_EQ(batch.dropped(), 131);
+  EXPECT_EQ(batch.samples(0).step(), 132);
+  EXPECT_EQ(counted(), 131);
+  step(8);
+  hub_->remove(s);
+  EXPECT_EQ(counted(), 136);
+}
+
 TEST_F(Telemetry, DecimateWidensTheIntervalAndCounts) {
   const auto s = subscribe(v1::OVERFLOW_POLICY_DECIMATE, 4);
   step(5);  // 1 2 3 4 are full: 2 and 4 go
