@@ -22,12 +22,13 @@ void add_external_loads(const EvalContext& context, std::vector<double>& r) {
 }
 
 /// Calls action(part, range, context) for the node equations and all sets, in the tiles and waves
-/// of the model's plan.
-template <class Action>
-void each_tile(const EvalContext& context, Evaluators* evaluators, Action action) {
+/// of the model's plan; before each tile begin(tile).
+template <class Begin, class Action>
+void each_tile(const EvalContext& context, Evaluators* evaluators, Begin begin, Action action) {
   const Model& model = *context.model;
   const AssemblyPlan& plan = model.assembly;
   const auto evaluate = [&](int tile, const EvalContext& own) {
+    begin(tile);
     action(model.node_equations, plan.elements(tile, model.node_equations.size()), own);
     for (const auto& set : model.sets)
       action(std::as_const(*set), plan.elements(tile, set->size()), own);
@@ -55,9 +56,11 @@ void compute_residual(EvalContext context, Scratch& scratch, std::vector<double>
   context.scratch = &scratch;
   accumulate(context);
   std::fill(r.begin(), r.end(), 0.0);
-  each_tile(context, evaluators, [&](const auto& part, ElementRange range, const EvalContext& own) {
-    part.residual(own, r.data(), range);
-  });
+  each_tile(
+      context, evaluators, [](int) {},
+      [&](const auto& part, ElementRange range, const EvalContext& own) {
+        part.residual(own, r.data(), range);
+      });
   add_external_loads(context, r);
 }
 
@@ -93,15 +96,19 @@ void compute_jacobian(EvalContext context, Workspace& workspace) {
   accumulate(context);
   compute_seeds(context, workspace.seeds, workspace.team());
   double* const values = workspace.values.data();
-  each_piece(workspace.team(), static_cast<int>(workspace.values.size()),
-             [&](int first, int last) { std::fill(values + first, values + last, 0.0); });
-  each_tile(context, workspace.evaluators.get(),
-            [&](const auto& part, ElementRange range, const EvalContext& own) {
-              if constexpr (std::is_same_v<decltype(part), const NodeEquations&>)
-                part.jacobian(own, values, range);
-              else
-                part.jacobian(own, workspace.seeds.data(), values, range);
-            });
+  const auto clear = [&](std::span<const ValueRange> ranges) {
+    for (const ValueRange& r : ranges) std::fill(values + r.first, values + r.last, 0.0);
+  };
+  const AssemblyPlan& plan = context.model->assembly;
+  clear(plan.begun_before());
+  each_tile(
+      context, workspace.evaluators.get(), [&](int tile) { clear(plan.begun_by(tile)); },
+      [&](const auto& part, ElementRange range, const EvalContext& own) {
+        if constexpr (std::is_same_v<decltype(part), const NodeEquations&>)
+          part.jacobian(own, values, range);
+        else
+          part.jacobian(own, workspace.seeds.data(), values, range);
+      });
 }
 
 void update_rotations(const Model& model, State& state, ThreadTeam* team) {

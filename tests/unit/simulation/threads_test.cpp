@@ -2,12 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "beam_line.h"
 #include "simulation/simulation.h"
+#include "solver/system.h"
 
 namespace mbcosim::threads_test {
 namespace {
@@ -124,6 +126,52 @@ TEST(AssemblyPlan, TilesOfAWaveAddToDifferentRows) {
   ASSERT_GT(tiles.size(), 10u);
   for (std::size_t k = 0; k < tiles.size(); ++k) EXPECT_EQ(tiles[k], static_cast<int>(k));
   EXPECT_LT(plan.waves(), 5);
+}
+
+/// The same with rods between nodes that are far apart in the deck, hence between many tiles.
+Line braced_line() {
+  Line line = long_line();
+  constexpr int kRods = 400;
+  line.joints += kRods;
+  for (int k = 1; k <= kRods; ++k)
+    line.supports += " joint: " + std::to_string(k + 1) + ", rod, " + std::to_string(k) + ", " +
+                     std::to_string(1001 - k) + ", from nodes, linear elastic, 1e3;\n";
+  return line;
+}
+
+// Tiles set to zero what they are the first to add to. Were a value left as it was, or set to zero
+// after somebody had added to it, the sum would not be that of all parts one after the other.
+TEST(AssemblyPlan, EachValueIsSetToZeroBeforeAnybodyAddsToIt) {
+  for (const Line& line : {long_line(), braced_line()}) {
+    const ModelPtr model = model_of(line.deck());
+    ASSERT_TRUE(model);
+    const auto simulation = started(model, 1);
+    ASSERT_FALSE(simulation->step_many(2).error);
+    const State state = simulation->state();
+    EvalContext context = model->context(state, Phase::step, 1e-3, 1e-3);
+    Workspace plain(*model);
+    context.scratch = &plain.scratch;
+    compute_seeds(context, plain.seeds, nullptr);
+    double* const sum = plain.values.data();
+    model->node_equations.jacobian(context, sum,
+                                   {0, static_cast<int>(model->node_equations.size())});
+    for (const auto& set : model->sets)
+      set->jacobian(context, plain.seeds.data(), sum, {0, set->size()});
+    double largest = 0;
+    for (const double value : plain.values) largest = std::max(largest, std::abs(value));
+    for (const int threads : {1, 2}) {
+      Workspace workspace(*model);
+      workspace.set_threads(threads);
+      std::fill(workspace.values.begin(), workspace.values.end(), std::nan(""));
+      compute_jacobian(context, workspace);
+      double furthest = 0;
+      for (std::size_t k = 0; k < plain.values.size(); ++k)
+        furthest = std::fmax(furthest, std::abs(workspace.values[k] - plain.values[k]));
+      EXPECT_LE(furthest, 1e-14 * largest) << line.joints << " joints, " << threads << " threads";
+      EXPECT_TRUE(std::none_of(workspace.values.begin(), workspace.values.end(),
+                               [](double value) { return std::isnan(value); }));
+    }
+  }
 }
 
 TEST(AssemblyPlan, SmallModelsAreOneTile) {
