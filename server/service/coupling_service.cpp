@@ -22,6 +22,8 @@ class AttachHandler final : public Handler, public PeerLink {
     parse(exchange.memory(), bytes, &message_, &share_);
     if (!greeted_) return exchange.post(Lane::work, [this, &exchange] { greet(exchange); });
     try {
+      Guard guard(mutex_);
+      if (!seat_) return;  // given up meanwhile: the call ends, whatever the peer still sends
       seat_->receive(message_);
     } catch (...) {
       return leave(exchange, status_of_exception(parts_.runtime, exchange.method(),
@@ -104,7 +106,7 @@ class AttachHandler final : public Handler, public PeerLink {
   v1::PeerMessage message_;
   std::atomic<bool> greeted_{false};
   Mutex mutex_;
-  std::unique_ptr<PeerSeat> seat_;  ///< changes under the lock, after `greeted_` only to go
+  std::unique_ptr<PeerSeat> seat_ TS_GUARDED_BY(mutex_);
   Timer::Id timer_ TS_GUARDED_BY(mutex_) = 0;
   bool over_ TS_GUARDED_BY(mutex_) = false;
 };

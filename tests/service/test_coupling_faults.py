@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 
+import grpc
 import pytest
 
 import mbcosim
@@ -257,6 +258,29 @@ def test_a_silent_peer_is_gone_though_no_step_asks_it(server, processes, daemon)
         wait_for(lambda: not simulation.describe().ports[0].has_peer)
         assert 0.15 < time.monotonic() - start < 2 * TIME_FACTOR
         stop.set()
+
+
+def test_a_simulation_may_be_deleted_while_its_peer_talks_on(server, daemon):
+    from mbcosim import exchange
+    from mbcosim.coupling import open_stream
+    from mbcosim.v1 import coupling_pb2 as pb
+    for k in range(100):
+        with oscillator(server) as simulation:
+            stop = threading.Event()
+
+            def messages():
+                yield exchange.hello(simulation, "spring")
+                while not stop.is_set():
+                    yield pb.PeerMessage(heartbeat=pb.Heartbeat(count=1))
+
+            stream = open_stream(server._channel)(messages(), metadata=server.metadata)
+            next(stream)
+            time.sleep(0.002 * (k % 5))
+        with pytest.raises(grpc.RpcError) as ended:
+            next(stream)
+        stop.set()
+        assert "deleted" in ended.value.details(), ended.value
+    assert server.list() == [] and daemon.alive()
 
 
 # ---------------------------------------------------------------- lost and repeated messages
