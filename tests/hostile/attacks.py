@@ -27,7 +27,7 @@ from fuzzer import Fuzzer
 from requests_of_http import Requests
 from google.protobuf import descriptor_pool, message_factory
 from google.protobuf.duration_pb2 import Duration
-from mbcosim.v1 import (coupling_pb2, events_pb2, geometry_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb,
+from mbcosim.v1 import (coupling_pb2, coupling_pb2_grpc, events_pb2, geometry_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb,
                         simulations_pb2_grpc, telemetry_pb2, telemetry_pb2_grpc)
 
 BODY = """
@@ -111,6 +111,32 @@ class Attacker:
         attack = local_attacks.SharedMemory(self, Fuzzer(self.random))
         while self.going():
             attack.once()
+
+    def talkative(self):
+        """Peers that talk on while their simulation is deleted."""
+        attach = coupling_pb2_grpc.CouplingStub(self.channel).Attach
+        while self.going():
+            name = self.create(lease=Duration(seconds=5), ports=[local_attacks.PORT])
+            if not name:
+                time.sleep(0.05)
+                continue
+            stop = threading.Event()
+            stream = attach(self.talk(name, stop), metadata=self.metadata, timeout=10)
+            try:
+                next(stream)
+                time.sleep(self.random.choice([0, 0.001, 0.005]))
+                self.call(self.stub.DeleteSimulation, pb.DeleteSimulationRequest(simulation=name))
+                for _ in stream:
+                    pass
+            except grpc.RpcError as error:
+                self.codes[error.code().name] += 1
+            stop.set()
+
+    @staticmethod
+    def talk(name, stop):
+        yield coupling_pb2.PeerMessage(hello=coupling_pb2.Hello(simulation=name, port="p"))
+        while not stop.is_set():
+            yield coupling_pb2.PeerMessage(heartbeat=coupling_pb2.Heartbeat(count=1))
 
     def folder(self):
         """Files of the state folder that change under the daemon."""
@@ -421,7 +447,7 @@ def is_open(connection):
 # What each kind must have come to, or it attacks nothing.
 KINDS = {"fuzz": ["OK", "INVALID_ARGUMENT", "NOT_FOUND"], "cancel": ["CANCELLED"], "race": ["OK", "NOT_FOUND"], "slow": ["OK"],
          "silent": ["UNAUTHENTICATED"], "half_open": ["OK"], "greedy": ["OK"], "large": ["CANCELLED"],
-         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"], "shared_memory": ["OK"], "folder": ["OK", "DATA_LOSS"],
+         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"], "shared_memory": ["OK"], "talkative": ["OK", "NOT_FOUND"], "folder": ["OK", "DATA_LOSS"],
          "states": ["OK", "FAILED_PRECONDITION", "DATA_LOSS"], "checkpoints": ["OK", "DATA_LOSS"]}
 
 
