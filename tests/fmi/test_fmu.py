@@ -59,7 +59,9 @@ def long_chain(exported, tmp_path_factory):
     """long_chain(standard): the tutorial's chain, which goes on for so long that other threads have their turn during a call."""
     path = tmp_path_factory.mktemp("deck") / "long_chain.mbd"
     with open(os.path.join(MODELS, "chain.mbd")) as file:
-        path.write_text(file.read().replace("final time: 3.;", "final time: 30.;"))
+        text = file.read()
+    assert text.count("final time: 3.;") == 1
+    path.write_text(text.replace("final time: 3.;", "final time: 30.;"))
     return lambda standard="3": exported(str(path), standard)
 
 

@@ -447,7 +447,8 @@ def is_open(connection):
 # What each kind must have come to, or it attacks nothing.
 KINDS = {"fuzz": ["OK", "INVALID_ARGUMENT", "NOT_FOUND"], "cancel": ["CANCELLED"], "race": ["OK", "NOT_FOUND"], "slow": ["OK"],
          "silent": ["UNAUTHENTICATED"], "half_open": ["OK"], "greedy": ["OK"], "large": ["CANCELLED"],
-         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"], "shared_memory": ["OK"], "talkative": ["OK", "NOT_FOUND"], "folder": ["OK", "DATA_LOSS"],
+         "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"], "shared_memory": ["OK"],
+         "talkative": ["OK", "NOT_FOUND"], "folder": ["OK", "DATA_LOSS"],
          "states": ["OK", "FAILED_PRECONDITION", "DATA_LOSS"], "checkpoints": ["OK", "DATA_LOSS"]}
 
 

@@ -128,7 +128,7 @@ TEST(AssemblyPlan, TilesOfAWaveAddToDifferentRows) {
   EXPECT_LT(plan.waves(), 5);
 }
 
-/// The same with rods between nodes that are far apart in the deck, hence between many tiles.
+/// The long line with rods between nodes that are far apart in the deck, hence between many tiles.
 Line braced_line() {
   Line line = long_line();
   constexpr int kRods = 400;
