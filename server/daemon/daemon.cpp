@@ -97,6 +97,12 @@ int worker_count(int wanted) {
   return wanted > 0 ? wanted : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
+/// As many as a busy server needs: half of the cores leave the others to what is computed.
+int most_pollers() {
+  constexpr int kLeast = 2, kMost = 16;
+  return std::clamp(worker_count(0) / 2, kLeast, kMost);
+}
+
 /// Of "NAME=ROLE", by identity. Names may have `=` in them.
 std::map<std::string, Role> certificate_roles(const std::vector<std::string>& given) {
   std::map<std::string, Role> roles;
@@ -180,10 +186,15 @@ Daemon::Daemon(const Config& config)
   add_methods();
   watch_values();
   durability_.start(parts_);
-  listen();
-  if (config_.shared_memory) open_shared_memory();
-  if (!config_.http.empty()) open_http();
-  if (config_.resume == "eager") eager_resume_.start(parts_);
+  try {
+    listen();
+    if (config_.shared_memory) open_shared_memory();
+    if (!config_.http.empty()) open_http();
+    if (config_.resume == "eager") eager_resume_.start(parts_);
+  } catch (...) {
+    if (server_) shut_down();
+    throw;
+  }
 }
 
 namespace {
@@ -277,10 +288,13 @@ void Daemon::listen() {
         grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
         credentials_for(address)));
   }
-  builder.RegisterCallbackGenericService(&gate_);
+  builder.RegisterAsyncGenericService(&gate_.service());
+  auto queue = builder.AddCompletionQueue();
   expose_metrics();
   server_ = builder.BuildAndStart();
   if (!server_) throw std::runtime_error("the server cannot start");
+  pollers_.emplace(std::move(queue), most_pollers());
+  gate_.open(pollers_->queue());
   for (std::size_t i = 0; i < listeners_.size(); ++i) {
     listeners_[i]->start(std::move(acceptors[i]));
     spdlog::info("listening on {}", listeners_[i]->bound());
@@ -391,8 +405,9 @@ bool let_go_of_grpc(std::chrono::seconds wait) {
 
 // gRPC closes no connection in the middle of a write: a client that stands still with its socket
 // full would hold it for ever.
-void Daemon::end_server() {
+bool Daemon::end_server() {
   static constexpr std::chrono::milliseconds kLastWords(500);
+  constexpr std::chrono::seconds kLastCalls(5);
   std::promise<void> ended;
   std::thread cutter([this, end = ended.get_future()] {
     run_caught("shutdown", [&] {
@@ -405,8 +420,11 @@ void Daemon::end_server() {
   server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace + kLastWords);
   ended.set_value();
   cutter.join();
+  if (!gate_.empty_within(kLastCalls)) return false;  // each needs the server to its end
   listeners_.clear();
   server_.reset();
+  pollers_->stop();
+  return true;
 }
 
 bool Daemon::shut_down() {
@@ -421,10 +439,10 @@ bool Daemon::shut_down() {
   shared_memory_.clear();
   // Its threads look once in a second or two whether they are to end.
   std::thread door_ends([this] { run_caught("http", [this] { door_.reset(); }); });
-  end_server();
+  const bool calls_ended = end_server();
   door_ends.join();
   metrics_.close();
-  const bool ended = workers_.lanes.stop(kLastJobs);
+  const bool ended = workers_.lanes.stop(kLastJobs) && calls_ended;
   durability_.stop(!ended);
   spdlog::info(ended ? "stopped" : "stopped; work that went on is dropped");
   return ended && let_go_of_grpc(kLastJobs);

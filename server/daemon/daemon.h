@@ -15,6 +15,7 @@
 #include "daemon/tls.h"
 #include "http/door.h"
 #include "rpc/health.h"
+#include "rpc/pollers.h"
 #include "rpc/workers.h"
 #include "service/config.h"
 #include "service/deck_sockets.h"
@@ -47,7 +48,7 @@ class Daemon {
   void listen();
   void open_shared_memory();
   void open_http();
-  void end_server();
+  bool end_server();
   void check_listener(const std::string& address) const;
   std::shared_ptr<grpc::ServerCredentials> credentials_for(const std::string& address) const;
 
@@ -70,6 +71,7 @@ class Daemon {
   Gate gate_;
   Health health_;
   const Parts parts_;
+  std::optional<Pollers> pollers_;
   std::unique_ptr<grpc::Server> server_;
   std::vector<std::unique_ptr<Listener>> listeners_;
   std::vector<std::unique_ptr<SharedMemoryService>> shared_memory_;  ///< one for each Unix socket

@@ -4,18 +4,13 @@
 
 #include <algorithm>
 #include <new>
+#include <thread>
 
 namespace mbcosim::server {
 namespace {
 
 constexpr std::chrono::seconds kLinger{10};  // that long an ended call waits for its client to read
-
-/// Refuses a call when there is not even memory to look at it.
-class RefusedCall final : public grpc::ServerGenericBidiReactor {
- public:
-  explicit RefusedCall(const grpc::Status& status) { Finish(status); }
-  void OnDone() override { delete this; }
-};
+constexpr std::chrono::milliseconds kForMemory{20};  // is waited when there is none for a call
 
 }  // namespace
 
@@ -41,27 +36,46 @@ void Handler::start(Exchange& exchange) { exchange.read(Exchange::kMessageWait);
 
 // ------------------------------------------------------------------ beginning
 
-void Exchange::start(const Method* method) {
-  guarded([&] {
-    grpc::GenericCallbackServerContext* context = nullptr;
-    {
-      Guard guard(mutex_);
-      self_ = shared_from_this();
-      context = context_;
-    }
-    if (gate_.closing()) throw shutting_down();
-    if (!method)
-      throw Refusal(v1::REASON_NOT_SERVED, "no method is named \"" + method_.substr(0, 100) + "\"");
-    if (!method->open) caller_ = runtime_.authenticator.check(*context, method->role);
-    label(*context);
-    if (method->counted != Counted::no) take_place(*context, method->counted == Counted::stream);
-    stream_ = method->counted == Counted::stream;
-    handler_ = method->make();
-    handler_->start(*this);
-  });
+// Whatever begins an operation holds the lock: its end is not looked at before.
+void Exchange::await(grpc::AsyncGenericService& service, grpc::ServerCompletionQueue& queue) {
+  Guard guard(mutex_);
+  rpc_->context.AsyncNotifyWhenDone(&course_);
+  service.RequestCall(&rpc_->context, &rpc_->stream, &queue, &queue, &coming_);
+  operations_ = 2;  // the call's coming and its course
+  self_ = shared_from_this();
 }
 
-void Exchange::label(const grpc::GenericCallbackServerContext& context) {
+void Exchange::has_come(bool ok) {
+  if (!ok) return let_go(2);  // the server ends; what did not come takes no course
+  gate_.await_call();
+  const grpc::GenericServerContext* context = nullptr;
+  {
+    Guard guard(mutex_);
+    came_ = true;
+    if (over_early_)
+      cancel();
+    else
+      context = &rpc_->context;
+  }
+  if (context) guarded([&] { start(*context); });
+  let_go();
+}
+
+void Exchange::start(const grpc::GenericServerContext& context) {
+  method_ = context.method();
+  if (gate_.closing()) throw shutting_down();
+  const Method* method = gate_.find(method_);
+  if (!method)
+    throw Refusal(v1::REASON_NOT_SERVED, "no method is named \"" + method_.substr(0, 100) + "\"");
+  if (!method->open) caller_ = runtime_.authenticator.check(context, method->role);
+  label(context);
+  if (method->counted != Counted::no) take_place(context, method->counted == Counted::stream);
+  stream_ = method->counted == Counted::stream;
+  handler_ = method->make();
+  handler_->start(*this);
+}
+
+void Exchange::label(const grpc::GenericServerContext& context) {
   const auto service = method_.rfind('.');  // of "/mbcosim.v1.Simulations/Step"
   labels_.method = service == std::string::npos ? method_ : method_.substr(service + 1);
   labels_.identity = caller_.identity;
@@ -70,7 +84,7 @@ void Exchange::label(const grpc::GenericCallbackServerContext& context) {
     labels_.trace_id = trace_id_of({found->second.data(), found->second.size()});
 }
 
-void Exchange::take_place(const grpc::GenericCallbackServerContext& context, bool stream) {
+void Exchange::take_place(const grpc::GenericServerContext& context, bool stream) {
   constexpr std::string_view kTcp[] = {"ipv4:", "ipv6:"};
   const std::string peer = context.peer();
   const bool told_apart = std::any_of(std::begin(kTcp), std::end(kTcp), [&](std::string_view kind) {
@@ -101,13 +115,14 @@ void Exchange::guarded(const std::function<void()>& body) noexcept {
 
 void Exchange::read(std::optional<Clock::duration> longest) {
   Guard guard(mutex_);
-  if (!context_ || finished_) return;
+  if (!came_ || finished_) return;
   if (longest) {
     wait_ = runtime_.timer.after(*longest, [weak = weak_from_this(), wait = *longest] {
       if (const auto self = weak.lock()) self->message_is_late(wait);
     });
   }
-  StartRead(&in_);
+  ++operations_;
+  rpc_->stream.Read(&in_, &reading_);
 }
 
 void Exchange::message_is_late(Clock::duration longest) {
@@ -124,7 +139,7 @@ void Exchange::message_is_late(Clock::duration longest) {
 
 void Exchange::write(grpc::ByteBuffer message) {
   Guard guard(mutex_);
-  if (!context_ || end_) return;
+  if (!came_ || end_) return;
   queue_.push_back(std::move(message));
   go_on();
 }
@@ -137,7 +152,7 @@ bool Exchange::all_written() const {
 bool Exchange::write_by(grpc::ByteBuffer message, Clock::time_point deadline) {
   Guard guard(mutex_);
   while (writing_ && !end_ && Clock::now() < deadline) written_.wait_until(mutex_, deadline);
-  if (writing_ || end_ || !context_) return false;
+  if (writing_ || end_ || !came_) return false;
   queue_.push_back(std::move(message));
   go_on();
   return true;
@@ -150,14 +165,14 @@ void Exchange::finish(grpc::Status status) {
 
 void Exchange::end(grpc::ByteBuffer message) {
   Guard guard(mutex_);
-  if (!context_ || end_) return;
+  if (!came_ || end_) return;
   queue_.push_back(std::move(message));
   want_finish(grpc::Status::OK);
 }
 
 void Exchange::hang_up() {
   Guard guard(mutex_);
-  if (context_) context_->TryCancel();
+  if (came_) rpc_->context.TryCancel();
 }
 
 void Exchange::post(Lane lane, std::function<void()> work) {
@@ -198,7 +213,7 @@ void Exchange::abandon() { finish(shutting_down().status()); }
 // ------------------------------------------------------------------ writing
 
 void Exchange::want_finish(grpc::Status status) {
-  if (!context_ || end_) return;
+  if (!came_ || end_) return;
   end_ = std::move(status);
   written_.notify_all();
   go_on();
@@ -214,77 +229,111 @@ void Exchange::go_on() {
   if (queue_.empty()) {
     if (!end_) return;
     finished_ = true;
-    Finish(*end_);
+    ++operations_;
+    rpc_->stream.Finish(*end_, &finishing_);
     return;
   }
   out_ = std::move(queue_.front());
   queue_.pop_front();
   if (end_ && queue_.empty()) {
     finished_ = true;
-    StartWriteAndFinish(&out_, {}, *end_);
+    ++operations_;
+    rpc_->stream.WriteAndFinish(out_, {}, *end_, &finishing_);
     return;
   }
   writing_ = true;
-  StartWrite(&out_);
+  ++operations_;
+  rpc_->stream.Write(out_, &sending_);
 }
 
 // ------------------------------------------------------------------ from gRPC
 
-void Exchange::OnReadDone(bool ok) {
+void Exchange::has_read(bool ok) {
   Timer::Id wait = 0;
   {
     Guard guard(mutex_);
     wait = std::exchange(wait_, 0);
   }
   if (wait != 0) runtime_.timer.cancel(wait);
-  if (call_.cancelled()) return;
-  guarded([&] {
-    if (!ok) return handler_->on_half_close(*this);
-    grpc::ByteBuffer message;
-    message.Swap(&in_);
-    handler_->on_message(*this, std::move(message));
-  });
+  if (!call_.cancelled()) {
+    guarded([&] {
+      if (!ok) return handler_->on_half_close(*this);
+      grpc::ByteBuffer message;
+      message.Swap(&in_);
+      handler_->on_message(*this, std::move(message));
+    });
+  }
+  let_go();
 }
 
-void Exchange::OnWriteDone(bool ok) {
+void Exchange::has_written(bool ok) {
+  bool goes_on = false;
   {
     Guard guard(mutex_);
     writing_ = false;
     out_.Clear();
     if (!ok) queue_.clear();
     go_on();
-    if (writing_ || end_) return;
+    goes_on = writing_ || end_;
   }
-  written_.notify_all();
-  if (ok) guarded([&] { handler_->on_written(*this); });
+  if (!goes_on) {
+    written_.notify_all();
+    if (ok) guarded([&] { handler_->on_written(*this); });
+  }
+  let_go();
 }
 
-void Exchange::OnCancel() {
-  call_.cancel();
-  Guard guard(mutex_);
-  queue_.clear();
-  if (end_) {
-    go_on();
-    return;
+void Exchange::has_finished(bool) { let_go(); }
+
+void Exchange::is_over(bool) {
+  bool cancelled = false;
+  {
+    Guard guard(mutex_);
+    over_early_ = !came_;
+    cancelled = came_ && rpc_->context.IsCancelled();
   }
-  end_ = grpc::Status::CANCELLED;
-  written_.notify_all();
+  if (cancelled) {
+    call_.cancel();
+    Guard guard(mutex_);
+    cancel();
+  }
+  let_go();
+}
+
+void Exchange::cancel() {
+  queue_.clear();
+  if (!end_) {
+    end_ = grpc::Status::CANCELLED;
+    written_.notify_all();
+  }
   go_on();
 }
 
-void Exchange::OnDone() {
+void Exchange::let_go(int operations) {
+  {
+    Guard guard(mutex_);
+    operations_ -= operations;
+    if (operations_ > 0) return;
+  }
+  leave();
+}
+
+void Exchange::leave() {
   bool delivered = false;
   Timer::Id linger = 0, wait = 0;
   std::shared_ptr<Exchange> self;
+  std::unique_ptr<Rpc> rpc;
   {
     Guard guard(mutex_);
-    delivered = !context_->IsCancelled();
-    context_ = nullptr;
+    delivered = came_ && !rpc_->context.IsCancelled();
+    came_ = false;
+    rpc = std::move(rpc_);
     ticket_ = {};
     linger = std::exchange(linger_, 0);
     wait = std::exchange(wait_, 0);
     self = std::move(self_);
   }
+  rpc.reset();
   call_.cancel();
   written_.notify_all();
   if (linger != 0) runtime_.timer.cancel(linger);
@@ -297,24 +346,48 @@ void Exchange::OnDone() {
 
 // ------------------------------------------------------------------ the gate
 
-grpc::ServerGenericBidiReactor* Gate::CreateReactor(grpc::GenericCallbackServerContext* context) {
-  try {
-    const auto exchange = std::make_shared<Exchange>(*this, runtime_, context);
-    {
-      Guard guard(mutex_);
-      calls_.emplace(exchange.get(), exchange);
+void Gate::open(grpc::ServerCompletionQueue& queue) {
+  queue_ = &queue;
+  await_call();
+}
+
+const Method* Gate::find(const std::string& path) const {
+  const auto found = methods_.find(path);
+  return found == methods_.end() ? nullptr : &found->second;
+}
+
+// Without memory for a call none can be answered: those that come wait until there is some.
+void Gate::await_call() noexcept {
+  for (;;) {
+    try {
+      const auto exchange = std::make_shared<Exchange>(*this, runtime_);
+      {
+        Guard guard(mutex_);
+        calls_.emplace(exchange.get(), exchange);
+      }
+      try {
+        return exchange->await(service_, *queue_);
+      } catch (const std::bad_alloc&) {
+        forget(exchange.get());
+      }
+    } catch (const std::bad_alloc&) {
     }
-    const auto found = methods_.find(context->method());
-    exchange->start(found == methods_.end() ? nullptr : &found->second);
-    return exchange.get();
-  } catch (const std::exception&) {
-    return new RefusedCall({grpc::StatusCode::RESOURCE_EXHAUSTED, "the server is out of memory"});
+    std::this_thread::sleep_for(kForMemory);
   }
 }
 
 void Gate::forget(Exchange* exchange) {
   Guard guard(mutex_);
   calls_.erase(exchange);
+  if (calls_.empty()) forgotten_.notify_all();
+}
+
+bool Gate::empty_within(std::chrono::milliseconds wait) {
+  const auto end = std::chrono::steady_clock::now() + wait;
+  Guard guard(mutex_);
+  while (!calls_.empty() && std::chrono::steady_clock::now() < end)
+    forgotten_.wait_until(mutex_, end);
+  return calls_.empty();
 }
 
 std::vector<std::shared_ptr<Exchange>> Gate::open_calls() {

@@ -17,6 +17,7 @@
 #include "rpc/call.h"
 #include "rpc/call_scope.h"
 #include "rpc/lanes.h"
+#include "rpc/pollers.h"
 #include "threads/timer.h"
 #include "wire/memory.h"
 #include "wire/refusal.h"
@@ -26,7 +27,7 @@ namespace mbcosim::server {
 class Exchange;
 class Gate;
 
-/// What a method does with one call. `on_…` come from gRPC's threads, messages one after the other,
+/// What a method does with one call. `on_…` come from the pollers, messages one after the other,
 /// and must not wait: work is posted to a lane. What they throw ends the call.
 class Handler {
  public:
@@ -70,8 +71,7 @@ grpc::Status status_of_exception(const Runtime& runtime, const std::string& meth
                                  const std::string& identity);
 
 /// Thread-safe. Lives until gRPC and all work posted have let go of it.
-class Exchange final : public grpc::ServerGenericBidiReactor,
-                       public std::enable_shared_from_this<Exchange> {
+class Exchange final : public std::enable_shared_from_this<Exchange> {
  public:
   using Clock = std::chrono::steady_clock;
   /// Longest wait for a message that the protocol wants next.
@@ -79,12 +79,11 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
   /// Longest rest of a stream that has no reason to stay open.
   static constexpr std::chrono::minutes kIdleStream{5};
 
-  Exchange(Gate& gate, const Runtime& runtime, grpc::GenericCallbackServerContext* context)
-      : gate_(gate), runtime_(runtime), method_(context->method()), context_(context) {}
+  Exchange(Gate& gate, const Runtime& runtime) : gate_(gate), runtime_(runtime) {}
 
-  /// Checks who calls and how much there is already; from then on the handler acts. `method`: null
-  /// when there is none of that name.
-  void start(const Method* method);
+  /// Asks gRPC for the next call that comes.
+  void await(grpc::AsyncGenericService& service, grpc::ServerCompletionQueue& queue)
+      TS_EXCLUDES(mutex_);
   /// The server ends: work is interrupted, idle streams end with SHUTTING_DOWN.
   void shut_down() TS_EXCLUDES(mutex_);
   /// Ends with SHUTTING_DOWN, whatever work goes on.
@@ -120,13 +119,35 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
   void guarded(const std::function<void()>& body) noexcept;
 
  private:
-  void OnReadDone(bool ok) override TS_EXCLUDES(mutex_);
-  void OnWriteDone(bool ok) override TS_EXCLUDES(mutex_);
-  void OnCancel() override TS_EXCLUDES(mutex_);
-  void OnDone() override TS_EXCLUDES(mutex_);
-  void label(const grpc::GenericCallbackServerContext& context);
-  void take_place(const grpc::GenericCallbackServerContext& context, bool stream)
-      TS_EXCLUDES(mutex_);
+  /// What gRPC does for the call; its end is told by a member function.
+  class Operation final : public Pollers::Event {
+   public:
+    using Ended = void (Exchange::*)(bool ok);
+    Operation(Exchange& exchange, Ended ended) : exchange_(exchange), ended_(ended) {}
+    /// The exchange may be gone after that, and this with it.
+    void happened(bool ok) override { (exchange_.*ended_)(ok); }
+
+   private:
+    Exchange& exchange_;
+    const Ended ended_;
+  };
+  /// What gRPC has of the call.
+  struct Rpc {
+    grpc::GenericServerContext context;
+    grpc::GenericServerAsyncReaderWriter stream{&context};
+  };
+
+  void has_come(bool ok) TS_EXCLUDES(mutex_);
+  void is_over(bool ok) TS_EXCLUDES(mutex_);
+  void has_read(bool ok) TS_EXCLUDES(mutex_);
+  void has_written(bool ok) TS_EXCLUDES(mutex_);
+  void has_finished(bool ok) TS_EXCLUDES(mutex_);
+  void let_go(int operations = 1) TS_EXCLUDES(mutex_);
+  void leave() TS_EXCLUDES(mutex_);
+  void start(const grpc::GenericServerContext& context) TS_EXCLUDES(mutex_);
+  void cancel() TS_REQUIRES(mutex_);
+  void label(const grpc::GenericServerContext& context);
+  void take_place(const grpc::GenericServerContext& context, bool stream) TS_EXCLUDES(mutex_);
   void go_on() TS_REQUIRES(mutex_);
   void end_job() TS_EXCLUDES(mutex_);
   void message_is_late(Clock::duration longest) TS_EXCLUDES(mutex_);
@@ -134,18 +155,24 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
 
   Gate& gate_;
   const Runtime& runtime_;
-  const std::string method_;
+  std::string method_;  ///< this and the next two are complete before the handler is there
   Caller caller_;
-  CallLabels labels_;  ///< complete before the handler is there
+  CallLabels labels_;
   Call call_;
   bool stream_ = false;
   std::unique_ptr<Handler> handler_;
+  Operation coming_{*this, &Exchange::has_come}, course_{*this, &Exchange::is_over},
+      reading_{*this, &Exchange::has_read}, sending_{*this, &Exchange::has_written},
+      finishing_{*this, &Exchange::has_finished};
   grpc::ByteBuffer in_;  ///< of the one read that may be under way
 
   mutable Mutex mutex_;
   Condition written_;
-  grpc::GenericCallbackServerContext* context_ TS_GUARDED_BY(mutex_);  ///< null after the end
-  std::shared_ptr<Exchange> self_ TS_GUARDED_BY(mutex_);               ///< gRPC's share
+  std::unique_ptr<Rpc> rpc_ TS_GUARDED_BY(mutex_) = std::make_unique<Rpc>();  ///< until the end
+  bool came_ TS_GUARDED_BY(mutex_) = false;                                   ///< and is not over
+  bool over_early_ TS_GUARDED_BY(mutex_) = false;         ///< it was over before it was known here
+  int operations_ TS_GUARDED_BY(mutex_) = 0;              ///< that gRPC has yet to end
+  std::shared_ptr<Exchange> self_ TS_GUARDED_BY(mutex_);  ///< gRPC's share
   Admission::Ticket ticket_ TS_GUARDED_BY(mutex_);
   Timer::Id wait_ TS_GUARDED_BY(mutex_) = 0;    ///< for a message
   Timer::Id linger_ TS_GUARDED_BY(mutex_) = 0;  ///< for a client that does not read the end
@@ -158,29 +185,39 @@ class Exchange final : public grpc::ServerGenericBidiReactor,
 };
 
 /// Answers every call to the server from its table of methods.
-class Gate final : public grpc::CallbackGenericService {
+class Gate final {
  public:
   explicit Gate(const Runtime& runtime) : runtime_(runtime) {}
   /// "/mbcosim.v1.Simulations/Step". Before the server starts.
   void add(const std::string& path, Method method) { methods_.emplace(path, std::move(method)); }
   const std::map<std::string, Method>& methods() const { return methods_; }
-  grpc::ServerGenericBidiReactor* CreateReactor(
-      grpc::GenericCallbackServerContext* context) override;
+  /// To be registered with the server.
+  grpc::AsyncGenericService& service() { return service_; }
+  /// Takes calls from now on. The server has started; the queue is polled.
+  void open(grpc::ServerCompletionQueue& queue);
   /// Refuses new calls, ends idle ones and interrupts the others.
   void close() TS_EXCLUDES(mutex_);
   /// After `close`: ends what is open still.
   void abandon() TS_EXCLUDES(mutex_);
+  /// After the server has ended. True: within that time the last call has ended, too, so that
+  /// nothing more is begun on the queue.
+  bool empty_within(std::chrono::milliseconds wait) TS_EXCLUDES(mutex_);
   bool closing() const { return closing_.load(); }
 
  private:
   friend class Exchange;
+  const Method* find(const std::string& path) const;
+  void await_call() noexcept TS_EXCLUDES(mutex_);
   void forget(Exchange* exchange) TS_EXCLUDES(mutex_);
   std::vector<std::shared_ptr<Exchange>> open_calls() TS_EXCLUDES(mutex_);
 
   const Runtime& runtime_;
   std::map<std::string, Method> methods_;
+  grpc::AsyncGenericService service_;
+  grpc::ServerCompletionQueue* queue_ = nullptr;
   std::atomic<bool> closing_{false};
   Mutex mutex_;
+  Condition forgotten_;
   std::map<Exchange*, std::weak_ptr<Exchange>> calls_ TS_GUARDED_BY(mutex_);
 };
 

@@ -1,4 +1,4 @@
-/// grpc.health.v1: answered on gRPC's own threads, so that it waits behind nothing.
+/// grpc.health.v1: answered by the pollers, so that it waits behind nothing.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-/// Where the work of calls is done; on gRPC's own threads only what takes but a moment.
+/// Where the work of calls is done; by the pollers only what takes but a moment.
 #pragma once
 
 #include <algorithm>
@@ -42,8 +42,8 @@ class Lanes {
     if (on_start_) job = timed(lane, std::move(job));
     pool(lane).post(owner, std::move(job));
   }
-  /// Who has it may work on a thread of gRPC. There is one, and gRPC has two threads at least: the
-  /// others go on with all other calls, however long that work turns out to be. Try it, never wait.
+  /// Who has it may work as a poller. There is one, and there are two pollers at least: the others
+  /// go on with all other calls, however long that work turns out to be. Try it, never wait.
   Mutex& at_once() { return at_once_; }
   /// Drops what has not started. True: what had started has ended within `wait`.
   bool stop(std::chrono::milliseconds wait) {

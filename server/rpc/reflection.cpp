@@ -74,7 +74,7 @@ void answer(const Gate& gate, const reflection::ServerReflectionRequest& request
   }
 }
 
-/// Short questions about constant things: answered on gRPC's threads, one at a time.
+/// Short questions about constant things: answered by the pollers, one at a time.
 class ReflectionHandler final : public Handler {
  public:
   explicit ReflectionHandler(const Gate& gate) : gate_(gate) {}

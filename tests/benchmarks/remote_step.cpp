@@ -8,7 +8,9 @@
 /// echo, queue   by a completion queue that one thread polls: the quickest that gRPC has
 /// echo, callback, sync   by its two other interfaces
 /// engine        a step in this process
-/// in turn       a step of the next of `--many` simulations, each on a stream of its own
+/// in turn       a step of the next of `--many` simulations, each on a stream of its own, or an
+/// echo
+///               (queue, Unix socket) on the next of as many streams
 ///
 /// All take turns of `--exchanges`. Of each: the median of the turns' medians, the lowest of them
 /// and the 99th percentile of all [us]; processor time of both processes [us]. Of a step: medians
@@ -261,8 +263,9 @@ double ratio(const std::vector<double>& a, const std::vector<double>& engine,
 
 struct EchoStream {
   explicit EchoStream(const std::string& address)
-      : stub(v1::Simulations::NewStub(
-            grpc::CreateChannel(address, grpc::InsecureChannelCredentials()))) {
+      : EchoStream(grpc::CreateChannel(address, grpc::InsecureChannelCredentials())) {}
+  explicit EchoStream(const std::shared_ptr<grpc::Channel>& channel)
+      : stub(v1::Simulations::NewStub(channel)) {
     context.set_wait_for_ready(true);
     stream = stub->StepStream(&context);
     request.set_steps(1);
@@ -414,16 +417,25 @@ int run(const Options& options) {
 
   std::vector<std::unique_ptr<Stepped>> many;
   for (int k = 0; k < options.many; ++k) many.push_back(std::make_unique<Stepped>(servers[0]));
-  std::size_t next = 0;
+  const auto channel =
+      grpc::CreateChannel(Place::of("", "unix", 1).address, grpc::InsecureChannelCredentials());
+  std::vector<std::unique_ptr<EchoStream>> many_echoes;
+  for (int k = 0; k < options.many; ++k)
+    many_echoes.push_back(std::make_unique<EchoStream>(channel));
+  std::size_t next = 0, next_echo = 0;
+  const std::string count = std::to_string(options.many);
   Lane alone(
       "one alone", [&] { stepped[0]->stepper.step(); }, &daemon);
   Lane in_turn(
-      std::to_string(options.many) + " in turn",
-      [&] { many[next++ % many.size()]->stepper.step(); }, &daemon);
-  for (int turn = 0; turn < options.turns && !many.empty(); ++turn) {
-    alone.take_turn(options.exchanges);
-    in_turn.take_turn(options.exchanges);
-  }
+      count + " in turn", [&] { many[next++ % many.size()]->stepper.step(); }, &daemon);
+  Lane echo_alone(
+      "echo alone", [&] { streams[0]->exchange(); }, echoes[0].get());
+  Lane echo_in_turn(
+      count + " echoes in turn", [&] { many_echoes[next_echo++ % many.size()]->exchange(); },
+      echoes[0].get());
+  for (int turn = 0; turn < options.turns && !many.empty(); ++turn)
+    for (Lane* lane : {&alone, &in_turn, &echo_alone, &echo_in_turn})
+      lane->take_turn(options.exchanges);
 
   std::printf("%-22s %9s %9s %9s %9s %9s\n", "[us]", "median", "lowest", "p99", "client", "server");
   Table table;
@@ -437,6 +449,8 @@ int run(const Options& options) {
   if (!many.empty()) {
     table.add(alone);
     table.add(in_turn, {{"ratio", ratio(in_turn.medians(), {}, alone.medians())}});
+    table.add(echo_alone);
+    table.add(echo_in_turn, {{"ratio", ratio(echo_in_turn.medians(), {}, echo_alone.medians())}});
   }
   if (!options.json.empty()) table.write(options.json);
   return 0;

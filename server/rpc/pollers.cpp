@@ -1,0 +1,119 @@
+#include "rpc/pollers.h"
+
+#include <pthread.h>
+
+#include <algorithm>
+
+#include "threads/top_frame.h"
+
+namespace mbcosim::server {
+namespace {
+
+constexpr double kMemory = 0.875;      // of a look's weight that is left at the next: about 8 looks
+constexpr double kOften = 0.8;         // part of the looks
+constexpr int kRestAfter = 40;         // looks without an event
+constexpr const char* kName = "poll";  // of the threads
+
+}  // namespace
+
+Pollers::Pollers(std::unique_ptr<grpc::ServerCompletionQueue> queue, int most)
+    : queue_(std::move(queue)), most_(std::max(2, most)) {
+  try {
+    for (int place = 0; place < most_; ++place)
+      threads_.emplace_back([this, place] { run_caught(kName, [&] { poll(place); }); });
+    threads_.emplace_back([this] { run_caught(kName, [this] { watch(); }); });
+  } catch (...) {  // the system grants no more threads
+    stop();
+    throw;
+  }
+}
+
+int Pollers::admitted() const {
+  Guard guard(mutex_);
+  return admitted_;
+}
+
+void Pollers::stop() {
+  {
+    Guard guard(mutex_);
+    if (std::exchange(stop_, true)) return;
+  }
+  queue_->Shutdown();
+  admission_.notify_all();
+  watch_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+// ------------------------------------------------------------------ polling
+
+void Pollers::poll(int place) {
+  pthread_setname_np(pthread_self(), kName);
+  for (;;) {
+    wait_for_admission(place);
+    void* tag = nullptr;
+    bool ok = false;
+    ++waiting_;
+    const bool more = queue_->Next(&tag, &ok);
+    --waiting_;
+    if (!more) return;  // the queue is empty and takes no more
+    ++events_;
+    if (watch_rests_.load()) wake_watch();
+    run_caught(kName, [&] { static_cast<Event*>(tag)->happened(ok); });
+  }
+}
+
+void Pollers::wait_for_admission(int place) {
+  if (place == 0) return;  // always is; this comes with each event
+  Guard guard(mutex_);
+  while (place >= admitted_ && !stop_) admission_.wait(mutex_);
+}
+
+// ------------------------------------------------------------------ the watch
+
+void Pollers::watch() {
+  pthread_setname_np(pthread_self(), kName);
+  Guard guard(mutex_);
+  while (!stop_) {
+    watch_.wait_for(mutex_, kLook);
+    look();
+    if (load_.looks_without > kRestAfter) rest();
+  }
+}
+
+void Pollers::look() {
+  const int waiting = waiting_.load();
+  const std::uint64_t events = events_.load();
+  const bool moved = std::exchange(load_.events, events) != events;
+  load_.looks_without = moved || waiting == 0 ? 0 : load_.looks_without + 1;
+  const auto weigh = [](double& part, bool seen) {
+    part = kMemory * part + (1 - kMemory) * (seen ? 1 : 0);
+  };
+  weigh(load_.none_waits, waiting == 0);
+  weigh(load_.several_wait, waiting > 1);
+  const bool held_up = waiting == 0 && !moved;
+  if ((held_up || load_.none_waits > kOften) && admitted_ < most_) {
+    ++admitted_;
+    load_.none_waits = load_.several_wait = 0;
+    admission_.notify_all();
+  } else if (load_.several_wait > kOften && admitted_ > 1) {
+    --admitted_;
+    load_.none_waits = load_.several_wait = 0;
+  }
+}
+
+// Between its looks nothing may happen for hours. Whoever takes an event counts it first and then
+// asks whether the watch rests: one of the two sees the other.
+void Pollers::rest() {
+  watch_rests_.store(true);
+  if (events_.load() != load_.events) watch_rests_.store(false);
+  while (watch_rests_.load() && !stop_) watch_.wait(mutex_);
+  load_.looks_without = 0;
+}
+
+void Pollers::wake_watch() {
+  Guard guard(mutex_);
+  watch_rests_.store(false);
+  watch_.notify_all();
+}
+
+}  // namespace mbcosim::server

@@ -1,0 +1,151 @@
+/// Threads that take events of gRPC: one as long as it keeps up, more when it does not.
+#include "rpc/pollers.h"
+
+#include <grpcpp/alarm.h>
+#include <grpcpp/server_builder.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <future>
+#include <set>
+
+namespace mbcosim::server::pollers_test {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kPatience = 20s;
+
+/// An event that comes through the queue at once, as often as it is asked for.
+class Bell final : public Pollers::Event {
+ public:
+  Bell(Pollers& pollers, std::function<void()> rung) : pollers_(pollers), rung_(std::move(rung)) {}
+  void ring() { alarm_.Set(&pollers_.queue(), gpr_now(GPR_CLOCK_MONOTONIC), this); }
+  void happened(bool ok) override {
+    if (ok) rung_();
+  }
+
+ private:
+  Pollers& pollers_;
+  grpc::Alarm alarm_;
+  const std::function<void()> rung_;
+};
+
+class PollersTest : public testing::Test {
+ protected:
+  Pollers& pollers() { return pollers_; }
+  bool admitted_becomes(int count) const {
+    for (const auto end = Clock::now() + kPatience; Clock::now() < end;
+         std::this_thread::sleep_for(1ms))
+      if (pollers_.admitted() == count) return true;
+    return false;
+  }
+  /// Rings and waits until it has been heard.
+  void hear_one() {
+    std::promise<void> heard;
+    Bell bell(pollers_, [&] { heard.set_value(); });
+    bell.ring();
+    ASSERT_EQ(heard.get_future().wait_for(kPatience), std::future_status::ready);
+  }
+
+ private:
+  grpc::ServerBuilder builder_;
+  Pollers pollers_{builder_.AddCompletionQueue(), 3};
+};
+
+TEST_F(PollersTest, OneThreadTakesAllWhileItKeepsUp) {
+  std::set<std::thread::id> threads;
+  std::promise<void> heard;
+  int count = 0;
+  Bell* again = nullptr;
+  Bell bell(pollers(), [&] {
+    threads.insert(std::this_thread::get_id());
+    if (++count == 200)
+      heard.set_value();
+    else
+      again->ring();
+  });
+  again = &bell;
+  bell.ring();
+  ASSERT_EQ(heard.get_future().wait_for(kPatience), std::future_status::ready);
+  EXPECT_EQ(threads.size(), 1u);
+  EXPECT_EQ(pollers().admitted(), 1);
+}
+
+// Also when nothing has happened for so long that the watch rests.
+TEST_F(PollersTest, AnotherGoesOnWhileOneIsHeldUp) {
+  for (const auto pause : {0ms, 1000ms}) {
+    std::this_thread::sleep_for(pause);
+    std::promise<void> held, free;
+    Bell holds(pollers(), [&] {
+      held.set_value();
+      free.get_future().wait();
+    });
+    holds.ring();
+    ASSERT_EQ(held.get_future().wait_for(kPatience), std::future_status::ready);
+    hear_one();
+    free.set_value();
+    EXPECT_TRUE(admitted_becomes(1)) << pause.count();
+  }
+}
+
+TEST_F(PollersTest, MoreShareWhatIsTooMuchForOne) {
+  std::atomic<bool> enough{false};
+  std::atomic<int> ringing{3};
+  std::vector<std::unique_ptr<Bell>> bells;
+  for (std::size_t k = 0; k < 3; ++k) {
+    bells.push_back(std::make_unique<Bell>(pollers(), [&, k] {
+      for (const auto end = Clock::now() + 300us; Clock::now() < end;) {
+      }
+      if (enough)
+        --ringing;
+      else
+        bells[k]->ring();
+    }));
+  }
+  for (const auto& bell : bells) bell->ring();
+  const auto start = Clock::now();
+  while (pollers().admitted() == 1 && Clock::now() < start + kPatience)
+    std::this_thread::sleep_for(1ms);
+  EXPECT_GT(pollers().admitted(), 1);
+  enough = true;
+  while (ringing > 0 && Clock::now() < start + 2 * kPatience) std::this_thread::sleep_for(1ms);
+  EXPECT_EQ(ringing, 0);
+  EXPECT_TRUE(admitted_becomes(1));
+}
+
+TEST_F(PollersTest, WhatAnEventThrowsEndsNoThread) {
+  std::promise<void> thrown;
+  Bell bell(pollers(), [&] {
+    thrown.set_value();
+    throw std::runtime_error("from an event");
+  });
+  bell.ring();
+  ASSERT_EQ(thrown.get_future().wait_for(kPatience), std::future_status::ready);
+  hear_one();
+}
+
+// An alarm that has been set is an event that must come: cancelled, at the latest.
+TEST(Pollers, TakesWhatIsLeftAtTheEnd) {
+  grpc::ServerBuilder builder;
+  std::promise<bool> came;
+  struct Last final : Pollers::Event {
+    explicit Last(std::promise<bool>& out) : came(out) {}
+    void happened(bool ok) override { came.set_value(ok); }
+    std::promise<bool>& came;
+  } last(came);
+  auto alarm = std::make_unique<grpc::Alarm>();
+  Pollers pollers(builder.AddCompletionQueue(), 2);
+  alarm->Set(&pollers.queue(), std::chrono::system_clock::now() + 1h, &last);
+  std::thread cancels([&] {
+    std::this_thread::sleep_for(20ms);
+    alarm->Cancel();
+  });
+  pollers.stop();
+  EXPECT_FALSE(came.get_future().get());
+  cancels.join();
+}
+
+}  // namespace
+}  // namespace mbcosim::server::pollers_test
