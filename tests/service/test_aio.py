@@ -136,7 +136,7 @@ def test_a_peer_that_computes_while_the_server_dies_is_told(start_daemon):
                 await dead.wait()
                 return spring(motion)
 
-            peer = await simulation.couple("spring", slow, peer_timeout=600, heartbeat_timeout=0.3)
+            peer = await simulation.couple("spring", slow, peer_timeout=600, heartbeat_timeout=0.5 * TIME_FACTOR)
             step = asyncio.ensure_future(simulation.step())
             await begun.wait()
             daemon.kill()

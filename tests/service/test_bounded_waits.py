@@ -265,14 +265,16 @@ def test_asyncio_notices_a_silent_server_in_a_step_without_a_timeout_and_in_a_lo
 
 
 def test_an_awaited_peer_shows_signs_of_life_while_it_computes(daemon):
+    silence = 0.6 * TIME_FACTOR
+
     async def main():
         async with mbcosim.aio.connect(daemon.address) as server:
             async with await server.load_text(decks.body(final_time="100.", spin="null"), ports=PORT) as simulation:
                 async def slow(motion):
-                    await asyncio.sleep(1.5)
+                    await asyncio.sleep(2.5 * silence)
                     return spring(motion)
 
-                async with await simulation.couple("spring", slow, heartbeat_timeout=0.6, server_timeout=1.5) as peer:
+                async with await simulation.couple("spring", slow, heartbeat_timeout=silence, server_timeout=2.5 * silence) as peer:
                     await simulation.step(1)
                     assert peer.error is None
 

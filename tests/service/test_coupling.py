@@ -345,8 +345,9 @@ def test_a_peer_may_want_signs_of_life(start_daemon):
     import signal
     daemon = start_daemon()
     with daemon.connect() as server, oscillator(server) as simulation:
-        with simulation.couple("spring", spring, server_timeout=0.5) as peer:
-            time.sleep(1.5)
+        silence = 0.5 * TIME_FACTOR
+        with simulation.couple("spring", spring, server_timeout=silence) as peer:
+            time.sleep(3 * silence)
             assert peer.error is None and simulation.step().step == 1
             daemon.process.send_signal(signal.SIGSTOP)
             wait_for(lambda: peer.error is not None, 5)

@@ -4,7 +4,7 @@ import pytest
 
 import decks
 import mbcosim
-from conftest import wait_for
+from conftest import TIME_FACTOR, wait_for
 from test_coupling import STIFFNESS, exact, spring
 
 STEP = 1e-3  # [s]; a load that starts with a step acts during a part of it only
@@ -108,7 +108,7 @@ def test_missing_reference_loads_are_told(server):
 def test_without_a_peer_the_step_fails(server):
     text = external('grpc, port, "p", 1, 1')
     with server.load_text(text) as simulation:
-        with simulation.couple("p", spring, peer_timeout=0.2):
+        with simulation.couple("p", spring, peer_timeout=0.5 * TIME_FACTOR):
             simulation.step()
         wait_for(lambda: not simulation.describe().ports[0].has_peer)
         with pytest.raises(mbcosim.StepFailed, match='port "p": the peer is gone'):
