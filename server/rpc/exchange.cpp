@@ -356,9 +356,10 @@ const Method* Gate::find(const std::string& path) const {
   return found == methods_.end() ? nullptr : &found->second;
 }
 
-// Without memory for a call none can be answered: those that come wait until there is some.
+// Without memory for a call none can be answered: those that come wait until there is some, or the
+// server ends.
 void Gate::await_call() noexcept {
-  for (;;) {
+  do {
     try {
       const auto exchange = std::make_shared<Exchange>(*this, runtime_);
       {
@@ -373,7 +374,7 @@ void Gate::await_call() noexcept {
     } catch (const std::bad_alloc&) {
     }
     std::this_thread::sleep_for(kForMemory);
-  }
+  } while (!closing());
 }
 
 void Gate::forget(Exchange* exchange) {
