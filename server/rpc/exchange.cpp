@@ -191,7 +191,10 @@ void Exchange::do_at_once(const std::function<void()>& work) {
     Guard guard(mutex_);
     ++jobs_;
   }
-  guarded(work);
+  {
+    const Pollers::Work of_poller;
+    guarded(work);
+  }
   end_job();
 }
 

@@ -113,7 +113,7 @@ class Exchange final : public std::enable_shared_from_this<Exchange> {
   void hang_up() TS_EXCLUDES(mutex_);
   /// Does work in a lane, unless the call is over by then. What it throws ends the call.
   void post(Lane lane, std::function<void()> work) TS_EXCLUDES(mutex_);
-  /// Does work, which takes but a moment, on this thread. What it throws ends the call.
+  /// Does work, which takes but a moment, on this thread, a poller's. What it throws ends the call.
   void do_at_once(const std::function<void()>& work) TS_EXCLUDES(mutex_);
   /// Calls `body`; what it throws ends the call.
   void guarded(const std::function<void()>& body) noexcept;

@@ -1,5 +1,6 @@
 #include "rpc/pollers.h"
 
+#include <grpc/support/time.h>
 #include <pthread.h>
 
 #include <algorithm>
@@ -13,6 +14,12 @@ constexpr double kMemory = 0.875;      // of a look's weight that is left at the
 constexpr double kOften = 0.8;         // part of the looks
 constexpr int kRestAfter = 40;         // looks without an event
 constexpr const char* kName = "poll";  // of the threads
+
+/// The last work of this thread.
+thread_local struct {
+  std::chrono::steady_clock::time_point end;
+  bool another_soon = false;
+} last_work;
 
 }  // namespace
 
@@ -53,14 +60,38 @@ void Pollers::poll(int place) {
     void* tag = nullptr;
     bool ok = false;
     ++waiting_;
-    const bool more = queue_->Next(&tag, &ok);
+    const Status status = next(place, &tag, &ok);
     --waiting_;
-    if (!more) return;  // the queue is empty and takes no more
+    if (status == Status::SHUTDOWN) return;  // the queue is empty and takes no more
     ++events_;
     if (watch_rests_.load()) wake_watch();
     run_caught(kName, [&] { static_cast<Event*>(tag)->happened(ok); });
   }
 }
+
+Pollers::Status Pollers::next(int place, void** tag, bool* ok) {
+  Status status = Status::TIMEOUT;
+  if (place == 0 && last_work.another_soon) status = look_until(last_work.end + kSoon, tag, ok);
+  if (status != Status::TIMEOUT) return status;
+  return queue_->Next(tag, ok) ? Status::GOT_EVENT : Status::SHUTDOWN;
+}
+
+// Other threads that want the core get it.
+Pollers::Status Pollers::look_until(Clock::time_point end, void** tag, bool* ok) {
+  while (Clock::now() < end) {
+    const Status status = queue_->AsyncNext(tag, ok, gpr_time_0(GPR_CLOCK_MONOTONIC));
+    if (status != Status::TIMEOUT) return status;
+    std::this_thread::yield();
+  }
+  return Status::TIMEOUT;
+}
+
+Pollers::Work::Work() {
+  static const bool may_look = std::thread::hardware_concurrency() > 1;  // one is the client's
+  last_work.another_soon = may_look && Clock::now() - last_work.end < kSoon;
+}
+
+Pollers::Work::~Work() { last_work.end = Clock::now(); }
 
 void Pollers::wait_for_admission(int place) {
   if (place == 0) return;  // always is; this comes with each event

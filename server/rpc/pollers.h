@@ -32,6 +32,18 @@ class Pollers {
   };
   static constexpr std::chrono::milliseconds kLook{5};
 
+  /// What a poller does itself for a client that waits for it, while it lives. When such work
+  /// follows the last one as soon as `kSoon`, the next is likely to, too: until then the thread
+  /// looks for it without going to sleep, as waking would take as long.
+  class Work {
+   public:
+    Work();
+    ~Work();
+    Work(const Work&) = delete;
+    Work& operator=(const Work&) = delete;
+  };
+  static constexpr std::chrono::microseconds kSoon{75};
+
   /// `most`: threads at once, at least 2.
   Pollers(std::unique_ptr<grpc::ServerCompletionQueue> queue, int most);
   ~Pollers() { stop(); }
@@ -46,6 +58,10 @@ class Pollers {
 
  private:
   void poll(int place);
+  using Clock = std::chrono::steady_clock;
+  using Status = grpc::CompletionQueue::NextStatus;
+  Status next(int place, void** tag, bool* ok);
+  Status look_until(Clock::time_point end, void** tag, bool* ok);
   void wait_for_admission(int place) TS_EXCLUDES(mutex_);
   void watch() TS_EXCLUDES(mutex_);
   void look() TS_REQUIRES(mutex_);

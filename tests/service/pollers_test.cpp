@@ -115,6 +115,25 @@ TEST_F(PollersTest, MoreShareWhatIsTooMuchForOne) {
   EXPECT_TRUE(admitted_becomes(1));
 }
 
+// Work that follows work at once: the thread does not sleep between, also when the end comes.
+TEST_F(PollersTest, LooksForTheNextPieceOfWork) {
+  int count = 0;
+  std::promise<void> heard;
+  std::atomic<bool> rings{false};
+  Bell bell(pollers(), [&] {
+    const Pollers::Work work;
+    rings = ++count < 500;
+    if (!rings) heard.set_value();
+  });
+  std::future<void> all = heard.get_future();
+  bell.ring();
+  while (all.wait_for(0s) != std::future_status::ready)
+    if (rings.exchange(false)) bell.ring();
+  pollers().stop();
+  EXPECT_EQ(count, 500);
+  EXPECT_EQ(pollers().admitted(), 1);
+}
+
 TEST_F(PollersTest, WhatAnEventThrowsEndsNoThread) {
   std::promise<void> thrown;
   Bell bell(pollers(), [&] {
