@@ -647,3 +647,13 @@ def test_a_client_that_hangs_up_interrupts_its_run(door, server, endless):
         wait_for(lambda: state(door, simulation) == "SIMULATION_STATE_STEPPING")
         link.close()
         wait_for(lambda: state(door, simulation) == "SIMULATION_STATE_READY")
+
+
+def test_a_port_that_is_taken_ends_the_daemon_in_order(tmp_path):
+    """gRPC serves already by then."""
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        ended = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/s", "--http", address],
+                               stderr=subprocess.PIPE, text=True, timeout=30 * TIME_FACTOR)
+    assert ended.returncode == 4 and f"cannot serve HTTP on {address}; is it in use?" in ended.stderr, ended.stderr
+    assert not os.path.exists(tmp_path / "s")
