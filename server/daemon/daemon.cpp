@@ -289,11 +289,10 @@ void Daemon::listen() {
         credentials_for(address)));
   }
   builder.RegisterAsyncGenericService(&gate_.service());
-  auto queue = builder.AddCompletionQueue();
+  pollers_.emplace(builder.AddCompletionQueue(), most_pollers());  // there before the server is
   expose_metrics();
   server_ = builder.BuildAndStart();
   if (!server_) throw std::runtime_error("the server cannot start");
-  pollers_.emplace(std::move(queue), most_pollers());
   gate_.open(pollers_->queue());
   for (std::size_t i = 0; i < listeners_.size(); ++i) {
     listeners_[i]->start(std::move(acceptors[i]));

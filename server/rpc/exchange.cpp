@@ -363,18 +363,16 @@ const Method* Gate::find(const std::string& path) const {
 // server ends.
 void Gate::await_call() noexcept {
   do {
+    std::shared_ptr<Exchange> exchange;
     try {
-      const auto exchange = std::make_shared<Exchange>(*this, runtime_);
+      exchange = std::make_shared<Exchange>(*this, runtime_);
       {
         Guard guard(mutex_);
         calls_.emplace(exchange.get(), exchange);
       }
-      try {
-        return exchange->await(service_, *queue_);
-      } catch (const std::bad_alloc&) {
-        forget(exchange.get());
-      }
+      return exchange->await(service_, *queue_);
     } catch (const std::bad_alloc&) {
+      forget(exchange.get());
     }
     std::this_thread::sleep_for(kForMemory);
   } while (!closing());

@@ -57,9 +57,9 @@ class Pollers {
   void stop() TS_EXCLUDES(mutex_);
 
  private:
-  void poll(int place);
   using Clock = std::chrono::steady_clock;
   using Status = grpc::CompletionQueue::NextStatus;
+  void poll(int place);
   Status next(int place, void** tag, bool* ok);
   Status look_until(Clock::time_point end, void** tag, bool* ok);
   void wait_for_admission(int place) TS_EXCLUDES(mutex_);

@@ -8,9 +8,8 @@
 /// echo, queue   by a completion queue that one thread polls: the quickest that gRPC has
 /// echo, callback, sync   by its two other interfaces
 /// engine        a step in this process
-/// in turn       a step of the next of `--many` simulations, each on a stream of its own, or an
-/// echo
-///               (queue, Unix socket) on the next of as many streams
+/// in turn       a step of the next of `--many` simulations, each on a stream of its own
+/// echoes in turn   an echo (queue, Unix socket) on the next of as many streams
 ///
 /// All take turns of `--exchanges`. Of each: the median of the turns' medians, the lowest of them
 /// and the 99th percentile of all [us]; processor time of both processes [us]. Of a step: medians
