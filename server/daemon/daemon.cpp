@@ -16,7 +16,10 @@
 #include <cstring>
 #include <fstream>
 #include <future>
+#include <latch>
+#include <system_error>
 #include <thread>
+#include <vector>
 
 #include "daemon/tls.h"
 #include "grpc/health/v1/health.grpc.pb.h"
@@ -103,6 +106,23 @@ int most_pollers() {
   return std::clamp(worker_count(0) / 2, kLeast, kMost);
 }
 
+/// gRPC would wait without end for threads of its own that it could not start.
+void check_threads() {
+  const std::size_t needed = 24 + static_cast<std::size_t>(most_pollers());
+  std::latch end(1);
+  std::vector<std::jthread> threads;  // destroyed first: each has been let go by then
+  try {
+    while (threads.size() < needed) threads.emplace_back([&end] { end.wait(); });
+  } catch (const std::exception&) {  // the number tells
+  }
+  end.count_down();
+  if (threads.size() < needed)
+    throw std::runtime_error(
+        "the system grants the server too few threads (ulimit -u, a container's limit of "
+        "processes, systemd's TasksMax): to start it needs " +
+        std::to_string(needed - threads.size()) + " more");
+}
+
 /// Of "NAME=ROLE", by identity. Names may have `=` in them.
 std::map<std::string, Role> certificate_roles(const std::vector<std::string>& given) {
   std::map<std::string, Role> roles;
@@ -127,9 +147,10 @@ Authenticator make_authenticator(const Config& config) {
   return authenticator;
 }
 
-/// Throws when options contradict each other. Fills in the share that one identity gets of what
-/// there is: half, where there are several.
+/// Throws when options contradict each other, or there are too few threads. Fills in the share that
+/// one identity gets of what there is: half, where there are several.
 Config checked(Config config) {
+  check_threads();
   const bool tls = !config.tls_certificate.empty();
   if (tls == config.tls_key.empty())
     throw std::runtime_error("--tls-certificate and --tls-key belong together");
@@ -393,11 +414,26 @@ namespace {
 bool let_go_of_grpc(std::chrono::seconds wait) {
   const auto done = std::make_shared<std::promise<void>>();
   const std::future<void> end = done->get_future();
-  std::thread([done] {
-    grpc_shutdown();
-    done->set_value();
-  }).detach();
+  try {
+    std::thread([done] {
+      grpc_shutdown();
+      done->set_value();
+    }).detach();
+  } catch (const std::system_error&) {  // the system grants no thread for it
+    return false;
+  }
   return end.wait_for(wait) == std::future_status::ready;
+}
+
+/// Calls `body` in a thread of its own; where the system grants none, `alone` in this one.
+std::thread beside(const char* name, const std::function<void()>& body,
+                   const std::function<void()>& alone) {
+  try {
+    return std::thread([=] { run_caught(name, body); });
+  } catch (const std::system_error&) {
+    run_caught(name, alone);
+    return {};
+  }
 }
 
 }  // namespace
@@ -408,17 +444,17 @@ bool Daemon::end_server() {
   static constexpr std::chrono::milliseconds kLastWords(500);
   constexpr std::chrono::seconds kLastCalls(5);
   std::promise<void> ended;
-  std::thread cutter([this, end = ended.get_future()] {
-    run_caught("shutdown", [&] {
-      if (end.wait_for(config_.shutdown_grace) == std::future_status::ready) return;
-      gate_.abandon();
-      if (end.wait_for(kLastWords) == std::future_status::ready) return;
-      for (const auto& listener : listeners_) listener->cut();
-    });
-  });
+  const auto cut_off = [this, end = ended.get_future()](std::chrono::seconds grace) {
+    if (end.wait_for(grace) == std::future_status::ready) return;
+    gate_.abandon();
+    if (end.wait_for(kLastWords) == std::future_status::ready) return;
+    for (const auto& listener : listeners_) listener->cut();
+  };
+  std::thread cutter = beside(
+      "shutdown", [&] { cut_off(config_.shutdown_grace); }, [&] { cut_off({}); });
   server_->Shutdown(std::chrono::system_clock::now() + config_.shutdown_grace + kLastWords);
   ended.set_value();
-  cutter.join();
+  if (cutter.joinable()) cutter.join();
   if (!gate_.empty_within(kLastCalls)) return false;  // each needs the server to its end
   listeners_.clear();
   server_.reset();
@@ -437,9 +473,10 @@ bool Daemon::shut_down() {
   store_.close_all();
   shared_memory_.clear();
   // Its threads look once in a second or two whether they are to end.
-  std::thread door_ends([this] { run_caught("http", [this] { door_.reset(); }); });
+  const auto end_door = [this] { door_.reset(); };
+  std::thread door_ends = beside("http", end_door, end_door);
   const bool calls_ended = end_server();
-  door_ends.join();
+  if (door_ends.joinable()) door_ends.join();
   metrics_.close();
   const bool ended = workers_.lanes.stop(kLastJobs) && calls_ended;
   durability_.stop(!ended);

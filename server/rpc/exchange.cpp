@@ -180,10 +180,16 @@ void Exchange::post(Lane lane, std::function<void()> work) {
     Guard guard(mutex_);
     ++jobs_;
   }
-  runtime_.lanes.post(lane, caller_.identity, [self = shared_from_this(), work = std::move(work)] {
+  auto job = [self = shared_from_this(), work = std::move(work)] {
     if (!self->call_.cancelled()) self->guarded(work);
     self->end_job();
-  });
+  };
+  try {
+    runtime_.lanes.post(lane, caller_.identity, std::move(job));
+  } catch (...) {
+    end_job();
+    throw;
+  }
 }
 
 void Exchange::do_at_once(const std::function<void()>& work) {

@@ -229,21 +229,29 @@ void SharedMemoryService::drop_silent() {
                              [&](const Silent& client) { return counts[client.process] == most; }));
 }
 
-/// For a client that asks, or has gone.
+/// For a client that asks, or has gone. Its request is read first, or it would not read the answer:
+/// a socket that is closed with something in it is reset.
 void SharedMemoryService::begin(shm::Descriptor socket) {
   const int peers = parts_.config.limits.shared_memory_peers;
-  if (connections_.size() >= static_cast<std::size_t>(peers) + kMostAsking) {
-    const grpc::Status status =
-        limit_refusal("shared_memory_peers", peers, "too many peers over shared memory").status();
-    shm::send_status(socket.get(), {status.error_code(), status.error_details()});
-    return;
-  }
   std::list<Connection> fresh(1);
   Connection& connection = fresh.front();
-  connection.thread = std::thread([this, &connection, socket = std::move(socket)]() mutable {
-    run_caught("shared memory peer", [&] { serve(std::move(socket), connection.call); });
-    connection.ended.store(true);
-  });
+  connection.socket = std::move(socket);
+  if (!shm::read_request(connection.socket.get(), &connection.request)) return;
+  const auto refuse = [&](const Refusal& refusal) {
+    const grpc::Status status = refusal.status();
+    shm::send_status(connection.socket.get(), {status.error_code(), status.error_details()});
+  };
+  if (connections_.size() >= static_cast<std::size_t>(peers) + kMostAsking)
+    return refuse(limit_refusal("shared_memory_peers", peers, "too many peers over shared memory"));
+  try {
+    connection.thread = std::thread([this, &connection] {
+      run_caught("shared memory peer", [&] { serve(connection); });
+      connection.ended.store(true);
+    });
+  } catch (const std::system_error&) {
+    return refuse(
+        limit_refusal("threads", 0, "the system grants the server no thread for this peer"));
+  }
   connections_.splice(connections_.end(), fresh);
 }
 
@@ -258,21 +266,21 @@ void SharedMemoryService::join_ended() {
   }
 }
 
-void SharedMemoryService::serve(shm::Descriptor socket, Call& call) {
-  shm::Request request;
-  if (!shm::read_request(socket.get(), &request)) return;
+void SharedMemoryService::serve(Connection& connection) {
+  shm::Descriptor socket = std::move(connection.socket);
   std::optional<shm::Channel> channel;
   grpc::Status status;
   Caller caller;
   try {
-    caller = parts_.runtime.authenticator.check_local(request.authorization, Role::control);
+    caller =
+        parts_.runtime.authenticator.check_local(connection.request.authorization, Role::control);
     const PeerPlaces::Place place(places_, caller.identity);
     const Admission::Ticket ticket = parts_.runtime.admission.admit(caller.identity, "", true);
     shm::Segment segment = shm::Segment::create();
     if (!shm::send_segment(socket.get(), segment)) return;
     channel.emplace(std::move(socket), std::move(segment), shm::Channel::Side::server,
                     static_cast<std::size_t>(parts_.config.limits.message_bytes));
-    serve_peer(*channel, caller, call);
+    serve_peer(*channel, caller, connection.call);
   } catch (...) {
     status = status_of_exception(parts_.runtime, "shared memory", caller.identity);
   }

@@ -28,6 +28,8 @@ class SharedMemoryService {
 
  private:
   struct Connection {
+    shm::Descriptor socket;
+    shm::Request request;
     Call call;
     std::thread thread;
     std::atomic<bool> ended{false};
@@ -44,7 +46,7 @@ class SharedMemoryService {
   void drop_silent();
   void begin(shm::Descriptor socket);
   void join_ended();
-  void serve(shm::Descriptor socket, Call& call);
+  void serve(Connection& connection);
   void serve_peer(shm::Channel& channel, const Caller& caller, Call& call);
 
   const std::string path_;

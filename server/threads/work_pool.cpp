@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <new>
 #include <system_error>
 #include <vector>
 
@@ -16,6 +17,8 @@ constexpr std::chrono::seconds kIdle(5);  // that long a thread waits for work b
 
 }  // namespace
 
+WorkPool::WorkPool(const Size& size) : size_(size) { add_thread(); }
+
 WorkPool::~WorkPool() {
   stop(std::chrono::hours(1));
   Guard guard(mutex_);
@@ -27,23 +30,30 @@ void WorkPool::post(const std::string& owner, Job job) {
   if (stop_) return;
   auto& place = *owners_.try_emplace(owner).first;
   place.second.jobs.push_back(std::move(job));
-  line_up(place);
+  try {
+    line_up(place);
+  } catch (...) {  // no memory: who hears of it must not find it done later
+    place.second.jobs.pop_back();
+    throw;
+  }
   if (idle_ > 0) {
     work_.notify_one();
     return;
   }
   join_ended();
-  if (static_cast<int>(threads_.size()) < size_.threads) add_thread();
-}
-
-// Without a thread of its own the job waits for one that is there.
-void WorkPool::add_thread() {
+  if (static_cast<int>(threads_.size()) >= size_.threads) return;
   try {
-    threads_.emplace_back([this] { run_caught(size_.name, [this] { work(); }); });
-  } catch (const std::system_error&) {
-    if (threads_.empty()) throw;
+    add_thread();
+  } catch (const std::system_error&) {  // the job waits for one that is there
+  } catch (const std::bad_alloc&) {     // likewise
   }
 }
+
+void WorkPool::add_thread() {
+  threads_.emplace_back([this] { run_caught(size_.name, [this] { work(); }); });
+}
+
+bool WorkPool::may_end() const { return stop_ || threads_.size() > 1; }
 
 void WorkPool::line_up(Owners::value_type& owner) {
   Owner& o = owner.second;
@@ -58,6 +68,7 @@ bool WorkPool::wait_for_turn() {
   ++idle_;
   while (turns_.empty() && !stop_ && std::chrono::steady_clock::now() < end)
     work_.wait_until(mutex_, end);
+  while (turns_.empty() && !may_end()) work_.wait(mutex_);
   --idle_;
   return !turns_.empty() && !stop_;
 }

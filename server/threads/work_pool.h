@@ -12,8 +12,9 @@
 
 namespace mbcosim::server {
 
-/// A bounded number of threads, made when they are needed and ended when they have been idle for a
-/// while. Owners take turns, each job after job in its own order of asking. Thread-safe.
+/// A bounded number of threads: one from the start, others made when they are needed, as far as the
+/// system grants them, and ended when they have been idle for a while. Owners take turns, each job
+/// after job in its own order of asking. Thread-safe.
 class WorkPool {
  public:
   using Job = std::function<void()>;
@@ -23,7 +24,7 @@ class WorkPool {
     int threads_of_owner = 1;  ///< that one owner may use at once
     int nice = 0;              ///< priority below that of the process
   };
-  explicit WorkPool(const Size& size) : size_(size) {}
+  explicit WorkPool(const Size& size);  ///< std::system_error: the system grants no thread
   ~WorkPool();
   WorkPool(const WorkPool&) = delete;
   WorkPool& operator=(const WorkPool&) = delete;
@@ -41,6 +42,7 @@ class WorkPool {
   };
   using Owners = std::map<std::string, Owner>;
   void add_thread() TS_REQUIRES(mutex_);
+  bool may_end() const TS_REQUIRES(mutex_);
   void line_up(Owners::value_type& owner) TS_REQUIRES(mutex_);
   bool wait_for_turn() TS_REQUIRES(mutex_);
   void run_one() TS_REQUIRES(mutex_);

@@ -35,16 +35,16 @@ def is_listening(path):
 
 
 class Daemon:
-    """A daemon on a socket of its own. Ends with SIGTERM and must then exit with 0."""
+    """A daemon on a socket of its own. Ends with SIGTERM and must then exit with 0. `process`: of Popen."""
 
-    def __init__(self, folder, *options):
+    def __init__(self, folder, *options, program=os.path.join(BIN, "mbcosimd"), **process):
         self.address, self.killed = f"unix:{folder}/mbcosim.sock", False
         self.log_path = os.path.join(folder, "log")
         self._log = open(self.log_path, "ab")
         self._output_path = os.path.join(folder, "output")
-        command = [os.path.join(BIN, "mbcosimd"), "--listen", self.address, "--shutdown-grace", "1", *options]
+        command = [program, "--listen", self.address, "--shutdown-grace", "1", *options]
         with open(self._output_path, "wb") as output:
-            self.process = subprocess.Popen(command, stdout=output, stderr=self._log, stdin=subprocess.DEVNULL)
+            self.process = subprocess.Popen(command, stdout=output, stderr=self._log, stdin=subprocess.DEVNULL, **process)
         wait_for(lambda: is_listening(self.address[len("unix:"):]) or not self.alive(), 30)
 
     def connect(self, **options):
