@@ -22,6 +22,8 @@ enum ExitCode {
   kInterrupted = 130
 };
 
+constexpr int kMostThreads = 1024;
+
 /// 0: as many as the machine has.
 inline int threads_or_all(int wanted) {
   return wanted > 0 ? wanted : static_cast<int>(std::thread::hardware_concurrency());
@@ -75,6 +77,9 @@ struct EigCommand {
   double time = 0;   ///< about the state at this time [s]
 };
 
+/// All that the command line knows, options of `run` that are seldom given among them. Returns the
+/// exit code.
+int command_line(int argc, char** argv);
 int run(const RunOptions& options);
 int validate(const std::string& deck, const SymbolValues& symbols, bool json);
 int describe(const std::string& deck, const SymbolValues& symbols, bool json);

@@ -1,5 +1,6 @@
 #include "cli/heap.h"
 
+#include <link.h>
 #include <malloc.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -12,15 +13,16 @@
 
 #include "math/large_pages.h"
 
-/// The program's code, as the linker has placed it.
-extern "C" const char __executable_start, etext;
+/// The program as the linker has placed it: its code, its constants and tables for exceptions in a
+/// row; its variables.
+extern "C" const char __executable_start, __data_start, end;
 
 namespace mbcosim::cli {
 
 #if defined(__GLIBC__) && !defined(MBCOSIM_SANITIZED)
 namespace {
 
-constexpr std::size_t kLeast = std::size_t{1} << 30, kFirst = 512 << 10;
+constexpr std::size_t kLeast = std::size_t{1} << 30, kFirst = 512 << 10, kStack = 48 << 10;
 constexpr int kStep = 32 << 20;  ///< also the largest threshold of glibc
 
 void keep_what_is_freed() {
@@ -29,11 +31,29 @@ void keep_what_is_freed() {
   mallopt(M_MMAP_THRESHOLD, kStep);
 }
 
+std::uintptr_t address_of(const void* place) { return reinterpret_cast<std::uintptr_t>(place); }
+
 /// All pages that have some of these bytes. A kernel that cannot leaves them to be touched.
-void get_pages(const char* begin, const char* end, int how) {
+void get_pages(std::uintptr_t begin, std::uintptr_t end, int how) {
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
-  const auto from = reinterpret_cast<std::uintptr_t>(begin) / page * page;
-  (void)madvise(reinterpret_cast<void*>(from), reinterpret_cast<std::uintptr_t>(end) - from, how);
+  begin = begin / page * page;
+  (void)madvise(reinterpret_cast<void*>(begin), end - begin, how);
+}
+
+/// Where the tables for exceptions begin.
+int find_tables(dl_phdr_info* program, std::size_t, void* found) {
+  for (int k = 0; k < program->dlpi_phnum; ++k)
+    if (const ElfW(Phdr)& part = program->dlpi_phdr[k]; part.p_type == PT_GNU_EH_FRAME)
+      *static_cast<std::uintptr_t*>(found) = program->dlpi_addr + part.p_vaddr;
+  return 1;  // the program itself is the first
+}
+
+/// Before what other files have done before `main`.
+[[gnu::constructor(101)]] void get_program() {
+  std::uintptr_t tables = 0;
+  dl_iterate_phdr(&find_tables, &tables);
+  if (tables != 0) get_pages(address_of(&__executable_start), tables, MADV_POPULATE_READ);
+  get_pages(address_of(&__data_start), address_of(&end), MADV_POPULATE_WRITE);
 }
 
 /// Addresses that the heap has at once; pages come when they are used.
@@ -55,9 +75,10 @@ bool is_unlimited(int what) {
 void begin_heap() {
 #if defined(__GLIBC__) && !defined(MBCOSIM_SANITIZED)
   keep_what_is_freed();
-  get_pages(&__executable_start, &etext, MADV_POPULATE_READ);
+  const char here = 0;  // below it the stack grows
+  get_pages(address_of(&here) - kStack, address_of(&here), MADV_POPULATE_WRITE);
   char* volatile first = static_cast<char*>(std::malloc(kFirst));
-  if (first) get_pages(first, first + kFirst, MADV_POPULATE_WRITE);
+  if (first) get_pages(address_of(first), address_of(first + kFirst), MADV_POPULATE_WRITE);
   std::free(first);
 #endif
 }

@@ -3,9 +3,10 @@
 
 namespace mbcosim::cli {
 
-/// Gets the pages of the program's code and of the first half MB of its heap at once: one by one,
-/// as they are touched, they make a small run take up to a sixth longer. Memory that is freed stays
-/// with the process. Nothing happens with another allocator than glibc's.
+/// Gets the pages of the stack that most runs use and of the first half MB of the heap at once, as
+/// the program got those of its code before `main`: one by one, as they are touched, they make a
+/// small run take up to a sixth longer. Memory that is freed stays with the process. Nothing
+/// happens with another allocator than glibc's.
 void begin_heap();
 
 /// For large models: memory comes in huge pages, too, where the kernel gives them on request

@@ -1,8 +1,9 @@
 /// What shells and `man` are told about the command line, read from the command line's own parser.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
+
+#include "cli/cli11.h"
 
 namespace mbcosim::cli {
 

@@ -1,12 +1,12 @@
 /// Words, numbers and errors of a card.
 #include "input/deck_card.h"
 
-#include <cctype>
 #include <cmath>
 #include <utility>
 
 #include "input/deck.h"
 #include "input/grammar/grammar.h"
+#include "input/lexer.h"
 #include "input/refusals.h"
 #include "input/suggest.h"
 
@@ -39,8 +39,7 @@ DeckCard::DeckCard(Deck& deck, const Statement& statement)
 SourceSpan DeckCard::head() const {
   std::size_t length = statement_.text.find_first_of(":;,");
   if (length == std::string_view::npos) length = statement_.text.size();
-  while (length > 1 && std::isspace(static_cast<unsigned char>(statement_.text[length - 1])))
-    --length;
+  while (length > 1 && is_blank(statement_.text[length - 1])) --length;
   return deck_.reading.span(statement_.file, statement_.offset, length);
 }
 
@@ -306,10 +305,8 @@ void DeckCard::refuse_unsupported(SourceSpan where, const std::string& context,
   refuse_for_good(where, context, word);
   const auto group = registry().not_supported.find(context);
   if (group == registry().not_supported.end()) return;
-  const auto entry = group->second.find(word);
-  if (entry == group->second.end()) return;
-  const auto shown = registry().display.find(word);
-  fail_unsupported(where, shown == registry().display.end() ? word : shown->second, entry->second);
+  if (const auto* const found = group->second.find(word))
+    fail_unsupported(where, std::string(found->word), std::string(found->value));
 }
 
 void DeckCard::refuse_for_good(SourceSpan where, const std::string& context,
@@ -341,8 +338,7 @@ void DeckCard::note(const std::string& message) {
 std::string DeckCard::card_name() const {
   std::string name;
   for (const char c : statement_.text.substr(0, statement_.text.find_first_of(":;,"))) {
-    const bool blank = std::isspace(static_cast<unsigned char>(c));
-    if (!blank)
+    if (!is_blank(c))
       name += c;
     else if (!name.empty() && name.back() != ' ')
       name += ' ';

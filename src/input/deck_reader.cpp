@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "input/cards.h"
+#include "input/lexer.h"
 #include "input/suggest.h"
 #include "model/check.h"
 #include "model/inverse_problem.h"
@@ -22,7 +23,7 @@ constexpr const char* kOrder =
 bool has_content(std::string_view text) {
   std::size_t i = 0;
   while (i < text.size()) {
-    if (std::isspace(static_cast<unsigned char>(text[i]))) {
+    if (is_blank(text[i])) {
       ++i;
     } else if (text[i] == '#') {
       i = std::min(text.find('\n', i), text.size());

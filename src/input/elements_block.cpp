@@ -19,7 +19,7 @@ struct Driven {
 [[noreturn]] void fail_unknown_head(DeckCard& card) {
   const Registry& registry = card.registry();
   std::vector<std::string> accepted = {"driven", "bind", "output"};
-  for (const auto& head : registry.heads) accepted.push_back(registry.display.at(head.first));
+  for (const auto& [word, head] : registry.heads) accepted.emplace_back(head.word);
   card.refuse_unsupported(card.head(), "elements", card.statement().word);
   fail_unknown_card(card, accepted);
 }
@@ -27,23 +27,21 @@ struct Driven {
 /// The reader of a head with types: consumes the type word.
 const Registry::ElementReader& typed_reader(DeckCard& card, const Registry::Head& head,
                                             ElementInfo& info) {
-  const Registry& registry = card.registry();
   const std::string& word = card.statement().word;
-  const std::string what = registry.display.at(word) + " type";
+  const std::string what = std::string(head.word) + " type";
   if (!card.more()) card.fail(what + " missing", "", "missing-argument");
   const SourceSpan where = card.next();
   const std::string type = card.peek_word();
-  const auto reader = head.types.find(type);
-  if (reader != head.types.end()) {
+  if (const auto* const found = head.types.find(type)) {
     card.skip();
-    info.type = registry.display.at(type);
-    card.set_type_form(word, reader->first);
-    return reader->second;
+    info.type = found->word;
+    card.set_type_form(word, found->key);
+    return found->value;
   }
   if (type.empty()) card.fail_expected(what + " expected");
   card.refuse_unsupported(where, word, type);
   std::vector<std::string> accepted;
-  for (const auto& t : head.types) accepted.push_back(registry.display.at(t.first));
+  for (const auto& t : head.types) accepted.emplace_back(t.word);
   card.fail_at(where, "unknown " + what + " \"" + type + "\"", suggested_word(type, accepted),
                "unknown-word");
 }
@@ -125,7 +123,7 @@ void read_element(DeckCard& card, Driven* driven = nullptr) {
   info.name = card.optional_name();
   const Registry::ElementReader& reader =
       head->second.types.empty() ? head->second.reader : typed_reader(card, head->second, info);
-  if (info.type.empty()) info.type = registry.display.at(word);
+  if (info.type.empty()) info.type = head->second.word;
   if (!head->second.types.empty()) card.set_subject(subject + " (" + info.type + ")", info.type);
   const std::size_t before = card.model().elements.size();
   std::vector<HintSample> samples;

@@ -100,10 +100,10 @@ DrivePtr DriveCard::nested_drive(std::string_view what) {
   if (take_empty()) return make_constant_drive(0);
   if (keyword("reference")) return drive_reference();
   const std::string name = peek_word();
-  const auto reader = registry().drives.find(name);
-  if (reader == registry().drives.end()) return make_constant_drive(real(what));
+  const auto* const found = registry().drives.find(name);
+  if (!found) return make_constant_drive(real(what));
   word(what);
-  return reader->second(*this);
+  return found->value(*this);
 }
 
 Vec3DrivePtr DriveCard::vec3_drive(std::string_view what, int) {

@@ -35,13 +35,10 @@ bool mentions_run_variables(const SymbolTable& symbols, std::string_view text) {
   return false;
 }
 
-template <class Map>
-std::vector<std::string> written_words(const Map& table, const Registry& registry) {
+template <class Value>
+std::vector<std::string> written_words(const WordTable<Value>& table) {
   std::vector<std::string> words;
-  for (const auto& entry : table) {
-    const auto shown = registry.display.find(entry.first);
-    words.push_back(shown == registry.display.end() ? entry.first : shown->second);
-  }
+  for (const auto& entry : table) words.emplace_back(entry.word);
   return words;
 }
 
@@ -63,7 +60,7 @@ void DeckCard::fail_word(std::string_view what, const std::string& word, const T
   const SourceSpan where = next();
   refuse_unsupported(where, context, word);
   fail_at(where, "unknown " + std::string(what) + " \"" + word + "\"",
-          suggested_word(word, written_words(table, registry())), "unknown-word");
+          suggested_word(word, written_words(table)), "unknown-word");
 }
 
 // ----------------------------------------------------------------------------------------------
@@ -104,10 +101,10 @@ DrivePtr DeckCard::drive(std::string_view what) {
   drive_depth_ = std::max(drive_depth_, nesting_);
   if (keyword("reference")) return drive_reference();
   keyword("function");
-  const auto reader = registry().drives.find(peek_word());
-  if (reader == registry().drives.end()) return constant_drive(what);
+  const auto* const found = registry().drives.find(peek_word());
+  if (!found) return constant_drive(what);
   accept_word();
-  return read_as("drive", reader->first, reader->second);
+  return read_as("drive", found->key, found->value);
 }
 
 DrivePtr DeckCard::string_expression(const std::string& text) {
@@ -237,19 +234,19 @@ const LabelMap<LawPtr<N>>& laws(const Deck& d) {
 /// A law that exists in other dimensions only.
 void refuse_word_of_other_dimension(DeckCard& card, const std::string& word, int dimension) {
   const Registry& r = card.registry();
-  std::string others;
+  std::string others, shown;
   const auto add = [&](const auto& readers, const char* text) {
-    if (readers.count(word)) others += (others.empty() ? "" : ", ") + std::string(text);
+    const auto* const found = readers.find(word);
+    if (!found) return;
+    shown = found->word;
+    others += (others.empty() ? "" : ", ") + std::string(text);
   };
   add(r.laws1, "1");
   add(r.laws3, "3");
   add(r.laws6, "6");
   if (others.empty()) return;
-  const auto shown = r.display.find(word);
-  card.fail_at(card.next(), "constitutive law \"" +
-                                (shown == r.display.end() ? word : shown->second) +
-                                "\" has no form in dimension " + std::to_string(dimension) +
-                                "; it exists in dimension " + others);
+  card.fail_at(card.next(), "constitutive law \"" + shown + "\" has no form in dimension " +
+                                std::to_string(dimension) + "; it exists in dimension " + others);
 }
 
 }  // namespace
@@ -284,14 +281,13 @@ LawPtr<N> DeckCard::law_of() {
   }
   const auto& readers = law_readers<N>(registry());
   const std::string w = peek_word();
-  const auto reader = readers.find(w);
-  if (reader != readers.end()) {
+  if (const auto* const found = readers.find(w)) {
     accept_word();
-    return read_as("law", reader->first, reader->second);
+    return read_as("law", found->key, found->value);
   }
-  const auto linear = readers.find("linearelastic");
-  if (N == 1 && linear != readers.end() && (w.empty() || deck_.reading.symbols.find(next_text())))
-    return read_as("law", linear->first, linear->second);
+  const auto* const linear = readers.find("linearelastic");
+  if (N == 1 && linear && (w.empty() || deck_.reading.symbols.find(next_text())))
+    return read_as("law", linear->key, linear->value);
   if (w.empty())
     fail_expected("constitutive law expected, e.g. " +
                   std::string(N == 1 ? "linear elastic" : "linear elastic generic"));
@@ -314,15 +310,15 @@ ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceS
         "scalar function \"" + name + "\" already defined at " + deck_.reading.place(known->second),
         "", "redefinition");
   const std::string w = peek_word();
-  const auto reader = registry().functions.find(w);
-  if (reader == registry().functions.end()) {
+  const auto* const found = registry().functions.find(w);
+  if (!found) {
     if (!more()) fail("scalar function type missing", "", "missing-argument");
     if (w.empty())
       fail_expected("scalar function type expected, e.g. const, linear, multilinear, cubic spline");
     fail_word("scalar function", w, registry().functions, "function");
   }
   skip();
-  ScalarFunctionPtr f = read_as("function", reader->first, reader->second);
+  ScalarFunctionPtr f = read_as("function", found->key, found->value);
   deck_.reading.functions[name] = f;
   deck_.function_places[name] = where;
   return f;
@@ -338,7 +334,7 @@ void DeckCard::read_function_definition() {
 ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
   const std::string name = quoted(std::string(what) + " name");
   const SourceSpan where = last();
-  if (registry().functions.count(peek_word())) return function_definition(name, where);
+  if (registry().functions.find(peek_word())) return function_definition(name, where);
   const auto known = deck_.reading.functions.find(name);
   if (known != deck_.reading.functions.end()) return known->second;
   if (deck_.damaged_kinds.count("scalar function \"" + name + "\""))
@@ -359,18 +355,18 @@ FluidPtr DeckCard::fluid_definition() {
   need_argument("hydraulic fluid");
   const Nesting nesting(*this);
   const std::string w = peek_word();
-  const auto reader = registry().fluids.find(w);
-  if (reader == registry().fluids.end()) {
-    const auto plain = registry().fluids.find("incompressible");
-    if (plain != registry().fluids.end() && (w == "density" || w == "viscosity"))
-      return read_as("fluid", plain->first, plain->second);
+  const auto* const found = registry().fluids.find(w);
+  if (!found) {
+    const auto* const plain = registry().fluids.find("incompressible");
+    if (plain && (w == "density" || w == "viscosity"))
+      return read_as("fluid", plain->key, plain->value);
     if (w.empty())
       fail_expected(
           "hydraulic fluid expected: \"reference, <label>\" or a type such as linear compressible");
     fail_word("hydraulic fluid", w, registry().fluids, "fluid");
   }
   skip();
-  return read_as("fluid", reader->first, reader->second);
+  return read_as("fluid", found->key, found->value);
 }
 
 FileDriverPtr DeckCard::file_driver() { return labelled(*this, deck_.file_drivers, "file driver"); }
@@ -378,12 +374,11 @@ FileDriverPtr DeckCard::file_driver() { return labelled(*this, deck_.file_driver
 FileDriverPtr DeckCard::file_driver_definition(int label) {
   need_argument("file driver type");
   const std::string w = peek_word();
-  const auto reader = registry().file_drivers.find(w);
-  if (reader == registry().file_drivers.end())
-    fail_word("file driver type", w, registry().file_drivers, "file driver");
+  const auto* const found = registry().file_drivers.find(w);
+  if (!found) fail_word("file driver type", w, registry().file_drivers, "file driver");
   skip();
-  set_form("file driver", reader->first);
-  return reader->second(*this, label);
+  set_form("file driver", found->key);
+  return found->value(*this, label);
 }
 
 }  // namespace mbcosim

@@ -3,9 +3,10 @@
 #include <sys/stat.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
+#include <memory>
 #include <optional>
 #include <system_error>
 
@@ -69,20 +70,24 @@ Result<std::string> FolderSource::read(const std::string& name) const {
   const auto closed = [&](const std::string& reason) {
     return io_error("cannot open " + quote(name) + (unrestricted_ ? ": " + reason : ""));
   };
-  const fs::path folder = fs::canonical(folder_.empty() ? "." : folder_, ec);
+  fs::path path = fs::path(folder_) / name;
+  if (!unrestricted_) {
+    const fs::path folder = fs::canonical(folder_.empty() ? "." : folder_, ec);
+    if (ec) return closed(ec.message());
+    path = fs::canonical(path, ec);
+    if (ec) return closed(ec.message());
+    if (!is_below(path, folder)) return io_error(quote(name) + " is outside the allowed folder");
+  }
+  const fs::file_status found = fs::status(path, ec);
   if (ec) return closed(ec.message());
-  const fs::path path = fs::canonical(folder / name, ec);
-  if (ec) return closed(ec.message());
-  if (!unrestricted_ && !is_below(path, folder))
-    return io_error(quote(name) + " is outside the allowed folder");
-  if (!fs::is_regular_file(path, ec)) return io_error(quote(name) + " is not a regular file");
-  std::ifstream in(path, std::ios::binary);
+  if (!fs::is_regular_file(found)) return io_error(quote(name) + " is not a regular file");
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(path.c_str(), "rb"),
+                                                           &std::fclose);
   if (!in) return closed(std::strerror(errno));
   std::string text;
   const auto size = fs::file_size(path, ec);
   if (!ec) text.resize(size);
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
+  text.resize(std::fread(text.data(), 1, text.size(), in.get()));
   return text;
 }
 

@@ -1,6 +1,6 @@
 #include "input/value.h"
 
-#include <cstdio>
+#include <charconv>
 
 namespace mbcosim {
 
@@ -20,10 +20,15 @@ const char* type_name(ValueType t) {
   return "";
 }
 
-std::string printed(double v) {
+std::string number_text(double v) {
   char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%g", v);
-  std::string r = buffer;
+  const auto done =
+      std::to_chars(buffer, buffer + sizeof buffer, v, std::chars_format::general, 6);  // %g
+  return {buffer, done.ptr};
+}
+
+std::string printed(double v) {
+  std::string r = number_text(v);
   if (r.find('.') == std::string::npos) r += '.';
   return r;
 }
@@ -40,12 +45,6 @@ std::string printed(const Value& v) {
       return '"' + std::get<std::string>(v) + '"';
   }
   return "";
-}
-
-std::string number_text(double v) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%g", v);
-  return buffer;
 }
 
 }  // namespace mbcosim

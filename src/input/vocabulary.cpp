@@ -24,7 +24,7 @@ class Collector {
   template <class Table>
   Words of(const Table& table) const {
     Words words;
-    for (const auto& entry : table) words[entry.first].word = shown(entry.first);
+    for (const auto& entry : table) words[entry.key].word = entry.word;
     return words;
   }
 
@@ -41,8 +41,8 @@ class Collector {
     const auto refused = registry_.not_supported.find(context);
     if (refused != registry_.not_supported.end())
       for (const auto& entry : refused->second)
-        if (!words.count(entry.first))
-          words[entry.first] = refused_word(shown(entry.first), "", false);
+        if (!words.count(entry.key))
+          words[entry.key] = refused_word(std::string(entry.word), "", false);
     const auto never = refusals().find(context);
     if (never != refusals().end())
       for (const auto& [word, refusal] : never->second)
@@ -97,15 +97,11 @@ class Collector {
   static std::string sentence(const Refusal& r) {
     return r.remedy.empty() ? r.reason : r.reason + "; " + r.remedy;
   }
-  std::string shown(const std::string& word) const {
-    const auto found = registry_.display.find(word);
-    return found == registry_.display.end() ? word : found->second;
-  }
   template <class Table>
   void add_laws(Words& words, const Table& table, int size) const {
     for (const auto& entry : table) {
-      words[entry.first].word = shown(entry.first);
-      words[entry.first].sizes.push_back(size);
+      words[entry.key].word = entry.word;
+      words[entry.key].sizes.push_back(size);
     }
   }
 
@@ -158,7 +154,8 @@ void add_blocks(Collector& c) {
 }
 
 void add_elements(Collector& c, const Registry& registry) {
-  Words heads = c.of(registry.heads);
+  Words heads;
+  for (const auto& [key, head] : registry.heads) heads[key].word = head.word;
   for (const char* word : {"bind", "driven", "output"}) heads[word].word = word;
   c.group("element", "Elements and statements of the block `elements`", std::move(heads),
           "elements");

@@ -1,15 +1,21 @@
 #include "math/processor.h"
 
+#ifdef __x86_64__
+// What the C library has asked the processor at the start. Under a hypervisor each question costs
+// tens of microseconds, and `__builtin_cpu_supports` would ask them all again.
+#include <sys/platform/x86.h>
+#endif
+
 namespace mbcosim {
 
 int processor_level() {
 #ifdef __x86_64__
-  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma") ||
-      !__builtin_cpu_supports("bmi") || !__builtin_cpu_supports("bmi2"))
+  if (!CPU_FEATURE_ACTIVE(AVX2) || !CPU_FEATURE_ACTIVE(FMA) || !CPU_FEATURE_ACTIVE(BMI1) ||
+      !CPU_FEATURE_ACTIVE(BMI2))
     return 1;
-  if (!__builtin_cpu_supports("avx512f") || !__builtin_cpu_supports("avx512bw") ||
-      !__builtin_cpu_supports("avx512cd") || !__builtin_cpu_supports("avx512dq") ||
-      !__builtin_cpu_supports("avx512vl"))
+  if (!CPU_FEATURE_ACTIVE(AVX512F) || !CPU_FEATURE_ACTIVE(AVX512BW) ||
+      !CPU_FEATURE_ACTIVE(AVX512CD) || !CPU_FEATURE_ACTIVE(AVX512DQ) ||
+      !CPU_FEATURE_ACTIVE(AVX512VL))
     return 3;
   return 4;
 #else

@@ -6,15 +6,12 @@
 #include <map>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "model/element_set.h"
 #include "model/fwd.h"
+#include "model/word_table.h"
 
 namespace mbcosim {
-
-/// Keywords are stored without blanks and in lower case, as the language compares them.
-std::string normalized(std::string_view word);
 
 class Registry {
  public:
@@ -30,14 +27,14 @@ class Registry {
   /// A statement head of the elements block: `body`, `beam3`, `gravity`, or a family with types:
   /// `joint`, `force`.
   struct Head {
+    std::string_view word;  ///< as written in documentation
     Family family;
     bool has_label = true;
-    ElementReader reader;                        ///< for heads without types
-    std::map<std::string, ElementReader> types;  ///< normalized type word -> reader
+    ElementReader reader;            ///< for heads without types
+    WordTable<ElementReader> types;  ///< of the others
   };
 
-  /// `words` lists synonyms, e.g. {"revolute hinge", "plane hinge"}; the first is the name used in
-  /// messages.
+  /// Words are literals. `words` lists synonyms, e.g. {"revolute hinge", "plane hinge"}.
   void element(std::string_view head, Family family, ElementReader reader, bool has_label = true);
   void typed(std::string_view head, Family family, std::initializer_list<std::string_view> words,
              ElementReader reader);
@@ -52,18 +49,19 @@ class Registry {
   /// (aerodynamic element) ...".
   void unsupported(std::string_view context, std::string_view word, std::string_view what);
 
-  std::map<std::string, Head> heads;
-  std::map<std::string, DriveReader> drives;
-  std::map<std::string, LawReader<1>> laws1;
-  std::map<std::string, LawReader<3>> laws3;
-  std::map<std::string, LawReader<6>> laws6;
-  std::map<std::string, FunctionReader> functions;
-  std::map<std::string, FluidReader> fluids;
-  std::map<std::string, FileDriverReader> file_drivers;  ///< "fixedstep", "variablestep", ...
-  /// context ("elements", "joint", "force", "drive", "law", ...) -> normalized word -> what it is.
-  std::map<std::string, std::map<std::string, std::string>> not_supported;
-  /// normalized word -> words as written in documentation, for messages and the editor grammar.
-  std::map<std::string, std::string> display;
+  std::map<std::string, Head, std::less<>> heads;  ///< by normalized word
+  WordTable<DriveReader> drives;
+  WordTable<LawReader<1>> laws1;
+  WordTable<LawReader<3>> laws3;
+  WordTable<LawReader<6>> laws6;
+  WordTable<FunctionReader> functions;
+  WordTable<FluidReader> fluids;
+  WordTable<FileDriverReader> file_drivers;  ///< "fixed step", "variable step", ...
+  /// What words are that are not served, by context: "elements", "joint", "force", "drive", ...
+  std::map<std::string, WordTable<std::string_view>, std::less<>> not_supported;
+
+ private:
+  Head& head(std::string_view word, Family family);
 };
 
 }  // namespace mbcosim

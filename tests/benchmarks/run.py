@@ -89,11 +89,13 @@ class Solvers:
         iterations = []
         for attempt in range(repeat):
             for k, command in enumerate(self.commands):
-                prefix = os.path.join(folder, f"result{k}")
+                results = tempfile.mkdtemp(dir=folder)  # as in a first run: no file is there to be overwritten
+                prefix = os.path.join(results, "result")
                 words = [word.replace("{deck}", str(deck)).replace("{prefix}", prefix) for word in command]
                 found[k].append(measured(words, os.path.dirname(deck)))
                 if attempt == 0:
                     iterations.append(iterations_in(prefix + ".out"))
+                shutil.rmtree(results)
         return [tuple(statistics.median(values) for values in zip(*runs)) for runs in found], iterations
 
 
@@ -233,10 +235,11 @@ def main():
     options = parser.parse_args()
     repeat = options.repeat or (1 if options.small else 5)
     build = options.build.resolve()
-    binary = build / "bin" / "mbcosim"
     table = Table(json.loads(options.compare.read_text()) if options.compare else {})
-    solvers = Solvers(binary, options.peer)
     with tempfile.TemporaryDirectory() as folder:
+        # A copy, as an installation makes one: what a linker has written lies in small pieces in the page cache.
+        binary = pathlib.Path(shutil.copy(build / "bin" / "mbcosim", folder))
+        solvers = Solvers(binary, options.peer)
         sections = {"tutorials": lambda: tutorials(table, solvers, [deck.resolve() for deck in options.decks], folder, repeat),
                     "process": lambda: parts_of_a_process(table, binary, folder, repeat),
                     "parts": lambda: parts_of_runs(table, build, [deck.resolve() for deck in options.decks]),

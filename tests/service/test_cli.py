@@ -69,6 +69,30 @@ def test_a_drive_without_a_value_exits_with_3(tmp_path):
         assert run.returncode == 3 and "sqrt: argument" in run.stderr
 
 
+def test_options_of_a_run_mean_the_same_wherever_they_stand(deck, tmp_path):
+    """Plain command lines are read by hand, before all that reads the others is set up."""
+    plain = [["-q", "--threads", "1"], ["--quiet", "--threads", "2"], []]
+    others = [["-q", "-q"], ["--threads=1"], ["--peer-timeout", "5"], ["--no-deck-sockets"]]
+    for number, options in enumerate(plain + others):
+        prefix = tmp_path / f"out{number}"
+        for name in [["-o", str(prefix)], ["--output", str(prefix)], [f"--output={prefix}"], [f"-o{prefix}"]]:
+            for words in (["run", str(deck), *name, *options], ["run", *options, *name, str(deck)]):
+                run = mbcosim(*words)
+                assert (run.returncode, run.stdout, run.stderr) == (0, "", ""), words
+                assert prefix.with_suffix(".mov").read_bytes() == (tmp_path / "out0.mov").read_bytes()
+                if number:
+                    prefix.with_suffix(".mov").unlink()  # each writes its own
+
+
+@pytest.mark.parametrize("words, told", [
+    (["-o"], "-o"), (["--threads", "0"], "--threads"), (["--threads", "1025"], "--threads"),
+    (["--threads", "2x"], "--threads"), (["--threads"], "--threads"), (["-x"], "-x"), (["another"], "another"), ([""], "")])
+def test_options_of_a_run_that_make_no_sense_are_refused(deck, words, told):
+    run = mbcosim("run", str(deck), *words)
+    assert run.returncode == 4 and told in run.stderr and not run.stdout
+    assert not deck.with_suffix(".mov").exists()
+
+
 def test_wrong_usage_exits_with_4(deck):
     assert mbcosim().returncode == 4
     assert mbcosim("run").returncode == 4

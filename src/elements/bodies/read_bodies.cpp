@@ -16,14 +16,17 @@ void warn_about_inertia(Card& card, const Mat3& j) {
       Eigen::SelfAdjointEigenSolver<Mat3>(Mat3(0.5 * (j + j.transpose())), Eigen::EigenvaluesOnly)
           .eigenvalues();
   const double rounding = 1e-9 * j.norm();
-  char moments[80];
-  std::snprintf(moments, sizeof moments, "principal moments %.6g, %.6g, %.6g", principal(0),
-                principal(1), principal(2));
+  const auto moments = [&] {
+    char text[80];
+    std::snprintf(text, sizeof text, "principal moments %.6g, %.6g, %.6g", principal(0),
+                  principal(1), principal(2));
+    return std::string(text);
+  };
   if (principal(0) < -rounding)
-    card.warn(std::string("the inertia matrix is indefinite: ") + moments,
+    card.warn("the inertia matrix is indefinite: " + moments(),
               "inertia is given about the centre of mass, not about the node");
   else if (principal(2) > principal(0) + principal(1) + rounding)
-    card.warn(std::string("no body has this inertia: ") + moments +
+    card.warn("no body has this inertia: " + moments() +
                   "; none can be larger than the sum of the other two",
               "inertia is given about the centre of mass; check its axes and units");
 }

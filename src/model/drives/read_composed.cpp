@@ -50,7 +50,7 @@ DrivePtr read_file(Card& card) {
   int column = 1;
   const std::string word = card.peek_word();
   const bool is_word =
-      word == "amplitude" || word == "output" || card.registry().drives.count(word) != 0;
+      word == "amplitude" || word == "output" || card.registry().drives.find(word) != nullptr;
   if (card.more() && !card.at_string() && !is_word) {
     column = card.integer("column", 1);
     if (column < 1 || column > driver->channels())

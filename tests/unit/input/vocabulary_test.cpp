@@ -41,7 +41,7 @@ TEST(Vocabulary, HasATableOfTheTypesOfEveryHead) {
   for (const auto& [head, facts] : registry.heads) {
     if (head == "outputelement") continue;  // its two words stand in its own row
     for (const auto& type : facts.types)
-      EXPECT_TRUE(find(groups, head, type.first)) << head << ", " << type.first;
+      EXPECT_TRUE(find(groups, head, type.key)) << head << ", " << type.key;
   }
 }
 

@@ -95,7 +95,7 @@ std::set<std::string> registered_words() {
   const Registry& registry = full_registry();
   std::set<std::string> words;
   const auto add = [&](const std::string& group, const auto& readers) {
-    for (const auto& [word, reader] : readers) words.insert(group + ":" + word);
+    for (const auto& entry : readers) words.insert(group + ":" + entry.key);
   };
   for (const auto& [head, entry] : registry.heads) {
     if (entry.types.empty()) words.insert(head);
