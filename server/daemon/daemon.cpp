@@ -458,7 +458,7 @@ bool Daemon::end_server() {
   if (!gate_.empty_within(kLastCalls)) return false;  // each needs the server to its end
   listeners_.clear();
   server_.reset();
-  pollers_->stop();
+  pollers_.reset();  // with its share of gRPC: the daemon gives back the last one
   return true;
 }
 
