@@ -1,5 +1,6 @@
 #include "elements/joints/deformable.h"
 #include "elements/joints/joint_tangent.h"
+#include "elements/joints/rod.h"
 
 namespace mbcosim {
 
@@ -106,6 +107,35 @@ void DeformableHinge::tangent(const Local<double>& u, Tangent& t) const {
   M.add(H1 * r.dep, omega);
   turn_with_first(M, H1 * r.f);
   put_moment(t, M);
+}
+
+/// From δl = Σ ±(δx − f × δθ), δl̇ = Σ ±(δv − f × δw − w × (f × δθ)) and, with e = l/L,
+/// δL = e·δl and δL̇ = e·δl̇ + (l̇ − L̇ e)·δl/L: δF = e δf + f (I − e eᵀ) δl/L.
+void Rod::tangent(const Local<double>& u, Tangent& t) const {
+  const Kinematics<double> k = kinematics(u);
+  const auto r = response(*this, u);
+  const double f = r.f(0), de = r.de(0) / L0, dep = r.dep(0) / L0;
+  const Vec3 e = k.l / k.length, F = f * e;
+  const Mat3 by_l = e * (de * e + dep / k.length * (k.speed - k.rate * e)).transpose() +
+                    f / k.length * (Mat3::Identity() - e * e.transpose());
+  const Mat3 by_speed = dep * e * e.transpose();
+  ByMotion m;
+  for (int n = 0; n < 2; ++n) {
+    const double sign = n == 0 ? -1 : 1;
+    const Mat3 arm = cross<double>(n == 0 ? k.f1 : k.f2);
+    m.x[n] = sign * by_l;
+    m.v[n] = sign * by_speed;
+    m.theta[n] = -(m.x[n] + m.v[n] * cross<double>(u.w(n))) * arm;
+    m.w[n] = -m.v[n] * arm;
+  }
+  for (int n = 0; n < 2; ++n) {
+    const double sign = n == 0 ? 1 : -1;
+    const Mat3 arm = sign * cross<double>(n == 0 ? k.f1 : k.f2);
+    const int row = t.row_node(n);
+    m.put(t, row, sign * Mat3::Identity());
+    m.put(t, row + 3, arm);
+    t.add_orientation(row + 3, n, cross(F) * arm);
+  }
 }
 
 void DeformableDisplacement::tangent(const Local<double>& u, Tangent& t) const {

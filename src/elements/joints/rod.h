@@ -19,8 +19,8 @@ struct Rod : TwoAttachments, LawUser<Rod, 1> {
 
   template <class T>
   struct Kinematics {
-    Vec<T> f1, f2, l;
-    T length, rate;  ///< L [m], L̇ [m/s]
+    Vec<T> f1, f2, l, speed;  ///< [m]; l̇ [m/s]
+    T length, rate;           ///< L [m], L̇ [m/s]
   };
   template <class T>
   Kinematics<T> kinematics(const Local<T>& u) const {
@@ -29,14 +29,14 @@ struct Rod : TwoAttachments, LawUser<Rod, 1> {
     k.f1 = arm_a(u);
     k.f2 = arm_b(u);
     k.l = u.x(1) + k.f2 - u.x(0) - k.f1;
-    const Vec<T> lp = u.v(1) + u.w(1).cross(k.f2) - u.v(0) - u.w(0).cross(k.f1);
+    k.speed = u.v(1) + u.w(1).cross(k.f2) - u.v(0) - u.w(0).cross(k.f1);
     const T square = k.l.dot(k.l);
     if (!(value_of(square) > 0))
       throw EvaluationError(
           "rod " + std::to_string(u.label()) +
           " has no length any more; use a shorter step, or check the loads on its nodes");
     k.length = sqrt(square);
-    k.rate = k.l.dot(lp) / k.length;
+    k.rate = k.l.dot(k.speed) / k.length;
     return k;
   }
   template <class T>
@@ -58,6 +58,7 @@ struct Rod : TwoAttachments, LawUser<Rod, 1> {
     r.load(0, F, k.f1.cross(F));
     r.load(1, -F, -k.f2.cross(F));
   }
+  void tangent(const Local<double>& u, Tangent& t) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const {
     return LogLine("rod", label).point(model, a).point(model, b).str();
