@@ -410,7 +410,8 @@ bool Daemon::drain() {
 namespace {
 
 /// Gives the daemon's share of gRPC back, the last one. gRPC then joins its threads, of which one
-/// may look for ten seconds after a client that did not read. False: it takes longer than `wait`.
+/// may look for ten seconds after a client that did not read. False: it takes longer than `wait`,
+/// or would, when somebody else's share goes.
 bool let_go_of_grpc(std::chrono::seconds wait) {
   const auto done = std::make_shared<std::promise<void>>();
   const std::future<void> end = done->get_future();
@@ -422,7 +423,10 @@ bool let_go_of_grpc(std::chrono::seconds wait) {
   } catch (const std::system_error&) {  // the system grants no thread for it
     return false;
   }
-  return end.wait_for(wait) == std::future_status::ready;
+  if (end.wait_for(wait) != std::future_status::ready) return false;
+  if (!grpc_is_initialized()) return true;
+  spdlog::error("gRPC is still in use at the end");
+  return false;
 }
 
 /// Calls `body` in a thread of its own; where the system grants none, `alone` in this one.
