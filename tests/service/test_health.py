@@ -22,6 +22,16 @@ def health(channel, service=""):
     return reply[1] if reply else 0
 
 
+@pytest.mark.parametrize("options", [[], ["--http", "127.0.0.1:0"]])
+def test_the_daemon_keeps_no_share_of_grpc_to_the_end(start_daemon, options):
+    """gRPC's threads may take ten seconds to end: they are left alone when its last share goes too late."""
+    daemon = start_daemon("--log-level", "debug", *options)
+    with daemon.connect() as server, server.load_text(decks.body()) as simulation:
+        assert simulation.step(3).step == 3
+    daemon.stop()
+    assert "stopped" in daemon.log() and "gRPC is still in use" not in daemon.log()
+
+
 def test_health_and_socket_mode(daemon, server):
     path = daemon.address[len("unix:"):]
     assert stat.S_IMODE(os.stat(path).st_mode) == 0o600
