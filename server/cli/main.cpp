@@ -14,12 +14,12 @@ namespace {
 
 using namespace mbcosim::cli;
 
-/// From 1 to kMostThreads.
-std::optional<int> threads_of(std::string_view text) {
+/// From 1 to kMostThreads; 0: it is no such number.
+int threads_of(std::string_view text) {
   int threads = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), threads);
   const bool whole = error == std::errc() && end == text.data() + text.size();
-  return whole && threads >= 1 && threads <= kMostThreads ? std::optional(threads) : std::nullopt;
+  return whole && threads >= 1 && threads <= kMostThreads ? threads : 0;
 }
 
 /// `run DECK` with no other options than those that nearly all have, since the whole command line
@@ -28,18 +28,21 @@ std::optional<RunOptions> plain_run(int argc, char** argv) {
   if (argc < 3 || std::string_view(argv[1]) != "run") return std::nullopt;
   RunOptions options;
   for (int k = 2; k < argc; ++k) {
-    const std::string_view word = argv[k];
-    const bool has_value = k + 1 < argc && argv[k + 1][0] != '-' && argv[k + 1][0] != 0;
-    if (word == "-q" || word == "--quiet")
+    const std::string_view word = argv[k], next = k + 1 < argc ? argv[k + 1] : "";
+    const bool has_value = !next.empty() && next[0] != '-';
+    if (word == "-q" || word == "--quiet") {
       options.quiet = true;
-    else if ((word == "-o" || word == "--output") && has_value && options.prefix.empty())
-      options.prefix = argv[++k];
-    else if (word == "--threads" && has_value && threads_of(argv[k + 1]))
-      options.threads = *threads_of(argv[++k]);
-    else if (!word.empty() && word[0] != '-' && options.deck.empty())
+    } else if ((word == "-o" || word == "--output") && has_value && options.prefix.empty()) {
+      options.prefix = next;
+      ++k;
+    } else if (const int threads = word == "--threads" ? threads_of(next) : 0; threads > 0) {
+      options.threads = threads;
+      ++k;
+    } else if (!word.empty() && word[0] != '-' && options.deck.empty()) {
       options.deck = word;
-    else
+    } else {
       return std::nullopt;
+    }
   }
   return options.deck.empty() ? std::nullopt : std::make_optional(options);
 }

@@ -16,9 +16,10 @@ usage: run.sh [--build FOLDER] [--peer "REF -s -f {deck} -o {prefix}"] [--decks 
               built)
   reduce      `mbcosim reduce` on a cube of bricks
 
-Times are those of the processor (user and system), the median of the repeated runs, in which both solvers alternate; ratios are
-peer / ours: above 1, ours is faster. An iteration's time is the difference between a run and one of twice the steps, over the
-difference in iterations. --compare prints old / new for each row of an earlier --json. Fails when a run fails; times have no bounds.
+Programs run from a copy and write new files, as after an installation. Times are those of the processor (user and system), the median
+of the repeated runs, in which both solvers alternate; ratios are peer / ours: above 1, ours is faster. An iteration's time is the
+difference between a run and one of twice the steps, over the difference in iterations. --compare prints old / new for each row of an
+earlier --json. Fails when a run fails; times have no bounds.
 """
 import argparse
 import json

@@ -87,13 +87,18 @@ void put_moment(Tangent& t, const ByMotion& m) {
   m.put(t, t.row_node(1) + 3, -Mat3::Identity());
 }
 
-template <class Joint>
-auto response(const Joint& joint, const Local<double>& u) {
+/// `arguments`: gives the strain and its rate.
+template <class Joint, class Arguments>
+auto response_to(const Joint& joint, const Local<double>& u, Arguments&& arguments) {
   typename Joint::template V<double> strain, rate;
-  joint.arguments(u, strain, rate);
+  arguments(strain, rate);
   typename std::remove_cvref_t<decltype(*joint.law)>::Response r;
   joint.law->respond(*u.context, strain, rate, true, r);
   return r;
+}
+template <class Joint>
+auto response(const Joint& joint, const Local<double>& u) {
+  return response_to(joint, u, [&](auto& strain, auto& rate) { joint.arguments(u, strain, rate); });
 }
 
 }  // namespace
@@ -113,24 +118,25 @@ void DeformableHinge::tangent(const Local<double>& u, Tangent& t) const {
 /// δL = e·δl and δL̇ = e·δl̇ + (l̇ − L̇ e)·δl/L: δF = e δf + f (I − e eᵀ) δl/L.
 void Rod::tangent(const Local<double>& u, Tangent& t) const {
   const Kinematics<double> k = kinematics(u);
-  const auto r = response(*this, u);
+  const auto r =
+      response_to(*this, u, [&](auto& strain, auto& rate) { arguments_of(k, strain, rate); });
   const double f = r.f(0), de = r.de(0) / L0, dep = r.dep(0) / L0;
   const Vec3 e = k.l / k.length, F = f * e;
   const Mat3 by_l = e * (de * e + dep / k.length * (k.speed - k.rate * e)).transpose() +
                     f / k.length * (Mat3::Identity() - e * e.transpose());
-  const Mat3 by_speed = dep * e * e.transpose();
+  const Mat3 by_speed = dep * e * e.transpose(),
+             arms[] = {cross<double>(k.f1), cross<double>(k.f2)};
   ByMotion m;
   for (int n = 0; n < 2; ++n) {
     const double sign = n == 0 ? -1 : 1;
-    const Mat3 arm = cross<double>(n == 0 ? k.f1 : k.f2);
     m.x[n] = sign * by_l;
     m.v[n] = sign * by_speed;
-    m.theta[n] = -(m.x[n] + m.v[n] * cross<double>(u.w(n))) * arm;
-    m.w[n] = -m.v[n] * arm;
+    m.theta[n] = -(m.x[n] + m.v[n] * cross<double>(u.w(n))) * arms[n];
+    m.w[n] = -m.v[n] * arms[n];
   }
   for (int n = 0; n < 2; ++n) {
     const double sign = n == 0 ? 1 : -1;
-    const Mat3 arm = sign * cross<double>(n == 0 ? k.f1 : k.f2);
+    const Mat3 arm = sign * arms[n];
     const int row = t.row_node(n);
     m.put(t, row, sign * Mat3::Identity());
     m.put(t, row + 3, arm);
