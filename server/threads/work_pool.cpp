@@ -36,7 +36,13 @@ void WorkPool::post(const std::string& owner, Job job) {
     place.second.jobs.pop_back();
     throw;
   }
-  if (idle_ > 0) {
+  call_thread();
+}
+
+// For whoever came to stand in `turns_`: one that is told stays idle until it wakes up.
+void WorkPool::call_thread() {
+  if (turns_.empty()) return;
+  if (turns_.size() <= static_cast<std::size_t>(idle_)) {
     work_.notify_one();
     return;
   }
@@ -82,7 +88,7 @@ void WorkPool::run_one() {
   o.jobs.pop_front();
   ++o.running;
   line_up(owner);
-  if (!turns_.empty() && idle_ > 0) work_.notify_one();
+  call_thread();
   mutex_.unlock();
   run_caught(size_.name, job);
   run_caught(size_.name, [&] { job = {}; });

@@ -42,6 +42,7 @@ class WorkPool {
   };
   using Owners = std::map<std::string, Owner>;
   void add_thread() TS_REQUIRES(mutex_);
+  void call_thread() TS_REQUIRES(mutex_);
   bool may_end() const TS_REQUIRES(mutex_);
   void line_up(Owners::value_type& owner) TS_REQUIRES(mutex_);
   bool wait_for_turn() TS_REQUIRES(mutex_);

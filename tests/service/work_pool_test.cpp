@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <latch>
+#include <thread>
 
 #include "rpc/admission.h"
 #include "threads/timer.h"
@@ -21,6 +22,19 @@ TEST(WorkPool, OneOwnersLongWorkLeavesRoomForOthers) {
   for (int i = 0; i < 5; ++i) pool.post("modest", [&] { others.count_down(); });
   others.wait();  // hangs when the greedy one has all threads
   hold.count_down();
+}
+
+// All is posted before the one idle thread has woken up, in most rounds.
+TEST(WorkPool, AnIdleThreadStandsForOneJobOnly) {
+  for (int round = 0; round < 200; ++round) {
+    WorkPool pool({"test", 3, 2, 0});
+    std::latch hold(1), others(5);
+    std::this_thread::sleep_for(1ms);
+    for (int i = 0; i < 3; ++i) pool.post("greedy", [&] { hold.wait(); });
+    for (int i = 0; i < 5; ++i) pool.post("modest", [&] { others.count_down(); });
+    others.wait();  // hangs when no other thread has been made
+    hold.count_down();
+  }
 }
 
 TEST(WorkPool, OwnersTakeTurns) {
