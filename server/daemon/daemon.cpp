@@ -108,7 +108,7 @@ int most_pollers() {
 
 /// gRPC would wait without end for threads of its own that it could not start.
 void check_threads() {
-  const std::size_t needed = 24 + static_cast<std::size_t>(most_pollers());
+  const std::size_t needed = 24 + static_cast<std::size_t>(most_pollers() + Pollers::kSpare);
   std::latch end(1);
   std::vector<std::jthread> threads;  // destroyed first: each has been let go by then
   try {
@@ -193,6 +193,9 @@ Daemon::Daemon(const Config& config)
           [this](const std::string& method, const std::string& identity, const Refusal& refusal) {
             log_.refused(method, identity, refusal);
             metrics_.count_failure(refusal.reason());
+          },
+          [this](const std::string& peer) {
+            for (const auto& listener : listeners_) listener->break_off(peer);
           }},
       results_(config_.results_root, config_.limits.results_root_bytes),
       deck_sockets_(config_.deck_sockets, config_.limits.deck_sockets, config_.listen),

@@ -6,6 +6,7 @@
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <spdlog/spdlog.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -26,6 +27,8 @@ constexpr int kWaiting = 1024;        ///< connections not yet accepted
 constexpr int kLookMs = 100;          ///< how soon the end is noticed
 constexpr int kAtOnce = 64;           ///< accepted before the next is handed over
 constexpr int kKeptDescriptors = 32;  ///< for files, while connections come and go
+
+bool is_unix(const std::string& address) { return address.compare(0, kUnix.size(), kUnix) == 0; }
 
 [[noreturn]] void fail(const std::string& address, int error) {
   throw std::runtime_error("cannot listen on " + address + ": " + std::strerror(error));
@@ -80,6 +83,30 @@ ino_t inode_of(int fd) {
   return ::fstatat(fd, "", &info, AT_EMPTY_PATH) == 0 ? info.st_ino : 0;
 }
 
+/// As gRPC names it, without the interface of an address that is only valid on that; empty for a
+/// Unix socket.
+std::string name_of_peer(int fd) {
+  sockaddr_storage name{};
+  socklen_t size = sizeof name;
+  if (::getpeername(fd, reinterpret_cast<sockaddr*>(&name), &size) != 0) return "";
+  if (name.ss_family == AF_UNIX) return "";
+  const auto& six = reinterpret_cast<const sockaddr_in6&>(name);
+  char host[NI_MAXHOST] = "", port[NI_MAXSERV] = "";
+  if (::getnameinfo(reinterpret_cast<const sockaddr*>(&name), size, host, sizeof host, port,
+                    sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0)
+    return "";
+  const std::string address = std::string(host).substr(0, std::string_view(host).find('%'));
+  if (name.ss_family == AF_INET6 && !IN6_IS_ADDR_V4MAPPED(&six.sin6_addr))
+    return "ipv6:%5B" + address + "%5D:" + port;
+  return "ipv4:" + address.substr(address.rfind(':') + 1) + ":" + port;  // of "::ffff:127.0.0.1"
+}
+
+std::string without_interface(std::string peer) {
+  const std::size_t interface = peer.find("%25"), end = peer.rfind("%5D");
+  if (interface < end && end != std::string::npos) peer.erase(interface, end - interface);
+  return peer;
+}
+
 /// Has the client closed it?
 bool has_gone(int fd) {
   pollfd look{fd, POLLRDHUP, 0};
@@ -118,7 +145,7 @@ shm::Descriptor listen_on(const addrinfo& info, bool both_families) {
 }  // namespace
 
 Listener::Listener(const std::string& address) : bound_(address), reserve_(open_reserve()) {
-  if (address.compare(0, kUnix.size(), kUnix) == 0) {
+  if (is_unix(address)) {
     bind_unix(address.substr(kUnix.size()));
     return;
   }
@@ -193,6 +220,53 @@ void Listener::cut() {
   if (count > 0) spdlog::warn("{}: {} connections that did not end are cut", bound_, count);
 }
 
+void Listener::break_off(const std::string& peer) {
+  if (is_unix(peer) != is_unix(bound_)) return;
+  Guard guard(mutex_);
+  unwanted_.push_back(peer);
+}
+
+void Listener::break_off_asked() {
+  std::vector<std::string> asked;
+  {
+    Guard guard(mutex_);
+    asked.swap(unwanted_);
+  }
+  for (const std::string& peer : asked) {
+    for (const int fd : is_unix(bound_) ? who_sends_most() : named(peer)) {
+      Peer& unwanted = peers_.at(fd);
+      spdlog::warn("{}: a connection of {} is broken off: it resets too many calls", bound_,
+                   unwanted.source);
+      const linger nothing{1, 0};  // to a client that writes on the end comes as a reset
+      ::setsockopt(fd, SOL_SOCKET, SO_LINGER, &nothing, sizeof nothing);
+      ::shutdown(fd, SHUT_RDWR);
+      unwanted.inode = 0;
+    }
+  }
+}
+
+std::vector<int> Listener::named(const std::string& as_grpc_does) const {
+  const std::string name = without_interface(as_grpc_does);
+  std::vector<int> found;
+  for (const auto& [fd, peer] : peers_)
+    if (inode_of(fd) == peer.inode && name_of_peer(fd) == name) found.push_back(fd);
+  return found;
+}
+
+std::vector<int> Listener::who_sends_most() const {
+  std::map<int, int> unread;  // bytes, by descriptor
+  int most = 1;
+  for (const auto& [fd, peer] : peers_) {
+    int& bytes = unread[fd];
+    if (inode_of(fd) != peer.inode || ::ioctl(fd, FIONREAD, &bytes) != 0) bytes = 0;
+    most = std::max(most, bytes);
+  }
+  std::vector<int> found;
+  for (const auto& [fd, bytes] : unread)
+    if (bytes >= (most + 1) / 2) found.push_back(fd);
+  return found;
+}
+
 void Listener::loop() {
   std::vector<pollfd> looks;
   for (const shm::Descriptor& socket : sockets_) looks.push_back({socket.get(), POLLIN, 0});
@@ -201,6 +275,7 @@ void Listener::loop() {
     for (const pollfd& look : looks)
       if (events > 0 && look.revents != 0) run_caught("listener", [&] { accept_from(look.fd); });
     run_caught("listener", [&] { hand_over_next(); });
+    run_caught("listener", [&] { break_off_asked(); });
   }
   accepted_.clear();
 }

@@ -16,6 +16,7 @@
 
 #include "service/event_log.h"
 #include "shared_memory/channel.h"
+#include "threads/mutex.h"
 
 namespace mbcosim::server {
 
@@ -41,11 +42,14 @@ class Listener {
   void stop();  ///< those who are there stay
   /// After `stop`: breaks off who is still there, as if their host had vanished.
   void cut();
+  /// Breaks off, soon, whom gRPC names `peer`. Connections of Unix sockets have no names: those
+  /// that have sent most of what nobody has read. Thread-safe.
+  void break_off(const std::string& peer) TS_EXCLUDES(mutex_);
 
  private:
   struct Peer {
     std::string source;
-    ino_t inode = 0;  ///< of its socket: another one means that the connection is gone
+    ino_t inode = 0;  ///< of its socket; another one, or 0: the connection is gone
   };
   void bind_unix(const std::string& path);
   void bind_tcp(const std::string& host, const std::string& port);
@@ -54,6 +58,9 @@ class Listener {
   bool accept_one(int listener);
   void hand_over_next();
   bool may_stay(int fd);
+  void break_off_asked() TS_EXCLUDES(mutex_);
+  std::vector<int> named(const std::string& peer) const;
+  std::vector<int> who_sends_most() const;
   /// For one more of it, with so many descriptors `free`?
   bool has_room(const std::string& source, std::int64_t free) const;
   void forget(std::map<int, Peer>::iterator peer);
@@ -65,6 +72,8 @@ class Listener {
   std::vector<shm::Descriptor> sockets_;
   shm::Descriptor reserve_;  ///< given up for a moment to drop a connection
   std::unique_ptr<Acceptor> acceptor_;
+  Mutex mutex_;
+  std::vector<std::string> unwanted_ TS_GUARDED_BY(mutex_);
   // --- of the thread
   std::map<int, Peer> peers_;                       ///< by descriptor
   std::map<std::string, std::int64_t> alike_;       ///< how many of `peers_` are of a source

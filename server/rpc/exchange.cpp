@@ -6,6 +6,8 @@
 #include <new>
 #include <thread>
 
+#include "threads/top_frame.h"
+
 namespace mbcosim::server {
 namespace {
 
@@ -49,16 +51,27 @@ void Exchange::has_come(bool ok) {
   if (!ok) return let_go(2);  // the server ends; what did not come takes no course
   gate_.await_call();
   const grpc::GenericServerContext* context = nullptr;
+  bool over = false;
   {
     Guard guard(mutex_);
     came_ = true;
-    if (over_early_)
-      cancel();
-    else
-      context = &rpc_->context;
+    context = &rpc_->context;  // stays until this lets go
+    over = over_early_;
+    if (over) cancel();
   }
-  if (context) guarded([&] { start(*context); });
+  guarded([&] {
+    note_peer(context->peer());
+    if (over)
+      gate_.has_reset(peer());
+    else
+      start(*context);
+  });
   let_go();
+}
+
+void Exchange::note_peer(std::string peer) {
+  Guard guard(mutex_);
+  peer_ = std::move(peer);
 }
 
 void Exchange::start(const grpc::GenericServerContext& context) {
@@ -69,7 +82,7 @@ void Exchange::start(const grpc::GenericServerContext& context) {
     throw Refusal(v1::REASON_NOT_SERVED, "no method is named \"" + method_.substr(0, 100) + "\"");
   if (!method->open) caller_ = runtime_.authenticator.check(context, method->role);
   label(context);
-  if (method->counted != Counted::no) take_place(context, method->counted == Counted::stream);
+  if (method->counted != Counted::no) take_place(method->counted == Counted::stream);
   stream_ = method->counted == Counted::stream;
   handler_ = method->make();
   handler_->start(*this);
@@ -84,14 +97,14 @@ void Exchange::label(const grpc::GenericServerContext& context) {
     labels_.trace_id = trace_id_of({found->second.data(), found->second.size()});
 }
 
-void Exchange::take_place(const grpc::GenericServerContext& context, bool stream) {
+void Exchange::take_place(bool stream) {
   constexpr std::string_view kTcp[] = {"ipv4:", "ipv6:"};
-  const std::string peer = context.peer();
+  const std::string connection = peer();
   const bool told_apart = std::any_of(std::begin(kTcp), std::end(kTcp), [&](std::string_view kind) {
-    return peer.compare(0, kind.size(), kind) == 0;
+    return connection.compare(0, kind.size(), kind) == 0;
   });
   Admission::Ticket ticket =
-      runtime_.admission.admit(caller_.identity, told_apart ? peer : "", stream);
+      runtime_.admission.admit(caller_.identity, told_apart ? connection : "", stream);
   Guard guard(mutex_);
   ticket_ = std::move(ticket);
 }
@@ -112,6 +125,11 @@ void Exchange::guarded(const std::function<void()>& body) noexcept {
 }
 
 // ------------------------------------------------------------------ for handlers
+
+std::string Exchange::peer() const {
+  Guard guard(mutex_);
+  return peer_;
+}
 
 void Exchange::read(std::optional<Clock::duration> longest) {
   Guard guard(mutex_);
@@ -303,8 +321,11 @@ void Exchange::is_over(bool) {
   }
   if (cancelled) {
     call_.cancel();
-    Guard guard(mutex_);
-    cancel();
+    {
+      Guard guard(mutex_);
+      cancel();
+    }
+    run_caught("reset", [this] { gate_.has_reset(peer()); });
   }
   let_go();
 }
@@ -368,20 +389,28 @@ const Method* Gate::find(const std::string& path) const {
 // Without memory for a call none can be answered: those that come wait until there is some, or the
 // server ends.
 void Gate::await_call() noexcept {
-  do {
-    std::shared_ptr<Exchange> exchange;
-    try {
-      exchange = std::make_shared<Exchange>(*this, runtime_);
-      {
-        Guard guard(mutex_);
-        calls_.emplace(exchange.get(), exchange);
-      }
-      return exchange->await(service_, *queue_);
-    } catch (const std::bad_alloc&) {
-      forget(exchange.get());
+  while (!begin_call() && !closing()) std::this_thread::sleep_for(kForMemory);
+}
+
+// False: there is no memory for it.
+bool Gate::begin_call() noexcept {
+  std::shared_ptr<Exchange> exchange;
+  try {
+    exchange = std::make_shared<Exchange>(*this, runtime_);
+    {
+      Guard guard(mutex_);
+      calls_.emplace(exchange.get(), exchange);
     }
-    std::this_thread::sleep_for(kForMemory);
-  } while (!closing());
+    exchange->await(service_, *queue_);
+    return true;
+  } catch (const std::bad_alloc&) {
+    forget(exchange.get());
+    return false;
+  }
+}
+
+void Gate::has_reset(const std::string& peer) {
+  if (resets_.are_too_many(peer, Exchange::Clock::now())) runtime_.break_off(peer);
 }
 
 void Gate::forget(Exchange* exchange) {

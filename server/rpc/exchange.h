@@ -18,6 +18,7 @@
 #include "rpc/call_scope.h"
 #include "rpc/lanes.h"
 #include "rpc/pollers.h"
+#include "rpc/resets.h"
 #include "threads/timer.h"
 #include "wire/memory.h"
 #include "wire/refusal.h"
@@ -63,6 +64,8 @@ struct Runtime {
   const Authenticator& authenticator;
   std::function<void(const std::string& method, const std::string& identity, const Refusal&)>
       on_refusal;
+  /// Breaks off a connection that resets too many of its calls.
+  std::function<void(const std::string& peer)> break_off;
 };
 
 /// A refusal, or anything else that was thrown, as the status of a call, which is told to
@@ -90,6 +93,8 @@ class Exchange final : public std::enable_shared_from_this<Exchange> {
   void abandon() TS_EXCLUDES(mutex_);
 
   // --- for handlers
+  /// The connection, as gRPC names it: "ipv4:127.0.0.1:40000"; empty before the call has come.
+  std::string peer() const TS_EXCLUDES(mutex_);
   const Caller& caller() const { return caller_; }
   const std::string& method() const { return method_; }
   const CallLabels& labels() const { return labels_; }
@@ -147,7 +152,8 @@ class Exchange final : public std::enable_shared_from_this<Exchange> {
   void start(const grpc::GenericServerContext& context) TS_EXCLUDES(mutex_);
   void cancel() TS_REQUIRES(mutex_);
   void label(const grpc::GenericServerContext& context);
-  void take_place(const grpc::GenericServerContext& context, bool stream) TS_EXCLUDES(mutex_);
+  void note_peer(std::string peer) TS_EXCLUDES(mutex_);
+  void take_place(bool stream) TS_EXCLUDES(mutex_);
   void go_on() TS_REQUIRES(mutex_);
   void end_job() TS_EXCLUDES(mutex_);
   void message_is_late(Clock::duration longest) TS_EXCLUDES(mutex_);
@@ -170,6 +176,7 @@ class Exchange final : public std::enable_shared_from_this<Exchange> {
   Condition written_;
   std::unique_ptr<Rpc> rpc_ TS_GUARDED_BY(mutex_) = std::make_unique<Rpc>();  ///< until the end
   bool came_ TS_GUARDED_BY(mutex_) = false;                                   ///< and is not over
+  std::string peer_ TS_GUARDED_BY(mutex_);
   bool over_early_ TS_GUARDED_BY(mutex_) = false;         ///< it was over before it was known here
   int operations_ TS_GUARDED_BY(mutex_) = 0;              ///< that gRPC has yet to end
   std::shared_ptr<Exchange> self_ TS_GUARDED_BY(mutex_);  ///< gRPC's share
@@ -208,6 +215,8 @@ class Gate final {
   friend class Exchange;
   const Method* find(const std::string& path) const;
   void await_call() noexcept TS_EXCLUDES(mutex_);
+  bool begin_call() noexcept TS_EXCLUDES(mutex_);
+  void has_reset(const std::string& peer);
   void forget(Exchange* exchange) TS_EXCLUDES(mutex_);
   std::vector<std::shared_ptr<Exchange>> open_calls() TS_EXCLUDES(mutex_);
 
@@ -219,6 +228,7 @@ class Gate final {
   Mutex mutex_;
   Condition forgotten_;
   std::map<Exchange*, std::weak_ptr<Exchange>> calls_ TS_GUARDED_BY(mutex_);
+  Resets resets_;
 };
 
 }  // namespace mbcosim::server

@@ -2,6 +2,7 @@
 
 #include <grpc/support/time.h>
 #include <pthread.h>
+#include <time.h>
 
 #include <algorithm>
 #include <utility>
@@ -22,12 +23,21 @@ thread_local struct {
   bool another_soon = false;
 } last_work;
 
+/// Of the processor, for a thread; none when it has ended.
+std::chrono::nanoseconds time_of(pthread_t thread) {
+  clockid_t clock{};
+  timespec time{};
+  if (pthread_getcpuclockid(thread, &clock) != 0 || clock_gettime(clock, &time) != 0) return {};
+  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+}
+
 }  // namespace
 
 Pollers::Pollers(std::unique_ptr<grpc::ServerCompletionQueue> queue, int most)
-    : queue_(std::move(queue)), most_(std::max(2, most)) {
+    : queue_(std::move(queue)), most_(std::max(2, most)), all_(most_ + kSpare) {
+  threads_.reserve(static_cast<std::size_t>(all_) + 1);  // the watch looks at the others
   try {
-    for (int place = 0; place < most_; ++place)
+    for (int place = 0; place < all_; ++place)
       threads_.emplace_back([this, place] { run_caught(kName, [&] { poll(place); }); });
     threads_.emplace_back([this] { run_caught(kName, [this] { watch(); }); });
   } catch (...) {  // the system grants no more threads
@@ -116,14 +126,15 @@ void Pollers::look() {
   const int waiting = waiting_.load();
   const std::uint64_t events = events_.load();
   const bool moved = std::exchange(load_.events, events) != events;
-  load_.looks_without = moved || waiting == 0 ? 0 : load_.looks_without + 1;
+  const bool at_work = waiting == 0 || are_at_work();
+  load_.looks_without = moved || at_work ? 0 : load_.looks_without + 1;
   const auto weigh = [](double& part, bool seen) {
     part = kMemory * part + (1 - kMemory) * (seen ? 1 : 0);
   };
   weigh(load_.none_waits, waiting == 0);
   weigh(load_.several_wait, waiting > 1);
-  const bool held_up = waiting == 0 && !moved;
-  if ((held_up || load_.none_waits > kOften) && admitted_ < most_) {
+  const bool held_up = at_work && !moved;
+  if (held_up ? admitted_ < all_ : load_.none_waits > kOften && admitted_ < most_) {
     ++admitted_;
     load_.none_waits = load_.several_wait = 0;
     admission_.notify_all();
@@ -133,12 +144,27 @@ void Pollers::look() {
   }
 }
 
+// Since the last look, for most of the time: those that wait for gRPC's events may be what works
+// inside gRPC.
+bool Pollers::are_at_work() {
+  const auto now = Clock::now();
+  std::chrono::nanoseconds worked{0};
+  for (int place = 0; place < all_; ++place)
+    worked += time_of(threads_[static_cast<std::size_t>(place)].native_handle());
+  const auto before = std::exchange(load_.worked, worked);
+  const auto since = std::exchange(load_.look, now);
+  return 2 * (worked - before) > now - since;
+}
+
 // Between its looks nothing may happen for hours. Whoever takes an event counts it first and then
 // asks whether the watch rests: one of the two sees the other.
 void Pollers::rest() {
   watch_rests_.store(true);
   if (events_.load() != load_.events) watch_rests_.store(false);
-  while (watch_rests_.load() && !stop_) watch_.wait(mutex_);
+  while (watch_rests_.load() && !stop_) {
+    watch_.wait_for(mutex_, kRestLook);
+    if (are_at_work()) watch_rests_.store(false);
+  }
   load_.looks_without = 0;
 }
 

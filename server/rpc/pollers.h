@@ -16,9 +16,10 @@ namespace mbcosim::server {
 
 /// Threads that wait for events of one completion queue and act on each. gRPC wakes one thread
 /// quickest when no other waits beside it (each event would be handed from one to the next), so
-/// that one alone waits as long as it keeps up. A watch lets another in when all are held up by
-/// what they do for longer than `kLook`, or have been busy for most of the last looks, and takes it
-/// back when several wait at once.
+/// that one alone waits as long as it keeps up. A watch lets another in when all are held up for
+/// longer than `kLook`, by what they do or inside gRPC, which reads from a client for as long as
+/// that one sends; or when they have been busy for most of the last looks. It takes one back when
+/// several wait at once.
 class Pollers {
  public:
   /// A tag of the queue.
@@ -44,7 +45,12 @@ class Pollers {
   };
   static constexpr std::chrono::microseconds kSoon{75};
 
-  /// `most`: threads at once, at least 2.
+  static constexpr std::chrono::milliseconds kRestLook{200};  ///< when there has been nothing
+
+  /// Threads beside those that a load may have, for when they are held up.
+  static constexpr int kSpare = 2;
+
+  /// `most`: threads at once that a load may have, at least 2.
   Pollers(std::unique_ptr<grpc::ServerCompletionQueue> queue, int most);
   ~Pollers() { stop(); }
   Pollers(const Pollers&) = delete;
@@ -67,16 +73,19 @@ class Pollers {
   void look() TS_REQUIRES(mutex_);
   void rest() TS_REQUIRES(mutex_);
   void wake_watch() TS_EXCLUDES(mutex_);
+  bool are_at_work() TS_REQUIRES(mutex_);
 
   /// What the watch has seen, weighted by age.
   struct Load {
     double none_waits = 0, several_wait = 0;  ///< parts of the looks
     std::uint64_t events = 0;                 ///< at the last look
     int looks_without = 0;                    ///< without an event
+    Clock::time_point look{};                 ///< the last one
+    std::chrono::nanoseconds worked{0};       ///< by the threads, until then
   };
 
   const std::unique_ptr<grpc::ServerCompletionQueue> queue_;
-  const int most_;
+  const int most_, all_;
   std::atomic<int> waiting_{0};           ///< threads in the queue
   std::atomic<std::uint64_t> events_{0};  ///< taken
   std::atomic<bool> watch_rests_{false};

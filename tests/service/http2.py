@@ -27,17 +27,32 @@ def headers_of(method):
     return b"".join(header(*field) for field in fields)
 
 
-def reset_at_once(path, method, count):
-    """Makes so many calls over one connection and resets each at once; the server need not take them all."""
-    block, at_once = headers_of(method), 100
-    with socket.socket(socket.AF_UNIX) as connection, contextlib.suppress(ConnectionError):
-        connection.connect(path)
+def reset_at_once(address, method, count, seconds=60):
+    """Makes so many calls over one connection to "unix:PATH" or "HOST:PORT", in so long at most, and resets each at once; the number of
+    those that were sent before the server broke off."""
+    block, at_once, start = headers_of(method), 100, time.monotonic()
+    with connect(address) as connection, contextlib.suppress(ConnectionError):
         threading.Thread(target=read_to_the_end, args=[connection.dup()], daemon=True).start()
         connection.sendall(PREFACE + frame(SETTINGS, 0, 0) + frame(SETTINGS, 1, 0))
         for first in range(0, count, at_once):
-            connection.sendall(b"".join(frame(HEADERS, 4, 2 * k + 1, block) + frame(RESET, 0, 2 * k + 1, b"\0\0\0\x08")
-                                        for k in range(first, first + at_once)))
+            if time.monotonic() - start - seconds > 0:
+                return first
+            try:
+                connection.sendall(b"".join(frame(HEADERS, 4, 2 * k + 1, block) + frame(RESET, 0, 2 * k + 1, b"\0\0\0\x08")
+                                            for k in range(first, first + at_once)))
+            except ConnectionError:
+                return first
         connection.shutdown(socket.SHUT_WR)
+    return count
+
+
+def connect(address):
+    if not address.startswith("unix:"):
+        host, port = address.rsplit(":", 1)
+        return socket.create_connection((host.strip("[]"), int(port)))
+    connection = socket.socket(socket.AF_UNIX)
+    connection.connect(address[len("unix:"):])
+    return connection
 
 
 def read_to_the_end(connection):

@@ -2,8 +2,11 @@
 #include "rpc/pollers.h"
 
 #include <grpcpp/alarm.h>
+#include <grpcpp/generic/async_generic_service.h>
 #include <grpcpp/server_builder.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <functional>
 #include <future>
@@ -122,8 +125,9 @@ TEST_F(PollersTest, LooksForTheNextPieceOfWork) {
   std::atomic<bool> rings{false};
   Bell bell(pollers(), [&] {
     const Pollers::Work work;
-    rings = ++count < 500;
-    if (!rings) heard.set_value();
+    const bool more = ++count < 500;
+    rings = more;  // which is taken back at once
+    if (!more) heard.set_value();
   });
   std::future<void> all = heard.get_future();
   bell.ring();
@@ -132,6 +136,80 @@ TEST_F(PollersTest, LooksForTheNextPieceOfWork) {
   pollers().stop();
   EXPECT_EQ(count, 500);
   EXPECT_EQ(pollers().admitted(), 1);
+}
+
+/// One side of a pair of sockets is a connection to a server, which reads from it as long as
+/// something comes.
+class Flood {
+  static constexpr std::pair<const char*, const char*> kHeaders[] = {
+      {":method", "POST"}, {":scheme", "http"}, {":path", "/a/b"},
+      {":authority", "a"}, {"te", "trailers"},  {"content-type", "application/grpc"}};
+
+ public:
+  explicit Flood(grpc::experimental::ExternalConnectionAcceptor& acceptor) {
+    int pair[2] = {-1, -1};
+    EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+    connection.fd = pair[0];
+    acceptor.HandleNewConnection(&connection);
+    socket_ = pair[1];
+    thread_ = std::thread([this] { send(); });
+  }
+  ~Flood() {
+    ends_ = true;
+    thread_.join();
+    ::close(socket_);
+  }
+
+ private:
+  static std::string frame(char type, char flags, std::uint32_t stream, const std::string& text) {
+    std::string out{0, 0, static_cast<char>(text.size()), type, flags};
+    for (const int shift : {24, 16, 8, 0}) out += static_cast<char>(stream >> shift);
+    return out + text;
+  }
+  // The preface, then calls that are reset at once.
+  void send() {
+    const auto text = [](const std::string& of) { return static_cast<char>(of.size()) + of; };
+    std::string block;
+    for (const auto& [name, value] : kHeaders) block += '\0' + text(name) + text(value);
+    std::string out = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + frame(4, 0, 0, "");
+    for (std::uint32_t stream = 1; !ends_;) {
+      for (; out.size() < (1U << 16); stream += 2)
+        out += frame(1, 4, stream, block) + frame(3, 0, stream, std::string("\0\0\0\10", 4));
+      const ssize_t sent = ::send(socket_, out.data(), out.size(), MSG_NOSIGNAL);
+      if (sent > 0) out.erase(0, static_cast<std::size_t>(sent));
+    }
+  }
+  int socket_ = -1;
+  std::atomic<bool> ends_{false};
+  std::thread thread_;
+};
+
+// Also when nothing has happened for so long that the watch rests.
+TEST(Pollers, AnotherGoesOnWhileGrpcReadsWithoutEnd) {
+  for (const auto pause : {0ms, 1000ms}) {
+    grpc::ServerBuilder builder;
+    grpc::AsyncGenericService service;
+    builder.RegisterAsyncGenericService(&service);
+    const auto acceptor = builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+        grpc::InsecureServerCredentials());
+    Pollers pollers(builder.AddCompletionQueue(), 2);
+    const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+    std::this_thread::sleep_for(pause);
+    {
+      const Flood flood(*acceptor);
+      std::this_thread::sleep_for(100ms);
+      for (int k = 0; k < 10; ++k) {
+        std::promise<void> heard;
+        Bell bell(pollers, [&] { heard.set_value(); });
+        bell.ring();
+        ASSERT_EQ(heard.get_future().wait_for(kPatience), std::future_status::ready);
+      }
+    }
+    server->Shutdown();
+    pollers.stop();
+  }
 }
 
 TEST_F(PollersTest, WhatAnEventThrowsEndsNoThread) {

@@ -3,6 +3,7 @@ import contextlib
 import os
 import resource
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -15,7 +16,7 @@ sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "
 import decks
 import mbcosim
 import reduce_scaling
-from conftest import BIN, TIME_FACTOR, counts_memory, wait_for
+from conftest import BIN, TIME_FACTOR, counts_memory, is_sanitized, wait_for
 from http2 import HalfMessages, reset_at_once
 from mbcosim import bundle
 from mbcosim.v1 import (coupling_pb2_grpc, reduction_pb2, reduction_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2,
@@ -447,12 +448,53 @@ def is_served(simulation):
         return False
 
 
+def has_ipv6():
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET6) as probe:
+        probe.bind(("::1", 0))
+        return True
+    return False
+
+
+STEP = "/mbcosim.v1.Simulations/Step"
+
+
 def test_calls_that_are_reset_at_once_end(start_daemon):
     daemon = ready(start_daemon())
     with daemon.connect() as server:
         simulation = server.load_text(decks.body())
-        reset_at_once(daemon.address[len("unix:"):], "/mbcosim.v1.Simulations/Step", 30_000)
+        assert reset_at_once(daemon.address, STEP, 1500) == 1500
         wait_for(lambda: is_served(simulation), 30)
+        assert "broken off" not in daemon.log()
+
+
+@pytest.mark.parametrize("over", ["unix", "tcp", "tcp6", "mapped"])
+def test_a_client_that_resets_calls_without_end_is_broken_off(guarded, over):
+    """Even one that nobody knows. gRPC reads a million of them in half a minute, faster than they end, and keeps some 20 KB of each until then."""
+    host = {"unix": None, "tcp": "127.0.0.1", "tcp6": "[::1]", "mapped": "[::]"}[over]
+    if over in ("tcp6", "mapped") and not has_ipv6():
+        pytest.skip("this machine has no loopback address of IPv6")
+    daemon = guarded(*["--listen", f"{host}:0", "--insecure"] if host else [])
+    address = daemon.address
+    if host:
+        wait_for(lambda: f"listening on {host}:" in daemon.log())
+        port = daemon.log().split(f"listening on {host}:")[1].split()[0]
+        address = ("127.0.0.1:" if over == "mapped" else f"{host}:") + port
+    sent, seconds = [], []
+    with daemon.connect(token="ann-token-0123456789") as server, server.load_text(decks.body()) as simulation:
+        before, most = resident(daemon), 0
+        attack = threading.Thread(target=lambda: sent.append(reset_at_once(address, STEP, 1_000_000)))
+        attack.start()
+        while attack.is_alive():
+            start = time.monotonic()
+            assert simulation.step().outcome == "ACCEPTED"
+            seconds.append(time.monotonic() - start)
+            most = max(most, resident(daemon))
+            time.sleep(0.05)
+        assert sent[0] < 1_000_000
+        assert max(seconds) < 5 * TIME_FACTOR
+        assert "it resets too many calls" in daemon.log()
+        if not is_sanitized():
+            assert most - before < 600 << 20
 
 
 # ---------------------------------------------------------------- everything ends in time
