@@ -108,7 +108,7 @@ int most_pollers() {
 
 /// gRPC would wait without end for threads of its own that it could not start.
 void check_threads() {
-  const std::size_t needed = 24 + static_cast<std::size_t>(most_pollers() + Pollers::kSpare);
+  const std::size_t needed = 25 + static_cast<std::size_t>(most_pollers() + Pollers::kSpare);
   std::latch end(1);
   std::vector<std::jthread> threads;  // destroyed first: each has been let go by then
   try {
@@ -193,9 +193,6 @@ Daemon::Daemon(const Config& config)
           [this](const std::string& method, const std::string& identity, const Refusal& refusal) {
             log_.refused(method, identity, refusal);
             metrics_.count_failure(refusal.reason());
-          },
-          [this](const std::string& peer) {
-            for (const auto& listener : listeners_) listener->break_off(peer);
           }},
       results_(config_.results_root, config_.limits.results_root_bytes),
       deck_sockets_(config_.deck_sockets, config_.limits.deck_sockets, config_.listen),
@@ -293,6 +290,7 @@ void Daemon::add_methods() {
   add_results(gate_, parts_);
   add_events(gate_, parts_);
   health_.add_to(gate_, !config_.health_credentials);
+  gate_.add(BacklogWatch::kMethod, BacklogWatch::method());
   if (config_.reflection) add_reflection(gate_);
 }
 
@@ -318,10 +316,21 @@ void Daemon::listen() {
   server_ = builder.BuildAndStart();
   if (!server_) throw std::runtime_error("the server cannot start");
   gate_.open(pollers_->queue());
+  watch_backlog();
   for (std::size_t i = 0; i < listeners_.size(); ++i) {
     listeners_[i]->start(std::move(acceptors[i]));
     spdlog::info("listening on {}", listeners_[i]->bound());
   }
+}
+
+void Daemon::watch_backlog() {
+  constexpr int kRefused = 1024;  // may be under way at once
+  backlog_.emplace(
+      gate_, static_cast<std::size_t>(config_.limits.open_calls) + kRefused,
+      [this] { return server_->InProcessChannel({}); },
+      [this](const std::string& peer) {
+        for (const auto& listener : listeners_) listener->break_off(peer);
+      });
 }
 
 void Daemon::open_shared_memory() {
@@ -474,6 +483,7 @@ bool Daemon::shut_down() {
   spdlog::info("shutting down");
   health_.stop();
   store_.note_end_of_server();
+  backlog_.reset();
   gate_.close();
   eager_resume_.stop();
   for (const auto& listener : listeners_) listener->stop();

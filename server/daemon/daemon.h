@@ -14,6 +14,7 @@
 #include "daemon/options.h"
 #include "daemon/tls.h"
 #include "http/door.h"
+#include "rpc/backlog_watch.h"
 #include "rpc/health.h"
 #include "rpc/pollers.h"
 #include "rpc/workers.h"
@@ -46,6 +47,7 @@ class Daemon {
   void watch_values();
   void expose_metrics();
   void listen();
+  void watch_backlog();
   void open_shared_memory();
   void open_http();
   bool end_server();
@@ -74,6 +76,7 @@ class Daemon {
   std::optional<Pollers> pollers_;
   std::unique_ptr<grpc::Server> server_;
   std::vector<std::unique_ptr<Listener>> listeners_;
+  std::optional<BacklogWatch> backlog_;  ///< ends before the server and the listeners
   std::vector<std::unique_ptr<SharedMemoryService>> shared_memory_;  ///< one for each Unix socket
   std::unique_ptr<http::Door> door_;
   std::atomic<bool> draining_{false};

@@ -6,6 +6,7 @@
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
 #include <sys/ioctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -144,7 +145,8 @@ shm::Descriptor listen_on(const addrinfo& info, bool both_families) {
 
 }  // namespace
 
-Listener::Listener(const std::string& address) : bound_(address), reserve_(open_reserve()) {
+Listener::Listener(const std::string& address)
+    : bound_(address), reserve_(open_reserve()), wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (is_unix(address)) {
     bind_unix(address.substr(kUnix.size()));
     return;
@@ -222,21 +224,26 @@ void Listener::cut() {
 
 void Listener::break_off(const std::string& peer) {
   if (is_unix(peer) != is_unix(bound_)) return;
+  const std::uint64_t one = 1;
   Guard guard(mutex_);
   unwanted_.push_back(peer);
+  (void)!::write(wake_.get(), &one, sizeof one);  // or within `kLookMs`
 }
 
 void Listener::break_off_asked() {
   std::vector<std::string> asked;
   {
+    std::uint64_t count = 0;
     Guard guard(mutex_);
+    (void)!::read(wake_.get(), &count, sizeof count);
     asked.swap(unwanted_);
   }
   for (const std::string& peer : asked) {
     for (const int fd : is_unix(bound_) ? who_sends_most() : named(peer)) {
       Peer& unwanted = peers_.at(fd);
-      spdlog::warn("{}: a connection of {} is broken off: it resets too many calls", bound_,
-                   unwanted.source);
+      spdlog::warn(
+          "{}: a connection of {} is broken off: its calls come faster than they can be answered",
+          bound_, unwanted.source);
       const linger nothing{1, 0};  // to a client that writes on the end comes as a reset
       ::setsockopt(fd, SOL_SOCKET, SO_LINGER, &nothing, sizeof nothing);
       ::shutdown(fd, SHUT_RDWR);
@@ -270,10 +277,12 @@ std::vector<int> Listener::who_sends_most() const {
 void Listener::loop() {
   std::vector<pollfd> looks;
   for (const shm::Descriptor& socket : sockets_) looks.push_back({socket.get(), POLLIN, 0});
+  looks.push_back({wake_.get(), POLLIN, 0});
   while (!stop_.load()) {
     const int events = ::poll(looks.data(), looks.size(), accepted_.empty() ? kLookMs : 0);
     for (const pollfd& look : looks)
-      if (events > 0 && look.revents != 0) run_caught("listener", [&] { accept_from(look.fd); });
+      if (events > 0 && look.revents != 0 && look.fd != wake_.get())
+        run_caught("listener", [&] { accept_from(look.fd); });
     run_caught("listener", [&] { hand_over_next(); });
     run_caught("listener", [&] { break_off_asked(); });
   }

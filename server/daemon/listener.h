@@ -71,6 +71,7 @@ class Listener {
   std::string bound_, path_;
   std::vector<shm::Descriptor> sockets_;
   shm::Descriptor reserve_;  ///< given up for a moment to drop a connection
+  shm::Descriptor wake_;     ///< of the thread's wait, when somebody is to be broken off
   std::unique_ptr<Acceptor> acceptor_;
   Mutex mutex_;
   std::vector<std::string> unwanted_ TS_GUARDED_BY(mutex_);

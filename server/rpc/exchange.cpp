@@ -6,8 +6,6 @@
 #include <new>
 #include <thread>
 
-#include "threads/top_frame.h"
-
 namespace mbcosim::server {
 namespace {
 
@@ -61,15 +59,13 @@ void Exchange::has_come(bool ok) {
   }
   guarded([&] {
     note_peer(context->peer());
-    if (over)
-      gate_.has_reset(peer());
-    else
-      start(*context);
+    if (!over) start(*context);
   });
   let_go();
 }
 
 void Exchange::note_peer(std::string peer) {
+  gate_.counts_.add(peer);
   Guard guard(mutex_);
   peer_ = std::move(peer);
 }
@@ -321,11 +317,8 @@ void Exchange::is_over(bool) {
   }
   if (cancelled) {
     call_.cancel();
-    {
-      Guard guard(mutex_);
-      cancel();
-    }
-    run_caught("reset", [this] { gate_.has_reset(peer()); });
+    Guard guard(mutex_);
+    cancel();
   }
   let_go();
 }
@@ -407,10 +400,6 @@ bool Gate::begin_call() noexcept {
     forget(exchange.get());
     return false;
   }
-}
-
-void Gate::has_reset(const std::string& peer) {
-  if (resets_.are_too_many(peer, Exchange::Clock::now())) runtime_.break_off(peer);
 }
 
 void Gate::forget(Exchange* exchange) {

@@ -15,10 +15,10 @@
 #include "rpc/auth.h"
 #include "rpc/budgets.h"
 #include "rpc/call.h"
+#include "rpc/call_counts.h"
 #include "rpc/call_scope.h"
 #include "rpc/lanes.h"
 #include "rpc/pollers.h"
-#include "rpc/resets.h"
 #include "threads/timer.h"
 #include "wire/memory.h"
 #include "wire/refusal.h"
@@ -64,8 +64,6 @@ struct Runtime {
   const Authenticator& authenticator;
   std::function<void(const std::string& method, const std::string& identity, const Refusal&)>
       on_refusal;
-  /// Breaks off a connection that resets too many of its calls.
-  std::function<void(const std::string& peer)> break_off;
 };
 
 /// A refusal, or anything else that was thrown, as the status of a call, which is told to
@@ -210,13 +208,18 @@ class Gate final {
   /// nothing more is begun on the queue.
   bool empty_within(std::chrono::milliseconds wait) TS_EXCLUDES(mutex_);
   bool closing() const { return closing_.load(); }
+  CallCounts& counts() { return counts_; }
+  /// Calls that gRPC has not let go of.
+  std::size_t alive() TS_EXCLUDES(mutex_) {
+    Guard guard(mutex_);
+    return calls_.size();
+  }
 
  private:
   friend class Exchange;
   const Method* find(const std::string& path) const;
   void await_call() noexcept TS_EXCLUDES(mutex_);
   bool begin_call() noexcept TS_EXCLUDES(mutex_);
-  void has_reset(const std::string& peer);
   void forget(Exchange* exchange) TS_EXCLUDES(mutex_);
   std::vector<std::shared_ptr<Exchange>> open_calls() TS_EXCLUDES(mutex_);
 
@@ -228,7 +231,7 @@ class Gate final {
   Mutex mutex_;
   Condition forgotten_;
   std::map<Exchange*, std::weak_ptr<Exchange>> calls_ TS_GUARDED_BY(mutex_);
-  Resets resets_;
+  CallCounts counts_;
 };
 
 }  // namespace mbcosim::server

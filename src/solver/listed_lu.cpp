@@ -390,6 +390,7 @@ ListedLu::ListedLu(const FactorPattern& factors, const MatrixPlaces& matrix,
   of_part_.resize(elimination_.size());
   substitution_ = builder.substitution();
   rows_.last = columns_.last = {};
+  count_bytes();
 }
 
 /// A block's slots belong to one part, and wide supernodes begin with a block.
@@ -512,13 +513,12 @@ bool ListedLu::pivots_dominate(double bound) const {
   return true;
 }
 
-std::size_t ListedLu::bytes() const {
-  std::size_t lists = 0;
-  for (const EliminationProgram& program : elimination_) lists += program.bytes();
+void ListedLu::count_bytes() {
+  for (const EliminationProgram& program : elimination_) bytes_ += program.bytes();
   for (const Stage& stage : substitution_)
-    for (const EliminationProgram& program : stage) lists += program.bytes();
-  return lists + sizeof(double) * numbers_.size() + sizeof(std::uint32_t) * upper_place_.size() +
-         2 * sizeof(int) * (rows_.block.size() + columns_.block.size());
+    for (const EliminationProgram& program : stage) bytes_ += program.bytes();
+  bytes_ += sizeof(double) * numbers_.size() + sizeof(std::uint32_t) * upper_place_.size() +
+            2 * sizeof(int) * (rows_.block.size() + columns_.block.size());
 }
 
 }  // namespace mbcosim

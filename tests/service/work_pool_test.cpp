@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "rpc/admission.h"
-#include "rpc/resets.h"
+#include "rpc/call_counts.h"
 #include "threads/timer.h"
 #include "wire/refusal.h"
 
@@ -122,21 +122,15 @@ TEST(Admission, LimitsHoldForEachIdentityEachConnectionAndAll) {
   EXPECT_FALSE(refused("ann", "1", true));
 }
 
-TEST(Resets, AreTooManyOfOneConnectionInOneSecond) {
-  Resets resets;
-  const Resets::Clock::time_point start{};
-  const auto too_many = [&](const char* connection, int count, std::chrono::milliseconds at) {
-    int found = 0;
-    for (int k = 0; k < count; ++k) found += resets.are_too_many(connection, start + at);
-    return found;
-  };
-  EXPECT_EQ(too_many("a", Resets::kMost - 1, 0ms), 0);
-  EXPECT_EQ(too_many("b", Resets::kMost - 1, 500ms), 0);
-  EXPECT_EQ(too_many("a", Resets::kMost - 1, 1000ms), 0);
-  EXPECT_EQ(too_many("b", 1, 1499ms), 1);
-  EXPECT_EQ(too_many("b", Resets::kMost, 1499ms), 1);
-  EXPECT_EQ(too_many("b", 1, 1500ms), 0);
-  EXPECT_EQ(too_many("a", 1, 1999ms), 1);
+TEST(CallCounts, AreThoseSinceTheLastTime) {
+  CallCounts counts;
+  for (int k = 0; k < 4; ++k) counts.add("a");
+  for (int k = 0; k < 2; ++k) counts.add("b");
+  counts.add("c");
+  const CallCounts::Counts taken = counts.take();
+  EXPECT_EQ(taken, (CallCounts::Counts{{"a", 4}, {"b", 2}, {"c", 1}}));
+  EXPECT_EQ(busiest(taken), (std::vector<std::string>{"a", "b"}));
+  EXPECT_TRUE(counts.take().empty());
 }
 
 TEST(Admission, NothingIsKeptOfARefusedCall) {
