@@ -261,8 +261,9 @@ std::vector<int> Listener::named(const std::string& as_grpc_does) const {
 }
 
 std::vector<int> Listener::who_sends_most() const {
-  std::map<int, int> unread;  // bytes, by descriptor
-  int most = 1;
+  constexpr int kMuch = 16 << 10;  // more than who waits for an answer has sent
+  std::map<int, int> unread;       // bytes, by descriptor
+  int most = 2 * kMuch;
   for (const auto& [fd, peer] : peers_) {
     int& bytes = unread[fd];
     if (inode_of(fd) != peer.inode || ::ioctl(fd, FIONREAD, &bytes) != 0) bytes = 0;
@@ -270,7 +271,7 @@ std::vector<int> Listener::who_sends_most() const {
   }
   std::vector<int> found;
   for (const auto& [fd, bytes] : unread)
-    if (bytes >= (most + 1) / 2) found.push_back(fd);
+    if (2 * bytes >= most) found.push_back(fd);
   return found;
 }
 

@@ -86,9 +86,14 @@ void BacklogWatch::look(CallCounts::Counts counts) {
                                   [](int sum, const auto& each) { return sum + each.second; });
   quiet_ = all <= kOwn && !grows;
   if (tidy_in_ > 0 && --tidy_in_ % kTidy == 0) malloc_trim(0);
-  if (quiet_ || (gate_.alive() <= most_alive_ && comes_in_time()) || is_to_end()) return;
+  if (quiet_) return;
+  if (gate_.alive() > most_alive_)
+    counts = gate_.alive_by_connection();
+  else if (comes_in_time() || is_to_end())
+    return;
+  else
+    for (const auto& [connection, count] : gate_.counts().take()) counts[connection] += count;
   tidy_in_ = 3 * kTidy;
-  for (const auto& [connection, count] : gate_.counts().take()) counts[connection] += count;
   for (const std::string& connection : busiest(counts)) break_off_(connection);
 }
 

@@ -20,8 +20,9 @@ namespace mbcosim::server {
 /// keeps some 20 KB of each: what limits them over one connection counts neither those that their
 /// client has reset (CVE-2023-44487) nor any of a client that never acknowledged the limit. How
 /// many wait for their turn cannot be asked. So, while calls come, this sends one of its own over a
-/// channel within the process: when it takes long to come, and memory grows meanwhile, or when more
-/// have come and not ended than are allowed, the connections over which most come are broken off.
+/// channel within the process: when it takes long to come, and memory grows meanwhile, the
+/// connections over which most come are broken off; when more have come and not ended than are
+/// allowed, those that have most of them.
 class BacklogWatch {
  public:
   /// Of the watch's own calls.

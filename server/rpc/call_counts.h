@@ -31,13 +31,17 @@ class CallCounts {
   Counts counts_ TS_GUARDED_BY(mutex_);
 };
 
-/// Those that have at least half as many as the busiest one.
+/// Those that have at least half as many as the busiest one. All connections of Unix sockets share
+/// one name, which counts only when nothing else is busier.
 inline std::vector<std::string> busiest(const CallCounts::Counts& counts) {
-  int most = 0;
-  for (const auto& [connection, count] : counts) most = std::max(most, count);
+  const auto most = std::max_element(counts.begin(), counts.end(),
+                                     [](auto& a, auto& b) { return a.second < b.second; });
   std::vector<std::string> found;
-  for (const auto& [connection, count] : counts)
-    if (2 * count >= most) found.push_back(connection);
+  for (const auto& [connection, count] : counts) {
+    const bool is_unix = connection.compare(0, 5, "unix:") == 0;
+    if (connection == most->first || (!is_unix && 2 * count >= most->second))
+      found.push_back(connection);
+  }
   return found;
 }
 

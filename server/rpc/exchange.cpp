@@ -424,6 +424,12 @@ std::vector<std::shared_ptr<Exchange>> Gate::open_calls() {
   return calls;
 }
 
+CallCounts::Counts Gate::alive_by_connection() {
+  CallCounts::Counts counts;
+  for (const auto& call : open_calls()) ++counts[call->peer()];
+  return counts;
+}
+
 void Gate::close() {
   closing_.store(true);
   const auto calls = open_calls();

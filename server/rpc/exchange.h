@@ -214,6 +214,7 @@ class Gate final {
     Guard guard(mutex_);
     return calls_.size();
   }
+  CallCounts::Counts alive_by_connection() TS_EXCLUDES(mutex_);
 
  private:
   friend class Exchange;

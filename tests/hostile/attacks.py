@@ -24,7 +24,6 @@ from broken_off import BrokenOff
 from forged_checkpoints import ForgedCheckpoints
 from forged_states import ForgedStates
 from fuzzer import Fuzzer
-from http2 import flood
 from requests_of_http import Requests
 from google.protobuf import descriptor_pool, message_factory
 from google.protobuf.duration_pb2 import Duration
@@ -422,17 +421,6 @@ class Attacker:
                 connection.close()
 
 
-    def flood(self):
-        """For a moment in each second: calls over one connection, as many as the server lets in, by turns reset at once and not."""
-        resets = True
-        while self.going():
-            sent, broken_off = flood(self.tcp, "/mbcosim.v1.Simulations/Step", 2, resets)
-            self.codes["OK"] += sent > 0
-            self.codes["BROKEN OFF"] += broken_off
-            resets = not resets
-            time.sleep(1)
-
-
 def all_methods():
     """(service, method) of the whole contract."""
     files = (pb, telemetry_pb2, coupling_pb2, reduction_pb2, geometry_pb2, results_pb2, events_pb2)
@@ -460,7 +448,7 @@ def is_open(connection):
 KINDS = {"fuzz": ["OK", "INVALID_ARGUMENT", "NOT_FOUND"], "cancel": ["CANCELLED"], "race": ["OK", "NOT_FOUND"], "slow": ["OK"],
          "silent": ["UNAUTHENTICATED"], "half_open": ["OK"], "greedy": ["OK"], "large": ["CANCELLED"],
          "descriptors": ["OK", "DROPPED"], "http": ["HTTP 200"], "shared_memory": ["OK"],
-         "talkative": ["OK", "NOT_FOUND"], "flood": ["OK"], "folder": ["OK", "DATA_LOSS"],
+         "talkative": ["OK", "NOT_FOUND"], "folder": ["OK", "DATA_LOSS"],
          "states": ["OK", "FAILED_PRECONDITION", "DATA_LOSS"], "checkpoints": ["OK", "DATA_LOSS"]}
 
 

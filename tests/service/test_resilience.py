@@ -467,9 +467,8 @@ def test_calls_that_are_reset_at_once_end(start_daemon):
         assert "broken off" not in daemon.log()
 
 
-@pytest.mark.parametrize("over", ["unix", "tcp", "tcp6", "mapped"])
-@pytest.mark.parametrize("resets", [True, False], ids=["reset", "kept"])
-def test_calls_that_come_faster_than_they_can_be_answered(guarded, over, resets):
+@pytest.mark.parametrize("resets, over", [(True, "unix"), (True, "tcp"), (False, "unix"), (False, "tcp6"), (False, "mapped")])
+def test_calls_that_come_faster_than_they_can_be_answered(guarded, resets, over):
     """gRPC keeps some 20 KB of each until its turn comes, a GB in a second; its own limit holds for a client that acknowledges it and resets
     nothing. This one needs no credentials for it."""
     host = {"unix": None, "tcp": "127.0.0.1", "tcp6": "[::1]", "mapped": "[::]"}[over]
@@ -484,7 +483,7 @@ def test_calls_that_come_faster_than_they_can_be_answered(guarded, over, resets)
     came, seconds = [], []
     with daemon.connect(token="ann-token-0123456789") as server, server.load_text(decks.body()) as simulation:
         before, most = resident(daemon), 0
-        attack = threading.Thread(target=lambda: came.append(flood(address, STEP, 8, resets)))
+        attack = threading.Thread(target=lambda: came.append(flood(address, STEP, 5, resets)))
         attack.start()
         while attack.is_alive():
             start = time.monotonic()

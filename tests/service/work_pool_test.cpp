@@ -131,6 +131,9 @@ TEST(CallCounts, AreThoseSinceTheLastTime) {
   EXPECT_EQ(taken, (CallCounts::Counts{{"a", 4}, {"b", 2}, {"c", 1}}));
   EXPECT_EQ(busiest(taken), (std::vector<std::string>{"a", "b"}));
   EXPECT_TRUE(counts.take().empty());
+  EXPECT_TRUE(busiest({}).empty());
+  EXPECT_EQ(busiest({{"a", 4}, {"unix:", 3}}), std::vector<std::string>{"a"});
+  EXPECT_EQ(busiest({{"a", 4}, {"b", 2}, {"unix:", 5}}), (std::vector<std::string>{"a", "unix:"}));
 }
 
 TEST(Admission, NothingIsKeptOfARefusedCall) {
