@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <future>
 #include <latch>
 #include <system_error>
@@ -219,13 +218,6 @@ Daemon::Daemon(const Config& config)
 }
 
 namespace {
-
-/// Memory of the process that is in the machine's [bytes].
-double resident_bytes() {
-  std::int64_t all = 0, resident = 0;
-  std::ifstream("/proc/self/statm") >> all >> resident;
-  return static_cast<double>(resident * ::sysconf(_SC_PAGESIZE));
-}
 
 const char* name_of(v1::SimulationState state) {
   switch (state) {

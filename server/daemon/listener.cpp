@@ -19,6 +19,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "rpc/call_counts.h"
 #include "threads/top_frame.h"
 
 namespace mbcosim::server {
@@ -53,11 +54,18 @@ void mask(sockaddr_storage& name) {
     std::memset(&address.s6_addr[kNetwork], 0, sizeof address - kNetwork);
 }
 
+/// Its number.
+std::string host_of(const sockaddr_storage& name, socklen_t size) {
+  char text[NI_MAXHOST] = "";
+  ::getnameinfo(reinterpret_cast<const sockaddr*>(&name), size, text, sizeof text, nullptr, 0,
+                NI_NUMERICHOST);
+  return text;
+}
+
 /// The other side: the process of a Unix socket, the address of another.
 std::string source_of(int fd) {
   sockaddr_storage name{};
   socklen_t size = sizeof name;
-  char text[NI_MAXHOST] = "";
   if (::getpeername(fd, reinterpret_cast<sockaddr*>(&name), &size) != 0) return "";
   if (name.ss_family == AF_UNIX) {
     ucred process{};
@@ -66,9 +74,7 @@ std::string source_of(int fd) {
     return "process " + std::to_string(process.pid);
   }
   mask(name);
-  ::getnameinfo(reinterpret_cast<const sockaddr*>(&name), size, text, sizeof text, nullptr, 0,
-                NI_NUMERICHOST);
-  return text;
+  return host_of(name, size);
 }
 
 // gRPC closes connections where no sanitizer looks. To the thread sanitizer, whoever gets the
@@ -84,22 +90,24 @@ ino_t inode_of(int fd) {
   return ::fstatat(fd, "", &info, AT_EMPTY_PATH) == 0 ? info.st_ino : 0;
 }
 
-/// As gRPC names it, without the interface of an address that is only valid on that; empty for a
-/// Unix socket.
+int port_of(const sockaddr_storage& name) {
+  return ntohs(name.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(name).sin6_port
+                                          : reinterpret_cast<const sockaddr_in&>(name).sin_port);
+}
+
+/// The other side of a TCP connection as gRPC names it, but for the interface of an address that is
+/// only valid on that.
 std::string name_of_peer(int fd) {
   sockaddr_storage name{};
   socklen_t size = sizeof name;
   if (::getpeername(fd, reinterpret_cast<sockaddr*>(&name), &size) != 0) return "";
-  if (name.ss_family == AF_UNIX) return "";
-  const auto& six = reinterpret_cast<const sockaddr_in6&>(name);
-  char host[NI_MAXHOST] = "", port[NI_MAXSERV] = "";
-  if (::getnameinfo(reinterpret_cast<const sockaddr*>(&name), size, host, sizeof host, port,
-                    sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0)
-    return "";
-  const std::string address = std::string(host).substr(0, std::string_view(host).find('%'));
-  if (name.ss_family == AF_INET6 && !IN6_IS_ADDR_V4MAPPED(&six.sin6_addr))
-    return "ipv6:%5B" + address + "%5D:" + port;
-  return "ipv4:" + address.substr(address.rfind(':') + 1) + ":" + port;  // of "::ffff:127.0.0.1"
+  std::string host = host_of(name, size);
+  host.erase(std::min(host.find('%'), host.size()));
+  const std::string port = ":" + std::to_string(port_of(name));
+  const bool is_six = name.ss_family == AF_INET6 &&
+                      !IN6_IS_ADDR_V4MAPPED(&reinterpret_cast<const sockaddr_in6&>(name).sin6_addr);
+  if (is_six) return "ipv6:%5B" + host + "%5D" + port;
+  return "ipv4:" + host.substr(host.rfind(':') + 1) + port;  // of "::ffff:127.0.0.1", say
 }
 
 std::string without_interface(std::string peer) {
@@ -118,8 +126,7 @@ int port_of(int socket) {
   sockaddr_storage name{};
   socklen_t size = sizeof name;
   if (::getsockname(socket, reinterpret_cast<sockaddr*>(&name), &size) != 0) return 0;
-  return ntohs(name.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(name).sin6_port
-                                          : reinterpret_cast<sockaddr_in&>(name).sin_port);
+  return port_of(name);
 }
 
 void set_port(addrinfo& info, int port) {
@@ -223,7 +230,7 @@ void Listener::cut() {
 }
 
 void Listener::break_off(const std::string& peer) {
-  if (is_unix(peer) != is_unix(bound_)) return;
+  if (is_told_apart(peer) == is_unix(bound_)) return;
   const std::uint64_t one = 1;
   Guard guard(mutex_);
   unwanted_.push_back(peer);

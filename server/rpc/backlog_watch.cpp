@@ -3,13 +3,12 @@
 #include <grpcpp/generic/generic_stub.h>
 #include <malloc.h>
 #include <pthread.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
 #include <numeric>
 
 #include "threads/top_frame.h"
+#include "wire/memory.h"
 
 namespace mbcosim::server {
 namespace {
@@ -21,13 +20,6 @@ constexpr std::int64_t kGrowth = 48 << 20;        // of memory [bytes] that is m
 constexpr int kTidy = 50;                         // looks after a crowd
 constexpr int kOwn = 1;                           // call of the last look
 constexpr const char* kThread = "backlog";
-
-/// Memory of the process that is in the machine's.
-std::int64_t resident_bytes() {
-  std::int64_t all = 0, resident = 0;
-  std::ifstream("/proc/self/statm") >> all >> resident;
-  return resident * ::sysconf(_SC_PAGESIZE);
-}
 
 std::int64_t allocated_bytes() {
   const struct mallinfo2 info = ::mallinfo2();

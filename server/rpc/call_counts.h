@@ -31,17 +31,20 @@ class CallCounts {
   Counts counts_ TS_GUARDED_BY(mutex_);
 };
 
-/// Those that have at least half as many as the busiest one. All connections of Unix sockets share
-/// one name, which counts only when nothing else is busier.
+/// Has the connection a name of its own? Those of Unix sockets share one.
+inline bool is_told_apart(const std::string& connection) {
+  return connection.compare(0, 5, "ipv4:") == 0 || connection.compare(0, 5, "ipv6:") == 0;
+}
+
+/// Those that have at least half as many as the busiest one; a name that many share only when it is
+/// the busiest.
 inline std::vector<std::string> busiest(const CallCounts::Counts& counts) {
   const auto most = std::max_element(counts.begin(), counts.end(),
                                      [](auto& a, auto& b) { return a.second < b.second; });
   std::vector<std::string> found;
-  for (const auto& [connection, count] : counts) {
-    const bool is_unix = connection.compare(0, 5, "unix:") == 0;
-    if (connection == most->first || (!is_unix && 2 * count >= most->second))
+  for (const auto& [connection, count] : counts)
+    if (connection == most->first || (is_told_apart(connection) && 2 * count >= most->second))
       found.push_back(connection);
-  }
   return found;
 }
 

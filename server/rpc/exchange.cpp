@@ -94,13 +94,9 @@ void Exchange::label(const grpc::GenericServerContext& context) {
 }
 
 void Exchange::take_place(bool stream) {
-  constexpr std::string_view kTcp[] = {"ipv4:", "ipv6:"};
   const std::string connection = peer();
-  const bool told_apart = std::any_of(std::begin(kTcp), std::end(kTcp), [&](std::string_view kind) {
-    return connection.compare(0, kind.size(), kind) == 0;
-  });
-  Admission::Ticket ticket =
-      runtime_.admission.admit(caller_.identity, told_apart ? connection : "", stream);
+  Admission::Ticket ticket = runtime_.admission.admit(
+      caller_.identity, is_told_apart(connection) ? connection : "", stream);
   Guard guard(mutex_);
   ticket_ = std::move(ticket);
 }

@@ -156,8 +156,8 @@ bool Pollers::are_at_work() {
   return 2 * (worked - before) > now - since;
 }
 
-// Between its looks nothing may happen for hours. Whoever takes an event counts it first and then
-// asks whether the watch rests: one of the two sees the other.
+// Nothing may happen for hours: the looks are rare then. Whoever takes an event counts it first and
+// then asks whether the watch rests: one of the two sees the other.
 void Pollers::rest() {
   watch_rests_.store(true);
   if (events_.load() != load_.events) watch_rests_.store(false);

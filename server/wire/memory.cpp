@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <fstream>
 #include <new>
 
 #include "wire/control_group.h"
@@ -83,6 +84,12 @@ MemoryShare MemoryScope::keep() {
 
 MemoryPause::MemoryPause() : scope_(std::exchange(scope_of_thread, nullptr)) {}
 MemoryPause::~MemoryPause() { scope_of_thread = scope_; }
+
+std::int64_t resident_bytes() {
+  std::int64_t all = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return resident * ::sysconf(_SC_PAGESIZE);
+}
 
 }  // namespace mbcosim::server
 

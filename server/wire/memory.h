@@ -151,4 +151,7 @@ auto within(MemoryBudget& budget, const CancelToken* cancel, MemoryShare* kept, 
   }
 }
 
+/// Memory of the process that is in the machine's.
+std::int64_t resident_bytes();
+
 }  // namespace mbcosim::server

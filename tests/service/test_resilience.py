@@ -454,6 +454,8 @@ def test_calls_that_are_reset_at_once_end(start_daemon):
         assert flood(daemon.address, "/mbcosim.v1.Simulations/Step", 60, resets=True, count=1500) == (1500, False)
         wait_for(lambda: is_served(simulation), 30)
         assert "broken off" not in daemon.log()
+        assert flood(daemon.address, "/mbcosim.v1.Simulations/Step", 60, resets=True, count=30_000)[0] > 1500
+        wait_for(lambda: is_served(simulation), 30)
 
 
 # ---------------------------------------------------------------- everything ends in time

@@ -124,16 +124,17 @@ TEST(Admission, LimitsHoldForEachIdentityEachConnectionAndAll) {
 
 TEST(CallCounts, AreThoseSinceTheLastTime) {
   CallCounts counts;
-  for (int k = 0; k < 4; ++k) counts.add("a");
-  for (int k = 0; k < 2; ++k) counts.add("b");
-  counts.add("c");
+  for (int k = 0; k < 4; ++k) counts.add("ipv4:a");
+  for (int k = 0; k < 2; ++k) counts.add("ipv6:b");
+  counts.add("ipv4:c");
   const CallCounts::Counts taken = counts.take();
-  EXPECT_EQ(taken, (CallCounts::Counts{{"a", 4}, {"b", 2}, {"c", 1}}));
-  EXPECT_EQ(busiest(taken), (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(taken, (CallCounts::Counts{{"ipv4:a", 4}, {"ipv6:b", 2}, {"ipv4:c", 1}}));
   EXPECT_TRUE(counts.take().empty());
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(busiest(taken), (Names{"ipv4:a", "ipv6:b"}));
   EXPECT_TRUE(busiest({}).empty());
-  EXPECT_EQ(busiest({{"a", 4}, {"unix:", 3}}), std::vector<std::string>{"a"});
-  EXPECT_EQ(busiest({{"a", 4}, {"b", 2}, {"unix:", 5}}), (std::vector<std::string>{"a", "unix:"}));
+  EXPECT_EQ(busiest({{"ipv4:a", 4}, {"unix:", 3}}), Names{"ipv4:a"});
+  EXPECT_EQ(busiest({{"ipv4:a", 4}, {"ipv6:b", 2}, {"unix:", 5}}), (Names{"ipv4:a", "unix:"}));
 }
 
 TEST(Admission, NothingIsKeptOfARefusedCall) {
