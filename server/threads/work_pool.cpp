@@ -17,7 +17,10 @@ constexpr std::chrono::seconds kIdle(5);  // that long a thread waits for work b
 
 }  // namespace
 
-WorkPool::WorkPool(const Size& size) : size_(size) { add_thread(); }
+WorkPool::WorkPool(const Size& size) : size_(size) {
+  Guard guard(mutex_);  // the thread may look at `threads_` before it stands there
+  add_thread();
+}
 
 WorkPool::~WorkPool() {
   stop(std::chrono::hours(1));

@@ -127,6 +127,10 @@ class Local {
   Vec<T> own3(int i) const { return Vec<T>(own_values[i], own_values[i + 1], own_values[i + 2]); }
   T scalar(int k) const { return scalar_values[k]; }  ///< value of local scalar dof k
   T scalar_rate(int k) const { return scalar_rates[k]; }
+  /// Derivative of scalar(k) by its unknown of the step: c, or 1 where it has no rate.
+  double scalar_seed(int k) const {
+    return model().scalars[connection->scalar[k]].differential ? context->seed : 1;
+  }
   /// Value or rate (by its order) of a degree of freedom. Rotation components have only a rate: the
   /// angular velocity.
   T dof(const LocalDof& d) const {
@@ -234,6 +238,7 @@ class Tangent {
  public:
   using Block = Eigen::Ref<const Mat3>;
   int row_node(int k) const { return 6 * k; }
+  int row_scalar(int k) const { return 6 * nodes + k; }
   int row_own(int i) const { return 6 * nodes + scalars + i; }
   int row_momentum(int k) const { return 6 * nodes + scalars + owns + 6 * k; }
   int col_node(int k) const { return 6 * k; }
@@ -256,6 +261,21 @@ class Tangent {
   void add_position(int row, int k, const Mat3& dx) { block(row, col_node(k)) -= c * dx; }
   void add_orientation(int row, int k, const Mat3& dtheta) {
     block(row, col_node(k) + 3) -= dtheta * seeds[k].A;
+  }
+  /// Adds to one row its dependence on the rotation and the angular velocity of node k: ∂r/∂θ,
+  /// ∂r/∂w.
+  void add_to_row(int row, int k, const Vec3& dtheta, const Vec3& dw = Vec3::Zero()) {
+    const Eigen::RowVector3d entries =
+        dtheta.transpose() * seeds[k].A + dw.transpose() * seeds[k].B;
+    for (int j = 0; j < 3; ++j) at(row, col_node(k) + 3 + j) -= entries(j);
+  }
+  /// The same for its position and velocity: ∂r/∂x, ∂r/∂v.
+  void add_point_to_row(int row, int k, const Vec3& dx, const Vec3& dv = Vec3::Zero()) {
+    for (int j = 0; j < 3; ++j) at(row, col_node(k) + j) -= c * dx(j) + dv(j);
+  }
+  /// Adds to three rows from `row` the derivative with respect to the unknown of one column.
+  void add_to_column(int row, int column, const Vec3& derivative) {
+    for (int j = 0; j < 3; ++j) at(row + j, column) -= derivative(j);
   }
 
   int nodes = 0, scalars = 0, owns = 0, rows = 0, columns = 0;

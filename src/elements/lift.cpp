@@ -75,7 +75,7 @@ void lift(const Local<double>& u, const NodeSeeds* seeds, int start, bool parame
     l.scalar_rates[i] = D(u.scalar_rates[i]);
     if (const int j = slot_of(s0 + i); j >= 0) {
       const bool differential = u.context->model->scalars[c.scalar[i]].differential;
-      l.scalar_values[i].d[j] = differential ? cc : 1;
+      l.scalar_values[i].d[j] = u.scalar_seed(i);
       l.scalar_rates[i].d[j] = differential ? 1 : 0;
     }
   }

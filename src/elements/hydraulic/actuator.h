@@ -47,6 +47,7 @@ struct Actuator {
   template <class T>
   struct Kinematics {
     Vec<T> e, arm1, arm2;
+    Vec<T> d, ddot;  ///< from face to face of chamber 1 [m]; d/dt of its ends' difference [m/s]
     T l, ldot;
   };
   template <class T>
@@ -55,10 +56,10 @@ struct Actuator {
     k.e = u.R(0) * direction;
     k.arm1 = u.R(0) * f1;
     k.arm2 = u.R(1) * f2;
-    const Vec<T> d = u.x(1) + k.arm2 - u.x(0) - k.arm1;
-    const Vec<T> ddot = u.v(1) + u.w(1).cross(k.arm2) - u.v(0) - u.w(0).cross(k.arm1);
-    k.l = k.e.dot(d);
-    k.ldot = k.e.dot(ddot) + d.dot(u.w(0).cross(k.e));
+    k.d = u.x(1) + k.arm2 - u.x(0) - k.arm1;
+    k.ddot = u.v(1) + u.w(1).cross(k.arm2) - u.v(0) - u.w(0).cross(k.arm1);
+    k.l = k.e.dot(k.d);
+    k.ldot = k.e.dot(k.ddot) + k.d.dot(u.w(0).cross(k.e));
     return k;
   }
   /// Flows into the chambers [kg/s].
@@ -83,6 +84,8 @@ struct Actuator {
     r.own(0, u.scalar(0) - u.own(0));
     r.own(1, u.scalar(1) - u.own(1));
   }
+
+  void tangent(const Local<double>& u, Tangent& t) const;
 
   void output(const Local<double>& u, OutputRow& row) const;
   std::string row_name(int k) const;

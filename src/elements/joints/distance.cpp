@@ -1,7 +1,5 @@
 #include "elements/joints/distance.h"
 
-#include "elements/joints/joint_tangent.h"
-
 namespace mbcosim {
 
 void Distance::tangent(const Local<double>& u, Tangent& t) const {
@@ -14,8 +12,8 @@ void Distance::tangent(const Local<double>& u, Tangent& t) const {
     t.add_orientation(moment, k, sign * Tx * fx);
     t.block(force, t.col_own(0)) -= sign * u.own(3) * Mat3::Identity();
     t.block(moment, t.col_own(0)) -= sign * u.own(3) * fx;
-    add_to_column(t, force, 3, sign * axis);
-    add_to_column(t, moment, 3, sign * (fx * axis));
+    t.add_to_column(force, t.col_own(3), sign * axis);
+    t.add_to_column(moment, t.col_own(3), sign * (fx * axis));
     t.add_position(t.row_own(0), k, sign * Mat3::Identity());
     t.add_orientation(t.row_own(0), k, -sign * fx);
   }

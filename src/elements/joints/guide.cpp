@@ -1,7 +1,5 @@
 #include "elements/joints/guide.h"
 
-#include "elements/joints/joint_tangent.h"
-
 #include "elements/joints/friction_joints.h"
 
 namespace mbcosim {
@@ -23,14 +21,14 @@ void push_along(const Local<double>& u, Tangent& t, int k, const Vec3& e, const 
   t.add_orientation(a + 3, 1, Fx * qx);
   t.add_orientation(b + 3, 0, qx * Fx);
   t.add_orientation(b + 3, 1, -Fx * qx);
-  add_to_column(t, a, k, e);
-  add_to_column(t, a + 3, k, s_e);
-  add_to_column(t, b, k, -e);
-  add_to_column(t, b + 3, k, -q_e);
-  add_point_to_row(t, row, 0, e / u.c());
-  add_point_to_row(t, row, 1, -e / u.c());
-  add_to_row(t, row, 0, s_e / u.c());
-  add_to_row(t, row, 1, -q_e / u.c());
+  t.add_to_column(a, t.col_own(k), e);
+  t.add_to_column(a + 3, t.col_own(k), s_e);
+  t.add_to_column(b, t.col_own(k), -e);
+  t.add_to_column(b + 3, t.col_own(k), -q_e);
+  t.add_point_to_row(row, 0, e / u.c());
+  t.add_point_to_row(row, 1, -e / u.c());
+  t.add_to_row(row, 0, s_e / u.c());
+  t.add_to_row(row, 1, -q_e / u.c());
 }
 
 }  // namespace
@@ -56,8 +54,8 @@ void Prismatic::tangent(const Local<double>& u, Tangent& t) const {
       const double sign = node == 0 ? -1 : 1;
       t.add_orientation(t.row_node(node) + 3, 0, sign * by_first);
       t.add_orientation(t.row_node(node) + 3, 1, sign * by_second);
-      add_to_column(t, t.row_node(node) + 3, k, sign * n);
-      add_to_row(t, t.row_own(k), node, sign / u.c() * n);
+      t.add_to_column(t.row_node(node) + 3, t.col_own(k), sign * n);
+      t.add_to_row(t.row_own(k), node, sign / u.c() * n);
     }
   }
 }

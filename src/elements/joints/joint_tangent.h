@@ -22,23 +22,6 @@ inline Mat3 inverse_gamma(const Vec3& phi) {
   return Mat3::Identity() - 0.5 * px + k * px * px;
 }
 
-/// Adds to one row its dependence on the rotation and the angular velocity of node k: ∂r/∂θ, ∂r/∂w.
-inline void add_to_row(Tangent& t, int row, int k, const Vec3& dtheta,
-                       const Vec3& dw = Vec3::Zero()) {
-  const Eigen::RowVector3d entries =
-      dtheta.transpose() * t.seeds[k].A + dw.transpose() * t.seeds[k].B;
-  for (int j = 0; j < 3; ++j) t.at(row, t.col_node(k) + 3 + j) -= entries(j);
-}
-/// The same for its position and velocity: ∂r/∂x, ∂r/∂v.
-inline void add_point_to_row(Tangent& t, int row, int k, const Vec3& dx,
-                             const Vec3& dv = Vec3::Zero()) {
-  for (int j = 0; j < 3; ++j) t.at(row, t.col_node(k) + j) -= t.c * dx(j) + dv(j);
-}
-/// Adds to three rows from `row` the derivative with respect to own unknown i.
-inline void add_to_column(Tangent& t, int row, int i, const Vec3& derivative) {
-  for (int j = 0; j < 3; ++j) t.at(row + j, t.col_own(i)) -= derivative(j);
-}
-
 /// A point at d from node k that is held by the force F, own unknowns 0–2: the node gets sign·(F, d
 /// × F), the own rows −sign·(x + d)/c.
 inline void hold_point(const Local<double>& u, Tangent& t, int k, const Vec3& d, double sign) {

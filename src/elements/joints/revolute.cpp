@@ -12,10 +12,10 @@ void RevolutePin::tangent(const Local<double>& u, Tangent& t) const {
   hold_point(u, t, 0, u.R(0) * a.f, -1);
   const int moment = t.row_node(0) + 3;
   t.add_orientation(moment, 0, -cross<double>(e3) * cross<double>(p));
-  add_to_column(t, moment, 3, e3.cross(e2));
-  add_to_column(t, moment, 4, e1.cross(e3));
-  add_to_row(t, t.row_own(3), 0, e2.cross(e3) / u.c());
-  add_to_row(t, t.row_own(4), 0, e1.cross(e3) / u.c());
+  t.add_to_column(moment, t.col_own(3), e3.cross(e2));
+  t.add_to_column(moment, t.col_own(4), e1.cross(e3));
+  t.add_to_row(t.row_own(3), 0, e2.cross(e3) / u.c());
+  t.add_to_row(t.row_own(4), 0, e1.cross(e3) / u.c());
 }
 
 /// MT = p × e₃ with p = M₁ e₂ − M₂ e₁.
@@ -31,10 +31,10 @@ void RevoluteAxes::constrain_tangent(const Local<double>& u, Tangent& t, int row
     const double sign = k == 0 ? -1 : 1;
     t.add_orientation(moment, 0, sign * by_first);
     t.add_orientation(moment, 1, sign * by_second);
-    add_to_column(t, moment, row, sign * n1);
-    add_to_column(t, moment, row + 1, sign * n2);
-    add_to_row(t, t.row_own(row), k, sign / u.c() * n1);
-    add_to_row(t, t.row_own(row + 1), k, -sign / u.c() * n2);
+    t.add_to_column(moment, t.col_own(row), sign * n1);
+    t.add_to_column(moment, t.col_own(row + 1), sign * n2);
+    t.add_to_row(t.row_own(row), k, sign / u.c() * n1);
+    t.add_to_row(t.row_own(row + 1), k, -sign / u.c() * n2);
   }
 }
 
@@ -53,8 +53,8 @@ void AxialRotation::tangent(const Local<double>& u, Tangent& t) const {
   for (int k = 0; k < 2; ++k) {
     const double sign = k == 0 ? -1 : 1;
     t.add_orientation(t.row_node(k) + 3, 0, -sign * turned);
-    add_to_column(t, t.row_node(k) + 3, 5, sign * e3);
-    add_to_row(t, t.row_own(5), k, k == 0 ? Vec3(-e3.cross(spin)) : Vec3::Zero(), -sign * e3);
+    t.add_to_column(t.row_node(k) + 3, t.col_own(5), sign * e3);
+    t.add_to_row(t.row_own(5), k, k == 0 ? Vec3(-e3.cross(spin)) : Vec3::Zero(), -sign * e3);
   }
 }
 

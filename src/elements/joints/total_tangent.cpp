@@ -44,34 +44,34 @@ void TotalJoint::tangent(const Local<double>& u, Tangent& t) const {
   for_each_constrained(constraint.translation, own, [&](int i, int k, Kind kind) {
     const Vec3 e = m.P.col(i), s_e = m.s.cross(e), f_e = m.arm.cross(e);
     const int row = t.row_own(k);
-    add_to_column(t, a, k, e);
-    add_to_column(t, a + 3, k, s_e);
-    add_to_column(t, b, k, -e);
-    add_to_column(t, b + 3, k, -f_e);
+    t.add_to_column(a, t.col_own(k), e);
+    t.add_to_column(a + 3, t.col_own(k), s_e);
+    t.add_to_column(b, t.col_own(k), -e);
+    t.add_to_column(b + 3, t.col_own(k), -f_e);
     if (kind == Kind::position) {
-      add_point_to_row(t, row, 0, e / c);
-      add_point_to_row(t, row, 1, -e / c);
-      add_to_row(t, row, 0, s_e / c);
-      add_to_row(t, row, 1, -f_e / c);
+      t.add_point_to_row(row, 0, e / c);
+      t.add_point_to_row(row, 1, -e / c);
+      t.add_to_row(row, 0, s_e / c);
+      t.add_to_row(row, 1, -f_e / c);
     } else {
       const Vec3 by_x = u.w(0).cross(e);
-      add_point_to_row(t, row, 0, by_x, e);
-      add_point_to_row(t, row, 1, -by_x, -e);
-      add_to_row(t, row, 0, -e.cross(relative), s_e);
-      add_to_row(t, row, 1, -m.arm.cross(e.cross(spin)), -f_e);
+      t.add_point_to_row(row, 0, by_x, e);
+      t.add_point_to_row(row, 1, -by_x, -e);
+      t.add_to_row(row, 0, -e.cross(relative), s_e);
+      t.add_to_row(row, 1, -m.arm.cross(e.cross(spin)), -f_e);
     }
   });
   const Mat3 by_rotation = inverse_gamma(rotation_error(u, m)) * m.Q1.transpose() / c;
   for_each_constrained(constraint.rotation, own, [&](int i, int k, Kind kind) {
     const Vec3 e = m.Q1.col(i), row = by_rotation.row(i);
-    add_to_column(t, a + 3, k, e);
-    add_to_column(t, b + 3, k, -e);
+    t.add_to_column(a + 3, t.col_own(k), e);
+    t.add_to_column(b + 3, t.col_own(k), -e);
     if (kind == Kind::position) {
-      add_to_row(t, t.row_own(k), 0, row);
-      add_to_row(t, t.row_own(k), 1, -row);
+      t.add_to_row(t.row_own(k), 0, row);
+      t.add_to_row(t.row_own(k), 1, -row);
     } else {
-      add_to_row(t, t.row_own(k), 0, -e.cross(spin), e);
-      add_to_row(t, t.row_own(k), 1, Vec3::Zero(), -e);
+      t.add_to_row(t.row_own(k), 0, -e.cross(spin), e);
+      t.add_to_row(t.row_own(k), 1, Vec3::Zero(), -e);
     }
   });
 }
@@ -86,23 +86,23 @@ void TotalPinJoint::tangent(const Local<double>& u, Tangent& t) const {
   int own = 0;
   for_each_constrained(constraint.translation, own, [&](int i, int k, Kind kind) {
     const Vec3 e = Rc.col(i), f_e = m.arm.cross(e);
-    add_to_column(t, a, k, -e);
-    add_to_column(t, a + 3, k, -f_e);
+    t.add_to_column(a, t.col_own(k), -e);
+    t.add_to_column(a + 3, t.col_own(k), -f_e);
     if (kind == Kind::position) {
-      add_point_to_row(t, t.row_own(k), 0, -e / c);
-      add_to_row(t, t.row_own(k), 0, -f_e / c);
+      t.add_point_to_row(t.row_own(k), 0, -e / c);
+      t.add_to_row(t.row_own(k), 0, -f_e / c);
     } else {
-      add_point_to_row(t, t.row_own(k), 0, Vec3::Zero(), -e);
-      add_to_row(t, t.row_own(k), 0, -m.arm.cross(e.cross(u.w(0))), -f_e);
+      t.add_point_to_row(t.row_own(k), 0, Vec3::Zero(), -e);
+      t.add_to_row(t.row_own(k), 0, -m.arm.cross(e.cross(u.w(0))), -f_e);
     }
   });
   const Mat3 by_rotation = inverse_gamma(rotation_error(u, m)) * Rcr.transpose() / c;
   for_each_constrained(constraint.rotation, own, [&](int i, int k, Kind kind) {
-    add_to_column(t, a + 3, k, -Rcr.col(i));
+    t.add_to_column(a + 3, t.col_own(k), -Rcr.col(i));
     if (kind == Kind::position)
-      add_to_row(t, t.row_own(k), 0, -by_rotation.row(i).transpose());
+      t.add_to_row(t.row_own(k), 0, -by_rotation.row(i).transpose());
     else
-      add_to_row(t, t.row_own(k), 0, Vec3::Zero(), -Rc.col(i));
+      t.add_to_row(t.row_own(k), 0, Vec3::Zero(), -Rc.col(i));
   });
 }
 

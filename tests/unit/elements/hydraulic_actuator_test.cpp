@@ -81,6 +81,30 @@ TEST_F(ActuatorInMotion, JacobianMatchesCentralDifferences) {
   EXPECT_LT(oblique.jacobian_error(1e-3, 1e-5), 1e-6);
 }
 
+TEST_F(ActuatorInMotion, ClosedFormMatchesDual) {
+  HydraulicBench oblique;
+  build(oblique, Vec3(.04, -.01, .03));
+  const auto& set = dynamic_cast<const ElementSetOf<Actuator>&>(oblique.set());
+  constexpr double c = 1e-3;
+  const EvalContext at = oblique.context(c);
+  std::vector<NodeSeeds> seeds(2);
+  for (int k = 0; k < 2; ++k) {
+    seeds[k].A = c * Mat3::Identity() + 0.1 * c * cross<double>(Vec3(1, -2, 3 + k));
+    seeds[k].B = Mat3::Identity() + 0.2 * cross<double>(Vec3(0.5 - k, 1, -1));
+  }
+  const auto& slot = set.slot(0);
+  Local<double> u;
+  set.gather(at, slot, u);
+  MatX closed = MatX::Zero(slot.row_count, slot.column_count), dual = closed;
+  set.closed_form(at, slot, u, seeds.data(), closed.data());
+  set.dual_jacobian(slot, u, seeds.data(), dual.data());
+  for (int i = 0; i < slot.row_count; ++i) {
+    const double size = dual.row(i).cwiseAbs().maxCoeff();
+    EXPECT_GT(size, 0) << "row " << i;
+    EXPECT_LT((closed.row(i) - dual.row(i)).cwiseAbs().maxCoeff(), 1e-12 * size) << "row " << i;
+  }
+}
+
 /// The power of the loads on both bodies is p₁ V̇₁ + p₂ V̇₂, up to the moment that the cylinder
 /// misses when the piston is off its axis: −F × (the arm from face to face).
 TEST_F(ActuatorInMotion, PowerIsPressureTimesVolumeRate) {
