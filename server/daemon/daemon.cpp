@@ -297,7 +297,9 @@ void Daemon::listen() {
   if (!config_.tls_certificate.empty()) certificate_.emplace(config_);
   std::vector<std::unique_ptr<Listener::Acceptor>> acceptors;
   for (const std::string& address : config_.listen) {
-    listeners_.push_back(std::make_unique<Listener>(address));
+    listeners_.push_back(std::make_unique<Listener>(
+        address, ConnectionCounts{[this] { metrics_.count_dropped_connection(); },
+                                  [this] { metrics_.count_broken_off_connection(); }}));
     acceptors.push_back(builder.experimental().AddExternalConnectionAcceptor(
         grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
         credentials_for(address)));

@@ -152,8 +152,11 @@ shm::Descriptor listen_on(const addrinfo& info, bool both_families) {
 
 }  // namespace
 
-Listener::Listener(const std::string& address)
-    : bound_(address), reserve_(open_reserve()), wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+Listener::Listener(const std::string& address, ConnectionCounts counts)
+    : bound_(address),
+      counts_(std::move(counts)),
+      reserve_(open_reserve()),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (is_unix(address)) {
     bind_unix(address.substr(kUnix.size()));
     return;
@@ -248,9 +251,7 @@ void Listener::break_off_asked() {
   for (const std::string& peer : asked) {
     for (const int fd : is_unix(bound_) ? who_sends_most() : named(peer)) {
       Peer& unwanted = peers_.at(fd);
-      spdlog::warn(
-          "{}: a connection of {} is broken off: its calls come faster than they can be answered",
-          bound_, unwanted.source);
+      tell_broken_off(unwanted.source);
       const linger nothing{1, 0};  // to a client that writes on the end comes as a reset
       ::setsockopt(fd, SOL_SOCKET, SO_LINGER, &nothing, sizeof nothing);
       ::shutdown(fd, SHUT_RDWR);
@@ -387,9 +388,19 @@ void Listener::drop_one(int listener) {
 }
 
 void Listener::tell_dropped() {
+  counts_.dropped();
   std::int64_t missed = 0;
   if (drops_.pass(Rate::Clock::now(), &missed))
     spdlog::warn("{}: connections are dropped: too few file descriptors are free", bound_);
+}
+
+void Listener::tell_broken_off(const std::string& source) {
+  counts_.broken_off();
+  std::int64_t missed = 0;
+  if (!breaks_.pass(Rate::Clock::now(), &missed)) return;
+  spdlog::warn(
+      "{}: a connection of {} is broken off: its calls come faster than they can be answered{}",
+      bound_, source, missed > 0 ? " (and " + std::to_string(missed) + " others before it)" : "");
 }
 
 }  // namespace mbcosim::server

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -22,6 +23,12 @@ namespace mbcosim::server {
 
 constexpr std::string_view kUnix = "unix:";  ///< begins the address of a socket in a file
 
+/// Who counts connections that the daemon itself ends; called by the listener's thread.
+struct ConnectionCounts {
+  std::function<void()> dropped = [] {};     ///< for want of file descriptors
+  std::function<void()> broken_off = [] {};  ///< its calls came too fast
+};
+
 /// Accepts connections on one address and hands them to gRPC, whose own listener ends for good when
 /// the process has no file descriptor left. Here the connection is dropped then, the last few
 /// descriptors are kept for files, and one source (an address, a process of this host) has at most
@@ -32,7 +39,7 @@ class Listener {
   using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
   /// Binds "unix:PATH", mode 0600, or "HOST:PORT"; port 0: any. A socket file is replaced. Throws
   /// std::runtime_error.
-  explicit Listener(const std::string& address);
+  explicit Listener(const std::string& address, ConnectionCounts counts = {});
   ~Listener();
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
@@ -67,8 +74,10 @@ class Listener {
   void forget_who_has_gone();
   void drop_one(int listener);
   void tell_dropped();
+  void tell_broken_off(const std::string& source);
 
   std::string bound_, path_;
+  const ConnectionCounts counts_;
   std::vector<shm::Descriptor> sockets_;
   shm::Descriptor reserve_;  ///< given up for a moment to drop a connection
   shm::Descriptor wake_;     ///< of the thread's wait, when somebody is to be broken off
@@ -85,7 +94,7 @@ class Listener {
   };
   std::map<std::string, std::deque<Accepted>> accepted_;  ///< not yet handed over, by source
   std::deque<std::string> turns_;                         ///< its keys, who is next first
-  Rate drops_{1};
+  Rate drops_{1}, breaks_{1};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

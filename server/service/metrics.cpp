@@ -81,6 +81,12 @@ Metrics::Metrics()
           counter(*registry_, "mbcosim_factorizations_total", "Matrices factored in steps")),
       dropped_(counter(*registry_, "mbcosim_samples_dropped_total",
                        "Samples that subscribers did not read in time")),
+      dropped_connections_(counter(
+          *registry_, "mbcosim_connections_dropped_total",
+          "Connections for which, or for their source, too few file descriptors were free")),
+      broken_off_connections_(
+          counter(*registry_, "mbcosim_connections_broken_off_total",
+                  "Connections whose calls came faster than they could be answered")),
       checkpoint_bytes_(
           counter(*registry_, "mbcosim_checkpoint_bytes_total", "Bytes of checkpoints")),
       journal_bytes_(counter(*registry_, "mbcosim_journal_bytes_total",

@@ -49,6 +49,8 @@ class Metrics {
   void count_dropped_samples(std::int64_t count) {
     dropped_->Increment(static_cast<double>(count));
   }
+  void count_dropped_connection() { dropped_connections_->Increment(); }
+  void count_broken_off_connection() { broken_off_connections_->Increment(); }
   void count_checkpoint(std::int64_t bytes, double seconds);
   void count_journal_entry(std::int64_t bytes, double seconds);
 
@@ -60,7 +62,7 @@ class Metrics {
   prometheus::Family<prometheus::Counter>& failures_;
   std::array<prometheus::Histogram*, kLanes> queue_seconds_{};
   prometheus::Counter *created_, *steps_, *iterations_, *factorizations_, *dropped_,
-      *checkpoint_bytes_, *journal_bytes_;
+      *dropped_connections_, *broken_off_connections_, *checkpoint_bytes_, *journal_bytes_;
   prometheus::Histogram *advance_seconds_, *exchange_seconds_, *peer_seconds_, *slot_seconds_,
       *checkpoint_seconds_, *journal_seconds_;
 };

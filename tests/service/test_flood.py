@@ -9,6 +9,7 @@ import pytest
 import decks
 from conftest import TIME_FACTOR, is_sanitized, wait_for
 from http2 import flood
+from test_operation import metrics
 from test_resilience import guarded, resident  # noqa: F401, a fixture
 
 
@@ -26,7 +27,7 @@ def test_calls_that_come_faster_than_they_can_be_answered(guarded, resets, over)
     host = {"unix": None, "tcp": "127.0.0.1", "tcp6": "[::1]", "mapped": "[::]"}[over]
     if over in ("tcp6", "mapped") and not has_ipv6():
         pytest.skip("this machine has no loopback address of IPv6")
-    daemon = guarded(*["--listen", f"{host}:0", "--insecure"] if host else [])
+    daemon = guarded("--http", "127.0.0.1:0", *["--listen", f"{host}:0", "--insecure"] if host else [])
     address = daemon.address
     if host:
         wait_for(lambda: f"listening on {host}:" in daemon.log())
@@ -46,6 +47,7 @@ def test_calls_that_come_faster_than_they_can_be_answered(guarded, resets, over)
         sent, broken_off = came[0]
         assert sent > 1000
         assert ("broken off: its calls come faster" in daemon.log()) == broken_off
+        assert (metrics(daemon, "ann-token-0123456789")["mbcosim_connections_broken_off_total"] > 0) == broken_off
         assert max(seconds) < 5 * TIME_FACTOR
         if not is_sanitized():
             assert most - before < 1000 << 20

@@ -188,9 +188,10 @@ def test_systemd_is_told(tmp_path, start_daemon, monkeypatch):
         assert daemon.process.wait(20 * TIME_FACTOR) == 0
 
 
-def metrics(daemon):
-    """Value by name, labels included."""
-    address, token = re.search(r"(http://[^/]+)/(?:\?token=(\S+))?", daemon.page()).groups()
+def metrics(daemon, token=None):
+    """Value by name, labels included. `token`: other than the page's."""
+    address, of_page = re.search(r"(http://[^/]+)/(?:\?token=(\S+))?", daemon.page()).groups()
+    token = token or of_page
     request = urllib.request.Request(address + "/metrics", headers={"Authorization": f"Bearer {token}"} if token else {})
     lines = urllib.request.urlopen(request).read().decode().splitlines()
     return {line.rsplit(" ", 1)[0]: float(line.rsplit(" ", 1)[1]) for line in lines if line and line[0] != "#"}

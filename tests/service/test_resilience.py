@@ -383,7 +383,7 @@ def test_a_few_processes_cannot_take_all_file_descriptors(start_daemon, start_cr
 
 
 def test_a_daemon_without_file_descriptors_goes_on_serving_who_is_connected(start_daemon, start_crowd):
-    daemon = ready(start_daemon())
+    daemon = ready(start_daemon("--http", "127.0.0.1:0"))
     resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (150, 150))
     with daemon.connect() as server, server.load_text(decks.body()) as simulation:
         crowds = [start_crowd(daemon, 60) for _ in range(4)]
@@ -395,6 +395,7 @@ def test_a_daemon_without_file_descriptors_goes_on_serving_who_is_connected(star
         wait_for(lambda: is_found_healthy(daemon))
         with daemon.connect() as other:
             assert len(other.list()) == 2
+        assert metrics(daemon)["mbcosim_connections_dropped_total"] > 0
 
 
 # ---------------------------------------------------------------- memory
