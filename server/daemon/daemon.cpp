@@ -320,7 +320,7 @@ void Daemon::listen() {
 void Daemon::watch_backlog() {
   constexpr int kRefused = 1024;  // may be under way at once
   backlog_.emplace(
-      gate_, static_cast<std::size_t>(config_.limits.open_calls) + kRefused,
+      gate_, budgets_.all(), static_cast<std::size_t>(config_.limits.open_calls) + kRefused,
       [this] { return server_->InProcessChannel({}); },
       [this](const std::string& peer) {
         for (const auto& listener : listeners_) listener->break_off(peer);

@@ -17,7 +17,6 @@ constexpr std::chrono::milliseconds kLook(30), kQuietLook(100);  // between two 
 constexpr std::chrono::milliseconds kShort(100);  // in which each comes, or memory is looked at
 constexpr std::chrono::milliseconds kSlice(20);   // between two looks at it
 constexpr std::int64_t kGrowth = 48 << 20;        // of memory [bytes] that is much
-constexpr int kTidy = 50;                         // looks after a crowd
 constexpr int kOwn = 1;                           // call of the last look
 constexpr const char* kThread = "backlog";
 
@@ -39,11 +38,13 @@ Method BacklogWatch::method() {
   return {Role::observe, true, Counted::no, [] { return std::make_unique<Come>(); }};
 }
 
-BacklogWatch::BacklogWatch(Gate& gate, std::size_t most_alive, Connect connect, BreakOff break_off)
+BacklogWatch::BacklogWatch(Gate& gate, const MemoryBudget& memory, std::size_t most_alive,
+                           Connect connect, BreakOff break_off)
     : gate_(gate),
       most_alive_(most_alive),
       connect_(std::move(connect)),
       break_off_(std::move(break_off)),
+      trim_(memory),
       thread_([this] { run_caught(kThread, [this] { watch(); }); }) {}
 
 BacklogWatch::~BacklogWatch() {
@@ -77,7 +78,7 @@ void BacklogWatch::look(CallCounts::Counts counts) {
   const int all = std::accumulate(counts.begin(), counts.end(), 0,
                                   [](int sum, const auto& each) { return sum + each.second; });
   quiet_ = all <= kOwn && !grows;
-  if (tidy_in_ > 0 && --tidy_in_ % kTidy == 0) malloc_trim(0);
+  trim_.look(HeapTrim::Clock::now());
   if (quiet_) return;
   if (gate_.alive() > most_alive_)
     counts = gate_.alive_by_connection();
@@ -85,7 +86,7 @@ void BacklogWatch::look(CallCounts::Counts counts) {
     return;
   else
     for (const auto& [connection, count] : gate_.counts().take()) counts[connection] += count;
-  tidy_in_ = 3 * kTidy;
+  trim_.ask(HeapTrim::Clock::now());
   for (const std::string& connection : busiest(counts)) break_off_(connection);
 }
 

@@ -13,6 +13,7 @@
 #include "rpc/call_counts.h"
 #include "rpc/exchange.h"
 #include "threads/mutex.h"
+#include "wire/heap_trim.h"
 
 namespace mbcosim::server {
 
@@ -22,7 +23,8 @@ namespace mbcosim::server {
 /// many wait for their turn cannot be asked. So, while calls come, this sends one of its own over a
 /// channel within the process: when it takes long to come, and memory grows meanwhile, the
 /// connections over which most come are broken off; when more have come and not ended than are
-/// allowed, those that have most of them.
+/// allowed, those that have most of them. What this frees, and what large models leave when they
+/// are deleted, goes back to the system.
 class BacklogWatch {
  public:
   /// Of the watch's own calls.
@@ -34,7 +36,8 @@ class BacklogWatch {
   /// `most_alive`: calls, those that are refused or have been reset included. The functions are
   /// called from a thread of the watch, `connect` when the first calls come. Throws
   /// std::system_error: the system grants no thread.
-  BacklogWatch(Gate& gate, std::size_t most_alive, Connect connect, BreakOff break_off);
+  BacklogWatch(Gate& gate, const MemoryBudget& memory, std::size_t most_alive, Connect connect,
+               BreakOff break_off);
   ~BacklogWatch();  ///< before the server of the channel ends
   BacklogWatch(const BacklogWatch&) = delete;
   BacklogWatch& operator=(const BacklogWatch&) = delete;
@@ -50,9 +53,9 @@ class BacklogWatch {
   const Connect connect_;
   const BreakOff break_off_;
   // --- of the thread
+  HeapTrim trim_;
   std::shared_ptr<grpc::Channel> channel_;
   bool quiet_ = true;          ///< nobody calls, memory has not grown
-  int tidy_in_ = 0;            ///< looks after a crowd memory is given back to the system
   std::int64_t resident_ = 0;  ///< memory [bytes] at the last look
   // ---
   Mutex mutex_;

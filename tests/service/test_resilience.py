@@ -12,6 +12,7 @@ import grpc
 import pytest
 
 sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "benchmarks"))
+import beam_models
 import decks
 import mbcosim
 import reduce_scaling
@@ -404,6 +405,15 @@ def resident(daemon):
     """Bytes."""
     with open(f"/proc/{daemon.process.pid}/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
+@counts_memory
+def test_the_memory_of_a_deleted_model_goes_back_to_the_system(daemon, server):
+    before = resident(daemon)
+    with server.load_text(beam_models.cantilever(2000, 2)) as simulation:
+        simulation.step()
+        assert resident(daemon) - before > 100 << 20
+    wait_for(lambda: resident(daemon) - before < 20 << 20)
 
 
 def test_messages_that_never_come_whole_take_bounded_memory(start_daemon):
