@@ -20,6 +20,9 @@
 ///
 ///     void tangent(const Local<double>&, Tangent&) const       −∂r/∂δ in closed form
 ///     void start(Start&) const                                 initial own unknowns and memory
+///     void at_derivatives(const Local<double>&, State&, bool first) const   before the first and
+///     the
+///         second residual of the derivatives phase
 ///     void after_predict(const Local<double>&, State&) const   once a step, after the prediction
 ///     void accumulate(const Local<double>&, Sums&) const       before each residual and matrix:
 ///         adds to what elements of other families sum up; tangents leave out that sums change

@@ -121,6 +121,14 @@ class ElementSetOf final : public PlacedElements {
   const Slot& slot(int i) const { return slots_[i]; }
   Slot& slot(int i) { return slots_[i]; }  ///< while the model is built
 
+  void at_derivatives(const EvalContext& context, State& state, ElementRange range,
+                      bool first) const override {
+    if constexpr (detail::HasAtDerivatives<E>)
+      each_active(context, range,
+                  [&](const E& e, const Local<double>& u) { e.at_derivatives(u, state, first); });
+    else
+      (void)context, (void)state, (void)range, (void)first;
+  }
   void after_predict(const EvalContext& context, State& state, ElementRange range) const override {
     if constexpr (detail::HasAfterPredict<E>)
       each_active(context, range,

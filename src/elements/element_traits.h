@@ -16,6 +16,10 @@ concept HasStart = requires(const E& e, Start& s) {
   e.start(s);
 };
 template <class E>
+concept HasAtDerivatives = requires(const E& e, const Local<double>& u, State& s) {
+  e.at_derivatives(u, s, true);
+};
+template <class E>
 concept HasAfterPredict = requires(const E& e, const Local<double>& u, State& s) {
   e.after_predict(u, s);
 };

@@ -259,6 +259,7 @@ void read_model(DeckCard& card) {
 void read_frame_motion(DeckCard& card) {
   FrameMotion m;
   const bool constant = card.required("kind of rigid body kinematics", {"const", "drive"}) == 0;
+  m.in_absolute_axes = !constant;
   bool any = false;
   const auto vector = [&](const char* word, Vec3DrivePtr& drive) {
     if (!card.keyword(word)) return;

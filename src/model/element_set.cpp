@@ -14,6 +14,8 @@ std::vector<std::string> ElementSet::data_names(int i) const {
 
 void ElementSet::find_structure(const std::vector<StructureProbe>&) {}
 
+void ElementSet::at_derivatives(const EvalContext&, State&, ElementRange, bool) const {}
+
 void ElementSet::after_assembly(const EvalContext& context, State& state, int i) const {
   const int own = first_own(i);
   for (int k = 0; k < unknowns(i); ++k) state.y[own + k] = state.yp[own + k] = 0;

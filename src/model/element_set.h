@@ -130,6 +130,9 @@ class ElementSet {
   /// Adds −∂r/∂δ to the sparse values; seeds by structural node index.
   virtual void jacobian(const EvalContext& context, const NodeSeeds* seeds, double* values,
                         ElementRange range) const = 0;
+  /// Before the first residual of the derivatives phase, and before the second.
+  virtual void at_derivatives(const EvalContext& context, State& state, ElementRange range,
+                              bool first) const;
   // --- stages around it, in the order of families (StageRank)
   /// Once a step, after the prediction.
   virtual void after_predict(const EvalContext& context, State& state,

@@ -50,8 +50,10 @@ struct Gravity {
 };
 
 /// `rigid body kinematics`: motion of the relative frame in which the model is written. Null drives
-/// are zero.
+/// are zero. As MBDyn has it, what `drive` gives are components in absolute axes, which
+/// `orientation` turns; `const` has them in the moving ones.
 struct FrameMotion {
+  bool in_absolute_axes = false;
   Vec3DrivePtr position, orientation, velocity, angular_velocity, acceleration,
       angular_acceleration;
 };

@@ -100,6 +100,11 @@ class Stepper::StepHooks : public NewtonHooks {
   const std::function<bool(int)>* exchange_;
 };
 
+void at_derivatives(const Model& model, State& state, bool first) {
+  const EvalContext context = model.context(state, Phase::derivatives);
+  for (const auto& set : model.sets) set->at_derivatives(context, state, set->all(), first);
+}
+
 /// The derivatives phase holds the kinematics: after each correction positions, orientations and
 /// velocities of nodes are put back to the given values; momenta, multipliers and the rest keep
 /// their corrections.
@@ -115,6 +120,7 @@ class Stepper::DerivativesHooks : public NewtonHooks {
         state.yp[n.first + i] = start_.yp[n.first + i];
       }
     state.rotation = start_.rotation;
+    at_derivatives(model_, state, false);
   }
   bool exchange(int iteration) const override { return !exchange_ || exchange_(iteration); }
   bool cancelled() const override { return cancel_ && cancel_->cancelled(); }
@@ -195,6 +201,7 @@ PhaseReport Stepper::solve_derivatives(State& state) {
     compute_jacobian(context, workspace_);
     workspace_.solver.analyze(workspace_.values.data(), LinearSolver::Matrices::few);
     InstantSystem system(model_, Phase::derivatives, c, c, state, workspace_);
+    at_derivatives(model_, state, true);
     report.newton = solve_newton(system, settings, hooks);
     if (report.newton.outcome == NewtonOutcome::converged)
       after_convergence(state, Phase::derivatives, c, c);

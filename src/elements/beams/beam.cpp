@@ -23,11 +23,23 @@ void Beam<Nodes>::after_predict(const Local<double>& u, State& state) const {
     h.kp_ref = h.R_ref.transpose() * (G * i.drp + bend.cross(Vec3(h.w_ref)));
   }
   state.memory[u.memory_offset() + kMemory - 1] = 1;
+  tell_laws_of_prediction(u, state);
+}
+
+template <int Nodes>
+void Beam<Nodes>::tell_laws_of_prediction(const Local<double>& u, State& state) const {
   for (int a = 0; a < points; ++a) {
     if (!point[a].law->has_memory()) continue;
     const Section<double> s = section(u, line(u), a);
     point[a].law->after_predict(*u.context, state, s.strain, s.rate);
   }
+}
+
+template <int Nodes>
+void Beam<Nodes>::at_derivatives(const Local<double>& u, State& state, bool first) const {
+  if (first == is_unloaded(u)) return;
+  state.memory[u.memory_offset() + kMemory - 1] = 1;
+  tell_laws_of_prediction(u, state);
 }
 
 template <int Nodes>

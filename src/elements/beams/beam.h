@@ -146,6 +146,7 @@ struct Beam {
 
   void tangent(const Local<double>& u, Tangent& t) const;
   void start(Start& s) const;
+  void at_derivatives(const Local<double>& u, State& state, bool first) const;
   void after_predict(const Local<double>& u, State& state) const;
   void after_convergence(const Local<double>& u, State& state) const;
   void output(const Local<double>& u, OutputRow& row) const;
@@ -188,8 +189,9 @@ struct Beam {
   static constexpr int kMemory =
       points * kSectionHistory + 1;  ///< the last one: has the beam been loaded?
 
-  /// Without an initial assembly MBDyn keeps the internal forces at zero until the first
-  /// prediction.
+  void tell_laws_of_prediction(const Local<double>& u, State& state) const;
+  /// Without an initial assembly the first residual of all, in the derivatives phase, has no
+  /// internal forces, as in MBDyn.
   template <class T>
   bool is_unloaded(const Local<T>& u) const {
     return u.context->phase != Phase::assembly && u.memory(kMemory - 1) == 0;

@@ -71,6 +71,9 @@ struct HelicoidalBeam {
   /// Takes the nodes as they were read for ℓ and the origin of the strains.
   void set_geometry(const Model& model);
   void start(Start& s) const;
+  void at_derivatives(const Local<double>& u, State& state, bool first) const {
+    if (!first) state.memory[u.memory_offset()] = 1;
+  }
   void after_predict(const Local<double>& u, State& state) const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;

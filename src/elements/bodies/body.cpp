@@ -26,10 +26,13 @@ void Body::tangent(const Local<double>& u, Tangent& t) const {
 }
 
 void Body::add_inertia(const Local<double>& u, int node_index, Inertia& inertia) const {
-  if (node_index != node) return;
+  if (node_index == node) add_to(inertia, u.R(0));
+}
+
+void Body::add_to(Inertia& inertia, const Mat3& R) const {
   inertia.m += m;
-  inertia.S += u.R(0) * S0;
-  inertia.J += u.R(0) * J0 * u.R(0).transpose();
+  inertia.S += R * S0;
+  inertia.J += R * J0 * R.transpose();
 }
 
 std::string Body::log(const Model& model, int label) const {
@@ -42,13 +45,17 @@ int Body::private_datum(std::string_view name) {
 }
 
 double Body::private_value(const Local<double>& u, int datum) const {
-  const Vec3 S = u.R(0) * S0;
+  return value(*u.context, {u.x(0), u.R(0), u.v(0), u.w(0)}, datum);
+}
+
+double Body::value(const EvalContext& context, const NodeState& n, int datum) const {
+  const Vec3 S = n.R * S0;
   if (datum == 2) return m;
   if (datum == 0) {
-    const Vec3 wl = u.R(0).transpose() * u.w(0);
-    return 0.5 * m * u.v(0).squaredNorm() + u.v(0).dot(u.w(0).cross(S)) + 0.5 * wl.dot(J0 * wl);
+    const Vec3 wl = n.R.transpose() * n.w;
+    return 0.5 * m * n.v.squaredNorm() + n.v.dot(n.w.cross(S)) + 0.5 * wl.dot(J0 * wl);
   }
-  return -u.model().gravity_at(*u.context, u.x(0)).dot(m * u.x(0) + S);
+  return -context.model->gravity_at(context, n.x).dot(m * n.x + S);
 }
 
 void PointMass::tangent(const Local<double>& u, Tangent& t) const {

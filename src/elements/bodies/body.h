@@ -41,6 +41,9 @@ struct Body {
   static int private_datum(std::string_view name);
   static std::vector<Datum> private_data() { return {{"E", "J"}, {"V", "J"}, {"m", "kg"}}; }
   double private_value(const Local<double>& u, int datum) const;
+  /// Of a node that stands and moves so.
+  double value(const EvalContext& context, const NodeState& node, int datum) const;
+  void add_to(Inertia& inertia, const Mat3& R) const;  ///< R of the node
 };
 
 extern template void Body::residual(const Local<double>&, Residual<double>&) const;  // body.cpp

@@ -12,8 +12,12 @@ template <class T>
 struct FrameState {
   explicit FrameState(const Local<T>& u) {
     const FrameMotion& frame = *u.model().frame_motion;
+    Mat3 axes = Mat3::Identity();
+    if (frame.in_absolute_axes && frame.orientation)
+      axes = rotation_of_vector<double>(frame.orientation->value(*u.context));
     const auto drive = [&](const Vec3DrivePtr& d) -> Vec<T> {
-      return (d ? d->value(*u.context) : Vec3(Vec3::Zero())).template cast<T>();
+      return (d ? Vec3(axes.transpose() * d->value(*u.context)) : Vec3(Vec3::Zero()))
+          .template cast<T>();
     };
     a0 = drive(frame.acceleration);
     w0 = drive(frame.angular_velocity);

@@ -1,6 +1,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "elements/bodies/body.h"
+#include "elements/bodies/modal_node_body.h"
 #include "elements/bodies/moving_frame.h"
 #include "elements/bodies/readers.h"
 #include "elements/families.h"
@@ -59,8 +60,14 @@ SourceSpan read_body_part(Card& card, int node, bool negative_allowed, Body& bod
 
 void read_body(Card& card, ElementInfo& info) {
   const int node = card.structural_node(Card::NodeNeed::not_dummy);
-  if (card.keyword("variable mass")) return read_variable_body(card, info, node);
   const StructuralNode& n = card.model().structural[node];
+  if (card.keyword("variable mass")) {
+    if (n.kind == StructuralKind::modal)
+      card.fail("structural node " + std::to_string(n.label) +
+                    " is a modal node; a body of variable mass cannot stand there",
+                "clamp a `dynamic` node to it and put the body there");
+    return read_variable_body(card, info, node);
+  }
   if (n.kind == StructuralKind::static_displacement ||
       (n.kind == StructuralKind::static_ && !card.model().control.is_static &&
        !inverse_problem(card.model())))
@@ -92,7 +99,10 @@ void read_body(Card& card, ElementInfo& info) {
     card.fail_at(where, "the mass is zero",
                  "give the body a mass, or remove it: a node without mass is held by joints, or is "
                  "`static`");
-  add_body(card, info, std::move(body));
+  if (n.kind == StructuralKind::modal)
+    add_general_element(card.builder(), info, std::make_unique<ModalNodeBody>(body));
+  else
+    add_body(card, info, std::move(body));
 }
 
 void read_gravity(Card& card, ElementInfo& info) {

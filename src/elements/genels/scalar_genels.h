@@ -80,6 +80,9 @@ struct GenelSpring {
     r.dof(l1, f);
     r.dof(l2, -f);
   }
+  void at_derivatives(const Local<double>& u, State& state, bool first) const {
+    if (first) after_predict(u, state);
+  }
   void after_predict(const Local<double>& u, State& state) const;
   void after_convergence(const Local<double>& u, State& state) const;
 
@@ -111,6 +114,9 @@ struct GenelSpringSupport {
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     r.dof(row_l, -force(u));
+  }
+  void at_derivatives(const Local<double>& u, State& state, bool first) const {
+    if (first) after_predict(u, state);
   }
   void after_predict(const Local<double>& u, State& state) const;
   void after_convergence(const Local<double>& u, State& state) const;

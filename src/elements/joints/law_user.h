@@ -29,6 +29,10 @@ struct LawUser {
     self().arguments(u, strain, rate);
     law->after_predict(*u.context, state, strain, rate);
   }
+  /// The law sees the start as if it had been predicted.
+  void at_derivatives(const Local<double>& u, State& state, bool first) const {
+    if (first) LawUser::after_predict(u, state);
+  }
   void after_convergence(const Local<double>& u, State& state) const {
     if (!law->has_memory()) return;
     V<double> strain, rate;

@@ -293,7 +293,7 @@ class ModalJointReader {
       card_.fail("modal joint: " + std::to_string(count) + " interface nodes, but the body has " +
                  std::to_string(data_.node_count()) + " FEM nodes");
     bool all = false;
-    if (count > 0 && card_.keyword("output")) all = card_.yes_no("output of interface nodes");
+    if (card_.keyword("output")) all = card_.yes_no("output of interface nodes");
     for (int k = 0; k < count; ++k) {
       ModalInterface interface;
       interface.fem_node = fem_node();

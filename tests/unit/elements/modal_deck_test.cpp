@@ -645,5 +645,23 @@ TEST(ModalDecks, ModalForces) {
   EXPECT_LT((amplitudes("force: 1, modal, 1, const, 3., const, 2.;\n", "0;") - nodal).norm(), 1e-9);
 }
 
+/// Behind the number of interface nodes `output` is theirs, even of none; the joint's own comes
+/// last.
+TEST(ModalDecks, OutputBehindTheInterfacesIsTheirs) {
+  const auto is_written = [](const std::string& end) {
+    ModalDeck deck;
+    deck.control = "structural nodes: 1; joints: 1;";
+    deck.files = {{"rigid.fem", fem(hand_made(false))}};
+    deck.node(1, "modal");
+    deck.joints = "joint: 1, modal, 1, 2, from file, no damping, \"rigid.fem\", 0" + end + ";\n";
+    const ModalRun run(deck);
+    const ElementRef joint = run.model().find_element(Family::joint, 1);
+    return joint.set->info(joint.index).output;
+  };
+  EXPECT_TRUE(is_written(""));
+  EXPECT_TRUE(is_written(", output, no"));
+  EXPECT_FALSE(is_written(", output, yes, output, no"));
+}
+
 }  // namespace
 }  // namespace mbcosim::modal_deck_test

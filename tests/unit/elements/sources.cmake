@@ -5,4 +5,4 @@ list(APPEND SOURCES registered_elements_test.cpp beam_test.cpp body_tangent_test
     hydraulic_beam_test.cpp hydraulic_fluid_test.cpp hydraulic_orifice_test.cpp
     hydraulic_physics_test.cpp hydraulic_pipe_test.cpp hydraulic_refusal_test.cpp
     hydraulic_valve_test.cpp fem_data_test.cpp modal_deck_test.cpp modal_joint_test.cpp
-    modal_refusal_test.cpp joint_motions_test.cpp joint_input_test.cpp variable_body_test.cpp user_conformance_test.cpp)
+    modal_node_body_test.cpp modal_refusal_test.cpp joint_motions_test.cpp joint_input_test.cpp variable_body_test.cpp user_conformance_test.cpp)
