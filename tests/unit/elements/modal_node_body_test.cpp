@@ -79,5 +79,21 @@ TEST(ModalNodeBody, MovesAsRigidBodiesDo) {
   EXPECT_NEAR(coarse / fine, 4, .5);
 }
 
+/// Free flight goes on as it began; MBDyn's first step adds the body's momentum once more.
+TEST(ModalNodeBody, KeepsTheVelocityOfTheStart) {
+  ModalDeck deck;
+  deck.initial_value = "derivatives coefficient: 1.e-6;";
+  deck.control = "structural nodes: 1; joints: 1; rigid bodies: 1;";
+  deck.files = {{"rigid.fem", write_fem_text(hand_made(false), {})}};
+  const Vec3 v(.1, .2, .3);
+  deck.node(1, "modal", {Vec3::Zero(), Mat3::Identity(), v});
+  deck.joints = "joint: 1, modal, 1, 2, from file, no damping, \"rigid.fem\", 0;\n";
+  deck.others = "body: 1, 1, 2., .1, -.2, .3, diag, 1., 2., 2.5;\n";
+  ModalRun run(deck);
+  run.to(1);
+  EXPECT_LT((run.node(1).v - v).norm(), 1e-9);
+  EXPECT_LT((run.node(1).x - v).norm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace mbcosim::modal_node_body_test
