@@ -2,9 +2,19 @@
 
 namespace mbcosim {
 
+namespace {
+
+/// Of the element where its set holds several.
+std::type_index type_of(const ElementRef& element) {
+  const auto* general = dynamic_cast<const GeneralElementSet*>(element.set);
+  return general ? typeid(general->element(element.index)) : typeid(*element.set);
+}
+
+}  // namespace
+
 void Drawings::draw(const ElementRef& element, const EvalContext& context,
                     ElementGeometry& geometry) const {
-  const auto found = draws_.find(typeid(*element.set));
+  const auto found = draws_.find(type_of(element));
   if (found != draws_.end()) return found->second(*element.set, element.index, context, geometry);
   int k = 0;
   for (const int node : element.set->nodes(element.index))

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "elements/element_set_of.h"
+#include "elements/general_element.h"
 #include "model/geometry.h"
 
 namespace mbcosim {
@@ -32,6 +33,15 @@ class Drawings {
   template <class... Es, class Function>
   void add_all(Function draw) {
     (add<Es>(draw), ...);
+  }
+  /// The same for general elements of type E.
+  template <class E, class Function>
+  void add_general(Function draw) {
+    set(typeid(E), [draw](const ElementSet& all, int i, const EvalContext& context,
+                          ElementGeometry& geometry) {
+      const GeneralElement& element = static_cast<const GeneralElementSet&>(all).element(i);
+      draw(static_cast<const E&>(element), context, geometry);
+    });
   }
   /// Loads that viewers draw as arrows: "F" [N], "M" [N·m]; `arrow(element, context, k)` is the
   /// k-th one, global components.

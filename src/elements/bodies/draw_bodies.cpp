@@ -30,17 +30,15 @@ void draw_variable_body(const VariableBody& e, const EvalContext& context, Eleme
             e.J_vm->value(context) + e.J_vg->value(context));
 }
 
-void draw_general(const ElementSet& all, int i, const EvalContext& context, ElementGeometry& g) {
-  const GeneralElement& e = static_cast<const GeneralElementSet&>(all).element(i);
-  if (const auto* body = dynamic_cast<const ModalNodeBody*>(&e))
-    draw_body(body->body(), context, g);
+void draw_modal_node_body(const ModalNodeBody& e, const EvalContext& context, ElementGeometry& g) {
+  draw_body(e.body(), context, g);
 }
 
 }  // namespace
 
 void draw_bodies(Drawings& d) {
   d.add_all<Body, InMovingFrame<Body>>(draw_body);
-  d.set(typeid(GeneralElementSet), draw_general);
+  d.add_general<ModalNodeBody>(draw_modal_node_body);
   d.add_all<PointMass, InMovingFrame<PointMass>>(draw_point_mass);
   d.add_all<VariableBody, InMovingFrame<VariableBody>>(draw_variable_body);
 }

@@ -65,7 +65,7 @@ void read_body(Card& card, ElementInfo& info) {
     if (n.kind == StructuralKind::modal)
       card.fail("structural node " + std::to_string(n.label) +
                     " is a modal node; a body of variable mass cannot stand there",
-                "clamp a `dynamic` node to it and put the body there");
+                "hold a `dynamic` node to it by a `total joint` and put the body there");
     return read_variable_body(card, info, node);
   }
   if (n.kind == StructuralKind::static_displacement ||

@@ -47,7 +47,7 @@ struct Actuator {
   template <class T>
   struct Kinematics {
     Vec<T> e, arm1, arm2;
-    Vec<T> d, ddot;  ///< from face to face of chamber 1 [m]; d/dt of its ends' difference [m/s]
+    Vec<T> d, ddot;  ///< from face to face of chamber 1, global [m]; its rate ḋ [m/s]
     T l, ldot;
   };
   template <class T>

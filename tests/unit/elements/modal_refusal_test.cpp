@@ -203,5 +203,14 @@ TEST(ModalPrivateData, NamesWhatItRefuses) {
   }
 }
 
+TEST(ModalCard, RefusesABodyOfVariableMassOnItsNode) {
+  ModalDeck deck = deck_with(kCard);
+  deck.others =
+      "body: 1, 1, variable mass, const, 1., null, single, eye, const, 1., single, eye, const, "
+      "1.;\n";
+  expect_refused(deck,
+                 "structural node 1 is a modal node; a body of variable mass cannot stand there");
+}
+
 }  // namespace
 }  // namespace mbcosim::modal_refusal_test

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "deck_run.h"
+#include "elements/modal_deck.h"
 
 namespace mbcosim::geometry_view_test {
 namespace {
@@ -173,6 +174,29 @@ TEST(GeometryOfAnActuator, IsItsTwoChambersWithTheirPressures) {
   EXPECT_EQ(x(1, 0), x(0, 1));
   EXPECT_NEAR((x(1, 1) - Vec3(1, 0, 0.4)).norm(), 0, 1e-15);  // the cylinder's own length
   EXPECT_GE(run.simulation().find_variable(g.lines[0].variable), 0);
+}
+
+/// General elements share one set: each type is drawn in its own way, those that none tells by
+/// their nodes.
+TEST(GeometryOfGeneralElements, IsThatOfTheirTypes) {
+  decks::ModalDeck deck;
+  deck.control = "structural nodes: 2; joints: 2; rigid bodies: 1; forces: 1;";
+  deck.files = {{"rigid.fem", write_fem_text(decks::hand_made(false), {})}};
+  deck.node(1, "modal");
+  deck.node(2, "static", {Vec3(1, 2, 3)});
+  deck.joints =
+      "joint: 1, modal, 1, 2, from file, no damping, \"rigid.fem\", 0;\n"
+      "joint: 2, clamp, 2, node, node;\n";
+  deck.forces = "force: 3, external structural, grpc, port, \"loads\", 1, 2;\n";
+  deck.others = "body: 4, 1, 2., .1, 0., 0., diag, 3., 2., 1.;\n";
+  DeckRun run(deck.bundle());
+  ASSERT_TRUE(run.ready());
+  GeometryView view(run.model(), run.simulation().state());
+  const ElementGeometry force = view.element(2), body = view.element(3);
+  ASSERT_EQ(force.points.size(), 1u);
+  EXPECT_EQ(view.position(force.points[0]), Vec3(1, 2, 3));
+  ASSERT_EQ(body.masses.size(), 1u);
+  EXPECT_EQ(body.masses[0].m, 2);
 }
 
 }  // namespace
