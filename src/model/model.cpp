@@ -41,22 +41,31 @@ NodeAcceleration attached_acceleration(const NodeState& r, const NodeAcceleratio
   return {ar.a + ar.wp.cross(arm) + r.w.cross(r.w.cross(arm)), ar.wp};
 }
 
+/// Of a node that a dummy follows. MBDyn moves dummies before it finds the accelerations of record
+/// 0: there those of nodes with equations count as zero, while what follows from velocities does
+/// not.
+NodeAcceleration followed_acceleration(const Model& model, const EvalContext& context, int node) {
+  const bool unknown = context.phase != Phase::input && context.state->step == 0 &&
+                       !model.structural[node].is_dummy() && !inverse_problem(model);
+  return unknown ? NodeAcceleration() : model.node_acceleration(context, node);
+}
+
 NodeAcceleration dummy_acceleration(const Model& model, const EvalContext& context,
                                     const StructuralNode& n) {
   const NodeState base = model.node_state(context, n.base);
-  const NodeAcceleration a = model.node_acceleration(context, n.base);
+  const NodeAcceleration a = followed_acceleration(model, context, n.base);
   if (n.kind == StructuralKind::dummy_offset)
     return attached_acceleration(base, a, base.R * n.offset);
   const NodeState reference = model.node_state(context, n.reference);
   NodeAcceleration s = relative_acceleration(
-      base, a, reference, model.node_acceleration(context, n.reference), n.orientation);
+      base, a, reference, followed_acceleration(model, context, n.reference), n.orientation);
   if (n.pivot < 0) return s;
   // The relative motion again, carried by the pivot's frame p: a = p̈ + Coriolis + P s̈.
   const NodeState relative = relative_state(base, reference, n.offset, n.orientation);
   const NodeState pivot = model.node_state(context, n.pivot);
   const NodeState p = attached_state(pivot, n.pivot_offset, n.pivot_orientation);
   const NodeAcceleration carried =
-      attached_acceleration(pivot, model.node_acceleration(context, n.pivot),
+      attached_acceleration(pivot, followed_acceleration(model, context, n.pivot),
                             pivot.R * n.pivot_offset + p.R * relative.x);
   const Vec3 spin = p.R * relative.w;
   return {carried.a + 2 * p.w.cross(p.R * relative.v) + p.R * s.a,

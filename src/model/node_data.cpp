@@ -1,4 +1,5 @@
 /// Private data of structural nodes (MBDyn input manual, "structural node", private data).
+#include <algorithm>
 #include <array>
 
 #include "model/inverse_problem.h"
@@ -7,27 +8,28 @@ namespace mbcosim {
 
 namespace {
 
+/// In the order of the manual, whose numbers `index` counts.
 enum Group {
   kX,
-  kXP,
-  kOmega,
   kx,
-  kxP,
-  komega,
   kPhi,
+  kXP,
+  kxP,
+  kOmega,
+  komega,
   kE,
   kE313,
   kE321,
   kPE,
   kXPP,
-  kOmegaP,
   kxPP,
+  kOmegaP,
   komegaP,
   kGroups
 };
-constexpr std::array<const char*, kGroups> kNames = {"X",     "XP",  "Omega",  "x",    "xP",
-                                                     "omega", "Phi", "E",      "E313", "E321",
-                                                     "PE",    "XPP", "OmegaP", "xPP",  "omegaP"};
+constexpr std::array<const char*, kGroups> kNames = {"X",     "x",     "Phi", "XP",     "xP",
+                                                     "Omega", "omega", "E",   "E313",   "E321",
+                                                     "PE",    "XPP",   "xPP", "OmegaP", "omegaP"};
 constexpr int kSlots = 4;  ///< datum = group·kSlots + component
 
 bool needs_acceleration(int group) { return group >= kXPP; }
@@ -59,12 +61,22 @@ Vec3 vector_datum(const Model& model, const EvalContext& context, int node, int 
       break;
   }
   // Unknown to the derivatives phase until it is over: as drive arguments accelerations start from
-  // zero. As in MBDyn those of dummy nodes do so in record 0, too.
-  const bool dummy_at_start = model.structural[node].is_dummy() && context.state->step == 0;
-  if (context.phase == Phase::derivatives || dummy_at_start) return Vec3::Zero();
+  // zero.
+  if (context.phase == Phase::derivatives) return Vec3::Zero();
   const NodeAcceleration a = model.node_acceleration(context, node);
   const Vec3 global = group == kXPP || group == kxPP ? a.a : a.wp;
   return group == kxPP || group == komegaP ? Vec3(s.R.transpose() * global) : global;
+}
+
+/// Of the two quadruples that describe a rotation, that in which the largest is positive.
+std::array<double, 4> euler_parameters(const Vec3& phi) {
+  const double half = phi.norm() / 2, scale = half > 0 ? std::sin(half) / (2 * half) : 0.5;
+  std::array<double, 4> e = {std::cos(half), scale * phi(0), scale * phi(1), scale * phi(2)};
+  const double largest = *std::max_element(
+      e.begin(), e.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+  if (largest < 0)
+    for (double& x : e) x = -x;
+  return e;
 }
 
 }  // namespace
@@ -90,10 +102,7 @@ int Model::structural_datum(int node, std::string_view name) const {
 double Model::structural_datum_value(const EvalContext& context, int node, int datum) const {
   const int group = datum / kSlots, i = datum % kSlots;
   if (group != kPE) return vector_datum(*this, context, node, group)(i);
-  const Vec3 phi = vector_datum(*this, context, node, kPhi);
-  const double angle = phi.norm();
-  if (i == 0) return std::cos(angle / 2);
-  return angle > 0 ? std::sin(angle / 2) * phi(i - 1) / angle : 0.0;
+  return euler_parameters(vector_datum(*this, context, node, kPhi))[i];
 }
 
 std::vector<std::string> Model::structural_data_names(const StructuralNode& node) {

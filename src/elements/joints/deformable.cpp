@@ -62,7 +62,7 @@ double DeformableDisplacement::own_datum(const Local<double>& u, int datum) cons
   if (datum >= 6) return law_force(u)(datum - 6);
   Vec3 d, rate;
   displacement(u, d, rate);
-  return datum < 3 ? d(datum) : rate(datum - 3);
+  return datum < 3 ? d(datum) : rate_in_node(rate)(datum - 3);
 }
 
 void read_deformable_displacement(Card& card, ElementInfo& info) {
@@ -101,7 +101,8 @@ double DeformableJoint::own_datum(const Local<double>& u, int datum) const {
   if (datum >= 12) return law_force(u)(datum - 12);
   Vec6 strain, rate;
   arguments(u, strain, rate);
-  return datum < 6 ? strain(datum) : rate(datum - 6);
+  if (datum < 6) return strain(datum);
+  return datum < 9 ? rate_in_node(rate.head<3>())(datum - 6) : rate(datum - 6);
 }
 
 void read_deformable_joint(Card& card, ElementInfo& info) {

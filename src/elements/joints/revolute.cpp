@@ -152,10 +152,9 @@ void output_hinge(const RevoluteAxes& e, const Local<double>& u, OutputRow& row,
   if (!e.without_angles) row.orientation("E", e.relative_rotation(u), e.description);
 }
 
+/// Angle and rate.
 double hinge_datum(const RevoluteAxes& e, const Local<double>& u, int datum) {
-  if (datum == 0) return e.unwrapped_angle(u);
-  if (datum == 1) return e.relative_velocity(u)(2);
-  return (e.hinge_b(u).transpose() * u.own3(0))(datum - 2);
+  return datum == 0 ? e.unwrapped_angle(u) : e.relative_velocity(u)(2);
 }
 
 }  // namespace
@@ -174,7 +173,7 @@ void RevoluteHinge::output_columns(const Local<double>& u, OutputRow& row) const
 }
 
 double RevoluteHinge::private_value(const Local<double>& u, int datum) const {
-  if (datum < 5) return hinge_datum(*this, u, datum);
+  if (datum < 2) return hinge_datum(*this, u, datum);
   return datum < 7 ? u.own(datum - 2) : 0.0;
 }
 
@@ -272,7 +271,7 @@ void AxialRotation::output_columns(const Local<double>& u, OutputRow& row) const
 
 double AxialRotation::private_value(const Local<double>& u, int datum) const {
   if (datum == 1) return u.drive(omega);
-  return datum < 5 ? hinge_datum(*this, u, datum) : u.own(datum - 2);
+  return datum == 0 ? unwrapped_angle(u) : u.own(datum - 2);
 }
 
 void read_axial_rotation(Card& card, ElementInfo& info) {

@@ -94,6 +94,7 @@ struct RevoluteAxes : TwoAttachments {
 ///   unknowns    F [N] global, M₁, M₂ [N·m] in H₂
 ///   loads       node 1 (−F, −d₁ × F − MT), node 2 (F, d₂ × F + MT)
 ///   rows        (x₁ + d₁ − x₂ − d₂)/c and those of RevoluteAxes
+///   data        the force is global, the moment in H₂ (the manual: both in axes of node 1)
 struct RevoluteHinge : RevoluteAxes, NamedData<RevoluteHinge> {
   Vec3 F0 = Vec3::Zero(), M0 = Vec3::Zero();  ///< initial reactions
 
@@ -162,6 +163,7 @@ struct RevoluteRotation : RevoluteAxes, NamedData<RevoluteRotation> {
 ///   unknowns    F [N], M₁, M₂, M₃ [N·m] in H₂
 ///   loads       as the revolute hinge with MT + e₃ M₃
 ///   rows        those of the revolute hinge, Ω − e₃·(w₂ − w₁)   [rad/s]
+///   data        as of the revolute hinge
 struct AxialRotation : RevoluteAxes, NamedData<AxialRotation> {
   DrivePtr omega;
 

@@ -15,7 +15,7 @@ struct LinearVelocity : NamedData<LinearVelocity> {
 
   static constexpr int width = 7;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr auto data_names = std::array<DatumName, 2>{{{"F", "N"}, {"v", "m/s"}}};
+  static constexpr auto data_names = std::array<DatumName, 2>{{{"v", "m/s"}, {"F", "N"}}};
 
   void connect(Connector& c) const {
     c.distinct_node(node);
@@ -35,7 +35,7 @@ struct LinearVelocity : NamedData<LinearVelocity> {
   }
   std::string row_name(int) const { return "velocity constraint"; }
   double private_value(const Local<double>& u, int datum) const {
-    return datum == 0 ? u.own(0) : u.drive(velocity);
+    return datum == 0 ? u.drive(velocity) : u.own(0);
   }
 };
 
@@ -49,7 +49,7 @@ struct AngularVelocity : NamedData<AngularVelocity> {
 
   static constexpr int width = 7;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
-  static constexpr auto data_names = std::array<DatumName, 2>{{{"M", "N m"}, {"w", "rad/s"}}};
+  static constexpr auto data_names = std::array<DatumName, 2>{{{"w", "rad/s"}, {"M", "N m"}}};
 
   void connect(Connector& c) const {
     c.distinct_node(node);
@@ -68,7 +68,7 @@ struct AngularVelocity : NamedData<AngularVelocity> {
   }
   std::string row_name(int) const { return "angular velocity constraint"; }
   double private_value(const Local<double>& u, int datum) const {
-    return datum == 0 ? u.own(0) : u.drive(velocity);
+    return datum == 0 ? u.drive(velocity) : u.own(0);
   }
 };
 

@@ -198,5 +198,37 @@ TEST(PrivateData, OfStructuralNodesMatchTheReferenceSolver) {
   EXPECT_EQ(model->structural_datum(0, "XPP[1]"), -1);
 }
 
+TEST(PrivateData, OfStructuralNodesAreCountedAsInTheManual) {
+  const ModelPtr model = nodes(
+      "structural: 1, static, null, eye, null, null;"
+      "structural: 2, dynamic, null, eye, null, null;",
+      "", "body: 2, 2, 1., null, eye;");
+  ASSERT_TRUE(model);
+  const auto names = [&](int node) {
+    return Model::structural_data_names(model->structural[node]);
+  };
+  EXPECT_EQ(names(0).size(), 34u);
+  ASSERT_EQ(names(1).size(), 46u);
+  const std::pair<int, const char*> expected[] = {
+      {1, "X[1]"},     {4, "x[1]"},       {7, "Phi[1]"},     {10, "XP[1]"},
+      {13, "xP[1]"},   {16, "Omega[1]"},  {19, "omega[1]"},  {22, "E[1]"},
+      {25, "E313[1]"}, {28, "E321[1]"},   {31, "PE[0]"},     {35, "XPP[1]"},
+      {38, "xPP[1]"},  {41, "OmegaP[1]"}, {44, "omegaP[1]"}, {46, "omegaP[3]"}};
+  for (const auto& [index, name] : expected) EXPECT_EQ(names(1)[index - 1], name) << index;
+}
+
+// Numbers of the reference solver: -cos 1 and sin 1.
+TEST(PrivateData, TheLargestEulerParameterIsPositive) {
+  const ModelPtr model = nodes("structural: 1, static, null, vector, 0.,0.,-2., null, null;");
+  ASSERT_TRUE(model);
+  const State state = make_initial_state(*model);
+  const EvalContext context = model->context(state, Phase::step);
+  const double expected[] = {-.54030230586814, 0, 0, .841470984807897};
+  for (int i = 0; i < 4; ++i) {
+    const int k = model->structural_datum(0, "PE[" + std::to_string(i) + "]");
+    EXPECT_NEAR(model->structural_datum_value(context, 0, k), expected[i], 1e-14) << i;
+  }
+}
+
 }  // namespace
 }  // namespace mbcosim::decks::nodes_test

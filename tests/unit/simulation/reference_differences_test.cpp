@@ -254,5 +254,26 @@ TEST(ReferenceDifferences, UnstableSpinOfModalBodiesAmplifiesTheTolerance) {
   EXPECT_LT(at9, 1e-7);
 }
 
+// Two points that a total joint keeps together have no relative velocity. (The reference solver
+// gives vy = 2 in record 0: it takes the arm x2 + f2 − x1 without f1, and f1 as if it were global.)
+TEST(ReferenceDifferences, TotalJointsHaveTheVelocityOfTheirLine) {
+  DeckRun run(
+      initial_value("final time: 1.; time step: 1e-3; max iterations: 20; tolerance: 1e-9;") +
+      R"deck(begin: control data; structural nodes: 2; rigid bodies: 2; joints: 1; end: control data;
+begin: nodes;
+  structural: 1, dynamic, null, eye, null, 0.,0.,2.;
+  structural: 2, dynamic, 1.,0.,0., eye, 0.,2.,0., 0.,0.,2.;
+end: nodes;
+begin: elements;
+  body: 1, 1, 2., null, diag, 1.,2.,3.;
+  body: 2, 2, 2., null, diag, 1.,2.,3.;
+  joint: 1, total joint, 1, position, 1.,0.,0., 2, position constraint, 1, 1, 1, null;
+end: elements;
+)deck");
+  ASSERT_TRUE(run.ready());
+  for (const char* name : {"vx", "vy", "vz"})
+    EXPECT_NEAR(run.datum(Family::joint, 1, name), 0, 1e-9) << name;
+}
+
 }  // namespace
 }  // namespace mbcosim::reference_differences_test
