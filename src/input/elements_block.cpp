@@ -63,7 +63,9 @@ void read_element_head(DeckCard& card, Family family, bool has_label, const Driv
       card.fail("inner label " + std::to_string(info.label) + " differs from driven label " +
                 std::to_string(driven->label));
     }
-    if (const ElementRef before = card.model().find_element(family, info.label); before.set) {
+    // An `automatic structural` exists with its node; cards give it initial values.
+    if (const ElementRef before = card.model().find_element(family, info.label);
+        before.set && family != Family::automatic_structural) {
       card.set_subject("");
       card.deck().redefined(card, name, info.label, before.set->info(before.index).where);
     }

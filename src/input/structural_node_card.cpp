@@ -109,7 +109,6 @@ void read_relative_dummy(DeckCard& card, StructuralNode& node) {
 
 void read_dummy(DeckCard& card, StructuralNode& node) {
   node.base = frame_node(card);
-  node.accelerations = card.model().structural[node.base].accelerations;
   if (card.required("kind of dummy node", {"offset", "relative frame"}) == 0) {
     node.kind = StructuralKind::dummy_offset;
     read_offset_dummy(card, node);
@@ -117,6 +116,12 @@ void read_dummy(DeckCard& card, StructuralNode& node) {
     node.kind = StructuralKind::dummy_relative;
     read_relative_dummy(card, node);
   }
+  // As in MBDyn: where each node on which the dummy node depends has its accelerations written.
+  const auto accelerated = [&](int on) {
+    return on < 0 || card.model().structural[on].accelerations;
+  };
+  node.accelerations =
+      accelerated(node.base) && accelerated(node.reference) && accelerated(node.pivot);
   if (card.peek_word() == "scale") card.fail_at(card.next(), "a dummy node has no scale");
   read_node_output(card, node);
 }

@@ -78,7 +78,7 @@ class Card {
   // ------------------------------------------------------------------
   // in frames; `node`: structural node index
   /// `context`: structural node that `reference, node` and `reference, local` mean; -1: the global
-  /// frame.
+  /// frame, as in MBDyn for the ground point of pins.
   virtual Vec3 absolute_position(std::string_view what, int context = -1,
                                  const OtherNode* other = nullptr) = 0;
   virtual Mat3 absolute_orientation(std::string_view what, int context = -1,

@@ -38,11 +38,12 @@ class Law {
   /// shared.
   virtual LawPtr<N> copy(ModelBuilder&) const { return nullptr; }
 
-  /// Data a law adds to its element's output line (the shock absorber's p, A, Fe, Fv); at most 8.
+  /// Data a law adds to its element's output line (the shock absorber's p, A, Fe, Fv).
   virtual int output_size() const { return 0; }
   virtual void output(const EvalContext&, const V& /*strain*/, const V& /*rate*/,
                       double* /*values*/) const {}
-  /// Index of a private datum ("p"), or -1: it is then `output` value number k.
+  /// Index of a private datum ("p"), or -1: it is then `output` value number k. Laws with private
+  /// data have at most 8 values.
   virtual int private_datum(const std::string& /*name*/) const { return -1; }
 
   /// Force for any scalar type, by the chain rule.

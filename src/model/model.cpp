@@ -120,7 +120,7 @@ NodeAcceleration Model::node_acceleration(const EvalContext& context, int node) 
   for (const ElementRef& body : node_bodies[node])
     if (body.set->is_active(*context.state, body.index))
       body.set->add_inertia(context, body.index, node, inertia);
-  if (inertia.m <= 0) return r;
+  if (inertia.m == 0) return r;
   if (n.is_displacement()) {
     r.a = vector_at(yp, n.first + 3) / inertia.m;
     return r;

@@ -3,6 +3,7 @@
 
 #include "model/check.h"
 #include "model/model.h"
+#include "model/node_momenta.h"
 
 namespace mbcosim {
 
@@ -11,6 +12,12 @@ ModelBuilder::ModelBuilder() : model_(std::make_unique<Model>()) {}
 int ModelBuilder::add_structural(StructuralNode node) {
   const int index = static_cast<int>(model_->structural.size());
   model_->structural_index.emplace(node.label, index);
+  if (node.has_momentum()) {
+    NodeMomenta& momenta = set<NodeMomenta>();
+    momenta.add(node, index);
+    model_->element_index[static_cast<int>(Family::automatic_structural)].emplace(
+        node.label, ElementRef{&momenta, momenta.size() - 1});
+  }
   model_->structural.push_back(std::move(node));
   return index;
 }

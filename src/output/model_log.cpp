@@ -70,10 +70,10 @@ void list(std::string& s, const Model& model, const char* title, Take take, Valu
 void index_lists(std::string& s, const Model& model) {
   const auto six = [](const StructuralNode& n) { return !n.is_displacement(); };
   const auto all = [](const StructuralNode&) { return true; };
-  const auto six_momentum = [](const StructuralNode& n) {
-    return n.kind == StructuralKind::dynamic;
+  const auto momentum = [](const StructuralNode& n) {
+    return n.has_momentum() || n.kind == StructuralKind::modal;
   };
-  const auto momentum = [](const StructuralNode& n) { return n.has_momentum(); };
+  const auto six_momentum = [&](const StructuralNode& n) { return six(n) && momentum(n); };
   const auto first = [](const StructuralNode& n) { return n.first; };
   const auto equilibrium = [](const StructuralNode& n) { return n.equilibrium; };
   const auto label = [](const StructuralNode& n) { return n.label; };

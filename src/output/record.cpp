@@ -14,7 +14,7 @@ void write_structural(const EvalContext& context, int index, OutputRow& row) {
   const NodeState s = context.model->node_state(context, index);
   row.begin(OutputFile::mov, node.label);
   row.vec3("X", "m", s.x);
-  if (node.is_displacement() && node.description != OrientationDescription::matrix)
+  if (node.is_displacement())
     row.vec3("Phi", "rad", Vec3::Zero());
   else
     row.orientation("R", s.R, node.description);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "elements/beams/beam.h"
+#include "elements/log_text.h"
 
 namespace mbcosim {
 
@@ -217,6 +218,22 @@ std::string BeamSlider::row_name(int own) const {
                    : "direction constraint " + std::to_string(own - 3);
 }
 
+/// As in the reference solver without the offset on the first node of the chain.
+std::string BeamSlider::log(const Model& model, int label) const {
+  const auto node_label = [&](int n) { return model.structural[n].label; };
+  std::string line = "beamslider:" + log_integers({label, node_label(node)}) + log_vector(offset) +
+                     log_matrix(Rs) + log_integers({static_cast<int>(spans.size())});
+  for (const Span& s : spans) {
+    line += log_integers({s.label});
+    for (int k = 0; k < 3; ++k) {
+      line += log_integers({node_label(s.node[k])});
+      if (k > 0 || &s != &spans.front()) line += log_vector(s.offset[k]);
+      line += log_matrix(s.orientation[k]);
+    }
+  }
+  return line;
+}
+
 /// As in the reference solver the moment's local columns are global, and its global ones turned by
 /// E once more.
 void BeamSlider::output(const GeneralView& u, OutputRow& row) const {
@@ -233,9 +250,11 @@ void BeamSlider::output(const GeneralView& u, OutputRow& row) const {
 
 namespace {
 
-void skip_hinge(Card& card, int node) {
-  if (!card.keyword("hinge")) return;
-  if (!card.keyword("same")) card.relative_orientation("orientation of the beam", node);
+/// `same`: that of the beam before.
+Mat3 read_hinge(Card& card, int node, const Mat3& same) {
+  if (!card.keyword("hinge")) return Mat3::Identity();
+  if (card.keyword("same")) return same;
+  return card.relative_orientation("orientation of the beam", node);
 }
 
 BeamSlider::Span read_span(Card& card, const BeamSlider::Span* before) {
@@ -257,7 +276,8 @@ BeamSlider::Span read_span(Card& card, const BeamSlider::Span* before) {
       if (k == 0 && before && s.offset[0] != before->offset[2])
         card.fail("beam slider: the offset differs from that of the beam before", "write `same`");
     }
-    skip_hinge(card, s.node[k]);
+    s.orientation[k] = read_hinge(
+        card, s.node[k], k == 0 && before ? before->orientation[2] : Mat3(Mat3::Identity()));
   }
   return s;
 }

@@ -21,9 +21,10 @@ namespace mbcosim {
 class BeamSlider : public GeneralElement {
  public:
   struct Span {
-    int label;       ///< of the beam
-    int node[3];     ///< structural node indices
-    Vec3 offset[3];  ///< node frames [m]
+    int label;            ///< of the beam
+    int node[3];          ///< structural node indices
+    Vec3 offset[3];       ///< node frames [m]
+    Mat3 orientation[3];  ///< of the beam in the node frames, for .log
   };
   int node = -1;
   Vec3 offset = Vec3::Zero();  ///< f₀, node frame [m]
@@ -39,6 +40,7 @@ class BeamSlider : public GeneralElement {
   void start(const GeneralView& u, State& state) const override;
   void after_convergence(const GeneralView& u, State& state) const override;
   std::string row_name(int own) const override;
+  std::string log(const Model& model, int label) const override;
   void output(const GeneralView& u, OutputRow& row) const override;
 
  private:

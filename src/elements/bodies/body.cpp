@@ -37,7 +37,7 @@ void Body::add_to(Inertia& inertia, const Mat3& R) const {
 
 std::string Body::log(const Model& model, int label) const {
   return "body:" + log_integers({label, model.structural[node].label}) + log_values({m}) +
-         log_vector(S0 / m) + log_matrix(J0);
+         log_vector(centre) + log_matrix(J0);
 }
 
 int Body::private_datum(std::string_view name) {

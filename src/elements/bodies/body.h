@@ -14,10 +14,11 @@ namespace mbcosim {
 /// On static nodes (`model: static`) only gravity acts.
 struct Body {
   int node = -1;
-  double m = 0;            ///< [kg]
-  Vec3 S0 = Vec3::Zero();  ///< first moment in the node frame [kg·m]
-  Mat3 J0 = Mat3::Zero();  ///< second moment about the node origin, node frame [kg·m²]
-  int k = 0;               ///< local index of the node
+  double m = 0;                ///< [kg]
+  Vec3 S0 = Vec3::Zero();      ///< first moment in the node frame [kg·m]
+  Mat3 J0 = Mat3::Zero();      ///< second moment about the node origin, node frame [kg·m²]
+  Vec3 centre = Vec3::Zero();  ///< of mass, node frame [m]; with mass 0: as the deck gives it
+  int k = 0;                   ///< local index of the node
 
   static constexpr int width = 6;
   static constexpr bool constant_structure = true;

@@ -17,8 +17,7 @@ void draw_mass(ElementGeometry& g, int node, double m, const Vec3& centre, const
 }
 
 void draw_body(const Body& e, const EvalContext&, ElementGeometry& g) {
-  const Vec3 centre = e.m != 0 ? Vec3(e.S0 / e.m) : Vec3::Zero();
-  draw_mass(g, e.node, e.m, centre, e.J0 + cross<double>(e.S0) * cross<double>(centre));
+  draw_mass(g, e.node, e.m, e.centre, e.J0 + cross<double>(e.S0) * cross<double>(e.centre));
 }
 
 void draw_point_mass(const PointMass& e, const EvalContext&, ElementGeometry& g) {

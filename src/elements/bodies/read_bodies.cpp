@@ -36,26 +36,60 @@ namespace {
 
 constexpr double kGravitationalConstant = 6.67384e-11;  ///< `G, si` [m³/(kg s²)], MBDyn's value
 
-/// mass, centre of mass, inertia about it [, {inertial | orientation}, axes]: one part of a
-/// (condensed) body. Returns the place of the mass.
-SourceSpan read_body_part(Card& card, int node, bool negative_allowed, Body& body) {
+/// What stands before the masses: `[ condense, <number>, ] [ allow negative mass, ]`.
+struct Masses {
+  int count = 1;
+  bool negative_allowed = false;
+};
+
+Masses read_masses(Card& card) {
+  Masses r;
+  if (card.keyword("condense")) {
+    r.count = card.integer("number of condensed masses");
+    if (r.count < 1)
+      card.fail("the number of condensed masses must be at least 1, got " +
+                std::to_string(r.count));
+    if (card.keyword("variable mass"))
+      card.fail("a body of variable mass cannot be condensed",
+                "write a body for each variable mass; a node may have several");
+  }
+  r.negative_allowed = card.keyword("allow negative mass");
+  return r;
+}
+
+double read_mass(Card& card, bool negative_allowed) {
   const double m = card.real("mass");
-  const SourceSpan where = card.last();
   if (m < 0 && !negative_allowed)
     card.fail("mass must not be negative, got " + std::to_string(m),
               "write `allow negative mass` before the mass if it is meant");
-  const Vec3 x = card.relative_position("centre of mass", node);
-  Mat3 j = card.relative_tensor("inertia", node);
+  return m;
+}
+
+/// mass, centre of mass, inertia about it [, {inertial | orientation}, axes]: one part of a
+/// (condensed) body. Returns the place of the mass.
+SourceSpan read_body_part(Card& card, bool negative_allowed, Body& body) {
+  const double m = read_mass(card, negative_allowed);
+  const SourceSpan where = card.last();
+  const Vec3 x = card.relative_position("centre of mass", body.node);
+  Mat3 j = card.relative_tensor("inertia", body.node);
   if (!negative_allowed) warn_about_inertia(card, j);
   if (card.one_of({"inertial", "orientation"}) >= 0 && !card.keyword("node")) {
-    const Mat3 r = card.relative_orientation("inertial axes", node);
+    const Mat3 r = card.relative_orientation("inertial axes", body.node);
     j = r * j * r.transpose();
   }
   const Mat3 xx = cross<double>(x);
   body.m += m;
   body.S0 += m * x;
   body.J0 += j - m * xx * xx;
+  body.centre = body.m != 0 ? Vec3(body.S0 / body.m) : x;
   return where;
+}
+
+void read_point_mass(Card& card, ElementInfo& info, int node) {
+  const Masses masses = read_masses(card);
+  PointMass body{node, 0};
+  for (int i = 0; i < masses.count; ++i) body.m += read_mass(card, masses.negative_allowed);
+  add_body(card, info, body);
 }
 
 void read_body(Card& card, ElementInfo& info) {
@@ -75,30 +109,17 @@ void read_body(Card& card, ElementInfo& info) {
         "structural node " + std::to_string(n.label) + " is static; a body needs a dynamic node",
         n.is_displacement() ? "make the node `dynamic displacement`, or remove the body"
                             : "make the node `dynamic`, or remove the body");
-  if (n.is_displacement()) {
-    const double m = card.real("mass");
-    if (!(m > 0)) card.fail("mass must be positive");
-    add_body(card, info, PointMass{node, m});
-    return;
-  }
-  int parts = 1;
-  if (card.keyword("condense")) {
-    parts = card.integer("number of condensed masses");
-    if (parts < 1)
-      card.fail("the number of condensed masses must be at least 1, got " + std::to_string(parts));
-    if (card.keyword("variable mass"))
-      card.fail("a body of variable mass cannot be condensed",
-                "write a body for each variable mass; a node may have several");
-  }
-  const bool negative = card.keyword("allow negative mass");
+  if (n.is_displacement()) return read_point_mass(card, info, node);
+  const Masses masses = read_masses(card);
   Body body;
   body.node = node;
   SourceSpan where;
-  for (int i = 0; i < parts; ++i) where = read_body_part(card, node, negative, body);
-  if (std::abs(body.m) < 2.2204460492503131e-16 && !negative)
-    card.fail_at(where, "the mass is zero",
-                 "give the body a mass, or remove it: a node without mass is held by joints, or is "
-                 "`static`");
+  for (int i = 0; i < masses.count; ++i)
+    where = read_body_part(card, masses.negative_allowed, body);
+  // One body of mass 0 adds inertia alone; of several, as in MBDyn, one has mass.
+  if (masses.count > 1 && std::abs(body.m) < 2.2204460492503131e-16 && !masses.negative_allowed)
+    card.fail_at(where, "the condensed mass is zero",
+                 "give one of the bodies a mass, or write each as a body of its own");
   if (n.kind == StructuralKind::modal)
     add_general_element(card.builder(), info, std::make_unique<ModalNodeBody>(body));
   else

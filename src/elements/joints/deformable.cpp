@@ -2,6 +2,14 @@
 
 namespace mbcosim {
 
+namespace {
+
+/// The velocities of the private data: as in MBDyn in the frame of the node, those of .jnt in the
+/// frame of the hinge.
+Vec3 in_node_frame(const Attachment& hinge, const Vec3& velocity) { return hinge.Rh * velocity; }
+
+}  // namespace
+
 void read_hinge_motion(Card& card, HingeMotion& e, bool with_offsets) {
   const auto read = [&](Attachment& at, const Attachment* other) {
     at = read_attachment(card);
@@ -62,7 +70,7 @@ double DeformableDisplacement::own_datum(const Local<double>& u, int datum) cons
   if (datum >= 6) return law_force(u)(datum - 6);
   Vec3 d, rate;
   displacement(u, d, rate);
-  return datum < 3 ? d(datum) : rate_in_node(rate)(datum - 3);
+  return datum < 3 ? d(datum) : in_node_frame(a, rate)(datum - 3);
 }
 
 void read_deformable_displacement(Card& card, ElementInfo& info) {
@@ -102,7 +110,7 @@ double DeformableJoint::own_datum(const Local<double>& u, int datum) const {
   Vec6 strain, rate;
   arguments(u, strain, rate);
   if (datum < 6) return strain(datum);
-  return datum < 9 ? rate_in_node(rate.head<3>())(datum - 6) : rate(datum - 6);
+  return datum < 9 ? in_node_frame(a, rate.head<3>())(datum - 6) : rate(datum - 6);
 }
 
 void read_deformable_joint(Card& card, ElementInfo& info) {
@@ -160,7 +168,7 @@ double ViscousBody::own_datum(const Local<double>& u, int datum) const {
   if (datum >= 6) return law_force(u)(datum - 6);
   Vec6 strain, rate;
   arguments(u, strain, rate);
-  return rate(datum);
+  return datum < 3 ? in_node_frame(a, rate.head<3>())(datum) : rate(datum);
 }
 
 void read_viscous_body(Card& card, ElementInfo& info) {

@@ -28,8 +28,6 @@ struct HingeMotion : TwoAttachments {
     d = H1.transpose() * s - origin.cast<T>();
     rate = H1.transpose() * (u.v(1) + u.w(1).cross(f2) - u.v(0) - u.w(0).cross(s));
   }
-  /// The private data vx, vy, vz are in axes of node 1; dx, dy, dz and all others in H₁.
-  Vec3 rate_in_node(const Vec3& rate) const { return a.Rh * rate; }
 };
 
 /// Deformable hinge: m = law(θ, ω), M = H₁ m; loads node 1 (0, M), node 2 (0, −M).

@@ -20,7 +20,9 @@ void read_modlugre(Card& card, Friction& f) {
   f.sigma1 = read_coefficient(card, "modlugre", "sigma 1");
   f.sigma2 = read_coefficient(card, "modlugre", "sigma 2");
   f.kappa = read_coefficient(card, "modlugre", "kappa");
-  if (!(f.kappa < 1)) card.fail("modlugre friction: kappa must be smaller than 1");
+  if (f.kappa > 1)
+    card.fail("modlugre friction: kappa must not be larger than 1",
+              "bristles that stay elastic up to more than the limit never slide");
   f.steady = card.scalar_function("friction function");
 }
 

@@ -20,7 +20,8 @@ struct Contact {
 /// friction models", IEEE Trans. Automatic Control 47(5), 2002.
 ///
 ///   unknown z [m] (differential), f = σ₀ z + σ₁ ż + σ₂ v, ż = v (1 − α(z, v) σ₀ z sgn(v)/f_ss(v))
-///   α = 0 for |z| ≤ κ z_ss or z v < 0, 1 for |z| ≥ z_ss, half a sine in between; z_ss = f_ss(v)/σ₀
+///   α = 0 for |z| ≤ κ z_ss or z v < 0, 1 for |z| > z_ss, half a sine in between; z_ss = f_ss(v)/σ₀
+///   With κ = 1 α jumps, so that a step may have no solution.
 ///
 /// `discrete coulomb`: dry friction that holds without any motion up to its limit.
 ///

@@ -88,14 +88,14 @@ void read_in_line(Card& card, ElementInfo& info) {
 
 namespace {
 
-/// An orientation whose axis 3 is `normal`.
+/// The shortest rotation that takes axis 3 to `normal`.
 Mat3 frame_of_normal(const Vec3& normal) {
-  int smallest = 0;
-  normal.cwiseAbs().minCoeff(&smallest);
-  const Vec3 first = Vec3(Vec3::Unit(smallest)).cross(normal).normalized();
-  Mat3 R;
-  R << first, normal.cross(first), normal;
-  return R;
+  const Vec3 s = Vec3(Vec3::UnitZ()).cross(normal);  // axis times the sine of the angle
+  const double cosine = normal(2);
+  if (s.isZero(0) && cosine < 0) return Mat3(Vec3(1, -1, -1).asDiagonal());
+  const Mat3 sx = cross<double>(s);
+  const double factor = cosine < 0 ? (1 - cosine) / s.squaredNorm() : 1 / (1 + cosine);
+  return Mat3::Identity() + sx + factor * sx * sx;
 }
 
 }  // namespace
@@ -208,7 +208,7 @@ void read_drive_displacement_pin(Card& card, ElementInfo& info) {
   e.a = read_attachment(card);
   read_offset(card, e.a);
   card.keyword("position");
-  e.X = card.absolute_position("pin position", e.a.node);
+  e.X = card.absolute_position("pin position");
   e.delta = card.hinted("drive3", card.vec3_drive("imposed displacement"));
   add_element(card.builder(), info, e);
 }

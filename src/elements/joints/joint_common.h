@@ -101,6 +101,12 @@ class LogLine {
   LogLine& add(const Model& model, const Attachment& a) {
     return node(model, a.node).add(a.f).add(a.Rh);
   }
+  /// node, then the pin X₀, R₀ as MBDyn writes it: Rᵀ (X₀ − x), R₀ Rᵀ of the node as read.
+  LogLine& pin(const Model& model, int index, const Vec3& X0, const Mat3& R0) {
+    const StructuralNode& n = model.structural[index];
+    const Mat3 Rt = n.R.transpose();
+    return node(model, index).add(Vec3(Rt * (X0 - n.x))).add(Mat3(R0 * Rt));
+  }
   /// node, offset.
   LogLine& point(const Model& model, const Attachment& a) { return node(model, a.node).add(a.f); }
   std::string str() const { return text_.str(); }

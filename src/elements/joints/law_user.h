@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "elements/joints/joint_common.h"
 #include "model/law.h"
 
@@ -61,9 +63,9 @@ struct LawUser {
   void output_law(const Local<double>& u, OutputRow& row) const {
     const int count = law->output_size();
     if (count == 0) return;
-    double values[8];
-    law_output(u, values);
-    row.values("constitutiveLaw", "", values, count);
+    std::vector<double> values(count);
+    law_output(u, values.data());
+    row.values("constitutiveLaw", "", values.data(), count);
   }
 
  private:

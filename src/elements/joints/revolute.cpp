@@ -90,11 +90,7 @@ void RevolutePin::output(const Local<double>& u, OutputRow& row) const {
 }
 
 std::string RevolutePin::log(const Model& model, int label) const {
-  const StructuralNode& node = model.structural[a.node];
-  const Mat3 Rt = node.R.transpose();
-  LogLine line("revolutepin", label);
-  line.add(model, a).node(model, a.node).add(Vec3(Rt * (X0 - node.x))).add(Mat3(R0 * Rt));
-  return line.str();
+  return LogLine("revolutepin", label).add(model, a).pin(model, a.node, X0, R0).str();
 }
 
 double RevolutePin::private_value(const Local<double>& u, int datum) const {
@@ -109,9 +105,9 @@ void read_revolute_pin(Card& card, ElementInfo& info) {
   RevolutePin e;
   e.a = read_point_and_hinge(card);
   card.keyword("position");
-  e.X0 = card.absolute_position("pin position", e.a.node);
+  e.X0 = card.absolute_position("pin position");
   if (card.one_of({"hinge", "orientation"}) >= 0)
-    e.R0 = card.absolute_orientation("pin orientation", e.a.node);
+    e.R0 = card.absolute_orientation("pin orientation");
   const Mat3 Q = card.model().structural[e.a.node].R * e.a.Rh;
   require_not_parallel(card, e.R0.col(2), Q.col(0), "revolute pin");
   require_not_parallel(card, e.R0.col(2), Q.col(1), "revolute pin");

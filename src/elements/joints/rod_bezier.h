@@ -84,7 +84,7 @@ struct RodBezier : LawUser<RodBezier, 1> {
   void set_quadrature(int order, int segments);
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const {
-    return LogLine("rodbezier", label)
+    return LogLine("rod bezier", label)
         .node(model, first)
         .add(O)
         .add(A)

@@ -20,15 +20,21 @@ void Screw::after_convergence(const Local<double>& u, State& state) const {
 
 void Screw::output_columns(const Local<double>& u, OutputRow& row, double friction_moment) const {
   const Motion<double> m = motion(u);
-  const Vec3 force = m.e * u.own(0),
-             moment = (m.e.cross(m.phi) - m.g) * (lead * u.own(0)) + m.e * friction_moment;
+  const Vec3 f = load(u, m), t = moment(u, m, friction_moment);
   const Mat3 H1 = hinge_a(u);
   row.begin(OutputFile::jnt, u.label());
-  row.reactions(force, moment, H1 * force, H1 * moment);
+  row.reactions(f, t, H1 * f, H1 * t);
   row.scalar("theta", "deg", (m.angle + full_turns(u, m.angle)) * kDegrees);
   row.scalar("advance", "m", m.e.dot(m.d));
   row.vec3("phi", "rad", m.phi);
   row.vec3("d", "m", m.d);
+}
+
+double Screw::datum_value(const Local<double>& u, int datum, double friction_moment) const {
+  const Motion<double> m = motion(u);
+  if (datum < 3) return load(u, m)(datum);
+  if (datum < 6) return moment(u, m, friction_moment)(datum - 3);
+  return datum == 6 ? m.e.dot(m.d) : m.angle + full_turns(u, m.angle);
 }
 
 void ScrewFriction::output(const Local<double>& u, OutputRow& row) const {

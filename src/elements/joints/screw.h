@@ -16,12 +16,14 @@ namespace mbcosim {
 /// is not aligned with the global frame changes the effective pitch; the loads are those that do no
 /// work for this very constraint. θ₀ and d₀ are those of the configuration as read; the joint takes
 /// no part in the initial assembly.
-struct Screw : TwoAttachments {  // a: p and Rh, b: q
-  double lead = 0;               ///< h: advance per radian [m]
-  double angle0 = 0;             ///< θ₀ [rad]
-  double advance0 = 0;           ///< d₀ [m]
+struct Screw : TwoAttachments, NamedData<Screw> {  // a: p and Rh, b: q
+  double lead = 0;                                 ///< h: advance per radian [m]
+  double angle0 = 0;                               ///< θ₀ [rad]
+  double advance0 = 0;                             ///< d₀ [m]
 
   static constexpr int width = 13;
+  static constexpr auto data_names =
+      joined(kForceData, kMomentData, std::array<DatumName, 2>{{{"d", "m"}, {"theta", "rad"}}});
 
   void connect(Connector& c) const {
     TwoAttachments::connect(c);
@@ -66,6 +68,7 @@ struct Screw : TwoAttachments {  // a: p and Rh, b: q
   void start(Start& s) const;
   void after_convergence(const Local<double>& u, State& state) const;
   void output_columns(const Local<double>& u, OutputRow& row, double friction_moment) const;
+  double datum_value(const Local<double>& u, int datum, double friction_moment) const;
   void output(const Local<double>& u, OutputRow& row) const {
     output_columns(u, row, 0);
     row.end();
@@ -74,6 +77,13 @@ struct Screw : TwoAttachments {  // a: p and Rh, b: q
     return LogLine("screw", label).add(model, a).add(model, b).str();
   }
   std::string row_name(int) const { return "screw constraint"; }
+  double private_value(const Local<double>& u, int datum) const { return datum_value(u, datum, 0); }
+
+ private:
+  Vec3 load(const Local<double>& u, const Motion<double>& m) const { return m.e * u.own(0); }
+  Vec3 moment(const Local<double>& u, const Motion<double>& m, double friction_moment) const {
+    return (m.e.cross(m.phi) - m.g) * (lead * u.own(0)) + m.e * friction_moment;
+  }
 };
 
 /// Screw with friction on its thread of mean radius r; tan a = h/r.
@@ -120,6 +130,9 @@ struct ScrewFriction : Screw {
     friction.after_convergence(u, s, 1, memory, contact(u));
   }
   void output(const Local<double>& u, OutputRow& row) const;
+  double private_value(const Local<double>& u, int datum) const {
+    return datum_value(u, datum, radius * friction.force(u, 1, contact(u)));
+  }
   std::string row_name(int k) const { return k == 0 ? Screw::row_name(k) : friction.row_name(); }
 };
 

@@ -46,9 +46,8 @@ void read_spherical_pin(Card& card, ElementInfo& info) {
   SphericalPin e;
   e.a = read_point_and_hinge(card);
   card.keyword("position");
-  e.X0 = card.absolute_position("pin position", e.a.node);
-  if (card.one_of({"hinge", "orientation"}) >= 0)
-    card.absolute_orientation("pin orientation", e.a.node);
+  e.X0 = card.absolute_position("pin position");
+  if (card.one_of({"hinge", "orientation"}) >= 0) card.absolute_orientation("pin orientation");
   add_element(card.builder(), info, e);
 }
 

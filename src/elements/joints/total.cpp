@@ -200,7 +200,7 @@ void TotalPinJoint::output(const Local<double>& u, OutputRow& row) const {
 std::string TotalPinJoint::log(const Model& model, int label) const {
   LogLine line("totalpinjoint", label);
   line.node(model, node).add(f).add(Rh).add(Rr).add(Xc).add(Rc).add(Rcr);
-  constraint.log(line);
+  if (logs_constraint) constraint.log(line);
   return line.str();
 }
 
@@ -285,6 +285,8 @@ void read_total_joint(Card& card, ElementInfo& info) {
   add_element(card.builder(), info, e);
 }
 
+constexpr int kNoContext = -1;  ///< for the frames of a pin's ground point
+
 void read_total_pin_joint(Card& card, ElementInfo& info) {
   TotalPinJoint e;
   e.node = read_attachment(card).node;
@@ -294,11 +296,12 @@ void read_total_pin_joint(Card& card, ElementInfo& info) {
   if (card.keyword("rotation orientation"))
     e.Rr = card.relative_orientation("rotation orientation", e.node);
   const OtherNode position{e.node, e.f, e.Rh}, rotation{e.node, e.f, e.Rr};
-  if (card.keyword("position")) e.Xc = card.absolute_position("pin position", e.node, &position);
+  if (card.keyword("position"))
+    e.Xc = card.absolute_position("pin position", kNoContext, &position);
   if (card.keyword("position orientation"))
-    e.Rc = card.absolute_orientation("position orientation", e.node, &position);
+    e.Rc = card.absolute_orientation("position orientation", kNoContext, &position);
   if (card.keyword("rotation orientation"))
-    e.Rcr = card.absolute_orientation("rotation orientation", e.node, &rotation);
+    e.Rcr = card.absolute_orientation("rotation orientation", kNoContext, &rotation);
   e.constraint = read_total_constraint(card);
   add_element(card.builder(), info, e);
 }
@@ -335,12 +338,13 @@ void read_imposed_displacement(Card& card, ElementInfo& info) {
 
 void read_imposed_displacement_pin(Card& card, ElementInfo& info) {
   TotalPinJoint e;
+  e.logs_constraint = false;
   e.node = read_attachment(card).node;
   (void)card.keyword("position");
   e.f = card.relative_position("offset", e.node);
   const OtherNode position{e.node, e.f, e.Rh};
   (void)card.keyword("position");
-  e.Xc = card.absolute_position("pin position", e.node, &position);
+  e.Xc = card.absolute_position("pin position", kNoContext, &position);
   TotalConstraint& c = e.constraint;
   impose_all(c, c.translation, c.displacement, card.vec3_drive("imposed displacement"));
   add_element(card.builder(), info, e);

@@ -181,6 +181,7 @@ struct TotalPinJoint : NamedData<TotalPinJoint> {
   Vec3 Xc = Vec3::Zero();
   Mat3 Rc = Mat3::Identity(), Rcr = Mat3::Identity();
   TotalConstraint constraint;
+  bool logs_constraint = true;  ///< not an `imposed displacement pin`
 
   static constexpr int width = 12;
   static constexpr bool constant_structure = true;

@@ -84,16 +84,16 @@ void CardanoPin::output(const Local<double>& u, OutputRow& row) const {
 }
 
 std::string CardanoPin::log(const Model& model, int label) const {
-  return LogLine("cardanopin", label).add(model, a).node(model, a.node).add(X0).add(R0).str();
+  return LogLine("cardanopin", label).add(model, a).pin(model, a.node, X0, R0).str();
 }
 
 void read_cardano_pin(Card& card, ElementInfo& info) {
   CardanoPin e;
   e.a = read_point_and_hinge(card);
   card.keyword("position");
-  e.X0 = card.absolute_position("pin position", e.a.node);
+  e.X0 = card.absolute_position("pin position");
   if (card.one_of({"hinge", "orientation"}) >= 0)
-    e.R0 = card.absolute_orientation("pin orientation", e.a.node);
+    e.R0 = card.absolute_orientation("pin orientation");
   require_not_parallel(card, e.R0.col(2), (card.model().structural[e.a.node].R * e.a.Rh).col(1),
                        "cardano pin");
   add_element(card.builder(), info, e);

@@ -45,6 +45,19 @@ class LawArray : public Law<N> {
     return std::any_of(laws_.begin(), laws_.end(),
                        [](const auto& law) { return law->has_memory(); });
   }
+  /// What the laws write, one after another; private data it has none, as in MBDyn.
+  int output_size() const override {
+    int size = 0;
+    for (const auto& law : laws_) size += law->output_size();
+    return size;
+  }
+  void output(const EvalContext& context, const V& strain, const V& rate,
+              double* values) const override {
+    for (const auto& law : laws_) {
+      law->output(context, strain, rate, values);
+      values += law->output_size();
+    }
+  }
   LawPtr<N> copy(ModelBuilder& builder) const override {
     std::vector<LawPtr<N>> laws;
     for (const auto& law : laws_) laws.push_back(copy_of(law, builder));

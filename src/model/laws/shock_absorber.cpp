@@ -40,9 +40,10 @@ struct Area {
 /// Shock absorber (MBDyn input manual, "shock absorber"), e = ε − ε₀(t):
 ///
 ///   p  = P₀ (1 + C e)^−γ                                          gas pressure [Pa]
-///   Fe = −A₀ p (1 − a tanh(ε̇/v)) + end stops                      gas, friction, penalty [N]
-///   Fv = ½ ρ A_f (A_f / (A C_d))² ε̇ |ε̇| + damping of the end stops  [N]
+///   Fe = −A₀ p + end stops with their damping                     gas, penalty [N]
+///   Fv = ½ ρ A_f (A_f / (A C_d))² ε̇ |ε̇|                           oil [N]
 ///   A  = metering(e) + orifice(ε̇)                                 orifice area [m²]
+///   f  = Fe + Fv + A₀ p a tanh(ε̇/v)                               the last: friction [N]
 struct ShockAbsorberData {
   double pressure, area, interaction, gamma;  ///< P₀, A₀, C, γ
   double max = 0, min = -0.5;                 ///< strains at the end stops
@@ -54,7 +55,8 @@ struct ShockAbsorberData {
 
 template <class T>
 struct ShockAbsorberForces {
-  T p, A, elastic, viscous;
+  T p, A, elastic, viscous, friction;
+  T total() const { return elastic + friction + viscous; }
 };
 
 template <class T>
@@ -71,15 +73,16 @@ ShockAbsorberForces<T> shock_absorber_forces(const ShockAbsorberData& d, const E
   r.A = d.metering(context, e, negative) + d.orifice(context, rate, negative);
   if (!(value_of(r.A) > 0))
     throw EvaluationError("shock absorber: the orifice area must be positive");
-  r.elastic = -(r.p * d.area * (T(1.0) - tanh(rate / d.friction_velocity) * d.friction));
+  r.elastic = -(r.p * d.area);
+  r.friction = r.p * d.area * tanh(rate / d.friction_velocity) * d.friction;
   const T ratio = T(d.fluid_area / d.discharge) / r.A;
   r.viscous = ratio * ratio * rate * abs(rate) * (0.5 * d.density * d.fluid_area);
   if (value_of(e) > d.max) {
     r.elastic += (e - d.max) * d.penalty;
-    if (value_of(rate) > 0) r.viscous += rate * d.penalty_damping;
+    if (value_of(rate) > 0) r.elastic += rate * d.penalty_damping;
   } else if (value_of(e) < d.min) {
     r.elastic += (e - d.min) * d.penalty;
-    if (value_of(rate) < 0) r.viscous += rate * d.penalty_damping;
+    if (value_of(rate) < 0) r.elastic += rate * d.penalty_damping;
   }
   return r;
 }
@@ -93,14 +96,13 @@ class ShockAbsorber : public Law<1> {
                Response& r) const override {
     const double e = pre_.reduced(context, strain)(0);
     if (!tangent) {
-      const auto s = shock_absorber_forces<double>(data_, context, e, rate(0));
-      r.f(0) = s.elastic + s.viscous;
+      r.f(0) = shock_absorber_forces<double>(data_, context, e, rate(0)).total();
       return;
     }
     using D = Dual<2>;
     const auto s =
         shock_absorber_forces<D>(data_, context, D::variable(e, 0), D::variable(rate(0), 1));
-    const D f = s.elastic + s.viscous;
+    const D f = s.total();
     r.f(0) = f.v;
     r.de(0) = f.d[0];
     r.dep(0) = f.d[1];

@@ -190,14 +190,15 @@ TEST(ModalJoint, AssemblyJacobianIsExact) {
     bench.add(generic_joint(bench, false, clamped, 2));
     bench.finish();
     const Model& model = *bench.model;
+    const ElementSet& set = *model.elements[0].set;
     const int n = model.unknowns;
     const auto residual = [&] {
       VecX r = VecX::Zero(2 * n);
-      model.sets[0]->assembly_residual(bench.context(Phase::assembly), 0, r.data(), r.data() + n);
+      set.assembly_residual(bench.context(Phase::assembly), 0, r.data(), r.data() + n);
       return r;
     };
     std::vector<ElementSet::Triplet> triplets;
-    model.sets[0]->assembly_jacobian(bench.context(Phase::assembly), 0, n, triplets);
+    set.assembly_jacobian(bench.context(Phase::assembly), 0, n, triplets);
     MatX exact = MatX::Zero(2 * n, 2 * n), numeric = MatX::Zero(2 * n, 2 * n);
     for (const auto& t : triplets) exact(t.row, t.column) += t.value;
     const State base = bench.state;

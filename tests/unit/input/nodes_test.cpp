@@ -103,6 +103,22 @@ TEST(DummyNode, FollowsItsBase) {
   expect_near(model->structural[5].x, 1, 2, 3);
 }
 
+// What the reference solver writes for each of them.
+TEST(DummyNode, HasAccelerationsWhereAllItsNodesDo) {
+  const ModelPtr model = nodes(
+      "structural: 1, dynamic, null, eye, null, null, accelerations, yes;"
+      "structural: 2, dynamic, null, eye, null, null, accelerations, yes;"
+      "structural: 3, static, null, eye, null, null;"
+      "structural: 4, dummy, 1, offset, null, eye;"
+      "structural: 5, dummy, 1, relative frame, 2;"
+      "structural: 6, dummy, 1, relative frame, 3;"
+      "structural: 7, dummy, 3, relative frame, 1;"
+      "structural: 8, dummy, 1, relative frame, 2, pivot node, 3;");
+  ASSERT_TRUE(model);
+  const bool expected[] = {true, true, false, false, false};
+  for (int k = 0; k < 5; ++k) EXPECT_EQ(model->structural[3 + k].accelerations, expected[k]) << k;
+}
+
 TEST(ScalarNode, ReadsValuesWithAndWithoutKeyword) {
   const ModelPtr model = nodes(
       "abstract: 1; abstract: 2, algebraic, value, 3.; abstract: 3, differential, 4., derivative, "

@@ -288,15 +288,15 @@ end: elements;
 }
 
 // Accelerations of dummy nodes are the time derivatives of their velocities, whatever the frames
-// do.
+// do. They are known where those of all nodes of their frames are.
 TEST(DeckDetails, DummyAccelerationsAreTheRatesOfTheirVelocities) {
   DeckRun run(
       deck("final time: 1.; time step: 1e-4; max iterations: 20; tolerance: 1e-9; method: ms, 1.;",
            "structural nodes: 6; rigid bodies: 3;",
            R"deck(begin: nodes;
   structural: 1, dynamic, .3,.1,0., euler123, .1,.2,.3, .5,-.2,.1, 1.,2.,-1., accelerations, yes;
-  structural: 2, dynamic, 0.,1.,.5, euler123, -.3,.1,.4, -.3,.4,.2, -2.,.5,1.5;
-  structural: 3, dynamic, 1.,0.,.2, euler123, .2,-.4,.1, .1,.1,-.6, .7,-1.2,2.2;
+  structural: 2, dynamic, 0.,1.,.5, euler123, -.3,.1,.4, -.3,.4,.2, -2.,.5,1.5, accelerations, yes;
+  structural: 3, dynamic, 1.,0.,.2, euler123, .2,-.4,.1, .1,.1,-.6, .7,-1.2,2.2, accelerations, yes;
   structural: 4, dummy, 1, offset, .4,-.3,.2, euler123, .3,.1,-.2;
   structural: 5, dummy, 4, relative frame, 2, position, .2,.1,.3, orientation, euler123, .5,.1,.2;
   structural: 6, dummy, 4, relative frame, 2, position, .2,.1,.3, orientation, euler123, .5,.1,.2,
