@@ -19,7 +19,7 @@ void ElementSet::at_derivatives(const EvalContext&, State&, ElementRange, bool) 
 void ElementSet::after_assembly(const EvalContext& context, State& state, int i) const {
   const int own = first_own(i);
   for (int k = 0; k < unknowns(i); ++k) state.y[own + k] = state.yp[own + k] = 0;
-  start(context, state, i);
+  if (is_active(state, i)) start(context, state, i);
 }
 
 }  // namespace mbcosim

@@ -258,6 +258,24 @@ std::pair<std::string, std::string> Model::row_text(int row) const {
   return {"row " + std::to_string(row), ""};
 }
 
+namespace {
+
+/// A `driven` element that is off at the start sets nothing, its nodes neither. A drive that cannot
+/// be evaluated yet fails where the run starts (update_activity), with its message.
+void start_if_active(const EvalContext& context, State& state, const ElementSet& set, int i) {
+  const ElementInfo& info = set.info(i);
+  if (info.driven) {
+    try {
+      state.memory[info.active_memory] = info.driven->value(context) != 0 ? 1 : 0;
+    } catch (const EvaluationError&) {
+      return;
+    }
+  }
+  if (set.is_active(state, i)) set.start(context, state, i);
+}
+
+}  // namespace
+
 State make_initial_state(const Model& model) {
   State state;
   const std::size_t n = static_cast<std::size_t>(model.unknowns);
@@ -295,7 +313,7 @@ State make_initial_state(const Model& model) {
   }
   const EvalContext context = model.context(state, Phase::assembly);
   for (const auto& set : model.sets)
-    for (int i = 0; i < set->size(); ++i) set->start(context, state, i);
+    for (int i = 0; i < set->size(); ++i) start_if_active(context, state, *set, i);
   return state;
 }
 

@@ -154,7 +154,7 @@ void update_activity(const EvalContext& context, State& state, bool restart) {
     if (active && (flag == 0 || !restart))
       for (const HintSample& hint : info.hints)
         state.memory[hint.memory] = hint.source->value(context);
-    if (restart && active && flag == 0) e.set->start(context, state, e.index);
+    if (active && flag == 0) e.set->start(context, state, e.index);
     flag = active ? 1 : 0;
   }
 }

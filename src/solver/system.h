@@ -28,8 +28,8 @@ void update_rotations(const Model& model, State& state, ThreadTeam* team = nullp
 void apply_correction(const Model& model, const std::vector<double>& delta, double c,
                       double c_algebraic, State& state, ThreadTeam* team = nullptr);
 
-/// Evaluates the drives of `driven` elements; with `restart`, elements that become active get their
-/// start values.
+/// Evaluates the drives of `driven` elements; those that become active get their start values. What
+/// their hints give is taken then and, without `restart`, from all that are active.
 void update_activity(const EvalContext& context, State& state, bool restart);
 
 }  // namespace mbcosim

@@ -9,6 +9,18 @@ void Accelerometer::start(Start& s) const {
 
 void FilteredAccelerometer::start(Start& s) const { s.own(2) = -(s.u.R(0) * e0).dot(s.u.v(0)); }
 
+void DisplacementSensor::start(Start& s) const {
+  const Local<double>& u = s.u;
+  const ScalarNode& node = u.model().scalars[output_node];
+  const Vec3 arm1 = u.R(k1) * f1, arm2 = u.R(k2) * f2;
+  const Vec3 d = u.x(k2) + arm2 - u.x(k1) - arm1;
+  const double distance = std::sqrt(d.dot(d));  // to the last bit what the row has
+  s.state.y[node.unknown] = distance;
+  if (!node.differential || distance == 0) return;
+  const Vec3 velocity = u.v(k2) + u.w(k2).cross(arm2) - u.v(k1) - u.w(k1).cross(arm1);
+  s.state.yp[node.unknown] = d.dot(velocity) / distance;
+}
+
 int Motor::private_datum(std::string_view name) { return index_of(data_names, name); }
 
 double Motor::private_value(const Local<double>& u, int datum) const {

@@ -102,6 +102,8 @@ struct DisplacementSensor {
     const Vec<T> d = u.x(k2) + u.R(k2) * f2 - u.x(k1) - u.R(k1) * f1;
     r.scalar(0, sqrt(d.dot(d)) - u.scalar(0));
   }
+  /// The node starts at the distance and its rate: its row has no rate to solve for.
+  void start(Start& s) const;
 };
 
 /// Direct current motor between two structural nodes; axis e = R₁ R_h e₃, Ω = e · (w₂ − w₁), own

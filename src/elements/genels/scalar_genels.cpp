@@ -14,6 +14,12 @@ void GenelClamp::output(const Local<double>& u, OutputRow& row) const {
   row.end();
 }
 
+void GenelDistance::start(Start& s) const {
+  if (second.structural) return;
+  const int k = unknown_of(s.u.model(), second);
+  (second.order == 0 ? s.state.y : s.state.yp)[k] = s.u.dof(l1) + s.u.drive(d);
+}
+
 void GenelDistance::output(const Local<double>& u, OutputRow& row) const {
   row.begin(OutputFile::gen, u.label());
   row.scalar("lambda", "", u.own(0));

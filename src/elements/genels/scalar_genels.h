@@ -54,6 +54,9 @@ struct GenelDistance {
     r.dof(l2, -u.own(0));
     r.own(0, divided() ? error / u.c() : error);
   }
+  /// The second dof starts where the first one and the drive put it, if it is a scalar node's; how
+  /// nodes in space start is for their deck to say.
+  void start(Start& s) const;
   void output(const Local<double>& u, OutputRow& row) const;
 
  private:

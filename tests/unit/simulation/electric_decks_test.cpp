@@ -109,6 +109,45 @@ begin: elements; body: 1, 1, 2., null, eye;
   }
 }
 
+// ---------------------------------------------------------------- displacement
+
+/// The node starts at the distance and at its rate, whatever its card declares, so that nothing
+/// rings. With a point off the node, which turns, the rate is d · v/|d| with the relative velocity
+/// v of the points. (The reference solver starts with |v|, and rings where that is another number.)
+TEST(DisplacementSensor, StartsAtTheDistanceAndItsRate) {
+  const auto deck = [](const std::string& rotor, const std::string& point) {
+    return initial_value_block(.001, .1,
+                               "max iterations: 20; tolerance: 1e-10; derivatives tolerance: "
+                               "1e-5; derivatives max iterations: 20; method: ms, .6;") +
+           "begin: control data; structural nodes: 2; abstract nodes: 1; joints: 1; rigid bodies: "
+           "1; electric elements: 1; end: control data;\nbegin: nodes; structural: 1, static, "
+           "null, eye, null, null; structural: 2, dynamic, " +
+           rotor +
+           "; abstract: 1, value, 3., derivative, 7.; end: nodes;\nbegin: elements; joint: 1, "
+           "clamp, 1, node, node; body: 2, 2, 1., null, eye; electric: 1, displacement, 1, null, "
+           "2, " +
+           point + ", 1; end: elements;\n";
+  };
+  const auto rate = [](DeckRun& run) {
+    const Model& model = run.model();
+    const int node = model.find_scalar(ScalarKind::abstract, 1);
+    return run.simulation().state().yp[model.scalars[node].unknown];
+  };
+  DeckRun sliding(deck("1.,0.,0., eye, .5,0.,0., null", "null"));
+  ASSERT_TRUE(sliding.ready());
+  EXPECT_NEAR(sliding.scalar_node(ScalarKind::abstract, 1), 1, 1e-9);
+  EXPECT_NEAR(rate(sliding), .5, 1e-6);
+  sliding.step(10);
+  EXPECT_NEAR(sliding.scalar_node(ScalarKind::abstract, 1), 1.005, 1e-9);  // as the reference
+  EXPECT_NEAR(rate(sliding), .5, 1e-6);
+
+  DeckRun turning(deck("1.,.4,0., eye, .5,0.,0., 1.,2.,3.", ".3,.2,.1"));
+  ASSERT_TRUE(turning.ready());
+  const Vec3 d(1.3, .6, .1), v = Vec3(.5, 0, 0) + Vec3(1, 2, 3).cross(Vec3(.3, .2, .1));
+  EXPECT_NEAR(turning.scalar_node(ScalarKind::abstract, 1), d.norm(), 1e-9);
+  EXPECT_NEAR(rate(turning), d.dot(v) / d.norm(), 1e-6);
+}
+
 // ---------------------------------------------------------------- motor
 
 /// Pole 1 at 0 V, pole 2 at 12 V; G = 0.4, L = 0.01, R = 2. `motor`: from the frame on.
