@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "elements/genels/pencil_scaling.h"
+
 namespace mbcosim {
 
 namespace {
@@ -21,10 +23,7 @@ double balancing_factor(double c, double r, double c_max, double r_max) {
   return f;
 }
 
-}  // namespace
-
-void balance(LinearSystem& s) {
-  if (s.E.size() != 0) return;
+void balance_matrix(LinearSystem& s) {
   const int n = s.order();
   constexpr double kWorthwhile = 0.95;
   constexpr int kMostSweeps = 100;
@@ -45,6 +44,19 @@ void balance(LinearSystem& s) {
     }
   }
 }
+
+void balance_pencil(LinearSystem& s) {
+  const PencilScales scales = scale_pencil(s.A, s.E);
+  const auto rows = scales.rows.asDiagonal(), columns = scales.columns.asDiagonal();
+  s.A = (rows * s.A * columns).eval();
+  s.E = (rows * s.E * columns).eval();
+  s.B = (rows * s.B).eval();
+  s.C = (s.C * columns).eval();
+}
+
+}  // namespace
+
+void balance(LinearSystem& s) { s.E.size() == 0 ? balance_matrix(s) : balance_pencil(s); }
 
 LinearSystem companion_system(CanonicalForm form, const std::vector<double>& denominator,
                               const std::vector<double>& numerator) {

@@ -24,7 +24,8 @@ struct LinearSystem {
 
 /// Rescales the states by powers of 2 so that rows and columns of A have similar norms (Parlett and
 /// Reinsch, "Balancing a matrix for calculation of eigenvalues and eigenvectors", Numer. Math. 13,
-/// 1969; norms as in LAPACK's dgebal). Systems with E stay as they are.
+/// 1969; norms as in LAPACK's dgebal). With E states and equations are rescaled by powers of 10:
+/// pencil_scaling.h.
 void balance(LinearSystem& system);
 
 /// Companion form of k (n₀ s^m + … + n_m)/(s^n + d₁ s^(n−1) + … + d_n), m ≤ n.

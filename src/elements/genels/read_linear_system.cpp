@@ -56,13 +56,11 @@ LinearSystem read_matrices(Card& card, int outputs, int inputs, int n) {
   return s;
 }
 
-/// [gain, k,] [balance, {yes|no},]
-void read_gain_and_balance(Card& card, LinearSystem& s) {
-  if (card.keyword("gain")) {
-    const double gain = card.real("gain");
-    s.C *= gain;
-    s.D *= gain;
-  }
+/// [gain, k,]
+double read_gain(Card& card) { return card.keyword("gain") ? card.real("gain") : 1; }
+
+/// [balance, {yes|no},]
+void read_balance(Card& card, LinearSystem& s) {
   if (!card.keyword("balance") || card.yes_no("balance")) balance(s);
 }
 
@@ -79,7 +77,10 @@ void add_state_space(Card& card, ElementInfo& info, std::vector<NodeDof> outputs
   const int n = read_size(card, "order", 1);
   LinearSystem s =
       read_matrices(card, static_cast<int>(outputs.size()), static_cast<int>(inputs.size()), n);
-  read_gain_and_balance(card, s);
+  const double gain = read_gain(card);
+  s.C *= gain;
+  s.D *= gain;
+  read_balance(card, s);
   const bool descriptor = s.E.size() != 0;
   auto element =
       std::make_unique<LinearSystemElement>(std::move(s), std::move(outputs), std::move(inputs));
@@ -122,9 +123,11 @@ void read_scalar_filter(Card& card, ElementInfo& info) {
   if (m > n)
     card.fail("scalar filter: the numerator's order " + std::to_string(m) +
               " exceeds the denominator's " + std::to_string(n));
-  LinearSystem s =
-      companion_system(form, denominator, read_reals(card, "numerator coefficient", m + 1));
-  read_gain_and_balance(card, s);
+  std::vector<double> numerator = read_reals(card, "numerator coefficient", m + 1);
+  const double gain = read_gain(card);
+  for (double& coefficient : numerator) coefficient *= gain;
+  LinearSystem s = companion_system(form, denominator, numerator);
+  read_balance(card, s);
   auto element =
       std::make_unique<LinearSystemElement>(std::move(s), std::move(outputs), std::move(inputs));
   add_general_element(card.builder(), info, std::move(element));

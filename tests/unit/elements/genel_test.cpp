@@ -6,6 +6,7 @@
 #include "elements/conformance.h"
 #include "elements/electric/electric.h"
 #include "elements/genels/linear_system.h"
+#include "elements/genels/pencil_scaling.h"
 #include "elements/genels/scalar_genels.h"
 #include "elements/genels/swashplate.h"
 #include "elements/general_element.h"
@@ -195,6 +196,22 @@ TEST(Genels, ClampStartsItsDofAtTheImposedValue) {
   EXPECT_EQ(state.y[(*model)->scalars[dof.node].unknown], 2);
 }
 
+/// A `driven` element that is off sets nothing.
+TEST(Genels, ClampThatIsOffLeavesItsDof) {
+  Bench bench;
+  const NodeDof dof = scalar_dof(bench);
+  ElementInfo info;
+  info.driven = make_constant_drive(0);
+  add_element(bench.builder, info, GenelClamp{dof, make_constant_drive(2), {}});
+  bench.builder.model().initial_value.initial_time = 0;
+  auto model = bench.builder.finish();
+  ASSERT_TRUE(static_cast<bool>(model));
+  const State state = make_initial_state(**model);
+  EXPECT_EQ(state.y[(*model)->scalars[dof.node].unknown], 0);
+  const ElementRef& clamp = (*model)->elements.front();
+  EXPECT_FALSE(clamp.set->is_active(state, clamp.index));
+}
+
 TEST(Genels, SwashplateMixesAndLimitsItsInputs) {
   Bench bench;
   Swashplate e = SwashplateCase::make(bench);
@@ -281,6 +298,49 @@ TEST(LinearSystemElement, BalancingScalesByPowersOfTwoAndKeepsTheTransferFunctio
   EXPECT_EQ(s.A(1, 0), 32);
   EXPECT_EQ(s.A(0, 0), -13.31);
   EXPECT_NEAR(transfer(s, 2.5), before, 1e-14);
+}
+
+void expect_scales(const VecX& scales, const std::vector<double>& expected) {
+  ASSERT_EQ(scales.size(), static_cast<int>(expected.size()));
+  for (int k = 0; k < scales.size(); ++k) EXPECT_NEAR(scales(k) / expected[k], 1, 1e-15) << k;
+}
+
+/// Columns: what the reference solver's states of the same pencils are divided by.
+TEST(LinearSystemElement, PencilsAreScaledByPowersOfTen) {
+  const auto scales = [](Eigen::Matrix2d A, Eigen::Matrix2d E) { return scale_pencil(A, E); };
+  Eigen::Matrix2d A, E;
+  A << 0, 1, -400, -3;
+  E << 2, .1, 0, 1;
+  expect_scales(scales(A, E).columns, {.1, 1});
+  expect_scales(scales(A, E).rows, {1, .1});
+  A << -1, 1, -1, -3;
+  E << 1, 0, 0, 1e4;
+  expect_scales(scales(A, E).columns, {1, .1});
+  A << -1, 1e3, -1, -3;
+  E << 1, 0, 0, 0;
+  expect_scales(scales(A, E).columns, {10, .1});
+  A << -1, 0, -1e4, -3;
+  E << 1, 0, 0, 1;
+  expect_scales(scales(A, E).columns, {.01, 100});
+  A << -1, 3e3, -1e-3, -3;
+  E << 1, 2e3, 1e-3, 1;
+  expect_scales(scales(A, E).columns, {100, .01});
+  A << 1, 1, 1, 1;
+  expect_scales(scales(A, A).columns, {1, 1});
+}
+
+/// E ẋ = A x + B u, y = C x at a real s: C (s E − A)⁻¹ B.
+TEST(LinearSystemElement, BalancingKeepsTheTransferFunctionOfAPencil) {
+  LinearSystem s;
+  s.A = (MatX(2, 2) << 0, 1, -400, -3).finished();
+  s.E = (MatX(2, 2) << 2, .1, 0, 1).finished();
+  s.B = (MatX(2, 1) << 0, 400).finished();
+  s.C = (MatX(1, 2) << 1, .5).finished();
+  const auto response = [&] { return (s.C * (2.5 * s.E - s.A).inverse() * s.B)(0, 0); };
+  const double before = response();
+  balance(s);
+  EXPECT_NEAR(s.A(1, 0), -4, 1e-14);
+  EXPECT_NEAR(response(), before, 1e-13 * std::abs(before));
 }
 
 }  // namespace

@@ -55,6 +55,104 @@ end: elements;
   EXPECT_NEAR(x(4), 0.0167321780651, 1e-11);
 }
 
+const std::string kFine =
+    "method: ms, .6; max iterations: 20; tolerance: 1e-10; derivatives tolerance: 1e-5; "
+    "derivatives max iterations: 20;";
+
+/// A genel that switches on between .050 and .051, on two springs to the ground.
+std::string switched_deck(const std::string& genel) {
+  return initial_value_block(.001, .1, kFine) +
+         "begin: control data; abstract nodes: 2; genels: 3; end: control data;\n"
+         "begin: nodes; abstract: 1, value, .3; abstract: 2; end: nodes;\nbegin: elements;\n"
+         "driven: 2, string, \"Time > .0505\", genel: 2, " +
+         genel + R"(;
+genel: 5, spring support, 1, abstract, algebraic, linear viscoelastic, 10., 1.;
+genel: 6, spring support, 2, abstract, algebraic, linear viscoelastic, 10., 1.;
+end: elements;
+)";
+}
+
+/// While it is off it sets nothing; when it switches on its node starts at the imposed value, with
+/// the predicted rate, and so the multiplier starts at −10 and not with the jump of the value. (The
+/// reference solver's numbers.)
+TEST(GenelDecks, DrivenClampSetsItsNodeWhenItSwitchesOn) {
+  DeckRun run(switched_deck("clamp, 2, abstract, algebraic, 1."));
+  ASSERT_TRUE(run.ready());
+  EXPECT_EQ(run.scalar_node(ScalarKind::abstract, 2), 0);
+  run.step(50);
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 2), 0, 1e-15);
+  run.step();
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 2), 1, 1e-12);
+  EXPECT_NEAR(run.own(Family::genel, 2), -10, 1e-9);
+  run.step();
+  EXPECT_NEAR(run.own(Family::genel, 2), -650, 1e-7);
+}
+
+/// The same of `distance`: its second node starts at the first one's value and the distance. (The
+/// reference solver's numbers, where that node is at 0 before.)
+TEST(GenelDecks, DrivenDistanceSetsItsSecondNodeWhenItSwitchesOn) {
+  DeckRun run(switched_deck("distance, 1, abstract, algebraic, 2, abstract, algebraic, 1."));
+  ASSERT_TRUE(run.ready());
+  run.step(51);
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), .1770904428111, 1e-10);
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 2), 1.177090442811, 1e-10);
+  EXPECT_NEAR(run.own(Family::genel, 2), -5.900630652922, 1e-8);
+  run.step();
+  EXPECT_NEAR(run.own(Family::genel, 2), -381.8183734933, 1e-6);
+}
+
+/// Nodes that are declared at their distance stay there. (The reference solver starts the second
+/// one at d + x₁ − x₂ = 0.)
+TEST(GenelDecks, DistanceKeepsNodesThatAreDeclaredInIt) {
+  DeckRun run(initial_value_block(.001, .1, kFine) +
+              R"(begin: control data; abstract nodes: 2; genels: 3; end: control data;
+begin: nodes; abstract: 1, value, .3; abstract: 2, value, 1.3; end: nodes;
+begin: elements; genel: 2, distance, 1, abstract, algebraic, 2, abstract, algebraic, 1.;
+genel: 5, spring support, 1, abstract, algebraic, linear viscoelastic, 10., 1.;
+genel: 6, spring support, 2, abstract, algebraic, linear viscoelastic, 10., 1.;
+end: elements;
+)");
+  ASSERT_TRUE(run.ready());
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), .3, 1e-7);
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 2), 1.3, 1e-7);
+}
+
+/// The reference solver's numbers: states in the coordinates of dggbal (x₁ ten times y), in which
+/// the start values are taken, too.
+TEST(GenelDecks, PencilIsBalancedByPowersOfTen) {
+  DeckRun run(initial_value_block(.001, .1, kFine) +
+              R"(begin: control data; abstract nodes: 1; genels: 1; end: control data;
+begin: nodes; abstract: 1; end: nodes;
+begin: elements; genel: 2, state space SISO, 1, abstract, algebraic, drive, sine, 0., 10., 1., forever, 0., 2,
+  matrix E, 1., 0., 0., 1., matrix A, 0., 1., -400., -3., matrix B, 0., 400., matrix C, 1., 0., value, .1, .2;
+end: elements;
+)");
+  ASSERT_TRUE(run.ready());
+  run.step(50);
+  EXPECT_NEAR(run.own(Family::genel, 2, 0), 8.888366981093e-01, 1e-9);
+  EXPECT_NEAR(run.own(Family::genel, 2, 1), 4.214624454297, 1e-8);
+  run.step(50);
+  EXPECT_NEAR(run.own(Family::genel, 2, 0), 4.861329543480, 1e-8);
+  EXPECT_NEAR(run.own(Family::genel, 2, 1), 11.37477481119, 1e-7);
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 4.861329543480e-01, 1e-8);
+}
+
+/// The gain multiplies the coefficients of the numerator: in the observable form, states have it,
+/// too. (The reference solver's numbers.)
+TEST(GenelDecks, GainOfAnObservableFilterIsInItsStates) {
+  DeckRun run(initial_value_block(.001, .1, kFine) +
+              R"(begin: control data; abstract nodes: 1; genels: 1; end: control data;
+begin: nodes; abstract: 1; end: nodes;
+begin: elements; genel: 3, scalar filter, 1, abstract, algebraic, drive, sine, 0., 20., 1., forever, 0.,
+  canonical form, observable, 2, 3., 40., 1, 1., 5., gain, 2., balance, no; end: elements;
+)");
+  ASSERT_TRUE(run.ready());
+  run.step(100);
+  EXPECT_NEAR(run.own(Family::genel, 3, 0), 1.460571308794e-01, 1e-10);
+  EXPECT_NEAR(run.own(Family::genel, 3, 1), 4.836433459313e-01, 1e-10);
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 1.460571308794e-01, 1e-10);
+}
+
 /// Abstract forces on clamped nodes: the multipliers are the sums of what is applied.
 TEST(GenelDecks, AbstractForcesOnClampedNodes) {
   DeckRun run(initial_value_block(
