@@ -24,15 +24,32 @@ void DisplacementSensor::start(Start& s) const {
 int Motor::private_datum(std::string_view name) { return index_of(data_names, name); }
 
 double Motor::private_value(const Local<double>& u, int datum) const {
+  const double i = u.own(0), voltage = u.scalar(1) - u.scalar(0);
   switch (datum) {
     case 0:
-      return torque(u);
+      return speed(u);
     case 1:
-      return (u.R(0) * Rh.col(2)).dot(u.w(1) - u.w(0));
+      return torque(u);
     case 2:
-      return u.own(0);
+      return torque(u) * speed(u);
+    case 3:
+      return voltage;
+    case 4:
+      return i;
+    case 5:
+      return u.own_rate(0);
+    case 6:
+      return voltage * i;
+    case 7:
+      return mechanical_angle(u);
+    case 8:
+      return electrical_angle(u);
+    case 9:
+      return ripple(u, M0);
+    case 10:
+      return ripple(u, M1) * i;
     default:
-      return ripple(u, datum == 3 ? M0 : M1);
+      return resistance(u);
   }
 }
 
@@ -40,8 +57,8 @@ double Motor::private_value(const Local<double>& u, int datum) const {
 void Motor::output(const Local<double>& u, OutputRow& row) const {
   if (!row.has_named_fields()) return;
   row.begin(OutputFile::ele, u.label());
-  row.scalar("M", "N m", private_value(u, 0));
-  row.scalar("Omega", "rad/s", private_value(u, 1));
+  row.scalar("M", "N m", torque(u));
+  row.scalar("Omega", "rad/s", speed(u));
   row.scalar("i", "A", u.own(0));
   row.scalar("iP", "A/s", u.own_rate(0));
   row.scalar("V1", "V", u.scalar(0));

@@ -110,7 +110,7 @@ struct DisplacementSensor {
 /// unknown: the current i. φ is the angle about e from axis 1 of R₁ R_h to axis 1 of node 2; with n
 /// terminal pairs φ_e = n φ modulo 2π, 0 ≤ φ_e < 2π:
 ///
-///     own row          −L i̇ − R(t) i − G Ω + V₂ − V₁                          [V]
+///     own row          −L i̇ − R(|i|) i − G Ω + V₂ − V₁                        [V]
 ///     torque [N·m]     M = M₀(φ_e) + (G + M₁(φ_e)) i: −M e on node 1, M e on node 2
 ///     electric nodes   −i, +i                                                 [A]
 ///
@@ -120,9 +120,9 @@ struct Motor {
   Mat3 Rh = Mat3::Identity();  ///< relative to `first`
   double G = 0;                ///< torque gain [N·m/A]
   double L = 0;                ///< inductance [H]
-  DrivePtr R;                  ///< resistance [Ω]
-  DrivePtr M0, M1;  ///< of φ_e: no-load torque [N·m], ripple of the gain [N·m/A]; or null
-  int terminal_pairs = 1;
+  DrivePtr R;                  ///< resistance [Ω] of the current's magnitude [A]
+  DrivePtr M0, M1;         ///< of φ_e: no-load torque [N·m], ripple of the gain [N·m/A]; or null
+  int terminal_pairs = 0;  ///< 0: not given, φ_e = 0
   double initial_current = 0;  ///< [A]
 
   static constexpr int width = 18;
@@ -137,40 +137,65 @@ struct Motor {
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     const Vec<T> e = u.R(0) * Vec3(Rh.col(2));
-    const T i = u.own(0), omega = e.dot(u.w(1) - u.w(0));
+    const T i = u.own(0), omega = speed(u);
     const Vec<T> m = e * torque(u);
     r.moment(0, -m);
     r.moment(1, m);
     r.scalar(0, -i);
     r.scalar(1, i);
-    r.own(0, u.scalar(1) - u.scalar(0) - omega * G - u.own_rate(0) * L - u.drive(R) * i);
+    r.own(0, u.scalar(1) - u.scalar(0) - omega * G - u.own_rate(0) * L - resistance(u) * i);
   }
   void start(Start& s) const { s.own(0) = initial_current; }
   void output(const Local<double>& u, OutputRow& row) const;
   static int private_datum(std::string_view name);
-  static constexpr std::array<DatumName, 5> data_names = {
-      {{"M", "N m"}, {"omega", "rad/s"}, {"i", "A"}, {"M0", "N m"}, {"M1", "N m/A"}}};
+  static constexpr std::array<DatumName, 12> data_names = {{{"omega", "rad/s"},
+                                                            {"M", "N m"},
+                                                            {"Pmech", "W"},
+                                                            {"U", "V"},
+                                                            {"i", "A"},
+                                                            {"iP", "A/s"},
+                                                            {"Pel", "W"},
+                                                            {"Phimech", "rad"},
+                                                            {"Phiel", "rad"},
+                                                            {"M0", "N m"},
+                                                            {"M1", "N m"},
+                                                            {"R", "ohm"}}};
   static std::vector<Datum> private_data() { return data_of(data_names); }
   double private_value(const Local<double>& u, int datum) const;
 
  private:
   template <class T>
-  T electrical_angle(const Local<T>& u) const {
+  T speed(const Local<T>& u) const {
+    return (u.R(0) * Vec3(Rh.col(2))).dot(u.w(1) - u.w(0));
+  }
+  template <class T>
+  T mechanical_angle(const Local<T>& u) const {
     using std::atan2;
     const Vec<T> x1 = u.R(0) * Vec3(Rh.col(0)), y1 = u.R(0) * Vec3(Rh.col(1)), x2 = u.R(1).col(0);
-    const T angle = atan2(y1.dot(x2), x1.dot(x2)) * double(terminal_pairs);
+    return atan2(y1.dot(x2), x1.dot(x2));
+  }
+  template <class T>
+  T electrical_angle(const Local<T>& u) const {
+    const T angle = mechanical_angle(u) * double(terminal_pairs);
     return angle - 2 * M_PI * std::floor(value_of(angle) / (2 * M_PI));
   }
   template <class T>
-  T ripple(const Local<T>& u, const DrivePtr& d) const {
-    if (!d) return T(0.0);
-    const T angle = electrical_angle(u);
-    T r(d->value(*u.context, value_of(angle)));
+  static T drive_at(const Local<T>& u, const Drive& drive, const T& argument) {
+    T r(drive.value(*u.context, value_of(argument)));
     if constexpr (!std::is_same_v<T, double>) {
-      if (d->has_derivative())
-        r += (angle - T(value_of(angle))) * d->derivative(*u.context, value_of(angle));
+      if (drive.has_derivative())
+        r += (argument - T(value_of(argument))) * drive.derivative(*u.context, value_of(argument));
     }
     return r;
+  }
+  template <class T>
+  T resistance(const Local<T>& u) const {
+    const T i = u.own(0);
+    return drive_at(u, *R, value_of(i) < 0 ? T(-i) : i);
+  }
+  template <class T>
+  T ripple(const Local<T>& u, const DrivePtr& d) const {
+    return d ? drive_at(u, *d, electrical_angle(u)) : T(0.0);
   }
   template <class T>
   T torque(const Local<T>& u) const {

@@ -1,4 +1,3 @@
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include "elements/electric/electric.h"
@@ -57,12 +56,22 @@ void read_displacement(Card& card, ElementInfo& info) {
   add_element(card.builder(), info, std::move(e));
 }
 
+/// A frame with this axis 3; its axis 1 is across it and the node's axis that is farthest from it
+/// (of two such axes the first).
+Mat3 frame_about(const Vec3& axis) {
+  int farthest = 0;
+  axis.cwiseAbs().minCoeff(&farthest);
+  const Vec3 first = Vec3(Vec3::Unit(farthest)).cross(axis).normalized();
+  Mat3 R;
+  R << first, axis.cross(first), axis;
+  return R;
+}
+
 /// `orientation, <orientation>` whose axis 3 is the motor's, or that axis itself.
 Mat3 read_motor_frame(Card& card, int node, bool* has_frame) {
   *has_frame = card.keyword("orientation");
   if (*has_frame) return card.relative_orientation("orientation", node);
-  const Vec3 axis = card.relative_unit_vector("axis", node);
-  return Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis).toRotationMatrix();
+  return frame_about(card.relative_unit_vector("axis", node));
 }
 
 /// [M0, <drive>,] [M1, <drive>,] terminal pairs, n

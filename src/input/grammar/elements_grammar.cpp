@@ -198,8 +198,8 @@ displacement
   = <node 1> , [ position , ] <offset> , <node 2> , [ position , ] <offset> , <abstract node>
 motor
   = <node 1> , <node 2> , { <direction> | orientation , <orientation> } , <electric node> , <electric node 2> , <torque gain [N m/A]> , <inductance [H]> , <drive> [ , initial current , <current [A]> ]
-  > .nc: M, omega, i, M0, M1
-  ! yes: its private data `M`, `omega`, `i`, `M0`, `M1` go to NetCDF, not to `.ele`
+  > .nc: M, Omega, i, iP, V1, V2
+  ! yes: its results go to NetCDF, not to `.ele`; the resistance is a drive of the magnitude of the current
 discrete control
   = 1 , 1 , <n order> , [ fir , <n order of B> , ] <n steps between samples> , { identification , { arx | armax } [ , forgetting factor , { const , <fraction> | dynamic , <n1> , <n2> , <rho> , <fact> , <kref> , <klim> } ] [ , excitation , <drive> ] [ , file , "<table>" ] | adaptive control , { arx | armax } , [ periodic , <n factor> , ] { gpc , 2 , 1 , 0 , [ prediction weights , 1. , 1. , ] [ control weights , 1. , ] <drive> | deadbeat , 2 , 1 } [ , trigger , <drive> ] [ , desired output , <drive> ] } , outputs , <scalar value> [ , scale , <drive> ] , inputs , <abstract dof>
   > PREFIX.<file>: a line for each sample

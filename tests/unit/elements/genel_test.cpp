@@ -147,7 +147,7 @@ struct MotorCase {
     e.Rh = bench.rotation();
     e.G = 0.4;
     e.L = 0.01;
-    e.R = make_constant_drive(2);
+    e.R = std::make_shared<QuadraticDrive>();
     e.M0 = std::make_shared<QuadraticDrive>();
     e.M1 = make_constant_drive(0.2);
     e.terminal_pairs = 3;

@@ -260,6 +260,67 @@ TEST(Motor, RippleMovesTheRotorAsInTheReferenceSolver) {
   EXPECT_NEAR(run.rotation_vector(2)(2), 4.110992569057e-01, 1e-10);
 }
 
+/// The reference solver's numbers after 11 steps, read there by the indices 1 to 12. The resistance
+/// is 2 + 0.1 |i|.
+TEST(Motor, PrivateDataOfTheReferenceSolver) {
+  const std::pair<const char*, double> expected[] = {
+      {"omega", 2.064872939738}, {"M", 2.905982251056},
+      {"Pmech", 6.000484113565}, {"U", 12},
+      {"i", 4.552676013196},     {"iP", -.3987090400143},
+      {"Pel", 54.63211215835},   {"Phimech", .2453374638986},
+      {"Phiel", .7360123916957}, {"M0", .1073601239170},
+      {"M1", .9775517218610},    {"R", 2.455267601320}};
+  DeckRun run(motor_deck(kConsistent, "euler123, 0.,0.,-.4, null, 0.,0.,.25",
+                         "orientation, eye, 1, 2, .4, .01, linear, 2., .1, initial current, .5, "
+                         "M0, linear, .1, .01, M1, linear, .2, .02, terminal pairs, 3"));
+  ASSERT_TRUE(run.ready());
+  run.step(11);
+  const ElementRef motor = run.model().find_element(Family::electric, 1);
+  const std::vector<std::string> names = motor.set->data_names(motor.index);
+  ASSERT_EQ(names.size(), std::size(expected));
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    EXPECT_EQ(names[k], expected[k].first);
+    EXPECT_NEAR(run.datum(Family::electric, 1, names[k]), expected[k].second, 1e-6) << names[k];
+  }
+}
+
+/// The resistance is the same for both directions of the current: with V = −12 all changes its
+/// sign.
+TEST(Motor, ResistanceIsADriveOfTheCurrentsMagnitude) {
+  const auto current = [](const std::string& volts, const std::string& speed) {
+    std::string deck = motor_deck(kConsistent + "time step: .005;", "eye, null, 0.,0.," + speed,
+                                  "0.,0.,1., 1, 2, .4, .01, linear, 2., 1.");
+    const std::string positive = "algebraic, const, 12.";
+    deck.replace(deck.find(positive), positive.size(), "algebraic, const, " + volts);
+    DeckRun run(deck);
+    EXPECT_TRUE(run.ready());
+    if (!run.ready()) return 0.;
+    run.step(40);
+    const double i = run.datum(Family::electric, 1, "i");
+    EXPECT_NEAR(run.datum(Family::electric, 1, "R"), 2 + std::abs(i), 1e-12);
+    return i;
+  };
+  const double forward = current("12.", ".25");
+  EXPECT_NEAR(forward, 2.580359142867, 1e-7);  // the reference solver's
+  EXPECT_NEAR(current("-12.", "-.25"), -forward, 1e-9);
+}
+
+/// A bare axis is axis 3 of a frame whose axis 1 is across the axis and that of node 1 which is
+/// farthest from it. Angles of the reference solver, where axis 1 of node 2 is that of node 1.
+TEST(Motor, AngleAboutABareAxis) {
+  const std::pair<const char*, double> reference[] = {{"0.,0.,1.", 1.570796326795},
+                                                      {"0.,1.,0.", 1.570796326795},
+                                                      {"-1.,.5,.2", 2.802976739779},
+                                                      {"1.,0.,1.", 0},
+                                                      {".9,.1,.2", -.4517760930558}};
+  for (const auto& [axis, angle] : reference) {
+    DeckRun run(motor_deck(kLoose, "eye, null, null", std::string(axis) + ", 1, 2, .4, .01, 2."));
+    ASSERT_TRUE(run.ready());
+    EXPECT_NEAR(run.datum(Family::electric, 1, "Phimech"), angle, 1e-6) << axis;
+    EXPECT_EQ(run.datum(Family::electric, 1, "Phiel"), 0) << axis;  // without terminal pairs
+  }
+}
+
 TEST(Electric, BadCardsAreRefused) {
   const auto refused = [](const std::string& deck, const std::string& part) {
     std::string all;
