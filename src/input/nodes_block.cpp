@@ -4,29 +4,40 @@
 #include "input/cards.h"
 #include "input/deck.h"
 #include "input/model_functions.h"
+#include "model/drive.h"
 
 namespace mbcosim {
 
 namespace {
 
-/// Copies a degree of freedom into a parameter node every `period` seconds and holds it in between.
-class SampleAndHold final : public StepListener {
+/// Value of a parameter node that samples a degree of freedom every `period` seconds and holds it
+/// in between: 0 until the first period is over; in a step that samples, the value of the iterate.
+class SampleAndHold final : public Drive, public StepListener {
  public:
-  SampleAndHold(NodeDof dof, double period, int value, int next)
-      : dof_(dof), period_(period), value_(value), next_(next) {}
+  enum Memory { next_time, is_sampling, kMemory };
+  /// `held`: memory slot of the value; `memory`: the first of kMemory others.
+  SampleAndHold(NodeDof dof, double period, int held, int memory)
+      : dof_(dof), period_(period), held_(held), memory_(memory) {}
+  using Drive::value;
+  double value(const EvalContext& context, double) const override {
+    const State& state = *context.state;
+    return state.memory[memory_ + is_sampling] != 0 ? context.model->dof_value(context, dof_)
+                                                    : state.memory[held_];
+  }
   void advance(const EvalContext& context, State& state, bool initial) const override {
-    double& next = state.memory[next_];
-    if (initial) next = context.time;
-    if (context.time < next - 1e-9 * period_) return;
-    state.memory[value_] = context.model->dof_value(context, dof_);
-    next += period_ * std::max(1.0, std::floor((context.time - next) / period_ + 1 + 1e-9));
+    state.memory[held_] = value(context, context.time);  // of the step before
+    double &next = state.memory[memory_ + next_time],
+           &sampling = state.memory[memory_ + is_sampling];
+    if (initial) next = context.time + period_;
+    sampling = context.time < next - 1e-9 * period_ ? 0 : 1;
+    if (sampling != 0)
+      next += period_ * std::max(1.0, std::floor((context.time - next) / period_ + 1 + 1e-9));
   }
 
  private:
   NodeDof dof_;
   double period_;  ///< [s]
-  int value_;      ///< memory slot of the node's value
-  int next_;       ///< memory slot of the next sampling time
+  int held_, memory_;
 };
 
 /// `[ value , ] x [ , derivative , xp ]`; nothing at all is 0.
@@ -153,10 +164,12 @@ void read_scalar_node(DeckCard& card, ScalarKind kind, ScalarNode node) {
   read_output_option(card, deck.output.scalar[k], node.output);
   card.expect_end();
   const int index = card.builder().add_scalar(std::move(node));
-  if (sampling.period > 0)
-    card.builder().on_step(std::make_shared<SampleAndHold>(sampling.dof, sampling.period,
-                                                           card.model().scalars[index].memory,
-                                                           card.builder().allocate_memory(1)));
+  if (sampling.period == 0) return;
+  const int held = card.model().scalars[index].memory;
+  const auto value = std::make_shared<SampleAndHold>(
+      sampling.dof, sampling.period, held, card.builder().allocate_memory(SampleAndHold::kMemory));
+  card.model().scalars[index].binding = value;
+  card.builder().on_step(value);
 }
 
 void read_node_card(DeckCard& card) {

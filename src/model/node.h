@@ -136,8 +136,8 @@ struct ScalarNode {
   int gage = 0;
   double gage_y = 0, gage_z = 0;
   int memory = -1;   ///< parameter nodes: offset of the value in State::memory
-  DrivePtr binding;  ///< parameter nodes: where the value comes from (`bind`), evaluated at every
-                     ///< use; null: the memory
+  DrivePtr binding;  ///< parameter nodes: where the value comes from (`bind`, `sample and hold`),
+                     ///< evaluated at every use; null: the memory
 
   int unknown = -1;  ///< index of unknown and row; -1 for parameter nodes
 };

@@ -326,6 +326,44 @@ end: elements;
 
 // A body that is not there yet has no momentum and does not slow its node; when it comes, the
 // momentum stays.
+/// Node 4 is 0 until .0325 s are over, then what node 2 has in the first step at or after each
+/// multiple of it; the force on node 1 sees that in the same step. (The reference solver's
+/// numbers.)
+TEST(DeckDetails, ParameterNodeSamplesTheStepItIsIn) {
+  DeckRun run(
+      deck("final time: .5; time step: .01; method: ms, .6; tolerance: 1e-10; max iterations: 50; "
+           "derivatives tolerance: 1e-5; derivatives max iterations: 50;",
+           "abstract nodes: 2; parameter nodes: 1; genels: 2; forces: 1;",
+           R"(begin: nodes;
+  abstract: 2; parameter: 4, sample and hold, 2, abstract, .0325; abstract: 1;
+end: nodes;
+begin: elements;
+  genel: 1, spring support, 1, abstract, algebraic, linear elastic, 1.;
+  genel: 2, clamp, 2, abstract, algebraic, sine, 0., 5., 1., forever, .3;
+  force: 1, abstract, 1, abstract, node, 4, parameter, string, "x", linear, 0., 2.;
+end: elements;
+)"));
+  ASSERT_TRUE(run.ready());
+  const double expected[] = {0,
+                             0,
+                             0,
+                             .4986693307951,
+                             .4986693307951,
+                             .4986693307951,
+                             .6428978074555,
+                             .6428978074555,
+                             .6428978074555,
+                             .7794255386042,
+                             .7794255386042};
+  NodeDof sampled;
+  sampled.node = run.model().find_scalar(ScalarKind::parameter, 4);
+  for (const double value : expected) {
+    run.step();
+    EXPECT_NEAR(run.model().dof_value(run.context(), sampled), value, 1e-12);
+    EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 2 * value, 1e-9);
+  }
+}
+
 TEST(Driven, BodiesThatAreNotActiveHaveNoMomentum) {
   DeckRun run(
       deck("final time: 1.; time step: 1e-2; max iterations: 20; tolerance: 1e-9;",
