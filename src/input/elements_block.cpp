@@ -161,7 +161,10 @@ void drive_existing(DeckCard& card, const Driven& driven) {
   if (info.driven)
     card.fail(std::string(family_name(family)) + " " + std::to_string(label) +
               " is driven already");
-  read_output_option(card, info.output, info.output);
+  // What the element's own card or an `output` card said before does not count.
+  const bool usual = card.deck().output.family[static_cast<int>(family)];
+  info.output = usual;
+  read_output_option(card, usual, info.output);
   card.expect_end();
   info.driven = driven.drive;
   info.active_memory = card.builder().allocate_memory(1, 1);

@@ -11,6 +11,10 @@ void DiscreteControl::connect(GeneralConnection& c) {
 void DiscreteControl::add_sample(const double* y, const double* u, double* memory) const {
   push_sample(memory + y_, static_cast<int>(gains_.A.size()), output_count(), y);
   push_sample(memory + u_, static_cast<int>(gains_.B.size()), input_count(), u);
+}
+
+void DiscreteControl::after_predict(const GeneralView& u, State& state) const {
+  double* memory = &state.memory[u.memory_offset()];
   Eigen::Map<VecX> sum(control(memory), input_count());
   sum.setZero();
   for (std::size_t j = 0; j < gains_.A.size(); ++j)

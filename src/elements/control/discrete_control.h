@@ -20,6 +20,8 @@ class DiscreteControl : public SampledControl {
       : SampledControl(std::move(signals)), gains_(std::move(gains)) {}
 
   void connect(GeneralConnection& c) override;
+  /// Only now: till the end of the step before, u_c is what that step had.
+  void after_predict(const GeneralView& u, State& state) const override;
 
  private:
   void add_sample(const double* y, const double* u, double* memory) const override;

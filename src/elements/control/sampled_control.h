@@ -39,7 +39,7 @@ class SampledControl : public GeneralElement {
   void residual(const GeneralView& u, GeneralResidual& r) const override;
   void jacobian(const GeneralView&, GeneralJacobian&) const override {}
   void after_convergence(const GeneralView& u, State& state) const override;
-  /// u[1], u[2], …: u_c.
+  /// u[1], u[2], …: u_c of the present step.
   int private_datum(std::string_view name) const override;
   std::vector<Datum> private_data() const override;
   double private_value(const GeneralView& u, int datum) const override {

@@ -71,6 +71,25 @@ TEST(Driven, GivesItsDriveToTheElement) {
   EXPECT_TRUE(e.set->info(e.index).hints.empty());
 }
 
+/// As the reference solver: the family's default, unless the driven card says otherwise.
+TEST(Driven, ExistingElementsGetTheDefaultOutput) {
+  const auto output = [](const std::string& defaults, const std::string& own,
+                         const std::string& driven) {
+    DeckText d = elements("joint: 8, clamp, 1, node, node" + own +
+                          "; driven: 8, 1., existing: joint, 8" + driven + ";");
+    d.control = defaults;
+    const ModelPtr model = model_of(d);
+    EXPECT_TRUE(model);
+    if (!model) return false;
+    const ElementRef e = model->find_element(Family::joint, 8);
+    return e.set->info(e.index).output;
+  };
+  EXPECT_TRUE(output("", ", output, no", ""));
+  EXPECT_FALSE(output("", "", ", output, no"));
+  EXPECT_FALSE(output("default output: none;", ", output, yes", ""));
+  EXPECT_TRUE(output("default output: none;", "", ", output, yes"));
+}
+
 TEST(Driven, SaysWhichHintsAreNotApplied) {
   const LoadReport report =
       load(elements("driven: 7, 1., hint, \"offset{1}\", joint: 7, clamp, 2, node, node;"));

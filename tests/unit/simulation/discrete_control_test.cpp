@@ -258,15 +258,16 @@ TEST(DiscreteControl, RestoredStatesContinueBitForBit) {
   expect_restored_runs_continue(files, 9, 13);  // between two samples
 }
 
+/// The controls that act in the present step. (As the reference solver.)
 TEST(DiscreteControl, PrivateDataAreTheControls) {
   const std::string card =
       std::string("1, 1, 1, fir, 0, 1, control, \"gains.dat\", ") + kRamp + ", scale, 3." + kInput;
   DeckRun run(with_gains(
       controller_deck(1, card, "force: 5, abstract, 1, abstract, const, 100.;\n", 1), "2"));
   ASSERT_TRUE(run.ready());
-  EXPECT_EQ(run.datum(Family::electric, 99, "u[1]"), 6);  // of the initial solution, y = 3
+  EXPECT_EQ(run.datum(Family::electric, 99, "u[1]"), 0);
   run.step();
-  EXPECT_EQ(run.datum(Family::electric, 99, "u[1]"), 12);
+  EXPECT_EQ(run.datum(Family::electric, 99, "u[1]"), 6);  // of the initial solution, y = 3
   EXPECT_NEAR(node_value(run, 1), 106, 1e-9);
   const ElementRef e = run.model().find_element(Family::electric, 99);
   EXPECT_EQ(e.set->private_datum(e.index, "u[2]"), -1);

@@ -269,6 +269,20 @@ end: elements;
   EXPECT_NEAR(factor(run), .93, 1e-12);
 }
 
+/// The k-th excitation goes to the k-th input. (In the reference solver they go to the inputs in
+/// reverse order.)
+TEST(Identification, ExcitationsAreInTheOrderOfTheInputs) {
+  Plant plant = kTwoByTwo;
+  plant.forces = {"0.", "0."};
+  DeckRun run(deck_of(plant, std::string("2, 2, 2, 1, identification, arx, excitation, const, .01, "
+                                         "const, .02") +
+                                 kOutput + ", node dof, 12, abstract, algebraic"));
+  ASSERT_TRUE(run.ready());
+  run.step();
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), .01, 1e-9);
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 2), .02, 1e-9);
+}
+
 /// The excitation of the first step after a sample is held; up to the first sample that of the
 /// start.
 TEST(Identification, ExcitationsOfTheReferenceSolver) {
