@@ -105,7 +105,7 @@ std::string model_log(const Model& model) {
     if (!line.empty()) s += line + '\n';
   }
   for (const std::string& line : model.log_lines) s += line + '\n';
-  index_lists(s, model);
+  if (!model.structural.empty()) index_lists(s, model);
   s += "Symbol table:\n";
   for (const auto& [name, value] : model.symbols) s += "  " + name + " = " + value + '\n';
   s += "Environment:\n";

@@ -91,6 +91,49 @@ end: elements;
   EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 10. / 4, 1e-6);
 }
 
+// A point half a metre from the centre of a body that spins at 2 rad/s has the acceleration −2 m/s²
+// along its arm. (The reference solver gives 0, the rate of the velocity along the arm.)
+TEST(ReferenceDifferences, AccelerometerOnASpinningBodyHasTheCentripetalAcceleration) {
+  DeckRun run(
+      initial_value("final time: 1.; time step: 1e-3; max iterations: 20; tolerance: 1e-8;") +
+      R"deck(begin: control data; structural nodes: 1; abstract nodes: 1; rigid bodies: 1; electric elements: 1; end: control data;
+begin: nodes;
+  structural: 1, dynamic, null, eye, null, 0.,0.,2.;
+  abstract: 1;
+end: nodes;
+begin: elements;
+  body: 1, 1, 2., null, diag, 1.,2.,3.;
+  electric: 1, accelerometer, translational, 1, 1, 1.,0.,0., position, .5,0.,0.;
+end: elements;
+)deck");
+  ASSERT_TRUE(run.ready());
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), -2, 1e-6);
+  run.step(50);
+  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), -2, 1e-6);
+}
+
+// A force on a node at a unit spring that follows the value which a ramp had at the end of the step
+// before. (In the reference solver only in the first step, later the present one.)
+TEST(ReferenceDifferences, PreviousValueOfAScalarNodeIsThatOfTheStepBefore) {
+  DeckRun run(
+      initial_value("final time: 1.; time step: .1; max iterations: 20; tolerance: 1e-10; "
+                    "derivatives tolerance: 1e9;") +
+      R"deck(begin: control data; abstract nodes: 2; genels: 2; forces: 1; end: control data;
+begin: nodes; abstract: 1; abstract: 2; end: nodes;
+begin: elements;
+  set: [dof,BEFORE,1,abstract,algebraic,prev=true];
+  genel: 1, clamp, 1, abstract, algebraic, linear, 1., 2.;
+  genel: 2, spring support, 2, abstract, algebraic, linear elastic, 1.;
+  force: 1, abstract, 2, abstract, string, "BEFORE";
+end: elements;
+)deck");
+  ASSERT_TRUE(run.ready());
+  for (int k = 1; k <= 5; ++k) {
+    run.step();
+    EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 2), 1 + .2 * (k - 1), 1e-9) << k;
+  }
+}
+
 // Statics under a dead load that grows by small steps, with a solution tolerance that accepts each
 // step after one iteration: the shear force at a section is the load outboard of it, whatever the
 // tolerance of the step before was. (The reference solver's beams keep the section frames of the
