@@ -112,6 +112,27 @@ end: elements;
   EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), -2, 1e-6);
 }
 
+// The position of a body that drifts at 1 m/s, sampled every .25 s. (The reference solver's node
+// stays 0.)
+TEST(ReferenceDifferences, ParameterNodeSamplesAStructuralNode) {
+  DeckRun run(
+      initial_value("final time: 1.; time step: .1; max iterations: 20; tolerance: 1e-8;") +
+      R"deck(begin: control data; structural nodes: 1; parameter nodes: 1; rigid bodies: 1; end: control data;
+begin: nodes;
+  structural: 2, dynamic, null, eye, 1.,0.,0., null;
+  parameter: 4, sample and hold, 2, structural, 1, .25;
+end: nodes;
+begin: elements; body: 2, 2, 1., null, eye; end: elements;
+)deck");
+  ASSERT_TRUE(run.ready());
+  NodeDof sampled;
+  sampled.node = run.model().find_scalar(ScalarKind::parameter, 4);
+  for (const double expected : {0., 0., .3, .3, .5, .5}) {
+    run.step();
+    EXPECT_NEAR(run.model().dof_value(run.context(), sampled), expected, 1e-9);
+  }
+}
+
 // A force on a node at a unit spring that follows the value which a ramp had at the end of the step
 // before. (In the reference solver only in the first step, later the present one.)
 TEST(ReferenceDifferences, PreviousValueOfAScalarNodeIsThatOfTheStepBefore) {
