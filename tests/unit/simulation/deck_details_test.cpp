@@ -325,8 +325,8 @@ end: elements;
 }
 
 /// Node 4 is 0 until .0325 s are over, then what node 2 has in the first step at or after each
-/// multiple of it; the force on node 1 sees that in the same step. (The reference solver's
-/// numbers.)
+/// multiple of it; the force on node 1 sees that in the same step. (As the reference
+/// solver.)
 TEST(DeckDetails, ParameterNodeSamplesTheStepItIsIn) {
   DeckRun run(
       deck("final time: .5; time step: .01; method: ms, .6; tolerance: 1e-10; max iterations: 50; "
@@ -346,10 +346,8 @@ end: elements;
   sampled.node = run.model().find_scalar(ScalarKind::parameter, 4);
   for (int k = 1; k <= 11; ++k) {
     run.step();
-    const double value = k < 4    ? 0
-                         : k < 7  ? .4986693307951
-                         : k < 10 ? .6428978074555
-                                  : .7794255386042;
+    const double sampled_at = k < 4 ? 0 : k < 7 ? .04 : k < 10 ? .07 : .1;
+    const double value = sampled_at == 0 ? 0 : .3 + std::sin(5 * sampled_at);
     EXPECT_NEAR(run.model().dof_value(run.context(), sampled), value, 1e-12);
     EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 2 * value, 1e-9);
   }
