@@ -66,13 +66,14 @@ class DeckCard final : public Card, public BeamOutputDefault {
                             const OtherNode* other = nullptr) override;
   Vec3 relative_vector(std::string_view what, int node) override;
   Vec3 relative_unit_vector(std::string_view what, int node) override;
-  Vec3 absolute_unit_vector(std::string_view what) override;
+  Vec3 absolute_unit_vector(std::string_view what, int context = -1) override;
   Mat3 relative_tensor(std::string_view what, int node) override;
 
   BeamOutput default_beam_output() const override;
 
   DrivePtr drive(std::string_view what = "drive") override;
-  Vec3DrivePtr vec3_drive(std::string_view what = "vector drive", int node = -1) override;
+  Vec3DrivePtr vec3_drive(std::string_view what = "vector drive",
+                          const VectorAxes& axes = {}) override;
   TplDrivePtr<6> vec6_drive(std::string_view what = "vector drive") override;
   TplDrivePtr<3, 3> mat3_drive(std::string_view what = "matrix drive") override;
   LawPtr<1> law1() override;
@@ -238,7 +239,7 @@ class DeckCard final : public Card, public BeamOutputDefault {
   Frame node_frame(int node) const;
   Frame frame_of_label();
   Reference reference_prefix(Entity entity, const OtherNode* other);
-  Vec3 free_vector(std::string_view what, int context, bool relative);
+  Vec3 free_vector(std::string_view what, const VectorAxes& axes);
   Vec3 unit(std::string_view what, const Vec3& v);
 
   DrivePtr constant_drive(std::string_view what);

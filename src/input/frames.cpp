@@ -125,25 +125,26 @@ Vec3 DeckCard::absolute_angular_velocity(std::string_view what) {
   }
 }
 
-Vec3 DeckCard::absolute_vector(std::string_view what) { return free_vector(what, -1, false); }
+Vec3 DeckCard::absolute_vector(std::string_view what) { return free_vector(what, {}); }
 Vec3 DeckCard::relative_vector(std::string_view what, int node) {
-  return free_vector(what, node, true);
+  return free_vector(what, {node_frame(node).R, false});
 }
 
-/// In the frame of node `context` when `relative`, else global with the frame of `context` as the
-/// default one.
-Vec3 DeckCard::free_vector(std::string_view what, int context, bool relative) {
+Vec3 DeckCard::free_vector(std::string_view what, const VectorAxes& axes) {
   need_argument(what);
   const Reference ref = reference_prefix(Entity::other, nullptr);
   const Vec3 u = vec3(what);
-  const Mat3 back = relative ? Mat3(node_frame(context).R.transpose()) : Mat3(Mat3::Identity());
+  const Mat3 from_global = axes.global ? Mat3(Mat3::Identity()) : Mat3(axes.R.transpose());
+  const Mat3 from_axes = axes.global ? axes.R : Mat3(Mat3::Identity());
   switch (ref.prefix) {
     case Prefix::global:
-      return back * u;
+      return from_global * u;
+    case Prefix::node:
+      return from_axes * u;
     case Prefix::local:
-      return ref.local * u;
+      return from_axes * ref.local * u;
     case Prefix::frame:
-      return back * ref.frame.R * u;
+      return from_global * ref.frame.R * u;
     default:
       return u;
   }
@@ -160,8 +161,8 @@ Vec3 DeckCard::unit(std::string_view what, const Vec3& v) {
 Vec3 DeckCard::relative_unit_vector(std::string_view what, int node) {
   return unit(what, relative_vector(what, node));
 }
-Vec3 DeckCard::absolute_unit_vector(std::string_view what) {
-  return unit(what, absolute_vector(what));
+Vec3 DeckCard::absolute_unit_vector(std::string_view what, int context) {
+  return unit(what, free_vector(what, {node_frame(context).R, true}));
 }
 
 Vec3 DeckCard::relative_position(std::string_view what, int node, const OtherNode* other) {

@@ -30,7 +30,7 @@ struct Tape {
 class DriveCard : public Card {
  public:
   DrivePtr drive(std::string_view what) override;
-  Vec3DrivePtr vec3_drive(std::string_view what, int node) override;
+  Vec3DrivePtr vec3_drive(std::string_view what, const VectorAxes& axes) override;
 
   std::string file_contents(std::string_view, std::string*) override { refuse("a file"); }
   std::string quoted(std::string_view) override { refuse("a string"); }
@@ -51,7 +51,7 @@ class DriveCard : public Card {
   Mat3 relative_orientation(std::string_view, int, const OtherNode*) override { refuse("a frame"); }
   Vec3 relative_vector(std::string_view, int) override { refuse("a frame"); }
   Vec3 relative_unit_vector(std::string_view, int) override { refuse("a frame"); }
-  Vec3 absolute_unit_vector(std::string_view) override { refuse("a frame"); }
+  Vec3 absolute_unit_vector(std::string_view, int) override { refuse("a frame"); }
   Mat3 relative_tensor(std::string_view, int) override { refuse("a frame"); }
   TplDrivePtr<6> vec6_drive(std::string_view) override { refuse("a vector of six drives"); }
   TplDrivePtr<3, 3> mat3_drive(std::string_view) override { refuse("a matrix of drives"); }
@@ -106,7 +106,7 @@ DrivePtr DriveCard::nested_drive(std::string_view what) {
   return found->value(*this);
 }
 
-Vec3DrivePtr DriveCard::vec3_drive(std::string_view what, int) {
+Vec3DrivePtr DriveCard::vec3_drive(std::string_view what, const VectorAxes&) {
   std::vector<SumTplDrive<3>::Term> terms;
   const auto term = [&] {
     Vec3 entity;
@@ -336,7 +336,7 @@ class LateVec3Drive final : public TplDrive<3, 1> {
   Vec3 derivative(const EvalContext& context) const override {
     return made_.at(context)->derivative(context);
   }
-  static Vec3DrivePtr make(DriveCard& card) { return card.vec3_drive("vector drive", -1); }
+  static Vec3DrivePtr make(DriveCard& card) { return card.vec3_drive("vector drive", {}); }
 
  private:
   Made<Vec3DrivePtr> made_;

@@ -188,9 +188,8 @@ TplDrivePtr<R, C> DeckCard::template_drive(std::string_view what, ReadEntity rea
   return std::make_shared<Sum>(std::move(terms));
 }
 
-Vec3DrivePtr DeckCard::vec3_drive(std::string_view what, int node) {
-  return template_drive<3, 1>(
-      what, [&] { return node < 0 ? absolute_vector(what) : relative_vector(what, node); });
+Vec3DrivePtr DeckCard::vec3_drive(std::string_view what, const VectorAxes& axes) {
+  return template_drive<3, 1>(what, [&] { return free_vector(what, axes); });
 }
 TplDrivePtr<6> DeckCard::vec6_drive(std::string_view what) {
   return template_drive<6, 1>(what, [&] { return vec6(what); });

@@ -29,6 +29,12 @@ struct OtherNode {
   Mat3 orientation = Mat3::Identity();  ///< R_ha, relative to `node`
 };
 
+/// How the vectors of a template drive are read and given.
+struct VectorAxes {
+  Mat3 R = Mat3::Identity();  ///< what `reference, node` and `reference, local` mean -> global
+  bool global = true;         ///< components: global (also without `reference`), or along `R`
+};
+
 class Card {
  public:
   virtual ~Card() = default;
@@ -93,14 +99,15 @@ class Card {
   virtual Vec3 relative_vector(std::string_view what, int node) = 0;
   /// Free vector, normalised; refused when null, warning when its norm was not 1.
   virtual Vec3 relative_unit_vector(std::string_view what, int node) = 0;
-  virtual Vec3 absolute_unit_vector(std::string_view what) = 0;
+  /// `context`: structural node that `reference, node` and `reference, local` mean; -1: the global
+  /// frame.
+  virtual Vec3 absolute_unit_vector(std::string_view what, int context = -1) = 0;
   virtual Mat3 relative_tensor(std::string_view what, int node) = 0;
 
   // ------------------------------------------------------------------ shared objects
   virtual DrivePtr drive(std::string_view what = "drive") = 0;
-  /// Vector template drive; entities are absolute vectors, or relative to `node`'s frame when node
-  /// >= 0.
-  virtual Vec3DrivePtr vec3_drive(std::string_view what = "vector drive", int node = -1) = 0;
+  virtual Vec3DrivePtr vec3_drive(std::string_view what = "vector drive",
+                                  const VectorAxes& axes = {}) = 0;
   virtual TplDrivePtr<6> vec6_drive(std::string_view what = "vector drive") = 0;
   virtual TplDrivePtr<3, 3> mat3_drive(std::string_view what = "matrix drive") = 0;
   virtual LawPtr<1> law1() = 0;

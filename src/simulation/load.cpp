@@ -24,11 +24,22 @@ std::uint64_t digest(const Reading& reading, Digest data) {
   return data.value();
 }
 
-void store_symbols(const Reading& reading, Model& model) {
+/// As .log prints it; plugin variables with what they have in the input configuration.
+std::string printed_value(const Symbol& s, const EvalContext& input) {
+  if (!s.plugin) return printed(s.value);
+  try {
+    return printed(s.plugin->value(input));
+  } catch (const EvaluationError&) {  // has no value there
+    return printed(s.value);
+  }
+}
+
+void store_symbols(const Reading& reading, ModelBuilder& builder) {
+  const EvalContext& input = builder.input_context();
   for (const Symbol* s : reading.symbols.sorted())
-    model.symbols.emplace_back(
-        std::string(s->constant ? "const " : "") + type_name(type_of(s->value)) + " " + s->name,
-        printed(s->value));
+    builder.model().symbols.emplace_back(std::string(s->constant || s->plugin ? "const " : "") +
+                                             type_name(type_of(s->value)) + " " + s->name,
+                                         printed_value(*s, input));
 }
 
 std::vector<DeckSymbol> declared_symbols(const Reading& reading) {
@@ -129,7 +140,7 @@ ModelPtr read_model(Reading& reading, ModelBuilder& builder, const LoadRequest& 
   }
   model.digest =
       digest_with(digest_with(digest(reading, deck.data_files), request.ports), request.symbols);
-  store_symbols(reading, model);
+  store_symbols(reading, builder);
   Result<ModelPtr> finished = builder.finish();
   if (!finished) {
     extra.push_back(plain_error("model", reading.file(0).name, finished.error().message));

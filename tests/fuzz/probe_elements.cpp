@@ -49,7 +49,7 @@ void read_rod(Card& card, ElementInfo&) {
 void read_driven_joint(Card& card, ElementInfo&) {
   const OtherNode first = read_end(card, nullptr);
   read_end(card, &first);
-  card.vec3_drive("displacement", first.node);
+  card.vec3_drive("displacement", {card.model().structural[first.node].R, false});
   if (card.more()) card.vec6_drive();
 }
 

@@ -27,8 +27,10 @@ class DirectedDrive : public TplDrive<3, 1> {
   DrivePtr magnitude_;
 };
 
-/// Node whose frame the drive's vectors are read in: a follower's own.
-int drive_frame(bool follower, int node) { return follower ? node : -1; }
+/// Axes of a drive's vectors: a follower's are those of its node, others are given in global ones.
+VectorAxes drive_axes(Card& card, bool follower, int node) {
+  return {card.model().structural[node].R, !follower};
+}
 
 /// The old syntax: `<direction>, <arm>, …, <drive>`.
 Vec3 read_old_direction(Card& card, bool follower, int node) {
@@ -37,7 +39,7 @@ Vec3 read_old_direction(Card& card, bool follower, int node) {
       "deprecated syntax: `position` is missing after the node; direction and arm are read",
       "write `position, <arm>, <direction>, <drive>`");
   return follower ? card.relative_unit_vector("direction", node)
-                  : card.absolute_unit_vector("direction");
+                  : card.absolute_unit_vector("direction", node);
 }
 
 void read_force(Card& card, ElementInfo& info, bool follower) {
@@ -46,7 +48,7 @@ void read_force(Card& card, ElementInfo& info, bool follower) {
   e.node = card.structural_node();
   if (card.keyword("position")) {
     e.a = card.relative_position("arm", e.node);
-    e.d = card.vec3_drive("force", drive_frame(follower, e.node));
+    e.d = card.vec3_drive("force", drive_axes(card, follower, e.node));
   } else {
     const Vec3 direction = read_old_direction(card, follower, e.node);
     e.a = card.relative_position("arm", e.node);
@@ -60,7 +62,7 @@ void read_displacement_force(Card& card, ElementInfo& info) {
   StructuralForce e;
   e.displacement = true;
   e.node = card.structural_node(Card::NodeNeed::not_dummy);
-  e.d = card.vec3_drive("force");
+  e.d = card.vec3_drive("force", drive_axes(card, false, e.node));
   add_element(card.builder(), info, std::move(e));
 }
 
@@ -75,9 +77,10 @@ void read_internal_force(Card& card, ElementInfo& info, bool follower) {
   e.second = card.structural_node();
   if (position && !card.keyword("position"))
     card.fail_expected("`position` expected after the second node");
-  e.a2 = card.relative_position("second arm", e.second);
+  const OtherNode other{e.first, e.a1};
+  e.a2 = card.relative_position("second arm", e.second, &other);
   if (position)
-    e.d = card.vec3_drive("force", drive_frame(follower, e.first));
+    e.d = card.vec3_drive("force", drive_axes(card, follower, e.first));
   else
     e.d = std::make_shared<DirectedDrive>(direction, card.drive("force"));
   add_element(card.builder(), info, std::move(e));
@@ -88,13 +91,13 @@ void read_internal_displacement_force(Card& card, ElementInfo& info) {
   e.displacement = true;
   e.first = card.structural_node(Card::NodeNeed::not_dummy);
   e.second = card.structural_node(Card::NodeNeed::not_dummy);
-  e.d = card.vec3_drive("force");
+  e.d = card.vec3_drive("force", drive_axes(card, false, e.first));
   add_element(card.builder(), info, std::move(e));
 }
 
 /// `[position, <arm>]` of a couple, of no effect but in .log.
-Vec3 read_unused_arm(Card& card, int node) {
-  return card.keyword("position") ? card.relative_position("arm", node) : Vec3(Vec3::Zero());
+Vec3 read_unused_arm(Card& card, int node, const OtherNode* other = nullptr) {
+  return card.keyword("position") ? card.relative_position("arm", node, other) : Vec3(Vec3::Zero());
 }
 
 void read_couple(Card& card, ElementInfo& info, bool follower) {
@@ -103,7 +106,7 @@ void read_couple(Card& card, ElementInfo& info, bool follower) {
   e.follower = follower;
   e.node = card.structural_node();
   e.a = read_unused_arm(card, e.node);
-  e.d = card.vec3_drive("couple", drive_frame(follower, e.node));
+  e.d = card.vec3_drive("couple", drive_axes(card, follower, e.node));
   add_element(card.builder(), info, std::move(e));
 }
 
@@ -114,8 +117,9 @@ void read_internal_couple(Card& card, ElementInfo& info, bool follower) {
   e.first = card.structural_node();
   e.a1 = read_unused_arm(card, e.first);
   e.second = card.structural_node();
-  e.a2 = read_unused_arm(card, e.second);
-  e.d = card.vec3_drive("couple", drive_frame(follower, e.first));
+  const OtherNode other{e.first, e.a1};
+  e.a2 = read_unused_arm(card, e.second, &other);
+  e.d = card.vec3_drive("couple", drive_axes(card, follower, e.first));
   add_element(card.builder(), info, std::move(e));
 }
 

@@ -43,10 +43,10 @@ void StructuralForce::output(const Local<double>& u, OutputRow& row) const {
 }
 
 std::string StructuralForce::log(const Model& model, int label) const {
-  if (displacement)
-    return "structural absolute displacement force:" + log_integers({label, label_of(model, node)});
   return std::string("structural ") + frame_word(follower) +
-         " force:" + log_integers({label, label_of(model, node)}) + log_vector(a);
+         (displacement ? " displacement force:" : " force:") +
+         log_integers({label, label_of(model, node)}) + log_vector(a) +
+         (relative_output ? " output_relative" : "");
 }
 
 void StructuralCouple::output(const Local<double>& u, OutputRow& row) const {

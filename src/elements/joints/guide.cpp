@@ -191,7 +191,8 @@ void read_drive_displacement(Card& card, ElementInfo& info) {
   read_offset(card, e.a);
   e.b = read_attachment(card);
   read_offset(card, e.b, &e.a);
-  e.delta = card.hinted("drive3", card.vec3_drive("imposed displacement", e.a.node));
+  const VectorAxes axes{card.model().structural[e.a.node].R, false};
+  e.delta = card.hinted("drive3", card.vec3_drive("imposed displacement", axes));
   add_element(card.builder(), info, e);
 }
 

@@ -231,7 +231,9 @@ void refuse_velocity_constraints(Card& card, const TotalConstraint& c) {
 
 }  // namespace
 
-TotalConstraint read_total_constraint(Card& card, bool with_drives) {
+TotalConstraint read_total_constraint(Card& card, const Mat3& position_axes,
+                                      const Mat3& rotation_axes, bool with_drives) {
+  const VectorAxes position{position_axes, false}, rotation{rotation_axes, false};
   TotalConstraint c;
   const Vec3DrivePtr zero = make_constant_vec3_drive(Vec3::Zero());
   for (Vec3DrivePtr* drive : {&c.displacement, &c.angle, &c.displacement_rate,
@@ -242,24 +244,32 @@ TotalConstraint read_total_constraint(Card& card, bool with_drives) {
     for (auto& kind : c.translation)
       kind = read_status(card, {"inactive", "active", "position", "velocity"});
     if (with_drives)
-      c.displacement = card.hinted("position-drive3", card.vec3_drive("imposed displacement"));
+      c.displacement =
+          card.hinted("position-drive3", card.vec3_drive("imposed displacement", position));
     if (inverse) {
-      c.displacement_rate = card.vec3_drive("velocity of the imposed displacement");
-      c.displacement_acceleration = card.vec3_drive("acceleration of the imposed displacement");
+      c.displacement_rate = card.vec3_drive("velocity of the imposed displacement", position);
+      c.displacement_acceleration =
+          card.vec3_drive("acceleration of the imposed displacement", position);
     }
   }
   if (card.keyword("orientation constraint")) {
     for (auto& kind : c.rotation)
       kind = read_status(card, {"inactive", "active", "rotation", "angular velocity"});
     if (with_drives)
-      c.angle = card.hinted("orientation-drive3", card.vec3_drive("imposed rotation"));
+      c.angle = card.hinted("orientation-drive3", card.vec3_drive("imposed rotation", rotation));
     if (inverse) {
-      c.angle_rate = card.vec3_drive("angular velocity of the imposed rotation");
-      c.angle_acceleration = card.vec3_drive("angular acceleration of the imposed rotation");
+      c.angle_rate = card.vec3_drive("angular velocity of the imposed rotation", rotation);
+      c.angle_acceleration =
+          card.vec3_drive("angular acceleration of the imposed rotation", rotation);
     }
   }
   if (inverse) refuse_velocity_constraints(card, c);
   return c;
+}
+
+TotalConstraint read_total_constraint(Card& card, const TotalJoint& e, bool with_drives) {
+  const Mat3& R = card.model().structural[e.first].R;
+  return read_total_constraint(card, R * e.R1h, R * e.R1r, with_drives);
 }
 
 void read_total_nodes(Card& card, TotalJoint& e) {
@@ -281,7 +291,7 @@ void read_total_nodes(Card& card, TotalJoint& e) {
 void read_total_joint(Card& card, ElementInfo& info) {
   TotalJoint e;
   read_total_nodes(card, e);
-  e.constraint = read_total_constraint(card);
+  e.constraint = read_total_constraint(card, e);
   add_element(card.builder(), info, e);
 }
 
@@ -302,7 +312,7 @@ void read_total_pin_joint(Card& card, ElementInfo& info) {
     e.Rc = card.absolute_orientation("position orientation", kNoContext, &position);
   if (card.keyword("rotation orientation"))
     e.Rcr = card.absolute_orientation("rotation orientation", kNoContext, &rotation);
-  e.constraint = read_total_constraint(card);
+  e.constraint = read_total_constraint(card, e.Rc, e.Rcr);
   add_element(card.builder(), info, e);
 }
 
@@ -332,7 +342,8 @@ void read_imposed_displacement(Card& card, ElementInfo& info) {
   const OtherNode other{e.first, e.f1, e.R1h};
   e.f2 = offset(e.second, &other);
   TotalConstraint& c = e.constraint;
-  impose_all(c, c.translation, c.displacement, card.vec3_drive("imposed displacement"));
+  const VectorAxes axes{card.model().structural[e.first].R, false};
+  impose_all(c, c.translation, c.displacement, card.vec3_drive("imposed displacement", axes));
   add_element(card.builder(), info, e);
 }
 
@@ -362,7 +373,8 @@ void read_imposed_orientation(Card& card, ElementInfo& info) {
   const OtherNode other{e.first, e.f1, e.R1r};
   e.R2r = orientation(e.second, &other);
   TotalConstraint& c = e.constraint;
-  impose_all(c, c.rotation, c.angle, card.vec3_drive("imposed rotation"));
+  const VectorAxes axes{card.model().structural[e.first].R * e.R1r, false};
+  impose_all(c, c.rotation, c.angle, card.vec3_drive("imposed rotation", axes));
   add_element(card.builder(), info, e);
 }
 

@@ -247,9 +247,12 @@ struct TotalPinJoint : NamedData<TotalPinJoint> {
 /// The two-node data of total joints: `<n> [ , position , <f> ] [ , position orientation , <Rh> ] [
 /// , rotation orientation , <Rr> ]`.
 void read_total_nodes(Card& card, TotalJoint& e);
-/// `[ , position constraint , … ] [ , orientation constraint , … ]`; without drives for total
-/// internal reactions.
-TotalConstraint read_total_constraint(Card& card, bool with_drives = true);
+/// `[ , position constraint , … ] [ , orientation constraint , … ]`: drives along the axes of the
+/// position and of the rotation (-> global); without drives for total internal reactions.
+TotalConstraint read_total_constraint(Card& card, const Mat3& position_axes,
+                                      const Mat3& rotation_axes, bool with_drives = true);
+/// The same with the axes that `e` has at its first node.
+TotalConstraint read_total_constraint(Card& card, const TotalJoint& e, bool with_drives = true);
 
 void read_total_joint(Card& card, ElementInfo& info);
 void read_total_pin_joint(Card& card, ElementInfo& info);

@@ -62,14 +62,14 @@ std::string TotalReaction::log(const Model& model, int label) const {
 void read_total_equation(Card& card, ElementInfo& info) {
   TotalEquation e;
   read_total_nodes(card, e.equation);
-  e.equation.constraint = read_total_constraint(card);
+  e.equation.constraint = read_total_constraint(card, e.equation);
   add_element(card.builder(), info, e);
 }
 
 void read_total_reaction(Card& card, ElementInfo& info) {
   TotalReaction e;
   read_total_nodes(card, e.joint);
-  e.joint.constraint = read_total_constraint(card, false);
+  e.joint.constraint = read_total_constraint(card, e.joint, false);
   if (!card.keyword("total equation"))
     card.fail_at(card.next(),
                  "total internal reaction: the equation whose multipliers act here is missing",

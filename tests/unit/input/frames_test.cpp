@@ -229,6 +229,33 @@ TEST(UnitVector, IsNormalisedWithAWarning) {
             "error: user defined element 1: axis: direction is null");
 }
 
+/// Of drives: in global components, or along the axes that `reference, node` names.
+TEST(VectorDrive, IsReadInAFrame) {
+  const Mat3 R = rotation_of_euler123(Vec3(.2, .1, -.3)),
+             R10 = rotation_of_euler123(Vec3(.1, .2, .3)), local = rotation_x(.1);
+  const Vec3 v(1, 2, 3);
+  const std::string numbers = " 1.,2.,3., 1., ";
+  const std::string card = "single," + numbers + "single, reference, node," + numbers +
+                           "single, reference, local, euler, .1,0.,0.," + numbers +
+                           "single, reference, global," + numbers +
+                           "array, 1, reference, 10, 1.,2.,3., 1.";
+  for (const bool global : {true, false}) {
+    const Mat3 to = global ? R : Mat3(Mat3::Identity()),
+               back = global ? Mat3(Mat3::Identity()) : Mat3(R.transpose());
+    EXPECT_EQ(
+        probe(two_nodes(), card,
+              [&](Card& card) {
+                const EvalContext context;
+                for (const Vec3& expected :
+                     {v, Vec3(to * v), Vec3(to * local * v), Vec3(back * v), Vec3(back * R10 * v)})
+                  EXPECT_LT(
+                      (card.vec3_drive("load", {R, global})->value(context) - expected).norm(),
+                      1e-14);
+              }),
+        "");
+  }
+}
+
 TEST(AbsolutePosition, MayBeGivenInANodesFrame) {
   EXPECT_EQ(probe(two_nodes(), "reference, node, 0.,0.,0., reference, node, eye",
                   [](Card& card) {

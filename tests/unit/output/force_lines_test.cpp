@@ -105,6 +105,72 @@ TEST_F(TextResults, LinesOfForces) {
   EXPECT_FALSE(total.empty());  // right-aligned, unlike the others
 }
 
+/// Directions and arms in frames of nodes, as .frc and .log show them: numbers of the reference
+/// solver. `reference, node` is the orientation that the (first) node has in the deck.
+TEST_F(TextResults, FramesOfForces) {
+  const std::string v = "1.,2.,3., const, 1.;\n", in_node = "single, reference, node, " + v,
+                    a1 = ", position, .1,.2,.3, 2, position, reference, ";
+  run(initial_value_block(.5, 1,
+                          "tolerance: 1e-8; max iterations: 20; derivatives tolerance: 1e9;") +
+      "begin: control data; structural nodes: 2; joints: 2; forces: 10; output precision: 12; end: "
+      "control data;\n"
+      "begin: nodes; structural: 1, static, 1.,2.,3., euler123, .1,.2,.3, null, null;\n"
+      "structural: 2, static, 2.,-1.,1.5, euler123, -.3,.4,.1, null, null; end: nodes;\n"
+      "begin: elements; joint: 1, clamp, 1, node, node; joint: 2, clamp, 2, node, node;\n"
+      "force: 1, absolute, 1, position, null, " +
+      in_node +
+      "force: 2, absolute, 1, position, null, array, 1, reference, local, euler123, .3,.2,.1, " +
+      v + "force: 3, absolute, 1, reference, node, 0.,3.,4., null, const, 10.;\n" +
+      "force: 4, absolute displacement, 1, " + in_node + "couple: 5, absolute, 1, " + in_node +
+      "couple: 6, absolute internal, 1, 2, " + in_node + "force: 7, absolute internal, 1" + a1 +
+      "other node, .4,.5,.6, " + in_node + "force: 8, follower internal, 1" + a1 +
+      "other position, .4,.5,.6, " + v + "couple: 9, follower internal, 1" + a1 +
+      "other node, .4,.5,.6, " + v +
+      "force: 10, follower, 1, position, .1,.2,.3, 1.,2.,3., const, 1., output relative;\n"
+      "end: elements;\n");
+  const std::vector<double> p1 = {1.095304240072, 2.190886661275, 3.307374989828},
+                            f = {.9530424007184, 1.908866612753, 3.073749898275};
+  expect_line("frc", "1 ", {1, f[0], f[1], f[2], 1, 2, 3});
+  expect_line("frc", "2 ", {1, 1.598494323421, 1.219401933120, 3.155610055678, 1, 2, 3});
+  expect_line("frc", "3 ", {1, -.1484222193926, 4.885467755911, 8.724114605548, 1, 2, 3});
+  expect_line("frc", "4 ", {1, f[0], f[1], f[2], 1, 2, 3});
+  expect_line("frc", "5 ", {1, f[0], f[1], f[2]});
+  expect_line("frc", "6 ", {1, f[0], f[1], f[2], 2, -f[0], -f[1], -f[2]});
+  expect_line("frc", "7 ",
+              {1, f[0], f[1], f[2], p1[0], p1[1], p1[2], 2, -f[0], -f[1], -f[2], 1.348904205098,
+               2.538841936307, 3.598260163592});
+  expect_line("frc", "8 ",
+              {1, f[0], f[1], f[2], p1[0], p1[1], p1[2], 2, -f[0], -f[1], -f[2], 1.444208445170,
+               2.729728597583, 3.905635153420});
+  EXPECT_EQ(last_line("log", "structural absolute displacement force: "),
+            "structural absolute displacement force: 4 1 0 0 0");
+  EXPECT_EQ(last_line("log", "structural internal follower force: "),
+            "structural internal follower force: 8 1 0.1 0.2 0.3 2 -1.54218 3.02129 2.91554");
+  EXPECT_EQ(last_line("log", "structural internal follower couple: "),
+            "structural internal follower couple: 9 1 0.1 0.2 0.3 2 -1.50302 2.92537 2.556");
+  EXPECT_EQ(last_line("log", "structural follower force: "),
+            "structural follower force: 10 1 0.1 0.2 0.3 output_relative");
+}
+
+/// Plugin variables in the symbol table of .log: constants with what the deck gives to the nodes.
+TEST_F(TextResults, LogShowsPresentValuesOfPluginVariables) {
+  run(initial_value_block(.5, 1,
+                          "tolerance: 1e-8; max iterations: 20; derivatives tolerance: 1e9;") +
+      "begin: control data; structural nodes: 1; abstract nodes: 1; genels: 1; rigid bodies: 1; "
+      "end: control data;\n"
+      "begin: nodes; structural: 1, dynamic, .1,.2,.3, eye, .5,0.,0., null;\n"
+      "abstract: 2, differential, value, .3, derivative, 1.; set: "
+      "[dof,PX,1,structural,1,algebraic];"
+      "set: [node,DX,1,structural,string=\"XP[1]\"]; set: [dof,NL,2,abstract,differential];\n"
+      "end: nodes;\n"
+      "begin: elements; body: 1, 1, 2., null, eye;\n"
+      "genel: 1, spring support, 2, abstract, algebraic, linear viscoelastic, 10., 1.;\n"
+      "end: elements;\n");
+  EXPECT_EQ(last_line("log", "  const real PX "), "  const real PX = 0.1");
+  EXPECT_EQ(last_line("log", "  const real DX "), "  const real DX = 0.5");
+  EXPECT_EQ(last_line("log", "  const real NL "), "  const real NL = 1.");
+}
+
 TEST_F(TextResults, LinesOfBeamsAndAbstractNodes) {
   run(initial_value_block(.5, 1,
                           "tolerance: 1e-10; max iterations: 20; derivatives tolerance: 1e9;") +

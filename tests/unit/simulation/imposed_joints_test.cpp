@@ -55,6 +55,71 @@ TEST(AngularAcceleration, WritesTheCoupleAlongTheDirectionAsRead) {
   for (std::size_t i = 0; i < reference.size(); ++i) EXPECT_NEAR(row.v[i], reference[i], 1e-8) << i;
 }
 
+/// What a total joint or total pin joint imposes, with a drive in global axes that grows as .1 t:
+/// numbers of the reference solver at t = .4 s.
+struct ImposedInGlobalAxes {
+  const char* joint;
+  Vec3 displacement, rotation;
+};
+
+class TotalJointDrives : public testing::TestWithParam<ImposedInGlobalAxes> {};
+
+TEST_P(TotalJointDrives, AreAlongTheAxesOfTheConstraint) {
+  const std::string drive = "single, reference, global, 1.,2.,3., ramp, .1, 0., forever, 0.";
+  std::string joint = GetParam().joint;
+  for (std::size_t at; (at = joint.find("DRIVE")) != std::string::npos;)
+    joint.replace(at, 5, drive);
+  DeckRun run(
+      initial_value_block(.1, 1,
+                          "tolerance: 1e-9; max iterations: 20; derivatives tolerance: 1e9;") +
+      R"(begin: control data; structural nodes: 2; rigid bodies: 2; joints: 1; end: control data;
+begin: nodes;
+  structural: 1, dynamic, 1.,2.,3., euler123, .1,.2,.3, null, null;
+  structural: 2, dynamic, 2.,-1.,1.5, euler123, -.3,.4,.1, null, null;
+end: nodes;
+begin: elements;
+  body: 1, 1, 1., null, eye;
+  body: 2, 2, 1., null, eye;
+  joint: 2, )" +
+      joint + ";\nend: elements;\n");
+  ASSERT_TRUE(run.ready());
+  run.step(4);
+  const double t = run.simulation().state().time;
+  const auto datum = [&](const char* name) { return run.datum(Family::joint, 2, name); };
+  const Vec3 displacement(datum("dx"), datum("dy"), datum("dz")),
+      rotation(datum("tx"), datum("ty"), datum("tz"));
+  EXPECT_LT((displacement - t / .4 * GetParam().displacement).norm(), 1e-12) << displacement;
+  EXPECT_LT((rotation - t / .4 * GetParam().rotation).norm(), 1e-12) << rotation;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Axes, TotalJointDrives,
+    testing::Values(
+        ImposedInGlobalAxes{
+            "total joint, 1, position orientation, euler123, .3,.2,.1, rotation orientation, "
+            "euler123, .2,-.1,.3, 2, position, reference, other node, null, position orientation, "
+            "reference, other orientation, eye, rotation orientation, reference, other "
+            "orientation, eye, position constraint, 1,1,1, DRIVE, orientation constraint, 1,1,1, "
+            "DRIVE",
+            Vec3(.03630671926557, .1103073429167, .09441457638958),
+            Vec3(.08136907476130, .08376995590360, .09360378283168)},
+        // `reference, node` of a pin's own place means the global frame
+        ImposedInGlobalAxes{
+            "total pin joint, 1, position, null, position, reference, node, 1.,2.,3., position "
+            "orientation, reference, node, euler123, .2,-.1,.3, position constraint, 1,1,1, DRIVE",
+            Vec3(.07793917056794, .08291638289872, .09721295766602), Vec3::Zero()}));
+
+/// The reference solver reads them as `reference, global`.
+TEST(Pins, OwnPlaceInAFrameOfTheNodeIsGlobal) {
+  for (const char* pin : {"spherical pin, 2, null, ", "imposed displacement pin, 2, null, "}) {
+    const std::string joint = std::string(pin) + "reference, node, .3,.1,-.2" +
+                              (pin[0] == 'i' ? ", 1.,0.,0., const, 0." : "");
+    DeckRun run(deck(joint));
+    ASSERT_TRUE(run.ready()) << pin;
+    EXPECT_LT((run.node(2).x - Vec3(.3, .1, -.2)).norm(), 1e-9) << pin;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Names, ImposedJoints,
     testing::Values(OldName{"imposed displacement, 1, .3,.1,-.2, 2, null, ",
