@@ -31,13 +31,15 @@ class Drive {
   T value_as(const EvalContext& context) const;
 };
 
-/// Called once at the start of each step, after time was set to the step's end and before the
-/// prediction; also once with `initial` at the start of the run. Registered with
-/// ModelBuilder::on_step.
+/// Registered with ModelBuilder::on_step.
 class StepListener {
  public:
   virtual ~StepListener() = default;
+  /// Called once at the start of each step, after time was set to the step's end and before the
+  /// prediction, but not of dummy steps; also once with `initial` at the start of the run.
   virtual void advance(const EvalContext& context, State& state, bool initial) const = 0;
+  /// Called when the state of an instant is found, as that of elements.
+  virtual void after_convergence(const EvalContext&, State&) const {}
 };
 
 /// A vector- or matrix-valued function: Σ entityₖ·driveₖ or one drive per component

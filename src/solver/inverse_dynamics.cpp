@@ -269,6 +269,8 @@ void InverseDynamics::finish(State& state) const {
   for (const ElementSpan& s : model_.stage_order)
     if (!inverse_constraint({s.set, s.range.first}))
       s.set->after_convergence(context(state), state, s.range);
+  for (const auto& listener : model_.step_listeners)
+    listener->after_convergence(context(state), state);
   for (const ElementRef& e : model_.elements)
     if (const auto* beams = beams_of(e); beams && !settings_.role(e.set->info(e.index)).ergonomy)
       accept_reference(*beams, e.index, state);

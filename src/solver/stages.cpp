@@ -24,6 +24,8 @@ void run_after_convergence(EvalContext context, Scratch& scratch, State& state) 
   accumulate(context);
   for (const ElementSpan& s : context.model->stage_order)
     s.set->after_convergence(context, state, s.range);
+  for (const auto& listener : context.model->step_listeners)
+    listener->after_convergence(context, state);
 }
 
 }  // namespace mbcosim

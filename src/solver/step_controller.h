@@ -36,6 +36,7 @@ struct StepAttempt {
   bool chosen = false;              ///< it is not the deck's
   std::optional<double> end = {};   ///< where the step ends, if not at the sum [s]
   bool accept_unconverged = false;  ///< it may end at its last iterate, being flagged then
+  bool dummy = false;               ///< before the run: what drives remember does not go on
 };
 
 /// What the controller advances.

@@ -274,8 +274,8 @@ void Stepper::select_pivots(const State& state) {
 
 PhaseReport Stepper::attempt_dummy_step(State& state, bool first) {
   const InitialValueSettings& s = model_.initial_value;
-  return attempt(state, {s.dummy_ratio * s.time_step}, s.dummy_method.value_or(MethodSettings{}),
-                 first, dummy_);
+  return attempt(state, {.h = s.dummy_ratio * s.time_step, .dummy = true},
+                 s.dummy_method.value_or(MethodSettings{}), first, dummy_);
 }
 
 void Stepper::end_dummy_steps(State& state) const {
@@ -405,8 +405,9 @@ PhaseReport Stepper::attempt(State& state, const StepAttempt& attempt, const Met
   try {
     begin_step(state, attempt, first);
     const StepFormula f = formula(state, attempt.h, method, first);
-    for (const auto& listener : model_.step_listeners)
-      listener->advance(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, false);
+    if (!attempt.dummy)
+      for (const auto& listener : model_.step_listeners)
+        listener->advance(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, false);
     predict(state, f);
     finish_prediction(state);
     update_activity(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, true);

@@ -15,9 +15,8 @@ double PolynomialDrive::derivative(const EvalContext&, double t) const {
   return c_[1] + t * (2 * c_[2] + t * 3 * c_[3]);
 }
 
-double TimeDrive::value(const EvalContext& context, double) const { return context.time; }
-
-double TimeStepDrive::value(const EvalContext& context, double) const { return context.h; }
+double TimeStepDrive::value(const EvalContext&, double t) const { return t; }
+double TimeStepDrive::value(const EvalContext& context) const { return context.h; }
 
 double StepDrive::value(const EvalContext&, double t) const {
   if (t == t0_ || t == t1_) return (i_ + s_) / 2;

@@ -10,7 +10,7 @@
 
 namespace mbcosim {
 
-/// c0 + c1 t + c2 t² + c3 t³: `linear`, `parabolic`, `cubic`, `direct`.
+/// c0 + c1 t + c2 t² + c3 t³: `linear`, `parabolic`, `cubic`; `time` and `direct` are t.
 class PolynomialDrive : public Drive {
  public:
   explicit PolynomialDrive(const std::array<double, 4>& c) : c_(c) {}
@@ -23,20 +23,13 @@ class PolynomialDrive : public Drive {
   std::array<double, 4> c_;
 };
 
-/// The time, whatever the argument.
-class TimeDrive : public Drive {
- public:
-  using Drive::value;
-  double value(const EvalContext& context, double t) const override;
-  bool has_derivative() const override { return true; }
-  double derivative(const EvalContext&, double) const override { return 1; }
-};
-
-/// The length of the present time step [s].
+/// In time the length of the present time step [s].
+///
+/// N.B. where a drive gives it an argument it is that argument: MBDyn's convention.
 class TimeStepDrive : public Drive {
  public:
-  using Drive::value;
   double value(const EvalContext& context, double t) const override;
+  double value(const EvalContext& context) const override;
 };
 
 /// `step`: i before t0, i + s after; `double step`: i + s between t0 and t1 only.

@@ -126,8 +126,13 @@ double PostponedDrive::derivative(const EvalContext& context, double t) const {
   return drive.has_derivative() ? drive.derivative(context, t) : 0;
 }
 
-double DofDrive::value(const EvalContext& context, double) const {
+double DofDrive::value(const EvalContext& context, double t) const { return f_->value(context, t); }
+double DofDrive::value(const EvalContext& context) const {
   return f_->value(context, context.model->dof_value(context, dof_));
+}
+
+double ScalarNodeDrive::value(const EvalContext& context, double) const {
+  return f_->value(context, context.model->dof_value(context, datum_));
 }
 
 double NodeDrive::value(const EvalContext& context, double) const {

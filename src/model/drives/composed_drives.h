@@ -113,14 +113,14 @@ class ScalarFunctionDrive : public Drive {
   ScalarFunctionPtr f_;
 };
 
-/// A · channel of a file driver.
+/// A · channel of a file driver in time, whatever the argument.
 class FileDrive : public Drive {
  public:
   FileDrive(FileDriverPtr driver, int channel, double amplitude)
       : driver_(std::move(driver)), channel_(channel), amplitude_(amplitude) {}
   using Drive::value;
-  double value(const EvalContext& context, double t) const override {
-    return amplitude_ * driver_->value(context, channel_, t);
+  double value(const EvalContext& context, double) const override {
+    return amplitude_ * driver_->value(context, channel_, context.time);
   }
 
  private:
@@ -129,19 +129,33 @@ class FileDrive : public Drive {
   double amplitude_;
 };
 
-/// f(value of a degree of freedom).
+/// In time f(value of a degree of freedom).
+///
+/// N.B. where a drive gives it an argument t it is f(t): MBDyn's convention.
 class DofDrive : public Drive {
  public:
   DofDrive(const NodeDof& dof, DrivePtr f) : dof_(dof), f_(std::move(f)) {}
-  using Drive::value;
   double value(const EvalContext& context, double t) const override;
+  double value(const EvalContext& context) const override;
 
  private:
   NodeDof dof_;
   DrivePtr f_;
 };
 
-/// f(private datum of a structural node).
+/// f(private datum of a scalar node), whatever the argument.
+class ScalarNodeDrive : public Drive {
+ public:
+  ScalarNodeDrive(const NodeDof& datum, DrivePtr f) : datum_(datum), f_(std::move(f)) {}
+  using Drive::value;
+  double value(const EvalContext& context, double t) const override;
+
+ private:
+  NodeDof datum_;
+  DrivePtr f_;
+};
+
+/// f(private datum of a structural node), whatever the argument.
 class NodeDrive : public Drive {
  public:
   NodeDrive(int node, int datum, DrivePtr f) : node_(node), datum_(datum), f_(std::move(f)) {}
@@ -153,7 +167,7 @@ class NodeDrive : public Drive {
   DrivePtr f_;
 };
 
-/// f(private datum of an element).
+/// f(private datum of an element), whatever the argument.
 class ElementDrive : public Drive {
  public:
   ElementDrive(ElementRef element, int datum, DrivePtr f)

@@ -152,9 +152,8 @@ void register_closed_form_drives(Registry& registry) {
   registry.drive({"null"}, constant(0));
   registry.drive({"unit", "one"}, constant(1));
   registry.drive({"const"}, [](Card& card) { return make_constant_drive(card.real("value")); });
-  registry.drive({"time"}, [](Card&) { return std::make_shared<TimeDrive>(); });
   registry.drive({"timestep"}, [](Card&) { return std::make_shared<TimeStepDrive>(); });
-  registry.drive({"direct"}, [](Card&) {
+  registry.drive({"time", "direct"}, [](Card&) {
     return std::make_shared<PolynomialDrive>(std::array<double, 4>{0, 1, 0, 0});
   });
   registry.drive({"linear"}, polynomial(2));

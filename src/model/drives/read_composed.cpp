@@ -104,8 +104,8 @@ DrivePtr read_scalar_node_drive(Card& card, ScalarKind kind, int label, SourceSp
   const std::string name = read_datum_name(card, owner, names);
   if (name != "x" && !(differential && name == "xP"))
     card.fail(owner + " has no private datum `" + name + "`", listed(names));
-  const NodeDof dof{false, node, 0, name == "xP" ? 1 : 0, differential};
-  return std::make_shared<DofDrive>(dof, card.drive("function of the private datum"));
+  const NodeDof datum{false, node, 0, name == "xP" ? 1 : 0, differential};
+  return std::make_shared<ScalarNodeDrive>(datum, card.drive("function of the private datum"));
 }
 
 DrivePtr read_node(Card& card) {

@@ -1,5 +1,9 @@
 #include "model/drives/step_driven_drives.h"
 
+#include <algorithm>
+#include <numeric>
+#include <span>
+
 #include "model/context.h"
 #include "model/diagnostic.h"
 
@@ -14,13 +18,16 @@ double RememberedDrive::value(const EvalContext& context, double) const {
   return context.state->memory[memory_];
 }
 
-void ClosestNextDrive::advance(const EvalContext& context, State& state, bool initial) const {
-  constexpr double kMostIncrements = 1e6;
+void ClosestNextDrive::advance(const EvalContext& context, State& state, bool) const {
   double& fires = state.memory[memory_];
   double& next = state.memory[memory_ + 1];
+  if (fires != 0 && state.step > 1) next = instant_after(context, next);
+  fires = context.time >= next && context.time <= t1_ ? 1 : 0;
+}
+
+double ClosestNextDrive::instant_after(const EvalContext& context, double next) const {
+  constexpr double kMostIncrements = 1e6;
   const double t = context.time;
-  fires = t >= next && t <= t1_ ? 1 : 0;
-  if (fires == 0) return;
   const double increment = increment_->value(context);
   if (!(increment > 0))
     throw EvaluationError("closest next: the increment must be positive, got " +
@@ -28,8 +35,8 @@ void ClosestNextDrive::advance(const EvalContext& context, State& state, bool in
   if ((t - next) / increment > kMostIncrements)
     throw EvaluationError("closest next: the increment " + std::to_string(increment) +
                           " is too small for the time step");
-  if (initial) return;  // it fires again at the first step, as in the reference solver
   while (next <= t) next += increment;
+  return next;
 }
 
 namespace {
@@ -59,26 +66,37 @@ void RandomDrive::advance(const EvalContext& context, State& state, bool) const 
   value = range_.mean + range_.amplitude * (2 * generator / static_cast<double>(kModulus) - 1);
 }
 
-void SampleAndHoldDrive::advance(const EvalContext& context, State& state, bool) const {
-  if (trigger_->value(context) != 0) state.memory[memory_] = f_->value(context);
+void SampleAndHoldDrive::advance(const EvalContext& context, State& state, bool initial) const {
+  if (!initial && trigger_->value(context) != 0) state.memory[memory_] = f_->value(context);
 }
 
-void DiscreteFilterDrive::advance(const EvalContext& context, State& state, bool) const {
-  double* y = &state.memory[memory_ + 1];
-  double* u = y + a_.size();
-  const double input = input_->value(context);
-  if (!b_.empty()) {
-    for (std::size_t k = b_.size() - 1; k > 0; --k) u[k] = u[k - 1];
-    u[0] = input;
-  }
-  double sum = b0_ * input;
-  for (std::size_t k = 0; k < a_.size(); ++k) sum += a_[k] * y[k];
-  for (std::size_t k = 0; k < b_.size(); ++k) sum += b_[k] * u[k];
-  if (!a_.empty()) {
-    for (std::size_t k = a_.size() - 1; k > 0; --k) y[k] = y[k - 1];
-    y[0] = sum;
-  }
-  state.memory[memory_] = sum;
+namespace {
+
+/// Makes room for the newest value at the front; the oldest one drops out.
+void age(std::span<double> history) { std::shift_right(history.begin(), history.end(), 1); }
+
+}  // namespace
+
+double DiscreteFilterDrive::value(const EvalContext& context, double t) const {
+  return b0_ * input_->value(context, t) + context.state->memory[memory_];
+}
+double DiscreteFilterDrive::value(const EvalContext& context) const {
+  return b0_ * input_->value(context) + context.state->memory[memory_];
+}
+
+void DiscreteFilterDrive::advance(const EvalContext& context, State& state, bool initial) const {
+  if (initial) return;
+  const std::span y(&state.memory[memory_ + 1], a_.size()), u(y.data() + y.size(), b_.size());
+  age(u);
+  if (!u.empty()) u[0] = input_->value(context);
+  double& sum = state.memory[memory_];
+  sum = std::inner_product(a_.begin(), a_.end(), y.begin(), 0.0);
+  sum = std::inner_product(b_.begin(), b_.end(), u.begin(), sum);
+  age(y);  // yₖ follows when it is known
+}
+
+void DiscreteFilterDrive::after_convergence(const EvalContext& context, State& state) const {
+  if (!a_.empty()) state.memory[memory_ + 1] = value(context);
 }
 
 void BistopDrive::advance(const EvalContext& context, State& state, bool) const {

@@ -16,6 +16,7 @@ namespace mbcosim {
 class MeterDrive : public Drive {
  public:
   MeterDrive(double t0, double t1, int steps) : t0_(t0), t1_(t1), steps_(steps) {}
+  int steps() const { return steps_; }
   using Drive::value;
   double value(const EvalContext& context, double t) const override;
 
@@ -35,8 +36,11 @@ class RememberedDrive : public Drive, public StepListener {
   int memory_;
 };
 
-/// 1 in the first step that ends at or after the next instant (within t1), then the instant moves
-/// on by the increment.
+/// 1 in the first step that ends at or after the next instant (within t1).
+///
+/// N.B. the instant moves on at the start of the step after, by increments of that step and past
+/// its end: instants that fall within it are lost, so that no two steps in turn fire. But a drive
+/// that fires at the initial time fires at the first step, too. MBDyn's convention.
 class ClosestNextDrive : public RememberedDrive {
  public:
   static constexpr int kMemory = 2;  ///< value, next instant
@@ -45,6 +49,7 @@ class ClosestNextDrive : public RememberedDrive {
   void advance(const EvalContext& context, State& state, bool initial) const override;
 
  private:
+  double instant_after(const EvalContext& context, double next) const;
   double t1_;
   DrivePtr increment_;
 };
@@ -67,7 +72,7 @@ class RandomDrive : public RememberedDrive {
   Range range_;
 };
 
-/// f taken at each step in which the trigger is not 0, and held.
+/// f taken at each step in which the trigger is not 0, and held; not at the initial time.
 class SampleAndHoldDrive : public RememberedDrive {
  public:
   static constexpr int kMemory = 1;
@@ -79,12 +84,13 @@ class SampleAndHoldDrive : public RememberedDrive {
   DrivePtr f_, trigger_;
 };
 
-/// yₖ = b₀ uₖ + Σ aⱼ yₖ₋ⱼ + Σ bⱼ uₖ₋ⱼ₊₁.
+/// yₖ = b₀ u + Σ aⱼ yₖ₋ⱼ + Σ bⱼ uₖ₋ⱼ₊₁, u the present input, uₖ that of the start of step k with
+/// the time of its end; without u₀.
 ///
 /// N.B. the terms of b₁ … see inputs one step newer than in a textbook filter: MBDyn's convention.
 class DiscreteFilterDrive : public RememberedDrive {
  public:
-  /// Memory: value, y (na), u (nb).
+  /// Memory: the sums, y (na), u (nb).
   DiscreteFilterDrive(int memory, std::vector<double> a, double b0, std::vector<double> b,
                       DrivePtr input)
       : RememberedDrive(memory),
@@ -92,7 +98,10 @@ class DiscreteFilterDrive : public RememberedDrive {
         b_(std::move(b)),
         b0_(b0),
         input_(std::move(input)) {}
+  double value(const EvalContext& context, double t) const override;
+  double value(const EvalContext& context) const override;
   void advance(const EvalContext& context, State& state, bool initial) const override;
+  void after_convergence(const EvalContext& context, State& state) const override;
 
  private:
   std::vector<double> a_, b_;

@@ -76,20 +76,23 @@ class DriveTable : public testing::Test {
     state_.memory.resize(offset + count, initial);
     return offset;
   }
-  std::shared_ptr<ClosestNextDrive> closest_next(double t0, double t1, double increment) {
+  std::shared_ptr<ClosestNextDrive> closest_next(double t0, double t1, DrivePtr increment) {
     const int memory = allocate(ClosestNextDrive::kMemory);
     state_.memory[memory + 1] = t0;
-    return std::make_shared<ClosestNextDrive>(memory, t1, make_constant_drive(increment));
+    return std::make_shared<ClosestNextDrive>(memory, t1, std::move(increment));
+  }
+  std::shared_ptr<ClosestNextDrive> closest_next(double t0, double t1, double increment) {
+    return closest_next(t0, t1, make_constant_drive(increment));
   }
   DrivePtr sample_and_hold(DrivePtr trigger, double initial) {
     const int memory = allocate(SampleAndHoldDrive::kMemory, initial);
-    return listen(
-        std::make_shared<SampleAndHoldDrive>(memory, std::make_shared<TimeDrive>(), trigger));
+    return listen(std::make_shared<SampleAndHoldDrive>(memory, linear(0, 1), trigger));
   }
-  DrivePtr discrete_filter() {
-    return listen(std::make_shared<DiscreteFilterDrive>(allocate(3), std::vector<double>{.5}, .25,
-                                                        std::vector<double>{.1},
-                                                        std::make_shared<TimeDrive>()));
+  std::shared_ptr<DiscreteFilterDrive> discrete_filter(std::vector<double> a, double b0,
+                                                       std::vector<double> b, DrivePtr input) {
+    const int memory = allocate(1 + static_cast<int>(a.size() + b.size()));
+    return listen(std::make_shared<DiscreteFilterDrive>(memory, std::move(a), b0, std::move(b),
+                                                        std::move(input)));
   }
   EvalContext context() const {
     EvalContext c;
@@ -103,6 +106,16 @@ class DriveTable : public testing::Test {
     state_.time = number * h;
     state_.h = h;
     for (const auto& listener : listeners_) listener->advance(context(), state_, number == 0);
+    for (const auto& listener : listeners_) listener->after_convergence(context(), state_);
+  }
+  /// Numbers of the steps up to `last` in which a drive is not 0.
+  std::vector<int> steps_of(const Drive& drive, int last) {
+    std::vector<int> steps;
+    for (int number = 0; number <= last; ++number) {
+      advance_to(number);
+      if (drive.value(context()) != 0) steps.push_back(number);
+    }
+    return steps;
   }
 
   State state_;
@@ -212,10 +225,7 @@ TEST_F(DriveTable, MatchesReferenceSolver) {
        polynomial(1, 2, 3, 4),
        {1, 3.25, 5.092773, 5.875, 10, 16, 32.13965, 49, 87.25, 142, 216.25},
        {4.25, 8, 20, 28.25, 62, 92, 128}},
-      {"time",
-       std::make_shared<TimeDrive>(),
-       {0, 0.5, 0.6875, 0.75, 1, 1.25, 1.6875, 2, 2.5, 3, 3.5},
-       {}},
+      {"time", linear(0, 1), {0, 0.5, 0.6875, 0.75, 1, 1.25, 1.6875, 2, 2.5, 3, 3.5}, {}},
       {"timestep",
        std::make_shared<TimeStepDrive>(),
        {0.0625, 0.0625, 0.0625, 0.0625, 0.0625, 0.0625, 0.0625, 0.0625, 0.0625, 0.0625, 0.0625},
@@ -230,8 +240,8 @@ TEST_F(DriveTable, MatchesReferenceSolver) {
         -5.612532},
        {3.896353, 5.428032, 6.607698, 6.003195, -0.5242787, -7.219835, -13.29541}},
       {"array, 3, const, 1., sine, 0., 1., 2., forever, 0., time",
-       std::make_shared<SumDrive>(std::vector<DrivePtr>{make_constant_drive(1), sine(0, 1, 2, 0, 0),
-                                                        std::make_shared<TimeDrive>()}),
+       std::make_shared<SumDrive>(
+           std::vector<DrivePtr>{make_constant_drive(1), sine(0, 1, 2, 0, 0), linear(0, 1)}),
        {1, 2.458851, 2.956714, 3.113278, 3.682942, 4.147969, 4.673896, 4.818595, 4.696944, 4.28224,
         3.798434},
        {2.937825, 2.755165, 2.080605, 1.630645, 0.1677063, -0.6022872, -0.979985}},
@@ -260,8 +270,16 @@ TEST_F(DriveTable, MatchesReferenceSolver) {
        sample_and_hold(listen(closest_next(1, kForever, .3)), -7),
        {-7, -7, -7, -7, 1, 1, 1.625, 1.9375, 2.5, 2.8125, 3.4375},
        {}},
+      {"sample and hold, time, const, 1., initial value, 3.",
+       sample_and_hold(make_constant_drive(1), 3),
+       {3, 0.5, 0.6875, 0.75, 1, 1.25, 1.6875, 2, 2.5, 3, 3.5},
+       {}},
+      {"sample and hold, time, meter, 0., forever, steps, 4, initial value, 5.",
+       sample_and_hold(std::make_shared<MeterDrive>(0, kForever, 4), 5),
+       {5, 0.5, 0.5, 0.75, 1, 1.25, 1.5, 2, 2.5, 3, 3.5},
+       {}},
       {"discrete filter, 1, .5, .25, 1, .1, time",
-       discrete_filter(),
+       discrete_filter({.5}, .25, {.1}, linear(0, 1)),
        {0, 0.3064209, 0.4375214, 0.4812607, 0.6562507, 0.83125, 1.1375, 1.35625, 1.70625, 2.05625,
         2.40625},
        {}},
@@ -429,11 +447,13 @@ TEST_F(DriveTable, MeterCountsStepsFromTheStart) {
 
 TEST_F(DriveTable, ClosestNextRefusesAnIncrementThatDoesNotAdvance) {
   listen(closest_next(0, kForever, 0));
-  EXPECT_THROW(advance_to(0), EvaluationError);
+  advance_to(0);
+  advance_to(1);
+  EXPECT_THROW(advance_to(2), EvaluationError);
 }
 
 TEST_F(DriveTable, DiscreteFilterSeesInputsOneStepNewer) {
-  const DrivePtr filter = discrete_filter();
+  const DrivePtr filter = discrete_filter({.5}, .25, {.1}, linear(0, 1));
   const std::vector<double> expected = {0, 0.021875, 0.0546875, 0.09296875};
   for (int k = 0; k < 4; ++k) {
     advance_to(k);
@@ -488,6 +508,88 @@ TEST_F(DriveTable, BistopRemembers) {
   EXPECT_EQ(drive->value(context(), 0), 1);
   advance_to(17);
   EXPECT_EQ(drive->value(context(), 0), 0);
+}
+
+/// Numbers of steps of the reference solver's `drive caller: 10, closest next, t0, forever, …,
+/// output, yes`.
+TEST_F(DriveTable, ClosestNextLosesTheInstantsWithinTheStepAfter) {
+  const auto fires = [&](double t0, DrivePtr increment) {
+    listeners_.clear();
+    return steps_of(*listen(closest_next(t0, kForever, std::move(increment))), 18);
+  };
+  const std::vector<int> odd{0, 1, 3, 5, 7, 9, 11, 13, 15, 17};
+  EXPECT_EQ(fires(0, make_constant_drive(.01)), odd);
+  EXPECT_EQ(fires(0, make_constant_drive(.0625)), odd);
+  EXPECT_EQ(fires(0, make_constant_drive(.1)), (std::vector<int>{0, 1, 4, 7, 10, 12, 15, 18}));
+  EXPECT_EQ(fires(0, make_constant_drive(.125)),
+            (std::vector<int>{0, 1, 4, 6, 8, 10, 12, 14, 16, 18}));
+  EXPECT_EQ(fires(.0625, make_constant_drive(.1)), (std::vector<int>{1, 3, 5, 8, 11, 13, 16}));
+  EXPECT_EQ(fires(.3, linear(.1, .1)), (std::vector<int>{5, 7, 10, 13, 16}));
+  EXPECT_EQ(fires(.3, linear(0, 1)), (std::vector<int>{5, 11}));
+}
+
+/// The reference solver's `discrete filter, 2, .5, -.2, .3, 2, .1, .05, const, 1.`.
+TEST_F(DriveTable, DiscreteFilterStartsWithoutTheInitialInput) {
+  const auto filter = discrete_filter({.5, -.2}, .3, {.1, .05}, make_constant_drive(1));
+  const std::vector<double> values{.3, .55, .665, .6725, .65325, .642125};
+  for (int number = 0; number < 6; ++number) {
+    advance_to(number);
+    EXPECT_NEAR(filter->value(context()), values[number], 1e-12) << number;
+  }
+}
+
+/// A degree of freedom that a step changes.
+class Unknown : public Drive {
+ public:
+  using Drive::value;
+  double value(const EvalContext& context, double) const override { return context.state->y[0]; }
+};
+
+/// As the reference solver's `discrete filter, 1, 1., 1., 1, 0.`, which sums the velocities of a
+/// node at the ends of the steps, and `1, 0., 0., 1, 1.`, which gives those of the starts.
+TEST_F(DriveTable, DiscreteFilterSeesThePresentInput) {
+  const auto input = std::make_shared<Unknown>();
+  const auto sum = discrete_filter({1}, 1, {0}, input),
+             delayed = discrete_filter({0}, 0, {1}, input);
+  state_.y = {0};
+  advance_to(0);
+  const std::vector<double> velocities{-.00143057, -.00343814, -.00588541};
+  double expected_sum = 0, before = 0;
+  for (int number = 1; number <= 3; ++number) {
+    advance_to(number);  // with the unknown of the step before
+    state_.y = {velocities[number - 1]};
+    for (const auto& listener : listeners_) listener->after_convergence(context(), state_);
+    expected_sum += state_.y[0];
+    EXPECT_NEAR(sum->value(context()), expected_sum, 1e-12) << number;
+    EXPECT_NEAR(delayed->value(context()), before, 1e-12) << number;
+    before = state_.y[0];
+  }
+}
+
+/// Where an argument is given, the history is still that of the input in time.
+TEST_F(DriveTable, DiscreteFilterTakesAnArgumentForThePresentInputAlone) {
+  const auto filter = discrete_filter({.5}, .3, {.1}, linear(0, 1));
+  for (int number = 0; number <= 2; ++number) advance_to(number, 1);
+  EXPECT_NEAR(filter->value(context()), .3 * 2 + .5 * (.3 + .1) + .1 * 2, 1e-12);
+  EXPECT_NEAR(filter->value(context(), 7), .3 * 7 + .5 * (.3 + .1) + .1 * 2, 1e-12);
+}
+
+/// As `drive, …, const, .3`.
+TEST_F(DriveTable, ArgumentsReplaceTheTime) {
+  advance_to(8);
+  const auto at_argument = [&](DrivePtr f) {
+    return ChainDrive(std::move(f), make_constant_drive(.3)).value(context());
+  };
+  const DrivePtr time = linear(0, 1), timestep = std::make_shared<TimeStepDrive>();
+  EXPECT_EQ(at_argument(timestep), .3);
+  EXPECT_EQ(timestep->value(context()), .0625);
+  EXPECT_EQ(at_argument(std::make_shared<FileDrive>(file2(), 0, 1)), 1);
+  advance_to(12);
+  EXPECT_EQ(at_argument(std::make_shared<FileDrive>(file2(), 0, 1)), 1.5);
+  EXPECT_EQ(PeriodicDrive(0, .5, std::make_shared<FileDrive>(file2(), 0, 1)).value(context()), 1.5);
+  const ChainDrive chain(std::make_shared<ProductDrive>(time, time), linear(.1, .2));
+  EXPECT_NEAR(chain.value(context()), .0625, 1e-15);
+  EXPECT_NEAR(derivative_in_time(chain, context()), 2 * .25 * .2, 1e-15);
 }
 
 TEST_F(DriveTable, PostponedFollowsTheDriveCallerDeclaredLater) {
