@@ -160,7 +160,7 @@ void read_template_drive_caller(DeckCard& card) {
     map[label] = {std::move(drive), card.head()};
   };
   if (shape == "1")
-    store(deck.drives1, [&] { return card.scalar_template_drive(); });
+    store(deck.drives1, [&] { return card.scalar_template_drive("template drive"); });
   else if (shape == "3")
     store(deck.drives3, [&] { return card.vec3_drive(); });
   else if (shape == "6")

@@ -68,11 +68,12 @@ struct Deck {
   LabelMap<DrivePtr> drives;
   std::unordered_map<int, int>
       drive_depth;  ///< length of the chain of references behind a drive caller
-  std::vector<int> drives_without_output;  ///< indices in Model::drives whose card has no `output`
+  std::vector<int> drives_without_output;  ///< indices in Model::drives whose card does not
+                                           ///< tell whether the value is written
   LabelMap<LawPtr<1>> laws1;
   LabelMap<LawPtr<3>> laws3;
   LabelMap<LawPtr<6>> laws6;
-  LabelMap<TplDrivePtr<1>> drives1;
+  LabelMap<DrivePtr> drives1;
   LabelMap<TplDrivePtr<3>> drives3;
   LabelMap<TplDrivePtr<6>> drives6;
   LabelMap<TplDrivePtr<3, 3>> drives33;

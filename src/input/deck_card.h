@@ -72,6 +72,7 @@ class DeckCard final : public Card, public BeamOutputDefault {
   BeamOutput default_beam_output() const override;
 
   DrivePtr drive(std::string_view what = "drive") override;
+  DrivePtr scalar_template_drive(std::string_view what) override;
   Vec3DrivePtr vec3_drive(std::string_view what = "vector drive",
                           const VectorAxes& axes = {}) override;
   TplDrivePtr<6> vec6_drive(std::string_view what = "vector drive") override;
@@ -161,8 +162,6 @@ class DeckCard final : public Card, public BeamOutputDefault {
   double equation_scale();
   /// `name, "<text>"` when it is there.
   std::string optional_name();
-  /// Vector, orientation or number for a `template drive caller`; see template_drive_reader.cpp.
-  TplDrivePtr<1> scalar_template_drive();
   TplDrivePtr<6, 6> mat6_drive(std::string_view what);
   Value value(std::string_view what);
 
@@ -249,6 +248,8 @@ class DeckCard final : public Card, public BeamOutputDefault {
   template <int N>
   void refuse_other_dimension();
   void refuse_order(const std::string& reason);
+  /// The next argument is an expression: no string, no word of the language, not empty.
+  bool at_expression();
   ScalarFunctionPtr function_definition(const std::string& name, SourceSpan where);
   template <int R, int C, class ReadEntity>
   TplDrivePtr<R, C> template_drive(std::string_view what, ReadEntity read);

@@ -53,6 +53,7 @@ class DriveCard : public Card {
   Vec3 relative_unit_vector(std::string_view, int) override { refuse("a frame"); }
   Vec3 absolute_unit_vector(std::string_view, int) override { refuse("a frame"); }
   Mat3 relative_tensor(std::string_view, int) override { refuse("a frame"); }
+  DrivePtr scalar_template_drive(std::string_view) override { refuse("a template drive"); }
   TplDrivePtr<6> vec6_drive(std::string_view) override { refuse("a vector of six drives"); }
   TplDrivePtr<3, 3> mat3_drive(std::string_view) override { refuse("a matrix of drives"); }
   LawPtr<1> law1() override { refuse("a constitutive law"); }

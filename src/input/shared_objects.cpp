@@ -127,8 +127,6 @@ LabelMap<TplDrivePtr<R, C>>& template_drives(Deck& deck) {
     return deck.drives66;
   else if constexpr (C == 3)
     return deck.drives33;
-  else if constexpr (R == 1)
-    return deck.drives1;
   else if constexpr (R == 3)
     return deck.drives3;
   else
@@ -200,10 +198,20 @@ TplDrivePtr<3, 3> DeckCard::mat3_drive(std::string_view what) {
 TplDrivePtr<6, 6> DeckCard::mat6_drive(std::string_view what) {
   return template_drive<6, 6>(what, [&] { return mat6(what); });
 }
-TplDrivePtr<1> DeckCard::scalar_template_drive() {
-  std::vector<SumTplDrive<1>::Term> terms;
-  terms.push_back({VecN<1>(1.0), drive("template drive")});
-  return std::make_shared<SumTplDrive<1>>(std::move(terms));
+DrivePtr DeckCard::scalar_template_drive(std::string_view what) {
+  need_argument(what);
+  if (!keyword("reference")) {
+    one_of({"component", "single"});
+    return drive(what);
+  }
+  const int label = this->label("template drive caller label");
+  const auto found = deck_.drives1.find(label);
+  if (found != deck_.drives1.end()) return found->second.object;
+  const std::string number = std::to_string(label);
+  fail_undefined(last(), "template drive caller", label,
+                 deck_.drives.count(label)
+                     ? "write `component, reference, " + number + "` for drive caller " + number
+                     : "");
 }
 
 // ----------------------------------------------------------------------------------------------
@@ -301,6 +309,11 @@ LawPtr<6> DeckCard::law6() { return law_of<6>(); }
 // ----------------------------------------------------------------------------------------------
 // functions and fluids
 
+bool DeckCard::at_expression() {
+  return more() && !at_string() && !at_empty() &&
+         (peek_word().empty() || deck_.reading.symbols.find(next_text()));
+}
+
 ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceSpan where) {
   const Nesting nesting(*this);
   if (const auto known = deck_.function_places.find(name); known != deck_.function_places.end())
@@ -309,14 +322,17 @@ ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceS
         "scalar function \"" + name + "\" already defined at " + deck_.reading.place(known->second),
         "", "redefinition");
   const std::string w = peek_word();
-  const auto* const found = registry().functions.find(w);
+  const auto* found = registry().functions.find(w);
+  if (found)
+    skip();
+  else if (at_expression())
+    found = registry().functions.find("const");
   if (!found) {
     if (!more()) fail("scalar function type missing", "", "missing-argument");
     if (w.empty())
       fail_expected("scalar function type expected, e.g. const, linear, multilinear, cubic spline");
     fail_word("scalar function", w, registry().functions, "function");
   }
-  skip();
   ScalarFunctionPtr f = read_as("function", found->key, found->value);
   deck_.reading.functions[name] = f;
   deck_.function_places[name] = where;
@@ -338,6 +354,8 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
   if (known != deck_.reading.functions.end()) return known->second;
   if (deck_.damaged_kinds.count("scalar function \"" + name + "\""))
     deck_.reading.set_damaged(true);
+  else if (at_expression())
+    return function_definition(name, where);
   fail_at(where, "scalar function \"" + name + "\" is not defined",
           suggested_function(name, deck_.reading.functions), "undefined");
 }

@@ -106,6 +106,10 @@ class Card {
 
   // ------------------------------------------------------------------ shared objects
   virtual DrivePtr drive(std::string_view what = "drive") = 0;
+  /// One-dimensional template drive: a drive, after `component` or `single` or alone; `reference`
+  /// means the label of a template drive caller.
+  virtual DrivePtr scalar_template_drive(std::string_view what) = 0;
+  /// Vector template drive.
   virtual Vec3DrivePtr vec3_drive(std::string_view what = "vector drive",
                                   const VectorAxes& axes = {}) = 0;
   virtual TplDrivePtr<6> vec6_drive(std::string_view what = "vector drive") = 0;

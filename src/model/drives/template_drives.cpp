@@ -47,12 +47,10 @@ auto ComponentTplDrive<R, C>::derivative(const EvalContext& context) const -> Va
   return v;
 }
 
-template class SumTplDrive<1>;
 template class SumTplDrive<3>;
 template class SumTplDrive<6>;
 template class SumTplDrive<3, 3>;
 template class SumTplDrive<6, 6>;
-template class ComponentTplDrive<1>;
 template class ComponentTplDrive<3>;
 template class ComponentTplDrive<6>;
 template class ComponentTplDrive<3, 3>;

@@ -43,12 +43,10 @@ class ComponentTplDrive final : public TplDrive<R, C> {
   std::vector<DrivePtr> drives_;
 };
 
-extern template class SumTplDrive<1>;
 extern template class SumTplDrive<3>;
 extern template class SumTplDrive<6>;
 extern template class SumTplDrive<3, 3>;
 extern template class SumTplDrive<6, 6>;
-extern template class ComponentTplDrive<1>;
 extern template class ComponentTplDrive<3>;
 extern template class ComponentTplDrive<6>;
 extern template class ComponentTplDrive<3, 3>;

@@ -34,7 +34,7 @@ Prestress<N> read_prestress(Card& card) {
   if (card.keyword("prestress")) p.stress = read_law_vector<N>(card, "prestress");
   if (card.keyword("prestrain")) {
     if constexpr (N == 1)
-      p.strain = card.drive("prestrain");
+      p.strain = card.scalar_template_drive("prestrain");
     else if constexpr (N == 3)
       p.strain = card.vec3_drive("prestrain");
     else

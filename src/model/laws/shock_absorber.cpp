@@ -139,7 +139,7 @@ Area read_area(Card& card, std::string_view what) {
 
 LawPtr<1> read_shock_absorber(Card& card) {
   Prestress<1> pre;
-  if (card.keyword("prestrain")) pre.strain = card.drive("prestrain");
+  if (card.keyword("prestrain")) pre.strain = card.scalar_template_drive("prestrain");
   ShockAbsorberData d;
   (void)card.keyword("help");  // asks the reference solver to print the syntax
   d.pressure = card.real("reference pressure");
