@@ -1,5 +1,6 @@
 /// Named objects that a deck may define in any block: frames, drives, laws, functions, fluids.
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <map>
 
 #include "input/cards.h"
@@ -78,23 +79,30 @@ void read_reference(DeckCard& card) {
 // ------------------------------------------------------------------------------------------------
 // drives
 
-void read_drive_output(DeckCard& card, NamedDrive& d) {
+/// A bare `yes` adds the derivative where there is one. True: it is told whether the value is
+/// written.
+bool read_drive_output(DeckCard& card, NamedDrive& d) {
+  bool told = false;
   while (card.keyword("output")) {
     bool named = true;
     do {
       switch (card.one_of({"value", "derivative"})) {
         case 0:
           d.output_value = card.yes_no("output of the value");
+          told = true;
           break;
         case 1:
           d.output_derivative = card.yes_no("output of the derivative");
           break;
         default:
           d.output_value = card.yes_no("output");
+          d.output_derivative = d.output_value && d.drive->has_derivative();
+          told = true;
           named = false;
       }
     } while (named && (card.peek_word() == "value" || card.peek_word() == "derivative"));
   }
+  return told;
 }
 
 void drop_missing_derivative(DeckCard& card, const Drive& drive, bool& wanted) {
@@ -116,8 +124,12 @@ void read_drive_trace(DeckCard& card, const NamedDrive& d) {
     trace.derivative = trace.value && d.drive->has_derivative();
   }
   drop_missing_derivative(card, *d.drive, trace.derivative);
-  if (trace.value || trace.derivative)
-    part<DriveTraces>(card.builder()).traces.push_back(std::move(trace));
+  if (!trace.value && !trace.derivative) return;
+  std::vector<DriveTraces::Trace>& traces = part<DriveTraces>(card.builder()).traces;
+  const auto place =
+      std::upper_bound(traces.begin(), traces.end(), d.label,
+                       [](int label, const DriveTraces::Trace& t) { return label < t.label; });
+  traces.insert(place, std::move(trace));
 }
 
 void read_drive_caller(DeckCard& card) {
@@ -127,9 +139,8 @@ void read_drive_caller(DeckCard& card) {
   d.name = card.optional_name();
   card.keyword("deferred");
   d.drive = card.drive();
-  if (card.peek_word() != "output")
+  if (!read_drive_output(card, d))
     deck.drives_without_output.push_back(static_cast<int>(card.model().drives.size()));
-  read_drive_output(card, d);
   drop_missing_derivative(card, *d.drive, d.output_derivative);
   read_drive_trace(card, d);
   card.expect_end();

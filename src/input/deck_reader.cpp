@@ -1,5 +1,6 @@
 #include "input/deck_reader.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "input/cards.h"
@@ -36,6 +37,14 @@ bool has_content(std::string_view text) {
     }
   }
   return false;
+}
+
+/// By label, as .drv lists them.
+void sort_drives(Model& model) {
+  std::sort(model.drives.begin(), model.drives.end(),
+            [](const NamedDrive& a, const NamedDrive& b) { return a.label < b.label; });
+  for (std::size_t k = 0; k < model.drives.size(); ++k)
+    model.drive_index[model.drives[k].label] = static_cast<int>(k);
 }
 
 }  // namespace
@@ -335,6 +344,7 @@ void DeckReader::finish() {
                  "give a final time after the initial one, or `forever`");
   if (model.control.output_drives)
     for (const int d : deck_.drives_without_output) model.drives[d].output_value = true;
+  sort_drives(model);
 }
 
 }  // namespace mbcosim

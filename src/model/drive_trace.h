@@ -6,7 +6,7 @@
 
 namespace mbcosim {
 
-/// Drives with `output trace`: a ModelPart. Their lines stand in .trc for every step.
+/// Drives with `output trace`, by label: a ModelPart. Their lines stand in .trc for every step.
 struct DriveTraces {
   struct Trace {
     int label;

@@ -3,6 +3,7 @@
 #include <charconv>
 
 #include "model/deck_channel.h"
+#include "model/drives/step_driven_drives.h"
 
 namespace mbcosim {
 
@@ -89,13 +90,16 @@ void index_lists(std::string& s, const Model& model) {
   list(s, model, "struct displacement node labels", all, label);
 }
 
+std::string output_frequency(const ControlSettings& control) {
+  if (!control.output_meter) return std::to_string(control.output_frequency);
+  const auto* meter = dynamic_cast<const MeterDrive*>(control.output_meter.get());
+  return meter ? std::to_string(meter->steps()) : "custom";
+}
+
 }  // namespace
 
 std::string model_log(const Model& model) {
-  std::string s = "output frequency: " +
-                  (model.control.output_meter ? std::string("custom")
-                                              : std::to_string(model.control.output_frequency)) +
-                  '\n';
+  std::string s = "output frequency: " + output_frequency(model.control) + '\n';
   for (std::size_t k = 0; k < model.structural.size(); ++k)
     node_line(s, model, static_cast<int>(k));
   for (const DeckChannel* channel : deck_channels(model))

@@ -211,7 +211,8 @@ class TextWriter : public ResultWriter, private OutputRow {
     const auto end = std::to_chars(digits, digits + sizeof digits, label).ptr;
     const int count = static_cast<int>(end - digits);
     char* p = current_->room(32);
-    if (count < kLabel && file != OutputFile::frc && file != OutputFile::trc) {
+    if (count < kLabel && file != OutputFile::frc && file != OutputFile::drv &&
+        file != OutputFile::trc) {
       std::memset(p, ' ', kLabel);
       p += kLabel - count;
     }
