@@ -21,15 +21,23 @@ int SampleTable::row_before(double t) const {
   return std::clamp(static_cast<int>(k) - 1, 0, last);
 }
 
-double TableDriver::value(const EvalContext&, int channel, double t) const {
-  const int last = table_.rows() - 1;
-  const double first_time = table_.time(0), last_time = table_.time(last);
-  if (t < first_time && options_.bail_lower)
+void TableDriver::check(double t) const {
+  if (t < table_.time(0) && options_.bail_lower)
     throw EndOfRun("file driver: time " + std::to_string(t) +
                    " is before the first sample (bailout)");
-  if (t > last_time && options_.bail_upper)
+  if (t > table_.time(table_.rows() - 1) && options_.bail_upper)
     throw EndOfRun("file driver: time " + std::to_string(t) +
                    " is after the last sample (bailout)");
+}
+
+void TableWatch::advance(const EvalContext& context, State&, bool) const {
+  table_->check(context.time);
+}
+
+double TableDriver::value(const EvalContext&, int channel, double t) const {
+  check(t);
+  const int last = table_.rows() - 1;
+  const double first_time = table_.time(0), last_time = table_.time(last);
   const bool edge_is_outside = !table_.times.empty();
   if (t < first_time || (edge_is_outside && t == first_time))
     return options_.pad_zeros ? 0.0 : sample(0, channel);

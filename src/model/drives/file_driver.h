@@ -1,9 +1,12 @@
 /// File drivers: named sources of channels of values in time. MBDyn input manual, "File drivers".
 #pragma once
 
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "model/drive.h"
 #include "model/fwd.h"
 
 namespace mbcosim {
@@ -46,6 +49,8 @@ class TableDriver : public FileDriver {
       : table_(std::move(table)), options_(options) {}
   int channels() const override { return table_.channels; }
   double value(const EvalContext& context, int channel, double t) const override;
+  /// Throws EndOfRun when the table is left at time t on a side with `bailout`.
+  void check(double t) const;
 
  private:
   double sample(int row, int channel) const {
@@ -53,6 +58,16 @@ class TableDriver : public FileDriver {
   }
   SampleTable table_;
   TableOptions options_;
+};
+
+/// A table with `bailout` ends the run also where nothing asks for its values.
+class TableWatch : public StepListener {
+ public:
+  explicit TableWatch(std::shared_ptr<const TableDriver> table) : table_(std::move(table)) {}
+  void advance(const EvalContext& context, State& state, bool initial) const override;
+
+ private:
+  std::shared_ptr<const TableDriver> table_;
 };
 
 /// Values received from a peer, kept in State::memory; they hold until new ones arrive.

@@ -67,7 +67,10 @@ FileDriverPtr make_table_driver(Card& card, SampleTable table, const TableOption
     card.fail("file driver: the initial time " + std::to_string(t) + " is outside the samples, " +
                   std::to_string(first) + " to " + std::to_string(last),
               "`bailout` ends the run there; start it within the samples or use `pad zeroes`");
-  return std::make_shared<TableDriver>(std::move(table), options);
+  auto driver = std::make_shared<TableDriver>(std::move(table), options);
+  if (options.bail_lower || options.bail_upper)
+    card.builder().on_step(std::make_shared<TableWatch>(driver));
+  return driver;
 }
 
 FileDriverPtr read_fixed_step(Card& card, int) {

@@ -438,5 +438,24 @@ end: elements;
   EXPECT_NEAR(run.node(2).x(0), .22 + std::pow(.22 - .0205, 2.5) * 4 / 15, 1e-5);
 }
 
+/// The reference solver, too, makes four steps of this deck and ends with exit code 0.
+TEST(DeckDetails, FileDriverWithBailoutEndsTheRunThoughNobodyAsksIt) {
+  DeckRun run({{"deck.mbd",
+                deck("final time: 1.; time step: .125; max iterations: 20; tolerance: "
+                     "1e-6;",
+                     "structural nodes: 1; rigid bodies: 1; file drivers: 1;",
+                     R"(begin: nodes; structural: 1, dynamic, null, eye, 1.,0.,0., null; end: nodes;
+begin: drivers; file: 7, fixed step, 3, 1, initial time, 0., time step, .25, bailout, upper, "x.dat"; end: drivers;
+begin: elements; body: 1, 1, 1., null, eye; end: elements;
+)")},
+               {"x.dat", "1.\n2.\n3.\n"}});
+  ASSERT_TRUE(run.ready());
+  const StepReport report = run.simulation().run_until(1);
+  EXPECT_FALSE(report.error);
+  EXPECT_EQ(report.outcome, StepOutcome::finished);
+  EXPECT_EQ(report.steps_done, 4);
+  EXPECT_EQ(run.simulation().time(), .5);
+}
+
 }  // namespace
 }  // namespace mbcosim::deck_details_test
