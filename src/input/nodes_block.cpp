@@ -79,12 +79,15 @@ Sampling read_parameter(DeckCard& card, ScalarNode& node) {
   return sampling;
 }
 
+/// The card switches on the lines of `.mov`; those of `.ine`, which the node's own card and
+/// `default output` switch on with them, it switches off, as MBDyn does.
 void read_nodes_output(DeckCard& card) {
   const int type = card.required("node type", kNodeWords);
   Model& model = card.model();
   const bool accelerations = type == 0 && card.keyword("accelerations");
   const auto mark_structural = [&](StructuralNode& node) {
     node.output = true;
+    node.output_inertia = false;
     node.accelerations |= accelerations;
   };
   const std::string kind =

@@ -179,6 +179,7 @@ TEST(OutputCard, SwitchesNodesOn) {
   EXPECT_TRUE(report.model->structural[0].accelerations);
   EXPECT_FALSE(report.model->structural[1].output);
   EXPECT_TRUE(report.model->structural[2].output);
+  EXPECT_FALSE(report.model->structural[2].output_inertia);
   EXPECT_FALSE(report.model->scalars[0].output);
 }
 
