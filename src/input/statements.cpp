@@ -221,8 +221,12 @@ struct Statements::Impl {
     Cursor c(reading, s);
     bool all = !c.more();
     while (c.more()) {
-      const std::string space = c.word("namespace");
-      if (space == "all" || space == "default")
+      const bool is_quoted = c.at_string();
+      const std::string space = is_quoted ? c.quoted("namespace") : c.word("namespace");
+      if (is_quoted)
+        reading.warn(c.last(), "no namespace has a name in quotes: \"" + space + "\" ignored",
+                     "write the name without quotes");
+      else if (space == "all" || space == "default")
         all = true;
       else if (space != "model")
         reading.warn(c.last(), "unknown namespace \"" + space + "\" ignored");

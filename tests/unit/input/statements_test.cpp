@@ -95,6 +95,13 @@ TEST(PrintSymbolTable, ListsSortedNamesWithTypes) {
   EXPECT_EQ(c.lines.front(), "  const string A = \"x\"");
 }
 
+TEST(PrintSymbolTable, IgnoresNamesInQuotes) {
+  const Calculation c = calculate("print symbol table: \"default\"; remark: 1;");
+  EXPECT_THAT(c.lines, ElementsAre("1"));
+  EXPECT_THAT(c.messages,
+              ElementsAre(testing::HasSubstr("no namespace has a name in quotes: \"default\"")));
+}
+
 TEST(Exit, EndsTheDeck) { EXPECT_THAT(lines("remark: 1; exit; remark: 2;"), ElementsAre("1")); }
 
 TEST(Variables, RedefineOptionAssignsAndTakesTheNewType) {
