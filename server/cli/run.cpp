@@ -9,6 +9,7 @@
 #include "cli/progress.h"
 #include "input/sources.h"
 #include "mbdyn/channels.h"
+#include "output/dof_text.h"
 #include "output/result_files.h"
 #include "threads/interrupt.h"
 
@@ -57,11 +58,13 @@ ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& wr
   simulation->set_threads(threads_or_all(options.threads));
   if (const auto started = simulation->start(cancel); !started) return complain(started.error());
   if (simulation->finished()) {
+    const InitialValueSettings& s = model->initial_value;
+    if (s.abort_after != InitialValueSettings::AbortAfter::never) return kDone;
     std::fprintf(stderr,
                  "note: no step was made: the final time, %g s (0 without the card `final time`), "
                  "is not after the initial one\n"
                  "  hint: write a later `final time`, or `final time: forever`\n",
-                 model->initial_value.final_time);
+                 s.final_time);
     return kDone;
   }
   const StepReport done = run_to_end(*simulation, cancel, options);
@@ -164,6 +167,7 @@ int run(const RunOptions& options) {
       std::fprintf(stderr, "note: nobody is coupled to port \"%s\"; its loads stay zero\n",
                    port.name.c_str());
 
+  if (!has_dof_file(*report.model)) std::fputs(dof_text(*report.model).c_str(), stdout);
   const std::string prefix = options.prefix.empty() ? options.deck : options.prefix;
   const auto writer = make_result_writer(formats_of(options, *report.model), prefix, nullptr);
   const auto kept = check_inputs(read, writer->paths(*report.model),

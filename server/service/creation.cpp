@@ -138,11 +138,11 @@ class Fresh {
 /// LAPACK cannot be stopped: the deck's own eigenanalyses are written only of what it does quickly.
 void check_eigenanalyses(const Model& model) {
   constexpr int kMost = 300;
-  for (const EigenSettings& settings : model.initial_value.eigenanalyses)
-    if (settings.solver == EigenSettings::Solver::lapack && model.unknowns > kMost)
-      throw limit_refusal("eigenanalysis_unknowns", kMost,
-                          "an `eigenanalysis` of the deck is too large for a dense solver: write "
-                          "`use arpack, <number>, <basis>, <tolerance>`");
+  const std::optional<EigenSettings>& settings = model.initial_value.eigenanalysis;
+  if (settings && settings->is_dense() && model.unknowns > kMost)
+    throw limit_refusal("eigenanalysis_unknowns", kMost,
+                        "an `eigenanalysis` of the deck is too large for a dense solver: write "
+                        "`use arpack, <number>, <basis>, <tolerance>`");
 }
 
 /// The model of a deck at its initial solution, with the codes at its sockets where the options ask

@@ -7,6 +7,7 @@
 #include "model/family.h"
 #include "model/model_part.h"
 #include "model/netcdf_sync.h"
+#include "model/printed_dofs.h"
 #include "model/unit_system.h"
 #include "model/user_elements.h"
 
@@ -217,10 +218,20 @@ void read_units(DeckCard& card) {
 }
 
 void read_print(DeckCard& card) {
-  while (card.more())
-    card.required(
+  PrintedDofs& p = part<PrintedDofs>(card.builder());
+  while (card.more()) {
+    const int item = card.required(
         "item", {"dof stats", "dof description", "equation description", "description",
                  "element connection", "node connection", "connection", "all", "none", "to file"});
+    const bool all = item == 7;
+    p.statistics |= all || item == 0;
+    p.dofs |= all || item == 1 || item == 3;
+    p.equations |= all || item == 2 || item == 3;
+    p.element_connections |= all || item == 4 || item == 6;
+    p.node_connections |= all || item == 5 || item == 6;
+    p.to_file |= item == 9;
+    if (item == 8) p = {.to_file = p.to_file};
+  }
 }
 
 void read_select_timeout(DeckCard& card) {

@@ -24,7 +24,8 @@ void read_iterative_eigensolver(DeckCard& card, EigenSettings& e, EigenSettings:
 
 void read_eigen_option(DeckCard& card, EigenSettings& e) {
   using Balance = EigenSettings::Balance;
-  constexpr Balance kBalance[] = {Balance::no, Balance::permute, Balance::scale, Balance::all};
+  // MBDyn permutes when it is to scale, too.
+  constexpr Balance kBalance[] = {Balance::no, Balance::permute, Balance::all, Balance::all};
   switch (card.required(
       "option",
       {"parameter", "output matrices", "output full matrices", "output sparse matrices",
@@ -88,11 +89,13 @@ void read_eigenanalysis(DeckCard& card) {
   EigenSettings e;
   read_eigen_times(card, e);
   while (card.more()) read_eigen_option(card, e);
-  if (e.solver == EigenSettings::Solver::lapack || e.ncv > e.nev) {
-    card.model().initial_value.eigenanalyses.push_back(std::move(e));
-    return;
-  }
-  card.fail("the number of basis vectors must be greater than the number of eigenvalues");
+  if (!e.is_dense() && e.ncv <= e.nev)
+    card.fail("the number of basis vectors must be greater than the number of eigenvalues");
+  std::optional<EigenSettings>& kept = card.model().initial_value.eigenanalysis;
+  if (kept)
+    card.warn_at(card.head(), "the eigenanalysis card before this one has no effect",
+                 "give the times in one card: `eigenanalysis: list, 2, <t1>, <t2>`");
+  kept = std::move(e);
 }
 
 }  // namespace mbcosim

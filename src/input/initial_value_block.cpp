@@ -243,7 +243,10 @@ void read_output(DeckCard& card) {
                          "jacobian matrix", "bailout", "messages", "counter", "cpu time",
                          "matrix condition number", "solver condition number"})) {
       case 0:
-        asks = false;
+        asks = settings(card).messages = false;
+        break;
+      case 7:
+        settings(card).messages = true;
         break;
       case 10:
       case 11:
@@ -261,9 +264,9 @@ void read_output(DeckCard& card) {
     }
   }
   if (asks)
-    card.note(
-        "nothing is printed during the iterations; `.out` has their number and the residual "
-        "of each step");
+    card.note(std::string("nothing is printed during the iterations; `.out` has ") +
+              (settings(card).messages ? "their number and the residual of each step"
+                                       : "no line of a step without `messages`"));
 }
 
 void read_abort_after(DeckCard& card) {

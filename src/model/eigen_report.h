@@ -27,14 +27,13 @@ struct GeneralizedEigen {
   Eigen::MatrixXcd right, left;
   int first = 0,
       last = -1;  ///< eigenvalues outside were isolated by the balancing (zero-based, inclusive)
-  double norm_a = 0, norm_b = 0;  ///< after balancing
+  double norm_a = 0, norm_b = 0;  ///< after balancing; −1 without it
 };
 
 /// What one analysis found; `solution` has one entry per mode.
 struct EigenReport {
   EigenSettings settings;
-  int index = 0;    ///< position in the deck's list of times
-  int count = 1;    ///< length of that list
+  int index = 0;    ///< position in the card's list of times
   double time = 0;  ///< [s]
   std::int64_t step = 0;
   BilinearPencil pencil;

@@ -33,14 +33,20 @@ struct EigenSettings {
   std::vector<double> times;
   double parameter = 1;
   bool matrices_full = false, matrices_sparse = false, eigenvectors = false, geometry = false;
-  int matrix_precision = 0, results_precision = 0;    ///< 0: default
+  int matrix_precision = 0, results_precision = 0;    ///< 0: that of all results
   double lower_frequency = -1, upper_frequency = -1;  ///< [Hz], negative: no limit
-  enum class Solver { lapack, arpack, jdqz } solver = Solver::lapack;
-  enum class Balance { no, permute, scale, all } balance = Balance::permute;
+  enum class Solver { unnamed, lapack, arpack, jdqz } solver = Solver::unnamed;
+  enum class Balance { no, permute, all } balance = Balance::permute;
   int nev = 0, ncv = 0;
   double tolerance = 0;
   int suffix_width = -1;               ///< -1: compute
   std::string suffix_format = "%0*d";  ///< as SuffixFormat reads it
+
+  bool is_dense() const { return solver == Solver::unnamed || solver == Solver::lapack; }
+  /// Sparse matrices are for other programs: alone they are all that is wanted.
+  bool finds_modes() const { return !matrices_sparse || eigenvectors || solver != Solver::unnamed; }
+  /// Else the table of the run log is all.
+  bool has_file() const { return matrices_full || matrices_sparse || eigenvectors || geometry; }
 };
 
 struct InitialValueSettings {
@@ -89,7 +95,8 @@ struct InitialValueSettings {
     derivatives,
     dummy_steps
   } abort_after = AbortAfter::never;
-  std::vector<EigenSettings> eigenanalyses;
+  bool messages = true;  ///< `.out` tells of the derivatives phase, the dummy steps and each step
+  std::optional<EigenSettings> eigenanalysis;  ///< of the last card
 };
 
 struct ControlSettings {

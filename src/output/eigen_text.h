@@ -8,13 +8,11 @@
 
 namespace mbcosim {
 
-/// Status line, header and one line per retained mode.
-std::string eigen_table(const EigenReport& report);
+/// Status line, header and one line per retained mode; empty when none were looked for.
+std::string eigen_table(const EigenReport& report, int digits);
 /// What stands between PREFIX and ".m": "_" and the position in the list of times, by the card's
 /// format.
-std::string eigen_suffix(const EigenReport& report);
-/// The same for the analysis at position `index` of `count`.
-std::string eigen_suffix(const EigenSettings& settings, int index, int count);
+std::string eigen_suffix(const EigenSettings& settings, int index);
 /// dTime, dCoef, and, as the card asks, Aplus, Aminus, labels, idx, X0, alpha, VR, VL.
 std::string eigen_file(const EigenReport& report, const Model& model);
 

@@ -132,6 +132,8 @@ class NetcdfWriter : public ResultWriter, public OutputRow {
   }
   void define_labels();
   void put_first_unknowns(const EigenReport& report);
+  /// `size`: the dimension of rows and of columns.
+  void put_matrices(const EigenReport& report, const std::string& name, int size);
 
   /// The fields of the line that starts; known by file and label.
   void start_line(OutputFile file, const std::string& label) {
@@ -265,6 +267,15 @@ void NetcdfWriter::put_first_unknowns(const EigenReport& report) {
   file_.put(first_unknowns_, values);
 }
 
+void NetcdfWriter::put_matrices(const EigenReport& report, const std::string& name, int size) {
+  for (const bool plus : {true, false}) {
+    const MatX dense = model_->dense(plus ? report.pencil.plus : report.pencil.minus).transpose();
+    file_.put(define(name + (plus ? ".Aplus" : ".Aminus"), NetcdfFile::Type::real, {size, size}, "",
+                     "real", "F/xPrime +- dCoef F/x"),
+              std::vector<double>(dense.data(), dense.data() + dense.size()));
+  }
+}
+
 void NetcdfWriter::eigenanalysis(const EigenReport& report) {
   const std::string name = "eig." + std::to_string(report.index),
                     size_name = "eig_" + std::to_string(report.index);
@@ -280,11 +291,13 @@ void NetcdfWriter::eigenanalysis(const EigenReport& report) {
   file_.put(time, std::vector<double>{report.time});
   file_.put(kappa, std::vector<double>{report.pencil.kappa});
   if (report.settings.geometry) put_first_unknowns(report);
-  if (report.modes.empty()) return;
-
+  const bool matrices = report.settings.matrices_full || report.settings.matrices_sparse;
+  if (report.modes.empty() && !matrices) return;
   const std::size_t n = static_cast<std::size_t>(model_->unknowns), m = report.modes.size();
-  const int size = file_.dimension(size_name + "_iSize", n),
-            modes = file_.dimension(size_name + "_iNVec_out", m), three = dimension(3),
+  const int size = file_.dimension(size_name + "_iSize", n);
+  if (matrices) put_matrices(report, name, size);
+  if (report.modes.empty()) return;
+  const int modes = file_.dimension(size_name + "_iNVec_out", m), three = dimension(3),
             two = dimension(2);
   std::vector<double> alpha;
   const GeneralizedEigen& s = report.solution;
@@ -293,13 +306,6 @@ void NetcdfWriter::eigenanalysis(const EigenReport& report) {
   file_.put(
       define(name + ".alpha", Type::real, {modes, three}, "", "real", "re(alpha), im(alpha), beta"),
       alpha);
-  if (report.settings.matrices_full || report.settings.matrices_sparse)
-    for (const bool plus : {true, false}) {
-      const MatX dense = model_->dense(plus ? report.pencil.plus : report.pencil.minus).transpose();
-      file_.put(define(name + (plus ? ".Aplus" : ".Aminus"), Type::real, {size, size}, "", "real",
-                       "F/xPrime +- dCoef F/x"),
-                std::vector<double>(dense.data(), dense.data() + dense.size()));
-    }
   if (!report.settings.eigenvectors) return;
   for (const bool right : {true, false}) {
     const Eigen::MatrixXcd& v = right ? report.solution.right : report.solution.left;

@@ -1,1 +1,1 @@
-set(SOURCES model_log.cpp eigen_text.cpp netcdf_file.cpp netcdf_library.cpp netcdf_records.cpp netcdf_writer.cpp record.cpp result_files.cpp result_history.cpp result_writer.cpp sample_files.cpp scientific.cpp text_file.cpp text_writer.cpp)
+set(SOURCES model_log.cpp dof_text.cpp eigen_text.cpp netcdf_file.cpp netcdf_library.cpp netcdf_records.cpp netcdf_writer.cpp record.cpp result_files.cpp result_history.cpp result_writer.cpp sample_files.cpp scientific.cpp text_file.cpp text_writer.cpp)

@@ -5,7 +5,9 @@
 #include <charconv>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
+#include "output/dof_text.h"
 #include "output/eigen_text.h"
 #include "output/model_log.h"
 #include "output/record.h"
@@ -38,6 +40,7 @@ class TextWriter : public ResultWriter, private OutputRow {
     std::vector<std::string> all = sample_paths(model, prefix_);
     for (const TextFile& file : files_) all.push_back(file.path());
     all.insert(all.end(), {out_.path(), log_.path()});
+    if (has_dof_file(model)) all.push_back(dof_path());
     each_eigenanalysis(model, [&](const std::string& path, double) { all.push_back(path); });
     return all;
   }
@@ -47,24 +50,29 @@ class TextWriter : public ResultWriter, private OutputRow {
     out_.create();
     log_.create();
     log_.text(model_log(model));
+    if (has_dof_file(model)) write_whole(dof_path(), dof_text(model));
     if (has_joint_output(model)) files_[static_cast<std::size_t>(OutputFile::jnt)].create();
     if (model.control.output_reference_frames) write_reference_frames(model, *this);
   }
   void derivatives(double time, int iterations, double error) override {
+    if (!messages_) return;
     out_.text("# Derivatives solution step at time " + general(time) + " performed in " +
               std::to_string(iterations) + " iterations with " + general(error) + " error\n");
-    if (model_->initial_value.dummy_steps == 0) header();
+    header_is_due_ = true;
   }
   void dummy_steps(double time, int iterations, double error) override {
+    if (!messages_) return;
     out_.text("# Initial solution after dummy steps at time " + general(time) + " performed in " +
               std::to_string(iterations) + " iterations with " + general(error) + " error\n");
-    header();
   }
   void begin_at(std::int64_t step, double time) override {
+    if (!messages_) return;
     out_.text("# Begins at step " + std::to_string(step) + ", time " + general(time) + "\n");
     header();
   }
   void step(const StepLine& s) override {
+    if (!messages_) return;
+    if (std::exchange(header_is_due_, false)) header();
     char* p = out_.room(256);
     const auto put = [&](std::string_view t) {
       std::memcpy(p, t.data(), t.size());
@@ -88,11 +96,10 @@ class TextWriter : public ResultWriter, private OutputRow {
   }
   void note(const std::string& text) override { out_.text(text); }
   void eigenanalysis(const EigenReport& report) override {
-    out_.text(eigen_table(report));
-    TextFile file;
-    file.open(prefix_ + eigen_suffix(report) + ".m", budget_);
-    file.text(eigen_file(report, *model_));
-    if (!file.finish() && other_) other_ = file.status();
+    out_.text(eigen_table(report, precision_));
+    if (report.settings.has_file())
+      write_whole(prefix_ + eigen_suffix(report.settings, report.index) + ".m",
+                  eigen_file(report, *model_));
   }
   void record(const EvalContext& context) override { write_record(context, *this); }
   void samples(const EvalContext& context) override {
@@ -114,6 +121,7 @@ class TextWriter : public ResultWriter, private OutputRow {
   void resume(const Model& model) override {
     know(model);
     each([](TextFile& file) { file.reopen(); });
+    if (budget_ && has_dof_file(model)) (void)budget_->take(size_of(dof_path()));
     each_eigenanalysis(*model_, [&](const std::string& path, double) {
       if (budget_) (void)budget_->take(size_of(path));
     });
@@ -155,7 +163,17 @@ class TextWriter : public ResultWriter, private OutputRow {
   void know(const Model& model) {
     model_ = &model;
     precision_ = model.control.output_precision;
+    messages_ = model.initial_value.messages;
     samples_.open(model, prefix_, budget_);
+  }
+  std::string dof_path() const { return prefix_ + ".dof"; }
+  /// A file that is written once.
+  void write_whole(const std::string& path, std::string_view text) {
+    TextFile file;
+    file.open(path, budget_);
+    file.create();
+    file.text(text);
+    if (!file.finish() && other_) other_ = file.status();
   }
   /// Calls `action` with each file, always in the same order.
   template <class Self, class Action>
@@ -172,12 +190,10 @@ class TextWriter : public ResultWriter, private OutputRow {
   /// Calls `action` with the path and the time of each eigenanalysis of the deck.
   template <class Action>
   void each_eigenanalysis(const Model& model, Action&& action) const {
-    int index = 0, count = 0;
-    for (const EigenSettings& s : model.initial_value.eigenanalyses)
-      count += static_cast<int>(s.times.size());
-    for (const EigenSettings& s : model.initial_value.eigenanalyses)
-      for (const double time : s.times)
-        action(prefix_ + eigen_suffix(s, index++, count) + ".m", time);
+    const std::optional<EigenSettings>& s = model.initial_value.eigenanalysis;
+    if (!s || !s->has_file()) return;
+    for (std::size_t k = 0; k < s->times.size(); ++k)
+      action(prefix_ + eigen_suffix(*s, static_cast<int>(k)) + ".m", s->times[k]);
   }
   /// Their files are none of this history any more.
   void forget_eigenanalyses_after(double now) {
@@ -252,7 +268,9 @@ class TextWriter : public ResultWriter, private OutputRow {
   ResultBudget* const budget_;  ///< may be null
   const Model* model_ = nullptr;
   int precision_ = 6;
-  Status other_ = ok();  ///< of files other than the members
+  bool messages_ = true;
+  bool header_is_due_ = false;  ///< before the next step; eigenanalyses stand above it
+  Status other_ = ok();         ///< of files other than the members
   std::array<TextFile, static_cast<std::size_t>(OutputFile::count)> files_;
   TextFile out_, log_;
   SampleFiles samples_;

@@ -106,6 +106,10 @@ struct Simulation::Impl {
   }
 
   Status start();
+  /// Phases between the initial assembly and the first step, with the record of step 0.
+  Status start_motion();
+  /// A deck that asks for no step: the record of what there is, and `text` in the run log.
+  Status end_without_steps(const std::string& text);
   void tell(StartEvent event) const {
     if (start_observer) start_observer(event);
   }
@@ -143,7 +147,7 @@ PhaseReport Simulation::Impl::run_dummy_steps() {
   return report;
 }
 
-/// Phases before the first step: assembly, derivatives, dummy steps, record of step 0.
+/// Phases before the first step.
 Status Simulation::Impl::start() {
   const InitialValueSettings& s = model->initial_value;
   using AbortAfter = InitialValueSettings::AbortAfter;
@@ -152,20 +156,22 @@ Status Simulation::Impl::start() {
     writer->begin(*model);
     if (auto status = writer->status(); !status) return status;
   }
-  if (s.abort_after == AbortAfter::input) {
-    record();
-    return ok();
-  }
+  if (s.abort_after == AbortAfter::input)
+    return end_without_steps("End of Input; no simulation or assembly is required.\n");
   if (inverse) return start_inverse();
   if (auto status = stepper.assemble(state); !status) return status;
   state.control.exact_time = time_keeping == TimeKeeping::exact;
-  if (s.abort_after == AbortAfter::assembly || s.final_time < s.initial_time) {
-    record();
-    return ok();
-  }
+  if (s.abort_after == AbortAfter::assembly || final_time < s.initial_time)
+    return end_without_steps("End of Initial Assembly; no simulation is required.\n");
   if (auto status = analyse_modes(-HUGE_VAL, std::nextafter(s.initial_time, -HUGE_VAL)); !status)
     return status;
   tell(StartEvent::assembled);
+  return start_motion();
+}
+
+Status Simulation::Impl::start_motion() {
+  const InitialValueSettings& s = model->initial_value;
+  using AbortAfter = InitialValueSettings::AbortAfter;
   PhaseReport report = stepper.solve_derivatives(state);
   if (report.error) {
     record();
@@ -174,23 +180,38 @@ Status Simulation::Impl::start() {
   tell(StartEvent::derivatives_solved);
   if (writer)
     writer->derivatives(state.time, report.newton.iterations, report.newton.residual_error);
-  NewtonReport last = report.newton;
-  if (s.dummy_steps > 0 && s.abort_after != AbortAfter::derivatives) {
+  if (s.abort_after == AbortAfter::derivatives || !(final_time > s.initial_time)) {
+    if (writer) writer->samples(context());
+    return end_without_steps("End of derivatives; no simulation is required.\n");
+  }
+  if (auto status = analyse_modes(std::nextafter(s.initial_time, -HUGE_VAL), s.initial_time);
+      !status)
+    return status;
+  StepLine line;
+  if (s.dummy_steps > 0) {
     report = run_dummy_steps();
     if (report.error) return *report.error;
     if (writer)
       writer->dummy_steps(state.time, report.newton.iterations, report.newton.residual_error);
-    last = report.newton;
     state.step = 0;
+    line.h = s.dummy_ratio * s.time_step;
   }
   if (writer) writer->samples(context());
-  StepLine line;
-  line.time = state.time;
-  line.iterations = last.iterations;
-  line.residual_error = last.residual_error;
+  line.time = state.time + line.h;  // MBDyn tells where another dummy step would end
+  line.iterations = report.newton.iterations;
+  line.residual_error = report.newton.residual_error;
   line.recorded = record();
-  if (writer) writer->step(line);
-  return analyse_modes(std::nextafter(s.initial_time, -HUGE_VAL), s.initial_time);
+  if (!writer) return ok();
+  writer->step(line);
+  if (s.abort_after == AbortAfter::dummy_steps)
+    writer->note("End of dummy steps; no simulation is required.\n");
+  return ok();
+}
+
+Status Simulation::Impl::end_without_steps(const std::string& text) {
+  record();
+  if (writer) writer->note(text);
+  return ok();
 }
 
 /// Inverse dynamics begins with the record at the initial time.
@@ -203,20 +224,16 @@ Status Simulation::Impl::start_inverse() {
 }
 
 Status Simulation::Impl::analyse_modes(double after, double until) {
-  if (!writer) return ok();
-  int index = 0, count = 0;
-  for (const EigenSettings& s : model->initial_value.eigenanalyses)
-    count += static_cast<int>(s.times.size());
-  for (const EigenSettings& s : model->initial_value.eigenanalyses)
-    for (const double time : s.times) {
-      const int position = index++;
-      if (!(time > after && time <= until)) continue;
-      auto report = mbcosim::analyse_modes(*model, state, s, cancel);
-      if (!report) return report.error();
-      report->index = position;
-      report->count = count;
-      writer->eigenanalysis(*report);
-    }
+  const std::optional<EigenSettings>& settings = model->initial_value.eigenanalysis;
+  if (!writer || !settings) return ok();
+  for (std::size_t k = 0; k < settings->times.size(); ++k) {
+    const double time = settings->times[k];
+    if (!(time > after && time <= until)) continue;
+    auto report = mbcosim::analyse_modes(*model, state, *settings, cancel);
+    if (!report) return report.error();
+    report->index = static_cast<int>(k);
+    writer->eigenanalysis(*report);
+  }
   return ok();
 }
 
@@ -273,7 +290,8 @@ Status Simulation::Impl::check_length(double length) const {
 
 StepReport Simulation::Impl::step(const CancelToken* cancel, const StepChoice& choice) {
   StepReport report;
-  const double previous_time = state.time;
+  // Dummy steps passed the instants between the initial time and the state without a look at them.
+  const double previous_time = state.step == 0 ? model->initial_value.initial_time : state.time;
   const auto begin = std::chrono::steady_clock::now();
   this->cancel = cancel;
   stepper.set_cancelled(cancel);

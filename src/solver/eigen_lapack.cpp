@@ -32,7 +32,7 @@ Result<GeneralizedEigen> generalized_eigen(MatX a, MatX b, EigenSettings::Balanc
   GeneralizedEigen result;
   result.alpha_r = result.alpha_i = result.beta = VecX::Zero(n);
   if (n == 0) return result;
-  const char balance_code = "NPSB"[static_cast<int>(balance)], job = vectors ? 'V' : 'N',
+  const char balance_code = "NPB"[static_cast<int>(balance)], job = vectors ? 'V' : 'N',
              sense = 'N';
   MatX left = MatX::Zero(n, n), right = MatX::Zero(n, n);
   VecX scale_left(n), scale_right(n), condition(n), condition_vectors(n);
@@ -56,6 +56,7 @@ Result<GeneralizedEigen> generalized_eigen(MatX a, MatX b, EigenSettings::Balanc
                           std::to_string(info) + ")");
   result.first = low - 1;
   result.last = high - 1;
+  if (balance == EigenSettings::Balance::no) result.norm_a = result.norm_b = -1;
   if (vectors) {
     result.right = unpack(right, result.alpha_i);
     result.left = unpack(left, result.alpha_i);

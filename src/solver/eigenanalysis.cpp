@@ -31,10 +31,11 @@ Result<GeneralizedEigen> iterative(const Model& model, const State& state,
   return result;
 }
 
+/// Of a pair only one is above a lower limit: that with the positive imaginary part.
 bool within_limits(const EigenSettings& s, std::complex<double> eigenvalue) {
-  const double frequency = std::abs(eigenvalue.imag()) / (2 * M_PI);
-  return !(s.lower_frequency >= 0 && frequency < s.lower_frequency) &&
-         !(s.upper_frequency >= 0 && frequency > s.upper_frequency);
+  const double frequency = eigenvalue.imag() / (2 * M_PI);
+  return !(s.lower_frequency >= 0 && frequency <= s.lower_frequency) &&
+         !(s.upper_frequency >= 0 && std::abs(frequency) > s.upper_frequency);
 }
 
 std::vector<EigenReport::NodePose> poses(const Model& model, const State& state) {
@@ -59,7 +60,9 @@ Result<EigenReport> analyse_modes(const Model& model, const State& state,
   report.time = state.time;
   report.step = state.step;
   report.pencil = bilinear_pencil(model, state, settings.parameter / 2);
-  const bool lapack = settings.solver == EigenSettings::Solver::lapack;
+  if (settings.geometry) report.nodes = poses(model, state);
+  if (!settings.finds_modes()) return report;
+  const bool lapack = settings.is_dense();
   if (lapack && model.unknowns > kLargestWhole)
     return make_error(ErrorKind::limit, "EIGENANALYSIS_SIZE",
                       "eigenanalysis: " + std::to_string(model.unknowns) +
@@ -75,7 +78,6 @@ Result<EigenReport> analyse_modes(const Model& model, const State& state,
   for (int k = report.solution.first; k <= report.solution.last; ++k)
     if (const auto s = report.eigenvalue(k); std::isfinite(s.real()) && within_limits(settings, s))
       report.modes.push_back(k);
-  if (settings.geometry) report.nodes = poses(model, state);
   return report;
 }
 

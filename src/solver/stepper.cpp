@@ -179,15 +179,19 @@ Status Stepper::assemble(State& state) {
   update_activity(model_.context(state, Phase::assembly), state, false);
   auto report = assemble_initially(model_, state, cancel_);
   if (!report) return report.error();
-  const EvalContext context = model_.context(state, Phase::derivatives);
-  for (const ElementRef& e : model_.elements)
-    if (e.set->is_active(state, e.index)) e.set->add_momentum(context, e.index, state);
   for (const StructuralNode& n : model_.structural)
     if (n.has_rotation()) put(state.yp, n.first + 3, Vec3::Zero());  // ġ relative to w_ref = w
   return ok();
 }
 
+void Stepper::add_momenta(State& state) const {
+  const EvalContext context = model_.context(state, Phase::derivatives);
+  for (const ElementRef& e : model_.elements)
+    if (e.set->is_active(state, e.index)) e.set->add_momentum(context, e.index, state);
+}
+
 PhaseReport Stepper::solve_derivatives(State& state) {
+  add_momenta(state);
   const State start = state;
   const DerivativesHooks hooks(model_, start, cancel_, start_exchange_);
   const InitialValueSettings& s = model_.initial_value;

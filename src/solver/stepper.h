@@ -37,9 +37,9 @@ class Stepper final : public StepSystem {
   void set_tangents(std::unique_ptr<TangentSolver> tangents);
   TangentSolver* tangents() { return workspace_.tangents.get(); }
 
-  /// Initial assembly, momenta. The state comes from make_initial_state.
+  /// Initial assembly. The state comes from make_initial_state.
   Status assemble(State& state);
-  /// Accelerations and multipliers at the initial time.
+  /// Momenta, accelerations and multipliers at the initial time, after `assemble`.
   PhaseReport solve_derivatives(State& state);
   /// One of the `dummy steps`: short steps before the first regular one. On failure the state is
   /// anywhere.
@@ -61,6 +61,8 @@ class Stepper final : public StepSystem {
   std::int64_t factorizations() const;  ///< by iterations so far
 
  private:
+  /// Those of the bodies, to the nodes.
+  void add_momenta(State& state) const;
   /// Pivots for all regular steps, from the matrix at the initial state: the same in every
   /// simulation of a model.
   void choose_pivots(const State& state);

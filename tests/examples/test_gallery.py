@@ -132,7 +132,7 @@ def test_the_gyroscope_precesses_at_the_rate_of_the_fast_top(tmp_path):
 def test_the_rotor_blade_flaps_at_the_published_frequencies(tmp_path):
     run = Run(tmp_path, "rotor_blade")
     text = pathlib.Path(f"{run.prefix}_0.m").read_text()
-    table = np.array([row.split() for row in re.search(r"alpha = \[\s*(.*?)\];", text, re.S).group(1).splitlines() if row.strip()], float)
+    table = np.array([row.rstrip(";").split() for row in re.search(r"alpha = \[\s*(.*?)\];", text, re.S).group(1).splitlines() if row.strip()], float)
     coefficient = float(re.search(r"dCoef = (\S+);", text).group(1))
     ratio = (table[:, 0] + 1j * table[:, 1]) / table[:, 2]
     values = (ratio - 1) / (ratio + 1) / coefficient

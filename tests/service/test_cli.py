@@ -237,6 +237,22 @@ def test_a_run_without_a_final_time_tells_that_it_made_no_step(tmp_path):
     assert "hint: write a later `final time`" in run.stderr
 
 
+def test_a_deck_that_asks_for_no_step_is_not_told_of_its_final_time(tmp_path):
+    (tmp_path / "deck").write_text(decks.body().replace("end: initial value;", "abort after: derivatives; end: initial value;"))
+    run = mbcosim("run", str(tmp_path / "deck"))
+    assert (run.returncode, run.stderr) == (0, "")
+    assert (tmp_path / "deck.out").read_text().endswith("End of derivatives; no simulation is required.\n")
+
+
+def test_print_goes_to_standard_output_or_a_file(tmp_path):
+    connections = "Element connections\nAutomatic Structural(1) connecting\n        Structural(1)\nRigid Body(1) connecting\n        Structural(1)\n"
+    for options, text in (("", connections), (", to file", "")):
+        (tmp_path / "deck").write_text(decks.body().replace("end: control data;", f"print: element connection{options}; end: control data;"))
+        run = mbcosim("run", str(tmp_path / "deck"))
+        assert (run.returncode, run.stdout) == (0, text)
+    assert (tmp_path / "deck.dof").read_text() == connections
+
+
 def test_a_deck_that_is_not_there_is_told_with_the_reason(tmp_path):
     run = mbcosim("run", "nothing.mbd", cwd=tmp_path)
     assert run.returncode == 2 and 'nothing.mbd: error: cannot open "nothing.mbd": No such file or directory' in run.stderr

@@ -128,7 +128,7 @@ solver
   ! ignored: checked
 output
   = { none | iterations | residual | solution | jacobian | jacobian matrix | bailout | messages | counter | cpu time | matrix condition number [ , norm , { inf | 1 } ] | solver condition number [ , stat , <yes or no> ] }
-  ! ignored: nothing is printed during the iterations; `.out` has their number and the residual of each step
+  ! partly: `none` and `messages`: whether `.out` has a line for each step; nothing is printed during the iterations
 output meter
   = <drive>
   ! ignored: of this block
@@ -196,7 +196,7 @@ threads
   ! ignored
 output
   = { none | iterations | residual | solution | jacobian | jacobian matrix | bailout | messages }
-  ! ignored: nothing is printed during the iterations; `.out` has their number and the residual of each record
+  ! partly: `none` and `messages`: whether `.out` has a line for each record; nothing is printed during the iterations
 output meter
   = <drive>
   ! ignored
@@ -259,7 +259,7 @@ title
   = "<title>"
 print
   = { dof stats | dof description | equation description | description | element connection | node connection | connection | all | none } [ , to file ]
-  ! ignored: checked
+  > .dof with `to file`, else standard output
 make restart file
   = [ { iterations , <n iterations> | time , <t [s]> | times , <n times> , ( <increasing [s]> ) * n times } [ , with solution array ] ]
   ! ignored: use snapshots

@@ -155,18 +155,28 @@ TEST(InitialValue, ReadsOutputAndEigenanalysis) {
       "eigenanalysis: list, 2, 0., 1., parameter, 1e-2, output full matrices, output eigenvectors, "
       "output geometry,"
       " upper frequency limit, 50., suffix width, 3, suffix format, \"%03d\", use lapack, balance, "
-      "permute;"
-      "eigenanalysis: 2., use arpack, 10, 20, 1e-3;");
+      "permute;");
   EXPECT_EQ(s.abort_after, InitialValueSettings::AbortAfter::derivatives);
-  ASSERT_EQ(s.eigenanalyses.size(), 2u);
-  const EigenSettings& e = s.eigenanalyses[0];
+  ASSERT_TRUE(s.eigenanalysis);
+  const EigenSettings& e = *s.eigenanalysis;
   EXPECT_EQ(e.times, (std::vector<double>{0, 1}));
   EXPECT_EQ(e.parameter, 1e-2);
   EXPECT_TRUE(e.matrices_full && e.eigenvectors && e.geometry);
   EXPECT_EQ(e.upper_frequency, 50);
   EXPECT_EQ(e.suffix_width, 3);
-  EXPECT_EQ(s.eigenanalyses[1].solver, EigenSettings::Solver::arpack);
-  EXPECT_EQ(s.eigenanalyses[1].ncv, 20);
+}
+
+TEST(InitialValue, TakesTheLastEigenanalysisOnly) {
+  DeckText d;
+  d.initial_value = "eigenanalysis: 0.; eigenanalysis: 2., use arpack, 10, 20, 1e-3;";
+  const LoadReport report = load(d);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(findings(report.diagnostics),
+            "warning: the eigenanalysis card before this one has no effect");
+  const EigenSettings& e = *report.model->initial_value.eigenanalysis;
+  EXPECT_EQ(e.times, std::vector<double>{2});
+  EXPECT_EQ(e.solver, EigenSettings::Solver::arpack);
+  EXPECT_EQ(e.ncv, 20);
 }
 
 TEST(ControlData, ReadsAssemblyAndOutput) {
@@ -232,6 +242,10 @@ TEST(WordsWithoutEffect, AreNamed) {
   EXPECT_EQ(finding("output: iterations, matrix condition number, norm, inf;", ""), printed);
   EXPECT_EQ(finding("output: cpu time;", ""), printed);
   EXPECT_EQ(finding("output: residual, none;", ""), "");
+  EXPECT_EQ(finding("output: none, messages;", ""), "");
+  EXPECT_EQ(finding("output: none, iterations;", ""),
+            "note: output: nothing is printed during the iterations; `.out` has no line of a step "
+            "without `messages`");
   EXPECT_EQ(finding("max time step: 1e-2, hard limit, no;", ""),
             "note: max time step: `hard limit` has no effect: the strategy treats the limit in one "
             "way");

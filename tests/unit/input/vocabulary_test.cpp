@@ -142,7 +142,7 @@ TEST(Vocabulary, ServesWhatIsRealAndRefusesWhatIsDead) {
       {"bulk", "spring support", "yes"},
       {"element", "hbeam", "yes"},
       {"control card", "output results", "partly"},
-      {"control card", "print", "ignored"},
+      {"control card", "print", "yes"},
       {"control card", "make restart file", "ignored"},
       {"control card", "read solution array", "no"},
       {"control card", "output file name", "no"},

@@ -55,7 +55,7 @@ TEST(Eigenanalysis, ReferenceNumbersOfASupportedBody) {
               kSupportedBody);
   ASSERT_TRUE(run.ready());
   const auto report = analyse_modes(run.model(), run.simulation().state(),
-                                    run.model().initial_value.eigenanalyses[0]);
+                                    *run.model().initial_value.eigenanalysis);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->modes.size(), 12u);
   EXPECT_EQ(report->solution.first, 6);
@@ -96,20 +96,91 @@ TEST(Eigenanalysis, WritesTheFilesOfTheCard) {
               kSupportedBody);
   ASSERT_TRUE(run.ready());
   auto report = analyse_modes(run.model(), run.simulation().state(),
-                              run.model().initial_value.eigenanalyses[0]);
+                              *run.model().initial_value.eigenanalysis);
   ASSERT_TRUE(report);
-  report->index = 3;
-  report->count = 11;
-  EXPECT_EQ(eigen_suffix(*report), "_03");
+  EXPECT_EQ(eigen_suffix(report->settings, 3), "_03");
   const std::string file = eigen_file(*report, run.model());
   EXPECT_THAT(file, testing::HasSubstr("dCoef = 5.000e-03;"));
-  EXPECT_THAT(file, testing::HasSubstr("Aplus = spconvert(Aplus);"));
-  EXPECT_THAT(file, testing::HasSubstr("labels = [\n 1\n 2\n];"));
-  EXPECT_THAT(file, testing::HasSubstr("idx = [\n 0\n 12\n];"));
+  EXPECT_THAT(file, testing::HasSubstr("];\nAplus = spconvert(Aplus);\n"));
+  EXPECT_THAT(file, testing::HasSubstr("labels = [\n1;\n2;\n];"));
+  EXPECT_THAT(file, testing::HasSubstr("idx = [\n0;\n12;\n];"));
   EXPECT_THAT(file, testing::HasSubstr("VL = ["));
-  EXPECT_EQ(report->modes.size(), 4u);  // 2.245 and 2.746 Hz with their conjugates
-  EXPECT_THAT(eigen_table(*report), testing::HasSubstr("ILO=7 IHI=18"));
-  EXPECT_THAT(eigen_table(*report), testing::HasSubstr("2.74629"));
+  EXPECT_EQ(report->modes.size(), 2u);  // 2.245 and 2.746 Hz without their conjugates
+  for (const int k : report->modes) EXPECT_GT(report->eigenvalue(k).imag(), 0);
+  EXPECT_THAT(eigen_table(*report, 6), testing::HasSubstr("ILO=7 IHI=18"));
+  EXPECT_THAT(eigen_table(*report, 6), testing::HasSubstr("2.74629"));
+}
+
+/// Three springs and dampers c of a point mass 1.5 kg, and one with c = 100 of an abstract
+/// oscillator of mass 2, whose modes are real.
+std::string small_system(const std::string& card) {
+  return initial_value_block(
+             1e-2, .01,
+             "max iterations: 30; tolerance: 1e-6; derivatives tolerance: 1e-4; " + card) +
+         R"(
+begin: control data; structural nodes: 1; abstract nodes: 1; rigid bodies: 1; genels: 5; end: control data;
+begin: nodes; structural: 1, dynamic displacement, 1.,2.,0., null; abstract: 1, differential; end: nodes;
+begin: elements; body: 1, 1, 1.5;
+ genel: 1, spring support, 1, structural, 1, algebraic, linear viscoelastic, 100., 1.;
+ genel: 2, spring support, 1, structural, 2, algebraic, linear viscoelastic, 150., 1.;
+ genel: 3, spring support, 1, structural, 3, algebraic, linear viscoelastic, 270., 1.;
+ genel: 4, spring support, 1, abstract, algebraic, linear viscoelastic, 100., 100.;
+ genel: 5, mass, 1, abstract, algebraic, 2.;
+end: elements;
+)";
+}
+
+/// Table and file of its modes at the start.
+std::pair<std::string, std::string> texts_of(const std::string& card, int digits = 6) {
+  DeckRun run(small_system(card));
+  if (!run.ready()) return {};
+  const auto report = analyse_modes(run.model(), run.simulation().state(),
+                                    *run.model().initial_value.eigenanalysis);
+  EXPECT_TRUE(report);
+  return {eigen_table(*report, digits), eigen_file(*report, run.model())};
+}
+
+/// Lines of the reference solver.
+TEST(Eigenanalysis, TextsAreLaidOutAsThoseOfTheReference) {
+  const auto [table, file] = texts_of(
+      "eigenanalysis: 0., parameter, .01, output full matrices, output eigenvectors, matrix output "
+      "precision, 2;");
+  EXPECT_THAT(table, testing::StartsWith(
+                         "Info: 0, success BALANC=\"P\" ILO=1 IHI=8 ABNRM=100.5 "
+                         "BBNRM=101.5\n"
+                         "Mode n.       Real           Imag             Damp %     Freq Hz\n"
+                         "       1:    -0.333333 +      8.15816 j         4.08248         "
+                         "1.29841\n"));
+  EXPECT_THAT(file, testing::StartsWith(
+                        "% time: 0.000000e+00\ndTime = 0.000000e+00;\n% coefficient\n"
+                        "dCoef = 5.000000e-03;\n% F/xPrime + dCoef * F/x\n"
+                        "Aplus = [1.50e+00 0.00e+00 0.00e+00 -5.00e-03 0.00e+00 0.00e+00 0.00e+00 "
+                        "0.00e+00 ;\n"));
+  EXPECT_THAT(file, testing::HasSubstr(" ];\n% F/xPrime - dCoef * F/x\nAminus = [1.50e+00 "));
+  EXPECT_THAT(file, testing::HasSubstr("];\n% alphar, alphai, beta\nalpha = [9.99"));
+  // Of the first row of the abstract oscillator: six complex modes, two real ones.
+  EXPECT_THAT(file,
+              testing::HasSubstr("0.000000e+00-i*0.000000e+00 -9.795832e-01 -2.041685e-02 ;\n"));
+}
+
+TEST(Eigenanalysis, FollowsTheDigitsOfAllResults) {
+  const std::string table = texts_of("eigenanalysis: 0., parameter, .01;", 10).first;
+  EXPECT_THAT(table, testing::HasSubstr("       1: -0.3333333333 +  8.158"));
+}
+
+TEST(Eigenanalysis, SparseMatricesAloneNeedNoModes) {
+  const auto [table, file] = texts_of("eigenanalysis: 0., parameter, .01, output sparse matrices;");
+  EXPECT_EQ(table, "");
+  EXPECT_THAT(file, testing::HasSubstr("% F/xPrime + dCoef *F/x\nAplus = [1 1 1.500000e+00;\n4 1 "
+                                       "1.500000e+00;\n"));
+  EXPECT_THAT(file, testing::EndsWith("8 8 -5.000000e-03;\n];\nAminus = spconvert(Aminus);\n"));
+}
+
+TEST(Eigenanalysis, BalancesAsTheReference) {
+  EXPECT_THAT(texts_of("eigenanalysis: 0., balance, no;").first,
+              testing::HasSubstr("BALANC=\"N\" ILO=1 IHI=8 ABNRM=-1 BBNRM=-1\n"));
+  EXPECT_THAT(texts_of("eigenanalysis: 0., balance, scale;").first,
+              testing::HasSubstr("BALANC=\"B\""));
 }
 
 TEST(Eigenanalysis, IterativeSolverFindsTheModesNearItsParameter) {
@@ -117,7 +188,7 @@ TEST(Eigenanalysis, IterativeSolverFindsTheModesNearItsParameter) {
               kSupportedBody);
   ASSERT_TRUE(run.ready());
   const auto report = analyse_modes(run.model(), run.simulation().state(),
-                                    run.model().initial_value.eigenanalyses[0]);
+                                    *run.model().initial_value.eigenanalysis);
   ASSERT_TRUE(report) << report.error().message;
   ASSERT_EQ(report->modes.size(), 4u);
   for (const Complex expected :
