@@ -37,6 +37,8 @@
 ///     static constexpr bool rotation_parameters = true         u.g(k), u.gp(k) are gathered
 ///     static constexpr bool constant_structure = true          entries of its matrix that vanish
 ///         at one state vanish at all: no branch depends on the state or on a drive
+///     template <class E> static constexpr std::array<MovablePart<E>, n> movable_parts()   what
+///         hints of `driven` fit to the configuration; E is the type that has them
 ///     void assembly_residual(const Local<T>&, Residual<T>&) const   replaces it in the assembly
 ///     AssemblyRole assembly_role() const                       when it depends on the element
 #pragma once

@@ -3,23 +3,38 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "elements/element_traits.h"
 #include "elements/element_view.h"
 #include "elements/lift.h"
+#include "elements/movable_part.h"
 #include "elements/placed_elements.h"
+#include "model/drive.h"
 
 namespace mbcosim {
 
 template <class E>
 class ElementSetOf final : public PlacedElements {
+  static constexpr bool kMovable = detail::HasMovableParts<E>;
+  template <class T>
+  using IfMovable = std::conditional_t<kMovable, T, std::monostate>;
+
  public:
+  /// A part that a hint moves; its numbers from `memory` on in State::memory.
+  struct Moved {
+    MovablePart<E> part;
+    int memory;
+  };
   /// What evaluations read, close together in memory.
   struct Slot : Place {
     E element;
+    [[no_unique_address]] IfMovable<std::vector<Moved>> moved{};
   };
 
   ElementSetOf()
@@ -32,7 +47,15 @@ class ElementSetOf final : public PlacedElements {
     s.element.connect(connector);
     slots_.push_back(std::move(s));
   }
+  /// As the deck has it.
   const E& element(int i) const { return slots_[i].element; }
+  bool add_hint(ModelBuilder& builder, int i, std::string_view hint) override {
+    if constexpr (kMovable) {
+      for (const MovablePart<E>& part : E::template movable_parts<E>())
+        if (part.hint == hint) return move_part(builder, i, part), true;
+    }
+    return PlacedElements::add_hint(builder, i, hint);
+  }
 
   int size() const override { return static_cast<int>(slots_.size()); }
   std::string row_name(int i, int k) const override {
@@ -47,7 +70,7 @@ class ElementSetOf final : public PlacedElements {
       Local<double> u;
       gather(context, slots_[i], u);
       Start st{u, state};
-      slots_[i].element.start(st);
+      Present(context, slots_[i])->start(st);
     } else {
       (void)context, (void)state, (void)i;
     }
@@ -97,10 +120,11 @@ class ElementSetOf final : public PlacedElements {
     constexpr bool parameters = detail::uses_parameters<E>(), momentum = detail::uses_momentum<E>();
     Local<Dual<width>> lu;
     Residual<Dual<width>> lr;
+    const Present element(*u.context, s);
     for (int start = 0; start < s.column_count; start += width) {
       detail::lift(u, seeds, start, parameters, lu);
       detail::clear(lr, s.connection, momentum);
-      s.element.residual(lu, lr);
+      element->residual(lu, lr);
       detail::store_columns(lr, s.connection, momentum, std::min(width, s.column_count - start),
                             s.row_count, matrix + start * s.row_count);
     }
@@ -116,7 +140,7 @@ class ElementSetOf final : public PlacedElements {
     t.c = context.seed;
     for (int k = 0; k < t.nodes; ++k) t.seeds[k] = seeds[s.connection.node[k]];
     t.data = matrix;
-    s.element.tangent(u, t);
+    Present(context, s)->tangent(u, t);
   }
   const Slot& slot(int i) const { return slots_[i]; }
   Slot& slot(int i) { return slots_[i]; }  ///< while the model is built
@@ -168,7 +192,7 @@ class ElementSetOf final : public PlacedElements {
     if constexpr (detail::HasOutput<E>) {
       Local<double> u;
       gather(context, slots_[i], u);
-      slots_[i].element.output(u, row);
+      Present(context, slots_[i])->output(u, row);
     } else {
       (void)context, (void)i, (void)row;
     }
@@ -196,7 +220,7 @@ class ElementSetOf final : public PlacedElements {
       if (!is_active(*context.state, i)) return 0;
       Local<double> u;
       gather(context, slots_[i], u);
-      return slots_[i].element.private_value(u, datum);
+      return Present(context, slots_[i])->private_value(u, datum);
     } else {
       return (void)context, (void)i, (void)datum, 0;
     }
@@ -205,7 +229,7 @@ class ElementSetOf final : public PlacedElements {
     if constexpr (detail::HasInertia<E>) {
       Local<double> u;
       gather(context, slots_[i], u);
-      slots_[i].element.add_inertia(u, node, inertia);
+      Present(context, slots_[i])->add_inertia(u, node, inertia);
     } else {
       (void)context, (void)i, (void)node, (void)inertia;
     }
@@ -246,6 +270,54 @@ class ElementSetOf final : public PlacedElements {
   }
 
  private:
+  /// The element as it is now: that of its slot, or a copy in which hints have moved parts.
+  class Present {
+   public:
+    Present(const EvalContext& context, const Slot& s) : element_(&s.element) {
+      if constexpr (kMovable) {
+        if (s.moved.empty()) return;
+        E& moved = copy_.emplace(s.element);
+        for (const Moved& m : s.moved)
+          std::copy_n(&context.state->memory[m.memory], m.part.count, m.part.numbers(moved));
+        element_ = &moved;
+      }
+    }
+    Present(const Present&) = delete;
+    const E* operator->() const { return element_; }
+    const E& operator*() const { return *element_; }
+
+   private:
+    const E* element_;
+    [[no_unique_address]] IfMovable<std::optional<E>> copy_;
+  };
+  /// Number k of a part as it fits where the nodes are.
+  class FittedNumber final : public Drive {
+   public:
+    FittedNumber(const ElementSetOf& set, int i, const MovablePart<E>& part, int k)
+        : set_(set), i_(i), part_(part), k_(k) {}
+    double value(const EvalContext& context, double) const override {
+      const Slot& s = set_.slots_[i_];
+      Local<double> u;
+      set_.gather(context, s, u);
+      E element = *Present(context, s);
+      part_.fit(element, u);
+      return part_.numbers(element)[k_];
+    }
+
+   private:
+    const ElementSetOf& set_;
+    int i_;
+    MovablePart<E> part_;
+    int k_;
+  };
+  void move_part(ModelBuilder& builder, int i, const MovablePart<E>& part) {
+    for (int k = 0; k < part.count; ++k) {
+      const int memory = builder.allocate_memory(1, part.numbers(slots_[i].element)[k]);
+      if (k == 0) slots_[i].moved.push_back({part, memory});
+      info(i).hints.push_back(
+          {std::make_shared<FittedNumber>(*this, i, part, k), memory, /*at_start=*/false});
+    }
+  }
   /// Calls function(element, what it sees) for the active ones.
   template <class Function>
   void each_active(const EvalContext& context, ElementRange range, Function function) const {
@@ -254,20 +326,20 @@ class ElementSetOf final : public PlacedElements {
       const Slot& s = slots_[i];
       if (!active(context, s)) continue;
       gather(context, s, u);
-      function(s.element, u);
+      function(*Present(context, s), u);
     }
   }
   void residual_of(const EvalContext& context, const Slot& s, Local<double>& u,
                    Residual<double>& local) const {
     gather(context, s, u);
     detail::clear(local, s.connection, detail::uses_momentum<E>());
-    s.element.residual(u, local);
+    Present(context, s)->residual(u, local);
   }
   void elastic_rows(const Slot& s, const Local<double>& u, double* rows) const {
     constexpr bool momentum = detail::uses_momentum<E>();
     Residual<double> r;
     detail::clear(r, s.connection, momentum);
-    s.element.residual(u, r);
+    Present(*u.context, s)->residual(u, r);
     detail::store_rows(r, s.connection, momentum, rows);
   }
   void differentiated_rows(const Slot& s, const Local<double>& u, double* rows,
@@ -277,10 +349,11 @@ class ElementSetOf final : public PlacedElements {
     detail::lift_in_time(u, t);
     Residual<TimeDual> r;
     detail::clear(r, s.connection, momentum);
+    const Present element(*u.context, s);
     if constexpr (detail::HasAssemblyResidual<E>)
-      s.element.assembly_residual(t, r);
+      element->assembly_residual(t, r);
     else
-      s.element.residual(t, r);
+      element->residual(t, r);
     detail::store_rows(r, s.connection, momentum, rows, rates);
   }
 

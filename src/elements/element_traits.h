@@ -70,6 +70,10 @@ concept HasAssembly = requires {
   E::assembly;
 };
 template <class E>
+concept HasMovableParts = requires {
+  E::template movable_parts<E>();
+};
+template <class E>
 constexpr bool uses_momentum() {
   if constexpr (requires { E::momentum_rows; })
     return E::momentum_rows;

@@ -72,7 +72,8 @@ void PlacedElements::find_structure(const std::vector<StructureProbe>& probes) {
     Place& p = place(e);
     p.first_entry = static_cast<int>(entries_.size());
     std::vector<bool> vanishes;
-    if (traits_.constant_structure && !probes.empty()) vanishes = vanishing(e, probes);
+    const bool constant = traits_.constant_structure && info(e).hints.empty();
+    if (constant && !probes.empty()) vanishes = vanishing(e, probes);
     for (int j = 0; j < p.column_count; ++j)
       for (int i = 0; i < p.row_count; ++i) {
         const int local = j * p.row_count + i;

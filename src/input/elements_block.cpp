@@ -1,6 +1,7 @@
 /// Cards of the `elements` block: any element by its head, `driven`, `bind`, `output`.
 #include "input/cards.h"
 #include "input/deck.h"
+#include "input/lexer.h"
 #include "input/model_functions.h"
 #include "input/suggest.h"
 #include "model/family.h"
@@ -85,14 +86,23 @@ void read_trailing_output(DeckCard& card, Family family, std::size_t before) {
     card.builder().info(model.elements[i]).output = output;
 }
 
-/// Hints that the element's reader did not ask for.
-void warn_of_unused(DeckCard& card, const std::vector<Hint>& hints) {
+/// "offset{2}", however it is spaced.
+std::string without_blanks(const Hint& hint) {
+  std::string text = hint.name + "{";
+  for (const char c : hint.arguments.text)
+    if (!is_blank(c)) text += c;
+  return text + "}";
+}
+
+/// Hints that the element's reader did not ask for: they move parts of the element.
+void apply_to_parts(DeckCard& card, const ElementRef& element, const std::vector<Hint>& hints) {
   for (const Hint& h : hints)
-    if (!h.used)
-      card.warn_at(h.where,
-                   "hint \"" + h.name + "\" is not applied: the element starts as its card says",
-                   "applied are drive{} (distance), drive3{} (drive hinge, drive displacement), "
-                   "position-drive3{} and orientation-drive3{} (total joint)");
+    if (!h.used && !card.builder().add_hint(element, without_blanks(h)))
+      card.warn_at(
+          h.where, "hint \"" + h.name + "\" is not applied: the element starts as its card says",
+          "applied are offset{1 or 2, 0 for the place of a pin} and hinge{1 or 2} of joints "
+          "that have them, drive{} (distance), drive3{} (drive hinge, drive displacement), "
+          "position-drive3{} and orientation-drive3{} (total joint)");
 }
 
 /// Joints of what the reader added (after `before` elements) between a node and itself.
@@ -132,10 +142,10 @@ void read_element(DeckCard& card, Driven* driven = nullptr) {
   if (driven) card.set_hints(&driven->hints, &samples);
   reader(card, info);
   refuse_self_joints(card, f, before);
-  if (driven) {
-    warn_of_unused(card, driven->hints);
-    if (!samples.empty())
-      card.builder().info(card.model().elements[before]).hints = std::move(samples);
+  if (driven && card.model().elements.size() > before) {
+    const ElementRef element = card.model().elements[before];
+    card.builder().info(element).hints = std::move(samples);
+    apply_to_parts(card, element, driven->hints);
   }
   set_inverse_role(card, before);
   read_inverse_role(card, before);

@@ -22,6 +22,7 @@ class OutputRow;
 struct HintSample {
   DrivePtr source;
   int memory = -1;
+  bool at_start = true;  ///< also when the element is active from the beginning of the run
 };
 
 /// What every element has, whatever it is.
@@ -110,6 +111,9 @@ class ElementSet {
   virtual int first_sum(int i) const;
   virtual void bind(const Model& model, int i,
                     int first_own) = 0;  ///< own unknowns start at first_own
+  /// Lets the hint `hint` ("offset{1}") of `driven` move a part of element i; false when the
+  /// element has no such part.
+  virtual bool add_hint(ModelBuilder& builder, int i, std::string_view hint);
   /// Looks which entries of the local matrices can differ from zero; the others stay out of the
   /// pattern. Without probes none is left out.
   virtual void find_structure(const std::vector<StructureProbe>& probes);

@@ -199,6 +199,7 @@ class ModelBuilder {
 
   /// What all elements have, to be changed while the model is built.
   ElementInfo& info(const ElementRef& element);
+  bool add_hint(const ElementRef& element, std::string_view hint);  ///< ElementSet::add_hint
 
   int allocate_memory(int count, double initial = 0);  ///< offset in State::memory
   int allocate_sums(int count);                        ///< offset in Scratch::sums

@@ -57,6 +57,10 @@ ElementInfo& ModelBuilder::info(const ElementRef& element) {
   return set_of(*model_, element).info(element.index);
 }
 
+bool ModelBuilder::add_hint(const ElementRef& element, std::string_view hint) {
+  return set_of(*model_, element).add_hint(*this, element.index, hint);
+}
+
 int ModelBuilder::allocate_sums(int count) {
   const int offset = model_->scratch.sums;
   model_->scratch.sums += count;

@@ -153,7 +153,7 @@ void update_activity(const EvalContext& context, State& state, bool restart) {
     double& flag = state.memory[info.active_memory];
     if (active && (flag == 0 || !restart))
       for (const HintSample& hint : info.hints)
-        state.memory[hint.memory] = hint.source->value(context);
+        if (restart || hint.at_start) state.memory[hint.memory] = hint.source->value(context);
     if (active && flag == 0) e.set->start(context, state, e.index);
     flag = active ? 1 : 0;
   }

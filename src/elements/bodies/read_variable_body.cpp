@@ -44,8 +44,9 @@ void read_variable_body(Card& card, ElementInfo& info, int node) {
   const auto matrix = [&](const std::string& what) {
     return differentiable(card, what, [&] { return card.mat3_drive(what); });
   };
+  const VectorAxes axes{card.model().structural[node].R, false};
   body.b = differentiable(card, "centre of mass",
-                          [&] { return card.vec3_drive("centre of mass", node); });
+                          [&] { return card.vec3_drive("centre of mass", axes); });
   body.J_vm = matrix("inertia that changes with the mass");
   body.J_vg = matrix("inertia that changes with the geometry");
   const EvalContext& start = card.builder().input_context();

@@ -34,6 +34,10 @@ struct HingeMotion : TwoAttachments {
 struct DeformableHinge : HingeMotion, LawUser<DeformableHinge, 3> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_hinges<E>();
+  }
   static constexpr auto data_names = joined(kAngleData, kSpinData, kMomentData);
 
   template <class T>
@@ -59,6 +63,11 @@ struct DeformableHinge : HingeMotion, LawUser<DeformableHinge, 3> {
 struct DeformableDisplacement : HingeMotion, LawUser<DeformableDisplacement, 3> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
+  /// The first offset stays as it is, as in the reference solver.
+  template <class E>
+  static constexpr auto movable_parts() {
+    return std::array{movable_offset2<E>(), movable_hinge1<E>(), movable_hinge2<E>()};
+  }
   static constexpr auto data_names = joined(kDisplacementData, kVelocityData, kForceData);
 
   template <class T>
@@ -84,6 +93,10 @@ struct DeformableDisplacement : HingeMotion, LawUser<DeformableDisplacement, 3> 
 struct DeformableJoint : HingeMotion, LawUser<DeformableJoint, 6> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_points_and_hinges<E>();
+  }
   static constexpr auto data_names =
       joined(kDisplacementData, kAngleData, kVelocityData, kSpinData, kForceData, kMomentData);
 
@@ -116,6 +129,10 @@ struct DeformableJoint : HingeMotion, LawUser<DeformableJoint, 6> {
 struct DeformableAxialJoint : HingeMotion, LawUser<DeformableAxialJoint, 1> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_hinges<E>();
+  }
   static constexpr auto data_names = joined(kHingeData, std::array<DatumName, 1>{{{"Mz", "N m"}}});
 
   template <class T>

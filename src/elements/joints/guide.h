@@ -86,6 +86,10 @@ struct Prismatic : TwoAttachments, NamedData<Prismatic> {
   static constexpr int width = 15;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_hinges<E>();
+  }
   static constexpr auto data_names = kMomentData;
 
   void connect(Connector& c) const {
@@ -119,6 +123,11 @@ struct DriveHinge : TwoAttachments, NamedData<DriveHinge> {
 
   static constexpr int width = 15;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  /// Without regard to the rotation that is imposed, as in the reference solver.
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_hinges<E>();
+  }
   static constexpr auto data_names = joined(kAngleData, kMomentData);
 
   void connect(Connector& c) const {
@@ -153,6 +162,21 @@ struct DriveDisplacement : TwoAttachments, NamedData<DriveDisplacement> {
 
   static constexpr int width = 15;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  /// N.B. They fit where δ has global components: the reference solver does not turn it with
+  /// node 1.
+  template <class E>
+  static constexpr auto movable_parts() {
+    return std::array<MovablePart<E>, 2>{{
+        {"offset{1}", 3, movable_offset1<E>().numbers,
+         [](E& e, const Local<double>& u) {
+           e.a.f = u.R(0).transpose() * (u.x(1) + e.arm_b(u) - u.x(0) - u.drive(e.delta));
+         }},
+        {"offset{2}", 3, movable_offset2<E>().numbers,
+         [](E& e, const Local<double>& u) {
+           e.b.f = u.R(1).transpose() * (u.x(0) + e.arm_a(u) + u.drive(e.delta) - u.x(1));
+         }},
+    }};
+  }
   static constexpr auto data_names =
       joined(kDisplacementData, ThreeData{{{"fx", "N"}, {"fy", "N"}, {"fz", "N"}}});
 
@@ -197,6 +221,17 @@ struct DriveDisplacementPin : NamedData<DriveDisplacementPin> {
 
   static constexpr int width = 9;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return std::array<MovablePart<E>, 2>{{
+        {"offset{1}", 3, [](E& e) { return e.a.f.data(); },
+         [](E& e, const Local<double>& u) {
+           e.a.f = u.R(0).transpose() * (e.X + u.drive(e.delta) - u.x(0));
+         }},
+        {"offset{0}", 3, [](E& e) { return e.X.data(); },
+         [](E& e, const Local<double>& u) { e.X = u.x(0) + u.R(0) * e.a.f - u.drive(e.delta); }},
+    }};
+  }
   static constexpr auto data_names =
       joined(kDisplacementData, ThreeData{{{"fx", "N"}, {"fy", "N"}, {"fz", "N"}}});
 

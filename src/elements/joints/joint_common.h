@@ -2,6 +2,7 @@
 /// .log, unwrapped angles.
 #pragma once
 
+#include <array>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -9,6 +10,7 @@
 
 #include "elements/element.h"
 #include "elements/joints/data_tables.h"
+#include "elements/movable_part.h"
 #include "model/card.h"
 
 namespace mbcosim {
@@ -78,6 +80,45 @@ struct TwoAttachments {
     return mbcosim::relative_rotation<T>(hinge_a(u), hinge_b(u));
   }
 };
+
+// ------------------------------------------------------------------ hints of `driven`
+/// The attachments of a joint between two nodes, such that points and frames coincide.
+template <class E>
+constexpr MovablePart<E> movable_offset1() {
+  return {"offset{1}", 3, [](E& e) { return e.a.f.data(); },
+          [](E& e, const Local<double>& u) {
+            e.a.f = u.R(0).transpose() * (u.x(1) + e.arm_b(u) - u.x(0));
+          }};
+}
+template <class E>
+constexpr MovablePart<E> movable_offset2() {
+  return {"offset{2}", 3, [](E& e) { return e.b.f.data(); },
+          [](E& e, const Local<double>& u) {
+            e.b.f = u.R(1).transpose() * (u.x(0) + e.arm_a(u) - u.x(1));
+          }};
+}
+template <class E>
+constexpr MovablePart<E> movable_hinge1() {
+  return {"hinge{1}", 9, [](E& e) { return e.a.Rh.data(); },
+          [](E& e, const Local<double>& u) { e.a.Rh = u.R(0).transpose() * e.hinge_b(u); }};
+}
+template <class E>
+constexpr MovablePart<E> movable_hinge2() {
+  return {"hinge{2}", 9, [](E& e) { return e.b.Rh.data(); },
+          [](E& e, const Local<double>& u) { e.b.Rh = u.R(1).transpose() * e.hinge_a(u); }};
+}
+template <class E>
+constexpr std::array<MovablePart<E>, 2> movable_points() {
+  return {movable_offset1<E>(), movable_offset2<E>()};
+}
+template <class E>
+constexpr std::array<MovablePart<E>, 2> movable_hinges() {
+  return {movable_hinge1<E>(), movable_hinge2<E>()};
+}
+template <class E>
+constexpr std::array<MovablePart<E>, 4> movable_points_and_hinges() {
+  return {movable_offset1<E>(), movable_offset2<E>(), movable_hinge1<E>(), movable_hinge2<E>()};
+}
 
 // ------------------------------------------------------------------ .log
 /// A line of .log: general notation with six digits.

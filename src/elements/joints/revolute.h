@@ -22,6 +22,17 @@ struct RevolutePin : NamedData<RevolutePin> {
   static constexpr int width = 11;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return std::array<MovablePart<E>, 3>{{
+        {"offset{1}", 3, [](E& e) { return e.a.f.data(); },
+         [](E& e, const Local<double>& u) { e.a.f = u.R(0).transpose() * (e.X0 - u.x(0)); }},
+        {"offset{0}", 3, [](E& e) { return e.X0.data(); },
+         [](E& e, const Local<double>& u) { e.X0 = u.x(0) + u.R(0) * e.a.f; }},
+        {"hinge{1}", 9, [](E& e) { return e.a.Rh.data(); },
+         [](E& e, const Local<double>& u) { e.a.Rh = u.R(0).transpose() * e.R0; }},
+    }};
+  }
   static constexpr auto data_names = joined(kHingeData, kForceData, kMomentData);
 
   void connect(Connector& c) const {
@@ -101,6 +112,10 @@ struct RevoluteHinge : RevoluteAxes, NamedData<RevoluteHinge> {
   static constexpr int width = 17;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_points_and_hinges<E>();
+  }
   static constexpr auto data_names = joined(kHingeData, kForceData, kMomentData);
 
   void connect(Connector& c) const {
@@ -137,6 +152,10 @@ struct RevoluteRotation : RevoluteAxes, NamedData<RevoluteRotation> {
   static constexpr int width = 14;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_hinges<E>();
+  }
   static constexpr auto data_names = joined(kHingeData, kMomentData);
 
   void connect(Connector& c) const {
@@ -170,6 +189,10 @@ struct AxialRotation : RevoluteAxes, NamedData<AxialRotation> {
   static constexpr int width = 18;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_points_and_hinges<E>();
+  }
   static constexpr auto data_names = joined(kHingeData, kForceData, kMomentData);
 
   void connect(Connector& c) const {

@@ -16,6 +16,10 @@ struct SphericalHinge : TwoAttachments, NamedData<SphericalHinge> {
   static constexpr int width = 15;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_points<E>();
+  }
   static constexpr auto data_names = kForceData;
 
   void connect(Connector& c) const {

@@ -95,6 +95,22 @@ struct TotalJoint : NamedData<TotalJoint> {
   static constexpr int width = 18;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  /// Points such that the displacement is the imposed one.
+  template <class E>
+  static constexpr auto movable_parts() {
+    return std::array<MovablePart<E>, 2>{{
+        {"offset{1}", 3, [](E& e) { return e.f1.data(); },
+         [](E& e, const Local<double>& u) {
+           e.f1 = u.R(0).transpose() * (u.x(1) + u.R(1) * e.f2 - u.x(0)) -
+                  e.R1h * u.drive(e.constraint.displacement);
+         }},
+        {"offset{2}", 3, [](E& e) { return e.f2.data(); },
+         [](E& e, const Local<double>& u) {
+           const Vec3 point = e.f1 + e.R1h * u.drive(e.constraint.displacement);
+           e.f2 = u.R(1).transpose() * (u.x(0) + u.R(0) * point - u.x(1));
+         }},
+    }};
+  }
   static constexpr auto data_names =
       joined(kPositionData, kAngleData, kForceData, kMomentData, kDisplacementData,
              kImposedAngleData, kVelocityData, kSpinData);
@@ -186,6 +202,21 @@ struct TotalPinJoint : NamedData<TotalPinJoint> {
   static constexpr int width = 12;
   static constexpr bool constant_structure = true;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  /// Points such that the displacement is the imposed one.
+  template <class E>
+  static constexpr auto movable_parts() {
+    return std::array<MovablePart<E>, 2>{{
+        {"offset{1}", 3, [](E& e) { return e.f.data(); },
+         [](E& e, const Local<double>& u) {
+           const Vec3 point = e.Xc + e.Rc * u.drive(e.constraint.displacement);
+           e.f = u.R(0).transpose() * (point - u.x(0));
+         }},
+        {"offset{0}", 3, [](E& e) { return e.Xc.data(); },
+         [](E& e, const Local<double>& u) {
+           e.Xc = u.x(0) + u.R(0) * e.f - e.Rc * u.drive(e.constraint.displacement);
+         }},
+    }};
+  }
   static constexpr auto data_names = TotalJoint::data_names;
 
   void connect(Connector& c) const {
