@@ -30,6 +30,14 @@ struct FrameState {
   Vec<T> a0, w0, alpha;
 };
 
+/// A velocity in the frame. The derivatives phase holds it: a matrix with its derivative would ask
+/// for what the phase takes back, so that the Coriolis force never fits.
+template <class T>
+Vec<T> velocity_in_frame(const Local<T>& u, const Vec<T>& velocity) {
+  if (u.context->phase != Phase::derivatives) return velocity;
+  return value_of<T>(velocity).template cast<T>();
+}
+
 /// A body or point mass in a model with `rigid body kinematics` (MBDyn input manual, control data):
 /// positions and velocities are relative to a frame whose origin accelerates by a₀ and that turns
 /// with ω₀, α₀ = dω₀/dt (components in the moving axes). The inertia loads of a part of mass m,
@@ -49,10 +57,10 @@ struct InMovingFrame : B {
     const FrameState<T> frame(u);
     const Vec<T>&w0 = frame.w0, &alpha = frame.alpha;
     const Vec<T> a = frame.acceleration(u.x(0));
-    const Vec<T> v = u.v(0);
+    const Vec<T> v = velocity_in_frame<T>(u, u.v(0));
     Vec<T> F = a * T(-this->m) - w0.cross(v) * T(2 * this->m);
     if constexpr (requires(B b) { b.J0; }) {
-      const Vec<T> S = u.R(0) * this->S0, w = u.w(0);
+      const Vec<T> S = u.R(0) * this->S0, w = velocity_in_frame<T>(u, u.w(0));
       const auto J = [&](const Vec<T>& y) -> Vec<T> {
         return u.R(0) * (this->J0 * Vec<T>(u.R(0).transpose() * y));
       };
@@ -83,8 +91,8 @@ struct InMovingFrame<VariableBody> : VariableBody {
     const Vec<T>& w0 = frame.w0;
     const VariableInertia p = inertia(*u.context, u.label());
     const Mat3 J0 = p.J();
-    const Vec<T> arm = u.R(0) * p.b, w = u.w(0);
-    const Vec<T> velocity = u.v(0) + w.cross(arm) + u.R(0) * p.b_rate;
+    const Vec<T> arm = u.R(0) * p.b, w = velocity_in_frame<T>(u, u.w(0));
+    const Vec<T> velocity = velocity_in_frame<T>(u, u.v(0)) + w.cross(arm) + u.R(0) * p.b_rate;
     const auto turned = [&](const Mat3& j, const Vec<T>& y) -> Vec<T> {
       return u.R(0) * Vec<T>(j * Vec<T>(u.R(0).transpose() * y));
     };
