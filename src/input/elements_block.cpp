@@ -177,8 +177,8 @@ void drive_existing(DeckCard& card, const Driven& driven) {
   read_output_option(card, usual, info.output);
   card.expect_end();
   info.driven = driven.drive;
-  info.active_memory = card.builder().allocate_memory(1, 1);
-  card.model().has_driven = true;
+  card.builder().register_driven(info);
+  apply_to_parts(card, e, driven.hints);
 }
 
 void read_driven(DeckCard& card) {
@@ -197,9 +197,6 @@ void read_driven(DeckCard& card) {
   DeckCard inner(card.deck(), card.rest_as_statement());
   inner.set_form("element", inner.statement().word);
   if (inner.statement().word == "existing") {
-    if (!driven.hints.empty())
-      card.fail_at(driven.hints.front().where, "a hint with `existing` is not supported yet",
-                   "write the element inside the driven card");
     drive_existing(inner, driven);
     return;
   }

@@ -20,7 +20,7 @@ Hint DeckCard::hint() {
   if (open == std::string_view::npos || close == std::string_view::npos || close < open ||
       skip_blanks(text, close + 1) < text.size())
     fail_at(hint.where, "hint must have the form <name>{<arguments>}",
-            "e.g. \"drive{model::distance(1, 2)}\"");
+            "e.g. \"drive{model::distance(1, 2)}\", \"offset{2}\"");
   hint.name = text.substr(0, open);
   while (!hint.name.empty() && is_blank(hint.name.back())) hint.name.pop_back();
   while (!hint.name.empty() && is_blank(hint.name.front())) hint.name.erase(0, 1);

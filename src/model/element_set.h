@@ -34,7 +34,8 @@ struct ElementInfo {
   SourceSpan where;
   bool output = true;
   DrivePtr driven;                ///< active while non-zero; null: always active
-  int active_memory = -1;         ///< offset of the activity flag in State::memory when driven
+  int active_memory = -1;         ///< offset in State::memory when driven: is it active? was it at
+                                  ///< the last prediction?
   int order = 0;                  ///< declaration order over all elements
   std::vector<HintSample> hints;  ///< of `driven`
 };

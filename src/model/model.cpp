@@ -266,7 +266,8 @@ void start_if_active(const EvalContext& context, State& state, const ElementSet&
   const ElementInfo& info = set.info(i);
   if (info.driven) {
     try {
-      state.memory[info.active_memory] = info.driven->value(context) != 0 ? 1 : 0;
+      double* const flags = &state.memory[info.active_memory];
+      flags[0] = flags[1] = info.driven->value(context) != 0 ? 1 : 0;
     } catch (const EvaluationError&) {
       return;
     }

@@ -113,7 +113,7 @@ class Model {
   }();
 
   // --- numbering, set by ModelBuilder::finish
-  bool has_driven = false;         ///< is any element `driven`?
+  std::vector<ElementRef> driven;  ///< elements that are `driven`
   int unknowns = 0;                ///< n
   std::vector<UnknownKind> kinds;  ///< (n)
   std::vector<double> row_scale;   ///< (n) scale of the owner, for `tolerance ..., scale`
@@ -199,6 +199,7 @@ class ModelBuilder {
 
   /// What all elements have, to be changed while the model is built.
   ElementInfo& info(const ElementRef& element);
+  void register_driven(ElementInfo& info);                          ///< which has got its drive
   bool add_hint(const ElementRef& element, std::string_view hint);  ///< ElementSet::add_hint
 
   int allocate_memory(int count, double initial = 0);  ///< offset in State::memory

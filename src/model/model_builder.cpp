@@ -34,13 +34,14 @@ ElementRef ModelBuilder::register_element(ElementSet& set) {
   const ElementRef ref{&set, set.size() - 1};
   ElementInfo& info = set.info(ref.index);
   info.order = static_cast<int>(model_->elements.size());
-  if (info.driven) {
-    info.active_memory = allocate_memory(1, 1);
-    model_->has_driven = true;
-  }
+  if (info.driven) register_driven(info);
   model_->elements.push_back(ref);
   model_->element_index[static_cast<int>(info.family)].emplace(info.label, ref);
   return ref;
+}
+
+void ModelBuilder::register_driven(ElementInfo& info) {
+  info.active_memory = allocate_memory(2, 1);
 }
 
 namespace {
@@ -277,6 +278,8 @@ Result<ModelPtr> ModelBuilder::finish() {
   for (const ElementRef& e : model.elements)
     if (e.set->info(e.index).family == Family::body)
       for (const int node : e.set->nodes(e.index)) model.node_bodies[node].push_back(e);
+  for (const ElementRef& e : model.elements)
+    if (e.set->info(e.index).driven) model.driven.push_back(e);
   order_stages(model);
   model.assembly = AssemblyPlan(model);
   sets_.clear();

@@ -55,6 +55,7 @@ class Newton {
     report.tolerance = settings_.tolerance;
     for (;;) {
       const bool settled = hooks_.exchange(report.iterations);
+      switch_elements();
       system_.compute_residual();
       report.residual_error = system_.error(settings_);
       scratch_.residual_history.push_back(report.residual_error);
@@ -76,6 +77,15 @@ class Newton {
   static NewtonReport& finish(NewtonReport& report, NewtonOutcome outcome) {
     report.outcome = outcome;
     return report;
+  }
+
+  /// An element that switches itself to and fro stays as it is after some changes: the iteration
+  /// would not end.
+  void switch_elements() {
+    constexpr int kMostSwitches = 4;
+    if (switches_ == kMostSwitches || !hooks_.switch_elements(system_.state())) return;
+    ++switches_;
+    switched_ = true;
   }
 
   /// One linear solve and update; false (with the outcome set) when the matrix cannot be factored
@@ -169,7 +179,8 @@ class Newton {
   bool factor(int iterations) {
     const bool keep = settings_.keep_jacobian;
     const long count = keep ? kept_iterations() : iterations;
-    fresh_ = count % settings_.jacobian_every == 0;
+    fresh_ = switched_ || count % settings_.jacobian_every == 0;
+    switched_ = false;
     if (fresh_) {
       build_matrix();
     } else if (keep && iterations == 0) {
@@ -208,7 +219,9 @@ class Newton {
   const NewtonHooks& hooks_;
   NewtonScratch& scratch_;
   const LineSearchSettings rescue_ = rescue_settings();
-  bool fresh_ = true;  ///< the matrix is that of the iterate
+  bool fresh_ = true;      ///< the matrix is that of the iterate
+  bool switched_ = false;  ///< elements came or went since the matrix was built
+  int switches_ = 0;
 };
 
 }  // namespace

@@ -70,6 +70,8 @@ class NewtonHooks {
   /// Before each residual: loads from outside may change. False: they have not settled, so that
   /// nothing has converged yet.
   virtual bool exchange(int /*iteration*/) const { return true; }
+  /// Before each residual: elements may come and go with the iterate. Did one?
+  virtual bool switch_elements(State&) const { return false; }
   /// Asked before each correction; true stops with `cancelled`.
   virtual bool cancelled() const { return false; }
 };

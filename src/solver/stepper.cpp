@@ -85,19 +85,23 @@ bool is_two_step(const MethodSettings& m) {
 
 }  // namespace
 
-/// Regular steps only ask whether to go on.
+/// `driven` elements that are switched in a step of one instant bring their own pivots.
 class Stepper::StepHooks : public NewtonHooks {
  public:
-  explicit StepHooks(const CancelToken* cancel, const std::function<bool(int)>* exchange = nullptr)
-      : cancel_(cancel), exchange_(exchange) {}
+  StepHooks(Stepper& stepper, bool one_instant) : stepper_(stepper), one_instant_(one_instant) {}
   bool exchange(int iteration) const override {
-    return !exchange_ || !*exchange_ || (*exchange_)(iteration);
+    return !stepper_.exchange_ || stepper_.exchange_(iteration);
   }
-  bool cancelled() const override { return cancel_ && cancel_->cancelled(); }
+  bool switch_elements(State& state) const override {
+    if (!follow_activity(stepper_.model_.context(state, Phase::step), state)) return false;
+    if (one_instant_) stepper_.select_pivots(state);
+    return true;
+  }
+  bool cancelled() const override { return stepper_.cancel_ && stepper_.cancel_->cancelled(); }
 
  private:
-  const CancelToken* cancel_;
-  const std::function<bool(int)>* exchange_;
+  Stepper& stepper_;
+  const bool one_instant_;
 };
 
 void at_derivatives(const Model& model, State& state, bool first) {
@@ -123,6 +127,9 @@ class Stepper::DerivativesHooks : public NewtonHooks {
     at_derivatives(model_, state, false);
   }
   bool exchange(int iteration) const override { return !exchange_ || exchange_(iteration); }
+  bool switch_elements(State& state) const override {
+    return follow_activity(model_.context(state, Phase::derivatives), state);
+  }
   bool cancelled() const override { return cancel_ && cancel_->cancelled(); }
 
  private:
@@ -141,10 +148,7 @@ Stepper::Stepper(const Model& model)
                             model.initial_value.dummy_max_iterations)),
       derivatives_coefficient_(model.initial_value.derivatives_coefficient) {
   constexpr std::size_t kMostDriven = 8;  // each may double the kinds of matrices
-  if (model.has_driven)
-    for (const ElementRef& e : model.elements)
-      if (e.set->info(e.index).driven) driven_.push_back(e);
-  if (driven_.size() > kMostDriven) driven_.clear();
+  if (model.driven.size() <= kMostDriven) driven_ = model.driven;
   activity_.resize(driven_.size());
   const InitialValueSettings& s = model.initial_value;
   if (is_third_order(s.method) || (s.dummy_method && is_third_order(*s.dummy_method)))
@@ -179,6 +183,7 @@ Status Stepper::assemble(State& state) {
   update_activity(model_.context(state, Phase::assembly), state, false);
   auto report = assemble_initially(model_, state, cancel_);
   if (!report) return report.error();
+  follow_activity(model_.context(state, Phase::derivatives), state);
   for (const StructuralNode& n : model_.structural)
     if (n.has_rotation()) put(state.yp, n.first + 3, Vec3::Zero());  // ġ relative to w_ref = w
   return ok();
@@ -308,14 +313,15 @@ ThirdOrderFormula Stepper::third_order(const State& state, const MethodSettings&
 
 NewtonReport Stepper::iterate(State& state, const StepFormula& f, const MethodSettings& method,
                               bool first, NewtonSettings settings) {
-  const StepHooks hooks(cancel_, &exchange_);
+  const bool one_instant = first || !is_third_order(method);
+  const StepHooks hooks(*this, one_instant);
   const InitialValueSettings& s = model_.initial_value;
   if (s.constraint_violations) {
-    const double c = !first && is_third_order(method) ? 1 : f.c();
+    const double c = one_instant ? f.c() : 1;
     settings.constraint_factor =
         c * (s.constraint_scale > 0 ? s.constraint_scale : 1 / s.time_step);
   }
-  if (first || !is_third_order(method)) {
+  if (one_instant) {
     InstantSystem system(model_, Phase::step, f.c(), f.c_algebraic(), state, workspace_);
     return solve_newton(system, settings, hooks);
   }

@@ -145,18 +145,29 @@ void apply_correction(const Model& model, const std::vector<double>& delta, doub
 }
 
 void update_activity(const EvalContext& context, State& state, bool restart) {
-  if (!context.model->has_driven) return;
-  for (const ElementRef& e : context.model->elements) {
+  for (const ElementRef& e : context.model->driven) {
     const ElementInfo& info = e.set->info(e.index);
-    if (!info.driven) continue;
     const bool active = info.driven->value(context) != 0;
-    double& flag = state.memory[info.active_memory];
-    if (active && (flag == 0 || !restart))
+    double* const flags = &state.memory[info.active_memory];
+    const bool started = flags[1] != 0;
+    if (active && (!started || !restart))
       for (const HintSample& hint : info.hints)
         if (restart || hint.at_start) state.memory[hint.memory] = hint.source->value(context);
-    if (active && flag == 0) e.set->start(context, state, e.index);
-    flag = active ? 1 : 0;
+    if (active && !started) e.set->start(context, state, e.index);
+    flags[0] = flags[1] = active ? 1 : 0;
   }
+}
+
+bool follow_activity(const EvalContext& context, State& state) {
+  bool switched = false;
+  for (const ElementRef& e : context.model->driven) {
+    const ElementInfo& info = e.set->info(e.index);
+    double& flag = state.memory[info.active_memory];
+    const double now = info.driven->value(context) != 0 ? 1 : 0;
+    switched = switched || now != flag;
+    flag = now;
+  }
+  return switched;
 }
 
 }  // namespace mbcosim

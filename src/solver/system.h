@@ -28,8 +28,12 @@ void update_rotations(const Model& model, State& state, ThreadTeam* team = nullp
 void apply_correction(const Model& model, const std::vector<double>& delta, double c,
                       double c_algebraic, State& state, ThreadTeam* team = nullptr);
 
-/// Evaluates the drives of `driven` elements; those that become active get their start values. What
-/// their hints give is taken then and, without `restart`, from all that are active.
+/// Evaluates the drives of `driven` elements at a prediction; those that were not active at the one
+/// before get their start values. What their hints give is taken then and, without `restart`, from
+/// all that are active.
 void update_activity(const EvalContext& context, State& state, bool restart);
+/// Evaluates them at another iterate of the step: as in MBDyn elements are switched at once, and
+/// start anew only at the next prediction. Was one switched?
+bool follow_activity(const EvalContext& context, State& state);
 
 }  // namespace mbcosim

@@ -81,8 +81,10 @@ struct Screw : TwoAttachments, NamedData<Screw> {  // a: p and Rh, b: q
 
  private:
   Vec3 load(const Local<double>& u, const Motion<double>& m) const { return m.e * u.own(0); }
+  /// That on node 1 with the other sign, its arm included.
   Vec3 moment(const Local<double>& u, const Motion<double>& m, double friction_moment) const {
-    return (m.e.cross(m.phi) - m.g) * (lead * u.own(0)) + m.e * friction_moment;
+    return m.s.cross(load(u, m)) + (m.e.cross(m.phi) - m.g) * (lead * u.own(0)) +
+           m.e * friction_moment;
   }
 };
 

@@ -94,6 +94,11 @@ void accept(const E& e, const Local<double>& u, State& state) {
   for (int i = 0; i < 3; ++i) memory[i] = theta(i);
 }
 
+/// 0 where no position is imposed, as in the reference solver.
+double imposed(TotalConstraint::Kind kind, double value) {
+  return kind == TotalConstraint::Kind::position ? value : 0;
+}
+
 template <class E>
 double total_datum(const E& e, const Local<double>& u, int datum, const Vec3& spin) {
   const auto m = e.motion(u);
@@ -110,9 +115,9 @@ double total_datum(const E& e, const Local<double>& u, int datum, const Vec3& sp
     case 3:
       return moment(i);
     case 4:
-      return u.drive(e.constraint.displacement)(i);
+      return imposed(e.constraint.translation[i], u.drive(e.constraint.displacement)(i));
     case 5:
-      return u.drive(e.constraint.angle)(i);
+      return imposed(e.constraint.rotation[i], u.drive(e.constraint.angle)(i));
     case 6:
       return m.velocity(i);
     default:

@@ -52,7 +52,7 @@ couple
   = <type of the couple group>
 driven
   = <drive> , [ hint , "<hint>" , ] { <element card> | existing : <head> , <label> }
-  ! partly: hints: `offset` and `hinge` of joints, `drive`, `drive3`, `position-drive3`, `orientation-drive3` with any drive that keeps no state of its own; others are named in a warning; none with `existing`
+  ! partly: hints: `offset` and `hinge` of joints, `drive`, `drive3`, `position-drive3`, `orientation-drive3` with any drive that keeps no state of its own; others are named in a warning; with `existing` only `offset` and `hinge`
 electric
   = <type of the electric group>
 force

@@ -100,6 +100,17 @@ TEST(Driven, SaysWhichHintsAreNotApplied) {
             "joint 7 (clamp): hint \"offset\" is not applied: the element starts as its card says");
 }
 
+TEST(Driven, MovesPartsOfExistingElementsOnly) {
+  const auto warnings = [](const std::string& hint) {
+    const LoadReport report =
+        load(elements("joint: 7, distance, 1, position, 1.,0.,0., 2, 3.; driven: 7, 1., hint, \"" +
+                      hint + "\", existing: joint, 7;"));
+    EXPECT_TRUE(report.ok());
+    return report.diagnostics.size();
+  };
+  EXPECT_EQ(warnings("drive{2.}"), 1u);
+}
+
 TEST(Driven, RefusesHintsThatCannotBeRead) {
   const auto message = [](const std::string& hint, const std::string& rest) {
     const LoadReport report = load(elements("driven: 7, 1., hint, \"" + hint + "\", " + rest));
@@ -113,7 +124,9 @@ TEST(Driven, RefusesHintsThatCannotBeRead) {
   EXPECT_THAT(message("drive{ramp, 1.}", distance), testing::HasSubstr("number expected"));
   EXPECT_THAT(message("drive{1., 2.}", distance), testing::HasSubstr("2."));
   EXPECT_THAT(message("drive{model::nothing(1)}", distance), testing::HasSubstr("nothing"));
-  EXPECT_THAT(message("drive{1.}", "existing: joint, 7;"), testing::HasSubstr("existing"));
+  EXPECT_THAT(
+      message("drive{1.}", distance + " driven: 7, 1., hint, \"drive{2.}\", existing: joint, 7;"),
+      testing::HasSubstr("driven already"));
 }
 
 TEST(Counts, AcceptExactNumbers) {

@@ -324,6 +324,22 @@ end: elements;
   }
 }
 
+/// What the derivatives phase leaves is as without the frame's rotation, below the usual tolerance.
+TEST(DeckDetails, CoriolisForcesFitInTheDerivativesPhase) {
+  DeckRun run(
+      deck("final time: 1.; time step: .01; max iterations: 20; tolerance: 1e-8; method: ms, .6;",
+           "structural nodes: 1; rigid bodies: 1; rigid body kinematics: const, angular velocity, "
+           "0.,0.,8.;",
+           R"deck(begin: nodes;
+  structural: 1, dynamic, .5,.1,-.2, euler, .3,.1,.2, -.3,.1,.2, .5,1.,-.7;
+end: nodes;
+begin: elements;
+  body: 1, 1, 1.5, .1,.02,-.03, diag, .1,.2,.15;
+end: elements;
+)deck"));
+  EXPECT_TRUE(run.ready());
+}
+
 /// Node 4 is 0 until .0325 s are over, then what node 2 has in the first step at or after each
 /// multiple of it; the force on node 1 sees that in the same step. (As the reference
 /// solver.)

@@ -11,7 +11,7 @@ namespace mbcosim::fitted_joints_test {
 namespace {
 
 /// Two free bodies that turn; the joint between them follows `driven`.
-std::string deck(const std::string& driven) {
+std::string deck_with(const std::string& before, const std::string& driven) {
   return R"(begin: data; problem: initial value; end: data;
 begin: initial value; initial time: 0.; final time: 1.; time step: 1./64.; method: ms, .6;
   tolerance: 1e-11; max iterations: 30; derivatives tolerance: 1e4; end: initial value;
@@ -23,9 +23,10 @@ end: nodes;
 begin: elements;
   body: 1, 1, 2., .1,0.,0., diag, 1.,2.,3.;
   body: 3, 3, 3., .1,.2,-.1, diag, 2.,2.,3.;
-  driven: 5, )" +
-         driven + ";\nend: elements;\n";
+  )" + (before.empty() ? "" : before + ";\n") +
+         "driven: 5, " + driven + ";\nend: elements;\n";
 }
+std::string deck(const std::string& driven) { return deck_with("", driven); }
 
 struct FittedJoint {
   std::string hints;  ///< with blanks between them
@@ -198,6 +199,18 @@ TEST(FittedJoint, ContinuesFromSnapshots) {
     expect_restored_runs_continue(text, 20, 20);
     expect_restored_runs_continue(text, 40, 10);
   }
+}
+
+TEST(FittedJoint, MayHaveACardOfItsOwn) {
+  const std::string later = "string, \"Time > .5\"", hints = "hint, \"offset{2}\"",
+                    joint = "joint: 5, " + joint_card("spherical hinge, POINTS");
+  DeckRun inside(deck(later + ", " + hints + ", " + joint)),
+      outside(deck_with(joint, later + ", " + hints + ", existing: joint, 5"));
+  ASSERT_TRUE(inside.ready() && outside.ready());
+  inside.step(64);
+  outside.step(64);
+  EXPECT_LT((inside.node(1).x - Vec3(.619251292129, .294879557626, .406224980483)).norm(), 1e-6);
+  EXPECT_EQ(inside.node(1).x, outside.node(1).x);
 }
 
 /// A joint that is on from the beginning stands as its card says: the initial assembly closes the

@@ -49,6 +49,41 @@ begin: elements;
   }
 }
 
+// In the reference solver rz is .5 and the velocity that of the node.
+TEST(PrivateData, TotalPinsAreRelativeToTheGround) {
+  DeckRun run(deck("structural nodes: 1; rigid bodies: 1; joints: 1; skip initial joint assembly;",
+                   R"deck(begin: nodes;
+  structural: 1, dynamic, null, eye, null, 0.,0.,2.;
+end: nodes;
+begin: elements;
+  body: 1, 1, 1., null, eye;
+  joint: 1, total pin joint, 1, position, 1.,0.,0., rotation orientation, euler, 0.,0.,.5,
+    position, 1.,0.,0., rotation orientation, euler, 0.,0.,.5, orientation constraint, 1, 1, 0, null;
+end: elements;
+)deck"));
+  ASSERT_TRUE(run.ready());
+  EXPECT_EQ(vector_datum(run, 1, "r"), Vec3::Zero());
+  EXPECT_LT((vector_datum(run, 1, "v") - Vec3(0, 2, 0)).norm(), 1e-15);
+}
+
+// What is imposed along free directions is 0, whatever the drives say.
+TEST(PrivateData, TotalJointsImposeWhatTheyHold) {
+  DeckRun run(deck("structural nodes: 1; rigid bodies: 1; joints: 1; skip initial joint assembly;",
+                   R"deck(begin: nodes; structural: 1, dynamic, null, eye, null, null; end: nodes;
+begin: elements;
+  body: 1, 1, 1., null, eye;
+  joint: 1, total pin joint, 1, position constraint, active, inactive, velocity,
+    component, linear, 0., .3, const, 2., const, .1,
+    orientation constraint, inactive, active, inactive, component, const, 2., time, const, 2.;
+end: elements;
+)deck"));
+  ASSERT_TRUE(run.ready());
+  run.step(2);
+  const double t = run.simulation().state().time;
+  EXPECT_EQ(vector_datum(run, 1, "d"), Vec3(.3 * t, 0, 0));
+  EXPECT_EQ(vector_datum(run, 1, "t"), Vec3(0, t, 0));
+}
+
 TEST(PrivateData, VelocitiesOfDeformableJointsAreInAxesOfTheFirstNode) {
   const std::string at =
       " joint, 1, null, hinge, euler123, .1,.2,.3, 2, null, hinge, eye, linear viscoelastic, 10., "

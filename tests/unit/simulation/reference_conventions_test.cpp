@@ -304,6 +304,8 @@ TEST(Screw, TellsItsColumns) {
   for (int k = 0; k < 6; ++k) EXPECT_EQ(run.datum(Family::joint, 5, names[k]), v[k]) << names[k];
   EXPECT_EQ(run.datum(Family::joint, 5, "d"), v[13]);
   EXPECT_NEAR(run.datum(Family::joint, 5, "Fx"), 1.716311e-2, 1e-6);
+  const Vec3 moment(-1.165851164874e-02, 9.783074884577e-03, 6.016318684754e-03);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(v[3 + k], moment(k), 1e-7) << names[3 + k];
   EXPECT_NEAR(run.datum(Family::joint, 5, "d"), 3.106309322e-3, 1e-8);
 }
 
