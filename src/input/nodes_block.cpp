@@ -80,14 +80,15 @@ Sampling read_parameter(DeckCard& card, ScalarNode& node) {
 }
 
 /// The card switches on the lines of `.mov`; those of `.ine`, which the node's own card and
-/// `default output` switch on with them, it switches off, as MBDyn does.
+/// `default output` switch on with them, it switches off, as MBDyn does, but for displacement
+/// nodes.
 void read_nodes_output(DeckCard& card) {
   const int type = card.required("node type", kNodeWords);
   Model& model = card.model();
   const bool accelerations = type == 0 && card.keyword("accelerations");
   const auto mark_structural = [&](StructuralNode& node) {
     node.output = true;
-    node.output_inertia = false;
+    if (!node.is_displacement()) node.output_inertia = false;
     node.accelerations |= accelerations;
   };
   const std::string kind =

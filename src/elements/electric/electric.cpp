@@ -21,6 +21,14 @@ void DisplacementSensor::start(Start& s) const {
   s.state.yp[node.unknown] = d.dot(velocity) / distance;
 }
 
+void Motor::start(Start& s) const {
+  const Local<double>& u = s.u;
+  s.own(0) = initial_current;
+  const auto declared = [&](int k) { return u.model().scalars[u.connection->scalar[k]].value; };
+  const double drop = R->value(*u.context, std::abs(initial_current)) * initial_current;
+  if (L != 0) s.own_rate(0) = (declared(1) - declared(0) - speed(u) * G - drop) / L;
+}
+
 int Motor::private_datum(std::string_view name) { return index_of(data_names, name); }
 
 double Motor::private_value(const Local<double>& u, int datum) const {

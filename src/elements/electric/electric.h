@@ -145,7 +145,8 @@ struct Motor {
     r.scalar(1, i);
     r.own(0, u.scalar(1) - u.scalar(0) - omega * G - u.own_rate(0) * L - resistance(u) * i);
   }
-  void start(Start& s) const { s.own(0) = initial_current; }
+  /// The current's rate starts as its row has it with the declared values of the nodes.
+  void start(Start& s) const;
   void output(const Local<double>& u, OutputRow& row) const;
   static int private_datum(std::string_view name);
   static constexpr std::array<DatumName, 12> data_names = {{{"omega", "rad/s"},

@@ -169,8 +169,8 @@ TEST(OutputCard, SwitchesNodesOn) {
   d.nodes =
       "structural: 1, dynamic, null, eye, null, null; structural: 2, dynamic, null, eye, null, "
       "null;"
-      "structural: 7, dynamic, null, eye, null, null; abstract: 3; output: structural, "
-      "accelerations, 1, range, 5, 8;"
+      "structural: 7, dynamic, null, eye, null, null; structural: 8, dynamic displacement, null, "
+      "null; abstract: 3; output: structural, accelerations, 1, range, 5, 8;"
       "output: abstract, 4;";
   const LoadReport report = load(d);
   ASSERT_TRUE(report.ok());
@@ -180,6 +180,7 @@ TEST(OutputCard, SwitchesNodesOn) {
   EXPECT_FALSE(report.model->structural[1].output);
   EXPECT_TRUE(report.model->structural[2].output);
   EXPECT_FALSE(report.model->structural[2].output_inertia);
+  EXPECT_TRUE(report.model->structural[3].output_inertia);
   EXPECT_FALSE(report.model->scalars[0].output);
 }
 

@@ -139,10 +139,14 @@ TEST_F(RunLog, EigenanalysisOfATimeAmongTheDummySteps) {
   EXPECT_LT(found, out.find("\nStep 2 "));
 }
 
-TEST_F(RunLog, OutputCardOfNodesHasNoInertia) {
-  run(deck("", "default output: none;", "output: structural, range, 1, 9;"));
+TEST_F(RunLog, OutputCardOfNodesHasInertiaOfDisplacementNodesAlone) {
+  run(deck("", "default output: none;", "output: structural, 2;"));
   EXPECT_TRUE(has("x.mov"));
   EXPECT_FALSE(has("x.ine"));
+  run(deck("", "default output: none;", "output: structural, range, 1, 9;"));
+  ASSERT_TRUE(has("x.ine"));
+  std::istringstream lines(file("x.ine"));
+  for (std::string line; std::getline(lines, line);) EXPECT_EQ(std::stoi(line), 3);
 }
 
 const char* const kDofs = R"(Regular steps dof stats

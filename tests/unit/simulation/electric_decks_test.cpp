@@ -198,6 +198,15 @@ TEST(Motor, NumbersOfTheReferenceSolver) {
   EXPECT_NEAR(started.datum(Family::electric, 1, "i"), 5.697951608942, 1e-7);
 }
 
+/// i̇ = (V − G Ω − R i)/L without an iteration of the derivatives phase; V is what the nodes
+/// declare.
+TEST(Motor, CurrentStartsWithTheRateOfItsRow) {
+  DeckRun run(motor_deck(kLoose, "eye, null, 0.,0.,.25",
+                         "0.,0.,1., 1, 2, .4, .01, 2., initial current, 1."));
+  ASSERT_TRUE(run.ready());
+  EXPECT_NEAR(run.datum(Family::electric, 1, "iP"), -(.4 * .25 + 2 * 1) / .01, 1e-9);
+}
+
 /// J Ω̇ = G i, L i̇ + R i + G Ω = V from rest: Ω approaches V/G with the two poles of
 /// s² + (R/L) s + G²/(J L).
 TEST(Motor, RunsUpToItsNoLoadSpeed) {
