@@ -259,7 +259,7 @@ title
   = "<title>"
 print
   = { dof stats | dof description | equation description | description | element connection | node connection | connection | all | none } [ , to file ]
-  > .dof with `to file`, else standard output
+  > .dof with `to file`, else standard output of `mbcosim run`
 make restart file
   = [ { iterations , <n iterations> | time , <t [s]> | times , <n times> , ( <increasing [s]> ) * n times } [ , with solution array ] ]
   ! ignored: use snapshots
