@@ -94,16 +94,23 @@ std::string without_blanks(const Hint& hint) {
   return text + "}";
 }
 
-/// Hints that the element's reader did not ask for: they move parts of the element.
-void apply_to_parts(DeckCard& card, const ElementRef& element, const std::vector<Hint>& hints) {
+/// Hints that the element's reader did not ask for: they move parts of the element. `others`: which
+/// hints that reader takes, for the remedy.
+void apply_to_parts(DeckCard& card, const ElementRef& element, const std::vector<Hint>& hints,
+                    const std::string& others) {
   for (const Hint& h : hints)
     if (!h.used && !card.builder().add_hint(element, without_blanks(h)))
       card.warn_at(
           h.where, "hint \"" + h.name + "\" is not applied: the element starts as its card says",
           "applied are offset{1 or 2, 0 for the place of a pin} and hinge{1 or 2} of joints "
-          "that have them, drive{} (distance), drive3{} (drive hinge, drive displacement), "
-          "position-drive3{} and orientation-drive3{} (total joint)");
+          "that have them, " +
+              others);
 }
+constexpr const char* kReadHints =
+    "drive{} (distance), drive3{} (drive hinge, drive displacement), position-drive3{} and "
+    "orientation-drive3{} (total joint)";
+constexpr const char* kNoReadHints =
+    "others when the element is written inside the driven card instead of `existing`";
 
 /// Joints of what the reader added (after `before` elements) between a node and itself.
 void refuse_self_joints(DeckCard& card, Family family, std::size_t before) {
@@ -145,7 +152,7 @@ void read_element(DeckCard& card, Driven* driven = nullptr) {
   if (driven && card.model().elements.size() > before) {
     const ElementRef element = card.model().elements[before];
     card.builder().info(element).hints = std::move(samples);
-    apply_to_parts(card, element, driven->hints);
+    apply_to_parts(card, element, driven->hints, kReadHints);
   }
   set_inverse_role(card, before);
   read_inverse_role(card, before);
@@ -178,7 +185,7 @@ void drive_existing(DeckCard& card, const Driven& driven) {
   card.expect_end();
   info.driven = driven.drive;
   card.builder().register_driven(info);
-  apply_to_parts(card, e, driven.hints);
+  apply_to_parts(card, e, driven.hints, kNoReadHints);
 }
 
 void read_driven(DeckCard& card) {

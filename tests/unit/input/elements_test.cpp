@@ -106,9 +106,11 @@ TEST(Driven, MovesPartsOfExistingElementsOnly) {
         load(elements("joint: 7, distance, 1, position, 1.,0.,0., 2, 3.; driven: 7, 1., hint, \"" +
                       hint + "\", existing: joint, 7;"));
     EXPECT_TRUE(report.ok());
-    return report.diagnostics.size();
+    return report.diagnostics;
   };
-  EXPECT_EQ(warnings("drive{2.}"), 1u);
+  const std::vector<Diagnostic> found = warnings("drive{2.}");
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_THAT(found[0].hint, testing::HasSubstr("inside the driven card"));
 }
 
 TEST(Driven, RefusesHintsThatCannotBeRead) {
