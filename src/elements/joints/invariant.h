@@ -51,6 +51,10 @@ struct InvariantMotion : HingeMotion {
 struct InvariantHinge : InvariantMotion, LawUser<InvariantHinge, 3> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_hinges<E>();
+  }
   static constexpr auto data_names = DeformableHinge::data_names;
 
   template <class T>
@@ -77,6 +81,10 @@ struct InvariantHinge : InvariantMotion, LawUser<InvariantHinge, 3> {
 struct InvariantDisplacement : InvariantMotion, LawUser<InvariantDisplacement, 3> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_points_and_hinges<E>();
+  }
   static constexpr auto data_names = DeformableDisplacement::data_names;
 
   template <class T>
@@ -102,6 +110,10 @@ struct InvariantDisplacement : InvariantMotion, LawUser<InvariantDisplacement, 3
 struct InvariantJoint : InvariantMotion, LawUser<InvariantJoint, 6> {
   static constexpr int width = 12;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
+  template <class E>
+  static constexpr auto movable_parts() {
+    return movable_points_and_hinges<E>();
+  }
   static constexpr auto data_names = DeformableJoint::data_names;
 
   template <class T>

@@ -473,5 +473,40 @@ begin: elements; body: 1, 1, 1., null, eye; end: elements;
   EXPECT_EQ(run.simulation().time(), .5);
 }
 
+/// The reference solver refuses such a `fixed step` file and loses the last line of a
+/// `variable step` one, whose value is 0 from t = .5 s on.
+TEST(DeckDetails, LastLineOfADriverFileNeedsNoNewline) {
+  const std::string drivers[] = {"fixed step, 3, 1, initial time, 0., time step, .5",
+                                 "variable step, 1"};
+  const std::string numbers[] = {"1.\n2.\n5.", "0. 1.\n.5 2.\n1. 5."};
+  for (int kind = 0; kind < 2; ++kind) {
+    SCOPED_TRACE(drivers[kind]);
+    DeckRun run(
+        {{"deck.mbd", deck("final time: 1.; time step: .125; max iterations: 20; tolerance: 1e-9;",
+                           "abstract nodes: 1; genels: 1; file drivers: 1;",
+                           "begin: nodes; abstract: 1, algebraic, value, 1.; end: nodes;\n"
+                           "begin: drivers; file: 7, " +
+                               drivers[kind] +
+                               ", \"x.dat\"; end: drivers;\n"
+                               "begin: elements; genel: 1, clamp, 1, abstract, file, 7, 1; "
+                               "end: elements;\n")},
+         {"x.dat", numbers[kind]}});
+    ASSERT_TRUE(run.ready());
+    run.step(7);
+    EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 1), 4.25, 1e-12);
+  }
+}
+
+TEST(DeckDetails, KineticEnergyOfAPointMassIsHalfItsMassTimesItsSpeedSquared) {
+  DeckRun run(deck("final time: 1.; time step: 1e-2; max iterations: 20; tolerance: 1e-9;",
+                   "structural nodes: 1; rigid bodies: 1;",
+                   R"(begin: nodes; structural: 1, dynamic displacement, null, 1.,2.,3.; end: nodes;
+begin: elements; body: 1, 1, 2.; end: elements;
+)"));
+  ASSERT_TRUE(run.ready());
+  run.step(3);
+  EXPECT_NEAR(run.datum(Family::body, 1, "E"), 14, 1e-12);  // 2 · (1 + 4 + 9) / 2
+}
+
 }  // namespace
 }  // namespace mbcosim::deck_details_test

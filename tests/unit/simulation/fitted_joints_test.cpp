@@ -43,6 +43,8 @@ std::string joint_card(std::string text) {
       {"HINGES", "1, hinge, euler123, .2,-.1,.3, 3, hinge, euler123, -.3,.2,.1"},
       {"DRIVES", "component, .01,.02, ramp, .1, 0., forever, 0."},
       {"LAW6", "linear viscoelastic generic, diag, 10.,10.,10.,1.,1.,1., proportional, .1"},
+      {"ELASTIC6", "linear elastic generic, diag, 10.,10.,10.,1.,1.,1."},
+      {"ELASTIC3", "linear elastic generic, diag, 10.,10.,10."},
       {"LAW3", "linear viscoelastic generic, diag, 10.,10.,10., proportional, .1"}};
   for (const auto& [word, arguments] : words)
     if (const auto at = text.find(word); at != std::string::npos)
@@ -154,6 +156,20 @@ INSTANTIATE_TEST_SUITE_P(
         FittedJoint{"hinge{2}", "deformable hinge, HINGES, LAW3",
                     Vec3(0.633418343513, 0.217791120028, 0.264880527433),
                     Vec3(0.0398509739471, 1.01337862591, 0.782953558741)},
+        FittedJoint{"hinge{1}", "invariant deformable hinge, HINGES, LAW3",
+                    Vec3(0.633418343513, 0.217791120028, 0.264880527433),
+                    Vec3(0.0398509739471, 1.01337862591, 0.782953558741)},
+        FittedJoint{"hinge{2}", "invariant deformable hinge, HINGES, LAW3",
+                    Vec3(0.633418343513, 0.217791120028, 0.264880527433),
+                    Vec3(0.0398509739471, 1.01337862591, 0.782953558741)},
+        FittedJoint{"offset{1} hinge{2}",
+                    "invariant deformable displacement joint, POINTS_AND_HINGES, ELASTIC3",
+                    Vec3(0.606663143078, 0.252809387982, 0.217980448099),
+                    Vec3(0.0028633911835, 1.1338552182, 0.753745715724)},
+        FittedJoint{"offset{2} hinge{1}",
+                    "invariant deformable displacement joint, POINTS_AND_HINGES, ELASTIC3",
+                    Vec3(0.62945611184, 0.250057056951, 0.320549715677),
+                    Vec3(0.0191976334901, 1.17698404475, 0.773358243822)},
         FittedJoint{"hinge{1}", "deformable axial joint, HINGES, linear elastic, 3.",
                     Vec3(0.644539067232, 0.223640125502, 0.272447365993),
                     Vec3(0.0353031257505, 1.17808310295, 0.747008315002)}));
@@ -188,6 +204,30 @@ TEST(FittedJoint, HingeOfAnIsotropicDisplacementDoesNotMatter) {
   plain.step(64);
   EXPECT_LT((fitted.node(1).x - plain.node(1).x).norm(), 1e-9);
   EXPECT_LT((fitted.rotation_vector(1) - plain.rotation_vector(1)).norm(), 1e-9);
+}
+
+/// In the reference solver, too, the displacement joint and the hinge together give these numbers,
+/// but the joint that is both moves otherwise, with and without hints.
+TEST(FittedJoint, InvariantJointIsADisplacementJointAndAHinge) {
+  const std::string later = "string, \"Time > .5\"";
+  std::string both = deck(later + ", joint: 5, " +
+                          joint_card("invariant deformable displacement joint, "
+                                     "POINTS_AND_HINGES, ELASTIC3") +
+                          "; driven: 6, " + later + ", joint: 6, " +
+                          joint_card("invariant deformable hinge, HINGES, linear elastic, 1."));
+  both.replace(both.find("joints: 1"), 9, "joints: 2");
+  DeckRun apart(both), joint(deck(later + ", joint: 5, " +
+                                  joint_card("invariant deformable joint, POINTS_AND_HINGES, "
+                                             "ELASTIC6")));
+  ASSERT_TRUE(apart.ready() && joint.ready());
+  apart.step(64);
+  joint.step(64);
+  const Vec3 x(0.182382190029, 0.130999292141, 0.335918929445),
+      phi(-0.193311251031, 0.95197775749, 0.891769258262);
+  for (const DeckRun* run : {&apart, &joint}) {
+    EXPECT_LT((run->node(1).x - x).norm(), 1e-6) << run->node(1).x.transpose();
+    EXPECT_LT((run->rotation_vector(1) - phi).norm(), 1e-6);
+  }
 }
 
 /// From a snapshot in which the joint is off, and from one in which it is on.
