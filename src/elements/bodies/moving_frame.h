@@ -30,10 +30,11 @@ struct FrameState {
   Vec<T> a0, w0, alpha;
 };
 
-/// A velocity in the frame. The derivatives phase holds it: a matrix with its derivative would ask
-/// for what the phase takes back, so that the Coriolis force never fits.
+/// A velocity in the frame, 0 in a static model. The derivatives phase holds it: a matrix with its
+/// derivative would ask for what the phase takes back, so that the Coriolis force never fits.
 template <class T>
 Vec<T> velocity_in_frame(const Local<T>& u, const Vec<T>& velocity) {
+  if (u.model().control.is_static) return Vec<T>::Constant(T(0.0));
   if (u.context->phase != Phase::derivatives) return velocity;
   return value_of<T>(velocity).template cast<T>();
 }
@@ -46,6 +47,8 @@ Vec<T> velocity_in_frame(const Local<T>& u, const Vec<T>& velocity) {
 ///   a_e = a₀ + α₀ × x + ω₀ × (ω₀ × x)         acceleration of the frame at the node
 ///   F   = −m a_e − α₀ × S − ω₀ × (ω₀ × S) − 2 ω₀ × (m v + w × S)
 ///   M   = −S × a_e − J α₀ − ω₀ × J ω₀ − 2 S × (ω₀ × v) + 2 w × P ω₀,  P = ½ tr(J) I − J = ∫r rᵀdm
+///
+/// In a static model those of a body at rest in the frame: v = w = 0.
 template <class B>
 struct InMovingFrame : B {
   explicit InMovingFrame(B body) : B(std::move(body)) {}
@@ -92,16 +95,17 @@ struct InMovingFrame<VariableBody> : VariableBody {
     const VariableInertia p = inertia(*u.context, u.label());
     const Mat3 J0 = p.J();
     const Vec<T> arm = u.R(0) * p.b, w = velocity_in_frame<T>(u, u.w(0));
-    const Vec<T> velocity = velocity_in_frame<T>(u, u.v(0)) + w.cross(arm) + u.R(0) * p.b_rate;
+    const Vec<T> velocity =
+        velocity_in_frame<T>(u, u.v(0) + u.w(0).cross(arm) + u.R(0) * p.b_rate);
     const auto turned = [&](const Mat3& j, const Vec<T>& y) -> Vec<T> {
       return u.R(0) * Vec<T>(j * Vec<T>(u.R(0).transpose() * y));
     };
     const Vec<T> a = frame.acceleration(u.x(0) + arm) + w0.cross(velocity) * T(2.0);
     const Vec<T> F = a * T(-p.m), J_w0 = turned(J0, w0);
     const Vec<T> P_w0 = w0 * T(0.5 * J0.trace()) - J_w0;
-    r.load(0, F,
-           arm.cross(F) - turned(J0, frame.alpha) - w0.cross(J_w0) + w.cross(P_w0) * T(2.0) -
-               turned(p.J_vg_rate, w0));
+    Vec<T> M = arm.cross(F) - turned(J0, frame.alpha) - w0.cross(J_w0) + w.cross(P_w0) * T(2.0);
+    if (!u.model().control.is_static) M -= turned(p.J_vg_rate, w0);
+    r.load(0, F, M);
   }
 };
 
