@@ -90,7 +90,8 @@ Mat<T> relative_rotation(const Mat<T>& a, const Mat<T>& b) {
 }
 
 /// Rotation vector of R, norm in [0, π]; the inverse of `rotation_of_vector`. Also defined for
-/// matrices that are not quite orthogonal. Half turns take the axis from the symmetric part.
+/// matrices that are not quite orthogonal. Half turns take the axis from the symmetric part; its
+/// largest component is negative then, as in the reference solver.
 template <class T>
 Vec<T> vector_of_rotation(const Mat<T>& r) {
   using std::atan2;
@@ -124,9 +125,9 @@ Vec<T> vector_of_rotation(const Mat<T>& r) {
   const T norm = sqrt(n.dot(n));
   for (int i = 0; i < 3; ++i) n(i) = n(i) / norm;
   T s = n.dot(a);
-  if (value_of(s) < 0) {
+  if (value_of(s) <= 0) {
     n = -n;
-    s = -s;
+    s = T(0.0) - s;  // not −0, with which the angle would be −π
   }
   const T phi = atan2(s, cos_phi);
   return Vec<T>(n(0) * phi, n(1) * phi, n(2) * phi);

@@ -33,6 +33,19 @@ TEST(Rotation, VectorRoundTripsUpToHalfATurn) {
   }
 }
 
+/// Of both axes of a half turn the one that the reference solver prints in .mov and .log.
+TEST(Rotation, AxisOfAHalfTurnHasANegativeLargestComponent) {
+  const std::pair<Vec3, Vec3> cases[] = {{{1, 0, 0}, {-1, 0, 0}},      {{0, 0, -1}, {0, 0, -1}},
+                                         {{1, -1, 0}, {-1, 1, 0}},     {{1, 2, 3}, {-1, -2, -3}},
+                                         {{0, .6, -.8}, {0, .6, -.8}}, {{3, -2, 1}, {-3, 2, -1}}};
+  for (const auto& [axis, printed] : cases) {
+    const Vec3 n = axis.normalized();
+    const Mat3 r = 2 * n * n.transpose() - Mat3::Identity();
+    EXPECT_LT((vector_of_rotation(r) - kPi * printed.normalized()).norm(), 1e-14)
+        << axis.transpose();
+  }
+}
+
 TEST(Rotation, EulerAnglesAsInTheManual) {
   const Mat3 r = rotation_of_euler123(Vec3(.1, .2, .3));
   EXPECT_NEAR(r(0, 0), .936293364, 1e-9);

@@ -59,6 +59,25 @@ TEST_F(ResultFilesTest, EveryFileOfARunIsAmongThePaths) {
   EXPECT_THAT(told, testing::IsSupersetOf(written));
 }
 
+/// A central field has no acceleration of its own.
+TEST_F(ResultFilesTest, OnlyUniformGravityHasAFile) {
+  const auto has_file = [&](const std::string& field) {
+    std::string deck = kDeck;
+    deck.replace(deck.find("output results: netcdf"), 22, "default output: all; gravity");
+    deck.insert(deck.find("end: elements"), "gravity: " + field + ";\n");
+    const LoadReport report = load_deck(BundleSource({{"deck.mbd", deck}}), "deck.mbd");
+    EXPECT_TRUE(report.ok());
+    if (!report.ok()) return false;
+    const auto writer = make_result_writer(*report.model, path(field.substr(0, 7)));
+    auto simulation = Simulation::create(report.model, nullptr, writer);
+    EXPECT_TRUE(simulation && !(*simulation)->run_until(0.05).error);
+    EXPECT_TRUE(writer->finish());
+    return fs::exists(path(field.substr(0, 7) + ".grv"));
+  };
+  EXPECT_TRUE(has_file("uniform, 0., 0., -1., 9.81"));
+  EXPECT_FALSE(has_file("central, origin, 9., 0., 0., mass, 1., G, 1."));
+}
+
 TEST_F(ResultFilesTest, AFolderInTheWayIsToldBeforeAnythingIsCreated) {
   fs::create_directory(path("x_1.m"));
   std::ofstream(path("x.mov")) << "of an earlier run";
