@@ -95,8 +95,7 @@ struct InMovingFrame<VariableBody> : VariableBody {
     const VariableInertia p = inertia(*u.context, u.label());
     const Mat3 J0 = p.J();
     const Vec<T> arm = u.R(0) * p.b, w = velocity_in_frame<T>(u, u.w(0));
-    const Vec<T> velocity =
-        velocity_in_frame<T>(u, u.v(0) + u.w(0).cross(arm) + u.R(0) * p.b_rate);
+    const Vec<T> velocity = velocity_in_frame<T>(u, u.v(0) + u.w(0).cross(arm) + u.R(0) * p.b_rate);
     const auto turned = [&](const Mat3& j, const Vec<T>& y) -> Vec<T> {
       return u.R(0) * Vec<T>(j * Vec<T>(u.R(0).transpose() * y));
     };
