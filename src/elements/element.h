@@ -27,6 +27,8 @@
 ///     void accumulate(const Local<double>&, Sums&) const       before each residual and matrix:
 ///         adds to what elements of other families sum up; tangents leave out that sums change
 ///     void after_convergence(const Local<double>&, State&) const
+///     bool stages_apart() const                                after_predict and after_convergence
+///         touch nothing but the element's nodes and memory: threads may share such elements
 ///     void output(const Local<double>&, OutputRow&) const      its lines: begin(…, u.label())
 ///     std::string log(const Model&, int label) const           its line of the .log file
 ///     int private_datum(std::string_view) const, std::vector<Datum> private_data() const

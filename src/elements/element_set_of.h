@@ -153,6 +153,12 @@ class ElementSetOf final : public PlacedElements {
     else
       (void)context, (void)state, (void)range, (void)first;
   }
+  bool stages_apart(int i) const override {
+    if constexpr (detail::HasStagesApart<E>)
+      return slots_[i].element.stages_apart();
+    else
+      return (void)i, false;
+  }
   void after_predict(const EvalContext& context, State& state, ElementRange range) const override {
     if constexpr (detail::HasAfterPredict<E>)
       each_active(context, range,

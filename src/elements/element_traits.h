@@ -24,6 +24,10 @@ concept HasAfterPredict = requires(const E& e, const Local<double>& u, State& s)
   e.after_predict(u, s);
 };
 template <class E>
+concept HasStagesApart = requires(const E& e) {
+  e.stages_apart();
+};
+template <class E>
 concept HasAccumulate = requires(const E& e, const Local<double>& u, Sums& s) {
   e.accumulate(u, s);
 };

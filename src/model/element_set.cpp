@@ -4,6 +4,8 @@ namespace mbcosim {
 
 int ElementSet::first_sum(int) const { return -1; }
 
+bool ElementSet::stages_apart(int) const { return false; }
+
 bool ElementSet::add_hint(ModelBuilder&, int, std::string_view) { return false; }
 
 void ElementSet::accumulate(const EvalContext&, ElementRange) const {}

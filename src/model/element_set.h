@@ -139,6 +139,9 @@ class ElementSet {
   virtual void at_derivatives(const EvalContext& context, State& state, ElementRange range,
                               bool first) const;
   // --- stages around it, in the order of families (StageRank)
+  /// Do the stages of element i touch nothing but the nodes it is attached to and its own memory,
+  /// so that such elements can be taken at the same time?
+  virtual bool stages_apart(int i) const;
   /// Once a step, after the prediction.
   virtual void after_predict(const EvalContext& context, State& state,
                              ElementRange range) const = 0;
@@ -194,6 +197,7 @@ struct ElementRef {
 struct ElementSpan {
   const ElementSet* set = nullptr;
   ElementRange range{0, 0};
+  bool stages_apart = false;  ///< of all of them
 };
 
 }  // namespace mbcosim

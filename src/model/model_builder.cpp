@@ -248,7 +248,9 @@ void order_stages(Model& model) {
       for (int first = 0, last; first < set.size(); first = last + 1) {
         for (last = first; last < set.size() && has_rank(last);) ++last;
         if (last == first) continue;
-        model.stage_order.push_back({&set, {first, last}});
+        bool apart = true;
+        for (int i = first; apart && i < last; ++i) apart = set.stages_apart(i);
+        model.stage_order.push_back({&set, {first, last}, apart});
         if (set.accumulates()) model.accumulation.push_back(model.stage_order.back());
       }
     }

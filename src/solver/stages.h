@@ -9,17 +9,21 @@
 ///   after convergence      once a step: what the accepted state leaves behind, into State::memory
 ///
 /// Within a stage elements come in the order of Model::stage_order: by the rank of their family,
-/// then by set. Residual and matrix do not depend on an order.
+/// then by set. Residual and matrix do not depend on an order. A team shares elements whose stages
+/// keep apart (ElementSet::stages_apart).
 #pragma once
 
+#include "math/thread_team.h"
 #include "model/context.h"
 #include "model/scratch.h"
 
 namespace mbcosim {
 
-void run_after_prediction(EvalContext context, Scratch& scratch, State& state);
+void run_after_prediction(EvalContext context, Scratch& scratch, State& state,
+                          ThreadTeam* team = nullptr);
 /// Fills the sums in the scratch of the context; nothing to do for a model without.
 void accumulate(const EvalContext& context);
-void run_after_convergence(EvalContext context, Scratch& scratch, State& state);
+void run_after_convergence(EvalContext context, Scratch& scratch, State& state,
+                           ThreadTeam* team = nullptr);
 
 }  // namespace mbcosim

@@ -338,57 +338,67 @@ void Stepper::set_tangents(std::unique_ptr<TangentSolver> tangents) {
 
 /// Values at the last two accepted steps -> prediction at the new time. Rotation unknowns are first
 /// rewritten relative to the last accepted orientation.
-void Stepper::predict(State& state, const StepFormula& f) const {
-  for (std::size_t k = 0; k < model_.places.size(); ++k) {
-    const NodePlace& n = model_.places[k];
-    if (!n.has_rotation()) continue;
-    const NodeRotation& now = state.rotation[k];
-    NodeRotationHistory& q = state.rotation_history[k];
-    q.R2 = q.R1;
-    q.w2 = q.w1;
-    q.R1 = now.R;
-    q.w1 = now.w;
-    const Mat3 step = q.R2 * q.R1.transpose();
-    if (is_half_turn(step))
-      throw EvaluationError(model_.node_text(static_cast<int>(k)) +
-                            " turned by half a revolution in one step; use a shorter step");
-    const Vec3 g = cgr_parameters(step);
-    put(state.y1, n.first + 3, Vec3::Zero());
-    put(state.yp1, n.first + 3, q.w1);
-    put(state.y2, n.first + 3, g);
-    put(state.yp2, n.first + 3, cgr_g_inverse(g) * q.w2);
-  }
+void Stepper::predict(State& state, const StepFormula& formula) const {
+  each_piece(workspace_.team(), static_cast<int>(model_.places.size()), [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) refer_to_accepted(state, k);
+  });
   const std::vector<double>&y1 = state.y1, &v1 = state.yp1, &y2 = state.y2, &v2 = state.yp2;
-  for (int i = 0; i < model_.unknowns; ++i) {
-    if (model_.kinds[i] == UnknownKind::differential) {
-      const double v = f.m0 * y1[i] + f.m1 * y2[i] + f.n0 * v1[i] + f.n1 * v2[i];
-      state.yp[i] = v;
-      state.y[i] = f.a1 * y1[i] + f.a2 * y2[i] + f.b0 * v + f.b1 * v1[i] + f.b2 * v2[i];
-    } else {
-      const double y = f.n0 * y1[i] + f.n1 * y2[i] - f.m1 * v1[i];
-      state.y[i] = y;
-      state.yp[i] = f.i0 * y + f.i1 * y1[i] + f.i2 * y2[i] + f.j1 * v1[i];
+  each_piece(workspace_.team(), model_.unknowns, [&](int begin, int end) {
+    const StepFormula f = formula;  // a copy, which no store changes
+    for (int i = begin; i < end; ++i) {
+      if (model_.kinds[i] == UnknownKind::differential) {
+        const double v = f.m0 * y1[i] + f.m1 * y2[i] + f.n0 * v1[i] + f.n1 * v2[i];
+        state.yp[i] = v;
+        state.y[i] = f.a1 * y1[i] + f.a2 * y2[i] + f.b0 * v + f.b1 * v1[i] + f.b2 * v2[i];
+      } else {
+        const double y = f.n0 * y1[i] + f.n1 * y2[i] - f.m1 * v1[i];
+        state.y[i] = y;
+        state.yp[i] = f.i0 * y + f.i1 * y1[i] + f.i2 * y2[i] + f.j1 * v1[i];
+      }
     }
-  }
+  });
+}
+
+void Stepper::refer_to_accepted(State& state, int k) const {
+  const NodePlace& n = model_.places[k];
+  if (!n.has_rotation()) return;
+  const NodeRotation& now = state.rotation[k];
+  NodeRotationHistory& q = state.rotation_history[k];
+  q.R2 = q.R1;
+  q.w2 = q.w1;
+  q.R1 = now.R;
+  q.w1 = now.w;
+  const Mat3 step = q.R2 * q.R1.transpose();
+  if (is_half_turn(step))
+    throw EvaluationError(model_.node_text(k) +
+                          " turned by half a revolution in one step; use a shorter step");
+  const Vec3 g = cgr_parameters(step);
+  put(state.y1, n.first + 3, Vec3::Zero());
+  put(state.yp1, n.first + 3, q.w1);
+  put(state.y2, n.first + 3, g);
+  put(state.yp2, n.first + 3, cgr_g_inverse(g) * q.w2);
 }
 
 /// The predicted rotation becomes the reference; increments restart from zero.
 void Stepper::finish_prediction(State& state) const {
-  for (std::size_t k = 0; k < model_.places.size(); ++k) {
-    const NodePlace& n = model_.places[k];
-    if (!n.has_rotation()) continue;
-    NodeRotation& now = state.rotation[k];
-    NodeRotationHistory& q = state.rotation_history[k];
-    const Vec3 g = at(state.y, n.first + 3), gp = at(state.yp, n.first + 3);
-    q.R_ref = now.R = cgr_rotation(g) * q.R1;
-    q.w_ref = now.w = cgr_g(g) * gp;
-    put(state.y, n.first + 3, Vec3::Zero());
-    put(state.yp, n.first + 3, Vec3::Zero());
-  }
+  each_piece(workspace_.team(), static_cast<int>(model_.places.size()), [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      const NodePlace& n = model_.places[k];
+      if (!n.has_rotation()) continue;
+      NodeRotation& now = state.rotation[k];
+      NodeRotationHistory& q = state.rotation_history[k];
+      const Vec3 g = at(state.y, n.first + 3), gp = at(state.yp, n.first + 3);
+      q.R_ref = now.R = cgr_rotation(g) * q.R1;
+      q.w_ref = now.w = cgr_g(g) * gp;
+      put(state.y, n.first + 3, Vec3::Zero());
+      put(state.yp, n.first + 3, Vec3::Zero());
+    }
+  });
 }
 
 void Stepper::after_convergence(State& state, Phase phase, double c, double ca) {
-  run_after_convergence(model_.context(state, phase, c, ca), workspace_.scratch, state);
+  run_after_convergence(model_.context(state, phase, c, ca), workspace_.scratch, state,
+                        workspace_.team());
 }
 
 void Stepper::begin_step(State& state, const StepAttempt& attempt, bool restart) const {
@@ -422,7 +432,7 @@ PhaseReport Stepper::attempt(State& state, const StepAttempt& attempt, const Met
     finish_prediction(state);
     update_activity(model_.context(state, Phase::step, f.c(), f.c_algebraic()), state, true);
     run_after_prediction(model_.context(state, Phase::step, f.c(), f.c_algebraic()),
-                         workspace_.scratch, state);
+                         workspace_.scratch, state, workspace_.team());
     if (first || !is_third_order(method)) select_pivots(state);
     report.newton = iterate(state, f, method, first, settings);
     report.flagged = attempt.accept_unconverged &&

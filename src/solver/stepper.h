@@ -88,7 +88,9 @@ class Stepper final : public StepSystem {
   double strategy_length(const State& state) const;
   ThirdOrderFormula third_order(const State& state, const MethodSettings& method) const;
   StepFormula formula(State& state, double h, const MethodSettings& method, bool first) const;
-  void predict(State& state, const StepFormula& f) const;
+  void predict(State& state, const StepFormula& formula) const;
+  /// Rotation unknowns of the last two accepted steps of node k, relative to the last orientation.
+  void refer_to_accepted(State& state, int k) const;
   void finish_prediction(State& state) const;
   void after_convergence(State& state, Phase phase, double c, double ca);
   bool evaluate_matrix(const State& state);

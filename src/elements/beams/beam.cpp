@@ -1,5 +1,6 @@
 #include "elements/beams/beam_section.h"
 
+#include <algorithm>
 #include <limits>
 
 namespace mbcosim {
@@ -53,6 +54,12 @@ void Beam<Nodes>::after_convergence(const Local<double>& u, State& state) const 
     if (point[a].law->has_memory())
       point[a].law->after_convergence(*u.context, state, s.strain, s.rate);
   }
+}
+
+template <int Nodes>
+bool Beam<Nodes>::stages_apart() const {
+  return std::none_of(point.begin(), point.end(),
+                      [](const Point& p) { return p.law->has_memory(); });
 }
 
 /// Takes the nodes as they are: the rotations from the orientations as read to the current ones are

@@ -149,6 +149,8 @@ struct Beam {
   void at_derivatives(const Local<double>& u, State& state, bool first) const;
   void after_predict(const Local<double>& u, State& state) const;
   void after_convergence(const Local<double>& u, State& state) const;
+  /// Laws with a memory may ask drives, and these other elements.
+  bool stages_apart() const;
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
   int private_datum(std::string_view name) const;

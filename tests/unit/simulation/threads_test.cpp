@@ -99,6 +99,30 @@ TEST(Threads, GiveTheSameError) {
   }
 }
 
+/// What a law that remembers something asks drives for may be in other elements.
+TEST(Threads, ShareStagesOfBeamsWhoseLawsRememberNothing) {
+  const std::string elastic = "linear elastic generic, diag, 1., 1., 1., 1., 1., 1.",
+                    bistop = "bistop, initial status, active, null, null, " + elastic;
+  const auto beams_are_apart = [](const std::string& first_law, const std::string& second_law) {
+    const ModelPtr model = model_of(
+        initial_value_block(.1, 1) +
+        "begin: control data; structural nodes: 3; rigid bodies: 3; beams: 2; end: control data;\n"
+        "begin: nodes; structural: 1, dynamic, null, eye, null, null; structural: 2, dynamic, 1., "
+        "0., 0., eye, null, null; structural: 3, dynamic, 2., 0., 0., eye, null, null; end: "
+        "nodes;\n"
+        "begin: elements; body: 1, 1, 1., null, eye; body: 2, 2, 1., null, eye; body: 3, 3, 1., "
+        "null, eye;\n beam2: 1, 1, null, 2, null, eye, " +
+        first_law + ";\n beam2: 2, 2, null, 3, null, eye, " + second_law + "; end: elements;\n");
+    if (!model) return false;
+    for (const ElementSpan& span : model->stage_order)
+      if (span.set->info(0).family == Family::beam) return span.stages_apart;
+    ADD_FAILURE();
+    return false;
+  };
+  EXPECT_TRUE(beams_are_apart(elastic, elastic));
+  EXPECT_FALSE(beams_are_apart(elastic, bistop));
+}
+
 TEST(AssemblyPlan, TilesOfAWaveAddToDifferentRows) {
   const ModelPtr model = model_of(long_line().deck());
   ASSERT_TRUE(model);
