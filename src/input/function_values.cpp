@@ -4,6 +4,7 @@
 #include <numbers>
 #include <type_traits>
 
+#include "math/rotation.h"
 #include "model/diagnostic.h"
 
 namespace mbcosim {
@@ -11,7 +12,6 @@ namespace mbcosim {
 namespace {
 
 constexpr double kRoundoff = 2.2e-16;
-constexpr double kPi = std::numbers::pi;
 
 [[noreturn]] void fail(const char* function, double x, const char* what) {
   throw EvaluationError(std::string(function) + ": argument " + number_text(x) + " " + what);

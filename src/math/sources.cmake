@@ -1,1 +1,1 @@
-set(SOURCES decompositions.cpp large_pages.cpp processor.cpp rotation.cpp thread_team.cpp)
+set(SOURCES decompositions.cpp large_pages.cpp processor.cpp rotation.cpp subnormals.cpp thread_team.cpp)

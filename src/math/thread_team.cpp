@@ -4,6 +4,8 @@
 #include <new>
 #include <system_error>
 
+#include "math/subnormals.h"
+
 namespace mbcosim {
 
 ThreadTeam::ThreadTeam(int threads) {
@@ -26,6 +28,7 @@ void ThreadTeam::run(Function function, void* work) {
   function_ = function;
   work_ = work;
   first_ = &first;
+  subnormal_mode_ = subnormal_mode();
   busy_ = static_cast<int>(others_.size());
   ++round_;
   round_.notify_all();
@@ -47,6 +50,7 @@ void ThreadTeam::serve(int thread) {
     wait_while(round_, round);
     if (ended_) return;
     ++round;
+    set_subnormal_mode(subnormal_mode_);
     take_part(thread, *first_);
     if (--busy_ == 0) busy_.notify_all();
   }

@@ -40,7 +40,8 @@ void wait_while(const std::atomic<T>& value, T old) {
   value.wait(old, std::memory_order_acquire);
 }
 
-/// Belongs to one caller at a time. Between two calls its threads sleep.
+/// Belongs to one caller at a time. Between two calls its threads sleep. They take subnormal
+/// numbers as the caller does.
 class ThreadTeam {
  public:
   /// `threads`: with the caller's own; fewer where the system has no more to give.
@@ -97,6 +98,7 @@ class ThreadTeam {
   Function function_ = nullptr;
   void* work_ = nullptr;
   First* first_ = nullptr;
+  unsigned subnormal_mode_ = 0;     ///< the caller's
   std::atomic<unsigned> round_{0};  ///< counts the calls
   std::atomic<int> busy_{0};        ///< threads that have not yet done their part of it
   std::atomic<bool> ended_{false};

@@ -5,13 +5,14 @@
 #include <cstdlib>
 #include <vector>
 
+#include "math/rotation.h"
+
 namespace mbcosim {
 namespace {
 
 constexpr int kMass = 0, kLength = 1, kTime = 2, kAngle = 7;
 constexpr std::size_t kLongestText = 100;
 constexpr long kHighestPower = 20;
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kPoundForce = 4.4482216152605, kFoot = 0.3048, kInch = 0.0254;
 
 struct Symbol {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/subnormals.h"
 #include "solver/advance_time.h"
 #include "solver/divergence.h"
 #include "solver/failure.h"
@@ -421,6 +422,7 @@ void Stepper::begin_step(State& state, const StepAttempt& attempt, bool restart)
 
 PhaseReport Stepper::attempt(State& state, const StepAttempt& attempt, const MethodSettings& method,
                              bool first, const NewtonSettings& settings) {
+  const SubnormalsAreZero fast;
   PhaseReport report;
   try {
     begin_step(state, attempt, first);

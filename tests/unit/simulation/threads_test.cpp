@@ -62,6 +62,26 @@ TEST(Threads, GiveTheSameBits) {
   }
 }
 
+#if defined(__SSE2__)
+/// From the loads on, motions become smaller and smaller.
+TEST(Steps, LeaveNoSubnormalNumbers) {
+  Line line = long_line();
+  line.step = 1e-6;
+  const ModelPtr model = model_of(line.deck());
+  ASSERT_TRUE(model);
+  const auto simulation = started(model, 1);
+  ASSERT_FALSE(simulation->step_many(3).error);
+  const State& state = simulation->state();
+  double smallest = 1;
+  for (const std::vector<double>* numbers : {&state.y, &state.yp, &state.memory})
+    for (const double x : *numbers) {
+      EXPECT_NE(std::fpclassify(x), FP_SUBNORMAL);
+      if (x != 0) smallest = std::min(smallest, std::abs(x));
+    }
+  EXPECT_LT(smallest, 1e-290);
+}
+#endif
+
 TEST(Threads, GiveTheSameBitsWithTheThirdOrderMethod) {
   Line line = long_line();
   line.initial = "method: third order, .6; tolerance: 1e-5;";
