@@ -10,7 +10,7 @@ namespace mbcosim {
 
 namespace {
 
-constexpr unsigned kModes = _MM_FLUSH_ZERO_MASK | 0x40;  ///< of results, of operands
+constexpr unsigned kModes = _MM_FLUSH_ZERO_MASK | _MM_DENORMALS_ZERO_MASK;  ///< results, operands
 
 }  // namespace
 
