@@ -179,8 +179,8 @@ class Assembly {
   }
 
   bool correct(double regularization = 0) {
-    SparseFactors lu(matrix(regularization), Watch(cancel_));
-    if (!lu.regular()) return false;
+    factors_.factor(matrix(regularization), Watch(cancel_));
+    if (!factors_.regular()) return false;
     VecX rhs(2 * size_);
     for (int a = 0; a < size_; ++a) {
       rhs(a) = r_[rows_[a]];
@@ -189,7 +189,7 @@ class Assembly {
       rhs(a) -= regularization * state_.y[columns_[a]];
       rhs(size_ + a) -= regularization * state_.yp[columns_[a]];
     }
-    const VecX delta = lu.solve(rhs) * model_.control.assembly_epsilon;
+    const VecX delta = factors_.solve(rhs) * model_.control.assembly_epsilon;
     if (!delta.allFinite()) return false;
     apply(delta);
     return true;
@@ -320,6 +320,7 @@ class Assembly {
   State& state_;
   const State start_;
   const CancelToken* const cancel_;
+  SparseFactors factors_;
   const std::unique_ptr<Scratch> scratch_;  ///< of elements
   int n_;
   int size_ = 0, node_rows_ = 0;  ///< local rows of one level, those of nodes among them

@@ -8,7 +8,6 @@
 #include "solver/advance_time.h"
 #include "solver/failure.h"
 #include "solver/newton.h"
-#include "solver/sparse_factors.h"
 #include "solver/stages.h"
 #include "solver/system.h"
 
@@ -183,7 +182,7 @@ void InverseDynamics::solve_position(State& state, PhaseReport& report) {
           make_error(ErrorKind::not_converged, "NOT_CONVERGED",
                      text + obstacle(right, newton.residual_error < errors_.front()))};
     }
-    const VecX delta = solved(matrix(state, kPosition, iteration == 0), right, "position");
+    const VecX delta = solved(kPosition, matrix(state, kPosition, iteration == 0), right);
     correct_position(delta, state);
     correction = newton_.solution_test == ResidualTest::minmax
                      ? delta.head(n_).cwiseAbs().maxCoeff()
@@ -235,7 +234,7 @@ void InverseDynamics::correct_position(const VecX& delta, State& state) const {
 
 void InverseDynamics::solve_velocity(State& state) {
   const VecX z =
-      solved(matrix(state, kVelocity, false), right_side(state, kVelocity, false), "velocity");
+      solved(kVelocity, matrix(state, kVelocity, false), right_side(state, kVelocity, false));
   for (const int k : nodes_) {
     const Vec3 w = z.segment<3>(first_[k] + 3);
     state.rotation[k].w = w;
@@ -245,15 +244,15 @@ void InverseDynamics::solve_velocity(State& state) {
 }
 
 void InverseDynamics::solve_acceleration(State& state) {
-  const VecX z = solved(matrix(state, kAcceleration, false),
-                        right_side(state, kAcceleration, false), "acceleration");
+  const VecX z = solved(kAcceleration, matrix(state, kAcceleration, false),
+                        right_side(state, kAcceleration, false));
   for (const int k : nodes_)
     for (int i = 0; i < 6; ++i) state.memory[settings_.memory + 6 * k + i] = z(first_[k] + i);
 }
 
 void InverseDynamics::solve_forces(State& state) {
   const VecX right = right_side(state, kForces, false);
-  const VecX z = solved(matrix(state, kForces, false), right, "force");
+  const VecX z = solved(kForces, matrix(state, kForces, false), right);
   const int first = settings_.underdetermined ? n_ : 0;
   for (const Joint& j : joints_) {
     const ElementRef e = j.constraint->joint();
@@ -439,26 +438,28 @@ InverseDynamics::Sparse InverseDynamics::matrix(const State& state, Stage stage,
   return m;
 }
 
-VecX InverseDynamics::solved(const Sparse& matrix, const VecX& right, const char* stage) {
+VecX InverseDynamics::solved(Stage stage, const Sparse& matrix, const VecX& right) {
   if (matrix.rows() == 0) return right;
   ++factorizations_;
   VecX z;
   try {
-    SparseFactors lu(matrix, Watch(cancel_));
+    SparseFactors& lu = factors_[stage];
+    lu.factor(matrix, Watch(cancel_));
     if (lu.regular()) z = lu.solve(right);
   } catch (const Stopped&) {
     throw StageFailure{cancelled_error("interrupted while a matrix was factored")};
   }
+  static constexpr std::array kNames = {"position", "velocity", "acceleration", "force"};
   constexpr double kLost = 1e-6;  // of the right hand side: nothing of the solution is left
   if (z.size() == 0 || !z.allFinite() || (matrix * z - right).norm() > kLost * (1 + right.norm()))
-    throw StageFailure{
-        make_error(ErrorKind::singular, "SINGULAR_MATRIX",
-                   std::string("the matrix of the ") + stage + " stage is singular\n  hint: " +
-                       (stage[0] == 'f'
-                            ? "the joints with `torque` must determine all forces, once; redundant "
-                              "ones share them with `joint regularization`"
-                            : "prescribed motions contradict or repeat each other, or, without "
-                              "weights and ergonomy, leave something free"))};
+    throw StageFailure{make_error(
+        ErrorKind::singular, "SINGULAR_MATRIX",
+        std::string("the matrix of the ") + kNames[stage] + " stage is singular\n  hint: " +
+            (stage == kForces
+                 ? "the joints with `torque` must determine all forces, once; redundant "
+                   "ones share them with `joint regularization`"
+                 : "prescribed motions contradict or repeat each other, or, without "
+                   "weights and ergonomy, leave something free"))};
   return z;
 }
 

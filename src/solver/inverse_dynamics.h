@@ -3,12 +3,14 @@
 #pragma once
 
 #include <Eigen/Sparse>
+#include <array>
 #include <memory>
 #include <vector>
 
 #include "elements/joints/inverse_constraint.h"
 #include "model/inverse_problem.h"
 #include "solver/cancel.h"
+#include "solver/sparse_factors.h"
 #include "solver/step_controller.h"
 
 namespace mbcosim {
@@ -106,7 +108,7 @@ class InverseDynamics final : public StepSystem {
   void add_spring_matrix(const State& state, bool first, Triplets& out) const;
   VecX loads(const State& state) const;
   void add_body_loads(const State& state, VecX& f) const;
-  VecX solved(const Sparse& matrix, const VecX& right, const char* stage);
+  VecX solved(Stage stage, const Sparse& matrix, const VecX& right);
   VecX with_nodes(const std::vector<double>& residual) const;
   State reference(const State& state) const;
   VecX spring_force(const State& state, const Spring& spring) const;
@@ -123,6 +125,8 @@ class InverseDynamics final : public StepSystem {
   int n_ = 0, m_ = 0;  ///< node components, rows of all joints
   double speed_ = 0;   ///< Σ of squares of the last record's velocities
   std::int64_t factorizations_ = 0;
+  std::array<SparseFactors, 4>
+      factors_;  ///< by stage: their orders of elimination are of use again
   const NewtonSettings newton_;
   std::vector<double> errors_;  ///< of the position stage, by iterations
 };

@@ -231,13 +231,18 @@ LinearSolver::Outcome LinearSolver::analyze(Klu& k, double* values, Matrices mat
   k.current = Klu::Current::none;
   if (!k.symbolic) return without_factors(k);
   LuOptions options;
-  if (matrices == Matrices::few) options.listed = 0;
+  if (matrices != Matrices::many) options.listed = 0;
   if (team_) options.threads = team_->size();
   if (k.lengthy && keep_diagonal(k, values, options)) return Outcome::ok;
   Klu::Factors factors(
       klu_factor(column_start_.data(), row_index_.data(), values, k.symbolic, &k.common), k.common);
   if (!factors.get()) return without_factors(k);
   watch_.look();
+  if (matrices == Matrices::one) {
+    std::swap(k.fresh, factors.get());
+    k.current = Klu::Current::fresh;
+    return Outcome::ok;
+  }
   k.choose_ordering(n_, column_start_.data(), row_index_.data(), values, factors.get());
   watch_.look();
   return keep(k, values, k.pattern(factors.get()), options) ? Outcome::ok : Outcome::failed;

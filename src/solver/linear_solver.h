@@ -57,7 +57,8 @@ class LinearSolver {
 
   enum class Outcome { ok, singular, failed };
   /// How many matrices the pivots are for: what makes each of many faster costs as much as dozens.
-  enum class Matrices { few, many };
+  /// With one, the matrix that they are chosen on, later ones get pivots of their own.
+  enum class Matrices { one, few, many };
   /// Chooses the pivots on these values; for the first kind, all others are forgotten.
   Outcome analyze(double* values, Matrices matrices = Matrices::many);
   /// Matrices may be of several kinds that do not share pivots, each named by a sequence of flags;

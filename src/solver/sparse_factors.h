@@ -2,8 +2,11 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <memory>
+#include <vector>
 
 #include "math/types.h"
+#include "model/sparse_pattern.h"
 #include "solver/linear_solver.h"
 #include "solver/watch.h"
 
@@ -11,15 +14,29 @@ namespace mbcosim {
 
 class SparseFactors {
  public:
-  /// `matrix`: (n, n), compressed. Throws Stopped and std::bad_alloc as LinearSolver does.
-  SparseFactors(const Eigen::SparseMatrix<double>& matrix, const Watch& watch);
+  /// Of nothing.
+  SparseFactors() = default;
+  SparseFactors(const Eigen::SparseMatrix<double>& matrix, const Watch& watch) {
+    factor(matrix, watch);
+  }
+  /// `matrix`: (n, n), compressed. Throws Stopped and std::bad_alloc as LinearSolver does. A matrix
+  /// with the pattern of the one before needs no order of its own; the factors are the same bits.
+  void factor(const Eigen::SparseMatrix<double>& matrix, const Watch& watch);
   /// False: a pivot vanished, there is nothing to solve with.
   bool regular() const { return regular_; }
-  VecX solve(VecX rhs);
+  VecX solve(VecX rhs) const;
 
  private:
-  LinearSolver solver_;
-  bool regular_;
+  /// What the order of elimination depends on.
+  struct Shape {
+    SparsePattern pattern;
+    std::vector<bool> weak;  ///< by column: is its diagonal too small for a pivot?
+    bool operator==(const Shape&) const = default;
+  };
+
+  Shape shape_;
+  std::unique_ptr<LinearSolver> solver_;
+  bool regular_ = false;
 };
 
 }  // namespace mbcosim

@@ -62,6 +62,34 @@ TEST(SparseFactors, SolveConstrainedSystems) {
   }
 }
 
+/// Values change a little, then diagonals become too small for pivots, then the pattern changes.
+TEST(SparseFactors, GiveTheSameBitsWhateverWasFactoredBefore) {
+  Chain loose(30);
+  for (int k = 0; k < 9; ++k) loose.add(k, k, -2. - k % 5);
+  const Sparse matrices[] = {Chain(30, 1e-6).matrix(), Chain(30, 2e-6).matrix(),
+                             loose.matrix(),           Chain(30, 10).matrix(),
+                             Chain(33).matrix(),       Chain(30).matrix()};
+  SparseFactors lu;
+  for (const Sparse& a : matrices) {
+    const VecX rhs = VecX::LinSpaced(a.rows(), -1, 2);
+    lu.factor(a, Watch());
+    ASSERT_TRUE(lu.regular());
+    EXPECT_EQ(lu.solve(rhs), SparseFactors(a, Watch()).solve(rhs));
+  }
+  Chain empty(30);
+  for (Sparse::InnerIterator e(matrices[5], 4); e; ++e)
+    empty.add(static_cast<int>(e.row()), 4, -e.value());
+  lu.factor(empty.matrix(), Watch());
+  EXPECT_FALSE(lu.regular());
+  CancelToken token;
+  token.cancel();
+  EXPECT_THROW(lu.factor(matrices[0], Watch(&token)), Stopped);
+  EXPECT_FALSE(lu.regular());
+  lu.factor(matrices[0], Watch());
+  const VecX rhs = VecX::LinSpaced(matrices[0].rows(), -1, 2);
+  EXPECT_EQ(lu.solve(rhs), SparseFactors(matrices[0], Watch()).solve(rhs));
+}
+
 TEST(SparseFactors, OfASingularMatrixAreNone) {
   const Sparse a = Chain(30).matrix();
   Chain empty(30);
