@@ -113,10 +113,11 @@ class Model {
   }();
 
   // --- numbering, set by ModelBuilder::finish
-  std::vector<ElementRef> driven;  ///< elements that are `driven`
-  int unknowns = 0;                ///< n
-  std::vector<UnknownKind> kinds;  ///< (n)
-  std::vector<double> row_scale;   ///< (n) scale of the owner, for `tolerance ..., scale`
+  std::vector<ElementRef> driven;   ///< elements that are `driven`
+  std::vector<ElementRef> printed;  ///< elements with output, in declaration order
+  int unknowns = 0;                 ///< n
+  std::vector<UnknownKind> kinds;   ///< (n)
+  std::vector<double> row_scale;    ///< (n) scale of the owner, for `tolerance ..., scale`
   std::vector<std::uint8_t> is_constraint_row;  ///< (n)
   // sparse matrix, compressed columns (n)
   std::vector<int> column_start, row_index;

@@ -280,8 +280,10 @@ Result<ModelPtr> ModelBuilder::finish() {
   for (const ElementRef& e : model.elements)
     if (e.set->info(e.index).family == Family::body)
       for (const int node : e.set->nodes(e.index)) model.node_bodies[node].push_back(e);
-  for (const ElementRef& e : model.elements)
+  for (const ElementRef& e : model.elements) {
     if (e.set->info(e.index).driven) model.driven.push_back(e);
+    if (e.set->info(e.index).output) model.printed.push_back(e);
+  }
   order_stages(model);
   model.assembly = AssemblyPlan(model);
   sets_.clear();

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "math/thread_team.h"
 #include "math/types.h"
 #include "model/step_control.h"
 
@@ -53,5 +54,13 @@ struct State {
   /// [N·m], global components (6 × structural nodes), or empty when there are none.
   std::vector<double> external_loads;
 };
+
+/// The arrays of numbers; rotations are not among them.
+inline constexpr std::vector<double> State::*kStateArrays[] = {
+    &State::y,   &State::yp,     &State::y1,        &State::yp1,         &State::y2,
+    &State::yp2, &State::memory, &State::variables, &State::kept_matrix, &State::external_loads};
+
+/// to = from; the threads of a team, if there is one, share the work.
+void copy_state(const State& from, State& to, ThreadTeam* team);
 
 }  // namespace mbcosim

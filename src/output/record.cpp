@@ -93,9 +93,8 @@ void write_record(const EvalContext& context, OutputRow& row) {
   }
   for (const ScalarNode& node : model.scalars)
     if (node.output) write_scalar(context, node, row);
-  for (const ElementRef& e : model.elements)
-    if (e.set->info(e.index).output && e.set->is_active(*context.state, e.index))
-      e.set->output(context, e.index, row);
+  for (const ElementRef& e : model.printed)
+    if (e.set->is_active(*context.state, e.index)) e.set->output(context, e.index, row);
   if (model.gravity && model.gravity->uniform && model.gravity->output) {
     row.begin(OutputFile::grv, model.gravity->label);
     row.vec3("a", "m/s^2", context.uniform_gravity);

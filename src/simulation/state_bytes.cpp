@@ -88,13 +88,6 @@ void unflatten_rotations(const std::vector<double>& r, State& state) {
     });
 }
 
-template <class StateType, class Visit>
-void each_array(StateType& s, Visit visit) {
-  for (auto* v : {&s.y, &s.yp, &s.y1, &s.yp1, &s.y2, &s.yp2, &s.memory, &s.variables,
-                  &s.kept_matrix, &s.external_loads})
-    visit(*v);
-}
-
 template <class Control, class Visit>
 void each_member(Control& c, Visit visit) {
   for (auto* flag :
@@ -133,7 +126,7 @@ std::string state_to_bytes(const State& state, std::uint64_t model_digest) {
   out.value(state.h_previous);
   out.value(state.step);
   each_member(state.control, [&](const auto& v) { out.value(v); });
-  each_array(state, [&](const std::vector<double>& v) { out.array(v); });
+  for (const auto array : kStateArrays) out.array(state.*array);
   out.array(flat_rotations(state));
   out.value(fnv1a(out.bytes));
   return std::move(out.bytes);
@@ -166,7 +159,7 @@ Result<State> state_from_bytes(std::string_view bytes, std::uint64_t model_diges
   bool fine = in.value(state.time) && in.value(state.h) && in.value(state.h_previous) &&
               in.value(state.step);
   each_member(state.control, [&](auto& v) { fine = fine && in.value(v); });
-  each_array(state, [&](std::vector<double>& v) { fine = fine && in.array(v); });
+  for (const auto array : kStateArrays) fine = fine && in.array(state.*array);
   std::vector<double> rotations;
   fine = fine && in.array(rotations) && rotations.size() % kRotationDoubles == 0 && in.empty();
   if (!fine || !can_go_on(state)) return damaged;

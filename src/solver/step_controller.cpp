@@ -94,7 +94,7 @@ Error stopped_while_factoring(const State& state) {
 
 template <class Make>
 PhaseReport StepController::whole_or_not(State& state, const Make& make) {
-  start_ = state;
+  system_.keep(state, start_);
   try {
     return make();
   } catch (const Stopped&) {

@@ -56,6 +56,8 @@ class StepSystem {
   /// Adds to the error of a failed step what the last matrix tells, or, after an iteration that
   /// diverged, that at the accepted `state`. Takes longer than the step.
   virtual void explain(PhaseReport& report, const State& state) = 0;
+  /// start = state, before each step; a system with threads shares the work.
+  virtual void keep(const State& state, State& start) const { start = state; }
 };
 
 /// A drive or law that could not be evaluated, as an error at the state's time and step.

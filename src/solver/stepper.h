@@ -53,6 +53,9 @@ class Stepper final : public StepSystem {
   bool can_retry() const override;
   PhaseReport attempt(State& state, const StepAttempt& attempt) override;
   void explain(PhaseReport& report, const State& state) override;
+  void keep(const State& state, State& start) const override {
+    copy_state(state, start, workspace_.team());
+  }
 
   /// As Workspace::set_threads.
   void set_threads(int threads) { workspace_.set_threads(threads); }

@@ -54,6 +54,45 @@ TEST(StateBytes, HoldAllThatTheSolverRemembers) {
   EXPECT_TRUE(read->control == state.control);
 }
 
+/// A state in which no two numbers are alike.
+State numbered_state(int unknowns, int nodes) {
+  State state = some_state();
+  double number = 0;
+  state.h = ++number;
+  state.h_previous = ++number;
+  for (const auto array : kStateArrays) {
+    (state.*array).resize(unknowns++);
+    for (double& x : state.*array) x = ++number;
+  }
+  const auto fill = [&](auto&... parts) {
+    (parts.setConstant(1), ...);
+    ((parts *= ++number), ...);
+  };
+  for (int k = 0; k < nodes; ++k) {
+    NodeRotation& q = state.rotation.emplace_back();
+    NodeRotationHistory& past = state.rotation_history.emplace_back();
+    fill(q.R, q.w, past.R_ref, past.R1, past.R2, past.w_ref, past.w1, past.w2);
+  }
+  return state;
+}
+
+/// Into an empty state, one with other numbers and larger and smaller ones.
+TEST(StateBytes, AreThoseOfACopyByThreads) {
+  const State state = numbered_state(20, 7);
+  const std::string expected = state_to_bytes(state, 99);
+  for (const int threads : {1, 2, 3}) {
+    ThreadTeam team(threads);
+    for (State copy :
+         {State(), numbered_state(20, 7), numbered_state(3, 1), numbered_state(40, 9)}) {
+      copy_state(state, copy, &team);
+      EXPECT_TRUE(state_to_bytes(copy, 99) == expected) << threads;
+    }
+  }
+  State copy;
+  copy_state(state, copy, nullptr);
+  EXPECT_TRUE(state_to_bytes(copy, 99) == expected);
+}
+
 TEST(StateBytes, OfAnOlderProgramAreRefusedByTheirVersion) {
   const std::string bytes = state_to_bytes(some_state(), 99);
   const Result<State> read = state_from_bytes(changed(bytes, kVersionAt, 1), 99);

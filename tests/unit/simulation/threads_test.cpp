@@ -62,6 +62,27 @@ TEST(Threads, GiveTheSameBits) {
   }
 }
 
+/// The second step is broken off after its first correction.
+TEST(Threads, TakeAFailedStepBackWhole) {
+  struct Broken {};
+  const ModelPtr model = model_of(long_line().deck());
+  ASSERT_TRUE(model);
+  std::string after;
+  for (const int threads : {1, 2, 3}) {
+    const auto simulation = started(model, threads);
+    ASSERT_FALSE(simulation->step().error);
+    const std::string before = simulation->export_state();
+    simulation->set_exchange(
+        [](int corrections) { return corrections > 0 ? throw Broken() : true; });
+    EXPECT_THROW((void)simulation->step(), Broken);
+    EXPECT_TRUE(simulation->export_state() == before) << threads;
+    simulation->set_exchange({});
+    ASSERT_FALSE(simulation->step().error);
+    if (threads == 1) after = simulation->export_state();
+    EXPECT_TRUE(simulation->export_state() == after) << threads;
+  }
+}
+
 #if defined(__SSE2__)
 /// From the loads on, motions become smaller and smaller.
 TEST(Steps, LeaveNoSubnormalNumbers) {
