@@ -33,6 +33,7 @@
 ///     std::string log(const Model&, int label) const           its line of the .log file
 ///     int private_datum(std::string_view) const, std::vector<Datum> private_data() const
 ///     double private_value(const Local<double>&, int) const
+///     bool constrains_velocity(int k) const                    own row k, a velocity alone
 ///     std::string row_name(int k) const                        meaning of own row k
 ///     void add_inertia(const Local<double>&, int node, Inertia&) const
 ///     static constexpr bool momentum_rows = true               has r.momentum(k, …): rows 1–6

@@ -194,6 +194,13 @@ class ElementSetOf final : public PlacedElements {
       return AssemblyRole::none;
   }
 
+  bool constrains_velocity(int i, int k) const override {
+    if constexpr (detail::ConstrainsVelocity<E>)
+      return slots_[i].element.constrains_velocity(k);
+    else
+      return PlacedElements::constrains_velocity(i, k);
+  }
+
   void output(const EvalContext& context, int i, OutputRow& row) const override {
     if constexpr (detail::HasOutput<E>) {
       Local<double> u;

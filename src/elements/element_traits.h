@@ -70,6 +70,10 @@ concept HasAssemblyRole = requires(const E& e) {
   e.assembly_role();
 };
 template <class E>
+concept ConstrainsVelocity = requires(const E& e) {
+  e.constrains_velocity(0);
+};
+template <class E>
 concept HasAssembly = requires {
   E::assembly;
 };

@@ -154,6 +154,8 @@ class ElementSet {
   // --- initial assembly: state.y, yp hold positions and rates, multipliers λ and λ′
   // (solver/initial_assembly.h)
   virtual AssemblyRole assembly_role(int i) const = 0;
+  /// Does own row k constrain a velocity alone?
+  virtual bool constrains_velocity(int /*i*/, int /*k*/) const { return false; }
   /// Adds to position-level rows r (n) and rate-level rows r_rate (n), both in the model's row
   /// numbering.
   virtual void assembly_residual(const EvalContext& context, int i, double* r,

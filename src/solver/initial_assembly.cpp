@@ -40,7 +40,7 @@ class Assembly {
     AssemblyReport report;
     for (;; ++report.iterations) {
       compute_residual();
-      report.error = error();
+      report.error = error(report.moved || !bears_velocities());
       errors_.push_back(report.error);
       if (const auto verdict = judge(test, errors_, report.iterations))
         return *verdict == NewtonOutcome::converged ? polish(report)
@@ -92,10 +92,12 @@ class Assembly {
         columns_.push_back(node.first + i);
       }
     node_rows_ = static_cast<int>(rows_.size());
+    is_velocity_.assign(node_rows_, false);
     for (const ElementRef& e : elements_)
       for (int k = 0; k < e.set->unknowns(e.index); ++k) {
         rows_.push_back(e.set->first_own(e.index) + k);
         columns_.push_back(rows_.back());
+        is_velocity_.push_back(e.set->constrains_velocity(e.index, k));
       }
     size_ = static_cast<int>(rows_.size());
     row_of_.assign(2 * n_, -1);
@@ -149,10 +151,21 @@ class Assembly {
       e.set->assembly_residual(c, e.index, r_.data(), r_rate_.data());
   }
 
-  double error() const {
+  /// Is all that contradicts velocity constraints little enough for the derivatives phase, which
+  /// keeps the velocities? Newton's method would turn it by way of dampers, whose forces the
+  /// initial stiffness alone balances, into far motions.
+  bool bears_velocities() const {
+    double r2 = 0;
+    for (int a = 0; a < size_; ++a)
+      if (is_velocity_[a]) r2 += r_rate_[rows_[a]] * r_rate_[rows_[a]];
+    return std::sqrt(r2) <= model_.initial_value.derivatives_tolerance;
+  }
+
+  double error(bool with_velocities) const {
     double r2 = 0, x2 = 1;
     for (int a = 0; a < size_; ++a) {
-      r2 += r_[rows_[a]] * r_[rows_[a]] + r_rate_[rows_[a]] * r_rate_[rows_[a]];
+      const double rate = with_velocities || !is_velocity_[a] ? r_rate_[rows_[a]] : 0;
+      r2 += r_[rows_[a]] * r_[rows_[a]] + rate * rate;
       const double x = state_.y[columns_[a]], v = state_.yp[columns_[a]];
       x2 += x * x + v * v;
     }
@@ -326,6 +339,7 @@ class Assembly {
   int size_ = 0, node_rows_ = 0;  ///< local rows of one level, those of nodes among them
   std::vector<ElementRef> elements_;
   std::vector<int> rows_, columns_;     ///< local index -> model row, column
+  std::vector<bool> is_velocity_;       ///< local index: of a velocity alone
   std::vector<int> to_local_, row_of_;  ///< model column, row (rate level: + n) -> local index
   std::vector<double> r_, r_rate_;      ///< by model row (n)
   std::vector<double> errors_;          ///< by iterations

@@ -24,17 +24,19 @@ void TotalConstraint::log(LogLine& line) const {
       for (int i = 0; i < 3; ++i) line.add(kinds[i] == wanted ? 1 : 0);
 }
 
-std::string TotalConstraint::row_name(int k) const {
+int TotalConstraint::component(int k) const {
   int row = 0;
-  for (int i = 0; i < 6; ++i) {
-    const Kind kind = i < 3 ? translation[i] : rotation[i - 3];
-    if (kind == Kind::free || row++ != k) continue;
-    const bool rate = kind == Kind::velocity;
-    const char* what =
-        i < 3 ? (rate ? "velocity" : "position") : (rate ? "angular velocity" : "rotation");
-    return std::string(what) + " constraint " + std::to_string(i % 3 + 1);
-  }
+  for (int i = 0; i < 6; ++i)
+    if (kind(i) != Kind::free && row++ == k) return i;
   MBCOSIM_CHECK(false, "a total constraint has no such row");
+}
+
+std::string TotalConstraint::row_name(int k) const {
+  const int i = component(k);
+  const bool rate = constrains_velocity(k);
+  const char* what =
+      i < 3 ? (rate ? "velocity" : "position") : (rate ? "angular velocity" : "rotation");
+  return std::string(what) + " constraint " + std::to_string(i % 3 + 1);
 }
 
 void TotalConstraint::assembly_multipliers(const Local<TimeDual>& u, Vec<TimeDual>& force,

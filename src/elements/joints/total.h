@@ -20,6 +20,7 @@ struct TotalConstraint {
   /// Flags of .log: position, velocity, rotation, angular velocity (3 each).
   void log(LogLine& line) const;
   std::string row_name(int k) const;
+  bool constrains_velocity(int k) const { return kind(component(k)) == Kind::velocity; }
 
   /// Multipliers in the constrained slots: force (first) and moment.
   template <class T>
@@ -59,6 +60,12 @@ struct TotalConstraint {
       if (rotation[i] != Kind::position) theta(i) = T(remnant(i));
     return theta;
   }
+
+ private:
+  Kind kind(int component) const {
+    return component < 3 ? translation[component] : rotation[component - 3];
+  }
+  int component(int row) const;  ///< 0 … 5, of translation and rotation
 };
 
 /// The rotation vector of a total joint that counts turns, and the remnant of its free rotations.
@@ -178,6 +185,7 @@ struct TotalJoint : NamedData<TotalJoint> {
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
   std::string row_name(int k) const { return constraint.row_name(k); }
+  bool constrains_velocity(int k) const { return constraint.constrains_velocity(k); }
   double private_value(const Local<double>& u, int datum) const;
 };
 
@@ -272,6 +280,7 @@ struct TotalPinJoint : NamedData<TotalPinJoint> {
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
   std::string row_name(int k) const { return constraint.row_name(k); }
+  bool constrains_velocity(int k) const { return constraint.constrains_velocity(k); }
   double private_value(const Local<double>& u, int datum) const;
 };
 

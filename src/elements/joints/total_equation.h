@@ -50,6 +50,7 @@ struct TotalEquation : NamedData<TotalEquation> {
   void output(const Local<double>& u, OutputRow& row) const;
   std::string log(const Model& model, int label) const;
   std::string row_name(int k) const { return equation.constraint.row_name(k); }
+  bool constrains_velocity(int k) const { return equation.constraint.constrains_velocity(k); }
   double private_value(const Local<double>& u, int datum) const {
     const Vec3DrivePtr& drive =
         datum < 3 ? equation.constraint.displacement : equation.constraint.angle;
