@@ -157,6 +157,36 @@ INSTANTIATE_TEST_SUITE_P(TotalJoints, PrescribedSpin,
                          testing::Values("total joint, 1, position, null, 2, position, null",
                                          "total pin joint, 2, position, null, position, null"));
 
+/// A body that turns as no joint lets it.
+std::string turning_body(const std::string& joint) {
+  return initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-8;") +
+         R"(begin: control data; structural nodes: 2; rigid bodies: 1; joints: 2; end: control data;
+begin: nodes;
+  structural: 1, static, null, eye, null, null;
+  structural: 2, dynamic, null, euler, 0.,0.,pi/2., null, 1.,2.,3.;
+end: nodes;
+begin: elements;
+  body: 2, 2, .5, null, diag, .1,.1,.1;
+  joint: 1, clamp, 1, node, node;
+  joint: 2, )" +
+         joint + ";\nend: elements;\n";
+}
+
+/// The direction is the node's, ŷ in global axes; the reference solver's assembly takes it as
+/// global. What is left of the velocity is nearest to the input.
+TEST(AngularVelocity, IsAssembledAboutTheDirectionOfTheNode) {
+  DeckRun run(turning_body("angular velocity, 2, 1.,0.,0., const, .2"));
+  ASSERT_TRUE(run.ready());
+  EXPECT_LT((run.node(2).w - Vec3(1, .2, 3)).norm(), 1e-12);
+}
+
+/// It transmits the spin; the reference solver's assembly keeps the input's.
+TEST(GimbalRotation, IsAssembledWithItsSpin) {
+  DeckRun run(turning_body("gimbal rotation, 1, 2, orientation, euler, 0.,0.,-pi/2."));
+  ASSERT_TRUE(run.ready());
+  EXPECT_LT((run.node(2).w - Vec3(1, 2, 0)).norm(), 1e-12);
+}
+
 /// The reference solver reads them as `reference, global`.
 TEST(Pins, OwnPlaceInAFrameOfTheNodeIsGlobal) {
   for (const char* pin : {"spherical pin, 2, null, ", "imposed displacement pin, 2, null, "}) {
