@@ -155,10 +155,13 @@ class Assembly {
   /// keeps the velocities? Newton's method would turn it by way of dampers, whose forces the
   /// initial stiffness alone balances, into far motions.
   bool bears_velocities() const {
+    return velocity_error() <= model_.initial_value.derivatives_tolerance;
+  }
+  double velocity_error() const {
     double r2 = 0;
     for (int a = 0; a < size_; ++a)
       if (is_velocity_[a]) r2 += r_rate_[rows_[a]] * r_rate_[rows_[a]];
-    return std::sqrt(r2) <= model_.initial_value.derivatives_tolerance;
+    return std::sqrt(r2);
   }
 
   double error(bool with_velocities) const {
@@ -276,6 +279,7 @@ class Assembly {
     state_ = start_;
     double change = HUGE_VAL;
     compute_residual();
+    if (error(false) <= model_.control.assembly_tolerance) return contradicted_velocities();
     for (int k = 0; k < iterations && change > 1e-9; ++k) {
       const std::vector<double> before = state_.y;
       if (is_cancelled() || !correct(kCompliance)) return {};
@@ -300,10 +304,29 @@ class Assembly {
 
   /// The constraints that stay violated, largest violation of each element first.
   std::string contradictions() const {
-    const auto violation = [this](int a) { return std::abs(r_[rows_[a]]); };
     double largest = 0;
-    for (int a = node_rows_; a < size_; ++a) largest = std::max(largest, violation(a));
+    for (int a = node_rows_; a < size_; ++a) largest = std::max(largest, std::abs(r_[rows_[a]]));
     if (!(largest > 1e-4)) return {};
+    return "these constraints contradict each other; the least violation that was found leaves" +
+           violations(r_, largest) +
+           "\n  hint: correct the positions or orientations given to one of them, or remove one";
+  }
+
+  /// When the input contradicts nothing else.
+  std::string contradicted_velocities() const {
+    double largest = 0;
+    for (int a = node_rows_; a < size_; ++a)
+      largest = std::max(largest, std::abs(r_rate_[rows_[a]]));
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g", velocity_error());
+    return "the input contradicts prescribed velocities alone" + violations(r_rate_, largest) +
+           "\n  hint: give the nodes these velocities, or a `derivatives tolerance` larger than " +
+           text + " to leave them to the first step";
+  }
+
+  /// Each element whose rows in `r` (n) are of the order of the largest, with the worst of them.
+  std::string violations(const std::vector<double>& r, double largest) const {
+    const auto violation = [&](int a) { return std::abs(r[rows_[a]]); };
     std::map<std::string, std::pair<double, std::string>> by_owner;
     for (int a = node_rows_; a < size_; ++a) {
       if (violation(a) < 1e-2 * largest) continue;
@@ -311,15 +334,13 @@ class Assembly {
       auto& worst = by_owner[owner];
       if (violation(a) >= worst.first) worst = {violation(a), equation};
     }
-    std::string s =
-        "these constraints contradict each other; the least violation that was found leaves";
+    std::string s;
     for (const auto& [owner, worst] : by_owner) {
       char text[32];
       std::snprintf(text, sizeof text, "%.3g", worst.first);
       s += "\n  " + owner + ", " + worst.second + ": off by " + text;
     }
-    return s +
-           "\n  hint: correct the positions or orientations given to one of them, or remove one";
+    return s;
   }
 
   VecX by_model_row(const VecX& local) const {

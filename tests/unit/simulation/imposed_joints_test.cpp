@@ -153,6 +153,21 @@ TEST_P(PrescribedSpin, IsAssembledWhenTheDerivativesPhaseWouldFail) {
   EXPECT_NEAR(run.node(2).w(2), .2, 1e-12);
 }
 
+/// With the damper the assembly fails, and tells what was contradicted.
+TEST_P(PrescribedSpin, IsNamedWhenItCannotBeAssembled) {
+  const LoadReport report = load_deck(
+      BundleSource({{"deck.mbd", body_to_be_spun(GetParam(), 4000, "1e-1")}}), "deck.mbd");
+  ASSERT_TRUE(report.ok());
+  const auto simulation = Simulation::create(report.model);
+  ASSERT_FALSE(simulation);
+  const std::string& text = simulation.error().message;
+  EXPECT_NE(text.find("the input contradicts prescribed velocities alone\n  joint 2"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("angular velocity constraint 3: off by 0.2"), std::string::npos) << text;
+  EXPECT_NE(text.find("`derivatives tolerance` larger than 0.2"), std::string::npos) << text;
+}
+
 INSTANTIATE_TEST_SUITE_P(TotalJoints, PrescribedSpin,
                          testing::Values("total joint, 1, position, null, 2, position, null",
                                          "total pin joint, 2, position, null, position, null"));
