@@ -18,8 +18,8 @@ usage: run.sh [--build FOLDER] [--peer "REF -s -f {deck} -o {prefix}"] [--decks 
 
 Programs run from a copy and write new files, as after an installation. Times are those of the processor (user and system), the median
 of the repeated runs, in which both solvers alternate; ratios are peer / ours: above 1, ours is faster. An iteration's time is the
-difference between a run and one of twice the steps, over the difference in iterations. --compare prints old / new for each row of an
-earlier --json. Fails when a run fails; times have no bounds.
+difference between the least of runs with few steps and with many, over the difference in iterations. --compare prints old / new for each
+row of an earlier --json. Fails when a run fails; times have no bounds.
 """
 import argparse
 import json
@@ -84,8 +84,8 @@ class Solvers:
             words = shlex.split(peer)
             self.commands.append(words if any("{deck}" in word for word in words) else sys.exit("--peer: a command with {deck} and {prefix}"))
 
-    def run(self, deck, folder, repeat):
-        """For each solver the medians over the runs: processor, wall, memory; and the iterations of all steps."""
+    def run(self, deck, folder, repeat, of=statistics.median):
+        """For each solver the medians over the runs, or what `of` says: processor, wall, memory; and the iterations of all steps."""
         found = [[] for _ in self.commands]
         iterations = []
         for attempt in range(repeat):
@@ -97,7 +97,7 @@ class Solvers:
                 if attempt == 0:
                     iterations.append(iterations_in(prefix + ".out"))
                 shutil.rmtree(results)
-        return [tuple(statistics.median(values) for values in zip(*runs)) for runs in found], iterations
+        return [tuple(of(values) for values in zip(*runs)) for runs in found], iterations
 
 
 def iterations_in(path):
@@ -154,14 +154,15 @@ def parts_of_runs(table, build, decks):
         table.add(f"{deck.stem}, engine", "ms", whole, **parts)
 
 
-def iteration_costs(solvers, model, folder, repeat, clock=0):
-    """Of each solver a Newton iteration [ms] by `clock` (0: processor, 1: wall), the rest of a process [ms], the runs of the longer
-    one, and the iterations between both."""
+def iteration_costs(solvers, model, folder, repeat, clock=0, more=20):
+    """Of each solver a Newton iteration [ms] by `clock` (0: processor, 1: wall), from runs of 5 steps and of so many `more`; the rest of
+    a process [ms], the longer runs, and the iterations between both. The least of the runs: what disturbs them only adds, and is as
+    long as the difference between two."""
     runs = []
-    for steps in (5, 25):
+    for steps in (5, 5 + more):
         deck = pathlib.Path(folder) / "beams.mbd"
         deck.write_text(model(steps))
-        runs.append(solvers.run(deck, folder, repeat))
+        runs.append(solvers.run(deck, folder, repeat, of=min))
     (first, few), (second, many) = runs
     costs = [(b[clock] - a[clock]) / max(1, m - f) * 1e3 for a, b, f, m in zip(first, second, few, many)]
     return costs, [a[clock] * 1e3 - f * cost for a, f, cost in zip(first, few, costs)], second, many[0] - few[0]
@@ -171,10 +172,17 @@ def cantilevers(sizes):
     return [(f"cantilever of {n}", lambda steps, n=n: beam_models.cantilever(n, steps)) for n in sizes]
 
 
+def steps_of_a_second(beams):
+    """At least as many as take a second on one thread."""
+    return max(50, 300_000 // beams)
+
+
 def all_cores(table, binary, folder, repeat, small):
     cores = os.cpu_count() or 1
-    for name, model in cantilevers([10] if small else [250, 1000, 10000]):
-        (one, all_of_them), *_ = iteration_costs(Solvers(binary, more=[cores]), model, folder, repeat, clock=1)
+    for beams in [10] if small else [250, 1000, 10000]:
+        [(name, model)] = cantilevers([beams])
+        more = 20 if small else steps_of_a_second(beams)
+        (one, all_of_them), *_ = iteration_costs(Solvers(binary, more=[cores]), model, folder, repeat, clock=1, more=more)
         table.add(f"{name}, on {cores} threads", "ms", all_of_them, on_one=one, speedup=one / all_of_them)
 
 
@@ -244,8 +252,8 @@ def main():
         sections = {"tutorials": lambda: tutorials(table, solvers, [deck.resolve() for deck in options.decks], folder, repeat),
                     "process": lambda: parts_of_a_process(table, binary, folder, repeat),
                     "parts": lambda: parts_of_runs(table, build, [deck.resolve() for deck in options.decks]),
-                    "beams": lambda: beams(table, solvers, folder, 1 if options.small else 3, options.small),
-                    "cores": lambda: all_cores(table, binary, folder, 1 if options.small else 3, options.small),
+                    "beams": lambda: beams(table, solvers, folder, options.repeat or (1 if options.small else 3), options.small),
+                    "cores": lambda: all_cores(table, binary, folder, repeat, options.small),
                     "engine": lambda: engine_parts(table, build, options.small),
                     "remote": lambda: remote(table, build, folder, options.small),
                     "reduce": lambda: reduction(table, binary, options.small)}
