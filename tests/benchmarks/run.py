@@ -156,8 +156,8 @@ def parts_of_runs(table, build, decks):
 
 def iteration_costs(solvers, model, folder, repeat, clock=0, more=20):
     """Of each solver a Newton iteration [ms] by `clock` (0: processor, 1: wall), from runs of 5 steps and of so many `more`; the rest of
-    a process [ms], the longer runs, and the iterations between both. The least of the runs: what disturbs them only adds, and is as
-    long as the difference between two."""
+    a process [ms], the longer runs, and the iterations between both. Of the repeated runs the least: what disturbs a run only adds to it,
+    and may be as long as the difference that is looked for."""
     runs = []
     for steps in (5, 5 + more):
         deck = pathlib.Path(folder) / "beams.mbd"
@@ -168,26 +168,26 @@ def iteration_costs(solvers, model, folder, repeat, clock=0, more=20):
     return costs, [a[clock] * 1e3 - f * cost for a, f, cost in zip(first, few, costs)], second, many[0] - few[0]
 
 
-def cantilevers(sizes):
-    return [(f"cantilever of {n}", lambda steps, n=n: beam_models.cantilever(n, steps)) for n in sizes]
+def cantilever(n):
+    return f"cantilever of {n}", lambda steps: beam_models.cantilever(n, steps)
 
 
-def steps_of_a_second(beams):
-    """At least as many as take a second on one thread."""
-    return max(50, 300_000 // beams)
+def steps_of_a_second(n):
+    """At least as many as a cantilever of n beams takes a second for on one thread."""
+    return max(50, 300_000 // n)
 
 
 def all_cores(table, binary, folder, repeat, small):
     cores = os.cpu_count() or 1
-    for beams in [10] if small else [250, 1000, 10000]:
-        [(name, model)] = cantilevers([beams])
-        more = 20 if small else steps_of_a_second(beams)
+    for n in [10] if small else [250, 1000, 10000]:
+        name, model = cantilever(n)
+        more = 20 if small else steps_of_a_second(n)
         (one, all_of_them), *_ = iteration_costs(Solvers(binary, more=[cores]), model, folder, repeat, clock=1, more=more)
         table.add(f"{name}, on {cores} threads", "ms", all_of_them, on_one=one, speedup=one / all_of_them)
 
 
 def beams(table, solvers, folder, repeat, small):
-    models = cantilevers([10, 100] if small else [100, 1000, 10000])
+    models = [cantilever(n) for n in ([10, 100] if small else [100, 1000, 10000])]
     for shape in ([(5, 5)] if small else [(100, 100), (20, 20, 20)]):
         models.append((f"grid of {' x '.join(map(str, shape))}", lambda steps, shape=shape: beam_models.grid(shape, steps)))
     for name, model in models:
