@@ -172,6 +172,20 @@ INSTANTIATE_TEST_SUITE_P(TotalJoints, PrescribedSpin,
                          testing::Values("total joint, 1, position, null, 2, position, null",
                                          "total pin joint, 2, position, null, position, null"));
 
+TEST(TotalEquation, LeavesAPrescribedSpinToTheFirstStep) {
+  std::string deck =
+      body_to_be_spun("total equation, 1, position, null, 2, position, null", 4000, "1");
+  deck.replace(deck.find("joints: 3"), 9, "joints: 4");
+  deck.insert(deck.find("end: elements"),
+              "joint: 4, total internal reaction, 1, position, null, 2, position, null, position "
+              "constraint, 1,1,1, orientation constraint, 1,1,1, total equation, 2;\n");
+  DeckRun run(deck);
+  ASSERT_TRUE(run.ready());
+  EXPECT_EQ(run.node(2).w, Vec3(Vec3::Zero()));
+  run.step();
+  EXPECT_NEAR(run.node(2).w(2), .2, 1e-12);
+}
+
 /// A body that turns as no joint lets it.
 std::string turning_body(const std::string& joint) {
   return initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-8;") +
