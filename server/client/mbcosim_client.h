@@ -453,7 +453,8 @@ class Subscription {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Steps on one open stream: one message each way per step. After an Error it is over.
+/// Steps on an open stream: one message each way per step. After an Error it is over. One thread at
+/// a time; of several that share a stream, each may have its own.
 class Stepper {
  public:
   struct Impl;  // of the library
@@ -503,6 +504,12 @@ class Simulation {
   bool interrupt(double timeout = kUsual);
   /// An open stream for stepping with the least delay.
   Stepper stepper(const std::vector<std::string>& outputs = {},
+                  const std::vector<std::string>& inputs = {}, double timeout = kUsual);
+  /// The same on the stream of another stepper: many simulations that are stepped in turn take
+  /// less time, and fewer streams. Steps on a stream follow each other; a stepper that ends with an
+  /// Error leaves the others another stream. Both are of one Server and, behind a proxy, of one
+  /// daemon.
+  Stepper stepper(const Stepper& beside, const std::vector<std::string>& outputs = {},
                   const std::vector<std::string>& inputs = {}, double timeout = kUsual);
   Subscription subscribe(const std::vector<std::string>& variables,
                          const SubscriptionOptions& options = {});

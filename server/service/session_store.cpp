@@ -105,6 +105,12 @@ SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Call& 
   return session;
 }
 
+SessionPtr SessionStore::get_alive(const std::string& id, const Caller& caller,
+                                   Access access) const {
+  Guard guard(mutex_);
+  return find(id, caller, access, "");
+}
+
 // Null: it is not alive, or the caller may not see it.
 SessionPtr SessionStore::find(const std::string& id, const Caller& caller, Access access,
                               const std::string& port) const {

@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <map>
 #include <memory>
 #include <set>
 #include <string>
 #include <thread>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -80,6 +80,8 @@ class SessionStore {
   /// One that is on the disk is brought back; CANCELLED when the call ends first.
   SessionPtr get(const std::string& id, const Caller& caller, Call& call, Access access,
                  const std::string& port = "") const;
+  /// The same of one that is in memory; null: it is not, or the caller may not see it.
+  SessionPtr get_alive(const std::string& id, const Caller& caller, Access access) const;
   /// What the caller may see, in the order of creation.
   std::vector<SessionPtr> list(const Caller& caller) const;
   /// Deletes in two parts. The first ends one that is alive, and with it all that waits for it; it
@@ -122,7 +124,7 @@ class SessionStore {
   EventLog& log_;
   Keeper keeper_;
   mutable Mutex mutex_;
-  std::map<std::string, SessionPtr> sessions_ TS_GUARDED_BY(mutex_);
+  std::unordered_map<std::string, SessionPtr> sessions_ TS_GUARDED_BY(mutex_);
   std::vector<std::string> order_ TS_GUARDED_BY(mutex_);
   std::multiset<std::string> places_ TS_GUARDED_BY(mutex_);  ///< owners of creations under way
   std::set<Request> creations_ TS_GUARDED_BY(mutex_);        ///< under way, with a request id
@@ -144,7 +146,9 @@ class SessionHold {
  public:
   SessionHold(const SessionStore& store, const std::string& id, const Caller& caller, Call& call,
               Access access, const std::string& port = "")
-      : session_(find(store, id, caller, call, access, port)), use_(*session_) {}
+      : SessionHold(find(store, id, caller, call, access, port)) {}
+  /// Throws NO_SUCH_SIMULATION when its lease has ended.
+  explicit SessionHold(SessionPtr session) : session_(std::move(session)), use_(*session_) {}
   Session& operator*() const { return *session_; }
   Session* operator->() const { return session_.get(); }
 

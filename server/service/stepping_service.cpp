@@ -17,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 
 // ------------------------------------------------------------------ StepStream
 
-/// Between its steps an open stream costs no thread.
+/// Between its steps an open stream costs no thread. It holds the simulation that it stepped last.
 class StepStreamHandler final : public Handler {
  public:
   explicit StepStreamHandler(const Parts& parts) : parts_(parts) {}
@@ -27,39 +27,56 @@ class StepStreamHandler final : public Handler {
   void start(Exchange& exchange) override { exchange.read(Exchange::kIdleStream); }
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
     constexpr std::size_t kShort = 4096;  // bytes
-    if (session_ && (*session_)->is_quick() && message.Length() <= kShort)
-      return exchange.do_at_once([&] { step_at_once(exchange, message); });
+    if (message.Length() <= kShort)
+      return exchange.do_at_once([&] {
+        parse(exchange.memory(), message, &request_, &share_);
+        step_at_once(exchange);
+      });
     exchange.post(Lane::advance, [this, &exchange, bytes = std::move(message)]() mutable {
-      take(exchange, bytes);
+      parse(exchange.memory(), bytes, &request_, &share_);
       step(exchange);
     });
   }
   // Another thread would take as long to wake as a small model to step.
-  void step_at_once(Exchange& exchange, grpc::ByteBuffer& message) {
-    take(exchange, message);
-    if ((*session_)->step_at_once(request_, exchange.caller(), exchange.call(),
-                                  reply_.mutable_step()))
-      return send(exchange);
+  void step_at_once(Exchange& exchange) {
+    if (is_held() || hold_alive(exchange.caller())) {
+      if ((*session_)->is_quick()) {
+        prepare(exchange);
+        if ((*session_)->step_at_once(request_, exchange.caller(), exchange.call(),
+                                      reply_.mutable_step()))
+          return send(exchange);
+      }
+    }
     exchange.post(Lane::advance, [this, &exchange] { step(exchange); });
   }
-  void take(Exchange& exchange, grpc::ByteBuffer& message) {
-    parse(exchange.memory(), message, &request_, &share_);
-    if (!session_) {
-      name_ = request_.simulation();
-      session_.emplace(parts_.store, name_, exchange.caller(), exchange.call(), Access::control);
-    }
-    if (!request_.simulation().empty() && request_.simulation() != name_)
-      throw Refusal(v1::REASON_BAD_ARGUMENT,
-                    "`simulation`: all messages of a stream must name the same");
+  void step(Exchange& exchange) {
+    if (!is_held()) hold(exchange);
+    prepare(exchange);
+    (*session_)->step(request_, exchange.caller(), exchange.call(), reply_.mutable_step());
+    send(exchange);
+  }
+  /// Is it the simulation that the message means?
+  bool is_held() const {
+    return session_ && (request_.simulation().empty() || request_.simulation() == name_);
+  }
+  /// Only of one that is in memory: from the disk it takes a while.
+  bool hold_alive(const Caller& caller) {
+    SessionPtr session = parts_.store.get_alive(request_.simulation(), caller, Access::control);
+    if (!session || session->lease().ended()) return false;
+    name_ = request_.simulation();
+    session_.emplace(std::move(session));
+    return true;
+  }
+  void hold(Exchange& exchange) {
+    name_ = request_.simulation();
+    session_.emplace(parts_.store, name_, exchange.caller(), exchange.call(), Access::control);
+  }
+  void prepare(Exchange& exchange) {
     request_.set_simulation(
         name_);  // a repeat in another message of the stream is the same request
     reply_.Clear();
     outputs_share_ =
         MemoryShare(exchange.memory(), (*session_)->variable_access().bytes_of(request_.outputs()));
-  }
-  void step(Exchange& exchange) {
-    (*session_)->step(request_, exchange.caller(), exchange.call(), reply_.mutable_step());
-    send(exchange);
   }
   // The next message may come, on another thread, as soon as it is wanted: nothing here is touched
   // from then on.
@@ -76,7 +93,7 @@ class StepStreamHandler final : public Handler {
   void on_half_close(Exchange& exchange) override { exchange.finish(grpc::Status::OK); }
 
   const Parts& parts_;
-  std::string name_;
+  std::string name_;  ///< of the session
   std::optional<SessionHold> session_;
   MemoryShare share_, outputs_share_;  ///< of the request and of the reply
   v1::StepRequest request_;

@@ -8,7 +8,8 @@
 /// echo, queue   by a completion queue that one thread polls: the quickest that gRPC has
 /// echo, callback, sync   by its two other interfaces
 /// engine        a step in this process
-/// in turn       a step of the next of `--many` simulations, each on a stream of its own
+/// in turn       a step of the next of `--many` simulations, all on one stream
+/// streams in turn   the same, each on a stream of its own
 /// echoes in turn   an echo (queue, Unix socket) on the next of as many streams
 ///
 /// All take turns of `--exchanges`. Of each: the median of the turns' medians, the lowest of them
@@ -287,12 +288,14 @@ struct EchoStream {
   v1::StepStreamReply reply;
 };
 
-/// A simulation of the deck with an open stream.
+/// A simulation of the deck with an open stream, and one that it may share with others.
 struct Stepped {
-  explicit Stepped(client::Server& server)
-      : simulation(server.load_text(kDeck)), stepper(simulation.stepper({kOutput})) {}
+  explicit Stepped(client::Server& server, const client::Stepper* beside = nullptr)
+      : simulation(server.load_text(kDeck)),
+        stepper(simulation.stepper({kOutput})),
+        sharing(simulation.stepper(beside ? *beside : stepper, {kOutput})) {}
   client::Simulation simulation;
-  client::Stepper stepper;
+  client::Stepper stepper, sharing;
 };
 
 struct Options {
@@ -415,25 +418,36 @@ int run(const Options& options) {
   }
 
   std::vector<std::unique_ptr<Stepped>> many;
-  for (int k = 0; k < options.many; ++k) many.push_back(std::make_unique<Stepped>(servers[0]));
+  for (int k = 0; k < options.many; ++k)
+    many.push_back(std::make_unique<Stepped>(servers[0], &stepped[0]->stepper));
   const auto channel =
       grpc::CreateChannel(Place::of("", "unix", 1).address, grpc::InsecureChannelCredentials());
   std::vector<std::unique_ptr<EchoStream>> many_echoes;
   for (int k = 0; k < options.many; ++k)
     many_echoes.push_back(std::make_unique<EchoStream>(channel));
-  std::size_t next = 0, next_echo = 0;
+  std::size_t next = 0, next_stream = 0, next_echo = 0;
   const std::string count = std::to_string(options.many);
   Lane alone(
       "one alone", [&] { stepped[0]->stepper.step(); }, &daemon);
+  std::vector<std::unique_ptr<mbcosim::Simulation>> locals;
+  for (int k = 0; k < options.many; ++k)
+    locals.push_back(std::move(*mbcosim::Simulation::create(report.model)));
+  std::size_t next_local = 0;
+  Lane engines(
+      count + " engines in turn", [&] { (void)locals[next_local++ % locals.size()]->step(); },
+      nullptr);
   Lane in_turn(
-      count + " in turn", [&] { many[next++ % many.size()]->stepper.step(); }, &daemon);
+      count + " in turn", [&] { many[next++ % many.size()]->sharing.step(); }, &daemon);
+  Lane streams_in_turn(
+      count + " streams in turn", [&] { many[next_stream++ % many.size()]->stepper.step(); },
+      &daemon);
   Lane echo_alone(
       "echo alone", [&] { streams[0]->exchange(); }, echoes[0].get());
   Lane echo_in_turn(
       count + " echoes in turn", [&] { many_echoes[next_echo++ % many.size()]->exchange(); },
       echoes[0].get());
   for (int turn = 0; turn < options.turns && !many.empty(); ++turn)
-    for (Lane* lane : {&alone, &in_turn, &echo_alone, &echo_in_turn})
+    for (Lane* lane : {&alone, &engines, &in_turn, &streams_in_turn, &echo_alone, &echo_in_turn})
       lane->take_turn(options.exchanges);
 
   std::printf("%-22s %9s %9s %9s %9s %9s\n", "[us]", "median", "lowest", "p99", "client", "server");
@@ -447,7 +461,9 @@ int run(const Options& options) {
   }
   if (!many.empty()) {
     table.add(alone);
+    table.add(engines);
     table.add(in_turn, {{"ratio", ratio(in_turn.medians(), {}, alone.medians())}});
+    table.add(streams_in_turn, {{"ratio", ratio(streams_in_turn.medians(), {}, alone.medians())}});
     table.add(echo_alone);
     table.add(echo_in_turn, {{"ratio", ratio(echo_in_turn.medians(), {}, echo_alone.medians())}});
   }

@@ -467,6 +467,92 @@ TEST(Client, AStreamCarriesInputsAndOutputsInOneMessage) {
   EXPECT_THROW(stepper.step({0, 0, 0, 0, 0, 0}), Error);
 }
 
+TEST(Client, SteppersOfManySimulationsShareAStream) {
+  constexpr std::size_t kMany = 5;
+  Server server = connect();
+  const std::string x = "node.structural.1.X", load = "node.structural.1.load";
+  std::vector<Simulation> shared, alone;
+  std::vector<Stepper> steppers;
+  for (std::size_t k = 0; k < kMany; ++k) {
+    shared.push_back(server.load_text(body()));
+    alone.push_back(server.load_text(body()));
+    steppers.push_back(k == 0 ? shared[0].stepper({x}, {load})
+                              : shared[k].stepper(steppers[0], {x}, {load}));
+  }
+  for (int step = 1; step <= 20; ++step)
+    for (std::size_t k = 0; k < kMany; ++k) {
+      const std::vector<double> force = {0, 0, 0.1 * step + double(k), 0, 0, 0};
+      const StepResult one = steppers[k].step(force),
+                       same = alone[k].step(1, {.inputs = {{load, force}}, .outputs = {x}});
+      EXPECT_EQ(one.step, step);
+      EXPECT_EQ(one.values.at(x), same.values.at(x));
+    }
+  // One that has ended leaves the others another stream.
+  EXPECT_THROW(steppers[1].step({1, 2}), Error);
+  EXPECT_THROW(steppers[1].step(std::vector<double>(6)), Error);
+  steppers[0].close();
+  for (std::size_t k = 2; k < kMany; ++k)
+    EXPECT_EQ(steppers[k].step(std::vector<double>(6)).step, 21);
+  steppers.push_back(shared[1].stepper(steppers[2], {x}));
+  EXPECT_EQ(steppers.back().step().step, 21) << "nothing of the refused step was done";
+
+  const auto field = [&](const std::function<void()>& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      return error.field();
+    }
+    return std::string("nothing is refused");
+  };
+  EXPECT_EQ(field([&] { shared[1].stepper(steppers[1]); }), "beside") << "it is over";
+  Server another = connect();
+  Simulation found = another.find(shared[0].name());
+  EXPECT_EQ(field([&] { found.stepper(steppers[2]); }), "beside") << "of another connection";
+}
+
+TEST(Client, ThreadsTakeTurnsOnASharedStream) {
+  constexpr std::size_t kThreads = 4;
+  Server server = connect();
+  std::vector<Simulation> simulations;
+  std::vector<Stepper> steppers;
+  for (std::size_t k = 0; k < kThreads; ++k) {
+    simulations.push_back(server.load_text(endless()));
+    steppers.push_back(k == 0 ? simulations[0].stepper({"time"})
+                              : simulations[k].stepper(steppers[0], {"time"}));
+  }
+  std::vector<std::thread> threads;
+  for (Stepper& stepper : steppers)
+    threads.emplace_back([&stepper] {
+      for (int step = 1; step <= 200; ++step) {
+        const StepResult result = stepper.step();
+        EXPECT_EQ(result.step, step);
+        EXPECT_NEAR(result.values.at("time").at(0), 1e-3 * step, 1e-9);
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST(Client, TheTurnOfAnotherStepperIsAwaitedForTheTimeout) {
+  Server server = connect();
+  Simulation slow = server.load_text(endless()), quick = server.load_text(body());
+  Stepper first = slow.stepper();
+  Stepper second = quick.stepper(first);
+  std::atomic<bool> interrupted{false};
+  std::thread thread(
+      [&] { interrupted = first.step({}, 1000000000).outcome == Outcome::interrupted; });
+  while (slow.refresh().step == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  try {
+    second.step({}, 1, {}, 0.1);
+    ADD_FAILURE() << "two steps at once on one stream";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), 4) << error.what();  // DEADLINE_EXCEEDED
+  }
+  EXPECT_TRUE(slow.interrupt());
+  thread.join();
+  EXPECT_TRUE(interrupted) << "the other's step goes on";
+  EXPECT_EQ(quick.refresh().step, 0);
+}
+
 TEST(Client, OptionsOfTheSimulation) {
   Server server = connect();
   LoadOptions options;

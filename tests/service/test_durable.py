@@ -339,6 +339,17 @@ def test_the_end_of_a_lease_suspends(start):
         assert changes == [pb.SIMULATION_STATE_SUSPENDED, pb.SIMULATION_STATE_READY]
 
 
+def test_a_stream_of_many_brings_back_the_one_it_names(start):
+    with start().connect() as server:
+        resting, lively = server.load_text(deck(), lease=0.5), server.load_text(deck())
+        with lively.stepper() as stepper, resting.stepper(beside=stepper) as other:
+            for step in range(1, 11):
+                assert (stepper.step().step, other.step().step) == (step, step)
+            stepper.step()
+            wait_for(lambda: state_of(server, resting.name) == pb.SIMULATION_STATE_SUSPENDED, 20)
+            assert (other.step().step, stepper.step().step) == (11, 12)
+
+
 def test_many_callers_wake_one_simulation_once(start):
     daemon = start()
     with daemon.connect() as server:

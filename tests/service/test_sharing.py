@@ -152,6 +152,18 @@ def test_every_method_asks_for_its_right(shared, guest, role, right):
         assert (simulation.name in seen) == (right is not None)
 
 
+@pytest.mark.parametrize("right", list(ALLOWED))
+def test_every_name_on_a_stream_asks_for_its_right(shared, right):
+    grants = [] if right is None else [mbcosim.grant("token:bob", right)]
+    server = shared("bob")
+    with shared("ann").load_text(decks.body(), grants=grants) as simulation, server.load_text(decks.body()) as own:
+        for names in ([own.name, simulation.name], [own.name, own.name, simulation.name, own.name]):
+            requests = [pb.StepRequest(simulation=name) for name in names]
+            assert outcome(lambda r=requests: list(server.simulations.StepStream(iter(r), metadata=server.metadata))) == expected("control", right, "control")
+        steps = 2 if right == "control" else 0
+        assert simulation.refresh().step == steps and own.refresh().step == 3 + (1 if right == "control" else 0)
+
+
 def test_owners_and_admins_may_do_all(shared):
     for name in ("ann", "root"):
         simulation = shared("ann").load_text(decks.body(), ports=PORT, record=True)

@@ -3,6 +3,7 @@ import contextlib
 import threading
 import time
 
+import grpc
 import pytest
 
 import decks
@@ -62,6 +63,100 @@ def test_steps_that_are_sent_ahead_are_answered_one_by_one(server):
     for thread in threads:
         thread.join()
     assert all(found == list(range(1, count + 1)) for found in all_found)
+
+
+def test_one_stream_steps_many_simulations(server, tumbling, reference):
+    """Each message may name another one; without a name it is the one before."""
+    with contextlib.ExitStack() as stack:
+        simulations = [stack.enter_context(server.load(tumbling)) for _ in range(4)]
+        handles = simulations[0].handles(NAMES)
+
+        def requests():
+            for _ in range(100):
+                for simulation in simulations:
+                    yield pb.StepRequest(simulation=simulation.name)
+                    yield pb.StepRequest(outputs=handles)
+
+        steps = [reply.step.step for reply in server.simulations.StepStream(requests(), metadata=server.metadata)]
+        assert steps == [step for k in range(100) for _ in simulations for step in (2 * k + 1, 2 * k + 2)]
+        assert [bits(simulation) for simulation in simulations] == 4 * [reference]
+
+
+def test_a_stream_ends_with_the_name_of_an_unknown_simulation(server):
+    with server.load_text(decks.body()) as simulation:
+        stream = server.simulations.StepStream(iter([pb.StepRequest(simulation=simulation.name), pb.StepRequest(simulation="simulations/none")]),
+                                               metadata=server.metadata)
+        assert next(stream).step.step == 1
+        with pytest.raises(grpc.RpcError) as caught:
+            next(stream)
+        assert caught.value.code() == grpc.StatusCode.NOT_FOUND and "simulations/none" in caught.value.details()
+        with pytest.raises(grpc.RpcError) as caught:
+            next(server.simulations.StepStream(iter([pb.StepRequest()]), metadata=server.metadata))
+        assert caught.value.code() == grpc.StatusCode.NOT_FOUND
+        assert simulation.step().step == 2
+
+
+def test_a_stream_holds_the_simulation_that_it_stepped_last(server):
+    """The lease of the one before runs out."""
+    first, second = (server.load_text(decks.body(), lease=1.0) for _ in range(2))
+    with first.stepper() as stepper, second.stepper(beside=stepper) as other:
+        stepper.step()
+        other.step()
+        wait_for(lambda: first.name not in {info.name for info in server.list()}, 20)
+        time.sleep(1.0)
+        assert other.step().step == 2
+        with pytest.raises(mbcosim.NotFound):
+            stepper.step()
+        assert other.step().step == 3  # on another stream
+    second.delete()
+
+
+def test_steppers_share_a_stream(server, tumbling, reference):
+    with contextlib.ExitStack() as stack:
+        simulations = [stack.enter_context(server.load(tumbling)) for _ in range(5)]
+        steppers = [simulations[0].stepper(NAMES)]
+        steppers += [simulation.stepper(NAMES, beside=steppers[0]) for simulation in simulations[1:]]
+        steppers[1].close()
+        with pytest.raises(ValueError, match="beside"):
+            simulations[1].stepper(beside=steppers[1])
+        with mbcosim.connect(server.address) as another, pytest.raises(ValueError, match="beside"):
+            another.attach(simulations[1].name).stepper(beside=steppers[0])
+        steppers[1] = simulations[1].stepper(NAMES, beside=steppers[2])
+        steppers[0].close()
+        with pytest.raises(mbcosim.Unavailable):
+            steppers[0].step()
+        steppers[0] = simulations[0].stepper(NAMES, beside=steppers[2])
+        for _ in range(200):
+            results = [stepper.step() for stepper in steppers]
+        for result in results:
+            assert b"".join(v.tobytes() for v in result.values.values()) == reference
+        for stepper in steppers:
+            stepper.close()
+
+
+def test_threads_take_turns_on_a_shared_stream(server):
+    with contextlib.ExitStack() as stack:
+        simulations = [stack.enter_context(server.load_text(decks.endless())) for _ in range(4)]
+        steppers = [simulations[0].stepper(["time"])]
+        steppers += [simulation.stepper(["time"], beside=steppers[0]) for simulation in simulations[1:]]
+        found = [[] for _ in steppers]
+        threads = [threading.Thread(target=lambda k=k: found[k].extend(steppers[k].step().step for _ in range(100))) for k in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert found == 4 * [list(range(1, 101))]
+        long = threading.Thread(target=lambda: steppers[0].step(count=10**9))
+        long.start()
+        wait_for(lambda: simulations[0].refresh().step > 100)
+        with pytest.raises(mbcosim.TimedOut):
+            steppers[1].step(timeout=0.1)
+        assert simulations[1].refresh().step == 100
+        simulations[0].interrupt()
+        long.join()
+        assert steppers[2].step().step == 101
+        for stepper in steppers:
+            stepper.close()
 
 
 def test_until_time_equals_steps(server, tumbling, reference):

@@ -1,10 +1,10 @@
 """Simulations on the server: step, read, write, save, restore, watch. Every call takes `timeout=` [s]."""
 from __future__ import annotations
 
-import queue
 from collections.abc import Iterable, Iterator
 from typing import Any, Optional, TypeVar
 
+import grpc
 import numpy as np
 import numpy.typing as npt
 
@@ -13,11 +13,11 @@ from mbcosim.v1 import common_pb2, simulations_pb2 as pb, telemetry_pb2
 from .analysis import Analysis
 from .calls import Condition, SimulationCalls, SnapshotCalls, StepResult, Values
 from .coupling import Answer, Peer
-from .errors import translated
+from .errors import Unavailable, translated
 from .histories import Histories
 from .objects import ModelObjects
-from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, end_with, fill_duration, parting, runs_calls, until_cancelled
-from .stepping import StepLine
+from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, checked_timeout, fill_duration, parting, runs_calls, until_cancelled
+from .stepping import SharedStream, StepLine
 from .words import pick
 
 Self = TypeVar("Self")
@@ -101,9 +101,10 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
     def __setitem__(self, name: str, value: npt.ArrayLike) -> None:
         self.write({name: value})
 
-    def stepper(self, outputs: Iterable[str] = (), inputs: Iterable[str] = (), *, timeout: Optional[float] = USUAL) -> Stepper:
-        """An open stream for stepping with the least delay; see Stepper."""
-        return Stepper(self, outputs, inputs, timeout)
+    def stepper(self, outputs: Iterable[str] = (), inputs: Iterable[str] = (), *, beside: Optional[Stepper] = None,
+                timeout: Optional[float] = USUAL) -> Stepper:
+        """An open stream for stepping with the least delay, or, `beside` another stepper, a place on that one's; see Stepper."""
+        return Stepper(self, outputs, inputs, beside, timeout)
 
     def couple(self, port: str, answer: Optional[Answer] = None, **options: Any) -> Peer:
         """Attaches a peer to a port; see coupling.Peer."""
@@ -116,21 +117,33 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
 
 
 class Stepper:
-    """Steps on one open stream: one message each way per step.
+    """Steps on an open stream: one message each way per step.
 
         with simulation.stepper(outputs=["node.structural.1.X"]) as stepper:
             for _ in range(1000):
                 x = stepper.step().values["node.structural.1.X"]
+
+    Many simulations of one connection (behind a proxy: of one daemon) are stepped on one stream by steppers `beside` the first:
+
+        steppers = [simulations[0].stepper()]
+        steppers += [simulation.stepper(beside=steppers[0]) for simulation in simulations[1:]]
+
+    Steps on a stream follow each other. After an exception a stepper is over; the others go on.
     """
 
-    def __init__(self, simulation: Simulation, outputs: Iterable[str], inputs: Iterable[str], timeout: Optional[float] = USUAL) -> None:
+    def __init__(self, simulation: Simulation, outputs: Iterable[str], inputs: Iterable[str], beside: Optional[Stepper] = None,
+                 timeout: Optional[float] = USUAL) -> None:
+        connection = simulation._connection
+        if beside is not None and (beside._stream is None or beside._stream.connection is not connection):
+            raise ValueError("beside: must be a stepper of the same connection that is not over")
         self._simulation, self._outputs = simulation, list(outputs)
-        self._requests: queue.SimpleQueue[Optional[pb.StepRequest]] = queue.SimpleQueue()
         self._request = pb.StepRequest(simulation=simulation.name, outputs=simulation.handles(self._outputs, timeout=timeout))
         self._inputs = list(inputs)
         self._request.inputs.handles.extend(simulation.handles(self._inputs, timeout=timeout))
-        self._replies = simulation._stub.StepStream(iter(self._requests.get, None), metadata=simulation._connection.about(simulation.name))
-        end_with(self._replies, self._requests)
+        stream = SharedStream(connection) if beside is None else beside._stream
+        assert stream is not None
+        stream.join(simulation.name)
+        self._stream: Optional[SharedStream] = stream
 
     def __enter__(self: Self) -> Self:
         return self
@@ -141,7 +154,7 @@ class Stepper:
     def step(self, values: Optional[npt.ArrayLike] = None, count: int = 1, *, step_size: Optional[float] = None,
              timeout: Optional[float] = None) -> StepResult:
         """Takes `count` steps, of `step_size` [s] each (default: the deck's); `values`: numbers of the stepper's inputs, one variable after the
-        other. After a timeout the stream is over."""
+        other. After a timeout the stepper is over."""
         request = pb.StepRequest()
         request.CopyFrom(self._request)
         request.steps = count
@@ -149,19 +162,21 @@ class Stepper:
             request.step_size = step_size
         if self._inputs:
             request.inputs.values.extend(np.ravel(np.asarray(values, float)))
-        self._requests.put(request)
-        with bounded(timeout, self._replies.cancel, "the step"), translated():
-            reply = next(self._replies)
-        return self._simulation.result(reply.step, self._outputs)
+        if self._stream is None:
+            raise Unavailable("the stepper is over", grpc.StatusCode.UNAVAILABLE)
+        checked_timeout(timeout)
+        try:
+            reply = self._stream.step(request, timeout)
+        except BaseException:
+            self.close()
+            raise
+        return self._simulation.result(reply, self._outputs)
 
     def close(self, *, timeout: Optional[float] = PARTING) -> None:
-        """Ends the stream."""
-        self._requests.put(None)
-        if not self._replies.is_active():
-            return
-        with parting(), bounded(timeout, self._replies.cancel, "the end of the stream"), translated():
-            for _ in self._replies:
-                pass
+        """Leaves the stream; the last stepper ends it."""
+        stream, self._stream = self._stream, None
+        if stream is not None:
+            stream.leave(timeout)
 
 
 class Subscription:

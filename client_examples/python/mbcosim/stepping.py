@@ -11,7 +11,8 @@ import grpc
 
 from mbcosim.v1 import simulations_pb2 as pb
 
-from .rpc import end_with
+from .errors import TimedOut, Unavailable, translated
+from .rpc import bounded, end_with, parting
 
 _SOON = 0.05  # seconds within which a step follows the one before in a loop
 _IDLE = 1.0   # seconds after which the stream is closed: an open one would keep the simulation alive
@@ -82,6 +83,75 @@ class StepLine:
             self._requests.put(None)
         if replies is not None:
             replies.cancel()
+
+
+class SharedStream:
+    """An open stream that steppers of one connection may share: one step after the other. After an exception the next step opens another one."""
+
+    def __init__(self, connection: Any) -> None:
+        self.connection = connection
+        self._turn = threading.Lock()  # who has it steps
+        self._state = threading.Lock()  # protects all below
+        self._users = 0
+        self._requests: queue.SimpleQueue[Optional[pb.StepRequest]] = queue.SimpleQueue()
+        self._replies: Any = None
+
+    def join(self, simulation: str) -> None:
+        """One more stepper; `simulation`: by which a proxy finds the daemon."""
+        with self._state:
+            self._users += 1
+        self._open(simulation)
+
+    def step(self, request: pb.StepRequest, timeout: Optional[float]) -> pb.StepReply:
+        """The reply, within `timeout` [s]. Raises mbcosim.Error."""
+        end = None if timeout is None else time.monotonic() + timeout
+        if not self._turn.acquire(timeout=-1 if timeout is None else min(timeout, threading.TIMEOUT_MAX)):
+            raise TimedOut(f"the step took longer than {timeout} s", grpc.StatusCode.DEADLINE_EXCEEDED)
+        try:
+            replies = self._open(request.simulation)
+            self._requests.put(request)
+            left = None if end is None else max(end - time.monotonic(), 1e-3)
+            with bounded(left, replies.cancel, "the step"), translated():
+                reply = next(replies, None)
+            if reply is None:
+                raise Unavailable("the stream has ended", grpc.StatusCode.UNAVAILABLE)
+            answer: pb.StepReply = reply.step
+            return answer
+        except BaseException:  # the reply of an interrupted step would be taken for the next one's
+            self._end(cancel=True)
+            raise
+        finally:
+            self._turn.release()
+
+    def leave(self, timeout: Optional[float]) -> None:
+        """The last one ends the stream, within `timeout` [s]."""
+        with self._state:
+            self._users -= 1
+            if self._users > 0:
+                return
+        replies = self._end()
+        if replies is None or not replies.is_active():
+            return
+        with parting(), bounded(timeout, replies.cancel, "the end of the stream"), translated():
+            for _ in replies:
+                pass
+
+    def _open(self, simulation: str) -> Any:
+        with self._state:
+            if self._replies is None:
+                self._requests = queue.SimpleQueue()
+                metadata = self.connection.about(simulation)
+                self._replies = self.connection.stubs.simulations.StepStream(iter(self._requests.get, None), metadata=metadata)
+                end_with(self._replies, self._requests)
+            return self._replies
+
+    def _end(self, cancel: bool = False) -> Any:
+        with self._state:
+            replies, self._replies = self._replies, None
+            self._requests.put(None)
+        if cancel and replies is not None:
+            replies.cancel()
+        return replies
 
 
 async def status_of(stream: Any) -> Any:
