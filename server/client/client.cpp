@@ -7,6 +7,7 @@
 #include "client/bundle.h"
 #include "client/convert.h"
 #include "client/simulation.h"
+#include "client/step_lines.h"
 
 namespace mbcosim::client {
 namespace {
@@ -94,6 +95,7 @@ double checked_timeout(double seconds) {
 
 // ------------------------------------------------------------------ Server
 
+Server::Impl::~Impl() = default;
 Server::Server(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::Server(Server&&) noexcept = default;
 Server& Server::operator=(Server&&) noexcept = default;
@@ -113,6 +115,7 @@ Server Server::connect(const std::string& address, double timeout, const Credent
       grpc::CreateCustomChannel(address, channel_credentials(credentials), channel_arguments());
   impl->simulations = v1::Simulations::NewStub(impl->channel);
   impl->coupling = v1::Coupling::NewStub(impl->channel);
+  impl->step_lines = std::make_unique<StepLines>(*impl);
   const auto deadline =
       std::chrono::system_clock::now() +
       std::chrono::milliseconds(static_cast<std::int64_t>(checked_timeout(timeout) * 1000));

@@ -50,12 +50,16 @@ grpc::Status upload(grpc::ClientWriter<Request>& stream, const Request& header,
   return stream.Finish();
 }
 
+class StepLines;
+
 struct Server::Impl {
+  ~Impl();
   std::string address, authorization;  ///< "Bearer …", or empty
   double reconnect = 0;                ///< [s]
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<v1::Simulations::Stub> simulations;
   std::unique_ptr<v1::Coupling::Stub> coupling;
+  std::unique_ptr<StepLines> step_lines;
 };
 
 constexpr double kParting = 2;  ///< longest wait of a destructor [s]

@@ -4,6 +4,7 @@
 
 #include "client/convert.h"
 #include "client/peer.h"
+#include "client/step_lines.h"
 
 namespace mbcosim::client {
 
@@ -118,7 +119,12 @@ void Simulation::Impl::fill(const StepOptions& options, v1::StepRequest* request
 
 StepResult Simulation::Impl::advance(v1::StepRequest& request, const StepOptions& options) {
   fill(options, &request);
-  const v1::StepReply reply = ask(*this, &Stub::Step, request, options.timeout);
+  request.set_simulation(info.name());
+  v1::StepReply reply;
+  StepLines& lines = *server->step_lines;
+  if (options.timeout != kEndless || !lines.step(request, &reply))
+    reply = ask(*this, &Stub::Step, request, options.timeout);
+  lines.note_step();
   StepResult result = to_result(reply);
   result.values = split(options.outputs, {reply.outputs().begin(), reply.outputs().end()});
   return result;

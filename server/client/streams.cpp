@@ -1,17 +1,12 @@
 /// Steps on an open stream, and samples as they come.
-#include <grpc/support/time.h>
-#include <grpcpp/client_context.h>
-#include <grpcpp/completion_queue.h>
 
 #include <algorithm>
-#include <chrono>
-#include <thread>
 #include <utility>
 
 #include "client/convert.h"
 #include "client/reading.h"
 #include "client/simulation.h"
-#include "threads/mutex.h"
+#include "client/step_lines.h"
 
 namespace mbcosim::client {
 
@@ -32,149 +27,6 @@ v1::OverflowPolicy to_proto(Overflow policy) {
 
 // ------------------------------------------------------------------ Stepper
 
-/// The call of a step line. Its thread waits for a reply that is likely to come soon, because the
-/// last one did, without going to sleep: waking would take as long.
-class StepCall {
- public:
-  /// `simulation`: by which a proxy finds the daemon.
-  StepCall(Server::Impl& server, const std::string& simulation)
-      : context_(server, kEndless, simulation),
-        messages_(server.simulations->PrepareAsyncStepStream(&context_, &queue_)) {
-    messages_->StartCall(begin());
-  }
-  ~StepCall() {
-    if (!finished_) {
-      const Deadline deadline(kParting, [this] { cancel(); });
-      if (await_all()) messages_->WritesDone(begin());
-      (void)finish();
-    }
-    queue_.Shutdown();
-    await_all();
-  }
-  StepCall(const StepCall&) = delete;
-  StepCall& operator=(const StepCall&) = delete;
-
-  void cancel() { context_.TryCancel(); }  // from any thread
-  bool finished() const { return finished_; }
-  /// False: the stream has ended.
-  bool exchange(const v1::StepRequest& request, v1::StepStreamReply* reply) {
-    if (!await_all()) return false;  // gRPC takes no message before the call has begun
-    const Clock::time_point start = Clock::now();
-    messages_->Write(request, begin());
-    messages_->Read(reply, begin());
-    const bool ok = await_all(comes_soon_ ? start + kSoon : start);
-    comes_soon_ = Clock::now() - start < kSoon;
-    return ok;
-  }
-  grpc::Status finish() {
-    grpc::Status status;
-    messages_->Finish(&status, begin());
-    await_all();
-    finished_ = true;
-    return status;
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::microseconds kSoon{75};
-
-  void* begin() {
-    ++under_way_;
-    return this;
-  }
-  /// Until nothing is under way any more. False: some of it has failed.
-  bool await_all(Clock::time_point awake_until = {}) {
-    static const bool may_look = std::thread::hardware_concurrency() > 1;  // one is the server's
-    bool all_ok = true;
-    while (under_way_ > 0) {
-      void* tag = nullptr;
-      bool ok = false;
-      if (!may_look || Clock::now() >= awake_until) {
-        if (!queue_.Next(&tag, &ok)) return false;
-      } else if (queue_.AsyncNext(&tag, &ok, gpr_time_0(GPR_CLOCK_MONOTONIC)) !=
-                 grpc::CompletionQueue::GOT_EVENT) {
-        std::this_thread::yield();
-        continue;
-      }
-      --under_way_;
-      all_ok = all_ok && ok;
-    }
-    return all_ok;
-  }
-
-  grpc::CompletionQueue queue_;
-  CallContext context_;
-  std::unique_ptr<grpc::ClientAsyncReaderWriter<v1::StepRequest, v1::StepStreamReply>> messages_;
-  int under_way_ = 0;  ///< operations
-  bool comes_soon_ = false, finished_ = false;
-};
-
-/// A stream that steppers of one server may share. Thread-safe: one step after the other.
-class StepLine {
- public:
-  StepLine(std::shared_ptr<Server::Impl> server, const std::string& simulation)
-      : server_(std::move(server)), call_(std::make_unique<StepCall>(*server_, simulation)) {}
-
-  const std::shared_ptr<Server::Impl>& server() const { return server_; }
-  /// After an Error the next one opens another stream.
-  void exchange(const v1::StepRequest& request, v1::StepStreamReply* reply, double timeout) {
-    const Clock::time_point start = Clock::now();
-    const Turn turn(*this, timeout);
-    if (call_->finished()) call_ = std::make_unique<StepCall>(*server_, request.simulation());
-    const Deadline deadline(left(timeout, start), [this] { call_->cancel(); });
-    if (call_->exchange(request, reply)) return;
-    const grpc::Status status = call_->finish();
-    if (deadline.is_over()) throw_late("the step", timeout);
-    require(status);
-    throw Error("the stream has ended", static_cast<int>(grpc::StatusCode::UNAVAILABLE), "", {});
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-
-  /// The right to use the call, for which others wait.
-  class Turn {
-   public:
-    Turn(StepLine& line, double timeout) : line_(line) {
-      const bool ends = timeout != kEndless;
-      const Clock::time_point end = Clock::now() + duration(ends ? timeout : 0);
-      const server::Guard guard(line_.mutex_);
-      while (line_.taken_ && (!ends || Clock::now() < end)) {
-        if (ends)
-          line_.given_back_.wait_until(line_.mutex_, end);
-        else
-          line_.given_back_.wait(line_.mutex_);
-      }
-      if (line_.taken_) throw_late("the step", timeout);
-      line_.taken_ = true;
-    }
-    ~Turn() {
-      const server::Guard guard(line_.mutex_);
-      line_.taken_ = false;
-      line_.given_back_.notify_one();
-    }
-    Turn(const Turn&) = delete;
-    Turn& operator=(const Turn&) = delete;
-
-   private:
-    StepLine& line_;
-  };
-
-  static Clock::duration duration(double seconds) {
-    return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-  }
-  static double left(double timeout, Clock::time_point start) {
-    if (timeout == kEndless) return kEndless;
-    return std::max(timeout - std::chrono::duration<double>(Clock::now() - start).count(), 1e-3);
-  }
-
-  const std::shared_ptr<Server::Impl> server_;
-  std::unique_ptr<StepCall> call_;  // of who has the turn
-  server::Mutex mutex_;
-  server::Condition given_back_;
-  bool taken_ TS_GUARDED_BY(mutex_) = false;
-};
-
 struct Stepper::Impl {
   /// `shared`: the line of another stepper, or null.
   Impl(Simulation::Impl& simulation, std::shared_ptr<StepLine> shared,
@@ -188,7 +40,8 @@ struct Stepper::Impl {
     if (!to.empty()) request.mutable_inputs()->mutable_handles()->Add(to.begin(), to.end());
     for (const std::string& output : read)
       outputs.emplace_back(output, simulation.variable(output).size());
-    line = shared ? std::move(shared) : std::make_shared<StepLine>(simulation.server, name);
+    server = simulation.server;
+    line = shared ? std::move(shared) : std::make_shared<StepLine>(*server, name);
   }
 
   const v1::StepReply& exchange(double timeout) {
@@ -201,7 +54,8 @@ struct Stepper::Impl {
     return reply.step();
   }
 
-  std::shared_ptr<StepLine> line;  ///< null: it is over
+  std::shared_ptr<Server::Impl> server;  // outlives the line
+  std::shared_ptr<StepLine> line;        ///< null: it is over
   v1::StepRequest request;
   v1::StepStreamReply reply;
   std::vector<std::pair<std::string, int>> outputs;  ///< and their sizes
@@ -244,7 +98,7 @@ Stepper Simulation::stepper(const std::vector<std::string>& outputs,
 
 Stepper Simulation::stepper(const Stepper& beside, const std::vector<std::string>& outputs,
                             const std::vector<std::string>& inputs, double timeout) {
-  if (!beside.impl_->line || beside.impl_->line->server() != impl_->server)
+  if (!beside.impl_->line || beside.impl_->server != impl_->server)
     throw Error("`beside` must be a stepper of the same connection that is not over",
                 static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT), "BAD_ARGUMENT", {}, "beside");
   return Stepper(

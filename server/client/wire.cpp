@@ -6,6 +6,7 @@
 #include <cstring>
 #include <system_error>
 
+#include "client/wakeful_stream.h"
 #include "shared_memory/channel.h"
 
 namespace mbcosim::client {
@@ -17,17 +18,18 @@ constexpr auto kLook = std::chrono::seconds(1);  // rounds of an endless wait
 
 class GrpcWire : public Wire {
  public:
-  GrpcWire(Server::Impl& server, const std::string& simulation)
-      : context_(server, kEndless, simulation), stream_(server.coupling->Attach(&context_)) {}
-  bool write(const v1::PeerMessage& message) override { return stream_->Write(message); }
-  bool read(v1::ServerMessage* message) override { return stream_->Read(message); }
-  void part() override { stream_->WritesDone(); }
-  void cancel() override { context_.TryCancel(); }
-  grpc::Status finish() override { return stream_->Finish(); }
+  GrpcWire(const Server::Impl& server, const std::string& simulation)
+      : stream_(server, simulation, [&](auto* context, auto* queue) {
+          return server.coupling->PrepareAsyncAttach(context, queue);
+        }) {}
+  bool write(const v1::PeerMessage& message) override { return stream_.write(message); }
+  bool read(v1::ServerMessage* message) override { return stream_.read(message); }
+  void part() override { stream_.end_writing(); }
+  void cancel() override { stream_.cancel(); }
+  grpc::Status finish() override { return stream_.finish(); }
 
  private:
-  CallContext context_;
-  std::unique_ptr<grpc::ClientReaderWriter<v1::PeerMessage, v1::ServerMessage>> stream_;
+  WakefulStream<v1::PeerMessage, v1::ServerMessage> stream_;
 };
 
 class SharedMemoryWire : public Wire {

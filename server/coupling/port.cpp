@@ -13,7 +13,12 @@ namespace mbcosim::server {
 namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(10);  // how soon a cancelled step is noticed
-constexpr int kSpins = 200;  // looks before sleeping: quick peers answer within them
+/// Looks before sleeping: quick peers answer within them. The peer and the thread that gets its
+/// message are at work meanwhile, each on a core.
+int looks() {
+  static const int count = std::thread::hardware_concurrency() > 2 ? 200 : 0;
+  return count;
+}
 
 std::string in_port(const std::string& name, const std::string& text) {
   return "port \"" + name + "\": " + text;
@@ -248,7 +253,7 @@ void Port::send(v1::ServerMessage& message, int generation) {
 
 std::optional<Answer> Port::take(const CancelToken& cancel) {
   Guard guard(mutex_);
-  for (int spin = 0; spin < kSpins && awaited_ && !answer_ && link_ && !link_->pulls(); ++spin) {
+  for (int look = 0; look < looks() && awaited_ && !answer_ && link_ && !link_->pulls(); ++look) {
     guard.unlock();
     std::this_thread::yield();
     guard.lock();

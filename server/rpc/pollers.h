@@ -33,9 +33,9 @@ class Pollers {
   };
   static constexpr std::chrono::milliseconds kLook{5};
 
-  /// What a poller does itself for a client that waits for it, while it lives. When such work
-  /// follows the last one as soon as `kSoon`, the next is likely to, too: until then the thread
-  /// looks for it without going to sleep, as waking would take as long.
+  /// What a poller does itself for a client or a step that waits for it, while it lives. When such
+  /// work follows the last one as soon as `kSoon`, the next is likely to, too: until then the
+  /// thread looks for it without going to sleep, as waking would take as long.
   class Work {
    public:
     Work();
@@ -43,7 +43,7 @@ class Pollers {
     Work(const Work&) = delete;
     Work& operator=(const Work&) = delete;
   };
-  static constexpr std::chrono::microseconds kSoon{75};
+  static constexpr std::chrono::microseconds kSoon{150};
 
   static constexpr std::chrono::milliseconds kRestLook{200};  ///< when there has been nothing
 

@@ -21,6 +21,7 @@ class AttachHandler final : public Handler, public PeerLink {
   void on_message(Exchange& exchange, grpc::ByteBuffer bytes) override {
     parse(exchange.memory(), bytes, &message_, &share_);
     if (!greeted_) return exchange.post(Lane::work, [this, &exchange] { greet(exchange); });
+    const Pollers::Work of_poller;
     try {
       Guard guard(mutex_);
       if (!seat_) return;  // given up meanwhile: the call ends, whatever the peer still sends

@@ -1,0 +1,128 @@
+/// Internal to the client library: messages there and back, with the least delay.
+#pragma once
+
+#include <grpc/support/time.h>
+#include <grpcpp/completion_queue.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "client/connection.h"
+#include "threads/mutex.h"
+
+namespace mbcosim::client {
+
+/// A call that streams `Out` to the server and `In` back. Who reads stays awake for a message that
+/// is likely to come soon, because the last one did: waking would take as long. One thread reads,
+/// one at a time writes, any cancels.
+template <class Out, class In>
+class WakefulStream {
+ public:
+  /// A message that comes as soon after it was asked for is awaited without sleep.
+  static constexpr std::chrono::microseconds kSoon{150};
+
+  /// `prepare(context, queue)` makes the call, which is about `simulation`.
+  template <class Prepare>
+  WakefulStream(const Server::Impl& server, const std::string& simulation, Prepare prepare)
+      : context_(server, kEndless, simulation), messages_(prepare(&context_, &queue_)) {
+    messages_->StartCall(begin(write_));
+  }
+  ~WakefulStream() {
+    if (!finished_) {
+      cancel();
+      (void)finish();
+    }
+    await(write_);
+    await(read_);
+    queue_.Shutdown();
+  }
+  WakefulStream(const WakefulStream&) = delete;
+  WakefulStream& operator=(const WakefulStream&) = delete;
+
+  void cancel() { context_.TryCancel(); }
+  /// False: the stream has ended.
+  bool write(const Out& message) {
+    if (!await(write_)) return false;
+    messages_->Write(message, begin(write_));
+    return true;
+  }
+  void end_writing() {
+    if (await(write_)) messages_->WritesDone(begin(write_));
+  }
+  /// False: the stream has ended.
+  bool read(In* message) {
+    const Clock::time_point start = Clock::now();
+    messages_->Read(message, begin(read_));
+    const bool ok = await(read_, comes_soon_ ? start + kSoon : start);
+    comes_soon_ = Clock::now() - start < kSoon;
+    return ok;
+  }
+  /// Once.
+  grpc::Status finish() {
+    grpc::Status status;
+    messages_->Finish(&status, begin(finish_));
+    await(finish_);
+    finished_ = true;
+    return status;
+  }
+  bool finished() const { return finished_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Operation {
+    bool under_way = false, ok = true;
+  };
+
+  void* begin(Operation& operation) TS_EXCLUDES(mutex_) {
+    const server::Guard guard(mutex_);
+    operation.under_way = true;
+    return &operation;
+  }
+  /// False: it has failed. One of the threads that wait takes from the queue for all.
+  bool await(const Operation& operation, Clock::time_point awake_until = {}) TS_EXCLUDES(mutex_) {
+    server::Guard guard(mutex_);
+    while (operation.under_way) {
+      if (is_taking_) {
+        ended_.wait(mutex_);
+        continue;
+      }
+      is_taking_ = true;
+      guard.unlock();
+      void* tag = nullptr;
+      const bool ok = take(&tag, awake_until);
+      guard.lock();
+      is_taking_ = false;
+      auto* const ended = static_cast<Operation*>(tag);
+      ended->under_way = false;
+      ended->ok = ok;
+      ended_.notify_all();
+    }
+    return operation.ok;
+  }
+  bool take(void** tag, Clock::time_point awake_until) {
+    static const bool may_look = std::thread::hardware_concurrency() > 1;  // one is the server's
+    bool ok = false;
+    while (may_look && Clock::now() < awake_until) {
+      if (queue_.AsyncNext(tag, &ok, gpr_time_0(GPR_CLOCK_MONOTONIC)) ==
+          grpc::CompletionQueue::GOT_EVENT)
+        return ok;
+      std::this_thread::yield();
+    }
+    queue_.Next(tag, &ok);
+    return ok;
+  }
+
+  grpc::CompletionQueue queue_;
+  CallContext context_;
+  const std::unique_ptr<grpc::ClientAsyncReaderWriter<Out, In>> messages_;
+  server::Mutex mutex_;
+  server::Condition ended_;
+  Operation write_ TS_GUARDED_BY(mutex_), read_ TS_GUARDED_BY(mutex_),
+      finish_ TS_GUARDED_BY(mutex_);
+  bool is_taking_ TS_GUARDED_BY(mutex_) = false;
+  bool comes_soon_ = false, finished_ = false;  // of who reads
+};
+
+}  // namespace mbcosim::client
