@@ -1,6 +1,7 @@
 #include "client/convert.h"
 
 #include <google/protobuf/util/time_util.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -301,9 +302,13 @@ std::vector<Diagnostic> to_diagnostics(
 }
 
 std::string new_request_id() {
-  std::random_device random;
+  unsigned words[4];
+  if (::getentropy(words, sizeof words) != 0) {
+    std::random_device random;
+    for (unsigned& word : words) word = random();
+  }
   char text[40];
-  std::snprintf(text, sizeof text, "%08x%08x%08x%08x", random(), random(), random(), random());
+  std::snprintf(text, sizeof text, "%08x%08x%08x%08x", words[0], words[1], words[2], words[3]);
   return text;
 }
 

@@ -72,7 +72,7 @@ class StepLines {
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMost = 16;  ///< streams; one for each thread that steps
   static constexpr std::chrono::milliseconds kSoon{50};  ///< within which a step follows in a loop
-  static constexpr std::chrono::seconds kIdle{1};        ///< after which a stream is closed
+  static constexpr std::chrono::milliseconds kIdle{1000};  ///< after which a stream is closed
   struct Line {
     std::unique_ptr<StepLine> line;
     std::string simulation;  ///< that it stepped last

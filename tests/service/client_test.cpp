@@ -553,6 +553,75 @@ TEST(Client, TheTurnOfAnotherStepperIsAwaitedForTheTimeout) {
   EXPECT_EQ(quick.refresh().step, 0);
 }
 
+TEST(Client, QuickStepsAreThoseOfAStream) {
+  Server server = connect();
+  const std::string x = "node.structural.1.X", load = "node.structural.1.load";
+  Simulation simulation = server.load_text(body()), other = server.load_text(body());
+  Stepper stepper = other.stepper({x}, {load});
+  for (int k = 1; k <= 50; ++k) {
+    const std::vector<double> force = {0, 0, 0.1 * k, 0, 0, 0};
+    const StepResult one = simulation.step(1, {.inputs = {{load, force}}, .outputs = {x}});
+    EXPECT_EQ(one.step, k);
+    EXPECT_EQ(one.values, stepper.step(force).values);
+    if (k % 10 == 0) {  // what a stream refuses is told as by a call, and nothing of it is done
+      try {
+        simulation.step(-1);
+        ADD_FAILURE() << "fewer steps than none";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.field(), "steps") << error.what();
+      }
+    }
+  }
+  EXPECT_EQ(simulation.run_until(0.1).step, 100);
+  EXPECT_EQ(simulation.refresh().step, 100);
+}
+
+TEST(Client, ThreadsStepSimulationsOfOneConnection) {
+  constexpr int kThreads = 20, kSteps = 100;  // more than there are streams
+  Server server = connect();
+  std::vector<Simulation> simulations;
+  for (int k = 0; k < kThreads; ++k) simulations.push_back(server.load_text(endless()));
+  std::vector<std::thread> threads;
+  for (Simulation& simulation : simulations)
+    threads.emplace_back([&simulation] {
+      for (int k = 1; k <= kSteps; ++k) EXPECT_EQ(simulation.step().step, k);
+    });
+  for (std::thread& thread : threads) thread.join();
+  for (Simulation& simulation : simulations) EXPECT_EQ(simulation.refresh().step, kSteps);
+}
+
+TEST(Client, QuickStepsDoNotKeepASimulationAlive) {
+  Server server = connect();
+  LoadOptions options;
+  options.lease = 1;
+  Simulation simulation = server.load_text(endless(), options);
+  for (int k = 0; k < 100; ++k) simulation.step();
+  const auto is_there = [&] {
+    const std::vector<SimulationInfo> all = server.list();
+    return std::any_of(all.begin(), all.end(),
+                       [&](const SimulationInfo& info) { return info.name == simulation.name(); });
+  };
+  EXPECT_TRUE(is_there());
+  const auto latest = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (is_there() && std::chrono::steady_clock::now() < latest)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_FALSE(is_there()) << "its lease is over";
+  EXPECT_THROW(simulation.step(), Error);
+}
+
+TEST(ABalancer, LeadsEveryStepToTheDaemonOfItsSimulation) {
+  if (!std::getenv("MBCOSIM_BALANCED")) GTEST_SKIP() << "only with several daemons";
+  Server server = connect();
+  std::vector<Simulation> simulations;
+  for (int k = 0; k < 6; ++k) simulations.push_back(server.load_text(endless()));
+  for (int k = 1; k <= 100; ++k)
+    for (Simulation& simulation : simulations) EXPECT_EQ(simulation.step().step, k);
+  std::vector<Stepper> steppers;
+  for (Simulation& simulation : simulations) steppers.push_back(simulation.stepper());
+  for (int k = 101; k <= 120; ++k)
+    for (Stepper& stepper : steppers) EXPECT_EQ(stepper.step().step, k);
+}
+
 TEST(Client, OptionsOfTheSimulation) {
   Server server = connect();
   LoadOptions options;

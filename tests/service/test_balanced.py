@@ -10,7 +10,7 @@ import threading
 import pytest
 
 import mbcosim
-from conftest import TIME_FACTOR, Daemon, wait_for
+from conftest import BIN, TIME_FACTOR, Daemon, wait_for
 from mbcosim.v1 import simulations_pb2 as pb
 from test_durable import bits, deck
 
@@ -124,3 +124,9 @@ def test_new_simulations_keep_away_from_a_daemon_that_drains(cluster):
         wait_for(lambda: all(daemon_of(server.load_text(deck(), durability="none")) != "a" for _ in range(6)), 10)
         assert staying.step(10).step == 10
         assert cluster.daemons["a"].alive()
+
+
+def test_quick_steps_of_the_cpp_client_find_their_daemons(cluster, tmp_path):
+    run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1", "--gtest_filter=ABalancer.*"], timeout=100 * TIME_FACTOR, text=True, cwd=tmp_path,
+                         env={**os.environ, "MBCOSIM_ADDRESS": f"127.0.0.1:{cluster.port}", "MBCOSIM_BALANCED": "1"}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert run.returncode == 0 and "1 test from" in run.stdout and "SKIPPED" not in run.stdout, run.stdout
