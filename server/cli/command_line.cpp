@@ -31,7 +31,7 @@ void add_reduce(CLI::App& app, mbcosim::cli::ReduceCommand& command, int& exit_c
   reduce_app
       ->add_option("--threads", command.threads,
                    "Threads of the factorizations; results are the same for every number; default: "
-                   "all of the machine")
+                   "all cores that the process may use")
       ->check(CLI::Range(1, mbcosim::cli::kMostThreads));
   for (const mbcosim::ReductionOptionHelp& option : mbcosim::reduction_option_help())
     reduce_app->add_option_function<std::string>(
@@ -274,7 +274,8 @@ int mbcosim::cli::command_line(int argc, char** argv) {
       ->add_option(
           "--threads", run_options.threads,
           "Threads that work on a large model, one for each 3000 unknowns at most; results "
-          "do not depend on it; default: all of the machine")
+          "do not depend on it; default: all cores that the process "
+          "may use")
       ->check(CLI::Range(1, mbcosim::cli::kMostThreads));
   run_app->callback([&] { exit_code = run(run_options); });
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -23,11 +22,6 @@ enum ExitCode {
 };
 
 constexpr int kMostThreads = 1024;
-
-/// 0: as many as the machine has.
-inline int threads_or_all(int wanted) {
-  return wanted > 0 ? wanted : static_cast<int>(std::thread::hardware_concurrency());
-}
 
 struct RunOptions {
   std::string deck;  ///< path of the main file

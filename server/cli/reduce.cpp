@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/fem_file.h"
 #include "cli/heap.h"
+#include "host/control_group.h"
 #include "input/sources.h"
 #include "reduction/job.h"
 #include "threads/interrupt.h"
@@ -81,7 +82,7 @@ int reduce_model(const ReduceCommand& command) {
   Error error;
   try {
     ReductionJob job = read_command(command);
-    job.options.threads = threads_or_all(command.threads);
+    job.options.threads = command.threads > 0 ? command.threads : server::usable_cores();
     const std::string folder = fs::path(command.job).parent_path().string();
     const FeModel model = load_model(job, [&](const std::string& name) {
       return read_file(folder.empty() ? "." : folder, name);

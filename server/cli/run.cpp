@@ -7,10 +7,12 @@
 #include "cli/heap.h"
 #include "cli/pace.h"
 #include "cli/progress.h"
+#include "host/control_group.h"
 #include "input/sources.h"
 #include "mbdyn/channels.h"
 #include "output/dof_text.h"
 #include "output/result_files.h"
+#include "solver/linear_solver.h"
 #include "threads/interrupt.h"
 
 namespace mbcosim::cli {
@@ -52,10 +54,16 @@ ExitCode complain(const Error& error) {
   return exit_code_of(error);
 }
 
+/// As the options say, or all that are of use to the model.
+int threads_for(const Model& model, const RunOptions& options) {
+  if (options.threads > 0) return options.threads;
+  return model.unknowns < 2 * LinearSolver::kUnknownsPerThread ? 1 : server::usable_cores();
+}
+
 ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& writer,
                   const CancelToken* cancel, const RunOptions& options) {
   const auto simulation = Simulation::prepare(model, writer);
-  simulation->set_threads(threads_or_all(options.threads));
+  simulation->set_threads(threads_for(*model, options));
   if (const auto started = simulation->start(cancel); !started) return complain(started.error());
   if (simulation->finished()) {
     const InitialValueSettings& s = model->initial_value;
@@ -84,7 +92,7 @@ ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWri
                           const InterruptGuard& interrupt, const RunOptions& options) try {
   const CancelToken* cancel = interrupt.token();
   const auto simulation = Simulation::prepare(model, writer);
-  simulation->set_threads(threads_or_all(options.threads));
+  simulation->set_threads(threads_for(*model, options));
   mbdyn::Patience patience;
   patience.time = std::chrono::milliseconds(std::llround(1000 * options.peer_timeout));
   patience.cancelled = [cancel] { return cancel->cancelled(); };

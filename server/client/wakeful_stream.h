@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "client/connection.h"
+#include "host/control_group.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::client {
@@ -27,15 +28,15 @@ class WakefulStream {
   template <class Prepare>
   WakefulStream(const Server::Impl& server, const std::string& simulation, Prepare prepare)
       : context_(server, kEndless, simulation), messages_(prepare(&context_, &queue_)) {
-    messages_->StartCall(begin(write_));
+    messages_->StartCall(begin(kWrite));
   }
   ~WakefulStream() {
     if (!finished_) {
       cancel();
       (void)finish();
     }
-    await(write_);
-    await(read_);
+    await(kWrite);
+    await(kRead);
     queue_.Shutdown();
   }
   WakefulStream(const WakefulStream&) = delete;
@@ -44,26 +45,26 @@ class WakefulStream {
   void cancel() { context_.TryCancel(); }
   /// False: the stream has ended.
   bool write(const Out& message) {
-    if (!await(write_)) return false;
-    messages_->Write(message, begin(write_));
+    if (!await(kWrite)) return false;
+    messages_->Write(message, begin(kWrite));
     return true;
   }
   void end_writing() {
-    if (await(write_)) messages_->WritesDone(begin(write_));
+    if (await(kWrite)) messages_->WritesDone(begin(kWrite));
   }
   /// False: the stream has ended.
   bool read(In* message) {
     const Clock::time_point start = Clock::now();
-    messages_->Read(message, begin(read_));
-    const bool ok = await(read_, comes_soon_ ? start + kSoon : start);
+    messages_->Read(message, begin(kRead));
+    const bool ok = await(kRead, comes_soon_ ? start + kSoon : start);
     comes_soon_ = Clock::now() - start < kSoon;
     return ok;
   }
   /// Once.
   grpc::Status finish() {
     grpc::Status status;
-    messages_->Finish(&status, begin(finish_));
-    await(finish_);
+    messages_->Finish(&status, begin(kFinish));
+    await(kFinish);
     finished_ = true;
     return status;
   }
@@ -71,19 +72,21 @@ class WakefulStream {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Operation {
+  enum Operation { kWrite, kRead, kFinish, kOperations };
+  struct State {
     bool under_way = false, ok = true;
   };
 
-  void* begin(Operation& operation) TS_EXCLUDES(mutex_) {
+  /// The tag of what is begun.
+  void* begin(Operation operation) TS_EXCLUDES(mutex_) {
     const server::Guard guard(mutex_);
-    operation.under_way = true;
-    return &operation;
+    states_[operation].under_way = true;
+    return &tags_[operation];
   }
   /// False: it has failed. One of the threads that wait takes from the queue for all.
-  bool await(const Operation& operation, Clock::time_point awake_until = {}) TS_EXCLUDES(mutex_) {
+  bool await(Operation operation, Clock::time_point awake_until = {}) TS_EXCLUDES(mutex_) {
     server::Guard guard(mutex_);
-    while (operation.under_way) {
+    while (states_[operation].under_way) {
       if (is_taking_) {
         ended_.wait(mutex_);
         continue;
@@ -94,15 +97,13 @@ class WakefulStream {
       const bool ok = take(&tag, awake_until);
       guard.lock();
       is_taking_ = false;
-      auto* const ended = static_cast<Operation*>(tag);
-      ended->under_way = false;
-      ended->ok = ok;
+      states_[static_cast<char*>(tag) - tags_] = {false, ok};
       ended_.notify_all();
     }
-    return operation.ok;
+    return states_[operation].ok;
   }
   bool take(void** tag, Clock::time_point awake_until) {
-    static const bool may_look = std::thread::hardware_concurrency() > 1;  // one is the server's
+    static const bool may_look = server::usable_cores() > 1;  // one is the server's
     bool ok = false;
     while (may_look && Clock::now() < awake_until) {
       if (queue_.AsyncNext(tag, &ok, gpr_time_0(GPR_CLOCK_MONOTONIC)) ==
@@ -119,8 +120,8 @@ class WakefulStream {
   const std::unique_ptr<grpc::ClientAsyncReaderWriter<Out, In>> messages_;
   server::Mutex mutex_;
   server::Condition ended_;
-  Operation write_ TS_GUARDED_BY(mutex_), read_ TS_GUARDED_BY(mutex_),
-      finish_ TS_GUARDED_BY(mutex_);
+  State states_[kOperations] TS_GUARDED_BY(mutex_);
+  char tags_[kOperations] = {};  ///< their addresses are the tags
   bool is_taking_ TS_GUARDED_BY(mutex_) = false;
   bool comes_soon_ = false, finished_ = false;  // of who reads
 };

@@ -6,6 +6,7 @@
 #include <exception>
 #include <thread>
 
+#include "host/control_group.h"
 #include "wire/convert.h"
 #include "wire/refusal.h"
 
@@ -16,7 +17,7 @@ constexpr auto kLook = std::chrono::milliseconds(10);  // how soon a cancelled s
 /// Looks before sleeping: quick peers answer within them. The peer and the thread that gets its
 /// message are at work meanwhile, each on a core.
 int looks() {
-  static const int count = std::thread::hardware_concurrency() > 2 ? 200 : 0;
+  static const int count = usable_cores() > 2 ? 200 : 0;
   return count;
 }
 

@@ -22,6 +22,7 @@
 
 #include "daemon/tls.h"
 #include "grpc/health/v1/health.grpc.pb.h"
+#include "host/control_group.h"
 #include "rpc/reflection.h"
 #include "service/coupling_service.h"
 #include "service/events_service.h"
@@ -95,9 +96,7 @@ void bound_messages(grpc::ServerBuilder& builder, const ServiceLimits& limits) {
   builder.SetResourceQuota(quota);
 }
 
-int worker_count(int wanted) {
-  return wanted > 0 ? wanted : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-}
+int worker_count(int wanted) { return wanted > 0 ? wanted : usable_cores(); }
 
 /// As many as a busy server needs: half of the cores leave the others to what is computed.
 int most_pollers() {

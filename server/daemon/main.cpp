@@ -16,6 +16,7 @@
 #include "daemon/logging.h"
 #include "daemon/options.h"
 #include "daemon/service_manager.h"
+#include "host/control_group.h"
 
 namespace {
 
@@ -64,7 +65,7 @@ int main(int argc, char** argv) {
 
   // glibc's eight arenas a core keep what was freed in each: a daemon whose simulations come and go
   // would take a multiple of what it uses.
-  mallopt(M_ARENA_MAX, static_cast<int>(std::max(2u, std::thread::hardware_concurrency())));
+  mallopt(M_ARENA_MAX, std::max(2, mbcosim::server::usable_cores()));
 
   // Debian's absl is built with assertions: it would put each lock of gRPC into a graph of all
   // locks, under one more lock that all threads share.

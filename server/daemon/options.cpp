@@ -208,7 +208,8 @@ Invocation read_options(int argc, char** argv) {
                  "Folder in which decks may open the Unix sockets that they name, for simulations "
                  "that ask for it")
       ->check(CLI::ExistingDirectory);
-  app.add_option("--workers", config.workers, "Simulations that step at once; 0: one per core")
+  app.add_option("--workers", config.workers,
+                 "Simulations that step at once; 0: one per core that the process may use")
       ->capture_default_str()
       ->check(CLI::Range(0, 4096));
   app.add_option(

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "host/control_group.h"
 #include "threads/top_frame.h"
 
 namespace mbcosim::server {
@@ -98,7 +99,7 @@ Pollers::Status Pollers::look_until(Clock::time_point end, void** tag, bool* ok)
 }
 
 Pollers::Work::Work() {
-  static const bool may_look = std::thread::hardware_concurrency() > 1;  // one is the client's
+  static const bool may_look = usable_cores() > 1;  // one is the client's
   last_work.another_soon = may_look && Clock::now() - last_work.end < kSoon;
 }
 

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <thread>
 
+#include "host/control_group.h"
+
 namespace mbcosim::shm {
 namespace {
 
@@ -18,7 +20,7 @@ int ring_of(Channel::Side side, bool outgoing) {
 
 /// On one core whoever spins keeps the other from answering.
 Clock::duration spin_time() {
-  return std::thread::hardware_concurrency() > 1 ? Clock::duration(kSpin) : Clock::duration::zero();
+  return server::usable_cores() > 1 ? Clock::duration(kSpin) : Clock::duration::zero();
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <new>
 
-#include "wire/control_group.h"
+#include "host/control_group.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {

@@ -1,4 +1,5 @@
 #include "wire/memory.h"
+#include "host/control_group.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +8,9 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
-#include "wire/control_group.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server::memory_test {
@@ -115,6 +116,7 @@ class ControlGroups : public testing::Test {
     std::ofstream(root_ / path) << text << '\n';
   }
   std::int64_t limit() const { return control_group_memory(root_.string()); }
+  double processors() const { return control_group_processors(root_.string()); }
   static constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::max();
 
  private:
@@ -154,6 +156,35 @@ TEST_F(ControlGroups, OfTheOlderVersionTheGroupOfMemoryHolds) {
   write("sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712");
   write("sys/fs/cgroup/memory/service/one/memory.limit_in_bytes", "5000000000");
   EXPECT_EQ(limit(), 5000000000);
+}
+
+TEST_F(ControlGroups, WithoutAnyAllProcessorsAreUsable) {
+  write("proc/self/cgroup", "0::/");
+  EXPECT_EQ(processors(), std::numeric_limits<double>::infinity());
+  EXPECT_GE(usable_cores(), 1);
+  EXPECT_LE(usable_cores(), static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+TEST_F(ControlGroups, OfAServiceTheSmallestShareOfProcessorsHolds) {
+  write("proc/self/cgroup", "0::/system.slice/mbcosimd.service");
+  write("sys/fs/cgroup/system.slice/mbcosimd.service/cpu.max", "max 100000");
+  EXPECT_EQ(processors(), std::numeric_limits<double>::infinity());
+  write("sys/fs/cgroup/system.slice/cpu.max", "400000 100000");
+  EXPECT_EQ(processors(), 4);
+  write("sys/fs/cgroup/system.slice/mbcosimd.service/cpu.max", "75000 50000");
+  EXPECT_EQ(processors(), 1.5);
+}
+
+TEST_F(ControlGroups, OfTheOlderVersionTheGroupOfProcessorsHolds) {
+  write("proc/self/cgroup", "9:cpu,cpuacct:/service/one\n4:memory:/wrong\n0::/unified");
+  write("sys/fs/cgroup/cpu/cpu.cfs_quota_us", "-1");
+  write("sys/fs/cgroup/cpu/cpu.cfs_period_us", "100000");
+  write("sys/fs/cgroup/cpu/wrong/cpu.cfs_quota_us", "1000");
+  write("sys/fs/cgroup/cpu/wrong/cpu.cfs_period_us", "100000");
+  EXPECT_EQ(processors(), std::numeric_limits<double>::infinity());
+  write("sys/fs/cgroup/cpu/service/one/cpu.cfs_quota_us", "250000");
+  write("sys/fs/cgroup/cpu/service/one/cpu.cfs_period_us", "100000");
+  EXPECT_EQ(processors(), 2.5);
 }
 
 }  // namespace
