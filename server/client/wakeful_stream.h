@@ -10,20 +10,16 @@
 #include <thread>
 
 #include "client/connection.h"
-#include "host/control_group.h"
+#include "threads/alertness.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::client {
 
 /// A call that streams `Out` to the server and `In` back. Who reads stays awake for a message that
-/// is likely to come soon, because the last one did: waking would take as long. One thread reads,
-/// one at a time writes, any cancels.
+/// is likely to come soon. One thread reads, one at a time writes, any cancels.
 template <class Out, class In>
 class WakefulStream {
  public:
-  /// A message that comes as soon after it was asked for is awaited without sleep.
-  static constexpr std::chrono::microseconds kSoon{150};
-
   /// `prepare(context, queue)` makes the call, which is about `simulation`.
   template <class Prepare>
   WakefulStream(const Server::Impl& server, const std::string& simulation, Prepare prepare)
@@ -54,10 +50,9 @@ class WakefulStream {
   }
   /// False: the stream has ended.
   bool read(In* message) {
-    const Clock::time_point start = Clock::now();
     messages_->Read(message, begin(kRead));
-    const bool ok = await(kRead, comes_soon_ ? start + kSoon : start);
-    comes_soon_ = Clock::now() - start < kSoon;
+    const bool ok = await(kRead, alertness_.begin(Clock::now()));
+    alertness_.end(Clock::now());
     return ok;
   }
   /// Once.
@@ -103,9 +98,8 @@ class WakefulStream {
     return states_[operation].ok;
   }
   bool take(void** tag, Clock::time_point awake_until) {
-    static const bool may_look = server::usable_cores() > 1;  // one is the server's
     bool ok = false;
-    while (may_look && Clock::now() < awake_until) {
+    while (Clock::now() < awake_until) {
       if (queue_.AsyncNext(tag, &ok, gpr_time_0(GPR_CLOCK_MONOTONIC)) ==
           grpc::CompletionQueue::GOT_EVENT)
         return ok;
@@ -123,7 +117,8 @@ class WakefulStream {
   State states_[kOperations] TS_GUARDED_BY(mutex_);
   char tags_[kOperations] = {};  ///< their addresses are the tags
   bool is_taking_ TS_GUARDED_BY(mutex_) = false;
-  bool comes_soon_ = false, finished_ = false;  // of who reads
+  server::Alertness alertness_;  // of who reads
+  bool finished_ = false;
 };
 
 }  // namespace mbcosim::client

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "host/control_group.h"
+#include "threads/alertness.h"
 #include "threads/top_frame.h"
 
 namespace mbcosim::server {
@@ -18,11 +18,11 @@ constexpr double kOften = 0.8;         // part of the looks
 constexpr int kRestAfter = 40;         // looks without an event
 constexpr const char* kName = "poll";  // of the threads
 
-/// The last work of this thread.
+/// For the next work of this thread.
 thread_local struct {
-  std::chrono::steady_clock::time_point end;
-  bool another_soon = false;
-} last_work;
+  Alertness alertness;
+  std::chrono::steady_clock::time_point awake_until;
+} next_work;
 
 /// Of the processor, for a thread; none when it has ended.
 std::chrono::nanoseconds time_of(pthread_t thread) {
@@ -83,7 +83,7 @@ void Pollers::poll(int place) {
 
 Pollers::Status Pollers::next(int place, void** tag, bool* ok) {
   Status status = Status::TIMEOUT;
-  if (place == 0 && last_work.another_soon) status = look_until(last_work.end + kSoon, tag, ok);
+  if (place == 0) status = look_until(next_work.awake_until, tag, ok);
   if (status != Status::TIMEOUT) return status;
   return queue_->Next(tag, ok) ? Status::GOT_EVENT : Status::SHUTDOWN;
 }
@@ -98,12 +98,9 @@ Pollers::Status Pollers::look_until(Clock::time_point end, void** tag, bool* ok)
   return Status::TIMEOUT;
 }
 
-Pollers::Work::Work() {
-  static const bool may_look = usable_cores() > 1;  // one is the client's
-  last_work.another_soon = may_look && Clock::now() - last_work.end < kSoon;
-}
+Pollers::Work::Work() { next_work.alertness.end(Clock::now()); }
 
-Pollers::Work::~Work() { last_work.end = Clock::now(); }
+Pollers::Work::~Work() { next_work.awake_until = next_work.alertness.begin(Clock::now()); }
 
 void Pollers::wait_for_admission(int place) {
   if (place == 0) return;  // always is; this comes with each event

@@ -33,9 +33,8 @@ class Pollers {
   };
   static constexpr std::chrono::milliseconds kLook{5};
 
-  /// What a poller does itself for a client or a step that waits for it, while it lives. When such
-  /// work follows the last one as soon as `kSoon`, the next is likely to, too: until then the
-  /// thread looks for it without going to sleep, as waking would take as long.
+  /// What a poller does itself for a client or a step that waits for it, while it lives. The thread
+  /// looks for the next such work without going to sleep when it is likely to come soon.
   class Work {
    public:
     Work();
@@ -43,8 +42,6 @@ class Pollers {
     Work(const Work&) = delete;
     Work& operator=(const Work&) = delete;
   };
-  static constexpr std::chrono::microseconds kSoon{150};
-
   static constexpr std::chrono::milliseconds kRestLook{200};  ///< when there has been nothing
 
   /// Threads beside those that a load may have, for when they are held up.

@@ -34,7 +34,7 @@ ARROWS = {
     "server/cli": {"threads", "host", "mbdyn", "math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/wire": {"math", "model", "solver", "simulation", "mbcosim", "host"},
     "server/host": set(),
-    "server/threads": {"solver"},
+    "server/threads": {"solver", "host"},
     "server/rpc": {"solver", "wire", "threads", "mbcosim", "grpc", "host"},
     "server/coupling": {"math", "model", "simulation", "threads", "wire", "mbcosim", "host"},
     "server/files": set(),

@@ -1,0 +1,62 @@
+/// Who stays awake for what comes soon, and who does not.
+#include "threads/alertness.h"
+
+#include <gtest/gtest.h>
+
+namespace mbcosim::server::alertness_test {
+namespace {
+
+using std::chrono::microseconds;
+
+/// Waits that take as long as they are told.
+class AlertnessOfAThread : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (usable_cores() == 1) GTEST_SKIP() << "the other side needs the core";
+  }
+  /// Was the thread awake for it?
+  bool wait(microseconds length) {
+    const Alertness::Clock::time_point until = alertness_.begin(now_);
+    const bool awake = until > now_;
+    EXPECT_EQ(until - now_,
+              awake ? Alertness::Clock::duration(Alertness::kSoon) : Alertness::Clock::duration{});
+    now_ += length;
+    alertness_.end(now_);
+    now_ += microseconds(5);
+    return awake;
+  }
+  int awake_of(int waits, microseconds length) {
+    int awake = 0;
+    for (int k = 0; k < waits; ++k) awake += wait(length) ? 1 : 0;
+    return awake;
+  }
+
+ private:
+  Alertness alertness_;
+  Alertness::Clock::time_point now_{std::chrono::hours(1)};
+};
+
+TEST_F(AlertnessOfAThread, ComesWithWhatComesSoon) {
+  EXPECT_FALSE(wait(microseconds(50))) << "nothing is known yet";
+  EXPECT_EQ(awake_of(1000, microseconds(50)), 1000);
+  EXPECT_TRUE(wait(microseconds(900)));
+  EXPECT_FALSE(wait(microseconds(50))) << "the last one took long";
+  EXPECT_TRUE(wait(microseconds(50)));
+}
+
+TEST_F(AlertnessOfAThread, IsNotForWhatComesSeldom) {
+  EXPECT_EQ(awake_of(1000, microseconds(500)), 0);
+}
+
+TEST_F(AlertnessOfAThread, RestsWhereItIsOfNoUse) {
+  const microseconds own_work(300);  // of the other side: soon enough to try, too long to be awake
+  wait(own_work);
+  const int awake = awake_of(1000, own_work);
+  EXPECT_GE(awake, 50) << "it tries again";
+  EXPECT_LE(awake, 200);
+  awake_of(100, microseconds(50));  // from now on it is
+  EXPECT_EQ(awake_of(100, microseconds(50)), 100);
+}
+
+}  // namespace
+}  // namespace mbcosim::server::alertness_test
