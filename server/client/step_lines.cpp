@@ -1,6 +1,7 @@
 #include "client/step_lines.h"
 
 #include <algorithm>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -16,7 +17,12 @@ StepLine::StepLine(const Server::Impl& server, const std::string& simulation) : 
 
 StepLine::~StepLine() {
   if (stream_->finished()) return;
-  const Deadline deadline(kParting, [this] { stream_->cancel(); });
+  std::optional<Deadline> deadline;
+  try {
+    if (!abandoned_) deadline.emplace(kParting, [this] { stream_->cancel(); });
+  } catch (const std::system_error&) {  // no thread to be had
+    stream_->cancel();
+  }
   stream_->end_writing();
   (void)stream_->finish();
 }

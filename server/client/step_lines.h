@@ -25,7 +25,10 @@ class StepLine {
   void exchange(const v1::StepRequest& request, v1::StepStreamReply* reply, double timeout)
       TS_EXCLUDES(mutex_);
   /// Its end waits for nothing.
-  void abandon() { stream_->cancel(); }
+  void abandon() {
+    abandoned_ = true;
+    stream_->cancel();
+  }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -47,6 +50,7 @@ class StepLine {
 
   const Server::Impl& server_;
   std::unique_ptr<Stream> stream_;  // of who has the turn
+  bool abandoned_ = false;
   server::Mutex mutex_;
   server::Condition given_back_;
   bool taken_ TS_GUARDED_BY(mutex_) = false;

@@ -593,7 +593,7 @@ TEST(Client, ThreadsStepSimulationsOfOneConnection) {
 TEST(Client, QuickStepsDoNotKeepASimulationAlive) {
   Server server = connect();
   LoadOptions options;
-  options.lease = 1;
+  options.lease = time_factor();
   Simulation simulation = server.load_text(endless(), options);
   for (int k = 0; k < 100; ++k) simulation.step();
   const auto is_there = [&] {
@@ -602,7 +602,7 @@ TEST(Client, QuickStepsDoNotKeepASimulationAlive) {
                        [&](const SimulationInfo& info) { return info.name == simulation.name(); });
   };
   EXPECT_TRUE(is_there());
-  const auto latest = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  const auto latest = std::chrono::steady_clock::now() + stretched(60);
   while (is_there() && std::chrono::steady_clock::now() < latest)
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   EXPECT_FALSE(is_there()) << "its lease is over";

@@ -98,12 +98,12 @@ def test_a_stream_ends_with_the_name_of_an_unknown_simulation(server):
 
 def test_a_stream_holds_the_simulation_that_it_stepped_last(server):
     """The lease of the one before runs out."""
-    first, second = (server.load_text(decks.body(), lease=1.0) for _ in range(2))
+    first, second = (server.load_text(decks.body(), lease=1.0 * TIME_FACTOR) for _ in range(2))
     with first.stepper() as stepper, second.stepper(beside=stepper) as other:
         stepper.step()
         other.step()
         wait_for(lambda: first.name not in {info.name for info in server.list()}, 20)
-        time.sleep(1.0)
+        time.sleep(1.0 * TIME_FACTOR)
         assert other.step().step == 2
         with pytest.raises(mbcosim.NotFound):
             stepper.step()
