@@ -235,7 +235,7 @@ class Attacker:
         def work(seed):
             rng = random.Random(seed)
             while self.going():
-                what = rng.randrange(7)
+                what = rng.randrange(8)
                 name = rng.choice(names) if names else None
                 if what == 0 or not name:
                     made = self.create(lease=Duration(seconds=2))
@@ -254,6 +254,9 @@ class Attacker:
                     if saved:
                         snapshots.append((name, saved.snapshot.name))
                         del snapshots[:-10]
+                elif what == 7:  # one stream, many simulations, of which some go meanwhile
+                    chosen = [pb.StepRequest(simulation=rng.choice([*names, "", "simulations/none"]), steps=rng.choice([0, 1, 1, 50])) for _ in range(30)]
+                    self.call(lambda steps, **options: list(self.stub.StepStream(iter(steps), **options)), chosen)
                 elif what == 4 and snapshots:
                     chosen = rng.choice(snapshots)
                     self.call(self.stub.RestoreSnapshot, pb.RestoreSnapshotRequest(simulation=chosen[0], snapshot=chosen[1]))
