@@ -7,7 +7,6 @@
 #include <chrono>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "client/connection.h"
 #include "threads/alertness.h"
@@ -51,7 +50,8 @@ class WakefulStream {
   /// False: the stream has ended.
   bool read(In* message) {
     messages_->Read(message, begin(kRead));
-    const bool ok = await(kRead, alertness_.begin(Clock::now()));
+    alertness_.begin(Clock::now());
+    const bool ok = await(kRead, &alertness_);
     alertness_.end(Clock::now());
     return ok;
   }
@@ -79,7 +79,7 @@ class WakefulStream {
     return &tags_[operation];
   }
   /// False: it has failed. One of the threads that wait takes from the queue for all.
-  bool await(Operation operation, Clock::time_point awake_until = {}) TS_EXCLUDES(mutex_) {
+  bool await(Operation operation, server::Alertness* alertness = nullptr) TS_EXCLUDES(mutex_) {
     server::Guard guard(mutex_);
     while (states_[operation].under_way) {
       if (is_taking_) {
@@ -89,7 +89,7 @@ class WakefulStream {
       is_taking_ = true;
       guard.unlock();
       void* tag = nullptr;
-      const bool ok = take(&tag, awake_until);
+      const bool ok = take(&tag, alertness);
       guard.lock();
       is_taking_ = false;
       states_[static_cast<char*>(tag) - tags_] = {false, ok};
@@ -97,13 +97,13 @@ class WakefulStream {
     }
     return states_[operation].ok;
   }
-  bool take(void** tag, Clock::time_point awake_until) {
+  bool take(void** tag, server::Alertness* alertness) {
     bool ok = false;
-    while (Clock::now() < awake_until) {
+    while (alertness && alertness->stays(Clock::now())) {
       if (queue_.AsyncNext(tag, &ok, gpr_time_0(GPR_CLOCK_MONOTONIC)) ==
           grpc::CompletionQueue::GOT_EVENT)
         return ok;
-      std::this_thread::yield();
+      alertness->yield();
     }
     queue_.Next(tag, &ok);
     return ok;

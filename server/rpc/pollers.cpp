@@ -18,11 +18,7 @@ constexpr double kOften = 0.8;         // part of the looks
 constexpr int kRestAfter = 40;         // looks without an event
 constexpr const char* kName = "poll";  // of the threads
 
-/// For the next work of this thread.
-thread_local struct {
-  Alertness alertness;
-  std::chrono::steady_clock::time_point awake_until;
-} next_work;
+thread_local Alertness for_work;  ///< of this thread, for its next work
 
 /// Of the processor, for a thread; none when it has ended.
 std::chrono::nanoseconds time_of(pthread_t thread) {
@@ -83,24 +79,24 @@ void Pollers::poll(int place) {
 
 Pollers::Status Pollers::next(int place, void** tag, bool* ok) {
   Status status = Status::TIMEOUT;
-  if (place == 0) status = look_until(next_work.awake_until, tag, ok);
+  if (place == 0) status = look_for_work(tag, ok);
   if (status != Status::TIMEOUT) return status;
   return queue_->Next(tag, ok) ? Status::GOT_EVENT : Status::SHUTDOWN;
 }
 
 // Other threads that want the core get it.
-Pollers::Status Pollers::look_until(Clock::time_point end, void** tag, bool* ok) {
-  while (Clock::now() < end) {
+Pollers::Status Pollers::look_for_work(void** tag, bool* ok) {
+  while (for_work.stays(Clock::now())) {
     const Status status = queue_->AsyncNext(tag, ok, gpr_time_0(GPR_CLOCK_MONOTONIC));
     if (status != Status::TIMEOUT) return status;
-    std::this_thread::yield();
+    for_work.yield();
   }
   return Status::TIMEOUT;
 }
 
-Pollers::Work::Work() { next_work.alertness.end(Clock::now()); }
+Pollers::Work::Work() { for_work.end(Clock::now()); }
 
-Pollers::Work::~Work() { next_work.awake_until = next_work.alertness.begin(Clock::now()); }
+Pollers::Work::~Work() { for_work.begin(Clock::now()); }
 
 void Pollers::wait_for_admission(int place) {
   if (place == 0) return;  // always is; this comes with each event

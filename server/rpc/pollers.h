@@ -64,7 +64,7 @@ class Pollers {
   using Status = grpc::CompletionQueue::NextStatus;
   void poll(int place);
   Status next(int place, void** tag, bool* ok);
-  Status look_until(Clock::time_point end, void** tag, bool* ok);
+  Status look_for_work(void** tag, bool* ok);
   void wait_for_admission(int place) TS_EXCLUDES(mutex_);
   void watch() TS_EXCLUDES(mutex_);
   void look() TS_REQUIRES(mutex_);

@@ -15,11 +15,12 @@ class AlertnessOfAThread : public testing::Test {
     if (usable_cores() == 1) GTEST_SKIP() << "the other side needs the core";
   }
   /// Was the thread awake for it?
-  bool wait(microseconds length) {
-    const Alertness::Clock::time_point until = alertness_.begin(now_);
-    const bool awake = until > now_;
-    EXPECT_EQ(until - now_,
-              awake ? Alertness::Clock::duration(Alertness::kSoon) : Alertness::Clock::duration{});
+  /// `absence`: for which others had the core.
+  bool wait(microseconds length, microseconds absence = {}) {
+    alertness_.begin(now_);
+    const bool awake = alertness_.stays(now_);
+    EXPECT_FALSE(alertness_.stays(now_ + Alertness::kSoon));
+    if (awake) alertness_.note_absence(absence);
     now_ += length;
     alertness_.end(now_);
     now_ += microseconds(5);
@@ -46,6 +47,21 @@ TEST_F(AlertnessOfAThread, ComesWithWhatComesSoon) {
 
 TEST_F(AlertnessOfAThread, IsNotForWhatComesSeldom) {
   EXPECT_EQ(awake_of(1000, microseconds(500)), 0);
+}
+
+TEST_F(AlertnessOfAThread, EndsForLongWhereOthersWantTheCore) {
+  awake_of(10, microseconds(50));
+  EXPECT_TRUE(wait(microseconds(50), microseconds(900)));
+  EXPECT_TRUE(wait(microseconds(3050), microseconds(3000)));
+  EXPECT_EQ(awake_of(60, microseconds(50)), 0);
+  EXPECT_GT(awake_of(10, microseconds(50)), 0) << "it tries again";
+  for (int k = 0; k < 4; ++k) {
+    while (!wait(microseconds(50), microseconds(3000))) continue;
+  }
+  EXPECT_EQ(awake_of(4000, microseconds(50)), 0) << "it happens often";
+  EXPECT_GT(awake_of(1000, microseconds(50)), 256);
+  EXPECT_TRUE(wait(microseconds(3050), microseconds(3000)));
+  EXPECT_GT(awake_of(70, microseconds(50)), 0) << "it has not happened for long";
 }
 
 TEST_F(AlertnessOfAThread, RestsWhereItIsOfNoUse) {
