@@ -57,7 +57,7 @@ ExitCode complain(const Error& error) {
 /// As the options say, or all that are of use to the model.
 int threads_for(const Model& model, const RunOptions& options) {
   if (options.threads > 0) return options.threads;
-  return model.unknowns < 2 * LinearSolver::kUnknownsPerThread ? 1 : server::usable_cores();
+  return LinearSolver::threads_of_use(model.unknowns) == 1 ? 1 : server::usable_cores();
 }
 
 ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& writer,

@@ -14,6 +14,7 @@
 /// afterwards, and nothing else has changed.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -46,6 +47,8 @@ class LinearSolver {
   /// Unknowns for each thread of a team: with fewer, threads would wait for each other. Smaller
   /// matrices than of two threads are not ordered for them.
   static constexpr int kUnknownsPerThread = 3000;
+  /// At least 1.
+  static int threads_of_use(int unknowns) { return std::max(1, unknowns / kUnknownsPerThread); }
 
   /// Asked while factoring.
   void set_watch(const Watch& watch) { watch_ = watch; }

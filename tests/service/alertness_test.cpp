@@ -14,8 +14,7 @@ class AlertnessOfAThread : public testing::Test {
   void SetUp() override {
     if (usable_cores() == 1) GTEST_SKIP() << "the other side needs the core";
   }
-  /// Was the thread awake for it?
-  /// `absence`: for which others had the core.
+  /// Was the thread awake for it? `absence`: for which others had the core meanwhile.
   bool wait(microseconds length, microseconds absence = {}) {
     alertness_.begin(now_);
     const bool awake = alertness_.stays(now_);

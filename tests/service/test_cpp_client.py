@@ -17,6 +17,14 @@ def test_the_library(start_daemon, tmp_path):
     assert run.returncode == 0, run.stdout
 
 
+def test_quick_steps_are_calls_where_no_stream_is_left(start_daemon):
+    daemon = start_daemon("--limit-identity-streams", "1")
+    run = subprocess.run([os.path.join(BIN, "client_tests"), "--gtest_brief=1", "--gtest_filter=Client.QuickStepsAre*:Client.ThreadsStep*"],
+                         timeout=100 * TIME_FACTOR, text=True, env={**os.environ, "MBCOSIM_ADDRESS": daemon.address}, stdout=subprocess.PIPE,
+                         stderr=subprocess.STDOUT)
+    assert run.returncode == 0 and "2 tests from" in run.stdout, run.stdout
+
+
 @pytest.mark.parametrize("test", ["EndsEveryCallAtItsTimeout", "IsNoticedInAStepWithoutATimeoutAndByPeersThatWait", "KeepsNoDestructorOfAPeer"])
 def test_a_silent_server_ends_every_call(falls_silent, tmp_path, test):
     address, silence = falls_silent

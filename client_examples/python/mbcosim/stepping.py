@@ -18,6 +18,14 @@ _SOON = 0.05  # seconds within which a step follows the one before in a loop
 _IDLE = 1.0   # seconds after which the stream is closed: an open one would keep the simulation alive
 
 
+def _open_stream(stub: Any, metadata: Any) -> tuple[queue.SimpleQueue[Optional[pb.StepRequest]], Any]:
+    """The requests, of which None ends the stream, and the replies."""
+    requests: queue.SimpleQueue[Optional[pb.StepRequest]] = queue.SimpleQueue()
+    replies = stub.StepStream(iter(requests.get, None), metadata=metadata)
+    end_with(replies, requests)
+    return requests, replies
+
+
 class StepLine:
     """The stream is opened when steps follow each other quickly, and closed when they do not. What cannot go on it is a call of its own."""
 
@@ -60,9 +68,7 @@ class StepLine:
     def _open(self) -> Any:
         with self._state:
             if self._replies is None and self._allowed and time.monotonic() - self._last < _SOON:
-                self._requests = queue.SimpleQueue()
-                self._replies = self._stub.StepStream(iter(self._requests.get, None), metadata=self._metadata)
-                end_with(self._replies, self._requests)
+                self._requests, self._replies = _open_stream(self._stub, self._metadata)
                 threading.Thread(target=self._close_when_idle, args=(self._replies,), daemon=True).start()
             return self._replies
 
@@ -139,10 +145,7 @@ class SharedStream:
     def _open(self, simulation: str) -> Any:
         with self._state:
             if self._replies is None:
-                self._requests = queue.SimpleQueue()
-                metadata = self.connection.about(simulation)
-                self._replies = self.connection.stubs.simulations.StepStream(iter(self._requests.get, None), metadata=metadata)
-                end_with(self._replies, self._requests)
+                self._requests, self._replies = _open_stream(self.connection.stubs.simulations, self.connection.about(simulation))
             return self._replies
 
     def _end(self, cancel: bool = False) -> Any:
