@@ -99,13 +99,11 @@ class WakefulStream {
   }
   bool take(void** tag, server::Alertness* alertness) {
     bool ok = false;
-    while (alertness && alertness->stays(Clock::now())) {
-      if (queue_.AsyncNext(tag, &ok, gpr_time_0(GPR_CLOCK_MONOTONIC)) ==
-          grpc::CompletionQueue::GOT_EVENT)
-        return ok;
-      alertness->yield();
-    }
-    queue_.Next(tag, &ok);
+    const bool seen = alertness && alertness->sees([&] {
+      return queue_.AsyncNext(tag, &ok, gpr_time_0(GPR_CLOCK_MONOTONIC)) ==
+             grpc::CompletionQueue::GOT_EVENT;
+    });
+    if (!seen) queue_.Next(tag, &ok);
     return ok;
   }
 

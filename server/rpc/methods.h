@@ -13,6 +13,9 @@
 
 namespace mbcosim::server {
 
+/// Bytes of a message that is taken by the poller and not counted.
+inline constexpr std::size_t kShortMessage = 4096;
+
 /// The bytes in one piece.
 std::string joined(const grpc::ByteBuffer& bytes);
 
@@ -20,9 +23,8 @@ std::string joined(const grpc::ByteBuffer& bytes);
 /// take hundreds of times its bytes. `share` holds what it takes.
 template <class Message>
 void parse(MemoryBudget& memory, grpc::ByteBuffer& bytes, Message* message, MemoryShare* share) {
-  constexpr std::size_t kSmall = 4096;
   bool good = false;
-  if (bytes.Length() <= kSmall) {
+  if (bytes.Length() <= kShortMessage) {
     good = grpc::SerializationTraits<Message>::Deserialize(&bytes, message).ok();
   } else {
     const MemoryShare whole(memory, static_cast<std::int64_t>(bytes.Length()));
@@ -62,14 +64,10 @@ class OneRequest : public Handler {
  public:
   explicit OneRequest(Lane lane) : lane_(lane) {}
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
+    if (message.Length() <= kShortMessage && may_be_quick()) return try_at_once(exchange, message);
     exchange.post(lane_, [this, &exchange, bytes = std::move(message)]() mutable {
-      share_ = MemoryShare(exchange.memory());
-      parse(exchange.memory(), bytes, &request_, &share_);
-      bytes.Clear();
-      CallLabels labels = exchange.labels();
-      if constexpr (requires { request_.request_id(); }) labels.request_id = request_.request_id();
-      const CallScope scope(labels);
-      serve(exchange, request_);
+      take(exchange, bytes);
+      labelled(exchange, [&] { serve(exchange, request_); });
     });
   }
   void on_half_close(Exchange&) override {
@@ -78,10 +76,39 @@ class OneRequest : public Handler {
 
  protected:
   virtual void serve(Exchange& exchange, const Request& request) = 0;
+  /// Is `serve_at_once` worth a try?
+  virtual bool may_be_quick() const { return false; }
+  /// The same as `serve` on a poller's thread, when it takes but a moment and waits for nobody.
+  /// False: it might not, and nothing has been done.
+  virtual bool serve_at_once(Exchange&, const Request&) { return false; }
   Lane lane() const { return lane_; }
   MemoryShare& share() { return share_; }
 
  private:
+  // Another thread would take as long to wake as quick work does.
+  void try_at_once(Exchange& exchange, grpc::ByteBuffer& message) {
+    exchange.do_at_once([&] {
+      take(exchange, message);
+      bool done = false;
+      labelled(exchange, [&] { done = serve_at_once(exchange, request_); });
+      if (done) return;
+      exchange.post(lane_,
+                    [this, &exchange] { labelled(exchange, [&] { serve(exchange, request_); }); });
+    });
+  }
+  void take(Exchange& exchange, grpc::ByteBuffer& message) {
+    share_ = MemoryShare(exchange.memory());
+    parse(exchange.memory(), message, &request_, &share_);
+    message.Clear();
+  }
+  template <class Work>
+  void labelled(const Exchange& exchange, Work work) const {
+    CallLabels labels = exchange.labels();
+    if constexpr (requires { request_.request_id(); }) labels.request_id = request_.request_id();
+    const CallScope scope(labels);
+    work();
+  }
+
   const Lane lane_;
   MemoryShare share_;  ///< of the request, and of what is made for it
   Request request_;
@@ -92,7 +119,10 @@ template <class Request, class Reply>
 class Unary final : public OneRequest<Request> {
  public:
   using Body = std::function<void(const CallFrame&, const Request&, Reply*)>;
-  Unary(Lane lane, Body body) : OneRequest<Request>(lane), body_(std::move(body)) {}
+  /// See `serve_at_once`; may be null.
+  using AtOnce = std::function<bool(const CallFrame&, const Request&, Reply*)>;
+  Unary(Lane lane, Body body, AtOnce at_once)
+      : OneRequest<Request>(lane), body_(std::move(body)), at_once_(std::move(at_once)) {}
 
  private:
   void serve(Exchange& exchange, const Request& request) override {
@@ -100,15 +130,26 @@ class Unary final : public OneRequest<Request> {
     body_(frame_of(exchange, this->share()), request, &reply);
     exchange.end(serialized(reply));
   }
+  bool may_be_quick() const override { return at_once_ != nullptr; }
+  bool serve_at_once(Exchange& exchange, const Request& request) override {
+    Reply reply;
+    if (!at_once_(frame_of(exchange, this->share()), request, &reply)) return false;
+    exchange.end(serialized(reply));
+    return true;
+  }
   const Body body_;
+  const AtOnce at_once_;
 };
+
+/// What the source of a series has: nothing more, a message, or the one after which there is none.
+enum class Next { nothing, message, last };
 
 /// One message in, a series out: the next is made when the client has taken the last.
 template <class Request, class Reply>
 class Series final : public OneRequest<Request> {
  public:
-  /// Fills the next message; false: there is none.
-  using Source = std::function<bool(Reply*)>;
+  /// Fills the next message, if there is one.
+  using Source = std::function<Next(Reply*)>;
   using Body = std::function<Source(const CallFrame&, const Request&)>;
   Series(Lane lane, Body body) : OneRequest<Request>(lane), body_(std::move(body)) {}
 
@@ -122,10 +163,14 @@ class Series final : public OneRequest<Request> {
   }
   void go_on(Exchange& exchange) {
     Reply reply;
-    if (source_(&reply))
-      exchange.write(serialized(reply));
-    else
-      exchange.finish(grpc::Status::OK);
+    switch (source_(&reply)) {
+      case Next::nothing:
+        return exchange.finish(grpc::Status::OK);
+      case Next::message:
+        return exchange.write(serialized(reply));
+      case Next::last:
+        return exchange.end(serialized(reply));
+    }
   }
   const Body body_;
   Source source_;
@@ -155,9 +200,10 @@ class Upload : public Handler {
 };
 
 template <class Request, class Reply>
-Method unary(Role role, Lane lane, typename Unary<Request, Reply>::Body body) {
+Method unary(Role role, Lane lane, typename Unary<Request, Reply>::Body body,
+             typename Unary<Request, Reply>::AtOnce at_once = {}) {
   return {role, false, Counted::call,
-          [lane, body] { return std::make_unique<Unary<Request, Reply>>(lane, body); }};
+          [=] { return std::make_unique<Unary<Request, Reply>>(lane, body, at_once); }};
 }
 
 template <class Request, class Reply>

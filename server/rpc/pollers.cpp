@@ -86,12 +86,12 @@ Pollers::Status Pollers::next(int place, void** tag, bool* ok) {
 
 // Other threads that want the core get it.
 Pollers::Status Pollers::look_for_work(void** tag, bool* ok) {
-  while (for_work.stays(Clock::now())) {
-    const Status status = queue_->AsyncNext(tag, ok, gpr_time_0(GPR_CLOCK_MONOTONIC));
-    if (status != Status::TIMEOUT) return status;
-    for_work.yield();
-  }
-  return Status::TIMEOUT;
+  Status status = Status::TIMEOUT;
+  for_work.sees([&] {
+    status = queue_->AsyncNext(tag, ok, gpr_time_0(GPR_CLOCK_MONOTONIC));
+    return status != Status::TIMEOUT;
+  });
+  return status;
 }
 
 Pollers::Work::Work() { for_work.end(Clock::now()); }

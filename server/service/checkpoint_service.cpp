@@ -34,7 +34,7 @@ ExportReplies::Source exported(const Parts& parts, const CallFrame& frame,
     std::string piece = readable([&] { return files->read(kChunkBytes); });
     const bool some = !piece.empty();
     reply->set_data(std::move(piece));
-    return some;
+    return some ? Next::message : Next::nothing;
   };
 }
 

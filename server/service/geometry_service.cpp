@@ -18,7 +18,7 @@ void add_geometry(Gate& gate, const Parts& parts) {
                      [session](const std::string& name) { return (*session)->find_variable(name); },
                      (*session)->origin().files, (*session)->origin().attached, request);
                  return [session, share, messages](v1::DescribeGeometryReply* reply) {
-                   return messages->next(reply);
+                   return messages->next(reply) ? Next::message : Next::nothing;
                  };
                }));
 }

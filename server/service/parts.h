@@ -104,12 +104,30 @@ void change_once(const SessionStore& store, Session& session, const CallFrame& f
   }
 }
 
+/// What may be done on a poller's thread; false: not now, and nothing has been done.
+template <class Request, class Reply>
+using QuickBody = std::function<bool(Session&, const Request&, Reply*, const CallFrame&)>;
+
+/// The same for a simulation that is in memory and whose steps are quick.
+template <class Request, class Reply>
+typename Unary<Request, Reply>::AtOnce on_quick_session(const Parts& parts, Access access,
+                                                        QuickBody<Request, Reply> body) {
+  if (!body) return {};
+  return [&parts, access, body = std::move(body)](const CallFrame& frame, const Request& request,
+                                                  Reply* reply) {
+    SessionPtr alive = parts.store.get_alive(request.simulation(), frame.caller, access);
+    if (!alive || !alive->is_quick()) return false;
+    const SessionHold session(std::move(alive));
+    return body(*session, request, reply, frame);
+  };
+}
+
 /// A method that works on one simulation, which is found and kept alive meanwhile; a request with
 /// an id changes it, and is done once. The role tells what the caller must be allowed to do with
-/// it, unless `other_access` does.
+/// it, unless `other_access` does. `at_once` is tried first.
 template <class Request, class Reply, class Body>
 Method on_session(const Parts& parts, Role role, Lane lane, Body body,
-                  std::optional<Access> other_access = {}) {
+                  std::optional<Access> other_access = {}, QuickBody<Request, Reply> at_once = {}) {
   const Access access =
       other_access.value_or(role == Role::observe ? Access::observe : Access::control);
   return unary<Request, Reply>(
@@ -126,7 +144,8 @@ Method on_session(const Parts& parts, Role role, Lane lane, Body body,
           body(*session, request, reply, frame);
         else
           body(*session, request, reply);
-      });
+      },
+      on_quick_session<Request, Reply>(parts, access, std::move(at_once)));
 }
 
 }  // namespace mbcosim::server

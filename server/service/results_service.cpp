@@ -29,11 +29,11 @@ FileReplies::Source file_pieces(const Parts& parts, const CallFrame& frame,
   const std::int64_t end = end_of(request, size);
   return [session, file = request.file(), at = request.offset_bytes(), end,
           cuts](v1::GetResultsReply* reply) mutable {
-    if (at >= end) return false;
+    if (at >= end) return Next::nothing;
     const std::size_t most = static_cast<std::size_t>(std::min(kPieceBytes, end - at));
     reply->set_data((*session)->results().read(file, at, most, cuts));
     at += static_cast<std::int64_t>(reply->data().size());
-    return true;
+    return at < end ? Next::message : Next::last;
   };
 }
 

@@ -413,6 +413,22 @@ void Session::read(const v1::ReadVariablesRequest& request, const Call& call,
   require_usable();
   variables_.check(request.handles());
   const CallGuard lock(lock_, call);
+  read_held(request, reply);
+}
+
+bool Session::read_at_once(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply) {
+  if (!shared_.lanes.at_once().try_lock()) return false;
+  const Guard alone(shared_.lanes.at_once(), std::adopt_lock);
+  require_usable();
+  variables_.check(request.handles());
+  if (!lock_.try_lock()) return false;
+  const Guard lock(lock_, std::adopt_lock);
+  read_held(request, reply);
+  return true;
+}
+
+void Session::read_held(const v1::ReadVariablesRequest& request,
+                        v1::ReadVariablesReply* reply) const {
   reply->set_step(simulation_->step_number());
   reply->set_time(simulation_->time());
   variables_.read(*simulation_, request.handles(), reply->mutable_values());

@@ -111,6 +111,8 @@ class Session {
   const Recorder& record() const;
   void read(const v1::ReadVariablesRequest& request, const Call& call,
             v1::ReadVariablesReply* reply);
+  /// False, and nothing done, when somebody would have to be waited for.
+  bool read_at_once(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply);
   void write(const v1::WriteVariablesRequest& request, const Call& call,
              const KeptReplies::Turn& turn, v1::WriteVariablesReply* reply);
 
@@ -218,6 +220,8 @@ class Session {
   void put_on_disk(std::optional<CapturedPoint> captured, const Change& change,
                    const google::protobuf::Message& reply);
   void fill_recovered(const Caller& caller, v1::SimulationInfo* out) const TS_REQUIRES(lock_);
+  void read_held(const v1::ReadVariablesRequest& request, v1::ReadVariablesReply* reply) const
+      TS_REQUIRES(lock_);
   CapturedPoint capture_held() TS_REQUIRES(lock_);
   void check(const v1::StepRequest& request) const;
   /// What a call changes, while nobody else may see it.

@@ -108,7 +108,8 @@ SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Call& 
 SessionPtr SessionStore::get_alive(const std::string& id, const Caller& caller,
                                    Access access) const {
   Guard guard(mutex_);
-  return find(id, caller, access, "");
+  SessionPtr session = find(id, caller, access, "");
+  return session && !session->lease().ended() ? session : nullptr;
 }
 
 // Null: it is not alive, or the caller may not see it.

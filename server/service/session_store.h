@@ -80,7 +80,8 @@ class SessionStore {
   /// One that is on the disk is brought back; CANCELLED when the call ends first.
   SessionPtr get(const std::string& id, const Caller& caller, Call& call, Access access,
                  const std::string& port = "") const;
-  /// The same of one that is in memory; null: it is not, or the caller may not see it.
+  /// The same of one that is in memory; null: it is not, or is about to leave it, or the caller may
+  /// not see it.
   SessionPtr get_alive(const std::string& id, const Caller& caller, Access access) const;
   /// What the caller may see, in the order of creation.
   std::vector<SessionPtr> list(const Caller& caller) const;

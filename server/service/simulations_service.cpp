@@ -172,6 +172,13 @@ void add_variables(Gate& gate, const Parts& parts) {
                [](Session& session, const auto& request, auto* reply, const CallFrame& frame) {
                  frame.share.grow(session.variable_access().bytes_of(request.handles()));
                  session.read(request, frame.call, reply);
+               },
+               std::nullopt,
+               [](Session& session, const v1::ReadVariablesRequest& request,
+                  v1::ReadVariablesReply* reply, const CallFrame& frame) {
+                 const MemoryShare values(frame.memory,
+                                          session.variable_access().bytes_of(request.handles()));
+                 return session.read_at_once(request, reply);
                }));
   gate.add(simulations_path("WriteVariables"),
            on_session<v1::WriteVariablesRequest, v1::WriteVariablesReply>(

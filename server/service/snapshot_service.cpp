@@ -72,10 +72,9 @@ SnapshotReplies::Source exported_snapshot(const Parts& parts, const CallFrame& f
   *bytes = within(parts.runtime.budgets.of(frame.caller.identity), &token, share.get(),
                   [&] { return session->export_state(number, frame.call); });
   return [bytes, share, at = std::size_t{0}](auto* reply) mutable {
-    if (at >= bytes->size()) return false;
     reply->set_data(bytes->substr(at, kChunkBytes));
     at += kChunkBytes;
-    return true;
+    return at < bytes->size() ? Next::message : Next::last;
   };
 }
 
@@ -91,7 +90,7 @@ RecordReplies::Source recorded(const Parts& parts, const CallFrame& frame,
     at += piece.size();
     const bool some = !piece.empty();
     reply->set_data(std::move(piece));
-    return some;
+    return some ? Next::message : Next::nothing;
   };
 }
 

@@ -26,8 +26,7 @@ class StepStreamHandler final : public Handler {
   // Clients open the stream before they know when they will step.
   void start(Exchange& exchange) override { exchange.read(Exchange::kIdleStream); }
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
-    constexpr std::size_t kShort = 4096;  // bytes
-    if (message.Length() <= kShort)
+    if (message.Length() <= kShortMessage)
       return exchange.do_at_once([&] {
         parse(exchange.memory(), message, &request_, &share_);
         step_at_once(exchange);
@@ -62,7 +61,7 @@ class StepStreamHandler final : public Handler {
   /// Only of one that is in memory: from the disk it takes a while.
   bool hold_alive(const Caller& caller) {
     SessionPtr session = parts_.store.get_alive(request_.simulation(), caller, Access::control);
-    if (!session || session->lease().ended()) return false;
+    if (!session) return false;
     name_ = request_.simulation();
     session_.emplace(std::move(session));
     return true;
@@ -217,6 +216,13 @@ void add_stepping(Gate& gate, const Parts& parts) {
                   const CallFrame& frame) {
                  frame.share.grow(session.variable_access().bytes_of(request.outputs()));
                  session.step(request, frame.caller, frame.call, reply);
+               },
+               std::nullopt,
+               [](Session& session, const v1::StepRequest& request, v1::StepReply* reply,
+                  const CallFrame& frame) {
+                 const MemoryShare outputs(frame.memory,
+                                           session.variable_access().bytes_of(request.outputs()));
+                 return session.step_at_once(request, frame.caller, frame.call, reply);
                }));
   gate.add(simulations_path("StepStream"),
            stream(Role::control, [&parts] { return std::make_unique<StepStreamHandler>(parts); }));

@@ -30,6 +30,13 @@ class Alertness {
   }
   /// Before each look: is there to be one, and no sleep yet?
   bool stays(Clock::time_point now) const { return is_awake_ && now - began_ < kSoon; }
+  /// Looks as long as there is to be no sleep; true: `look` says that it has come.
+  template <class Look>
+  bool sees(Look look) {
+    for (; stays(Clock::now()); yield())
+      if (look()) return true;
+    return false;
+  }
   /// After each look in vain: others may have the core.
   void yield() {
     const Clock::time_point before = Clock::now();

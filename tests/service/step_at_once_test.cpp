@@ -1,5 +1,5 @@
-/// Steps on the thread that reads the request: when a session takes one, and that all else is as it
-/// would be through a lane.
+/// Steps, and values that are read, on the thread that takes the request: when a session does them,
+/// and that all else is as it would be through a lane.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -239,6 +239,22 @@ TEST_F(AtOnce, WhatWasBegunGoesOnInALane) {
   EXPECT_EQ(by_lane(*begun).step(), 2);
 }
 
+TEST_F(AtOnce, ValuesAreThoseOfALane) {
+  const auto begun = session();
+  by_lane(*begun);
+  v1::ReadVariablesRequest request;
+  for (const Variable& variable : begun->variables())
+    request.add_handles(begun->find_variable(variable.name));
+  v1::ReadVariablesReply first, second;
+  begun->read(request, call_, &first);
+  ASSERT_TRUE(begun->read_at_once(request, &second));
+  EXPECT_GT(second.values_size(), 10);
+  EXPECT_EQ(second.step(), 1);
+  EXPECT_EQ(second.SerializeAsString(), first.SerializeAsString());
+  request.add_handles(-1);
+  EXPECT_THROW(begun->read_at_once(request, &second), Refusal);
+}
+
 /// A step that would not end by itself.
 class AtOnceWithoutEnd : public AtOnce {
  protected:
@@ -279,6 +295,8 @@ TEST_F(AtOnceWithoutEnd, IsTheOnlyOne) {
       Call call;
       EXPECT_FALSE(other->step_at_once(request_, ann_, call, &reply));
       EXPECT_THROW(endless_->step(request_, ann_, call, &reply), Refusal) << "it is busy";
+      v1::ReadVariablesReply values;
+      EXPECT_FALSE(other->read_at_once({}, &values)) << "a poller at most works";
     }).join();
     call_.cancel();
   });
