@@ -186,15 +186,15 @@ HttpAnswer HttpHost::post(const std::string& path, const std::string& type,
   end_ = Clock::now() + timeout_;
   const bool ipv6 = host_.find(':') != std::string::npos;
   const std::string host = ipv6 ? "[" + host_ + "]" : host_;
-  const std::string head = "POST " + path + " HTTP/1.1\r\nHost: " + host + ":" + port_ +
-                           "\r\nContent-Type: " + type + "\r\n" +
-                           (token_.empty() ? "" : "Authorization: Bearer " + token_ + "\r\n") +
-                           "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n";
+  std::string request = "POST " + path + " HTTP/1.1\r\nHost: " + host + ":" + port_ +
+                        "\r\nContent-Type: " + type + "\r\n" +
+                        (token_.empty() ? "" : "Authorization: Bearer " + token_ + "\r\n") +
+                        "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n";
+  request += body;  // in one piece: the host wakes once
   for (bool again = descriptor_ >= 0;; again = false) {
     try {
       if (descriptor_ < 0) open();
-      send(head);
-      send(body);
+      send(request);
       return receive();
     } catch (const HttpFailure&) {
       const bool nothing_came = buffer_.empty() && Clock::now() < end_;

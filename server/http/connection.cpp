@@ -3,7 +3,10 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
+#include <charconv>
 #include <ctime>
 
 #include "http/sockets.h"
@@ -29,18 +32,73 @@ std::string date_now() {
           std::strftime(text.data(), text.size(), "%a, %d %b %Y %H:%M:%S GMT", &parts)};
 }
 
-void start_header(mg_connection* raw, int status, std::string_view content_type) {
-  mg_response_header_start(raw, status);
-  mg_response_header_add(raw, "Date", date_now().c_str(), -1);
-  mg_response_header_add(raw, "Content-Type", content_type.data(),
-                         static_cast<int>(content_type.size()));
-  mg_response_header_add(raw, "X-Content-Type-Options", "nosniff", -1);
+/// The head of an answer. civetweb would send it line by line, and wake the client with each.
+class Head {
+ public:
+  Head(mg_connection* raw, int status, std::string_view content_type)
+      : raw_(raw),
+        text_("HTTP/1.1 " + std::to_string(status) + ' ' + mg_get_response_code_text(raw, status) +
+              "\r\n") {
+    add("Date", date_now());
+    add("Content-Type", content_type);
+    add("X-Content-Type-Options", "nosniff");
+  }
+  void add(std::string_view name, std::string_view value) {
+    text_.append(name).append(": ").append(value).append("\r\n");
+  }
+  void add(const Headers& headers) {
+    for (const auto& [name, value] : headers) add(name, value);
+  }
+  void keep_connection(bool keep) {
+    if (!keep) mg_disable_connection_keep_alive(raw_);
+    add("Connection", keep ? "keep-alive" : "close");
+  }
+  /// With the beginning of the body.
+  void send(std::string_view body = {}) {
+    constexpr std::size_t kTogether = 1 << 16;  // bytes
+    text_.append("\r\n");
+    const bool together = body.size() <= kTogether;
+    if (together) text_.append(body);
+    mg_write(raw_, text_.data(), text_.size());
+    if (!together) mg_write(raw_, body.data(), body.size());
+  }
+
+ private:
+  mg_connection* raw_;
+  std::string text_;
+};
+
+/// Of a body that is `chunked` (RFC 9112, 7.1); an empty one is its end.
+std::string chunk(std::string_view bytes) {
+  std::array<char, 2 * sizeof bytes.size()> size{};
+  const char* const end = std::to_chars(size.begin(), size.end(), bytes.size(), 16).ptr;
+  std::string text(size.data(), static_cast<std::size_t>(end - size.data()));
+  return text.append("\r\n").append(bytes).append("\r\n");
+}
+
+bool equal_but_for_case(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+    return std::tolower(x) == std::tolower(y);
+  });
+}
+
+/// Is `word` one of "a, b, c"?
+bool is_one_of(std::string_view word, std::string_view list) {
+  while (!list.empty()) {
+    std::string_view each = list.substr(0, list.find(','));
+    list.remove_prefix(std::min(each.size() + 1, list.size()));
+    each.remove_prefix(std::min(each.find_first_not_of(' '), each.size()));
+    each = each.substr(0, each.find_last_not_of(' ') + 1);
+    if (equal_but_for_case(each, word)) return true;
+  }
+  return false;
 }
 
 int socket_of(mg_connection* raw, const mg_request_info& info) {
   auto* peer = static_cast<Peer*>(mg_get_user_connection_data(raw));
   if (!peer) {
-    peer = new Peer{find_socket(info)};  // deleted by the door when the connection closes
+    peer = new Peer;  // deleted by the door when the connection closes
+    peer->socket = find_socket(info);
     mg_set_user_connection_data(raw, peer);
   }
   return peer->socket;
@@ -50,12 +108,20 @@ int socket_of(mg_connection* raw, const mg_request_info& info) {
 
 int answer_malformed(mg_connection* raw, int status, const char* message) {
   const std::string body = std::string(message) + '\n';
-  start_header(raw, status, kPlainText);
-  mg_response_header_add(raw, "Content-Length", std::to_string(body.size()).c_str(), -1);
-  mg_response_header_add(raw, "Connection", "close", -1);
-  mg_response_header_send(raw);
-  mg_write(raw, body.data(), body.size());
+  Head head(raw, status, kPlainText);
+  head.add("Content-Length", std::to_string(body.size()));
+  head.keep_connection(false);
+  head.send(body);
   return 0;
+}
+
+void Peer::look_for_request() {
+  if (socket < 0) return;
+  for_request.begin(Alertness::Clock::now());
+  for_request.sees([this] {
+    pollfd state{socket, POLLIN, 0};
+    return ::poll(&state, 1, 0) != 0;
+  });
 }
 
 Connection::Connection(mg_connection* raw, Reaper& reaper)
@@ -101,46 +167,55 @@ Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   return cut ? Body::broken : Body::complete;
 }
 
-void Connection::start_answer(int status, std::string_view content_type, const Headers& headers) {
-  status_ = status;
-  reaper_.arm(socket_, kTransferTime);
-  start_header(raw_, status, content_type);
-  for (const auto& [name, value] : headers)
-    mg_response_header_add(raw_, name.c_str(), value.data(), static_cast<int>(value.size()));
+/// Is the connection kept? So does civetweb read it from the request; it upgrades nothing.
+bool Connection::stays() const {
+  const std::string_view wishes = header("Connection");
+  if (has_header("Connection"))
+    return is_one_of("keep-alive", wishes) && !is_one_of("upgrade", wishes);
+  return info_->http_version && std::string_view(info_->http_version) == "1.1";
 }
 
 void Connection::respond(int status, std::string_view content_type, std::string_view body,
                          const Headers& headers) {
-  start_answer(status, content_type, headers);
-  mg_response_header_add(raw_, "Content-Length", std::to_string(body.size()).c_str(), -1);
+  status_ = status;
+  reaper_.arm(socket_, kTransferTime);
   const bool unread = !body_read_ && info_->content_length != 0 && method() == "POST";
-  if (unread) mg_response_header_add(raw_, "Connection", "close", -1);
-  mg_response_header_send(raw_);
-  if (method() != "HEAD") mg_write(raw_, body.data(), body.size());
+  Head head(raw_, status, content_type);
+  head.add(headers);
+  head.add("Content-Length", std::to_string(body.size()));
+  head.keep_connection(!unread && stays());
+  head.send(method() == "HEAD" ? std::string_view() : body);
   // civetweb reads on to the end of the request; whoever sends it slowly is cut off.
   if (unread) reaper_.arm(socket_, kLinger);
 }
 
 bool Connection::start_stream(std::string_view content_type, const Headers& headers) {
-  start_answer(200, content_type, headers);
-  mg_response_header_add(raw_, "Transfer-Encoding", "chunked", -1);
-  mg_response_header_add(raw_, "Cache-Control", "no-store", -1);
-  mg_response_header_send(raw_);
+  status_ = 200;
+  reaper_.arm(socket_, kTransferTime);
+  Head head(raw_, status_, content_type);
+  head.add(headers);
+  head.add("Transfer-Encoding", "chunked");
+  head.add("Cache-Control", "no-store");
+  head.keep_connection(stays());
+  head.send();
   reaper_.disarm(socket_);
   return !gone();
 }
 
 bool Connection::send_piece(std::string_view bytes) {
   if (bytes.empty()) return true;
-  reaper_.arm(socket_, kTransferTime);
-  const int sent = mg_send_chunk(raw_, bytes.data(), static_cast<unsigned>(bytes.size()));
+  const bool sent = send_all(chunk(bytes));
   reaper_.disarm(socket_);
-  return sent > 0;
+  return sent;
 }
 
-void Connection::end_stream() {
+void Connection::end_stream(std::string_view last_piece) {
+  send_all(chunk(last_piece) + chunk({}));
+}
+
+bool Connection::send_all(std::string_view bytes) {
   reaper_.arm(socket_, kTransferTime);
-  mg_send_chunk(raw_, "", 0);
+  return mg_write(raw_, bytes.data(), bytes.size()) == static_cast<int>(bytes.size());
 }
 
 bool Connection::gone() const {

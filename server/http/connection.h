@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "http/reaper.h"
+#include "threads/alertness.h"
 
 namespace mbcosim::server::http {
 
@@ -22,6 +23,10 @@ using Headers = std::vector<std::pair<std::string, std::string>>;
 struct Peer {
   int socket = -1;          ///< -1: not found
   bool in_request = false;  ///< that a Connection stands for
+  Alertness for_request;    ///< of the thread that serves it
+
+  /// A request is over: looks for the next one, as long as it is likely to come soon.
+  void look_for_request();
 };
 
 /// Time that a client has to send a request's body, or to read an answer.
@@ -49,14 +54,15 @@ class Connection {
   /// Starts an answer that comes in pieces; false: the client is gone.
   bool start_stream(std::string_view content_type, const Headers& headers = {});
   bool send_piece(std::string_view bytes);
-  void end_stream();
+  void end_stream(std::string_view last_piece);
 
   /// Whether the client has hung up. Cheap.
   bool gone() const;
   int status() const { return status_; }
 
  private:
-  void start_answer(int status, std::string_view content_type, const Headers& headers);
+  bool stays() const;
+  bool send_all(std::string_view bytes);
 
   mg_connection* raw_;
   const mg_request_info* info_;

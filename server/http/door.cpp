@@ -110,7 +110,11 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
   mg_callbacks callbacks{};
   callbacks.init_connection = came;
   callbacks.begin_request = [](mg_connection* raw) { return of(raw).serve(raw); };
-  callbacks.end_request = [](const mg_connection* raw, int) { ended(raw); };
+  callbacks.end_request = [](const mg_connection* raw, int) {
+    ended(raw);
+    auto* peer = static_cast<Peer*>(mg_get_user_connection_data(raw));
+    if (peer) peer->look_for_request();
+  };
   callbacks.connection_close = went;
   callbacks.http_error = answer_malformed;
   callbacks.log_message = log_message;
@@ -148,6 +152,7 @@ int Door::Impl::came(const mg_connection* raw, void**) {
 
 void Door::Impl::began(const mg_connection* raw) {
   auto* peer = static_cast<Peer*>(mg_get_user_connection_data(raw));
+  peer->for_request.end(Alertness::Clock::now());
   if (!peer->in_request) crowd.began(peer->socket);
   peer->in_request = true;
 }

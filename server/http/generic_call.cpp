@@ -1,26 +1,45 @@
 #include "http/generic_call.h"
 
+#include <grpc/support/time.h>
+
+#include "threads/alertness.h"
+
 namespace mbcosim::server::http {
 namespace {
 
 constexpr std::chrono::milliseconds kHangUpLook{200};  // how soon a client that hung up is noticed
+
+thread_local Alertness for_reply;  ///< of this thread
 
 void* tag() {  // one operation at a time: any tag will do
   static char mark;
   return &mark;
 }
 
+grpc::ByteBuffer buffer_of(std::string_view bytes) {
+  const grpc::Slice slice(bytes.data(), bytes.size());
+  return {&slice, 1};
+}
+
+/// No value: it cannot be decompressed.
+std::optional<std::string> joined(const grpc::ByteBuffer& buffer) {
+  std::vector<grpc::Slice> slices;
+  if (!buffer.Dump(&slices).ok()) return std::nullopt;
+  std::string bytes;
+  bytes.reserve(buffer.Length());
+  for (const grpc::Slice& slice : slices)
+    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+  return bytes;
+}
+
 }  // namespace
 
-GenericCall::GenericCall(const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
+GenericCall::GenericCall(const std::shared_ptr<grpc::Channel>& channel, std::string path,
                          const Metadata& metadata, std::optional<std::chrono::milliseconds> timeout,
                          std::function<bool()> gone)
-    : gone_(std::move(gone)), stub_(channel) {
+    : path_(std::move(path)), gone_(std::move(gone)), stub_(channel) {
   for (const auto& [name, value] : metadata) context_.AddMetadata(name, value);
   if (timeout) context_.set_deadline(std::chrono::system_clock::now() + *timeout);
-  stream_ = stub_.PrepareCall(&context_, path, &queue_);
-  stream_->StartCall(tag());
-  done();
 }
 
 GenericCall::~GenericCall() {
@@ -33,19 +52,48 @@ GenericCall::~GenericCall() {
 }
 
 bool GenericCall::done() {
-  void* tag = nullptr;
-  bool ok = false;
-  for (;;) {
-    const auto status = queue_.AsyncNext(&tag, &ok, std::chrono::system_clock::now() + kHangUpLook);
-    if (status == grpc::CompletionQueue::GOT_EVENT) return ok;
-    if (status == grpc::CompletionQueue::SHUTDOWN) return false;
-    if (gone_()) context_.TryCancel();
-  }
+  for_reply.begin(Alertness::Clock::now());
+  const bool ok = take();
+  for_reply.end(Alertness::Clock::now());
+  return ok;
 }
 
-void GenericCall::send(std::string_view request) {
-  const grpc::Slice slice(request.data(), request.size());
-  stream_->WriteLast(grpc::ByteBuffer(&slice, 1), grpc::WriteOptions(), tag());
+bool GenericCall::take() {
+  using Status = grpc::CompletionQueue::NextStatus;
+  void* tag = nullptr;
+  bool ok = false;
+  Status status = Status::TIMEOUT;
+  const auto comes_by = [&](const auto& deadline) {
+    status = queue_.AsyncNext(&tag, &ok, deadline);
+    return status != Status::TIMEOUT;
+  };
+  if (!for_reply.sees([&] { return comes_by(gpr_time_0(GPR_CLOCK_MONOTONIC)); }))
+    while (!comes_by(std::chrono::system_clock::now() + kHangUpLook))
+      if (gone_()) context_.TryCancel();
+  return status == Status::GOT_EVENT && ok;
+}
+
+GenericCall::Answer GenericCall::ask(std::string_view request) {
+  Answer answer;
+  grpc::ByteBuffer reply;
+  const auto call = stub_.PrepareUnaryCall(&context_, path_, buffer_of(request), &queue_);
+  call->StartCall();
+  call->Finish(&reply, &answer.status, tag());
+  done();
+  if (!answer.status.ok()) return answer;
+  std::optional<std::string> bytes = joined(reply);
+  if (bytes)
+    answer.reply = std::move(*bytes);
+  else
+    answer.status = {grpc::StatusCode::INTERNAL, "a reply cannot be decompressed"};
+  return answer;
+}
+
+void GenericCall::start(std::string_view request) {
+  stream_ = stub_.PrepareCall(&context_, path_, &queue_);
+  stream_->StartCall(tag());
+  done();
+  stream_->WriteLast(buffer_of(request), grpc::WriteOptions(), tag());
   done();
 }
 
@@ -53,13 +101,7 @@ std::optional<std::string> GenericCall::receive() {
   grpc::ByteBuffer reply;
   stream_->Read(&reply, tag());
   if (!done()) return std::nullopt;
-  std::vector<grpc::Slice> slices;
-  if (!reply.Dump(&slices).ok()) return std::nullopt;
-  std::string bytes;
-  bytes.reserve(reply.Length());
-  for (const grpc::Slice& slice : slices)
-    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
-  return bytes;
+  return joined(reply);
 }
 
 grpc::Status GenericCall::finish() {

@@ -21,15 +21,22 @@ class GenericCall {
 
   /// `gone` tells whether the caller has lost interest; the call is then cancelled. `path` is
   /// "/mbcosim.v1.Simulations/Step".
-  GenericCall(const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
+  GenericCall(const std::shared_ptr<grpc::Channel>& channel, std::string path,
               const Metadata& metadata, std::optional<std::chrono::milliseconds> timeout,
               std::function<bool()> gone);
   ~GenericCall();
   GenericCall(const GenericCall&) = delete;
   GenericCall& operator=(const GenericCall&) = delete;
 
-  /// Sends the only request.
-  void send(std::string_view request);
+  struct Answer {
+    grpc::Status status;
+    std::string reply;  ///< if the status is good
+  };
+  /// Of a method with one request and one reply, the whole call.
+  Answer ask(std::string_view request);
+
+  /// Begins the call of a method with one request and a stream of replies.
+  void start(std::string_view request);
   /// The next reply; no value: there is none, `finish` tells why.
   std::optional<std::string> receive();
   grpc::Status finish();
@@ -38,7 +45,9 @@ class GenericCall {
  private:
   /// Waits for the operation just started.
   bool done();
+  bool take();
 
+  const std::string path_;
   grpc::ClientContext context_;
   grpc::CompletionQueue queue_;
   std::function<bool()> gone_;

@@ -10,6 +10,7 @@ namespace mbcosim::server::http {
 namespace {
 
 constexpr std::chrono::milliseconds kEndLook{100};  // how late a socket may be ended
+constexpr int kRestAfter = 20;                      // looks at nothing
 
 }  // namespace
 
@@ -28,7 +29,7 @@ void Reaper::arm(int socket, std::chrono::milliseconds time) {
   if (socket < 0) return;
   const Guard lock(mutex_);
   deadlines_[socket] = std::min(end_, Clock::now() + time);
-  if (deadlines_.size() == 1) changed_.notify_one();
+  if (rests_) changed_.notify_one();
 }
 
 void Reaper::disarm(int socket) {
@@ -42,10 +43,14 @@ void Reaper::hurry(std::chrono::milliseconds time) {
   for (auto& [socket, deadline] : deadlines_) deadline = std::min(end_, deadline);
 }
 
+// Requests come and go quicker than a thread wakes: it looks now and then as long as some do.
 void Reaper::loop() {
   const Guard lock(mutex_);
+  int looks_at_nothing = 0;
   while (!stop_) {
-    if (deadlines_.empty()) {
+    looks_at_nothing = deadlines_.empty() ? looks_at_nothing + 1 : 0;
+    rests_ = looks_at_nothing > kRestAfter;
+    if (rests_) {
       changed_.wait(mutex_);
       continue;
     }

@@ -34,6 +34,7 @@ class Reaper {
   std::map<int, Clock::time_point> deadlines_ TS_GUARDED_BY(mutex_);  ///< by socket
   Clock::time_point end_ TS_GUARDED_BY(mutex_) = Clock::time_point::max();
   bool stop_ TS_GUARDED_BY(mutex_) = false;
+  bool rests_ TS_GUARDED_BY(mutex_) = false;  ///< the thread, until it is woken
   std::thread thread_;
 };
 

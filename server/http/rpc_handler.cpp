@@ -241,19 +241,21 @@ grpc::Status RpcHandler::read_request(Call& call, std::string* request) const {
                                              : bad_request("the message is too large");
 }
 
-void RpcHandler::answer_whole(Call& call, GenericCall& rpc) const {
-  const auto reply = rpc.receive();
-  const grpc::Status status = rpc.finish();
-  if (!status.ok() || !reply) return call.refuse(status);
+void RpcHandler::answer_whole(Call& call, GenericCall& rpc, const std::string& request) {
+  GenericCall::Answer answer = rpc.ask(request);
+  if (!answer.status.ok()) return call.refuse(answer.status);
   MemoryShare share;
   const std::string body = within(call.memory, nullptr, &share, [&] {
-    return transcode(call.framing.encoding, call.method.output_type(), std::move(*reply));
+    if (!call.framing.enveloped())
+      return transcode(call.framing.encoding, call.method.output_type(), std::move(answer.reply));
+    return call.message_piece(std::move(answer.reply)) + call.end_piece(grpc::Status::OK);
   });
   call.connection.respond(200, content_type_of(call.framing), body,
                           {{"Cache-Control", "no-store"}});
 }
 
-void RpcHandler::answer_pieces(Call& call, GenericCall& rpc) const {
+void RpcHandler::answer_pieces(Call& call, GenericCall& rpc, const std::string& request) {
+  rpc.start(request);
   bool open = call.connection.start_stream(content_type_of(call.framing));
   while (open) {
     auto reply = rpc.receive();
@@ -263,8 +265,7 @@ void RpcHandler::answer_pieces(Call& call, GenericCall& rpc) const {
   if (!open) rpc.cancel();
   const grpc::Status status = rpc.finish();
   if (!open) return;
-  call.connection.send_piece(call.end_piece(status));
-  call.connection.end_stream();
+  call.connection.end_stream(call.end_piece(status));
 }
 
 void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
@@ -307,8 +308,7 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
     if (connection.has_header(name)) metadata.emplace_back(name, connection.header(name));
   GenericCall rpc(channel_, "/" + method.service()->full_name() + "/" + method.name(), metadata,
                   timeout, [&] { return closing_.load() || connection.gone(); });
-  rpc.send(request);
-  framing->kind == Kind::unary ? answer_whole(call, rpc) : answer_pieces(call, rpc);
+  streams ? answer_pieces(call, rpc, request) : answer_whole(call, rpc, request);
 }
 
 }  // namespace mbcosim::server::http

@@ -55,8 +55,8 @@ class RpcHandler {
 
   grpc::Status read_request(Call& call, std::string* request) const;
   grpc::Status read_counted(Call& call, std::string* request) const;
-  void answer_whole(Call& call, GenericCall& rpc) const;
-  void answer_pieces(Call& call, GenericCall& rpc) const;
+  static void answer_whole(Call& call, GenericCall& rpc, const std::string& request);
+  static void answer_pieces(Call& call, GenericCall& rpc, const std::string& request);
 
   std::shared_ptr<grpc::Channel> channel_;
   MemoryBudgets& budgets_;

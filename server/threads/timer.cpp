@@ -18,10 +18,9 @@ Timer::~Timer() {
 Timer::Id Timer::at(Clock::time_point time, std::function<void()> call) {
   Guard guard(mutex_);
   const Id id = ++last_;
-  const bool first = calls_.empty() || time < calls_.begin()->first.first;
   calls_.emplace(Key(time, id), std::move(call));
   times_.emplace(id, time);
-  if (first) changed_.notify_one();
+  if (time < looks_at_) changed_.notify_one();
   return id;
 }
 
@@ -37,12 +36,14 @@ void Timer::loop() {
   Guard guard(mutex_);
   while (!stop_) {
     if (calls_.empty()) {
+      looks_at_ = Clock::time_point::max();
       changed_.wait(mutex_);
       continue;
     }
     const auto first = calls_.begin();
-    if (first->first.first > Clock::now()) {
-      changed_.wait_until(mutex_, first->first.first);
+    looks_at_ = first->first.first;
+    if (looks_at_ > Clock::now()) {
+      changed_.wait_until(mutex_, looks_at_);
       continue;
     }
     const std::function<void()> call = std::move(first->second);

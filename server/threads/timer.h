@@ -13,7 +13,8 @@
 namespace mbcosim::server {
 
 /// One thread that calls functions when their time has come. They must be short: who has real work
-/// posts it to a pool. Thread-safe.
+/// posts it to a pool. Who sets a time and cancels it before it has come, again and again, seldom
+/// wakes the thread. Thread-safe.
 class Timer {
  public:
   using Clock = std::chrono::steady_clock;
@@ -40,6 +41,7 @@ class Timer {
   std::map<Id, Clock::time_point> times_ TS_GUARDED_BY(mutex_);
   Id last_ TS_GUARDED_BY(mutex_) = 0;
   bool stop_ TS_GUARDED_BY(mutex_) = false;
+  Clock::time_point looks_at_ TS_GUARDED_BY(mutex_) = Clock::time_point::min();  ///< the thread
   std::thread thread_;
 };
 

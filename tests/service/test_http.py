@@ -582,6 +582,38 @@ def test_pipelined_requests_are_answered_in_their_order(door):
     assert answers[0].endswith(b"ok\n") and answers[1].endswith(b"ready\n")
 
 
+@pytest.mark.parametrize("version, wish, kept", [
+    ("1.1", None, True), ("1.1", "close", False), ("1.1", "Keep-Alive", True), ("1.1", "TE, keep-alive", True), ("1.1", "upgrade, keep-alive", False),
+    ("1.0", None, False), ("1.0", "keep-alive", True), ("1.0", "close", False)])
+def test_a_connection_is_kept_as_the_answer_says(door, version, wish, kept):
+    link = door.raw()
+    request = f"GET /healthz HTTP/{version}\r\nHost: {door.host}:{door.port}\r\n" + (f"Connection: {wish}\r\n" if wish else "") + "\r\n"
+    link.sendall(request.encode())
+    head, body = link.recv(65536).split(b"\r\n\r\n")
+    assert body == b"ok\n" and f"Connection: {'keep-alive' if kept else 'close'}".encode() in head.split(b"\r\n")
+    if kept:
+        link.sendall(request.encode())
+        assert link.recv(65536).endswith(b"ok\n")
+        link.close()
+    else:
+        assert all_of(link) == b""
+
+
+def test_answers_come_in_one_piece(door, server, pendulum):
+    """Who waits for one is woken once."""
+    with server.load(pendulum) as simulation:
+        body = json.dumps({"simulation": simulation.name, "steps": 1})
+        request = (f"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nAuthorization: Bearer {door.token}\r\n"
+                   f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n{body}").encode()
+        link = door.raw()
+        for step in range(1, 21):
+            link.sendall(request)
+            head, answer = link.recv(65536).split(b"\r\n\r\n")
+            assert f"Content-Length: {len(answer)}".encode() in head.split(b"\r\n")
+            assert json.loads(answer)["step"] == str(step)
+        link.close()
+
+
 @pytest.mark.parametrize("request_line, status", [(b"GET /healthz HTTP/1.1", b"200"), (b"GET /healthz HTTP/9.9", b"505"), (b"GET nothing HTTP/1.1", b"400")])
 def test_answers_are_dated_whether_ours_or_the_library_s(door, request_line, status):
     link = door.raw()

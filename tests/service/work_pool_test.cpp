@@ -98,6 +98,18 @@ TEST(Timer, CallsInTheOrderOfTimesAndForgetsWhatIsCancelled) {
   EXPECT_EQ(order, "ab");
 }
 
+TEST(Timer, KeepsEarlierTimesAmongLaterOnesThatComeAndGo) {
+  Timer timer;
+  for (int k = 0; k < 100; ++k) timer.cancel(timer.after(10min, [] {}));
+  std::latch done(3);
+  const auto started = Timer::Clock::now();
+  const Timer::Id far = timer.after(5min, [] {});
+  for (const auto wait : {30ms, 10ms, 20ms}) timer.after(wait, [&] { done.count_down(); });
+  timer.cancel(far);
+  done.wait();
+  EXPECT_GE(Timer::Clock::now() - started, 30ms);
+}
+
 TEST(Admission, LimitsHoldForEachIdentityEachConnectionAndAll) {
   Admission admission({5, 2, 1, 2});
   const auto refused = [&](const char* identity, const char* connection, bool stream) {
