@@ -4,9 +4,7 @@
 
 #include <cmath>
 #include <exception>
-#include <thread>
 
-#include "host/control_group.h"
 #include "wire/convert.h"
 #include "wire/refusal.h"
 
@@ -14,12 +12,6 @@ namespace mbcosim::server {
 namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(10);  // how soon a cancelled step is noticed
-/// Looks before sleeping: quick peers answer within them. The peer and the thread that gets its
-/// message are at work meanwhile, each on a core.
-int looks() {
-  static const int count = usable_cores() > 2 ? 200 : 0;
-  return count;
-}
 
 std::string in_port(const std::string& name, const std::string& text) {
   return "port \"" + name + "\": " + text;
@@ -254,9 +246,10 @@ void Port::send(v1::ServerMessage& message, int generation) {
 
 std::optional<Answer> Port::take(const CancelToken& cancel) {
   Guard guard(mutex_);
-  for (int look = 0; look < looks() && awaited_ && !answer_ && link_ && !link_->pulls(); ++look) {
+  for_answer_.begin(Clock::now());
+  if (link_ && !link_->pulls()) {
     guard.unlock();
-    std::this_thread::yield();
+    look_for_answer();
     guard.lock();
   }
   const bool forever = agreement_.policy == v1::PEER_POLICY_WAIT;
@@ -265,6 +258,7 @@ std::optional<Answer> Port::take(const CancelToken& cancel) {
   while (awaited_ && !answer_ && link_ && Clock::now() < deadline && !cancel.cancelled())
     if (!link_->pulls() || !pull()) changed_.wait_for(mutex_, kLook);
   waiting_since_.reset();
+  for_answer_.end(Clock::now());
   const bool answered = awaited_ && answer_.has_value();
   const bool late = awaited_ && !answered && link_;
   awaited_ = false;
@@ -275,6 +269,14 @@ std::optional<Answer> Port::take(const CancelToken& cancel) {
   if (!peer_failure_.empty())
     return go_on_without("the peer failed: " + peer_failure_.substr(0, kLongestText));
   return std::move(answer_);
+}
+
+// Of a quick peer: another thread brings it, which would have to wake this one.
+void Port::look_for_answer() {
+  for_answer_.sees([this] {
+    const Guard guard(mutex_);
+    return !awaited_ || answer_ || !link_;
+  });
 }
 
 // One look at a link that pulls. False: nothing will come through it any more.

@@ -11,6 +11,7 @@
 #include "coupling/recorder.h"
 #include "mbcosim/v1/coupling.pb.h"
 #include "mbcosim/v1/simulations.pb.h"
+#include "threads/alertness.h"
 #include "threads/mutex.h"
 #include "wire/refusal.h"
 
@@ -110,6 +111,7 @@ class Port {
   template <class Use>
   void use_link(Use&& use) TS_REQUIRES(mutex_);
   void send_message(const v1::ServerMessage& message) TS_REQUIRES(mutex_);
+  void look_for_answer() TS_EXCLUDES(mutex_);
   bool pull() TS_REQUIRES(mutex_);
   Answer take_content(const v1::PeerExchange& exchange) TS_REQUIRES(mutex_);
   void check_rejection(const v1::Rejection& rejection) const;
@@ -134,7 +136,8 @@ class Port {
   std::optional<Refusal> ended_ TS_GUARDED_BY(mutex_);
   std::optional<Clock::time_point> waiting_since_ TS_GUARDED_BY(mutex_);
   std::atomic<Clock::rep> heard_{0};  ///< when the peer last sent something
-  v1::PeerMessage pulled_;            ///< of the session's thread
+  v1::PeerMessage pulled_;            ///< of the session's thread, as is the next
+  Alertness for_answer_;
 };
 
 }  // namespace mbcosim::server

@@ -3,24 +3,15 @@
 #include <poll.h>
 
 #include <cstring>
-#include <thread>
-
-#include "host/control_group.h"
 
 namespace mbcosim::shm {
 namespace {
 
-constexpr auto kSpin = std::chrono::microseconds(40);  // longer than a quick exchange
 constexpr auto kLook = std::chrono::milliseconds(10);  // how soon a dead other side is noticed
 constexpr std::size_t kLengthBytes = sizeof(std::uint32_t);
 
 int ring_of(Channel::Side side, bool outgoing) {
   return (side == Channel::Side::server) == outgoing ? 0 : 1;
-}
-
-/// On one core whoever spins keeps the other from answering.
-Clock::duration spin_time() {
-  return server::usable_cores() > 1 ? Clock::duration(kSpin) : Clock::duration::zero();
 }
 
 }  // namespace
@@ -29,7 +20,6 @@ Channel::Channel(Descriptor socket, Segment segment, Side side, std::size_t long
     : socket_(std::move(socket)),
       segment_(std::move(segment)),
       longest_message_(longest_message),
-      spin_(spin_time()),
       writer_(segment_.header(ring_of(side, true)), segment_.bytes(ring_of(side, true)),
               kRingBytes),
       reader_(segment_.header(ring_of(side, false)), segment_.bytes(ring_of(side, false)),
@@ -77,7 +67,7 @@ bool Channel::write(const char* bytes, std::size_t count, Clock::time_point dead
     const Clock::time_point now = Clock::now();
     if (closed() || now >= deadline) return false;
     const auto ready = [this, writer = &writer_] { return closed() || writer->space() > 0; };
-    const bool room = wait_until(space_, std::min(deadline, now + kLook), spin_, ready);
+    const bool room = wait_until(space_, std::min(deadline, now + kLook), ready);
     if (!room && other_is_gone()) return false;
   }
   return true;
@@ -120,11 +110,20 @@ Channel::Received Channel::receive(google::protobuf::MessageLite* message,
     if (closed() || last_look) return Received::closed;
     const Clock::time_point now = Clock::now();
     if (now >= deadline) return Received::timeout;
-    const auto ready = [this, reader = &reader_] { return closed() || reader->available() > 0; };
-    const bool more = wait_until(data_, std::min(deadline, now + kLook), spin_, ready);
+    const bool more = wait_for_message(std::min(deadline, now + kLook));
     last_look = !more && other_is_gone();  // what it sent before its end still counts
   }
   return Received::message;
+}
+
+// True: some of it is there, or nothing will be.
+bool Channel::wait_for_message(Clock::time_point until) {
+  const auto ready = [this, reader = &reader_] { return closed() || reader->available() > 0; };
+  for_message_.begin(Clock::now());
+  const bool there =
+      for_message_.sees([&] { return look(ready); }) || wait_until(data_, until, ready);
+  for_message_.end(Clock::now());
+  return there;
 }
 
 Channel::Received Channel::try_receive(google::protobuf::MessageLite* message) {

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "shared_memory/ring.h"
+#include "threads/alertness.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::shm {
@@ -109,6 +110,7 @@ class Channel {
   bool closed() const { return closed_.load(std::memory_order_relaxed); }
 
  private:
+  bool wait_for_message(Clock::time_point until) TS_REQUIRES(receive_mutex_);
   bool write(const char* bytes, std::size_t count, Clock::time_point deadline)
       TS_REQUIRES(send_mutex_);
   bool advance() TS_REQUIRES(receive_mutex_);
@@ -118,10 +120,10 @@ class Channel {
   Descriptor socket_;
   Segment segment_;
   const std::size_t longest_message_;
-  const Clock::duration spin_;
   server::Mutex send_mutex_, receive_mutex_;
   RingWriter writer_ TS_GUARDED_BY(send_mutex_);
   RingReader reader_ TS_GUARDED_BY(receive_mutex_);
+  server::Alertness for_message_ TS_GUARDED_BY(receive_mutex_);
   Bell &space_, &data_;  ///< of `writer_` and `reader_`
   std::string out_ TS_GUARDED_BY(send_mutex_), in_ TS_GUARDED_BY(receive_mutex_);  ///< under way
   std::size_t received_ TS_GUARDED_BY(receive_mutex_) = 0;  ///< bytes of `in_` that are there

@@ -84,19 +84,21 @@ inline void relax() {
 #endif
 }
 
-/// Looks for a while, since quick peers answer within it, then sleeps until the bell rings. True:
-/// `ready()`. May return early.
+/// Some looks one after the other. True: `ready()`.
 template <class Ready>
-bool wait_until(Bell& bell, Clock::time_point until, Clock::duration spin, Ready&& ready) {
-  constexpr int kLooks = 32;  // between looks at the clock
-  if (ready()) return true;
-  const Clock::time_point spin_end = std::min(until, Clock::now() + spin);
-  while (spin > Clock::duration::zero() && Clock::now() < spin_end) {
-    for (int look = 0; look < kLooks; ++look) {
-      if (ready()) return true;
-      relax();
-    }
+bool look(Ready&& ready) {
+  constexpr int kLooks = 8;
+  for (int k = 0; k < kLooks; ++k) {
+    if (ready()) return true;
+    relax();
   }
+  return false;
+}
+
+/// Sleeps until the bell rings. True: `ready()`. May return early.
+template <class Ready>
+bool wait_until(Bell& bell, Clock::time_point until, Ready&& ready) {
+  if (ready()) return true;
   const std::uint32_t seen = bell.rings.load();
   bell.sleepers.store(1);  // before the look at the data; `ring` comes after the data
   if (!ready()) bell.wait(seen, until);

@@ -19,12 +19,13 @@ class AlertnessOfAThread : public testing::Test {
     alertness_.begin(now_);
     const bool awake = alertness_.stays(now_);
     EXPECT_FALSE(alertness_.stays(now_ + Alertness::kSoon));
-    if (awake) alertness_.note_absence(absence);
+    if (awake) alertness_.note_absence(now_, now_ + absence);
     now_ += length;
     alertness_.end(now_);
     now_ += microseconds(5);
     return awake;
   }
+  Alertness::Clock::time_point now() const { return now_; }
   int awake_of(int waits, microseconds length) {
     int awake = 0;
     for (int k = 0; k < waits; ++k) awake += wait(length) ? 1 : 0;
@@ -52,15 +53,15 @@ TEST_F(AlertnessOfAThread, EndsForLongWhereOthersWantTheCore) {
   awake_of(10, microseconds(50));
   EXPECT_TRUE(wait(microseconds(50), microseconds(900)));
   EXPECT_TRUE(wait(microseconds(3050), microseconds(3000)));
-  EXPECT_EQ(awake_of(60, microseconds(50)), 0);
-  EXPECT_GT(awake_of(10, microseconds(50)), 0) << "it tries again";
+  EXPECT_EQ(awake_of(150, microseconds(50)), 0);
+  EXPECT_GT(awake_of(50, microseconds(50)), 0) << "it tries again";
   for (int k = 0; k < 4; ++k) {
     while (!wait(microseconds(50), microseconds(3000))) continue;
   }
-  EXPECT_EQ(awake_of(4000, microseconds(50)), 0) << "it happens often";
-  EXPECT_GT(awake_of(1000, microseconds(50)), 256);
+  EXPECT_EQ(awake_of(30000, microseconds(50)), 0) << "it happens often";
+  EXPECT_GT(awake_of(8000, microseconds(50)), 256);
   EXPECT_TRUE(wait(microseconds(3050), microseconds(3000)));
-  EXPECT_GT(awake_of(70, microseconds(50)), 0) << "it has not happened for long";
+  EXPECT_GT(awake_of(200, microseconds(50)), 0) << "it has not happened for long";
 }
 
 TEST_F(AlertnessOfAThread, RestsWhereItIsOfNoUse) {
@@ -69,8 +70,21 @@ TEST_F(AlertnessOfAThread, RestsWhereItIsOfNoUse) {
   const int awake = awake_of(1000, own_work);
   EXPECT_GE(awake, 50) << "it tries again";
   EXPECT_LE(awake, 200);
-  awake_of(100, microseconds(50));  // from now on it is
+  awake_of(600, microseconds(50));  // from now on it is
   EXPECT_EQ(awake_of(100, microseconds(50)), 100);
+}
+
+TEST_F(AlertnessOfAThread, TriesAgainWhenAllOthersDo) {
+  const auto is_first_try = [](Alertness::Clock::time_point now) {
+    return now.time_since_epoch() % Alertness::kTries < microseconds(305);
+  };
+  for (const int before : {0, 7, 30}) {
+    awake_of(10 + before, microseconds(50));
+    while (wait(microseconds(300))) continue;
+    Alertness::Clock::time_point began = now();
+    while (!wait(microseconds(300))) began = now();
+    EXPECT_TRUE(is_first_try(began)) << before;
+  }
 }
 
 }  // namespace
