@@ -141,3 +141,56 @@ def test_a_daemon_that_dies_in_a_loop_is_noticed(start_daemon):
             await in_a_loop(simulation)
 
     run(daemon, body)
+
+
+def test_steppers_share_a_stream(daemon):
+    async def body(server):
+        simulations = [await server.load_text(decks.body()) for _ in range(4)]
+        steppers = [await simulations[0].stepper([POSITION])]
+        steppers += [await simulation.stepper([POSITION], beside=steppers[0]) for simulation in simulations[1:]]
+        assert len({stepper._stream for stepper in steppers}) == 1
+        await steppers[0].close()
+        with pytest.raises(mbcosim.Unavailable):
+            await steppers[0].step()
+        with pytest.raises(ValueError, match="beside"):
+            await simulations[0].stepper(beside=steppers[0])
+        async with mbcosim.aio.connect(daemon.address) as another:
+            with pytest.raises(ValueError, match="beside"):
+                await (await another.attach(simulations[0].name)).stepper(beside=steppers[1])
+        steppers[0] = await simulations[0].stepper([POSITION], beside=steppers[1])
+        for _ in range(50):  # at once, and in turn
+            await asyncio.gather(*(stepper.step() for stepper in steppers))
+            results = [await stepper.step() for stepper in steppers]
+        assert {result.step for result in results} == {100}
+        assert len({result.values[POSITION].tobytes() for result in results}) == 1
+        for stepper in steppers:
+            await stepper.close()
+        for simulation in simulations:
+            await simulation.delete()
+
+    run(daemon, body)
+
+
+def test_what_ends_one_stepper_leaves_the_others(daemon):
+    async def body(server):
+        quick, slow = await server.load_text(decks.body()), await server.load_text(decks.endless())
+        steppers = [await quick.stepper()]
+        steppers += [await simulation.stepper(beside=steppers[0]) for simulation in (slow, quick)]
+        with pytest.raises(mbcosim.TimedOut):
+            await steppers[1].step(count=10**6, timeout=0.2 * TIME_FACTOR)
+        with pytest.raises(mbcosim.Unavailable):
+            await steppers[1].step()
+        assert (await steppers[0].step()).step == 1
+        with pytest.raises(mbcosim.Error):
+            await steppers[2].step(step_size=-1.0)
+        task = asyncio.ensure_future((await slow.stepper(beside=steppers[0])).step(count=10**6))
+        await asyncio.sleep(0.2)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert (await steppers[0].step()).step == 2
+        await steppers[0].close()
+        for simulation in (quick, slow):
+            await simulation.delete()
+
+    run(daemon, body)

@@ -35,7 +35,7 @@ from .histories import History
 from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, checked_timeout, metadata, parting,
                   runs_calls)
 from .simulation import subscribe_request
-from .stepping import AwaitedStepLine, exchange_step, status_of
+from .stepping import AwaitedSharedStream, AwaitedStepLine, status_of
 
 T = TypeVar("T")
 Self = TypeVar("Self")
@@ -214,11 +214,12 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
             raise PreconditionFailed("the variables are not known yet: await Simulation.describe() first")
         return self._known
 
-    async def stepper(self, outputs: Iterable[str] = (), inputs: Iterable[str] = (), *, timeout: Optional[float] = USUAL) -> Stepper:
-        """An open stream for stepping with the least delay; see Stepper."""
+    async def stepper(self, outputs: Iterable[str] = (), inputs: Iterable[str] = (), *, beside: Optional[Stepper] = None,
+                      timeout: Optional[float] = USUAL) -> Stepper:
+        """An open stream for stepping with the least delay, or, `beside` another stepper, a place on that one's; see Stepper."""
         outputs = list(outputs)
         handles = await self.handles([*outputs, *inputs], timeout=timeout)
-        return Stepper(self, outputs, handles[:len(outputs)], handles[len(outputs):])
+        return Stepper(self, outputs, handles[:len(outputs)], handles[len(outputs):], beside)
 
     async def couple(self, port: str, answer: Optional[Answer] = None, **options: Any) -> Peer:
         """Attaches a peer to a port. `answer` may be a coroutine function; for the options see coupling.Peer."""
@@ -300,18 +301,26 @@ class Events(events.Course):
 
 
 class Stepper:
-    """Steps on one open stream: one message each way per step.
+    """Steps on an open stream: one message each way per step.
 
         async with await simulation.stepper(outputs=["node.structural.1.X"]) as stepper:
             x = (await stepper.step()).values["node.structural.1.X"]
+
+    Many simulations of one connection are stepped on one stream by steppers `beside` the first; see mbcosim.simulation.Stepper.
     """
 
-    def __init__(self, simulation: Simulation, outputs: list[str], output_handles: Iterable[int], input_handles: Iterable[int]) -> None:
+    def __init__(self, simulation: Simulation, outputs: list[str], output_handles: Iterable[int], input_handles: Iterable[int],
+                 beside: Optional[Stepper] = None) -> None:
+        connection = simulation._connection
+        if beside is not None and (beside._stream is None or beside._stream.connection is not connection):
+            raise ValueError("beside: must be a stepper of the same connection that is not over")
         self._simulation, self._outputs = simulation, outputs
         self._request = pb.StepRequest(simulation=simulation.name, outputs=output_handles)
         self._request.inputs.handles.extend(input_handles)
-        connection = simulation._connection
-        self._stream = connection.stubs.simulations.StepStream(metadata=connection.about(simulation.name))
+        stream = AwaitedSharedStream(connection) if beside is None else beside._stream
+        assert stream is not None
+        stream.join(simulation.name)
+        self._stream: Optional[AwaitedSharedStream] = stream
 
     async def __aenter__(self: Self) -> Self:
         return self
@@ -322,7 +331,7 @@ class Stepper:
     async def step(self, values: Optional[npt.ArrayLike] = None, count: int = 1, *, step_size: Optional[float] = None,
                    timeout: Optional[float] = None) -> StepResult:
         """Takes `count` steps, of `step_size` [s] each (default: the deck's); `values`: numbers of the stepper's inputs, one variable after the
-        other. After a timeout the stream is over."""
+        other. After a timeout the stepper is over."""
         request = pb.StepRequest()
         request.CopyFrom(self._request)
         request.steps = count
@@ -330,17 +339,26 @@ class Stepper:
             request.step_size = step_size
         if request.inputs.handles:
             request.inputs.values.extend(np.ravel(np.asarray(values, float)))
-        with translated():
-            reply = await _bounded(timeout, exchange_step(self._stream, request), self._stream.cancel, "the step")
-        return self._simulation.result(reply.step, self._outputs)
+        if self._stream is None:
+            raise Unavailable("the stepper is over", grpc.StatusCode.UNAVAILABLE)
+        checked_timeout(timeout)
+        try:
+            with translated():
+                reply = await _bounded(timeout, self._stream.step(request), lambda: None, "the step")
+        except BaseException:
+            await self.close()
+            raise
+        return self._simulation.result(reply, self._outputs)
 
     async def close(self, *, timeout: Optional[float] = PARTING) -> None:
-        """Ends the stream."""
-        if self._stream.done():
+        """Leaves the stream; the last stepper ends it."""
+        shared, self._stream = self._stream, None
+        stream = shared.leave() if shared is not None else None
+        if stream is None or stream.done():
             return
         with parting():
-            await self._stream.done_writing()
-            await _bounded(timeout, self._stream.code(), self._stream.cancel, "the end of the stream")
+            await stream.done_writing()
+            await _bounded(timeout, stream.code(), stream.cancel, "the end of the stream")
 
 
 class Subscription:

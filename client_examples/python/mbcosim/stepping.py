@@ -176,6 +176,46 @@ async def exchange_step(stream: Any, request: pb.StepRequest) -> pb.StepStreamRe
     return answer
 
 
+class AwaitedSharedStream:
+    """SharedStream for asyncio, within one event loop."""
+
+    def __init__(self, connection: Any) -> None:
+        self.connection = connection
+        self._turn = asyncio.Lock()  # who has it steps
+        self._users = 0
+        self._stream: Any = None
+
+    def join(self, simulation: str) -> None:
+        """See SharedStream.join."""
+        self._users += 1
+        self._open(simulation)
+
+    async def step(self, request: pb.StepRequest) -> pb.StepReply:
+        """See SharedStream.step. Raises grpc.RpcError."""
+        async with self._turn:
+            try:
+                return (await exchange_step(self._open(request.simulation), request)).step
+            except BaseException:  # the reply of a step that nobody awaits any more would be taken for the next one's
+                self._end(cancel=True)
+                raise
+
+    def leave(self) -> Any:
+        """The stream that is to be ended, by the last one."""
+        self._users -= 1
+        return self._end() if self._users == 0 else None
+
+    def _open(self, simulation: str) -> Any:
+        if self._stream is None:
+            self._stream = self.connection.stubs.simulations.StepStream(metadata=self.connection.about(simulation))
+        return self._stream
+
+    def _end(self, cancel: bool = False) -> Any:
+        stream, self._stream = self._stream, None
+        if cancel and stream is not None:
+            stream.cancel()
+        return stream
+
+
 class AwaitedStepLine:
     """StepLine for asyncio, within one event loop."""
 
