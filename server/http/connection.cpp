@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cctype>
 #include <charconv>
 #include <ctime>
@@ -116,12 +117,15 @@ int answer_malformed(mg_connection* raw, int status, const char* message) {
 }
 
 void Peer::look_for_request() {
+  static std::atomic_flag somebody_looks;  // many clients, however quick, keep one core awake
   if (socket < 0) return;
   for_request.begin(Alertness::Clock::now());
+  if (somebody_looks.test_and_set()) return;
   for_request.sees([this] {
     pollfd state{socket, POLLIN, 0};
     return ::poll(&state, 1, 0) != 0;
   });
+  somebody_looks.clear();
 }
 
 Connection::Connection(mg_connection* raw, Reaper& reaper)

@@ -25,7 +25,8 @@ struct Peer {
   bool in_request = false;  ///< that a Connection stands for
   Alertness for_request;    ///< of the thread that serves it
 
-  /// A request is over: looks for the next one, as long as it is likely to come soon.
+  /// A request is over: looks for the next one, as long as it is likely to come soon. One thread
+  /// of all does.
   void look_for_request();
 };
 
