@@ -116,8 +116,8 @@ typename Unary<Request, Reply>::AtOnce on_quick_session(const Parts& parts, Acce
   return [&parts, access, body = std::move(body)](const CallFrame& frame, const Request& request,
                                                   Reply* reply) {
     SessionPtr alive = parts.store.get_alive(request.simulation(), frame.caller, access);
-    if (!alive || !alive->is_quick()) return false;
-    const SessionHold session(std::move(alive));
+    if (!alive || !alive->is_quick() || !alive->lease().take()) return false;
+    const SessionHold session(std::move(alive), std::adopt_lock);
     return body(*session, request, reply, frame);
   };
 }

@@ -190,6 +190,8 @@ class Session {
   class Use {
    public:
     explicit Use(Session& session);
+    /// Takes over what the caller has taken of the lease.
+    Use(Session& session, std::adopt_lock_t) : lease_(session.lease_) {}
     ~Use() { lease_.give_back(); }
     Use(const Use&) = delete;
     Use& operator=(const Use&) = delete;

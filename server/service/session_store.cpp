@@ -108,8 +108,7 @@ SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Call& 
 SessionPtr SessionStore::get_alive(const std::string& id, const Caller& caller,
                                    Access access) const {
   Guard guard(mutex_);
-  SessionPtr session = find(id, caller, access, "");
-  return session && !session->lease().ended() ? session : nullptr;
+  return find(id, caller, access, "");
 }
 
 // Null: it is not alive, or the caller may not see it.

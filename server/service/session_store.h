@@ -80,8 +80,7 @@ class SessionStore {
   /// One that is on the disk is brought back; CANCELLED when the call ends first.
   SessionPtr get(const std::string& id, const Caller& caller, Call& call, Access access,
                  const std::string& port = "") const;
-  /// The same of one that is in memory; null: it is not, or is about to leave it, or the caller may
-  /// not see it.
+  /// The same of one that is in memory; null: it is not, or the caller may not see it.
   SessionPtr get_alive(const std::string& id, const Caller& caller, Access access) const;
   /// What the caller may see, in the order of creation.
   std::vector<SessionPtr> list(const Caller& caller) const;
@@ -148,12 +147,15 @@ class SessionHold {
   SessionHold(const SessionStore& store, const std::string& id, const Caller& caller, Call& call,
               Access access, const std::string& port = "")
       : SessionHold(find(store, id, caller, call, access, port)) {}
-  /// Throws NO_SUCH_SIMULATION when its lease has ended.
-  explicit SessionHold(SessionPtr session) : session_(std::move(session)), use_(*session_) {}
+  /// Takes over what the caller has taken of the lease.
+  SessionHold(SessionPtr session, std::adopt_lock_t adopt)
+      : session_(std::move(session)), use_(*session_, adopt) {}
   Session& operator*() const { return *session_; }
   Session* operator->() const { return session_.get(); }
 
  private:
+  explicit SessionHold(SessionPtr session) : session_(std::move(session)), use_(*session_) {}
+
   // A session that is going to the disk at the moment can be taken when it is there.
   static SessionPtr find(const SessionStore& store, const std::string& id, const Caller& caller,
                          Call& call, Access access, const std::string& port) {

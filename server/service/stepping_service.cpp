@@ -61,9 +61,9 @@ class StepStreamHandler final : public Handler {
   /// Only of one that is in memory: from the disk it takes a while.
   bool hold_alive(const Caller& caller) {
     SessionPtr session = parts_.store.get_alive(request_.simulation(), caller, Access::control);
-    if (!session) return false;
+    if (!session || !session->lease().take()) return false;
     name_ = request_.simulation();
-    session_.emplace(std::move(session));
+    session_.emplace(std::move(session), std::adopt_lock);
     return true;
   }
   void hold(Exchange& exchange) {
