@@ -19,7 +19,7 @@ namespace mbcosim::server {
 class Alertness {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::microseconds kSoon{400}, kShort{200}, kLost{1000};
+  static constexpr std::chrono::microseconds kSoon{500}, kShort{300}, kLost{1000};
   static constexpr std::chrono::milliseconds kTries{25};  ///< from one to the next
 
   /// A wait begins.
