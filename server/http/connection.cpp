@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cctype>
 #include <charconv>
 #include <ctime>
 
@@ -54,7 +53,7 @@ class Head {
     if (!keep) mg_disable_connection_keep_alive(raw_);
     add("Connection", keep ? "keep-alive" : "close");
   }
-  /// With the beginning of the body.
+  /// With the body, in one piece unless it is long.
   void send(std::string_view body = {}) {
     constexpr std::size_t kTogether = 1 << 16;  // bytes
     text_.append("\r\n");
@@ -77,20 +76,15 @@ std::string chunk(std::string_view bytes) {
   return text.append("\r\n").append(bytes).append("\r\n");
 }
 
-bool equal_but_for_case(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
-    return std::tolower(x) == std::tolower(y);
-  });
-}
-
-/// Is `word` one of "a, b, c"?
+/// Is `word` one of "a, b, c", in whatever case?
 bool is_one_of(std::string_view word, std::string_view list) {
   while (!list.empty()) {
     std::string_view each = list.substr(0, list.find(','));
     list.remove_prefix(std::min(each.size() + 1, list.size()));
     each.remove_prefix(std::min(each.find_first_not_of(' '), each.size()));
     each = each.substr(0, each.find_last_not_of(' ') + 1);
-    if (equal_but_for_case(each, word)) return true;
+    const bool as_long = each.size() == word.size();
+    if (as_long && mg_strncasecmp(each.data(), word.data(), word.size()) == 0) return true;
   }
   return false;
 }

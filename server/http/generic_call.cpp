@@ -2,6 +2,7 @@
 
 #include <grpc/support/time.h>
 
+#include "rpc/methods.h"
 #include "threads/alertness.h"
 
 namespace mbcosim::server::http {
@@ -19,17 +20,6 @@ void* tag() {  // one operation at a time: any tag will do
 grpc::ByteBuffer buffer_of(std::string_view bytes) {
   const grpc::Slice slice(bytes.data(), bytes.size());
   return {&slice, 1};
-}
-
-/// No value: it cannot be decompressed.
-std::optional<std::string> joined(const grpc::ByteBuffer& buffer) {
-  std::vector<grpc::Slice> slices;
-  if (!buffer.Dump(&slices).ok()) return std::nullopt;
-  std::string bytes;
-  bytes.reserve(buffer.Length());
-  for (const grpc::Slice& slice : slices)
-    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
-  return bytes;
 }
 
 }  // namespace
@@ -52,13 +42,6 @@ GenericCall::~GenericCall() {
 }
 
 bool GenericCall::done() {
-  for_reply.begin(Alertness::Clock::now());
-  const bool ok = take();
-  for_reply.end(Alertness::Clock::now());
-  return ok;
-}
-
-bool GenericCall::take() {
   using Status = grpc::CompletionQueue::NextStatus;
   void* tag = nullptr;
   bool ok = false;
@@ -67,9 +50,12 @@ bool GenericCall::take() {
     status = queue_.AsyncNext(&tag, &ok, deadline);
     return status != Status::TIMEOUT;
   };
-  if (!for_reply.sees([&] { return comes_by(gpr_time_0(GPR_CLOCK_MONOTONIC)); }))
-    while (!comes_by(std::chrono::system_clock::now() + kHangUpLook))
-      if (gone_()) context_.TryCancel();
+  for_reply.wait([&] { return comes_by(gpr_time_0(GPR_CLOCK_MONOTONIC)); },
+                 [&] {
+                   while (!comes_by(std::chrono::system_clock::now() + kHangUpLook))
+                     if (gone_()) context_.TryCancel();
+                   return true;
+                 });
   return status == Status::GOT_EVENT && ok;
 }
 
@@ -80,12 +66,7 @@ GenericCall::Answer GenericCall::ask(std::string_view request) {
   call->StartCall();
   call->Finish(&reply, &answer.status, tag());
   done();
-  if (!answer.status.ok()) return answer;
-  std::optional<std::string> bytes = joined(reply);
-  if (bytes)
-    answer.reply = std::move(*bytes);
-  else
-    answer.status = {grpc::StatusCode::INTERNAL, "a reply cannot be decompressed"};
+  if (answer.status.ok()) answer.reply = joined(reply);
   return answer;
 }
 

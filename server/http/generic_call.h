@@ -45,7 +45,6 @@ class GenericCall {
  private:
   /// Waits for the operation just started.
   bool done();
-  bool take();
 
   const std::string path_;
   grpc::ClientContext context_;

@@ -119,11 +119,8 @@ Channel::Received Channel::receive(google::protobuf::MessageLite* message,
 // True: some of it is there, or nothing will be.
 bool Channel::wait_for_message(Clock::time_point until) {
   const auto ready = [this, reader = &reader_] { return closed() || reader->available() > 0; };
-  for_message_.begin(Clock::now());
-  const bool there =
-      for_message_.sees([&] { return look(ready); }) || wait_until(data_, until, ready);
-  for_message_.end(Clock::now());
-  return there;
+  return for_message_.wait([&] { return look(ready); },
+                           [&] { return wait_until(data_, until, ready); });
 }
 
 Channel::Received Channel::try_receive(google::protobuf::MessageLite* message) {

@@ -37,6 +37,14 @@ class Alertness {
       if (look()) return true;
     return false;
   }
+  /// A whole wait, in which `sleep` does what is left. Whether it has come.
+  template <class Look, class Sleep>
+  bool wait(Look look, Sleep sleep) {
+    begin(Clock::now());
+    const bool came = sees(look) || sleep();
+    end(Clock::now());
+    return came;
+  }
   /// After each look in vain: others may have the core.
   void yield() {
     const Clock::time_point before = Clock::now();

@@ -194,3 +194,19 @@ def test_what_ends_one_stepper_leaves_the_others(daemon):
             await simulation.delete()
 
     run(daemon, body)
+
+
+def test_a_step_whose_stepper_is_closed_while_it_waits_opens_no_stream(daemon):
+    async def body(server):
+        async with await server.load_text(decks.body()) as simulation:
+            stepper = await simulation.stepper()
+            shared = stepper._stream
+            async with shared._turn:
+                waiting = asyncio.ensure_future(stepper.step())
+                await asyncio.sleep(0.05)
+                await stepper.close()
+            with pytest.raises(mbcosim.Unavailable, match="over"):
+                await waiting
+            assert shared._stream is None and (await simulation.step()).step == 1
+
+    run(daemon, body)

@@ -159,6 +159,27 @@ def test_threads_take_turns_on_a_shared_stream(server):
             stepper.close()
 
 
+def test_a_step_whose_stepper_is_closed_while_it_waits_opens_no_stream(server):
+    with server.load_text(decks.body()) as simulation:
+        stepper, caught = simulation.stepper(), []
+        shared = stepper._stream
+
+        def step():
+            try:
+                stepper.step()
+            except mbcosim.Error as error:
+                caught.append(error)
+
+        thread = threading.Thread(target=step)
+        with shared._turn:
+            thread.start()
+            time.sleep(0.1 * TIME_FACTOR)
+            stepper.close()
+        thread.join()
+        assert [type(error) for error in caught] == [mbcosim.Unavailable]
+        assert shared._replies is None and simulation.step().step == 1
+
+
 def test_until_time_equals_steps(server, tumbling, reference):
     with server.load(tumbling) as simulation:
         result = simulation.run_until(2.0)

@@ -144,6 +144,8 @@ class SharedStream:
 
     def _open(self, simulation: str) -> Any:
         with self._state:
+            if self._users == 0:
+                raise Unavailable("the stepper is over", grpc.StatusCode.UNAVAILABLE)
             if self._replies is None:
                 self._requests, self._replies = _open_stream(self.connection.stubs.simulations, self.connection.about(simulation))
             return self._replies
@@ -191,7 +193,7 @@ class AwaitedSharedStream:
         self._open(simulation)
 
     async def step(self, request: pb.StepRequest) -> pb.StepReply:
-        """See SharedStream.step. Raises grpc.RpcError."""
+        """See SharedStream.step. Raises grpc.RpcError, mbcosim.Unavailable."""
         async with self._turn:
             try:
                 return (await exchange_step(self._open(request.simulation), request)).step
@@ -205,6 +207,8 @@ class AwaitedSharedStream:
         return self._end() if self._users == 0 else None
 
     def _open(self, simulation: str) -> Any:
+        if self._users == 0:
+            raise Unavailable("the stepper is over", grpc.StatusCode.UNAVAILABLE)
         if self._stream is None:
             self._stream = self.connection.stubs.simulations.StepStream(metadata=self.connection.about(simulation))
         return self._stream
