@@ -2,6 +2,7 @@
 import contextlib
 import threading
 import time
+from concurrent import futures
 
 import grpc
 import pytest
@@ -160,23 +161,15 @@ def test_threads_take_turns_on_a_shared_stream(server):
 
 
 def test_a_step_whose_stepper_is_closed_while_it_waits_opens_no_stream(server):
-    with server.load_text(decks.body()) as simulation:
-        stepper, caught = simulation.stepper(), []
+    with server.load_text(decks.body()) as simulation, futures.ThreadPoolExecutor() as pool:
+        stepper = simulation.stepper()
         shared = stepper._stream
-
-        def step():
-            try:
-                stepper.step()
-            except mbcosim.Error as error:
-                caught.append(error)
-
-        thread = threading.Thread(target=step)
         with shared._turn:
-            thread.start()
+            waiting = pool.submit(stepper.step)
             time.sleep(0.1 * TIME_FACTOR)
             stepper.close()
-        thread.join()
-        assert [type(error) for error in caught] == [mbcosim.Unavailable]
+        with pytest.raises(mbcosim.Unavailable, match="over"):
+            waiting.result()
         assert shared._replies is None and simulation.step().step == 1
 
 
