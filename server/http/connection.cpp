@@ -14,7 +14,8 @@
 namespace mbcosim::server::http {
 namespace {
 
-constexpr std::chrono::milliseconds kLinger{2000};  // for the rest of a request that is refused
+constexpr std::chrono::milliseconds kRestTime{10000};  // for what is left of a refused request
+constexpr std::size_t kPiece = 1 << 13;  // bytes; civetweb's threads have stacks of 100 KiB
 
 // civetweb does not tell the socket of a connection: it is the one with this peer.
 int find_socket(const mg_request_info& info) {
@@ -150,7 +151,7 @@ Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   body->clear();
   if (info_->content_length > static_cast<long long>(limit)) return Body::too_long;
   reaper_.arm(socket_, kTransferTime);
-  std::array<char, 1 << 13> piece;  // civetweb's threads have stacks of 100 KiB
+  std::array<char, kPiece> piece;
   for (;;) {
     const int count = mg_read(raw_, piece.data(), piece.size());
     if (count < 0) return Body::broken;
@@ -183,8 +184,15 @@ void Connection::respond(int status, std::string_view content_type, std::string_
   head.add("Content-Length", std::to_string(body.size()));
   head.keep_connection(!unread && stays());
   head.send(method() == "HEAD" ? std::string_view() : body);
-  // civetweb reads on to the end of the request; whoever sends it slowly is cut off.
-  if (unread) reaper_.arm(socket_, kLinger);
+  if (unread) drop_rest();
+}
+
+// A connection that is closed before it was read to its end is reset: the client, which still
+// sends, would never see the answer (RFC 9112, 9.6). Whoever sends slowly is cut off.
+void Connection::drop_rest() {
+  reaper_.arm(socket_, kRestTime);
+  std::array<char, kPiece> piece;
+  while (mg_read(raw_, piece.data(), piece.size()) > 0) continue;
 }
 
 bool Connection::start_stream(std::string_view content_type, const Headers& headers) {

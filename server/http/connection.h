@@ -63,6 +63,7 @@ class Connection {
 
  private:
   bool stays() const;
+  void drop_rest();
   bool send_all(std::string_view bytes);
 
   mg_connection* raw_;

@@ -280,6 +280,21 @@ def test_a_body_over_the_limit_is_refused_with_its_name(door):
     assert error["details"][0]["debug"]["metadata"] == {"limit": "message_bytes", "maximum": "1000000"}
 
 
+@pytest.mark.parametrize("token, status", [(True, b"429"), (False, b"401")], ids=["too_long", "no_token"])
+def test_who_still_sends_a_refused_body_gets_the_answer(door, token, status):
+    body = b"x" * 5_000_000
+    head = f"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nContent-Type: application/json\r\n"
+    head += (f"Authorization: Bearer {door.token}\r\n" if token else "") + f"Content-Length: {len(body)}\r\n\r\n"
+    with door.raw() as link:
+        link.sendall(head.encode() + body[:1000])
+        time.sleep(0.3)  # the answer is there, and the connection was closed if nobody reads on
+        for start in range(1000, len(body), 1_000_000):
+            link.sendall(body[start:start + 1_000_000])
+            time.sleep(0.05)
+        answer = link.makefile("rb").read()  # to the end of the connection, which is no reset
+    assert answer.startswith(b"HTTP/1.1 " + status) and b"Connection: close" in answer
+
+
 def field(number, content):
     """Of bytes, as protobuf writes it."""
     length, digits = len(content), b""
