@@ -1,6 +1,46 @@
 #include "elements/element.h"
 
+#include <algorithm>
+
 namespace mbcosim {
+
+namespace {
+
+/// Its place in `list`, to which it is added if there is room; −1: there is none.
+int find_or_add(int what, int* list, int size, int* count, int* added) {
+  const int* const at = std::find(list, list + *count, what);
+  if (at != list + *count) return static_cast<int>(at - list);
+  if (*count == size) return -1;
+  ++*added;
+  list[*count] = what;
+  return (*count)++;
+}
+
+}  // namespace
+
+LocalDof Connector::see(const NodeDof& dof) {
+  const Model& model = builder_.model();
+  LocalDof l;
+  l.component = dof.component;
+  l.order = dof.order;
+  if (!dof.structural) {
+    if (model.scalars[dof.node].kind != ScalarKind::parameter)
+      l.scalar = find_or_add(dof.node, c_.scalar, kMaxScalars, &c_.scalar_count, &c_.seen_scalars);
+    return l;
+  }
+  const bool is_velocity = dof.order == 1 && dof.component < 6;
+  const bool is_position = dof.order == 0 && dof.component < 3;
+  if ((is_velocity || is_position) && !model.structural[dof.node].is_dummy())
+    l.node = find_or_add(dof.node, c_.node, kMaxNodes, &c_.node_count, &c_.seen_nodes);
+  return l;
+}
+
+void Connector::follow(const void* drive, const std::vector<NodeDof>& dofs) {
+  if (dofs.empty() || dofs.size() > kMaxFollowed) return;
+  FollowedDofs& followed = c_.followed.emplace_back();
+  followed.drive = drive;
+  for (const NodeDof& dof : dofs) followed.dofs.push_back(see(dof));
+}
 
 void PlacedElements::gather(const EvalContext& context, const Place& p, Local<double>& u) const {
   const Model& model = *context.model;

@@ -38,6 +38,8 @@
 ///     void add_inertia(const Local<double>&, int node, Inertia&) const
 ///     static constexpr bool momentum_rows = true               has r.momentum(k, …): rows 1–6
 ///     static constexpr bool rotation_parameters = true         u.g(k), u.gp(k) are gathered
+///     static constexpr bool follows_drives = true        calls Connector::drives though it has a
+///         tangent: where they follow the state the matrix is that of `residual`
 ///     static constexpr bool constant_structure = true          entries of its matrix that vanish
 ///         at one state vanish at all: no branch depends on the state or on a drive
 ///     template <class E> static constexpr std::array<MovablePart<E>, n> movable_parts()   what

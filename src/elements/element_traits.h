@@ -83,24 +83,19 @@ concept HasMovableParts = requires {
 };
 template <class E>
 constexpr bool uses_momentum() {
-  if constexpr (requires { E::momentum_rows; })
-    return E::momentum_rows;
-  else
-    return false;
+  return requires { requires E::momentum_rows; };
 }
 template <class E>
 constexpr bool uses_parameters() {
-  if constexpr (requires { E::rotation_parameters; })
-    return E::rotation_parameters;
-  else
-    return false;
+  return requires { requires E::rotation_parameters; };
 }
 template <class E>
 constexpr bool has_constant_structure() {
-  if constexpr (requires { E::constant_structure; })
-    return E::constant_structure;
-  else
-    return false;
+  return requires { requires E::constant_structure; };
+}
+template <class E>
+constexpr bool follows_drives() {
+  return requires { requires E::follows_drives; };
 }
 
 }  // namespace mbcosim::detail

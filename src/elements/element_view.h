@@ -7,6 +7,7 @@
 #include "math/types.h"
 #include "model/check.h"
 #include "model/context.h"
+#include "model/drive.h"
 #include "model/element_set.h"
 #include "model/model.h"
 #include "model/output_row.h"
@@ -18,21 +19,6 @@ constexpr int kMaxScalars = 8;
 constexpr int kMaxOwn = 24;
 constexpr int kMaxLocal = 6 * kMaxNodes + kMaxScalars + kMaxOwn;
 
-/// Where an element is attached. Local columns and equilibrium rows: 6 (3) per node, 1 per scalar
-/// dof, then own unknowns.
-struct Connection {
-  int node_count = 0, scalar_count = 0, own_count = 0;
-  int node[kMaxNodes];      ///< structural node index
-  int scalar[kMaxScalars];  ///< scalar node index
-  bool own_differential[kMaxOwn] = {};
-  int own = -1;     ///< first own unknown
-  int memory = -1;  ///< offset in State::memory
-  int memory_count = 0;
-  int scratch_count = 0;  ///< doubles that it needs in Scratch::local
-  int sums = -1;          ///< offset in Scratch::sums
-  int sum_count = 0;
-};
-
 /// Handle of a scalar degree of freedom inside an element: a scalar node, or one component of a
 /// connected structural node.
 struct LocalDof {
@@ -40,6 +26,30 @@ struct LocalDof {
   int node = -1;    ///< local node index and
   int component = 0;
   int order = 0;
+};
+
+/// What a drive of an element follows at once, in the order of its slopes; without node and scalar
+/// where the matrix leaves it out.
+struct FollowedDofs {
+  const void* drive;
+  std::vector<LocalDof> dofs;
+};
+
+/// Where an element is attached. Local columns and equilibrium rows: 6 (3) per node, 1 per scalar
+/// dof, then own unknowns.
+struct Connection {
+  int node_count = 0, scalar_count = 0, own_count = 0;
+  int seen_nodes = 0, seen_scalars = 0;  ///< the last ones, which only drives see: without rows
+  int node[kMaxNodes];                   ///< structural node index
+  int scalar[kMaxScalars];               ///< scalar node index
+  bool own_differential[kMaxOwn] = {};
+  int own = -1;     ///< first own unknown
+  int memory = -1;  ///< offset in State::memory
+  int memory_count = 0;
+  int scratch_count = 0;  ///< doubles that it needs in Scratch::local
+  int sums = -1;          ///< offset in Scratch::sums
+  int sum_count = 0;
+  std::vector<FollowedDofs> followed;
 };
 
 class Connector {
@@ -53,12 +63,14 @@ class Connector {
   /// As `node`, but never merged with an equal one: local index k is the k-th call.
   int distinct_node(int structural_node) {
     MBCOSIM_CHECK(c_.node_count < kMaxNodes, "an element has more nodes than there is room for");
+    MBCOSIM_CHECK(c_.seen_nodes == 0, "a node is connected after drives");
     c_.node[c_.node_count] = structural_node;
     return c_.node_count++;
   }
   int scalar(int scalar_node) {
     MBCOSIM_CHECK(c_.scalar_count < kMaxScalars,
                   "an element has more scalar dofs than there is room for");
+    MBCOSIM_CHECK(c_.seen_scalars == 0, "a scalar dof is connected after drives");
     c_.scalar[c_.scalar_count] = scalar_node;
     return c_.scalar_count++;
   }
@@ -71,6 +83,17 @@ class Connector {
     else
       l.scalar = scalar(d.node);
     return l;
+  }
+  /// What drives follow at once shall be in the matrix of Newton's method (Local::drive). Called
+  /// when all nodes and dofs are connected that the element acts on.
+  template <class... DriveP>
+  void drives(const DriveP&... drives) {
+    const auto follow_one = [&](const auto& drive) {
+      std::vector<NodeDof> dofs;
+      drive->collect_followed(dofs);
+      follow(drive.get(), dofs);
+    };
+    (follow_one(drives), ...);
   }
   void algebraic(int count) { own(count, false); }
   void differential(int count) { own(count, true); }
@@ -94,6 +117,8 @@ class Connector {
   }
 
  private:
+  void follow(const void* drive, const std::vector<NodeDof>& dofs);
+  LocalDof see(const NodeDof& dof);
   void own(int count, bool differential) {
     MBCOSIM_CHECK(c_.own_count + count <= kMaxOwn,
                   "an element has more unknowns than there is room for");
@@ -158,8 +183,30 @@ class Local {
     return context->scratch->sums[offset];
   }
   int label() const { return info->label; }
-  T drive(const DrivePtr& d) const { return d->value_as<T>(*context); }
-  Vec<T> drive(const Vec3DrivePtr& d) const { return d->template value_as<T>(*context); }
+  T drive(const DrivePtr& d) const {
+    T r = d->value_as<T>(*context);
+    if constexpr (kByIncrements)
+      if (const FollowedDofs* followed = followed_by(d.get())) {
+        std::array<double, kMaxFollowed> slopes;
+        double* next = slopes.data();
+        d->write_slopes(*context, 1, next);
+        for (std::size_t k = 0; k < followed->dofs.size(); ++k)
+          follow(followed->dofs[k], slopes[k], r);
+      }
+    return r;
+  }
+  Vec<T> drive(const Vec3DrivePtr& d) const {
+    Vec<T> r = d->template value_as<T>(*context);
+    if constexpr (kByIncrements)
+      if (const FollowedDofs* followed = followed_by(d.get())) {
+        std::array<Vec3, kMaxFollowed> slopes;
+        Vec3* next = slopes.data();
+        d->write_slopes(*context, next);
+        for (std::size_t k = 0; k < followed->dofs.size(); ++k)
+          for (int i = 0; i < 3; ++i) follow(followed->dofs[k], slopes[k](i), r(i));
+      }
+    return r;
+  }
   const Model& model() const { return *context->model; }
 
   const EvalContext* context = nullptr;
@@ -168,6 +215,20 @@ class Local {
   LocalNode<T> nodes[kMaxNodes];
   T scalar_values[kMaxScalars], scalar_rates[kMaxScalars];
   T own_values[kMaxOwn], own_rates[kMaxOwn];
+
+ private:
+  static constexpr bool kByIncrements = !std::is_same_v<T, double> && !std::is_same_v<T, TimeDual>;
+  const FollowedDofs* followed_by(const void* drive) const {
+    if (!context->follows) return nullptr;
+    for (const FollowedDofs& each : connection->followed)
+      if (each.drive == drive) return &each;
+    return nullptr;
+  }
+  void follow(const LocalDof& d, double slope, T& value) const {
+    if (d.scalar < 0 && d.node < 0) return;
+    const T x = dof(d);
+    for (int j = 0; j < T::directions; ++j) value.d[j] += slope * x.d[j];
+  }
 };
 
 /// Where an element puts its contributions; everything is added.

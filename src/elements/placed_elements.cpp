@@ -17,13 +17,15 @@ void append_rows_columns(const Model& model, const Connection& c, bool momentum,
     const StructuralNode& node = model.structural[c.node[k]];
     const int count = node.position_unknowns();
     for (int i = 0; i < 6; ++i) {
-      rows.push_back(i < count ? node.equilibrium + i : -1);
+      const bool has_row = i < count && k < c.node_count - c.seen_nodes;
+      rows.push_back(has_row ? node.equilibrium + i : -1);
       columns.push_back(i < count ? node.first + i : -1);
     }
   }
   for (int i = 0; i < c.scalar_count; ++i) {
-    rows.push_back(model.scalars[c.scalar[i]].unknown);
-    columns.push_back(model.scalars[c.scalar[i]].unknown);
+    const int unknown = model.scalars[c.scalar[i]].unknown;
+    rows.push_back(i < c.scalar_count - c.seen_scalars ? unknown : -1);
+    columns.push_back(unknown);
   }
   for (int i = 0; i < c.own_count; ++i) {
     rows.push_back(c.own + i);
@@ -45,7 +47,7 @@ std::string PlacedElements::row_name(int, int k) const {
 
 std::vector<int> PlacedElements::nodes(int i) const {
   const Connection& c = place(i).connection;
-  return std::vector<int>(c.node, c.node + c.node_count);
+  return std::vector<int>(c.node, c.node + c.node_count - c.seen_nodes);
 }
 
 const ElementInfo* PlacedElements::keep(ElementInfo info) {
@@ -72,7 +74,8 @@ void PlacedElements::find_structure(const std::vector<StructureProbe>& probes) {
     Place& p = place(e);
     p.first_entry = static_cast<int>(entries_.size());
     std::vector<bool> vanishes;
-    const bool constant = traits_.constant_structure && info(e).hints.empty();
+    const bool constant =
+        traits_.constant_structure && info(e).hints.empty() && p.connection.followed.empty();
     if (constant && !probes.empty()) vanishes = vanishing(e, probes);
     for (int j = 0; j < p.column_count; ++j)
       for (int i = 0; i < p.row_count; ++i) {

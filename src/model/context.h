@@ -19,7 +19,8 @@ struct EvalContext {
                     ///< are taken apart
   double c_algebraic = 1;  ///< ∂ẏ/∂y of algebraic unknowns (bookkeeping)
   Phase phase = Phase::step;
-  Scratch* scratch = nullptr;           ///< of elements; null where results are read
+  bool follows = false;        ///< matrices know what drives follow at once: Newton's in steps do
+  Scratch* scratch = nullptr;  ///< of elements; null where results are read
   Vec3 uniform_gravity = Vec3::Zero();  ///< [m/s²]; see Model::gravity_at for any point
 };
 

@@ -7,8 +7,12 @@
 #include "math/dual.h"
 #include "math/types.h"
 #include "model/fwd.h"
+#include "model/node.h"
 
 namespace mbcosim {
+
+/// Of a drive with more the slopes are not asked for.
+constexpr int kMaxFollowed = 16;
 
 /// A scalar function. Immutable: what a drive remembers (sample and hold, random seeds, filters)
 /// lives in `State::memory` at an offset that it got from `ModelBuilder::allocate_memory`; it
@@ -29,6 +33,12 @@ class Drive {
   /// Value in time as any scalar: a TimeDual carries the derivative when there is one, else zero.
   template <class T>
   T value_as(const EvalContext& context) const;
+
+  /// Degrees of freedom that the value in time follows at once, as far as it is known how: they
+  /// belong into Newton's matrix. One may come twice.
+  virtual void collect_followed(std::vector<NodeDof>&) const {}
+  /// Writes factor · ∂value/∂dof, value in time, for each of them in the same order.
+  virtual void write_slopes(const EvalContext&, double /*factor*/, double*& /*next*/) const {}
 };
 
 /// Registered with ModelBuilder::on_step.
@@ -57,7 +67,21 @@ class TplDrive {
   /// Value in time as any scalar type (3-vectors); a TimeDual carries the time derivative.
   template <class T>
   Eigen::Matrix<T, R, C> value_as(const EvalContext& context) const;
+
+  /// As those of a scalar drive.
+  virtual void collect_followed(std::vector<NodeDof>&) const {}
+  virtual void write_slopes(const EvalContext&, Value*& /*next*/) const {}
 };
+
+/// Slopes of `drive`, each times `direction`.
+template <class Value>
+void write_directed_slopes(const EvalContext& context, const Drive& drive, const Value& direction,
+                           Value*& next) {
+  std::array<double, kMaxFollowed> slopes;
+  double* end = slopes.data();
+  drive.write_slopes(context, 1, end);
+  for (const double* slope = slopes.data(); slope != end; ++slope) *next++ = *slope * direction;
+}
 
 /// drive.derivative at t = context.time.
 double derivative_in_time(const Drive& drive, const EvalContext& context);

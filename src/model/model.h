@@ -154,6 +154,8 @@ class Model {
   /// "x", "xP".
   int structural_datum(int node, std::string_view name) const;
   double structural_datum_value(const EvalContext& context, int node, int datum) const;
+  /// The degree of freedom that a datum is, if it is one.
+  static std::optional<NodeDof> dof_of_structural_datum(int node, int datum);
   static std::vector<std::string> structural_data_names(const StructuralNode& node);
 
   /// Values in the sparse pattern as a full matrix (n, n).

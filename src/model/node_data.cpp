@@ -105,6 +105,15 @@ double Model::structural_datum_value(const EvalContext& context, int node, int d
   return euler_parameters(vector_datum(*this, context, node, kPhi))[i];
 }
 
+std::optional<NodeDof> Model::dof_of_structural_datum(int node, int datum) {
+  const int group = datum / kSlots, i = datum % kSlots;
+  if (group == kX) return NodeDof{.structural = true, .node = node, .component = i, .order = 0};
+  if (group == kXP) return NodeDof{.structural = true, .node = node, .component = i, .order = 1};
+  if (group == kOmega)
+    return NodeDof{.structural = true, .node = node, .component = 3 + i, .order = 1};
+  return std::nullopt;
+}
+
 std::vector<std::string> Model::structural_data_names(const StructuralNode& node) {
   std::vector<std::string> names;
   const bool accelerations =

@@ -97,6 +97,9 @@ struct InitialValueSettings {
   } abort_after = AbortAfter::never;
   bool messages = true;  ///< `.out` tells of the derivatives phase, the dummy steps and each step
   std::optional<EigenSettings> eigenanalysis;  ///< of the last card
+
+  /// Do results depend on how many iterations a step takes?
+  bool iterations_count() const { return at_most || strategy == StepStrategy::factor; }
 };
 
 struct ControlSettings {

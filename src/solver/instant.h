@@ -35,7 +35,13 @@ class InstantSystem final : public NewtonSystem {
   Coefficients coefficients() const override { return {c_, ca_}; }
 
  private:
-  EvalContext context() const { return model_.context(state_, phase_, c_, ca_); }
+  EvalContext context() const {
+    EvalContext r = model_.context(state_, phase_, c_, ca_);
+    // MBDyn's matrix does not: that shows where a phase is cut off after a number of iterations, as
+    // that of derivatives after one.
+    r.follows = phase_ == Phase::step && !model_.initial_value.iterations_count();
+    return r;
+  }
   /// Do derivatives of external loads enter the matrix?
   bool by_tangents() const { return ws_.tangents && phase_ == Phase::step; }
 

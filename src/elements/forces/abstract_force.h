@@ -19,6 +19,7 @@ struct AbstractForce {
   void connect(Connector& c) {
     l1 = c.dof(first);
     if (internal) l2 = c.dof(second);
+    c.drives(d);
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {

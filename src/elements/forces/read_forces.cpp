@@ -21,6 +21,12 @@ class DirectedDrive : public TplDrive<3, 1> {
     return has_derivative() ? Vec3(direction_ * derivative_in_time(*magnitude_, context))
                             : Vec3::Zero();
   }
+  void collect_followed(std::vector<NodeDof>& dofs) const override {
+    magnitude_->collect_followed(dofs);
+  }
+  void write_slopes(const EvalContext& context, Vec3*& next) const override {
+    write_directed_slopes(context, *magnitude_, direction_, next);
+  }
 
  private:
   Vec3 direction_;

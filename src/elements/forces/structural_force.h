@@ -1,8 +1,7 @@
 /// Forces and couples on structural nodes, given by vector drives. MBDyn input manual, "Force
 /// elements".
 ///
-/// The drives may depend on the state (`dof`, `node`, `element`): such dependences are not in the
-/// Jacobian.
+/// The drives may depend on the state; the matrix of Newton's method knows it of `dof` and `node`.
 #pragma once
 
 #include "elements/element.h"
@@ -23,8 +22,12 @@ struct StructuralForce {
 
   static constexpr int width = 6;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
+  static constexpr bool follows_drives = true;
 
-  void connect(Connector& c) { c.node(node); }
+  void connect(Connector& c) {
+    c.node(node);
+    c.drives(d);
+  }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     const Vec<T> f = force(u);
@@ -52,7 +55,10 @@ struct StructuralCouple {
   static constexpr int width = 6;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
 
-  void connect(Connector& c) { c.node(node); }
+  void connect(Connector& c) {
+    c.node(node);
+    c.drives(d);
+  }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     r.moment(0, moment(u));
@@ -87,6 +93,7 @@ struct InternalForce {
   void connect(Connector& c) {
     k1 = c.node(first);
     k2 = c.node(second);
+    c.drives(d);
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
@@ -119,6 +126,7 @@ struct InternalCouple {
   void connect(Connector& c) {
     k1 = c.node(first);
     k2 = c.node(second);
+    c.drives(d);
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
@@ -150,7 +158,10 @@ struct TotalForce {
   static constexpr int width = 6;
   static constexpr AssemblyRole assembly = AssemblyRole::holonomic;
 
-  void connect(Connector& c) { c.node(node); }
+  void connect(Connector& c) {
+    c.node(node);
+    c.drives(df, dm);
+  }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     const Vec<T> force = u.R(0) * (Rf * u.drive(df));
@@ -177,6 +188,7 @@ struct TotalInternalForce {
   void connect(Connector& c) {
     k1 = c.node(first);
     k2 = c.node(second);
+    c.drives(df, dm);
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {

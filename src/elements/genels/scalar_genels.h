@@ -22,6 +22,7 @@ struct GenelClamp {
   void connect(Connector& c) {
     l = c.dof(dof);
     c.algebraic(1);
+    c.drives(d);
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
@@ -46,6 +47,7 @@ struct GenelDistance {
     l1 = c.dof(first);
     l2 = c.dof(second);
     c.algebraic(1);
+    c.drives(d);
   }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {

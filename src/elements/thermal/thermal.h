@@ -46,7 +46,10 @@ struct ThermalSource {
   DrivePtr heat;  ///< [W]
 
   static constexpr int width = 1;
-  void connect(Connector& c) const { c.scalar(node); }
+  void connect(Connector& c) const {
+    c.scalar(node);
+    c.drives(heat);
+  }
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     r.scalar(0, u.drive(heat));

@@ -17,6 +17,14 @@ double ProductDrive::derivative(const EvalContext& context, double t) const {
   return f_->derivative(context, t) * g_->value(context, t) +
          f_->value(context, t) * g_->derivative(context, t);
 }
+void ProductDrive::collect_followed(std::vector<NodeDof>& dofs) const {
+  f_->collect_followed(dofs);
+  g_->collect_followed(dofs);
+}
+void ProductDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
+  f_->write_slopes(context, factor * g_->value(context), next);
+  g_->write_slopes(context, factor * f_->value(context), next);
+}
 
 namespace {
 
@@ -42,6 +50,12 @@ double SumDrive::derivative(const EvalContext& context, double t) const {
   double sum = 0;
   for (const DrivePtr& f : parts_) sum += f->derivative(context, t);
   return sum;
+}
+void SumDrive::collect_followed(std::vector<NodeDof>& dofs) const {
+  for (const DrivePtr& f : parts_) f->collect_followed(dofs);
+}
+void SumDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
+  for (const DrivePtr& f : parts_) f->write_slopes(context, factor, next);
 }
 
 double ExtremeDrive::value(const EvalContext& context, double t) const {
@@ -72,6 +86,13 @@ double ChainDrive::value(const EvalContext& context) const {
 }
 double ChainDrive::derivative(const EvalContext& context, double t) const {
   return f_->derivative(context, g_->value(context, t)) * g_->derivative(context, t);
+}
+void ChainDrive::collect_followed(std::vector<NodeDof>& dofs) const {
+  if (f_->has_derivative()) g_->collect_followed(dofs);
+}
+void ChainDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
+  if (f_->has_derivative())
+    g_->write_slopes(context, factor * f_->derivative(context, g_->value(context)), next);
 }
 
 double PeriodicDrive::value(const EvalContext& context, double t) const {
@@ -130,13 +151,36 @@ double DofDrive::value(const EvalContext& context, double t) const { return f_->
 double DofDrive::value(const EvalContext& context) const {
   return f_->value(context, context.model->dof_value(context, dof_));
 }
+void DofDrive::collect_followed(std::vector<NodeDof>& dofs) const {
+  if (f_->has_derivative()) dofs.push_back(dof_);
+}
+void DofDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
+  if (f_->has_derivative())
+    *next++ = factor * f_->derivative(context, context.model->dof_value(context, dof_));
+}
 
 double ScalarNodeDrive::value(const EvalContext& context, double) const {
   return f_->value(context, context.model->dof_value(context, datum_));
 }
+void ScalarNodeDrive::collect_followed(std::vector<NodeDof>& dofs) const {
+  if (f_->has_derivative()) dofs.push_back(datum_);
+}
+void ScalarNodeDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
+  if (f_->has_derivative())
+    *next++ = factor * f_->derivative(context, context.model->dof_value(context, datum_));
+}
 
 double NodeDrive::value(const EvalContext& context, double) const {
   return f_->value(context, context.model->structural_datum_value(context, node_, datum_));
+}
+void NodeDrive::collect_followed(std::vector<NodeDof>& dofs) const {
+  const auto dof = Model::dof_of_structural_datum(node_, datum_);
+  if (dof && f_->has_derivative()) dofs.push_back(*dof);
+}
+void NodeDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
+  if (!Model::dof_of_structural_datum(node_, datum_) || !f_->has_derivative()) return;
+  const double argument = context.model->structural_datum_value(context, node_, datum_);
+  *next++ = factor * f_->derivative(context, argument);
 }
 
 double ElementDrive::value(const EvalContext& context, double) const {

@@ -23,6 +23,8 @@ class ProductDrive : public Drive {
   double value(const EvalContext& context) const override;
   bool has_derivative() const override { return f_->has_derivative() && g_->has_derivative(); }
   double derivative(const EvalContext& context, double t) const override;
+  void collect_followed(std::vector<NodeDof>& dofs) const override;
+  void write_slopes(const EvalContext& context, double factor, double*& next) const override;
 
  private:
   DrivePtr f_, g_;
@@ -36,6 +38,8 @@ class SumDrive : public Drive {
   double value(const EvalContext& context) const override;
   bool has_derivative() const override;
   double derivative(const EvalContext& context, double t) const override;
+  void collect_followed(std::vector<NodeDof>& dofs) const override;
+  void write_slopes(const EvalContext& context, double factor, double*& next) const override;
 
  private:
   std::vector<DrivePtr> parts_;
@@ -66,6 +70,8 @@ class ChainDrive : public Drive {
   double value(const EvalContext& context) const override;
   bool has_derivative() const override { return f_->has_derivative() && g_->has_derivative(); }
   double derivative(const EvalContext& context, double t) const override;
+  void collect_followed(std::vector<NodeDof>& dofs) const override;
+  void write_slopes(const EvalContext& context, double factor, double*& next) const override;
 
  private:
   DrivePtr f_, g_;
@@ -137,6 +143,8 @@ class DofDrive : public Drive {
   DofDrive(const NodeDof& dof, DrivePtr f) : dof_(dof), f_(std::move(f)) {}
   double value(const EvalContext& context, double t) const override;
   double value(const EvalContext& context) const override;
+  void collect_followed(std::vector<NodeDof>& dofs) const override;
+  void write_slopes(const EvalContext& context, double factor, double*& next) const override;
 
  private:
   NodeDof dof_;
@@ -149,6 +157,8 @@ class ScalarNodeDrive : public Drive {
   ScalarNodeDrive(const NodeDof& datum, DrivePtr f) : datum_(datum), f_(std::move(f)) {}
   using Drive::value;
   double value(const EvalContext& context, double t) const override;
+  void collect_followed(std::vector<NodeDof>& dofs) const override;
+  void write_slopes(const EvalContext& context, double factor, double*& next) const override;
 
  private:
   NodeDof datum_;
@@ -161,6 +171,8 @@ class NodeDrive : public Drive {
   NodeDrive(int node, int datum, DrivePtr f) : node_(node), datum_(datum), f_(std::move(f)) {}
   using Drive::value;
   double value(const EvalContext& context, double t) const override;
+  void collect_followed(std::vector<NodeDof>& dofs) const override;
+  void write_slopes(const EvalContext& context, double factor, double*& next) const override;
 
  private:
   int node_, datum_;

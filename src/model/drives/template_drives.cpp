@@ -26,6 +26,16 @@ auto SumTplDrive<R, C>::derivative(const EvalContext& context) const -> Value {
 }
 
 template <int R, int C>
+void SumTplDrive<R, C>::collect_followed(std::vector<NodeDof>& dofs) const {
+  for (const Term& term : terms_) term.drive->collect_followed(dofs);
+}
+
+template <int R, int C>
+void SumTplDrive<R, C>::write_slopes(const EvalContext& context, Value*& next) const {
+  for (const Term& term : terms_) write_directed_slopes(context, *term.drive, term.entity, next);
+}
+
+template <int R, int C>
 auto ComponentTplDrive<R, C>::value(const EvalContext& context) const -> Value {
   Value v = Value::Zero();
   for (int i = 0; i < R * C; ++i)
@@ -45,6 +55,21 @@ auto ComponentTplDrive<R, C>::derivative(const EvalContext& context) const -> Va
   for (int i = 0; i < R * C; ++i)
     if (drives_[i] && drives_[i]->has_derivative()) v(i) = derivative_in_time(*drives_[i], context);
   return v;
+}
+
+template <int R, int C>
+void ComponentTplDrive<R, C>::collect_followed(std::vector<NodeDof>& dofs) const {
+  for (const DrivePtr& d : drives_)
+    if (d) d->collect_followed(dofs);
+}
+
+template <int R, int C>
+void ComponentTplDrive<R, C>::write_slopes(const EvalContext& context, Value*& next) const {
+  for (int i = 0; i < R * C; ++i) {
+    Value direction = Value::Zero();
+    direction(i) = 1;
+    if (drives_[i]) write_directed_slopes(context, *drives_[i], direction, next);
+  }
 }
 
 template class SumTplDrive<3>;

@@ -24,6 +24,8 @@ class SumTplDrive final : public TplDrive<R, C> {
   Value value(const EvalContext& context) const override;
   bool has_derivative() const override;
   Value derivative(const EvalContext& context) const override;
+  void collect_followed(std::vector<NodeDof>& dofs) const override;
+  void write_slopes(const EvalContext& context, Value*& next) const override;
 
  private:
   std::vector<Term> terms_;
@@ -38,6 +40,8 @@ class ComponentTplDrive final : public TplDrive<R, C> {
   Value value(const EvalContext& context) const override;
   bool has_derivative() const override;
   Value derivative(const EvalContext& context) const override;
+  void collect_followed(std::vector<NodeDof>& dofs) const override;
+  void write_slopes(const EvalContext& context, Value*& next) const override;
 
  private:
   std::vector<DrivePtr> drives_;

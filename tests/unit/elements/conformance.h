@@ -165,6 +165,7 @@ class Bench {
     c.h = s.h;
     c.c = c.seed = kC;
     c.c_algebraic = 1;
+    c.follows = true;
     return c;
   }
   VecX residual(const State& s) const {

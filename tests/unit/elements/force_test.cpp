@@ -4,8 +4,12 @@
 #include "elements/conformance.h"
 #include "elements/forces/abstract_force.h"
 #include "elements/forces/structural_force.h"
+#include "elements/genels/scalar_genels.h"
+#include "elements/thermal/thermal.h"
 #include "model/drive.h"
 #include "model/drives/closed_form_drives.h"
+#include "model/drives/composed_drives.h"
+#include "model/drives/template_drives.h"
 
 namespace mbcosim::conformance::force_test {
 namespace {
@@ -100,6 +104,128 @@ using Cases =
                    InternalCase<InternalForce, true, true>,
                    InternalCase<InternalCouple, true, true>, TotalCase, TotalInternalCase>;
 MBCOSIM_CONFORMANCE(Forces, Cases);
+
+/// Drives that follow nodes on which their element does not act, and one on which it may: the
+/// matrix is exact.
+class ElementsWithFollowedDrives : public testing::Test {
+ protected:
+  ElementsWithFollowedDrives() {
+    third_ = bench_.add_node(StructuralKind::static_displacement);
+    ScalarNode node;
+    node.label = 11;
+    scalar_ = bench_.builder.add_scalar(node);
+  }
+  DrivePtr of_node(int node, const char* datum, DrivePtr f) {
+    const Model& model = bench_.builder.model();
+    return std::make_shared<NodeDrive>(node, model.structural_datum(node, datum), std::move(f));
+  }
+  static DrivePtr parabola(double a, double b) {
+    return std::make_shared<PolynomialDrive>(std::array<double, 4>{0.3, a, b, 0});
+  }
+  DrivePtr scalar_drive() {
+    const auto product = std::make_shared<ProductDrive>(
+        of_node(bench_.second, "XP[3]", parabola(2, 0)),
+        std::make_shared<DofDrive>(NodeDof{true, third_, 1, 0, true}, parabola(-1, 3)));
+    const auto chain = std::make_shared<ChainDrive>(
+        parabola(0, 5),
+        std::make_shared<ScalarNodeDrive>(NodeDof{false, scalar_, 0, 1, true}, parabola(1, -2)));
+    return std::make_shared<SumDrive>(std::vector<DrivePtr>{
+        product, chain, of_node(bench_.first, "Omega[2]", parabola(7, 1)), make_constant_drive(2)});
+  }
+  Vec3DrivePtr vector_drive() {
+    using Sum = SumTplDrive<3>;
+    std::vector<Sum::Term> terms = {{bench_.vec(), scalar_drive()},
+                                    {bench_.vec(), of_node(third_, "X[1]", parabola(4, 0))}};
+    return std::make_shared<Sum>(std::move(terms));
+  }
+  Vec3DrivePtr component_drive() {
+    return std::make_shared<ComponentTplDrive<3>>(
+        std::vector<DrivePtr>{of_node(third_, "XP[2]", parabola(1, 1)), nullptr, scalar_drive()});
+  }
+  template <class E>
+  void expect_exact_matrix(E e) {
+    bench_.add(std::move(e));
+    bench_.finish();
+    for (int k = 0; k < 3; ++k) {
+      bench_.generic_state(0.3);
+      const MatX J = bench_.jacobian();
+      EXPECT_GT(J.col(bench_.model->scalars[scalar_].unknown).norm(), 1e-3);
+      EXPECT_GT(J.middleCols(bench_.model->structural[third_].first, 3).norm(), 1e-3);
+      expect_near(bench_, J, bench_.numerical_jacobian(), 1e-7);
+    }
+  }
+
+  Bench bench_;
+  int third_ = 0, scalar_ = 0;
+};
+
+TEST_F(ElementsWithFollowedDrives, AbsoluteForce) {
+  expect_exact_matrix(StructuralForce{bench_.first, bench_.vec(), vector_drive()});
+}
+
+TEST_F(ElementsWithFollowedDrives, FollowerForce) {
+  expect_exact_matrix(StructuralForce{bench_.first, bench_.vec(), component_drive(), true});
+}
+
+TEST_F(ElementsWithFollowedDrives, Couple) {
+  expect_exact_matrix(StructuralCouple{bench_.second, Vec3::Zero(), component_drive(), true});
+}
+
+TEST_F(ElementsWithFollowedDrives, InternalForce) {
+  expect_exact_matrix(
+      InternalForce{bench_.first, bench_.second, bench_.vec(), bench_.vec(), vector_drive()});
+}
+
+TEST_F(ElementsWithFollowedDrives, InternalCouple) {
+  InternalCouple e;
+  e.first = bench_.first;
+  e.second = bench_.second;
+  e.d = component_drive();
+  e.follower = true;
+  expect_exact_matrix(std::move(e));
+}
+
+TEST_F(ElementsWithFollowedDrives, TotalForce) {
+  expect_exact_matrix(TotalForce{bench_.first, bench_.vec(), bench_.rotation(), bench_.rotation(),
+                                 vector_drive(), component_drive()});
+}
+
+TEST_F(ElementsWithFollowedDrives, TotalInternalForce) {
+  TotalInternalForce e;
+  e.first = bench_.first;
+  e.second = bench_.second;
+  e.df = component_drive();
+  e.dm = vector_drive();
+  expect_exact_matrix(std::move(e));
+}
+
+TEST_F(ElementsWithFollowedDrives, AbstractForce) {
+  AbstractForce e;
+  e.first = NodeDof{true, bench_.second, 3, 0, true};
+  e.second = NodeDof{false, scalar_, 0, 0, true};
+  e.internal = true;
+  e.d = scalar_drive();
+  expect_exact_matrix(std::move(e));
+}
+
+TEST_F(ElementsWithFollowedDrives, GenelClamp) {
+  GenelClamp e;
+  e.dof = NodeDof{true, bench_.second, 1, 0, true};
+  e.d = scalar_drive();
+  expect_exact_matrix(std::move(e));
+}
+
+TEST_F(ElementsWithFollowedDrives, GenelDistance) {
+  GenelDistance e;
+  e.first = NodeDof{true, bench_.first, 2, 0, true};
+  e.second = NodeDof{true, bench_.second, 1, 0, true};
+  e.d = scalar_drive();
+  expect_exact_matrix(std::move(e));
+}
+
+TEST_F(ElementsWithFollowedDrives, ThermalSource) {
+  expect_exact_matrix(ThermalSource{scalar_, scalar_drive()});
+}
 
 /// Two nodes and loads of the reference deck.
 class AppliedLoads : public testing::Test {

@@ -194,6 +194,9 @@ TEST(BeamDecks, SofterCantilever) {
     expect_cantilever(run, s, 6e-8);
 }
 
+// The reference's matrix does not know how the shunt follows node 3. It stops anywhere below the
+// tolerance, as we do: a moment of 1e-9 N m turns the tip by 1e-9 L/EJ = 5e-14. Below 1e-9
+// the residual does not go, by rounding.
 TEST(BeamDecks, PiezoelectricShunt) {
   DeckRun run(cantilever("1.e6", "1.e-9", true));
   ASSERT_TRUE(run.ready());
@@ -212,12 +215,14 @@ TEST(BeamDecks, PiezoelectricShunt) {
     SCOPED_TRACE("step " + std::to_string(s[0]));
     EXPECT_NEAR(run.node(2).x(2), s[1], 1e-8 * s[1]);
     EXPECT_NEAR(run.node(3).x(2), s[2], 1e-8 * s[2]);
-    EXPECT_NEAR(run.rotation_vector(3)(1), s[3], 3e-8 * std::abs(s[3]));
+    EXPECT_NEAR(run.rotation_vector(3)(1), s[3], 2 * 5e-14);
     EXPECT_NEAR(run.node(3).v(2), s[4], 1e-8 * s[4]);
     EXPECT_NEAR(run.datum(Family::beam, 1, "pI.My"), s[5], 6e-8);
     EXPECT_NEAR(run.datum(Family::beam, 1, "pII.My"), s[6], 6e-8);
   }
-  EXPECT_NEAR(run.scalar_node(ScalarKind::abstract, 11), -0.118619319, 1e-9);
+  const double voltage = run.scalar_node(ScalarKind::abstract, 11);
+  EXPECT_NEAR(voltage, -80 * run.node(3).v(2), 1e-9);
+  EXPECT_NEAR(voltage, -0.118619319, 2e-9);  // each within 1e-9
 }
 
 constexpr const char* kTightStart =
