@@ -16,30 +16,32 @@ int find_or_add(int what, int* list, int size, int* count, int* added) {
   return (*count)++;
 }
 
-}  // namespace
-
-LocalDof Connector::see(const NodeDof& dof) {
-  const Model& model = builder_.model();
+LocalDof see(const Model& model, const NodeDof& dof, Connection& c) {
   LocalDof l;
   l.component = dof.component;
   l.order = dof.order;
-  if (!dof.structural) {
-    if (model.scalars[dof.node].kind != ScalarKind::parameter)
-      l.scalar = find_or_add(dof.node, c_.scalar, kMaxScalars, &c_.scalar_count, &c_.seen_scalars);
-    return l;
-  }
-  const bool is_velocity = dof.order == 1 && dof.component < 6;
-  const bool is_position = dof.order == 0 && dof.component < 3;
-  if ((is_velocity || is_position) && !model.structural[dof.node].is_dummy())
-    l.node = find_or_add(dof.node, c_.node, kMaxNodes, &c_.node_count, &c_.seen_nodes);
+  if (!model.has_column(dof)) return l;
+  if (dof.structural)
+    l.node = find_or_add(dof.node, c.node, kMaxNodes, &c.node_count, &c.seen_nodes);
+  else
+    l.scalar = find_or_add(dof.node, c.scalar, kMaxScalars, &c.scalar_count, &c.seen_scalars);
   return l;
 }
 
-void Connector::follow(const void* drive, const std::vector<NodeDof>& dofs) {
-  if (dofs.empty() || dofs.size() > kMaxFollowed) return;
-  FollowedDofs& followed = c_.followed.emplace_back();
-  followed.drive = drive;
-  for (const NodeDof& dof : dofs) followed.dofs.push_back(see(dof));
+}  // namespace
+
+void find_followed(const Model& model, Connection& c) {
+  std::vector<NodeDof> dofs;
+  for (FollowedDofs& followed : c.followed) {
+    dofs.clear();
+    followed.drive->collect_followed(dofs);
+    if (dofs.size() > kMaxFollowed) continue;
+    for (const NodeDof& dof : dofs) followed.dofs.push_back(see(model, dof, c));
+  }
+  std::erase_if(c.followed, [](const FollowedDofs& each) {
+    return std::ranges::none_of(each.dofs,
+                                [](const LocalDof& l) { return l.node >= 0 || l.scalar >= 0; });
+  });
 }
 
 void PlacedElements::gather(const EvalContext& context, const Place& p, Local<double>& u) const {

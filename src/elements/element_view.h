@@ -31,7 +31,7 @@ struct LocalDof {
 /// What a drive of an element follows at once, in the order of its slopes; without node and scalar
 /// where the matrix leaves it out.
 struct FollowedDofs {
-  const void* drive;
+  const StateFollower* drive;
   std::vector<LocalDof> dofs;
 };
 
@@ -49,8 +49,12 @@ struct Connection {
   int scratch_count = 0;  ///< doubles that it needs in Scratch::local
   int sums = -1;          ///< offset in Scratch::sums
   int sum_count = 0;
-  std::vector<FollowedDofs> followed;
+  std::vector<FollowedDofs> followed;  ///< their dofs are found when the model is complete
 };
+
+/// Finds what drives follow and gives their nodes and scalar nodes local numbers, as far as there
+/// is room.
+void find_followed(const Model& model, Connection& connection);
 
 class Connector {
  public:
@@ -63,14 +67,12 @@ class Connector {
   /// As `node`, but never merged with an equal one: local index k is the k-th call.
   int distinct_node(int structural_node) {
     MBCOSIM_CHECK(c_.node_count < kMaxNodes, "an element has more nodes than there is room for");
-    MBCOSIM_CHECK(c_.seen_nodes == 0, "a node is connected after drives");
     c_.node[c_.node_count] = structural_node;
     return c_.node_count++;
   }
   int scalar(int scalar_node) {
     MBCOSIM_CHECK(c_.scalar_count < kMaxScalars,
                   "an element has more scalar dofs than there is room for");
-    MBCOSIM_CHECK(c_.seen_scalars == 0, "a scalar dof is connected after drives");
     c_.scalar[c_.scalar_count] = scalar_node;
     return c_.scalar_count++;
   }
@@ -84,16 +86,10 @@ class Connector {
       l.scalar = scalar(d.node);
     return l;
   }
-  /// What drives follow at once shall be in the matrix of Newton's method (Local::drive). Called
-  /// when all nodes and dofs are connected that the element acts on.
+  /// What drives follow at once shall be in the matrix of Newton's method (Local::drive).
   template <class... DriveP>
   void drives(const DriveP&... drives) {
-    const auto follow_one = [&](const auto& drive) {
-      std::vector<NodeDof> dofs;
-      drive->collect_followed(dofs);
-      follow(drive.get(), dofs);
-    };
-    (follow_one(drives), ...);
+    (c_.followed.push_back({drives.get(), {}}), ...);
   }
   void algebraic(int count) { own(count, false); }
   void differential(int count) { own(count, true); }
@@ -117,8 +113,6 @@ class Connector {
   }
 
  private:
-  void follow(const void* drive, const std::vector<NodeDof>& dofs);
-  LocalDof see(const NodeDof& dof);
   void own(int count, bool differential) {
     MBCOSIM_CHECK(c_.own_count + count <= kMaxOwn,
                   "an element has more unknowns than there is room for");
@@ -218,14 +212,14 @@ class Local {
 
  private:
   static constexpr bool kByIncrements = !std::is_same_v<T, double> && !std::is_same_v<T, TimeDual>;
-  const FollowedDofs* followed_by(const void* drive) const {
+  const FollowedDofs* followed_by(const StateFollower* drive) const {
     if (!context->follows) return nullptr;
     for (const FollowedDofs& each : connection->followed)
       if (each.drive == drive) return &each;
     return nullptr;
   }
   void follow(const LocalDof& d, double slope, T& value) const {
-    if (d.scalar < 0 && d.node < 0) return;
+    if ((d.scalar < 0 && d.node < 0) || !std::isfinite(slope)) return;
     const T x = dof(d);
     for (int j = 0; j < T::directions; ++j) value.d[j] += slope * x.d[j];
   }

@@ -43,6 +43,9 @@ class GeneralConnection {
   /// A scalar dof of any node: its local row and column (position components only for structural
   /// nodes).
   int dof(const NodeDof& dof);
+  /// What a drive follows at once gets columns without rows when the model is complete:
+  /// GeneralJacobian::drive.
+  void drive(const DrivePtr& drive) { followed_.push_back({drive.get(), {}, {}}); }
   int algebraic(int count) { return own(count, false); }
   int differential(int count) { return own(count, true); }
   int memory(int count, double initial = 0);  ///< offset from the element's first memory slot
@@ -57,8 +60,15 @@ class GeneralConnection {
     int index;  ///< structural or scalar node, or number of the own unknown
     int first;  ///< local number
   };
+  struct Followed {
+    const Drive* drive;
+    std::vector<NodeDof> dofs;
+    std::vector<int> columns;  ///< local numbers of the dofs; -1 where the matrix leaves one out
+  };
   int add_node(int structural_node, bool whole);
   int own(int count, bool differential);
+  void find_followed(const Model& model);
+  int column_of(const Model& model, const NodeDof& dof);
 
   ModelBuilder* builder_;
   std::vector<Entry> entries_;
@@ -66,6 +76,7 @@ class GeneralConnection {
   int size_ = 0;  ///< local rows = local columns
   int first_own_ = -1, memory_ = -1, memory_count_ = 0, scratch_count_ = 0;
   std::vector<int> rows_, columns_;  ///< model's numbers by local number, -1: none; filled by bind
+  std::vector<Followed> followed_;   ///< by drives
   std::vector<int> parameter_;  ///< parameter nodes: offset of the value in State::memory, else -1
 };
 
@@ -176,6 +187,8 @@ class GeneralJacobian {
   /// Given ∂r/∂(value of a dof at its order); `column`: its local number. Second derivatives are
   /// left out.
   void dof(int row, int column, const NodeDof& d, double dr);
+  /// Given ∂r/∂(value in time of a drive): what that follows at once.
+  void drive(int row, const DrivePtr& d, double dr);
   void add3(int row, int column, const Mat3& m) {
     for (int j = 0; j < 3; ++j)
       for (int i = 0; i < 3; ++i) add(row + i, column + j, m(i, j));

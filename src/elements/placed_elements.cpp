@@ -60,6 +60,7 @@ const ElementInfo* PlacedElements::keep(ElementInfo info) {
 void PlacedElements::bind(const Model& model, int i, int first_own) {
   Place& p = place(i);
   p.connection.own = first_own;
+  find_followed(model, p.connection);
   p.activity = p.info->active_memory;
   p.first_row = static_cast<int>(rows_.size());
   p.first_column = static_cast<int>(columns_.size());

@@ -136,10 +136,11 @@ class Machine {
         (++top_)->i = wrap(state().step);
         break;
       case Op::load_var:
-        (++top_)->r = T(frame_.var);
+        (++top_)->r = frame_.var;
         break;
       case Op::load_drive:
-        (++top_)->r = T(program_.drives[in.index]->value(*frame_.context));
+        (++top_)->r = frame_.drives ? frame_.drives[in.index]
+                                    : T(program_.drives[in.index]->value(*frame_.context));
         break;
       case Op::convert:
         convert(in);

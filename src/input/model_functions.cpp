@@ -207,6 +207,12 @@ class StructuralDatum : public Drive {
   double value(const EvalContext& context, double) const override {
     return model_of(context).structural_datum_value(context, node_, datum_);
   }
+  void collect_followed(std::vector<NodeDof>& dofs) const override {
+    if (const auto dof = Model::dof_of_structural_datum(node_, datum_)) dofs.push_back(*dof);
+  }
+  void write_slopes(const EvalContext&, double factor, double*& next) const override {
+    if (Model::dof_of_structural_datum(node_, datum_)) *next++ = factor;
+  }
 
  private:
   int node_, datum_;
@@ -229,6 +235,12 @@ class DofValue : public Drive {
     const int k = dof_.component % 3;
     if (dof_.component < 3) return dof_.order ? s.v(k) : s.x(k);
     return dof_.order ? s.w(k) : vector_of_rotation<double>(s.R)(k);
+  }
+  void collect_followed(std::vector<NodeDof>& dofs) const override {
+    if (!previous_) dofs.push_back(dof_);
+  }
+  void write_slopes(const EvalContext&, double factor, double*& next) const override {
+    if (!previous_) *next++ = factor;
   }
 
  private:

@@ -9,6 +9,7 @@
 #include "input/program.h"
 #include "input/syntax.h"
 #include "model/diagnostic.h"
+#include "model/node.h"
 
 namespace mbcosim {
 
@@ -36,10 +37,17 @@ class PendingString {
   double value_and_gradient(const EvalContext& context, const double* arguments,
                             double* gradient) const;
   int arguments() const { return static_cast<int>(arguments_.size()); }
+  double slope(const EvalContext& context, double var) const;  ///< ∂value/∂Var
+  /// As those of Drive, by way of plugin variables and the like.
+  void collect_followed(std::vector<NodeDof>& dofs) const;
+  void write_slopes(const EvalContext& context, double factor, double*& next) const;
 
  private:
   template <class T>
-  T evaluate(const EvalContext& context, const T* arguments, double var) const;
+  T evaluate(const EvalContext& context, const T* arguments, const T& var,
+             const T* drives = nullptr) const;
+  template <class T>
+  void write_slopes_as(const EvalContext& context, double factor, double*& next) const;
   template <class T>
   double gradient(const EvalContext& context, const double* arguments, double* gradient) const;
   template <class T>

@@ -119,7 +119,8 @@ struct Frame {
   const EvalContext* context = nullptr;
   Reading* reading = nullptr;  ///< while the deck is read; null during the run
   const T* arguments = nullptr;
-  double var = 0;                  ///< value of `Var`
+  T var{};                         ///< value of `Var`
+  const T* drives = nullptr;       ///< values of Program::drives; null: they are asked
   std::uint64_t random_key = 0;    ///< distinguishes the random numbers of different strings
   std::vector<std::string> texts;  ///< stack of texts; the result, when it is one
   bool keep_locals = false;        ///< wanted: the values of the locals after the run, in `locals`

@@ -23,6 +23,16 @@ class StringDrive : public Drive {
     return string_->value(context, t);
   }
   double value(const EvalContext& context) const override { return string_->value(context, 0.0); }
+  bool has_slope() const override { return true; }
+  double slope(const EvalContext& context, double t) const override {
+    return string_->slope(context, t);
+  }
+  void collect_followed(std::vector<NodeDof>& dofs) const override {
+    string_->collect_followed(dofs);
+  }
+  void write_slopes(const EvalContext& context, double factor, double*& next) const override {
+    string_->write_slopes(context, factor, next);
+  }
 
  private:
   std::shared_ptr<const PendingString> string_;
@@ -170,11 +180,13 @@ T PendingString::result(const Program& program, const Slot<T>& slot) const {
 }
 
 template <class T>
-T PendingString::evaluate(const EvalContext& context, const T* arguments, double var) const {
+T PendingString::evaluate(const EvalContext& context, const T* arguments, const T& var,
+                          const T* drives) const {
   Frame<T> frame;
   frame.context = &context;
   frame.arguments = arguments;
   frame.var = var;
+  frame.drives = drives;
   frame.random_key = random_key_;
   try {
     if (!program_.code.empty()) return result(program_, run(program_, frame));
@@ -201,7 +213,7 @@ double PendingString::gradient(const EvalContext& context, const double* argumen
   T duals[kMostArguments];
   const int n = static_cast<int>(arguments_.size());
   for (int k = 0; k < n; ++k) duals[k] = T::variable(arguments[k], k);
-  const T r = evaluate<T>(context, duals, 0);
+  const T r = evaluate<T>(context, duals, T(0.0));
   for (int k = 0; k < n; ++k) gradient[k] = r.d[k];
   return r.v;
 }
@@ -211,6 +223,35 @@ double PendingString::value_and_gradient(const EvalContext& context, const doubl
   if (arguments_.size() <= 1) return gradient<Dual<1>>(context, arguments, result);
   if (arguments_.size() <= 6) return gradient<Dual<6>>(context, arguments, result);
   return gradient<Dual<12>>(context, arguments, result);
+}
+
+double PendingString::slope(const EvalContext& context, double var) const {
+  using T = Dual<1>;
+  return evaluate<T>(context, nullptr, T::variable(var, 0)).d[0];
+}
+
+void PendingString::collect_followed(std::vector<NodeDof>& dofs) const {
+  if (program_.drives.size() > kMostArguments) return;
+  for (const DrivePtr& drive : program_.drives) drive->collect_followed(dofs);
+}
+
+template <class T>
+void PendingString::write_slopes_as(const EvalContext& context, double factor,
+                                    double*& next) const {
+  T drives[kMostArguments];
+  for (std::size_t k = 0; k < program_.drives.size(); ++k)
+    drives[k] = T::variable(program_.drives[k]->value(context), static_cast<int>(k));
+  const T r = evaluate<T>(context, nullptr, T(0.0), drives);
+  for (std::size_t k = 0; k < program_.drives.size(); ++k)
+    program_.drives[k]->write_slopes(context, factor * r.d[k], next);
+}
+
+void PendingString::write_slopes(const EvalContext& context, double factor, double*& next) const {
+  if (program_.drives.size() > kMostArguments) return;
+  if (program_.drives.size() <= 6)
+    write_slopes_as<Dual<6>>(context, factor, next);
+  else
+    write_slopes_as<Dual<12>>(context, factor, next);
 }
 
 void PendingString::commit(const EvalContext& context, std::vector<double>* variables) const {

@@ -14,18 +14,31 @@ namespace mbcosim {
 /// Of a drive with more the slopes are not asked for.
 constexpr int kMaxFollowed = 16;
 
+/// What drives have in common.
+class StateFollower {
+ public:
+  virtual ~StateFollower() = default;
+  /// Degrees of freedom that the value in time follows at once, as far as it is known how: they
+  /// belong into Newton's matrix. One may come twice. Asked when the deck is read.
+  virtual void collect_followed(std::vector<NodeDof>&) const {}
+};
+
 /// A scalar function. Immutable: what a drive remembers (sample and hold, random seeds, filters)
 /// lives in `State::memory` at an offset that it got from `ModelBuilder::allocate_memory`; it
 /// advances in `advance`, once a step.
-class Drive {
+class Drive : public StateFollower {
  public:
-  virtual ~Drive() = default;
   /// Value for the argument `t`; throws EvaluationError. `context.time` is the time of the step's
   /// end.
   virtual double value(const EvalContext& context, double t) const = 0;
   virtual bool has_derivative() const { return false; }
   /// Derivative with respect to the argument; only when `has_derivative()`.
   virtual double derivative(const EvalContext& context, double t) const;
+  /// The same for Newton's matrix alone, where a run-time string has one, too.
+  virtual bool has_slope() const { return has_derivative(); }
+  virtual double slope(const EvalContext& context, double t) const {
+    return derivative(context, t);
+  }
 
   /// Value in time: for t = context.time, unless the drive tells an argument from the time
   /// (run-time strings: `Var` is 0).
@@ -34,10 +47,7 @@ class Drive {
   template <class T>
   T value_as(const EvalContext& context) const;
 
-  /// Degrees of freedom that the value in time follows at once, as far as it is known how: they
-  /// belong into Newton's matrix. One may come twice.
-  virtual void collect_followed(std::vector<NodeDof>&) const {}
-  /// Writes factor · ∂value/∂dof, value in time, for each of them in the same order.
+  /// Writes factor · ∂value/∂dof, value in time, for each dof that is followed, in their order.
   virtual void write_slopes(const EvalContext&, double /*factor*/, double*& /*next*/) const {}
 };
 
@@ -55,10 +65,9 @@ class StepListener {
 /// A vector- or matrix-valued function: Σ entityₖ·driveₖ or one drive per component
 /// (MBDyn input manual, "template drive callers").
 template <int R, int C>
-class TplDrive {
+class TplDrive : public StateFollower {
  public:
   using Value = Eigen::Matrix<double, R, C>;
-  virtual ~TplDrive() = default;
   virtual Value value(const EvalContext& context) const = 0;
   virtual bool has_derivative() const { return false; }
   virtual Value derivative(
@@ -68,8 +77,6 @@ class TplDrive {
   template <class T>
   Eigen::Matrix<T, R, C> value_as(const EvalContext& context) const;
 
-  /// As those of a scalar drive.
-  virtual void collect_followed(std::vector<NodeDof>&) const {}
   virtual void write_slopes(const EvalContext&, Value*& /*next*/) const {}
 };
 

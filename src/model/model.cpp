@@ -201,6 +201,13 @@ double Model::dof_value(const EvalContext& context, const NodeDof& dof) const {
   return s.w(dof.component - 3);
 }
 
+bool Model::has_column(const NodeDof& dof) const {
+  if (!dof.structural) return scalars[dof.node].unknown >= 0;
+  const bool is_velocity = dof.order == 1 && dof.component < 6;
+  const bool is_position = dof.order == 0 && dof.component < 3;
+  return (is_velocity || is_position) && !structural[dof.node].is_dummy();
+}
+
 int Model::find_structural(int label) const {
   const auto it = structural_index.find(label);
   return it == structural_index.end() ? -1 : it->second;

@@ -145,6 +145,8 @@ class Model {
   EvalContext context(const State& state, Phase phase, double c = 1, double c_algebraic = 1) const;
   /// Value (order 0), rate (1) or second derivative (2) of a node's degree of freedom.
   double dof_value(const EvalContext& context, const NodeDof& dof) const;
+  /// Is it an unknown, its rate or an angular velocity?
+  bool has_column(const NodeDof& dof) const;
 
   // --- lookup
   int find_structural(int label) const;  ///< index or -1

@@ -1,7 +1,7 @@
 /// Forces and couples on structural nodes, given by vector drives. MBDyn input manual, "Force
 /// elements".
 ///
-/// The drives may depend on the state; the matrix of Newton's method knows it of `dof` and `node`.
+/// The drives may depend on the state: StateFollower.
 #pragma once
 
 #include "elements/element.h"

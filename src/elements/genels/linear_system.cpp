@@ -90,7 +90,10 @@ LinearSystem companion_system(CanonicalForm form, const std::vector<double>& den
 
 void LinearSystemElement::connect(GeneralConnection& c) {
   for (const NodeDof& dof : outputs_) output_.push_back(c.dof(dof));
-  for (const ScalarValue& value : inputs_) input_.push_back(value.drive ? -1 : c.dof(value.dof));
+  for (const ScalarValue& value : inputs_) {
+    input_.push_back(value.drive ? -1 : c.dof(value.dof));
+    if (value.drive) c.drive(value.drive);
+  }
   first_state_ = c.differential(system_.order());
 }
 
@@ -136,11 +139,15 @@ void LinearSystemElement::jacobian(const GeneralView&, GeneralJacobian& jacobian
   for (int i = 0; i < system_.outputs(); ++i)
     jacobian.dof(output_[i], output_[i], outputs_[i], -1.0);
   for (int k = 0; k < system_.inputs(); ++k) {
-    if (inputs_[k].drive) continue;
-    for (int i = 0; i < n; ++i)
-      jacobian.dof(first_state_ + i, input_[k], inputs_[k].dof, system_.B(i, k));
+    const auto add = [&](int row, double dr) {
+      if (inputs_[k].drive)
+        jacobian.drive(row, inputs_[k].drive, dr);
+      else
+        jacobian.dof(row, input_[k], inputs_[k].dof, dr);
+    };
+    for (int i = 0; i < n; ++i) add(first_state_ + i, system_.B(i, k));
     for (int i = 0; system_.D.size() != 0 && i < system_.outputs(); ++i)
-      jacobian.dof(output_[i], input_[k], inputs_[k].dof, system_.D(i, k));
+      add(output_[i], system_.D(i, k));
   }
 }
 

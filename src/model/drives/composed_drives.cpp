@@ -88,11 +88,11 @@ double ChainDrive::derivative(const EvalContext& context, double t) const {
   return f_->derivative(context, g_->value(context, t)) * g_->derivative(context, t);
 }
 void ChainDrive::collect_followed(std::vector<NodeDof>& dofs) const {
-  if (f_->has_derivative()) g_->collect_followed(dofs);
+  if (f_->has_slope()) g_->collect_followed(dofs);
 }
 void ChainDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
-  if (f_->has_derivative())
-    g_->write_slopes(context, factor * f_->derivative(context, g_->value(context)), next);
+  if (f_->has_slope())
+    g_->write_slopes(context, factor * f_->slope(context, g_->value(context)), next);
 }
 
 double PeriodicDrive::value(const EvalContext& context, double t) const {
@@ -152,22 +152,22 @@ double DofDrive::value(const EvalContext& context) const {
   return f_->value(context, context.model->dof_value(context, dof_));
 }
 void DofDrive::collect_followed(std::vector<NodeDof>& dofs) const {
-  if (f_->has_derivative()) dofs.push_back(dof_);
+  if (f_->has_slope()) dofs.push_back(dof_);
 }
 void DofDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
-  if (f_->has_derivative())
-    *next++ = factor * f_->derivative(context, context.model->dof_value(context, dof_));
+  if (f_->has_slope())
+    *next++ = factor * f_->slope(context, context.model->dof_value(context, dof_));
 }
 
 double ScalarNodeDrive::value(const EvalContext& context, double) const {
   return f_->value(context, context.model->dof_value(context, datum_));
 }
 void ScalarNodeDrive::collect_followed(std::vector<NodeDof>& dofs) const {
-  if (f_->has_derivative()) dofs.push_back(datum_);
+  if (f_->has_slope()) dofs.push_back(datum_);
 }
 void ScalarNodeDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
-  if (f_->has_derivative())
-    *next++ = factor * f_->derivative(context, context.model->dof_value(context, datum_));
+  if (f_->has_slope())
+    *next++ = factor * f_->slope(context, context.model->dof_value(context, datum_));
 }
 
 double NodeDrive::value(const EvalContext& context, double) const {
@@ -175,12 +175,12 @@ double NodeDrive::value(const EvalContext& context, double) const {
 }
 void NodeDrive::collect_followed(std::vector<NodeDof>& dofs) const {
   const auto dof = Model::dof_of_structural_datum(node_, datum_);
-  if (dof && f_->has_derivative()) dofs.push_back(*dof);
+  if (dof && f_->has_slope()) dofs.push_back(*dof);
 }
 void NodeDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
-  if (!Model::dof_of_structural_datum(node_, datum_) || !f_->has_derivative()) return;
+  if (!Model::dof_of_structural_datum(node_, datum_) || !f_->has_slope()) return;
   const double argument = context.model->structural_datum_value(context, node_, datum_);
-  *next++ = factor * f_->derivative(context, argument);
+  *next++ = factor * f_->slope(context, argument);
 }
 
 double ElementDrive::value(const EvalContext& context, double) const {
