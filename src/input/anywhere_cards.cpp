@@ -144,8 +144,7 @@ void read_drive_caller(DeckCard& card) {
   drop_missing_derivative(card, *d.drive, d.output_derivative);
   read_drive_trace(card, d);
   card.expect_end();
-  deck.drives[d.label] = {d.drive, card.head()};
-  deck.drive_depth[d.label] = card.drive_depth();
+  deck.drives[d.label] = {d.drive, card.head(), card.weight()};
   card.model().drive_index[d.label] = static_cast<int>(card.model().drives.size());
   card.model().drives.push_back(std::move(d));
 }
@@ -168,7 +167,7 @@ void read_template_drive_caller(DeckCard& card) {
       deck.redefined(card, "template drive caller", label, found->second.where);
     auto drive = read();
     card.expect_end();
-    map[label] = {std::move(drive), card.head()};
+    map[label] = {std::move(drive), card.head(), card.weight()};
   };
   if (shape == "1")
     store(deck.drives1, [&] { return card.scalar_template_drive("template drive"); });
@@ -201,7 +200,7 @@ void read_constitutive_law(DeckCard& card) {
       deck.redefined(card, "constitutive law", label, found->second.where);
     auto law = read();
     card.expect_end();
-    map[label] = {std::move(law), card.head()};
+    map[label] = {std::move(law), card.head(), card.weight()};
   };
   if (dimension == 1)
     store(deck.laws1, [&] { return card.law1(); });
@@ -226,7 +225,7 @@ void read_hydraulic_fluid(DeckCard& card) {
     card.fail_at(card.next(), "a hydraulic fluid cannot refer to another one");
   FluidPtr fluid = card.fluid_definition();
   card.expect_end();
-  deck.fluids[label] = {std::move(fluid), card.head()};
+  deck.fluids[label] = {std::move(fluid), card.head(), card.weight()};
 }
 
 /// Read for its form; only aerodynamic elements would use it.

@@ -20,10 +20,17 @@ namespace mbcosim {
 
 class DeckCard;
 
+/// What the evaluation of a drive, a law or a function takes.
+struct Weight {
+  int depth = 0;    ///< longest chain of references behind it
+  int objects = 0;  ///< counted as often as they are evaluated
+};
+
 template <class T>
 struct Named {
   T object;
   SourceSpan where;
+  Weight weight{};
 };
 template <class T>
 using LabelMap = std::unordered_map<int, Named<T>>;
@@ -66,8 +73,6 @@ struct Deck {
 
   std::unordered_map<int, std::size_t> frames;  ///< label -> index in Model::frames
   LabelMap<DrivePtr> drives;
-  std::unordered_map<int, int>
-      drive_depth;  ///< length of the chain of references behind a drive caller
   std::vector<int> drives_without_output;  ///< indices in Model::drives whose card does not
                                            ///< tell whether the value is written
   LabelMap<LawPtr<1>> laws1;
@@ -81,7 +86,7 @@ struct Deck {
   LabelMap<FluidPtr> fluids;
   LabelMap<bool> c81_data;
   LabelMap<FileDriverPtr> file_drivers;
-  std::map<std::string, SourceSpan, std::less<>> function_places;
+  std::map<std::string, Named<ScalarFunctionPtr>, std::less<>> functions;
   std::set<int> bound_parameters;  ///< indices of parameter nodes that a `bind` card feeds
 
   /// Labels whose definition was refused: errors that follow from them are not reported.

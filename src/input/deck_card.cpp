@@ -136,12 +136,26 @@ bool DeckCard::at_string() { return cursor_.more() && cursor_.at_string(); }
 // numbers
 
 DeckCard::Nesting::Nesting(DeckCard& card) : card_(card) {
-  if (++card_.nesting_ <= card_.deck_.reading.limits.expression_depth) return;
+  card_.weight_.depth = std::max(card_.weight_.depth, ++card_.nesting_);
+  ++card_.weight_.objects;
+  if (card_.nesting_ <= card_.deck_.reading.limits.expression_depth) return;
   --card_.nesting_;
   card_.deck_.reading.fail_limit(card_.last(), "expression-depth",
                                  "drives, laws or functions are nested deeper than " +
                                      std::to_string(card_.deck_.reading.limits.expression_depth) +
                                      " levels");
+}
+
+void DeckCard::refer(const std::string& name, const Weight& weight) {
+  constexpr int kDeepest = 1000;  // evaluation recurses along the chain
+  constexpr int kMost = 100000;
+  weight_.depth = std::max(weight_.depth, nesting_ + weight.depth);
+  weight_.objects += weight.objects;
+  if (weight_.depth > kDeepest) fail("the chain of references behind " + name + " is too long");
+  if (weight_.objects > kMost)
+    fail("with " + name + " more than " + std::to_string(kMost) +
+             " drives, laws or functions would be evaluated for one value",
+         "each counts as often as it is referred to");
 }
 
 void DeckCard::need_numbers(std::string_view what, std::int64_t count) {

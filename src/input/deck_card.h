@@ -9,13 +9,11 @@
 #include <vector>
 
 #include "input/cursor.h"
-#include "model/beam_output.h"
+#include "input/deck.h"
 #include "model/card.h"
 #include "model/element_set.h"
 
 namespace mbcosim {
-
-struct Deck;
 
 /// `"<name>{<arguments>}"` of a `driven` card.
 struct Hint {
@@ -131,7 +129,10 @@ class DeckCard final : public Card, public BeamOutputDefault {
   }
   /// Adds the form to an error about the card that has no hint.
   void add_remedy(Diagnostic& d) const;
-  int drive_depth() const { return drive_depth_; }
+  /// Of what the card has read.
+  const Weight& weight() const { return weight_; }
+  /// It refers to an object, called `name` in errors.
+  void refer(const std::string& name, const Weight& weight);
   std::string_view next_text();                     ///< the next argument as it is written
   void skip();                                      ///< the next argument
   FileDriverPtr file_driver_definition(int label);  ///< `<type>, ...` of a `file` card
@@ -242,7 +243,6 @@ class DeckCard final : public Card, public BeamOutputDefault {
   Vec3 unit(std::string_view what, const Vec3& v);
 
   DrivePtr constant_drive(std::string_view what);
-  DrivePtr drive_reference();
   template <int N>
   LawPtr<N> law_of();
   template <int N>
@@ -275,7 +275,7 @@ class DeckCard final : public Card, public BeamOutputDefault {
   std::string subject_, type_, defined_kind_;
   int defined_label_ = -1;
   int nesting_ = 0;
-  int drive_depth_ = 0;  ///< longest chain of drives that this card makes
+  Weight weight_;
   Form form_;
   std::string peeked_;
   bool has_peeked_ = false;

@@ -205,6 +205,7 @@ class NotingCard final : public DriveCard {
     const auto found = card_.deck().drives.find(label);
     if (found == card_.deck().drives.end())
       card_.fail_undefined(card_.last(), "drive caller", label);
+    card_.refer("drive caller " + std::to_string(label), found->second.weight);
     return note(found->second.object);
   }
   bool take_empty() override {

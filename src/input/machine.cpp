@@ -8,6 +8,7 @@
 #include "input/syntax.h"
 #include "math/hash.h"
 #include "model/drive.h"
+#include "model/nested_evaluation.h"
 #include "model/scalar_function.h"
 #include "model/state.h"
 
@@ -26,24 +27,6 @@ namespace {
 
 constexpr int kSmallStack = 24;
 constexpr int kSmallLocals = 8;
-constexpr int kDeepestCall = 64;  // drives that evaluate strings that evaluate drives ...
-
-/// Counts how deep strings call each other on this thread: drives may refer to each other in a
-/// circle.
-class CallDepth {
- public:
-  CallDepth() {
-    if (++depth_ > kDeepestCall) {
-      --depth_;
-      throw EvaluationError("strings and drives refer to each other in a circle");
-    }
-  }
-  ~CallDepth() { --depth_; }
-
- private:
-  static thread_local int depth_;
-};
-thread_local int CallDepth::depth_ = 0;
 
 std::int32_t wrap(std::int64_t x) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(x));
@@ -595,7 +578,7 @@ void start_locals(const Program& program, const Frame<T>& frame, Slot<T>* locals
 
 template <class T>
 Slot<T> run(const Program& program, Frame<T>& frame) {
-  const CallDepth depth;
+  const NestedEvaluation nested;
   Slot<T> small_stack[kSmallStack], small_locals[kSmallLocals];
   std::vector<Slot<T>> large_stack;
   Slot<T>* stack = small_stack;

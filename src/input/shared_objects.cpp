@@ -42,13 +42,12 @@ std::vector<std::string> written_words(const WordTable<Value>& table) {
   return words;
 }
 
-constexpr int kMostChainedDrives = 1000;  // evaluation recurses along the chain
-
 template <class T>
 const T& labelled(DeckCard& card, const LabelMap<T>& map, const std::string& kind) {
   const int label = card.label(kind + " label");
   const auto found = map.find(label);
   if (found == map.end()) card.fail_undefined(card.last(), kind, label);
+  card.refer(kind + " " + std::to_string(label), found->second.weight);
   return found->second.object;
 }
 
@@ -78,16 +77,6 @@ DrivePtr DeckCard::constant_drive(std::string_view what) {
   return make_constant_drive(real(what));
 }
 
-DrivePtr DeckCard::drive_reference() {
-  const int label = this->label("drive caller label");
-  const auto found = deck_.drives.find(label);
-  if (found == deck_.drives.end()) fail_undefined(last(), "drive caller", label);
-  drive_depth_ = std::max(drive_depth_, nesting_ + deck_.drive_depth[label]);
-  if (drive_depth_ > kMostChainedDrives)
-    fail("the chain of drives behind drive caller " + std::to_string(label) + " is too long");
-  return found->second.object;
-}
-
 DrivePtr DeckCard::drive(std::string_view what) {
   need_argument(what);
   if (cursor_.at_empty()) {
@@ -98,8 +87,7 @@ DrivePtr DeckCard::drive(std::string_view what) {
     fail_expected(std::string(what) + ": drive expected, string found",
                   "write: string, \"<expression>\"");
   const Nesting nesting(*this);
-  drive_depth_ = std::max(drive_depth_, nesting_);
-  if (keyword("reference")) return drive_reference();
+  if (keyword("reference")) return labelled(*this, deck_.drives, "drive caller");
   keyword("function");
   const auto* const found = registry().drives.find(peek_word());
   if (!found) return constant_drive(what);
@@ -206,8 +194,11 @@ DrivePtr DeckCard::scalar_template_drive(std::string_view what) {
   }
   const int label = this->label("template drive caller label");
   const auto found = deck_.drives1.find(label);
-  if (found != deck_.drives1.end()) return found->second.object;
   const std::string number = std::to_string(label);
+  if (found != deck_.drives1.end()) {
+    refer("template drive caller " + number, found->second.weight);
+    return found->second.object;
+  }
   fail_undefined(last(), "template drive caller", label,
                  deck_.drives.count(label)
                      ? "write `component, reference, " + number + "` for drive caller " + number
@@ -316,11 +307,11 @@ bool DeckCard::at_expression() {
 
 ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceSpan where) {
   const Nesting nesting(*this);
-  if (const auto known = deck_.function_places.find(name); known != deck_.function_places.end())
-    fail_at(
-        where,
-        "scalar function \"" + name + "\" already defined at " + deck_.reading.place(known->second),
-        "", "redefinition");
+  if (const auto known = deck_.functions.find(name); known != deck_.functions.end())
+    fail_at(where,
+            "scalar function \"" + name + "\" already defined at " +
+                deck_.reading.place(known->second.where),
+            "", "redefinition");
   const std::string w = peek_word();
   const auto* found = registry().functions.find(w);
   if (found)
@@ -335,7 +326,7 @@ ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceS
   }
   ScalarFunctionPtr f = read_as("function", found->key, found->value);
   deck_.reading.functions[name] = f;
-  deck_.function_places[name] = where;
+  deck_.functions[name] = {f, where, weight_};
   return f;
 }
 
@@ -350,8 +341,10 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
   const std::string name = quoted(std::string(what) + " name");
   const SourceSpan where = last();
   if (registry().functions.find(peek_word())) return function_definition(name, where);
-  const auto known = deck_.reading.functions.find(name);
-  if (known != deck_.reading.functions.end()) return known->second;
+  if (const auto known = deck_.functions.find(name); known != deck_.functions.end()) {
+    refer("scalar function \"" + name + "\"", known->second.weight);
+    return known->second.object;
+  }
   if (deck_.damaged_kinds.count("scalar function \"" + name + "\""))
     deck_.reading.set_damaged(true);
   else if (at_expression())

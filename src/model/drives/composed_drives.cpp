@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "model/model.h"
+#include "model/nested_evaluation.h"
 
 namespace mbcosim {
 
@@ -52,7 +53,8 @@ double SumDrive::derivative(const EvalContext& context, double t) const {
   return sum;
 }
 void SumDrive::collect_followed(std::vector<NodeDof>& dofs) const {
-  for (const DrivePtr& f : parts_) f->collect_followed(dofs);
+  for (const DrivePtr& f : parts_)
+    if (dofs.size() <= kMaxFollowed) f->collect_followed(dofs);
 }
 void SumDrive::write_slopes(const EvalContext& context, double factor, double*& next) const {
   for (const DrivePtr& f : parts_) f->write_slopes(context, factor, next);
@@ -102,31 +104,6 @@ double PeriodicDrive::derivative(const EvalContext& context, double t) const {
   return t < t0_ ? 0 : f_->derivative(context, std::fmod(t - t0_, period_));
 }
 
-namespace {
-
-/// Postponed drives can refer to each other in a circle; nothing else can.
-class Depth {
- public:
-  Depth() {
-    if (++depth() > kMost) {
-      --depth();
-      throw EvaluationError("postponed drives refer to each other in a circle");
-    }
-  }
-  ~Depth() { --depth(); }
-  Depth(const Depth&) = delete;
-  Depth& operator=(const Depth&) = delete;
-
- private:
-  static constexpr int kMost = 100;
-  static int& depth() {
-    thread_local int depth = 0;
-    return depth;
-  }
-};
-
-}  // namespace
-
 const Drive& PostponedDrive::target(const EvalContext& context) const {
   const auto it = context.model->drive_index.find(label_);
   if (it == context.model->drive_index.end())
@@ -134,15 +111,15 @@ const Drive& PostponedDrive::target(const EvalContext& context) const {
   return *context.model->drives[it->second].drive;
 }
 double PostponedDrive::value(const EvalContext& context, double t) const {
-  const Depth depth;
+  const NestedEvaluation nested;
   return target(context).value(context, t);
 }
 double PostponedDrive::value(const EvalContext& context) const {
-  const Depth depth;
+  const NestedEvaluation nested;
   return target(context).value(context);
 }
 double PostponedDrive::derivative(const EvalContext& context, double t) const {
-  const Depth depth;
+  const NestedEvaluation nested;
   const Drive& drive = target(context);
   return drive.has_derivative() ? drive.derivative(context, t) : 0;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "math/eigen_storage.h"
 #include "solver/supernodal_lu.h"
 
 namespace mbcosim {

@@ -1,0 +1,31 @@
+/// Bounds on evaluations that lead to others by labels, which nothing checks when the deck is read:
+/// those of strings and postponed drives.
+#pragma once
+
+#include "model/diagnostic.h"
+
+namespace mbcosim {
+
+/// Lives while such an evaluation goes on; throws EvaluationError when one leads back to itself, or
+/// takes more of them than anybody would wait for, as when each refers to others twice.
+class NestedEvaluation {
+ public:
+  NestedEvaluation() {
+    if (depth_ == 0) count_ = 0;
+    if (depth_ == kDeepest)
+      throw EvaluationError("strings and drives refer to each other in a circle");
+    if (++count_ > kMost)
+      throw EvaluationError(
+          "strings and drives that refer to each other take too many evaluations");
+    ++depth_;
+  }
+  ~NestedEvaluation() { --depth_; }
+  NestedEvaluation(const NestedEvaluation&) = delete;
+  NestedEvaluation& operator=(const NestedEvaluation&) = delete;
+
+ private:
+  static constexpr int kDeepest = 64, kMost = 10000;
+  inline static thread_local int depth_ = 0, count_ = 0;
+};
+
+}  // namespace mbcosim

@@ -1,0 +1,104 @@
+/// Objects that refer to others: a chain without end would use up the stack, two references at each
+/// of forty levels would be 10^12 evaluations, which nothing could stop.
+#include <gtest/gtest.h>
+
+#include "deck_fixture.h"
+
+namespace mbcosim::decks {
+namespace {
+
+/// A deck whose force or rod uses the last of `levels` objects, each made by `card` with # for its
+/// number and @ for that of the one before.
+std::string chain(int levels, const std::string& first, const std::string& card,
+                  const std::string& element) {
+  const auto with = [](std::string text, char sign, int number) {
+    for (std::size_t at; (at = text.find(sign)) != std::string::npos;)
+      text.replace(at, 1, std::to_string(number));
+    return text;
+  };
+  DeckText deck;
+  deck.initial_value = "final time: 1.; time step: 1e-2; max iterations: 20; tolerance: 1e-6;";
+  deck.control = "structural nodes: 2; rigid bodies: 2; joints: 1; forces: 1;";
+  deck.nodes =
+      "structural: 1, dynamic, null, eye, null, null;"
+      "structural: 2, dynamic, 1., 0., 0., eye, null, null;" +
+      first;
+  for (int k = 2; k <= levels; ++k) deck.nodes += with(with(card, '#', k), '@', k - 1) + "\n";
+  deck.elements =
+      "body: 1, 1, 1., null, eye; body: 2, 2, 1., null, eye;\n" + with(element, '#', levels);
+  std::string text = deck.text();  // whichever of the two the element is not
+  const bool has_joint = element.starts_with("joint");
+  const std::string unused = has_joint ? " forces: 1;" : " joints: 1;";
+  return text.erase(text.find(unused), unused.size());
+}
+
+constexpr const char* kForce = "force: 1, absolute, 1, position, null, single, 1., 0., 0., ";
+constexpr const char* kRod = "joint: 1, rod, 1, 2, from nodes, reference, #;";
+
+struct Objects {
+  const char *name, *first, *twice, *once;
+  std::string element;
+};
+const Objects kObjects[] = {
+    {"drive caller", "drive caller: 1, const, 1.;",
+     "drive caller: #, array, 2, reference, @, reference, @;",
+     "drive caller: #, mult, const, 1., reference, @;", std::string(kForce) + "reference, #;"},
+    {"scalar function", "scalar function: \"f1\", const, 1.;",
+     "scalar function: \"f#\", sum, \"f@\", \"f@\";",
+     "scalar function: \"f#\", sum, \"f@\", \"f1\";",
+     std::string(kForce) + "scalar function, \"f#\";"},
+    {"constitutive law", "constitutive law: 1, 1, linear elastic, 1.;",
+     "constitutive law: #, 1, array, 2, reference, @, reference, @;",
+     "constitutive law: #, 1, array, 2, reference, @, reference, 1;", kRod}};
+
+TEST(ReferenceBounds, TwoAtEachLevelAreRefused) {
+  for (const Objects& o : kObjects) {
+    const std::string few = findings(load(chain(12, o.first, o.twice, o.element)).diagnostics);
+    EXPECT_EQ(few, "") << o.name;
+    const std::string many = findings(load(chain(40, o.first, o.twice, o.element)).diagnostics);
+    EXPECT_NE(many.find("more than 100000 drives, laws or functions would be evaluated"),
+              std::string::npos)
+        << o.name << ": " << many;
+    EXPECT_NE(many.find(std::string("with ") + o.name), std::string::npos) << many;
+  }
+}
+
+TEST(ReferenceBounds, LongChainsAreRefused) {
+  for (const Objects& o : kObjects) {
+    const std::string few = findings(load(chain(300, o.first, o.once, o.element)).diagnostics);
+    EXPECT_EQ(few, "") << o.name;
+    const std::string many = findings(load(chain(1200, o.first, o.once, o.element)).diagnostics);
+    EXPECT_NE(many.find("the chain of references behind"), std::string::npos)
+        << o.name << ": " << many.substr(0, 500);
+  }
+}
+
+// Labels that are looked up during the run.
+TEST(ReferenceBounds, EvaluationsThatLeadToManyOthersEnd) {
+  for (const char* card :
+       {"drive caller: #, array, 2, postponed, @, postponed, @;",
+        "drive caller: #, string, \"model::drive(@, 0.) + model::drive(@, 0.)\";"}) {
+    const LoadReport report =
+        load(chain(40, "drive caller: 1, const, 1.;", card, std::string(kForce) + "postponed, #;"));
+    ASSERT_TRUE(report.ok()) << findings(report.diagnostics);
+    const auto created = Simulation::create(report.model);
+    ASSERT_FALSE(created);
+    EXPECT_NE(created.error().message.find("refer to each other take too many evaluations"),
+              std::string::npos)
+        << created.error().message;
+  }
+}
+
+TEST(ReferenceBounds, EvaluationsThatLeadBackEnd) {
+  const LoadReport report = load(chain(2, "drive caller: 1, postponed, 2;",
+                                       "drive caller: 2, mult, const, 1., postponed, 1;",
+                                       std::string(kForce) + "reference, #;"));
+  ASSERT_TRUE(report.ok()) << findings(report.diagnostics);
+  const auto created = Simulation::create(report.model);
+  ASSERT_FALSE(created);
+  EXPECT_NE(created.error().message.find("refer to each other in a circle"), std::string::npos)
+      << created.error().message;
+}
+
+}  // namespace
+}  // namespace mbcosim::decks
