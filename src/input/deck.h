@@ -20,7 +20,7 @@ namespace mbcosim {
 
 class DeckCard;
 
-/// What the evaluation of a drive, a law or a function takes.
+/// What the evaluation of a drive, a law, a function or a dummy node takes.
 struct Weight {
   int depth = 0;    ///< longest chain of references behind it
   int objects = 0;  ///< counted as often as they are evaluated
@@ -72,6 +72,7 @@ struct Deck {
   bool inverse_dynamics = false;  ///< is it the problem?
 
   std::unordered_map<int, std::size_t> frames;  ///< label -> index in Model::frames
+  std::unordered_map<int, Weight> dummy_nodes;
   LabelMap<DrivePtr> drives;
   std::vector<int> drives_without_output;  ///< indices in Model::drives whose card does not
                                            ///< tell whether the value is written

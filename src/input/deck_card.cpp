@@ -154,7 +154,7 @@ void DeckCard::refer(const std::string& name, const Weight& weight) {
   if (weight_.depth > kDeepest) fail("the chain of references behind " + name + " is too long");
   if (weight_.objects > kMost)
     fail("with " + name + " more than " + std::to_string(kMost) +
-             " drives, laws or functions would be evaluated for one value",
+             " drives, laws, functions or nodes would be evaluated for one value",
          "each counts as often as it is referred to");
 }
 

@@ -5,6 +5,7 @@
 #include "input/model_functions.h"
 #include "input/suggest.h"
 #include "model/family.h"
+#include "model/nested_evaluation.h"
 
 namespace mbcosim {
 
@@ -227,6 +228,7 @@ class BeamGage final : public Drive {
     std::copy(data, data + 3, data_);
   }
   double value(const EvalContext& context, double) const override {
+    const NestedEvaluation nested;
     const auto datum = [&](int k) {
       return beam_.set->private_value(context, beam_.index, data_[k]);
     };

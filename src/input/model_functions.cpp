@@ -8,6 +8,7 @@
 #include "model/diagnostic.h"
 #include "model/drive.h"
 #include "model/model.h"
+#include "model/nested_evaluation.h"
 #include "model/registry.h"
 
 namespace mbcosim {
@@ -253,6 +254,7 @@ class ElementDatum final : public Drive {
   ElementDatum(ElementRef element, int datum) : element_(element), datum_(datum) {}
   using Drive::value;
   double value(const EvalContext& context, double) const override {
+    const NestedEvaluation nested;
     return element_.set->private_value(context, element_.index, datum_);
   }
 

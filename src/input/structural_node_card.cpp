@@ -107,6 +107,17 @@ void read_relative_dummy(DeckCard& card, StructuralNode& node) {
     node.pivot_orientation = card.relative_orientation("orientation", node.pivot);
 }
 
+/// Where a dummy node is follows at each use from where those are on which it depends.
+void weigh_dummy(DeckCard& card, const StructuralNode& node) {
+  std::unordered_map<int, Weight>& weights = card.deck().dummy_nodes;
+  for (const int on : {node.base, node.reference, node.pivot}) {
+    if (on < 0) continue;
+    const int label = card.model().structural[on].label;
+    card.refer("structural node " + std::to_string(label), weights[label]);
+  }
+  weights[node.label] = {card.weight().depth + 1, card.weight().objects + 1};
+}
+
 void read_dummy(DeckCard& card, StructuralNode& node) {
   node.base = frame_node(card);
   if (card.required("kind of dummy node", {"offset", "relative frame"}) == 0) {
@@ -122,6 +133,7 @@ void read_dummy(DeckCard& card, StructuralNode& node) {
   };
   node.accelerations =
       accelerated(node.base) && accelerated(node.reference) && accelerated(node.pivot);
+  weigh_dummy(card, node);
   if (card.peek_word() == "scale") card.fail_at(card.next(), "a dummy node has no scale");
   read_node_output(card, node);
 }

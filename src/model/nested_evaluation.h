@@ -1,5 +1,5 @@
-/// Bounds on evaluations that lead to others by labels, which nothing checks when the deck is read:
-/// those of strings and postponed drives.
+/// Bounds on evaluations that lead to others in ways which nothing checks when the deck is read:
+/// strings, postponed drives and values of elements, to which parameter nodes may be bound.
 #pragma once
 
 #include "model/diagnostic.h"
@@ -13,10 +13,12 @@ class NestedEvaluation {
   NestedEvaluation() {
     if (depth_ == 0) count_ = 0;
     if (depth_ == kDeepest)
-      throw EvaluationError("strings and drives refer to each other in a circle");
+      throw EvaluationError(
+          "drives, strings and values of elements refer to each other in a circle");
     if (++count_ > kMost)
       throw EvaluationError(
-          "strings and drives that refer to each other take too many evaluations");
+          "drives, strings and values of elements that refer to each other take too many "
+          "evaluations");
     ++depth_;
   }
   ~NestedEvaluation() { --depth_; }

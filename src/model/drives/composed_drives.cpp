@@ -161,6 +161,7 @@ void NodeDrive::write_slopes(const EvalContext& context, double factor, double*&
 }
 
 double ElementDrive::value(const EvalContext& context, double) const {
+  const NestedEvaluation nested;
   return f_->value(context, element_.set->private_value(context, element_.index, datum_));
 }
 

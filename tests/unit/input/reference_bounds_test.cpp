@@ -56,7 +56,7 @@ TEST(ReferenceBounds, TwoAtEachLevelAreRefused) {
     const std::string few = findings(load(chain(12, o.first, o.twice, o.element)).diagnostics);
     EXPECT_EQ(few, "") << o.name;
     const std::string many = findings(load(chain(40, o.first, o.twice, o.element)).diagnostics);
-    EXPECT_NE(many.find("more than 100000 drives, laws or functions would be evaluated"),
+    EXPECT_NE(many.find("more than 100000 drives, laws, functions or nodes would be evaluated"),
               std::string::npos)
         << o.name << ": " << many;
     EXPECT_NE(many.find(std::string("with ") + o.name), std::string::npos) << many;
@@ -71,6 +71,25 @@ TEST(ReferenceBounds, LongChainsAreRefused) {
     EXPECT_NE(many.find("the chain of references behind"), std::string::npos)
         << o.name << ": " << many.substr(0, 500);
   }
+}
+
+TEST(ReferenceBounds, DummyNodesToo) {
+  const auto findings_of = [](int count, const std::string& rest) {
+    DeckText deck;
+    deck.initial_value = "final time: 1.; time step: 1e-2; max iterations: 20; tolerance: 1e-6;";
+    deck.control = "structural nodes: " + std::to_string(count) + "; rigid bodies: 1;";
+    deck.nodes = "structural: 1, dynamic, null, eye, null, null;\n";
+    for (int k = 2; k <= count; ++k)
+      deck.nodes += "structural: " + std::to_string(k) + ", dummy, " + std::to_string(k - 1) +
+                    rest + (rest.back() == ' ' ? std::to_string(k - 1) : "") + ";\n";
+    deck.elements = "body: 1, 1, 1., null, eye;";
+    return findings(load(deck).diagnostics);
+  };
+  EXPECT_EQ(findings_of(900, ", offset, null, eye"), "");
+  EXPECT_NE(findings_of(1200, ", offset, null, eye").find("the chain of references behind"),
+            std::string::npos);
+  EXPECT_EQ(findings_of(12, ", relative frame, "), "");
+  EXPECT_NE(findings_of(40, ", relative frame, ").find("more than 100000"), std::string::npos);
 }
 
 // Labels that are looked up during the run.
@@ -98,6 +117,32 @@ TEST(ReferenceBounds, EvaluationsThatLeadBackEnd) {
   ASSERT_FALSE(created);
   EXPECT_NE(created.error().message.find("refer to each other in a circle"), std::string::npos)
       << created.error().message;
+}
+
+/// The whole of what a deck with these cards meets before its first step.
+std::string trouble(const DeckText& deck) {
+  const LoadReport report = load(deck);
+  if (!report.ok()) return findings(report.diagnostics);
+  const auto created = Simulation::create(report.model);
+  return created ? "" : created.error().message;
+}
+
+// A joint's distance follows a parameter node that is bound to it.
+TEST(ReferenceBounds, ParametersThatAreBoundInACircleEnd) {
+  DeckText deck;
+  deck.initial_value = "final time: 1.; time step: 1e-2; max iterations: 20; tolerance: 1e-6;";
+  deck.control =
+      "structural nodes: 2; rigid bodies: 2; parameter nodes: 1; joints: 1; skip initial joint "
+      "assembly;";
+  deck.nodes =
+      "structural: 1, dynamic, null, eye, null, null;"
+      "structural: 2, dynamic, 1., 0., 0., eye, null, null; parameter: 5, element;";
+  deck.elements =
+      "body: 1, 1, 1., null, eye; body: 2, 2, 1., null, eye;"
+      "joint: 1, distance, 1, 2, dof, 5, parameter, linear, 1., 1.; bind: 1, joint, 5, string, "
+      "\"d\";";
+  const std::string found = trouble(deck);
+  EXPECT_NE(found.find("refer to each other in a circle"), std::string::npos) << found;
 }
 
 }  // namespace
