@@ -109,7 +109,8 @@ class ElementSetOf final : public PlacedElements {
     if (!active(context, s)) return inactive_matrix(context, s, matrix);
     gather(context, s, u);
     if constexpr (detail::HasTangent<E>)
-      if (s.connection.followed.empty()) return closed_form(context, s, u, seeds, matrix);
+      if (!detail::follows_drives<E>() || s.connection.followed.empty())
+        return closed_form(context, s, u, seeds, matrix);
     if constexpr (!detail::HasTangent<E> || detail::follows_drives<E>())
       dual_jacobian(s, u, seeds, matrix);
   }

@@ -1,8 +1,6 @@
 #include "elements/general_element.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <utility>
 
 namespace mbcosim {
@@ -53,14 +51,16 @@ int GeneralConnection::scratch(int count) {
 }
 
 int GeneralConnection::column_of(const Model& model, const NodeDof& dof) {
-  const auto append = [&](int first, int count, int size) {
+  const auto find_or_append = [&](int first, int count, int size) {
+    const auto known = std::find(columns_.begin(), columns_.end(), first);
+    if (known != columns_.end()) return static_cast<int>(known - columns_.begin());
     for (int k = 0; k < size; ++k) columns_.push_back(k < count ? first + k : -1);
     return std::exchange(size_, size_ + size);
   };
   if (!model.has_column(dof)) return -1;
-  if (!dof.structural) return append(model.scalars[dof.node].unknown, 1, 1);
+  if (!dof.structural) return find_or_append(model.scalars[dof.node].unknown, 1, 1);
   const StructuralNode& node = model.structural[dof.node];
-  return append(node.first, node.position_unknowns(), 6) + dof.component;
+  return find_or_append(node.first, node.position_unknowns(), 6) + dof.component;
 }
 
 void GeneralConnection::find_followed(const Model& model) {
@@ -110,20 +110,6 @@ void GeneralJacobian::dof(int row, int column, const NodeDof& d, double dr) {
   if (!d.structural || d.component < 3 || d.component >= 6) return rate(row, column, dr);
   const int axis = d.component - 3, first = column - axis;
   for (int k = 0; k < 3; ++k) add(row, first + k, -dr * seeds_[d.node].B(axis, k));
-}
-
-void GeneralJacobian::drive(int row, const DrivePtr& d, double dr) {
-  if (!context_.follows || dr == 0) return;
-  for (const GeneralConnection::Followed& followed : connection_.followed_) {
-    if (followed.drive != d.get() || followed.dofs.empty()) continue;
-    std::array<double, kMaxFollowed> slopes;
-    double* next = slopes.data();
-    d->write_slopes(context_, dr, next);
-    for (std::size_t k = 0; k < followed.dofs.size(); ++k)
-      if (followed.columns[k] >= 0 && std::isfinite(slopes[k]))
-        dof(row, followed.columns[k], followed.dofs[k], slopes[k]);
-    return;
-  }
 }
 
 void GeneralElementSet::add(ModelBuilder& builder, ElementInfo info,

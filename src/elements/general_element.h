@@ -16,6 +16,8 @@
 /// number. Elements of fixed small size use elements/element.h.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -44,7 +46,7 @@ class GeneralConnection {
   /// nodes).
   int dof(const NodeDof& dof);
   /// What a drive follows at once gets columns without rows when the model is complete:
-  /// GeneralJacobian::drive.
+  /// GeneralJacobian::each_followed.
   void drive(const DrivePtr& drive) { followed_.push_back({drive.get(), {}, {}}); }
   int algebraic(int count) { return own(count, false); }
   int differential(int count) { return own(count, true); }
@@ -187,8 +189,9 @@ class GeneralJacobian {
   /// Given ∂r/∂(value of a dof at its order); `column`: its local number. Second derivatives are
   /// left out.
   void dof(int row, int column, const NodeDof& d, double dr);
-  /// Given ∂r/∂(value in time of a drive): what that follows at once.
-  void drive(int row, const DrivePtr& d, double dr);
+  /// Calls use(column, dof, slope), for `dof` above, with all that a drive follows at once.
+  template <class Use>
+  void each_followed(const DrivePtr& d, Use use) const;
   void add3(int row, int column, const Mat3& m) {
     for (int j = 0; j < 3; ++j)
       for (int i = 0; i < 3; ++i) add(row + i, column + j, m(i, j));
@@ -203,6 +206,21 @@ class GeneralJacobian {
   const std::vector<int>& positions_;
   double* values_;
 };
+
+template <class Use>
+void GeneralJacobian::each_followed(const DrivePtr& d, Use use) const {
+  if (!context_.follows) return;
+  for (const GeneralConnection::Followed& followed : connection_.followed_) {
+    if (followed.drive != d.get() || followed.dofs.empty()) continue;
+    std::array<double, kMaxFollowed> slopes;
+    double* next = slopes.data();
+    d->write_slopes(context_, 1, next);
+    for (std::size_t k = 0; k < followed.dofs.size(); ++k)
+      if (followed.columns[k] >= 0 && std::isfinite(slopes[k]))
+        use(followed.columns[k], followed.dofs[k], slopes[k]);
+    return;
+  }
+}
 
 /// Interface of one general element; the meaning of each member as in ElementSet.
 class GeneralElement {

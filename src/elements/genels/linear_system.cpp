@@ -139,15 +139,16 @@ void LinearSystemElement::jacobian(const GeneralView&, GeneralJacobian& jacobian
   for (int i = 0; i < system_.outputs(); ++i)
     jacobian.dof(output_[i], output_[i], outputs_[i], -1.0);
   for (int k = 0; k < system_.inputs(); ++k) {
-    const auto add = [&](int row, double dr) {
-      if (inputs_[k].drive)
-        jacobian.drive(row, inputs_[k].drive, dr);
-      else
-        jacobian.dof(row, input_[k], inputs_[k].dof, dr);
+    const auto add = [&](int column, const NodeDof& dof, double slope) {
+      for (int i = 0; i < n; ++i)
+        jacobian.dof(first_state_ + i, column, dof, system_.B(i, k) * slope);
+      for (int i = 0; system_.D.size() != 0 && i < system_.outputs(); ++i)
+        jacobian.dof(output_[i], column, dof, system_.D(i, k) * slope);
     };
-    for (int i = 0; i < n; ++i) add(first_state_ + i, system_.B(i, k));
-    for (int i = 0; system_.D.size() != 0 && i < system_.outputs(); ++i)
-      add(output_[i], system_.D(i, k));
+    if (inputs_[k].drive)
+      jacobian.each_followed(inputs_[k].drive, add);
+    else
+      add(input_[k], inputs_[k].dof, 1);
   }
 }
 
