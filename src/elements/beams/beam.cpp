@@ -7,21 +7,27 @@ namespace mbcosim {
 
 template <int Nodes>
 void Beam<Nodes>::after_predict(const Local<double>& u, State& state) const {
-  Vec3 r[Nodes], rp[Nodes];
+  using W = Wide<double>;
+  using Past = SectionHistory<const double>;
+  Vec<W> r[Nodes], rp[Nodes];
   for (int k = 0; k < Nodes; ++k) {
     const NodeRotationHistory& q = state.rotation_history[u.connection->node[k]];
-    r[k] = cgr_parameters<double>(q.R_ref * q.R1.transpose());
-    rp[k] = cgr_g_inverse(r[k]) * q.w_ref;
+    const Vec3 g = cgr_parameters<double>(q.R_ref * q.R1.transpose());
+    r[k] = g.template cast<W>();
+    rp[k] = Vec3(cgr_g_inverse(g) * q.w_ref).template cast<W>();
   }
+  const Increment<W> i = increment(r, rp, true, place<W>(0));
+  const Mat<W> G = cgr_g(i.r);
+  const Vec<W> bend = G * i.dr, w_ref = G * i.rp;
+  const Mat<W> R_ref = cgr_rotation(i.r) * remembered<Mat<W>>(u, 0, &Past::R);
+  const Vec<W> k_ref = R_ref.transpose() * bend + remembered<Vec<W>>(u, 0, &Past::k);
+  const Vec<W> kp_ref = R_ref.transpose() * Vec<W>(G * i.drp + bend.cross(w_ref));
   for (int a = 0; a < points; ++a) {
-    SectionHistory<double> h(&state.memory[u.memory_offset() + a * kSectionHistory]);
-    const Increment<double> i = increment(r, rp, true, a);
-    const Mat3 G = cgr_g(i.r);
-    const Vec3 bend = G * i.dr;
-    h.R_ref = cgr_rotation(i.r) * h.R;
-    h.k_ref = h.R_ref.transpose() * bend + h.k;
-    h.w_ref = G * i.rp;
-    h.kp_ref = h.R_ref.transpose() * (G * i.drp + bend.cross(Vec3(h.w_ref)));
+    auto h = history(state.memory, u.memory_offset(), a);
+    h.R_ref = lane(R_ref, a);
+    h.k_ref = lane(k_ref, a);
+    h.w_ref = lane(w_ref, a);
+    h.kp_ref = lane(kp_ref, a);
   }
   state.memory[u.memory_offset() + kMemory - 1] = 1;
   tell_laws_of_prediction(u, state);
@@ -29,11 +35,11 @@ void Beam<Nodes>::after_predict(const Local<double>& u, State& state) const {
 
 template <int Nodes>
 void Beam<Nodes>::tell_laws_of_prediction(const Local<double>& u, State& state) const {
-  for (int a = 0; a < points; ++a) {
-    if (!point[a].law->has_memory()) continue;
-    const Section<double> s = section(u, line(u), a);
-    point[a].law->after_predict(*u.context, state, s.strain, s.rate);
-  }
+  if (stages_apart()) return;  // none has a memory
+  const auto s = section(u, line(u), 0);
+  for (int a = 0; a < points; ++a)
+    if (point[a].law->has_memory())
+      point[a].law->after_predict(*u.context, state, lane(s.strain, a), lane(s.rate, a));
 }
 
 template <int Nodes>
@@ -45,14 +51,14 @@ void Beam<Nodes>::at_derivatives(const Local<double>& u, State& state, bool firs
 
 template <int Nodes>
 void Beam<Nodes>::after_convergence(const Local<double>& u, State& state) const {
-  const Line<double> along = line(u);
+  const auto s = section(u, line(u), 0);
   for (int a = 0; a < points; ++a) {
-    const Section<double> s = section(u, along, a);
-    SectionHistory<double> h(&state.memory[u.memory_offset() + a * kSectionHistory]);
-    h.R = s.R;
-    h.k = s.strain.template tail<3>();
+    auto h = history(state.memory, u.memory_offset(), a);
+    h.R = lane(s.R, a);
+    const Vec6 strain = lane(s.strain, a);
+    h.k = strain.template tail<3>();
     if (point[a].law->has_memory())
-      point[a].law->after_convergence(*u.context, state, s.strain, s.rate);
+      point[a].law->after_convergence(*u.context, state, strain, lane(s.rate, a));
   }
 }
 
@@ -75,7 +81,7 @@ void Beam<Nodes>::restart(const Local<double>& u, State& state) const {
   for (int a = 0; a < points; ++a) {
     const double m = point[a].metric;
     const Vec3 r = interpolate(Shape::n[a], g), dr = m * interpolate(Shape::dn[a], g);
-    SectionHistory<double> h(&state.memory[u.memory_offset() + a * kSectionHistory]);
+    auto h = history(state.memory, u.memory_offset(), a);
     const Vec3 bend = cgr_g(r) * dr;
     h.R = h.R_ref = cgr_rotation(r) * point[a].R0;
     h.k = h.k_ref = h.R.transpose() * bend;
@@ -112,13 +118,14 @@ double Beam<Nodes>::set_geometry(const Model& model) {
 
 template struct Beam<2>;
 template struct Beam<3>;
-#define MBCOSIM_INSTANTIATE(Nodes)                                                              \
-  template void Beam<Nodes>::residual(const Local<double>&, Residual<double>&) const;           \
-  template Beam<Nodes>::Line<double> Beam<Nodes>::line(const Local<double>&) const;             \
-  template Section<double> Beam<Nodes>::section(const Local<double>&, const Line<double>&, int) \
-      const;                                                                                    \
-  template Vec6 Beam<Nodes>::internal_force(const Local<double>&, int, const Section<double>&)  \
-      const;
+#define MBCOSIM_INSTANTIATE(Nodes)                                                         \
+  template void Beam<Nodes>::residual(const Local<double>&, Residual<double>&) const;      \
+  template auto Beam<Nodes>::line(const Local<double>&) const->Line<Wide<double>>;         \
+  template auto Beam<Nodes>::section(const Local<double>&, const Line<Wide<double>>&, int) \
+      const->Section<Wide<double>>;                                                        \
+  template auto Beam<Nodes>::internal_force(const Local<double>&, int,                     \
+                                            const Section<Wide<double>>&)                  \
+      const->Eigen::Matrix<Wide<double>, 6, 1>;
 MBCOSIM_INSTANTIATE(2)
 MBCOSIM_INSTANTIATE(3)
 #undef MBCOSIM_INSTANTIATE

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "elements/element.h"
+#include "math/pack.h"
 #include "model/beam_output.h"
 #include "model/law.h"
 
@@ -82,9 +83,17 @@ struct Section {
 /// (global) pulls on node a and, reversed, on node a+1, with moments M_a + (p_a − x) × F_a about
 /// the node positions x. The time derivative of G is left out of w and κ̇, and orientations are
 /// integrated step by step, as MBDyn does: both affect digits, not orders.
+///
+/// In doubles all points are computed side by side (`Wide`), in other numbers one after the other.
 template <int Nodes>
 struct Beam {
   static constexpr int points = Nodes - 1;
+  template <class T>
+  using Wide = SideBySide<points, T>;  ///< one number of each point that is computed at once
+  template <class T>
+  static constexpr int at_once = std::is_same_v<T, double> ? points : 1;
+  template <class W>
+  using Plain = std::conditional_t<(lanes<W> > 1), W, double>;  ///< W without derivatives
   static constexpr int width = 6 * Nodes;
   static constexpr bool rotation_parameters = true;
   static constexpr AssemblyRole assembly = AssemblyRole::elastic;
@@ -117,14 +126,19 @@ struct Beam {
   template <class T>
   void residual(const Local<T>& u, Residual<T>& r) const {
     if (is_unloaded(u)) return;
-    const Line<T> along = line(u);
-    for (int a = 0; a < points; ++a) {
-      const Section<T> s = section(u, along, a);
-      const Eigen::Matrix<T, 6, 1> local = internal_force(u, a, s);
-      const Vec<T> f = s.R * Vec<T>(local.template head<3>());
-      const Vec<T> m = s.R * Vec<T>(local.template tail<3>());
-      r.load(a, f, m + Vec<T>(s.p - u.x(a)).cross(f));
-      r.load(a + 1, -f, -m - Vec<T>(s.p - u.x(a + 1)).cross(f));
+    using W = Wide<T>;
+    const Line<W> along = line(u);
+    for (int a = 0; a < points; a += at_once<T>) {
+      const Section<W> s = section(u, along, a);
+      const Eigen::Matrix<W, 6, 1> local = internal_force(u, a, s);
+      const Vec<W> f = s.R * Vec<W>(local.template head<3>());
+      const Vec<W> m = s.R * Vec<W>(local.template tail<3>());
+      const Vec<W> before = m + Vec<W>(s.p - position(u, a)).cross(f);
+      const Vec<W> after = -m - Vec<W>(s.p - position(u, a + 1)).cross(f);
+      for (int k = 0; k < at_once<T>; ++k) {
+        r.load(a + k, lane(f, k), lane(before, k));
+        r.load(a + k + 1, -lane(f, k), lane(after, k));
+      }
     }
   }
 
@@ -136,13 +150,19 @@ struct Beam {
   };
   /// Rates are there for viscoelastic beams only.
   template <class T>
-  Line<T> line(const Local<T>& u) const;
-  /// Kinematics of evaluation point `a`.
+  Line<Wide<T>> line(const Local<T>& u) const;
+  /// Positions of the nodes before the evaluation points from `a` on (after them: a + 1).
   template <class T>
-  Section<T> section(const Local<T>& u, const Line<T>& along, int a) const;
-  /// Section-frame force and moment (F, M) at point `a` [N, N·m].
+  static Vec<Wide<T>> position(const Local<T>& u, int a) {
+    return side_by_side<Vec<Wide<T>>>([&](int k) -> const Vec<T>& { return u.x(a + k); });
+  }
+  /// Kinematics of the evaluation points from `a` on.
   template <class T>
-  Eigen::Matrix<T, 6, 1> internal_force(const Local<T>& u, int a, const Section<T>& s) const;
+  Section<Wide<T>> section(const Local<T>& u, const Line<Wide<T>>& along, int a) const;
+  /// Section-frame forces and moments (F, M) there [N, N·m].
+  template <class T>
+  Eigen::Matrix<Wide<T>, 6, 1> internal_force(const Local<T>& u, int a,
+                                              const Section<Wide<T>>& s) const;
 
   void tangent(const Local<double>& u, Tangent& t) const;
   void start(Start& s) const;
@@ -162,18 +182,23 @@ struct Beam {
   double set_geometry(const Model& model);
 
  private:
+  /// What evaluation points bring with them, side by side.
+  template <class P>
+  struct Place {
+    P n[Nodes], dn[Nodes];  ///< N and dN/dξ
+    P metric;
+    Vec<P> l0;
+  };
+  template <class P>
+  Place<P> place(int a) const;
   /// Interpolated rotation parameters of the step, their derivatives along the line and in time.
   template <class T>
   struct Increment {
     Vec<T> r, dr, rp, drp;
   };
-  template <class T>
-  Increment<T> increment(const Vec<T> (&g)[Nodes], const Vec<T> (&gp)[Nodes], bool with_rates,
-                         int a) const;
-  template <class T>
-  Increment<T> increment(const Line<T>& along, bool assembling, int a) const {
-    return increment(along.g, along.gp, viscoelastic && !assembling, a);
-  }
+  template <class T, class P>
+  static Increment<T> increment(const Vec<T> (&g)[Nodes], const Vec<T> (&gp)[Nodes],
+                                bool with_rates, const Place<P>& at);
   /// Rotation parameters from the orientation as read to the current one, during the initial
   /// assembly.
   template <class T>
@@ -181,12 +206,12 @@ struct Beam {
   void restart(const Local<double>& u, State& state) const;
 
   struct PointTangent;
-  PointTangent point_tangent(const Local<double>& u, const Tangent& t, const Line<double>& along,
-                             int a) const;
-  void add_rate(const Local<double>& u, const Tangent& t, int a, const Increment<double>& i,
-                const Mat6& damping, PointTangent& p) const;
-  Mat6 force_by_node(const Local<double>& u, const Tangent& t, const PointTangent& p, int a,
-                     int k) const;
+  PointTangent point_tangent(const Local<double>& u, const Tangent& t,
+                             const Line<Wide<double>>& along) const;
+  void add_rate(const Local<double>& u, const Tangent& t, const Increment<Wide<double>>& i,
+                const Eigen::Matrix<Wide<double>, 6, 6>& damping, PointTangent& p) const;
+  Eigen::Matrix<Wide<double>, 6, 6> force_by_node(const Local<double>& u, const Tangent& t,
+                                                  const PointTangent& p, int k) const;
 
   static constexpr int kMemory =
       points * kSectionHistory + 1;  ///< the last one: has the beam been loaded?

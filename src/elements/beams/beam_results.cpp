@@ -45,23 +45,24 @@ void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
   const OrientationDescription description =
       fields.description.value_or(u.model().control.orientation);
   row.begin(OutputFile::act, u.label());
-  const Line<double> along = line(u);
+  const auto s = section(u, line(u), 0);
+  const auto loads = internal_force(u, 0, s);
   for (int a = 0; a < points; ++a) {
     const std::string suffix = Nodes == 2 ? "" : a == 0 ? "_I" : "_II";
-    const Section<double> s = section(u, along, a);
-    const Vec6 f = is_unloaded(u) ? Vec6(Vec6::Zero()) : internal_force(u, a, s);
+    const Vec6 strain = lane(s.strain, a), rate = lane(s.rate, a);
+    const Vec6 f = is_unloaded(u) ? Vec6(Vec6::Zero()) : Vec6(lane(loads, a));
     const auto vector = [&](Field field, const char* name, const char* unit, const Vec3& value) {
       if (chosen & field) row.vec3((name + suffix).c_str(), unit, value);
     };
-    vector(Field::position, "X", "m", s.p);
+    vector(Field::position, "X", "m", lane(s.p, a));
     if (chosen & Field::orientation)
-      row.orientation((orientation_name(description) + suffix).c_str(), s.R, description);
+      row.orientation((orientation_name(description) + suffix).c_str(), lane(s.R, a), description);
     vector(Field::force, "F", "N", f.template head<3>());
     vector(Field::moment, "M", "N m", f.template tail<3>());
-    vector(Field::strain, "nu", "-", s.strain.template head<3>());
-    vector(Field::curvature, "k", "1/m", s.strain.template tail<3>());
-    vector(Field::strain_rate, "nuP", "1/s", s.rate.template head<3>());
-    vector(Field::curvature_rate, "kP", "1/(m s)", s.rate.template tail<3>());
+    vector(Field::strain, "nu", "-", strain.template head<3>());
+    vector(Field::curvature, "k", "1/m", strain.template tail<3>());
+    vector(Field::strain_rate, "nuP", "1/s", rate.template head<3>());
+    vector(Field::curvature_rate, "kP", "1/(m s)", rate.template tail<3>());
   }
   row.end();
 }
@@ -105,25 +106,26 @@ int Beam<Nodes>::private_datum(std::string_view name) const {
 template <int Nodes>
 double Beam<Nodes>::private_value(const Local<double>& u, int datum) const {
   const int axis = datum % 3, group = datum / 3 % kGroups, a = datum / 3 / kGroups;
-  const Section<double> s = section(u, line(u), a);
+  const auto s = section(u, line(u), 0);
   switch (group) {
     case kStrain:
-      return s.strain(axis);
+      return lane(s.strain(axis), a);
     case kCurvature:
-      return s.strain(3 + axis);
+      return lane(s.strain(3 + axis), a);
     case kForce:
     case kMoment:
-      return is_unloaded(u) ? 0 : internal_force(u, a, s)(group == kForce ? axis : 3 + axis);
+      return is_unloaded(u) ? 0
+                            : lane(internal_force(u, 0, s)(group == kForce ? axis : 3 + axis), a);
     case kPosition:
-      return s.p(axis);
+      return lane(s.p(axis), a);
     case kOrientation:
-      return vector_of_rotation(s.R)(axis);
+      return vector_of_rotation(Mat3(lane(s.R, a)))(axis);
     case kAngularVelocity:
-      return s.w(axis);
+      return lane(s.w(axis), a);
     case kStrainRate:
-      return s.rate(axis);
+      return lane(s.rate(axis), a);
     default:
-      return s.rate(3 + axis);
+      return lane(s.rate(3 + axis), a);
   }
 }
 

@@ -7,11 +7,25 @@
 namespace mbcosim {
 
 /// Σ weight_k · value_k.
-template <int Nodes, class T>
-inline Vec<T> interpolate(const double (&weight)[Nodes], const Vec<T> (&value)[Nodes]) {
+template <int Nodes, class P, class T>
+inline Vec<T> interpolate(const P (&weight)[Nodes], const Vec<T> (&value)[Nodes]) {
   Vec<T> sum = value[0] * weight[0];
   for (int k = 1; k < Nodes; ++k) sum += value[k] * weight[k];
   return sum;
+}
+
+/// What evaluation point `a` of the beam whose memory starts at `offset` remembers.
+template <class Numbers>
+inline auto history(Numbers& memory, int offset, int a) {
+  return SectionHistory<std::remove_reference_t<decltype(memory[0])>>(
+      &memory[offset + a * kSectionHistory]);
+}
+
+/// A vector or matrix that evaluation points from `a` on remember, of as many as `Wide` has lanes.
+template <class Wide, class T, class Field>
+inline Wide remembered(const Local<T>& u, int a, Field field) {
+  return side_by_side<Wide>(
+      [&](int k) { return history(u.context->state->memory, u.memory_offset(), a + k).*field; });
 }
 
 template <int Nodes>
@@ -29,33 +43,45 @@ Vec<T> Beam<Nodes>::total_parameters(const Local<T>& u, int k) {
 
 template <int Nodes>
 template <class T>
-inline typename Beam<Nodes>::template Line<T> Beam<Nodes>::line(const Local<T>& u) const {
+inline auto Beam<Nodes>::line(const Local<T>& u) const -> Line<Wide<T>> {
+  using W = Wide<T>;
   const bool assembling = u.context->phase == Phase::assembly;
-  Line<T> along;
+  Line<W> along;
   for (int k = 0; k < Nodes; ++k) {
     const Vec<T> arm = u.R(k) * offset[k].template cast<T>();
-    along.x[k] = u.x(k) + arm;
-    along.g[k] = assembling ? total_parameters(u, k) : u.g(k);
+    along.x[k] = Vec<T>(u.x(k) + arm).template cast<W>();
+    along.g[k] = (assembling ? total_parameters(u, k) : u.g(k)).template cast<W>();
     if (!viscoelastic || assembling) continue;
-    along.v[k] = u.v(k) + u.w(k).cross(arm);
-    along.gp[k] = u.gp(k);
+    along.v[k] = Vec<T>(u.v(k) + u.w(k).cross(arm)).template cast<W>();
+    along.gp[k] = u.gp(k).template cast<W>();
   }
   return along;
 }
 
 template <int Nodes>
-template <class T>
-inline typename Beam<Nodes>::template Increment<T> Beam<Nodes>::increment(const Vec<T> (&g)[Nodes],
-                                                                          const Vec<T> (&gp)[Nodes],
-                                                                          bool with_rates,
-                                                                          int a) const {
+template <class P>
+inline auto Beam<Nodes>::place(int a) const -> Place<P> {
   using Shape = BeamShape<Nodes>;
+  Place<P> at;
+  for (int j = 0; j < Nodes; ++j) {
+    at.n[j] = side_by_side<P>([&](int k) { return Shape::n[a + k][j]; });
+    at.dn[j] = side_by_side<P>([&](int k) { return Shape::dn[a + k][j]; });
+  }
+  at.metric = side_by_side<P>([&](int k) { return point[a + k].metric; });
+  at.l0 = side_by_side<Vec<P>>([&](int k) -> const Vec3& { return point[a + k].l0; });
+  return at;
+}
+
+template <int Nodes>
+template <class T, class P>
+inline auto Beam<Nodes>::increment(const Vec<T> (&g)[Nodes], const Vec<T> (&gp)[Nodes],
+                                   bool with_rates, const Place<P>& at) -> Increment<T> {
   Increment<T> i;
-  i.r = interpolate(Shape::n[a], g);
-  i.dr = interpolate(Shape::dn[a], g) * point[a].metric;
+  i.r = interpolate(at.n, g);
+  i.dr = interpolate(at.dn, g) * at.metric;
   if (with_rates) {
-    i.rp = interpolate(Shape::n[a], gp);
-    i.drp = interpolate(Shape::dn[a], gp) * point[a].metric;
+    i.rp = interpolate(at.n, gp);
+    i.drp = interpolate(at.dn, gp) * at.metric;
   } else {
     i.rp = i.drp = Vec<T>::Constant(T(0.0));
   }
@@ -64,45 +90,56 @@ inline typename Beam<Nodes>::template Increment<T> Beam<Nodes>::increment(const 
 
 template <int Nodes>
 template <class T>
-Section<T> Beam<Nodes>::section(const Local<T>& u, const Line<T>& along, int a) const {
-  using Shape = BeamShape<Nodes>;
-  const Point& q = point[a];
+auto Beam<Nodes>::section(const Local<T>& u, const Line<Wide<T>>& along, int a) const
+    -> Section<Wide<T>> {
+  using W = Wide<T>;
+  using P = Plain<W>;
+  using Past = SectionHistory<const double>;
+  const Place<P> at = place<P>(a);
   const bool assembling = u.context->phase == Phase::assembly;
-  const SectionHistory<const double> past(
-      &u.context->state->memory[u.memory_offset() + a * kSectionHistory]);
-  const Vec3 k_ref = assembling ? Vec3(Vec3::Zero()) : Vec3(past.k_ref);
-  const Mat3 R_ref = assembling ? q.R0 : Mat3(past.R_ref);
+  Vec<P> k_ref = Vec<P>::Constant(P(0.0));
+  Mat<P> R_ref;
+  if (assembling) {
+    R_ref = side_by_side<Mat<P>>([&](int k) -> const Mat3& { return point[a + k].R0; });
+  } else {
+    k_ref = remembered<Vec<P>>(u, a, &Past::k_ref);
+    R_ref = remembered<Mat<P>>(u, a, &Past::R_ref);
+  }
 
-  const Increment<T> i = increment(along, assembling, a);
-  const Mat<T> G = cgr_g(i.r), rotation = cgr_rotation(i.r);
-  const Vec<T> bend = G * i.dr;  // G(r) r′
+  const Increment<W> i = increment(along.g, along.gp, viscoelastic && !assembling, at);
+  const Mat<W> G = cgr_g(i.r), rotation = cgr_rotation(i.r);
+  const Vec<W> bend = G * i.dr;  // G(r) r′
 
-  Section<T> s;
-  s.p = interpolate(Shape::n[a], along.x);
-  s.l = interpolate(Shape::dn[a], along.x) * q.metric;
-  s.R = rotation * R_ref.template cast<T>();
-  s.strain.template head<3>() = s.R.transpose() * s.l - q.l0.template cast<T>();
-  s.strain.template tail<3>() = s.R.transpose() * bend + k_ref.template cast<T>();
-  s.rate.setConstant(T(0.0));
-  s.w.setConstant(T(0.0));
+  Section<W> s;
+  s.p = interpolate(at.n, along.x);
+  s.l = interpolate(at.dn, along.x) * at.metric;
+  s.R = rotation * R_ref.template cast<W>();
+  s.strain.template head<3>() = s.R.transpose() * s.l - at.l0.template cast<W>();
+  s.strain.template tail<3>() = s.R.transpose() * bend + k_ref.template cast<W>();
+  s.rate.setConstant(W(0.0));
+  s.w.setConstant(W(0.0));
   if (!viscoelastic || assembling) return s;
 
-  const Vec<T> lp = interpolate(Shape::dn[a], along.v) * q.metric;
-  s.w = G * i.rp + rotation * Vec3(past.w_ref).template cast<T>();
-  s.rate.template head<3>() = s.R.transpose() * Vec<T>(lp + s.l.cross(s.w));
-  s.rate.template tail<3>() =
-      s.R.transpose() * Vec<T>(G * i.drp + bend.cross(s.w)) + Vec3(past.kp_ref).template cast<T>();
+  const Vec<W> lp = interpolate(at.dn, along.v) * at.metric;
+  s.w = G * i.rp + rotation * remembered<Vec<P>>(u, a, &Past::w_ref).template cast<W>();
+  s.rate.template head<3>() = s.R.transpose() * Vec<W>(lp + s.l.cross(s.w));
+  s.rate.template tail<3>() = s.R.transpose() * Vec<W>(G * i.drp + bend.cross(s.w)) +
+                              remembered<Vec<P>>(u, a, &Past::kp_ref).template cast<W>();
   return s;
 }
 
 template <int Nodes>
 template <class T>
-Eigen::Matrix<T, 6, 1> Beam<Nodes>::internal_force(const Local<T>& u, int a,
-                                                   const Section<T>& s) const {
-  Eigen::Matrix<T, 6, 1> f = point[a].law->template force<T>(*u.context, s.strain, s.rate);
-  for (int j = 0; j < static_cast<int>(actuators.size()); ++j)
-    for (int i = 0; i < 6; ++i) f(i) += u.scalar(j) * point[a].actuation(i, j);
-  return f;
+auto Beam<Nodes>::internal_force(const Local<T>& u, int a, const Section<Wide<T>>& s) const
+    -> Eigen::Matrix<Wide<T>, 6, 1> {
+  using One = Eigen::Matrix<T, 6, 1>;
+  return side_by_side<Eigen::Matrix<Wide<T>, 6, 1>>([&](int k) {
+    One f = point[a + k].law->template force<T>(*u.context, One(lane(s.strain, k)),
+                                                One(lane(s.rate, k)));
+    for (int j = 0; j < static_cast<int>(actuators.size()); ++j)
+      for (int i = 0; i < 6; ++i) f(i) += u.scalar(j) * point[a + k].actuation(i, j);
+    return f;
+  });
 }
 
 }  // namespace mbcosim
