@@ -161,6 +161,7 @@ struct ViscousBody : LawUser<ViscousBody, 6> {
   Attachment a;
 
   static constexpr int width = 6;
+  static constexpr AssemblyRole assembly = AssemblyRole::elastic;
   static constexpr auto data_names = joined(kVelocityData, kSpinData, kForceData, kMomentData);
 
   void connect(Connector& c) const { c.distinct_node(a.node); }

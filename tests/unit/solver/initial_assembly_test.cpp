@@ -126,5 +126,30 @@ TEST(InitialAssembly, StiffNodesMoveLess) {
   EXPECT_NEAR(run.node(2).x(0), .25, 1e-9);
 }
 
+/// What is viscous pushes at its node as springs do: k (x − x₀) = −D v, k g(R R₀ᵀ) = −D w.
+TEST(InitialAssembly, ViscousBodiesPushAtTheirNodes) {
+  DeckRun run(
+      deck("structural: 1, dynamic, .1,0.,0., eye, .5,0.,-.2, 0.,0.,.3, assembly, 2., 1., no;\n",
+           body(1) + "joint: 1, viscous body, 1, null, linear viscous isotropic, .5;\n", 1, 1));
+  ASSERT_TRUE(run.ready());
+  EXPECT_LT((run.node(1).x - Vec3(-.025, 0, .05)).norm(), 1e-9);
+  EXPECT_LT((run.node(1).R - cgr_rotation<double>(Vec3(0, 0, -.075))).norm(), 1e-9);
+  EXPECT_EQ(run.node(1).v, Vec3(.5, 0, -.2));
+}
+
+/// The same at both of their nodes, here of one stiffness.
+TEST(InitialAssembly, ViscousJointsPushTheirNodesApart) {
+  DeckRun run(
+      deck("structural: 1, dynamic, null, eye, null, null, assembly, 2., 1., no;\n"
+           "structural: 2, dynamic, null, eye, 0.,.4,0., null, assembly, 2., 1., no;\n",
+           body(1) + body(2) +
+               "joint: 1, deformable displacement joint, 1, null, 2, null, linear viscous "
+               "isotropic, .5;\n",
+           2, 1));
+  ASSERT_TRUE(run.ready());
+  EXPECT_LT((run.node(1).x - Vec3(0, .1, 0)).norm(), 1e-9);
+  EXPECT_LT((run.node(2).x - Vec3(0, -.1, 0)).norm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace mbcosim::initial_assembly_test
