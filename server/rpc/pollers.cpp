@@ -120,7 +120,7 @@ void Pollers::look() {
   const int waiting = waiting_.load();
   const std::uint64_t events = events_.load();
   const bool moved = std::exchange(load_.events, events) != events;
-  const bool at_work = waiting == 0 || are_at_work();
+  const bool at_work = have_worked(moved) || waiting == 0;
   load_.looks_without = moved || at_work ? 0 : load_.looks_without + 1;
   const auto weigh = [](double& part, bool seen) {
     part = kMemory * part + (1 - kMemory) * (seen ? 1 : 0);
@@ -138,16 +138,16 @@ void Pollers::look() {
   }
 }
 
-// Since the last look, for most of the time: those that wait for gRPC's events may be what works
-// inside gRPC.
-bool Pollers::are_at_work() {
-  const auto now = Clock::now();
+// Those that wait for gRPC's events may be what works inside gRPC. On a busy machine that takes
+// many looks for what would be one alone: what counts is the processor's time, however long it took
+// to get it.
+bool Pollers::have_worked(bool moved) {
   std::chrono::nanoseconds worked{0};
   for (int place = 0; place < all_; ++place)
     worked += time_of(threads_[static_cast<std::size_t>(place)].native_handle());
-  const auto before = std::exchange(load_.worked, worked);
-  const auto since = std::exchange(load_.look, now);
-  return 2 * (worked - before) > now - since;
+  const bool enough = 2 * (worked - load_.worked) > kLook;
+  if (moved || enough) load_.worked = worked;
+  return enough;
 }
 
 // Nothing may happen for hours: the looks are rare then. Whoever takes an event counts it first and
@@ -157,7 +157,7 @@ void Pollers::rest() {
   if (events_.load() != load_.events) watch_rests_.store(false);
   while (watch_rests_.load() && !stop_) {
     watch_.wait_for(mutex_, kRestLook);
-    if (are_at_work()) watch_rests_.store(false);
+    if (have_worked(false)) watch_rests_.store(false);
   }
   load_.looks_without = 0;
 }

@@ -70,15 +70,16 @@ class Pollers {
   void look() TS_REQUIRES(mutex_);
   void rest() TS_REQUIRES(mutex_);
   void wake_watch() TS_EXCLUDES(mutex_);
-  bool are_at_work() TS_REQUIRES(mutex_);
+  /// For half of `kLook` since the last event, or since this was so before; `moved`: there has been
+  /// one.
+  bool have_worked(bool moved) TS_REQUIRES(mutex_);
 
   /// What the watch has seen, weighted by age.
   struct Load {
     double none_waits = 0, several_wait = 0;  ///< parts of the looks
     std::uint64_t events = 0;                 ///< at the last look
     int looks_without = 0;                    ///< without an event
-    Clock::time_point look{};                 ///< the last one
-    std::chrono::nanoseconds worked{0};       ///< by the threads, until then
+    std::chrono::nanoseconds worked{0};       ///< by the threads, when they were last asked anew
   };
 
   const std::unique_ptr<grpc::ServerCompletionQueue> queue_;

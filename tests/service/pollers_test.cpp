@@ -8,9 +8,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <functional>
 #include <future>
 #include <set>
+#include <thread>
+#include <vector>
 
 namespace mbcosim::server::pollers_test {
 namespace {
@@ -185,31 +188,46 @@ class Flood {
   std::thread thread_;
 };
 
-// Also when nothing has happened for so long that the watch rests.
-TEST(Pollers, AnotherGoesOnWhileGrpcReadsWithoutEnd) {
-  for (const auto pause : {0ms, 1000ms}) {
-    grpc::ServerBuilder builder;
-    grpc::AsyncGenericService service;
-    builder.RegisterAsyncGenericService(&service);
-    const auto acceptor = builder.experimental().AddExternalConnectionAcceptor(
-        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-        grpc::InsecureServerCredentials());
-    Pollers pollers(builder.AddCompletionQueue(), 2);
-    const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
-    std::this_thread::sleep_for(pause);
-    {
-      const Flood flood(*acceptor);
-      std::this_thread::sleep_for(100ms);
-      for (int k = 0; k < 10; ++k) {
-        std::promise<void> heard;
-        Bell bell(pollers, [&] { heard.set_value(); });
-        bell.ring();
-        ASSERT_EQ(heard.get_future().wait_for(kPatience), std::future_status::ready);
-      }
+/// Bells are heard while somebody floods the server, who begins `pause` after its start.
+void expect_to_hear_beside_flood(std::chrono::milliseconds pause) {
+  grpc::ServerBuilder builder;
+  grpc::AsyncGenericService service;
+  builder.RegisterAsyncGenericService(&service);
+  const auto acceptor = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      grpc::InsecureServerCredentials());
+  Pollers pollers(builder.AddCompletionQueue(), 2);
+  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  std::this_thread::sleep_for(pause);
+  {
+    const Flood flood(*acceptor);
+    std::this_thread::sleep_for(100ms);
+    for (int k = 0; k < 10; ++k) {
+      std::promise<void> heard;
+      Bell bell(pollers, [&] { heard.set_value(); });
+      bell.ring();
+      ASSERT_EQ(heard.get_future().wait_for(kPatience), std::future_status::ready);
     }
-    server->Shutdown();
-    pollers.stop();
   }
+  server->Shutdown();
+  pollers.stop();
+}
+
+TEST(Pollers, AnotherGoesOnWhileGrpcReadsWithoutEnd) { expect_to_hear_beside_flood(0ms); }
+
+TEST(Pollers, AnotherGoesOnWhenTheWatchHasRested) { expect_to_hear_beside_flood(1000ms); }
+
+/// Where the one that reads gets a small part of a core, also in looks that are far apart.
+TEST(Pollers, AnotherGoesOnOnABusyMachine) {
+  std::atomic<bool> ends{false};
+  std::vector<std::jthread> busy;
+  for (unsigned k = 0; k < 6 * std::thread::hardware_concurrency(); ++k)
+    busy.emplace_back([&ends] {
+      while (!ends) {
+      }
+    });
+  expect_to_hear_beside_flood(1000ms);
+  ends = true;
 }
 
 TEST_F(PollersTest, WhatAnEventThrowsEndsNoThread) {
