@@ -46,11 +46,11 @@ void Beam<Nodes>::output(const Local<double>& u, OutputRow& row) const {
       fields.description.value_or(u.model().control.orientation);
   row.begin(OutputFile::act, u.label());
   const auto s = section(u, line(u), 0);
-  const auto loads = internal_force(u, 0, s);
+  using Loads = Eigen::Matrix<Wide<double>, 6, 1>;
+  const Loads loads = is_unloaded(u) ? Loads(Loads::Constant(0.0)) : internal_force(u, 0, s);
   for (int a = 0; a < points; ++a) {
     const std::string suffix = Nodes == 2 ? "" : a == 0 ? "_I" : "_II";
-    const Vec6 strain = lane(s.strain, a), rate = lane(s.rate, a);
-    const Vec6 f = is_unloaded(u) ? Vec6(Vec6::Zero()) : Vec6(lane(loads, a));
+    const Vec6 strain = lane(s.strain, a), rate = lane(s.rate, a), f = lane(loads, a);
     const auto vector = [&](Field field, const char* name, const char* unit, const Vec3& value) {
       if (chosen & field) row.vec3((name + suffix).c_str(), unit, value);
     };
