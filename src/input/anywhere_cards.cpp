@@ -144,6 +144,7 @@ void read_drive_caller(DeckCard& card) {
   drop_missing_derivative(card, *d.drive, d.output_derivative);
   read_drive_trace(card, d);
   card.expect_end();
+  d.evaluations = card.weight().objects;
   deck.drives[d.label] = {d.drive, card.head(), card.weight()};
   card.model().drive_index[d.label] = static_cast<int>(card.model().drives.size());
   card.model().drives.push_back(std::move(d));

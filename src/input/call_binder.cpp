@@ -133,7 +133,7 @@ void CallBinder::call_scalar_function(const SyntaxItem& item, std::string_view n
   if (item.count == 2) convert_argument(item.name, 1, 2, 'I');
   reduce_model(item.count, Op::function_value).index =
       static_cast<std::int32_t>(out_.functions.size());
-  out_.functions.push_back(f->second);
+  out_.functions.push_back({f->second.object, f->second.weight.objects});
 }
 
 void CallBinder::call_node_datum(const SyntaxItem& item, std::string_view name) {

@@ -20,18 +20,6 @@ namespace mbcosim {
 
 class DeckCard;
 
-/// What the evaluation of a drive, a law, a function or a dummy node takes.
-struct Weight {
-  int depth = 0;    ///< longest chain of references behind it
-  int objects = 0;  ///< counted as often as they are evaluated
-};
-
-template <class T>
-struct Named {
-  T object;
-  SourceSpan where;
-  Weight weight{};
-};
 template <class T>
 using LabelMap = std::unordered_map<int, Named<T>>;
 
@@ -87,7 +75,6 @@ struct Deck {
   LabelMap<FluidPtr> fluids;
   LabelMap<bool> c81_data;
   LabelMap<FileDriverPtr> file_drivers;
-  std::map<std::string, Named<ScalarFunctionPtr>, std::less<>> functions;
   std::set<int> bound_parameters;  ///< indices of parameter nodes that a `bind` card feeds
 
   /// Labels whose definition was refused: errors that follow from them are not reported.

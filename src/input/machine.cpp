@@ -513,7 +513,9 @@ class Machine {
   }
 
   void scalar_function(const Instruction& in) {
-    const ScalarFunction& f = *program_.functions[in.index];
+    const Program::Function& function = program_.functions[in.index];
+    NestedEvaluation::charge(function.evaluations);
+    const ScalarFunction& f = *function.object;
     if (in.count == 2) {
       --top_;
       const int order = top_[1].i;
@@ -578,7 +580,9 @@ void start_locals(const Program& program, const Frame<T>& frame, Slot<T>* locals
 
 template <class T>
 Slot<T> run(const Program& program, Frame<T>& frame) {
+  constexpr std::size_t kOfADrive = 16;  // instructions that take as long as a drive
   const NestedEvaluation nested;
+  NestedEvaluation::charge(static_cast<int>(program.code.size() / kOfADrive));
   Slot<T> small_stack[kSmallStack], small_locals[kSmallLocals];
   std::vector<Slot<T>> large_stack;
   Slot<T>* stack = small_stack;

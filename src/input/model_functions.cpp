@@ -181,11 +181,10 @@ double evaluate(const NodeFunction& f, const EvalContext& context, int label_a, 
 }
 
 double evaluate_drive(const EvalContext& context, int label, double argument, bool derivative) {
-  const Model& model = model_of(context);
-  const auto it = model.drive_index.find(label);
-  if (it == model.drive_index.end())
-    fail("drive caller " + std::to_string(label) + " is not defined");
-  const Drive& drive = *model.drives[it->second].drive;
+  const NamedDrive* const found = model_of(context).find_drive(label);
+  if (!found) fail("drive caller " + std::to_string(label) + " is not defined");
+  NestedEvaluation::charge(found->evaluations);
+  const Drive& drive = *found->drive;
   if (!derivative) return drive.value(context, argument);
   if (!drive.has_derivative()) fail("drive caller " + std::to_string(label) + " has no derivative");
   return drive.derivative(context, argument);

@@ -94,10 +94,14 @@ struct Program {
     int variable =
         -1;  ///< ≥ 0: starts with State::variables[variable] and is written back once a step
   };
+  struct Function {
+    ScalarFunctionPtr object;
+    int evaluations;  ///< of functions, for one value
+  };
   std::vector<Instruction> code;
   std::vector<std::string> texts;
   std::vector<DrivePtr> drives;
-  std::vector<ScalarFunctionPtr> functions;
+  std::vector<Function> functions;
   std::vector<Local> locals;
   int depth = 0;  ///< largest number of values on the stack
   ValueType type = ValueType::real;

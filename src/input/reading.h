@@ -34,6 +34,19 @@ struct Trail {
   std::int32_t value = 0;
 };
 
+/// What the evaluation of a drive, a law, a function or a dummy node takes.
+struct Weight {
+  int depth = 0;    ///< longest chain of references behind it
+  int objects = 0;  ///< counted as often as they are evaluated
+};
+
+template <class T>
+struct Named {
+  T object;
+  SourceSpan where;
+  Weight weight{};
+};
+
 struct ReaderOptions {
   bool strict = false;    ///< `for` and `if` are unknown cards, absent counts mean 0
   bool redefine = false;  ///< declarations of known variables assign (MBDyn's switch -r)
@@ -121,8 +134,7 @@ class Reading {
   const Limits limits;
   const ReaderOptions options;
   SymbolTable symbols;
-  std::map<std::string, ScalarFunctionPtr, std::less<>>
-      functions;  ///< `scalar function` cards, for model::sf::NAME
+  std::map<std::string, Named<ScalarFunctionPtr>, std::less<>> functions;
   std::map<std::string, double, std::less<>>
       currents;  ///< model::current("L"), set while a card is read
   std::map<std::string, std::string, std::less<>> environment;  ///< what `setenv` defined

@@ -307,7 +307,8 @@ bool DeckCard::at_expression() {
 
 ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceSpan where) {
   const Nesting nesting(*this);
-  if (const auto known = deck_.functions.find(name); known != deck_.functions.end())
+  auto& functions = deck_.reading.functions;
+  if (const auto known = functions.find(name); known != functions.end())
     fail_at(where,
             "scalar function \"" + name + "\" already defined at " +
                 deck_.reading.place(known->second.where),
@@ -325,8 +326,7 @@ ScalarFunctionPtr DeckCard::function_definition(const std::string& name, SourceS
     fail_word("scalar function", w, registry().functions, "function");
   }
   ScalarFunctionPtr f = read_as("function", found->key, found->value);
-  deck_.reading.functions[name] = f;
-  deck_.functions[name] = {f, where, weight_};
+  functions[name] = {f, where, weight_};
   return f;
 }
 
@@ -341,7 +341,8 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
   const std::string name = quoted(std::string(what) + " name");
   const SourceSpan where = last();
   if (registry().functions.find(peek_word())) return function_definition(name, where);
-  if (const auto known = deck_.functions.find(name); known != deck_.functions.end()) {
+  const auto& functions = deck_.reading.functions;
+  if (const auto known = functions.find(name); known != functions.end()) {
     refer("scalar function \"" + name + "\"", known->second.weight);
     return known->second.object;
   }
@@ -350,7 +351,7 @@ ScalarFunctionPtr DeckCard::scalar_function(std::string_view what) {
   else if (at_expression())
     return function_definition(name, where);
   fail_at(where, "scalar function \"" + name + "\" is not defined",
-          suggested_function(name, deck_.reading.functions), "undefined");
+          suggested_function(name, functions), "undefined");
 }
 
 FluidPtr DeckCard::fluid() {

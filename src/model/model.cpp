@@ -213,6 +213,11 @@ int Model::find_structural(int label) const {
   return it == structural_index.end() ? -1 : it->second;
 }
 
+const NamedDrive* Model::find_drive(int label) const {
+  const auto found = drive_index.find(label);
+  return found == drive_index.end() ? nullptr : &drives[found->second];
+}
+
 int Model::find_scalar(ScalarKind kind, int label) const {
   const auto& index = scalar_index[static_cast<int>(kind)];
   const auto it = index.find(label);

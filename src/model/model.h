@@ -37,6 +37,7 @@ struct NamedDrive {
   int label = 0;
   std::string name;
   DrivePtr drive;
+  int evaluations = 1;  ///< of drives and functions, for one value
   bool output_value = false, output_derivative = false;
 };
 
@@ -151,6 +152,7 @@ class Model {
   // --- lookup
   int find_structural(int label) const;  ///< index or -1
   int find_scalar(ScalarKind kind, int label) const;
+  const NamedDrive* find_drive(int label) const;            ///< null when there is none
   ElementRef find_element(Family family, int label) const;  ///< set == nullptr when absent
   /// Private datum of a node: index or -1. Structural names: model/node_data.cpp; scalar nodes:
   /// "x", "xP".

@@ -15,18 +15,23 @@ class NestedEvaluation {
     if (depth_ == kDeepest)
       throw EvaluationError(
           "drives, strings and values of elements refer to each other in a circle");
-    if (++count_ > kMost)
-      throw EvaluationError(
-          "drives, strings and values of elements that refer to each other take too many "
-          "evaluations");
+    charge(1);
     ++depth_;
   }
   ~NestedEvaluation() { --depth_; }
   NestedEvaluation(const NestedEvaluation&) = delete;
   NestedEvaluation& operator=(const NestedEvaluation&) = delete;
 
+  /// The one that goes on takes so many evaluations of drives, functions and the like.
+  static void charge(int evaluations) {
+    if ((count_ += evaluations) > kMost)
+      throw EvaluationError(
+          "drives, functions, strings and values of elements that refer to each other take too "
+          "many evaluations");
+  }
+
  private:
-  static constexpr int kDeepest = 64, kMost = 10000;
+  static constexpr int kDeepest = 64, kMost = 100000;
   inline static thread_local int depth_ = 0, count_ = 0;
 };
 

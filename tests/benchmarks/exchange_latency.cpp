@@ -15,9 +15,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -264,10 +266,24 @@ void print(const char* transport, int numbers, const Samples& echo, const Couple
                 median, quantile(run->intervals, 0.99), run->solver, median - run->solver,
                 (median - run->solver) / base);
   }
-  std::fflush(stdout);
+  if (std::fflush(stdout) != 0) throw std::runtime_error("nobody reads the table any more");
 }
 
-/// A program of this folder; ends with this process's `stop`.
+/// Another process; it ends with this object.
+class Process {
+ public:
+  explicit Process(pid_t pid) : pid_(pid) {}
+  ~Process() {
+    ::kill(pid_, SIGTERM);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+ private:
+  pid_t pid_;
+};
+
 pid_t start(const std::string& program, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), program);
   std::vector<char*> argv;
@@ -275,13 +291,7 @@ pid_t start(const std::string& program, std::vector<std::string> arguments) {
   argv.push_back(nullptr);
   pid_t pid = 0;
   if (::posix_spawn(&pid, program.c_str(), nullptr, nullptr, argv.data(), environ) == 0) return pid;
-  std::fprintf(stderr, "error: cannot start %s\n", program.c_str());
-  std::exit(4);
-}
-
-void stop(pid_t pid) {
-  ::kill(pid, SIGTERM);
-  ::waitpid(pid, nullptr, 0);
+  throw std::runtime_error("cannot start " + program);
 }
 
 /// A channel to a process that echoes. Called while this process has one thread.
@@ -316,8 +326,10 @@ void measure_stream(const char* name, const Place& place, int numbers, int count
 }
 
 int run(int count) {
-  pid_t echo_process = 0;
-  const auto shared_memory = start_shared_memory_echo(&echo_process);
+  std::signal(SIGPIPE, SIG_IGN);  // when nobody reads the table, the other processes must end
+  pid_t echo_pid = 0;
+  const auto shared_memory = start_shared_memory_echo(&echo_pid);
+  const Process echo_process(echo_pid);
   const std::string folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   const std::string sockets =
       std::filesystem::temp_directory_path() / ("latency" + std::to_string(::getpid()));
@@ -325,11 +337,11 @@ int run(int count) {
   const Place unix_socket{"unix:" + sockets + ".d", "unix:" + sockets + ".e"};
   const Place loopback{"127.0.0.1:" + std::to_string(port),
                        "127.0.0.1:" + std::to_string(port + 1)};
-  const pid_t daemon =
+  const Process daemon(
       start(folder + "/mbcosimd", {"--listen", unix_socket.daemon, "--insecure", "--listen",
-                                   loopback.daemon, "--log-level", "warn"});
-  const pid_t echo =
-      start(folder + "/exchange_latency", {"--echo", unix_socket.echo, loopback.echo});
+                                   loopback.daemon, "--log-level", "warn"}));
+  const Process echo(
+      start(folder + "/exchange_latency", {"--echo", unix_socket.echo, loopback.echo}));
   client::Server::connect(unix_socket.daemon, 30);
 
   Echo in_process;
@@ -349,10 +361,6 @@ int run(int count) {
           couple_in_process(v1::COUPLING_MODE_LOOSE, numbers, count),
           couple_in_process(v1::COUPLING_MODE_TIGHT, numbers, count));
   }
-  stop(daemon);
-  stop(echo);
-  shared_memory->close();
-  stop(echo_process);
   return 0;
 }
 

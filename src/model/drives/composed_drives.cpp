@@ -105,10 +105,11 @@ double PeriodicDrive::derivative(const EvalContext& context, double t) const {
 }
 
 const Drive& PostponedDrive::target(const EvalContext& context) const {
-  const auto it = context.model->drive_index.find(label_);
-  if (it == context.model->drive_index.end())
+  const NamedDrive* const found = context.model->find_drive(label_);
+  if (!found)
     throw EvaluationError("postponed drive: there is no drive caller " + std::to_string(label_));
-  return *context.model->drives[it->second].drive;
+  NestedEvaluation::charge(found->evaluations);
+  return *found->drive;
 }
 double PostponedDrive::value(const EvalContext& context, double t) const {
   const NestedEvaluation nested;

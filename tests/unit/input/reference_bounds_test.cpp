@@ -92,20 +92,63 @@ TEST(ReferenceBounds, DummyNodesToo) {
   EXPECT_NE(findings_of(40, ", relative frame, ").find("more than 100000"), std::string::npos);
 }
 
+/// What the deck meets before its first step; it is read without a finding.
+std::string trouble_of_start(const std::string& text) {
+  const LoadReport report = load(text);
+  EXPECT_TRUE(report.ok()) << findings(report.diagnostics);
+  if (!report.ok()) return "";
+  const auto created = Simulation::create(report.model);
+  return created ? "" : created.error().message;
+}
+
+std::string repeated(const std::string& term, int count) {
+  std::string sum = "0.";
+  for (int k = 0; k < count; ++k) sum += " + " + term;
+  return sum;
+}
+
 // Labels that are looked up during the run.
 TEST(ReferenceBounds, EvaluationsThatLeadToManyOthersEnd) {
   for (const char* card :
        {"drive caller: #, array, 2, postponed, @, postponed, @;",
         "drive caller: #, string, \"model::drive(@, 0.) + model::drive(@, 0.)\";"}) {
-    const LoadReport report =
-        load(chain(40, "drive caller: 1, const, 1.;", card, std::string(kForce) + "postponed, #;"));
-    ASSERT_TRUE(report.ok()) << findings(report.diagnostics);
-    const auto created = Simulation::create(report.model);
-    ASSERT_FALSE(created);
-    EXPECT_NE(created.error().message.find("refer to each other take too many evaluations"),
-              std::string::npos)
-        << created.error().message;
+    const std::string of_all = trouble_of_start(
+        chain(40, "drive caller: 1, const, 1.;", card, std::string(kForce) + "postponed, #;"));
+    EXPECT_NE(of_all.find("refer to each other take too many evaluations"), std::string::npos)
+        << of_all;
   }
+}
+
+// What is looked up takes as much as its card has told: 2^15 drives or functions, a long text.
+TEST(ReferenceBounds, EvaluationsOfWhatIsHeavyEnd) {
+  const Objects &drives = kObjects[0], &functions = kObjects[1];
+  const auto force = [](const std::string& text) { return kForce + ("string, \"" + text) + "\";"; };
+  const auto trouble = [](const Objects& o, const std::string& element) {
+    return trouble_of_start(chain(15, o.first, o.twice, element));
+  };
+  const std::string function = "1e-5*model::sf::f#(0.)", drive = "1e-5*model::drive(#, 0.)";
+  EXPECT_EQ(trouble(functions, force(repeated(function, 1))), "");
+  EXPECT_EQ(trouble(drives, force(repeated(drive, 1))), "");
+  for (const std::string& found :
+       {trouble(functions, force(repeated(function, 20))),
+        trouble(drives, force(repeated(drive, 20))),
+        trouble(drives, std::string(kForce) +
+                            "array, 2, postponed, 99, postponed, 99; drive caller: 99, array, 5, "
+                            "postponed, #, postponed, #, postponed, #, postponed, #, postponed, "
+                            "#;")})
+    EXPECT_NE(found.find("refer to each other take too many evaluations"), std::string::npos)
+        << found;
+}
+
+TEST(ReferenceBounds, LongTextsThatAreEvaluatedOftenEnd) {
+  const auto trouble = [](int terms, int count) {
+    const std::string of_drive =
+        "drive caller: 1, string, \"" + repeated("1e-9*Time", terms) + "\";";
+    return trouble_of_start(chain(
+        1, of_drive, "", kForce + ("string, \"" + repeated("model::drive(1, 0.)", count)) + "\";"));
+  };
+  EXPECT_EQ(trouble(1000, 20), "");
+  EXPECT_NE(trouble(1000, 1000).find("take too many evaluations"), std::string::npos);
 }
 
 TEST(ReferenceBounds, EvaluationsThatLeadBackEnd) {

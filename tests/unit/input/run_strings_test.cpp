@@ -39,7 +39,7 @@ class RunStrings : public testing::Test {
     source_ = std::make_unique<BundleSource>(std::map<std::string, std::string>{{"a.mbd", deck}});
     reading_ = std::make_unique<Reading>(*source_, Limits{}, &builder_);
     reading_->start_run_variables(2);
-    reading_->functions["f"] = std::make_shared<Parabola>();
+    reading_->functions["f"] = {std::make_shared<Parabola>(), {}};
     builder_.model().drives.push_back({7, "", std::make_shared<Line>(), false, false});
     builder_.model().drive_index[7] = 0;
     ASSERT_TRUE(static_cast<bool>(reading_->open_file("a.mbd")));

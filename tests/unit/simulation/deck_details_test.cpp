@@ -328,35 +328,40 @@ end: elements;
 /// nodes follow their loads. (In the reference solver its forces, too, but the moments have
 /// Coriolis terms.)
 TEST(DeckDetails, StaticModelsInAFrameFeelNoCoriolisForces) {
-  DeckRun run(
-      deck("final time: 1.; time step: .01; max iterations: 50; tolerance: 1e-9; derivatives "
-           "tolerance: 1e9;",
-           "model: static; structural nodes: 2; rigid bodies: 1; joints: 2; forces: 1; rigid body "
-           "kinematics: const, angular velocity, .3, .5, 2., acceleration, 1., 2., 3.;",
-           R"(begin: nodes; structural: 1, static, null, eye, null, null;
+  for (const char* mass : {"1.5, .1, .02, -.03, diag, .1, .2, .15",
+                           "variable mass, const, 1.5, single, .1, .02, -.03, const, 1., single, "
+                           "diag, .1, .2, .15, const, 1., null"}) {
+    DeckRun run(deck(
+        "final time: 1.; time step: .01; max iterations: 50; tolerance: 1e-9; derivatives "
+        "tolerance: 1e9;",
+        "model: static; structural nodes: 2; rigid bodies: 1; joints: 2; forces: 1; rigid body "
+        "kinematics: const, angular velocity, .3, .5, 2., acceleration, 1., 2., 3.;",
+        R"(begin: nodes; structural: 1, static, null, eye, null, null;
   structural: 2, dynamic, .5, .1, -.2, eye, null, null; end: nodes;
 begin: elements; joint: 1, clamp, 1, node, node;
-  body: 2, 2, 1.5, .1, .02, -.03, diag, .1, .2, .15;
+  body: 2, 2, )" +
+            std::string(mass) + R"(;
   joint: 3, deformable joint, 1, position, .5, .1, -.2, 2, position, null, linear elastic generic,
     diag, 1000., 1200., 1400., 200., 250., 300.;
   force: 4, absolute, 2, position, null, 0., 0., 1., sine, 0., 7., 50., forever, 0.; end: elements;
 )"));
-  ASSERT_TRUE(run.ready());
-  const Vec3 w0(.3, .5, 2), a0(1, 2, 3), b(.1, .02, -.03);
-  const double m = 1.5;
-  Mat3 J = Vec3(.1, .2, .15).asDiagonal();
-  J -= m * cross<double>(b) * cross<double>(b);
-  for (int k = 1; k <= 3; ++k) {
-    run.step(1);
-    const NodeState s = run.node(2);
-    EXPECT_GT(s.v.norm(), .01);
-    const Vec3 S = s.R * (m * b), a = a0 + w0.cross(w0.cross(s.x));
-    const Vec3 F = -m * a - w0.cross(w0.cross(S)) + Vec3(0, 0, 50 * std::sin(7 * .01 * k));
-    const Vec3 M = -S.cross(a) - w0.cross(s.R * J * s.R.transpose() * w0);
-    for (int i = 0; i < 3; ++i) {
-      const std::string axis(1, static_cast<char>('x' + i));
-      EXPECT_NEAR(run.datum(Family::joint, 3, "F" + axis), F(i), 1e-6);
-      EXPECT_NEAR(run.datum(Family::joint, 3, "M" + axis), M(i), 1e-6);
+    ASSERT_TRUE(run.ready());
+    const Vec3 w0(.3, .5, 2), a0(1, 2, 3), b(.1, .02, -.03);
+    const double m = 1.5;
+    Mat3 J = Vec3(.1, .2, .15).asDiagonal();
+    J -= m * cross<double>(b) * cross<double>(b);
+    for (int k = 1; k <= 3; ++k) {
+      run.step(1);
+      const NodeState s = run.node(2);
+      EXPECT_GT(s.v.norm(), .01);
+      const Vec3 S = s.R * (m * b), a = a0 + w0.cross(w0.cross(s.x));
+      const Vec3 F = -m * a - w0.cross(w0.cross(S)) + Vec3(0, 0, 50 * std::sin(7 * .01 * k));
+      const Vec3 M = -S.cross(a) - w0.cross(s.R * J * s.R.transpose() * w0);
+      for (int i = 0; i < 3; ++i) {
+        const std::string axis(1, static_cast<char>('x' + i));
+        EXPECT_NEAR(run.datum(Family::joint, 3, "F" + axis), F(i), 1e-6);
+        EXPECT_NEAR(run.datum(Family::joint, 3, "M" + axis), M(i), 1e-6);
+      }
     }
   }
 }
