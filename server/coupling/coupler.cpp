@@ -1,6 +1,8 @@
 #include "coupling/coupler.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "wire/refusal.h"
 
@@ -151,6 +153,28 @@ google::protobuf::RepeatedPtrField<v1::CheckpointPort> Coupler::memory() const {
   return memory;
 }
 
+namespace {
+
+/// Throws DAMAGED_STATE: what no port leaves behind.
+void check_memory(const PortModel& port, const v1::CheckpointPort& memory) {
+  double last = -std::numeric_limits<double>::infinity();
+  bool sound = v1::InputHold_IsValid(memory.input_hold()) &&
+               v1::PortFrame_IsValid(memory.form().frame()) &&
+               (!memory.has_answered_for_step() || memory.answered_for_step() >= 0);
+  for (const v1::CheckpointAnswer& answer : memory.answers()) {
+    sound = sound && std::isfinite(answer.time()) && answer.time() > last &&
+            answer.values_size() == port.answer_size() &&
+            std::all_of(answer.values().begin(), answer.values().end(),
+                        [](double value) { return std::isfinite(value); });
+    last = answer.time();
+  }
+  if (!sound)
+    throw Refusal(v1::REASON_DAMAGED_STATE,
+                  "what is stored of port \"" + port.name() + "\" does not fit the port");
+}
+
+}  // namespace
+
 void Coupler::take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointPort>& memory) {
   for (const v1::CheckpointPort& in : memory)
     for (Line& line : lines_) {
@@ -164,6 +188,7 @@ void Coupler::take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointP
       if (in.had_peer()) line.port->expect_peer(line.agreement);
       line.agreement = line.port->agreement();
       line.history = InputHistory(line.agreement.held_answers());
+      check_memory(line.port->model(), in);
       for (const v1::CheckpointAnswer& answer : in.answers())
         line.history.add(answer.time(), {answer.values().begin(), answer.values().end()});
       if (in.has_answered_for_step()) line.answered_for = in.answered_for_step();
@@ -225,7 +250,7 @@ void Coupler::exchange(const CancelToken& cancel) {
   for (Line& line : lines_) {
     if (!line.due || line.sent_for >= 0) continue;
     line.sent_for = line.message.exchange().step();
-    line.port->send(line.message, line.agreement.generation);
+    line.port->send(line.message, line.agreement.generation, cancel);
   }
   for (Line& line : lines_)
     if (line.due) take_answer(line, cancel);
@@ -249,7 +274,7 @@ void Coupler::turn_loads(Simulation& simulation) const {
       line.port->model().apply_following(line.history.at(target_time_), line.agreement, simulation);
 }
 
-void Coupler::finish(const Simulation& simulation) {
+void Coupler::finish(const Simulation& simulation, const CancelToken& cancel) {
   for (Line& line : lines_) {
     const bool staggered = line.agreement.mode == v1::COUPLING_MODE_STAGGERED;
     if (!staggered || simulation.finished() || simulation.step_number() % line.agreement.every != 0)
@@ -257,7 +282,7 @@ void Coupler::finish(const Simulation& simulation) {
     if (!line.port->has_peer()) continue;
     fill(line, simulation, simulation.time() + simulation.next_step_size(), 0);
     line.message.mutable_exchange()->set_target_estimated(true);
-    line.port->send(line.message, line.agreement.generation);
+    line.port->send(line.message, line.agreement.generation, cancel);
     line.sent_for = simulation.step_number();
   }
 }
@@ -271,10 +296,10 @@ void Coupler::start(Line& line, const Simulation& simulation) {
   line.settled = false;
 }
 
-void Coupler::start_passes(const Simulation& simulation, bool again) {
+void Coupler::start_passes(const Simulation& simulation, bool again, const CancelToken& cancel) {
   for (Line& line : lines_) {
     if (!line.agreement.is_window()) continue;
-    if (again) line.port->notify(false, simulation.step_number(), simulation.time());
+    if (again) line.port->notify(false, simulation.step_number(), simulation.time(), cancel);
     start(line, simulation);
   }
 }
@@ -306,10 +331,10 @@ void Coupler::announce_tangents(Simulation& simulation) {
   simulation.set_load_tangents(std::move(tangents));
 }
 
-void Coupler::end_attempt(bool accepted, const Simulation& simulation) {
+void Coupler::end_attempt(bool accepted, const Simulation& simulation, const CancelToken& cancel) {
   for (Line& line : lines_) {
     if (!line.agreement.is_tight()) continue;
-    line.port->notify(accepted, simulation.step_number(), simulation.time());
+    line.port->notify(accepted, simulation.step_number(), simulation.time(), cancel);
     start(line, simulation);
   }
 }
@@ -358,7 +383,7 @@ bool Coupler::exchange_window(const Simulation& simulation, int pass, const Canc
   for (Line& line : lines_) {
     if (!line.agreement.is_window()) continue;
     fill(line, simulation, simulation.time(), pass);
-    line.port->send(line.message, line.agreement.generation);
+    line.port->send(line.message, line.agreement.generation, cancel);
   }
   bool agreed = true;
   for (Line& line : lines_)
@@ -375,7 +400,7 @@ bool Coupler::exchange_iteration(Simulation& simulation, int iteration, const Ca
   for (Line& line : lines_) {
     if (!takes_part(line)) continue;
     fill(line, simulation, simulation.time(), iteration + 1);
-    line.port->send(line.message, line.agreement.generation);
+    line.port->send(line.message, line.agreement.generation, cancel);
   }
   bool settled = true;
   for (Line& line : lines_) {
@@ -390,10 +415,10 @@ bool Coupler::exchange_iteration(Simulation& simulation, int iteration, const Ca
   return settled;
 }
 
-void Coupler::notify(bool accepted, const Simulation& simulation) {
+void Coupler::notify(bool accepted, const Simulation& simulation, const CancelToken& cancel) {
   for (Line& line : lines_)
     if (line.agreement.is_implicit())
-      line.port->notify(accepted, simulation.step_number(), simulation.time());
+      line.port->notify(accepted, simulation.step_number(), simulation.time(), cancel);
 }
 
 }  // namespace mbcosim::server

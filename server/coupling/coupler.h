@@ -46,7 +46,7 @@ class Coupler {
   /// Explicit ports whose loads follow their nodes: turns them to the present iterate.
   bool has_following() const;
   void turn_loads(Simulation& simulation) const;
-  void finish(const Simulation& simulation);
+  void finish(const Simulation& simulation, const CancelToken& cancel);
   /// The simulation went to another state: what peers answered before says nothing any more.
   void reset();
 
@@ -57,7 +57,7 @@ class Coupler {
   // --- window ports: redo the step
   /// `again`: the passes before agreed, but the step is done anew with another length; the peers
   /// are told that it is rejected.
-  void start_passes(const Simulation& simulation, bool again);
+  void start_passes(const Simulation& simulation, bool again, const CancelToken& cancel);
   void apply_window(Simulation& simulation) const;
   /// One exchange at the end of a pass. True: all interfaces agree. Throws PeerLost.
   bool exchange_window(const Simulation& simulation, int pass, const CancelToken& cancel);
@@ -70,10 +70,10 @@ class Coupler {
 
   /// An attempt at the step failed and another follows, or a piece of it was accepted: tight peers
   /// are told, their iteration starts again.
-  void end_attempt(bool accepted, const Simulation& simulation);
+  void end_attempt(bool accepted, const Simulation& simulation, const CancelToken& cancel);
 
   /// Tells window and tight peers how the step ended.
-  void notify(bool accepted, const Simulation& simulation);
+  void notify(bool accepted, const Simulation& simulation, const CancelToken& cancel);
 
   // --- since the last `start_clock`
   void start_clock() {

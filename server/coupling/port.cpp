@@ -229,19 +229,19 @@ void Port::use_link(Use&& use) {
 }
 
 // A broken link is noticed by the peer's thread, which detaches.
-void Port::send_message(const v1::ServerMessage& message) {
+void Port::send_message(const v1::ServerMessage& message, const CancelToken& cancel) {
   const Clock::time_point deadline = Clock::now() + agreement_.timeout;
-  use_link([&](PeerLink& link) { link.send(message, deadline); });
+  use_link([&](PeerLink& link) { link.send(message, deadline, cancel); });
 }
 
-void Port::send(v1::ServerMessage& message, int generation) {
+void Port::send(v1::ServerMessage& message, int generation, const CancelToken& cancel) {
   const Guard guard(mutex_);
   if (!link_ || generation != agreement_.generation) return;
   message.mutable_exchange()->set_index(++index_);
   awaited_ = true;
   answer_.reset();
   if (recorder_) recorder_->sent(model_.name(), message);
-  send_message(message);
+  send_message(message, cancel);
 }
 
 std::optional<Answer> Port::take(const CancelToken& cancel) {
@@ -313,7 +313,7 @@ std::optional<Answer> Port::go_on_without(const std::string& why) {
   }
 }
 
-void Port::notify(bool accepted, std::int64_t step, double time) {
+void Port::notify(bool accepted, std::int64_t step, double time, const CancelToken& cancel) {
   v1::ServerMessage message;
   v1::StepNotice* notice = accepted ? message.mutable_accepted() : message.mutable_rejected();
   *notice = step_notice(step, time);
@@ -321,7 +321,7 @@ void Port::notify(bool accepted, std::int64_t step, double time) {
   if (!link_) return;
   if (agreement_.units) agreement_.units->to_peer(notice);
   if (recorder_) recorder_->sent(model_.name(), message);
-  send_message(message);
+  send_message(message, cancel);
 }
 
 }  // namespace mbcosim::server

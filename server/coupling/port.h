@@ -17,13 +17,30 @@
 
 namespace mbcosim::server {
 
+/// A peer that does not read holds up a step that is cancelled for a second at most.
+class Patience {
+ public:
+  explicit Patience(const CancelToken& cancel) : cancel_(cancel) {}
+  bool is_over() {
+    if (!cancel_.cancelled()) return false;
+    const auto now = std::chrono::steady_clock::now();
+    if (!end_) end_ = now + std::chrono::seconds(1);
+    return now >= *end_;
+  }
+
+ private:
+  const CancelToken& cancel_;
+  std::optional<std::chrono::steady_clock::time_point> end_;
+};
+
 /// Sends to one peer. Implemented over gRPC by the service, over a queue by tests.
 class PeerLink {
  public:
   virtual ~PeerLink() = default;
-  /// False: the peer is gone. Returns at `deadline` at the latest, the link being broken then.
+  /// False: the peer is gone. Returns at `deadline` at the latest, and when the Patience with it is
+  /// over, the link being broken then.
   virtual bool send(const v1::ServerMessage& message,
-                    std::chrono::steady_clock::time_point deadline) = 0;
+                    std::chrono::steady_clock::time_point deadline, const CancelToken& cancel) = 0;
   /// Sends a sign of life, unless other messages are on their way anyway.
   virtual void beat(const v1::ServerMessage&) {}
   /// May the session's thread fetch answers itself? That saves a change of threads.
@@ -97,20 +114,21 @@ class Port {
   void await_peer(const CancelToken& cancel);
   /// Sends what `model().fill` put into `message` for the peer of this handshake. Does not throw:
   /// `take` tells.
-  void send(v1::ServerMessage& message, int generation);
+  void send(v1::ServerMessage& message, int generation, const CancelToken& cancel);
   /// The answer to the last `send`, or nothing when the policy goes on without. Throws PeerLost,
   /// PeerRejected.
   std::optional<Answer> take(const CancelToken& cancel);
   bool is_waiting() const;  ///< was a message sent whose answer was not taken?
   void forget();            ///< gives up the answer that is on its way
   /// Tells the peer how an implicit step ended.
-  void notify(bool accepted, std::int64_t step, double time);
+  void notify(bool accepted, std::int64_t step, double time, const CancelToken& cancel);
 
  private:
   using Clock = std::chrono::steady_clock;
   template <class Use>
   void use_link(Use&& use) TS_REQUIRES(mutex_);
-  void send_message(const v1::ServerMessage& message) TS_REQUIRES(mutex_);
+  void send_message(const v1::ServerMessage& message, const CancelToken& cancel)
+      TS_REQUIRES(mutex_);
   void look_for_answer() TS_EXCLUDES(mutex_);
   bool pull() TS_REQUIRES(mutex_);
   Answer take_content(const v1::PeerExchange& exchange) TS_REQUIRES(mutex_);

@@ -322,7 +322,7 @@ std::vector<int> StateFolder::snapshots(const std::string& id) const {
   return numbered(id, kSnapshotFile);
 }
 
-std::int64_t StateFolder::written_at(const std::string& id) const {
+std::int64_t StateFolder::used_at(const std::string& id) const {
   std::int64_t last = 0;
   const auto look = [&](const std::string& path) {
     struct stat info {};
@@ -331,6 +331,11 @@ std::int64_t StateFolder::written_at(const std::string& id) const {
   look(folder(id) + "/" + kPointFile);
   for (const int number : journals(id)) look(journal_path(id, number));
   return last;
+}
+
+// The time of its point tells; one that cannot be set leaves that of its last checkpoint.
+void StateFolder::note_use(const std::string& id) const {
+  (void)::utimensat(AT_FDCWD, (folder(id) + "/" + kPointFile).c_str(), nullptr, 0);
 }
 
 // ------------------------------------------------------------------ journals

@@ -75,8 +75,10 @@ class StateFolder {
   void take(std::int64_t bytes) TS_EXCLUDES(mutex_);
   void give_back(std::int64_t bytes) TS_EXCLUDES(mutex_);
 
-  /// When it was written last [s since 1970].
-  std::int64_t written_at(const std::string& id) const;
+  /// When it was written or used last [s since 1970].
+  std::int64_t used_at(const std::string& id) const;
+  /// It is in use now.
+  void note_use(const std::string& id) const;
   /// Nothing when there is none. False: what the system does not let be removed stays, and the next
   /// start finds it.
   bool remove(const std::string& id);

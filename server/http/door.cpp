@@ -79,7 +79,8 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
       crowd(options.connections),
       rpc(parts.channel, parts.budgets,
           {options.message_bytes, options.streams_per_identity,
-           std::max(1, options.connections * 3 / 4)}) {
+           std::max(1, options.connections * 3 / 4), std::max(1, options.connections / 2),
+           std::max(1, options.connections * 7 / 8)}) {
   const std::string wanted = numeric(options.address);
   if (!is_loopback(wanted) && !options.insecure)
     throw std::runtime_error("refused to serve HTTP on " + options.address +

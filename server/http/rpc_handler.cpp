@@ -159,31 +159,30 @@ struct RpcHandler::Call {
 };
 
 /// A stream's place among those that an identity, and all together, may have.
-class RpcHandler::StreamPlace {
+class RpcHandler::Place {
  public:
-  StreamPlace(RpcHandler& handler, const std::string& identity)
-      : handler_(handler), identity_(identity) {
-    const Guard lock(handler_.mutex_);
-    int& mine = handler_.streams_[identity_];
-    if (mine >= handler_.limits_.streams_per_identity ||
-        handler_.open_streams_ >= handler_.limits_.streams)
-      return;
+  Place(Mutex& mutex, Places& places, const std::string& identity)
+      : mutex_(mutex), places_(places), identity_(identity) {
+    const Guard lock(mutex_);
+    int& mine = places_.by_identity[identity_];
+    if (mine >= places_.most_per_identity || places_.all >= places_.most) return;
     ++mine;
-    ++handler_.open_streams_;
+    ++places_.all;
     held_ = true;
   }
-  ~StreamPlace() {
-    const Guard lock(handler_.mutex_);
-    const auto mine = handler_.streams_.find(identity_);
-    if (held_) --handler_.open_streams_, --mine->second;
-    if (mine->second == 0) handler_.streams_.erase(mine);
+  ~Place() {
+    const Guard lock(mutex_);
+    const auto mine = places_.by_identity.find(identity_);
+    if (held_) --places_.all, --mine->second;
+    if (mine->second == 0) places_.by_identity.erase(mine);
   }
-  StreamPlace(const StreamPlace&) = delete;
-  StreamPlace& operator=(const StreamPlace&) = delete;
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
   bool held() const { return held_; }
 
  private:
-  RpcHandler& handler_;
+  Mutex& mutex_;
+  Places& places_;
   const std::string identity_;
   bool held_ = false;
 };
@@ -297,8 +296,14 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
   std::string request;
   const grpc::Status readable = read_counted(call, &request);
   if (!readable.ok()) return call.refuse(readable);
-  std::optional<StreamPlace> place;
-  if (streams && !place.emplace(*this, identity).held())
+  // Others have connections, too, and so have those who ask whether the daemon is well.
+  const Place call_place(mutex_, calls_, identity);
+  if (!call_place.held())
+    return call.refuse(limit_refusal("http_calls", limits_.calls_per_identity,
+                                     "too many calls are under way over HTTP; wait for some")
+                           .status());
+  std::optional<Place> place;
+  if (streams && !place.emplace(mutex_, streams_, identity).held())
     return call.refuse(limit_refusal("http_streams", limits_.streams_per_identity,
                                      "too many streams are open over HTTP; close some")
                            .status());

@@ -36,10 +36,16 @@ class RpcHandler {
     std::size_t body_bytes;
     int streams_per_identity;
     int streams;  ///< of all identities
+    int calls_per_identity;
+    int calls;  ///< streams and others, of all identities
   };
 
   RpcHandler(std::shared_ptr<grpc::Channel> channel, MemoryBudgets& budgets, const Limits& limits)
-      : channel_(std::move(channel)), budgets_(budgets), limits_(limits) {}
+      : channel_(std::move(channel)),
+        budgets_(budgets),
+        limits_(limits),
+        streams_{limits.streams_per_identity, limits.streams},
+        calls_{limits.calls_per_identity, limits.calls} {}
 
   /// The method that "/mbcosim.v1.Simulations/Step" names; null: none.
   static const google::protobuf::MethodDescriptor* find(std::string_view path);
@@ -51,7 +57,7 @@ class RpcHandler {
 
  private:
   struct Call;
-  class StreamPlace;
+  class Place;
 
   grpc::Status read_request(Call& call, std::string* request) const;
   grpc::Status read_counted(Call& call, std::string* request) const;
@@ -63,8 +69,13 @@ class RpcHandler {
   const Limits limits_;
   std::atomic<bool> closing_{false};
   Mutex mutex_;
-  std::map<std::string, int> streams_ TS_GUARDED_BY(mutex_);  ///< open ones by identity
-  int open_streams_ TS_GUARDED_BY(mutex_) = 0;
+  /// That are taken.
+  struct Places {
+    const int most_per_identity, most;
+    std::map<std::string, int> by_identity = {};
+    int all = 0;
+  };
+  Places streams_ TS_GUARDED_BY(mutex_), calls_ TS_GUARDED_BY(mutex_);
 };
 
 }  // namespace mbcosim::server::http

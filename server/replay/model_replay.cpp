@@ -47,7 +47,8 @@ class RecordedPeer : public server::PeerLink {
   RecordedPeer(Port& port, PortRecord& record, Outcome& outcome, double tolerance)
       : port_(port), record_(record), outcome_(outcome), tolerance_(tolerance) {}
 
-  bool send(const v1::ServerMessage& now, std::chrono::steady_clock::time_point) override {
+  bool send(const v1::ServerMessage& now, std::chrono::steady_clock::time_point,
+            const CancelToken&) override {
     skip_greetings();
     const v1::RecordEntry* expected = record_.peek();
     if (!expected || !expected->has_to_peer()) {

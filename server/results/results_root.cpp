@@ -29,7 +29,9 @@ std::string usable(const std::string& path) {
 
 ResultsRoot::ResultsRoot(const std::string& path, std::int64_t most)
     : path_(usable(path)), most_(most) {
-  if (!path_.empty()) used_ = bytes_in(path_);
+  if (path_.empty()) return;
+  Guard guard(mutex_);
+  measure();
 }
 
 std::unique_ptr<ResultsFolder> ResultsRoot::make(const std::string& simulation,
@@ -37,21 +39,22 @@ std::unique_ptr<ResultsFolder> ResultsRoot::make(const std::string& simulation,
   if (path_.empty())
     throw Refusal(v1::REASON_NO_RESULTS,
                   "the server writes no result files: it was started without --results-root");
-  take(quota);
   const std::string path = path_of(simulation);
+  take(path, quota);
   if (::mkdir(path.c_str(), 0700) == 0) return std::make_unique<ResultsFolder>(*this, path, quota);
   const std::string why = std::strerror(errno);
-  give_back(quota);
+  give_back(path);
   throw Refusal(v1::REASON_STORAGE_FULL, "the folder for the results cannot be made: " + why);
 }
 
 std::unique_ptr<ResultsFolder> ResultsRoot::reopen(const std::string& simulation,
                                                    std::int64_t quota, bool* found) {
   std::error_code none;
-  *found = !path_.empty() && fs::is_directory(path_of(simulation), none);
+  const std::string path = path_of(simulation);
+  *found = !path_.empty() && fs::is_directory(path, none);
   if (!*found) return make(simulation, quota);
-  take(quota - bytes_in(path_of(simulation)));
-  return std::make_unique<ResultsFolder>(*this, path_of(simulation), quota);
+  take(path, quota);
+  return std::make_unique<ResultsFolder>(*this, path, quota);
 }
 
 void ResultsRoot::remove(const std::string& simulation) {
@@ -59,27 +62,49 @@ void ResultsRoot::remove(const std::string& simulation) {
   const std::int64_t bytes = bytes_in(path_of(simulation));
   std::error_code none;
   fs::remove_all(path_of(simulation), none);
-  give_back(bytes);
+  Guard guard(mutex_);
+  left_ -= bytes;
 }
 
-void ResultsRoot::take(std::int64_t bytes) {
+// What is there and not in use.
+void ResultsRoot::measure() {
+  left_ = 0;
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path_, none))
+    if (quotas_.count(entry.path().string()) == 0)
+      left_ += entry.is_directory(none) ? bytes_in(entry.path().string())
+                                        : static_cast<std::int64_t>(entry.file_size(none));
+  measured_ = std::chrono::steady_clock::now();
+}
+
+// Operators remove files, too: before there is no room it is looked anew, once in a second.
+void ResultsRoot::take(const std::string& path, std::int64_t quota) {
+  const std::int64_t there = bytes_in(path);  // of an earlier process
   Guard guard(mutex_);
-  if (bytes > most_ - used_)
+  const auto fits = [&] { return quota - there <= most_ - promised_ - left_; };
+  if (!fits() && std::chrono::steady_clock::now() - measured_ > std::chrono::seconds(1)) measure();
+  if (!fits())
     throw limit_refusal("results_root_bytes", most_,
                         "the folder of results has no room for another quota of " +
-                            std::to_string(bytes) + " bytes");
-  used_ += bytes;
+                            std::to_string(quota - there) + " bytes");
+  quotas_[path] = quota;
+  promised_ += quota;
+  left_ -= there;
 }
 
-void ResultsRoot::give_back(std::int64_t bytes) {
+void ResultsRoot::give_back(const std::string& path) {
+  const std::int64_t there = bytes_in(path);
   Guard guard(mutex_);
-  used_ -= bytes;
+  const auto quota = quotas_.find(path);
+  promised_ -= quota->second;
+  quotas_.erase(quota);
+  left_ += there;
 }
 
 ResultsFolder::~ResultsFolder() {
   std::error_code none;
   if (!kept_) fs::remove_all(path_, none);
-  root_.give_back(budget_.most() - (kept_ ? bytes_in(path_) : 0));
+  root_.give_back(path_);
 }
 
 }  // namespace mbcosim::server

@@ -1,7 +1,9 @@
 /// The folder on the server's disk in which simulations have folders for their result files.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -33,13 +35,17 @@ class ResultsRoot {
   std::string path_of(const std::string& simulation) const {
     return path_ + "/" + simulation.substr(simulation.find('/') + 1);
   }
-  void take(std::int64_t bytes) TS_EXCLUDES(mutex_);
-  void give_back(std::int64_t bytes) TS_EXCLUDES(mutex_);
+  void take(const std::string& path, std::int64_t quota) TS_EXCLUDES(mutex_);
+  void give_back(const std::string& path) TS_EXCLUDES(mutex_);
+  void measure() TS_REQUIRES(mutex_);
 
   const std::string path_;
   const std::int64_t most_;
   Mutex mutex_;
-  std::int64_t used_ TS_GUARDED_BY(mutex_) = 0;  ///< of folders that are left, and quotas of others
+  std::map<std::string, std::int64_t> quotas_ TS_GUARDED_BY(mutex_);  ///< of folders in use
+  std::int64_t promised_ TS_GUARDED_BY(mutex_) = 0;                   ///< their sum
+  std::int64_t left_ TS_GUARDED_BY(mutex_) = 0;                       ///< bytes in all others
+  std::chrono::steady_clock::time_point measured_ TS_GUARDED_BY(mutex_){};
 };
 
 /// The folder of one simulation. At its end it is removed, unless it is to be kept.

@@ -159,9 +159,12 @@ bool Exchange::all_written() const {
   return !writing_;
 }
 
-bool Exchange::write_by(grpc::ByteBuffer message, Clock::time_point deadline) {
+bool Exchange::write_by(grpc::ByteBuffer message, Clock::time_point deadline,
+                        const std::function<bool()>& gives_up) {
+  constexpr std::chrono::milliseconds kLook(10);
   Guard guard(mutex_);
-  while (writing_ && !end_ && Clock::now() < deadline) written_.wait_until(mutex_, deadline);
+  while (writing_ && !end_ && Clock::now() < deadline && !(gives_up && gives_up()))
+    written_.wait_until(mutex_, gives_up ? std::min(deadline, Clock::now() + kLook) : deadline);
   if (writing_ || end_ || !came_) return false;
   queue_.push_back(std::move(message));
   go_on();

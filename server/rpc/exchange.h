@@ -105,9 +105,10 @@ class Exchange final : public std::enable_shared_from_this<Exchange> {
   /// Sends, after what is on its way. Nobody waits; ask `all_written` first where it may be much.
   void write(grpc::ByteBuffer message) TS_EXCLUDES(mutex_);
   bool all_written() const TS_EXCLUDES(mutex_);
-  /// Sends when what is on its way has left by then; waits for that. False: it has not, or the call
-  /// is over.
-  bool write_by(grpc::ByteBuffer message, Clock::time_point deadline) TS_EXCLUDES(mutex_);
+  /// Sends when what is on its way has left by then; waits for that, unless `gives_up`, which is
+  /// asked now and then. False: it has not, or the call is over.
+  bool write_by(grpc::ByteBuffer message, Clock::time_point deadline,
+                const std::function<bool()>& gives_up = {}) TS_EXCLUDES(mutex_);
   /// Ends the call once everything is written; what comes later is dropped.
   void finish(grpc::Status status) TS_EXCLUDES(mutex_);
   /// Sends a last message and ends the call well.

@@ -15,7 +15,7 @@ namespace mbcosim::server {
 enum class Lane {
   quick,    ///< never waits: looks something up, tells somebody
   work,     ///< may wait for a session's step
-  advance,  ///< steps: at most one call of each session
+  advance,  ///< steps: one call of each session, and those that wait for its end
   heavy     ///< computes for long: decks, eigenvalues, reductions
 };
 
@@ -32,7 +32,7 @@ class Lanes {
   Lanes(int sessions, int cores)
       : quick_({"quick", 4, 3, 0}),
         work_({"work", 96, 64, 0}),
-        advance_({"advance", sessions, sessions, 0}),
+        advance_({"advance", 2 * sessions, sessions, 0}),
         heavy_({"heavy", heavy_threads(cores), heavy_threads(cores) - 1, 5}) {}
 
   /// Is told of every job how long it waited for its thread [s]. Before the first job.

@@ -6,6 +6,7 @@
 
 #include "durable/record_file.h"
 #include "math/hash.h"
+#include "service/display_name.h"
 #include "service/durability.h"
 #include "service/simulations_service.h"
 
@@ -46,13 +47,15 @@ class ImportHandler final : public Upload<v1::ImportCheckpointRequest> {
         }) {}
 
  private:
-  void add(Exchange& exchange, v1::ImportCheckpointRequest& request, MemoryShare) override {
+  void add(Exchange& exchange, v1::ImportCheckpointRequest& request, MemoryShare share) override {
     if (!header_) {
       if (!request.has_header())
         throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
       parts_.durability.require();
       check_request_id(request.header().request_id());
       header_ = request.header();
+      check_display_name(header_->display_name());
+      header_share_ = std::move(share);
       share_ = MemoryShare(exchange.memory());
       return;
     }
@@ -77,7 +80,7 @@ class ImportHandler final : public Upload<v1::ImportCheckpointRequest> {
   StoredBundle bundle_;
   RecordReader reader_;
   std::uint64_t digest_ = kFnvBasis;
-  MemoryShare share_;
+  MemoryShare header_share_, share_;
 };
 
 }  // namespace

@@ -41,7 +41,7 @@ class ExchangeInStep {
   void iterate() {
     simulation_.set_attempt_ended([this](bool accepted) {
       const MemoryPause uncounted;
-      coupler_.end_attempt(accepted, simulation_);
+      coupler_.end_attempt(accepted, simulation_, token_);
       if (sockets_) sockets_->attempt_failed();
     });
     simulation_.set_exchange([this](int iteration) {
@@ -67,7 +67,7 @@ class ExchangeInStep {
     passes.most = coupler_.maximum_passes();
     passes.begin = [this](int pass) {
       const MemoryPause uncounted;
-      if (pass == 1) coupler_.start_passes(simulation_, std::exchange(agreed_, false));
+      if (pass == 1) coupler_.start_passes(simulation_, std::exchange(agreed_, false), token_);
       coupler_.apply_window(simulation_);
       if (pass > 1) coupler_.start_iterations(simulation_);
     };
@@ -128,9 +128,9 @@ std::optional<StepReport> CoupledStep::solve(Simulation& simulation, StepSlot sl
 }
 
 void CoupledStep::tell(bool accepted, const Simulation& simulation) {
-  coupler_.notify(accepted, simulation);
+  coupler_.notify(accepted, simulation, token_);
   if (!accepted) return;
-  coupler_.finish(simulation);
+  coupler_.finish(simulation, token_);
   if (sockets_) sockets_->accepted(token_);
 }
 

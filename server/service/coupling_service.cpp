@@ -54,6 +54,7 @@ class AttachHandler final : public Handler, public PeerLink {
   }
   // The port is free again before the peer learns of its end, so that it may come back at once.
   void leave(Exchange& exchange, const grpc::Status& status) {
+    leaving_.store(true);  // who sends lets go of the port
     exchange.post(Lane::work, [this, &exchange, status] {
       give_up_seat();
       exchange.finish(status);
@@ -91,8 +92,11 @@ class AttachHandler final : public Handler, public PeerLink {
   }
 
   // --- the link
-  bool send(const v1::ServerMessage& message, Clock::time_point deadline) override {
-    if (exchange_->write_by(serialized(message), deadline)) return true;
+  bool send(const v1::ServerMessage& message, Clock::time_point deadline,
+            const CancelToken& cancel) override {
+    Patience patience(cancel);
+    const auto gives_up = [&] { return leaving_.load() || patience.is_over(); };
+    if (exchange_->write_by(serialized(message), deadline, gives_up)) return true;
     exchange_->hang_up();
     return false;
   }
@@ -105,7 +109,7 @@ class AttachHandler final : public Handler, public PeerLink {
   Exchange* exchange_ = nullptr;
   MemoryShare share_;  ///< of the message
   v1::PeerMessage message_;
-  std::atomic<bool> greeted_{false};
+  std::atomic<bool> greeted_{false}, leaving_{false};
   Mutex mutex_;
   std::unique_ptr<PeerSeat> seat_ TS_GUARDED_BY(mutex_);
   Timer::Id timer_ TS_GUARDED_BY(mutex_) = 0;

@@ -88,6 +88,7 @@ void Durability::stop(bool busy) {
   changed_.notify_all();
   if (!thread_.joinable()) return;
   thread_.join();
+  note_uses();
   for (const SessionPtr& session : parts_->store.all())
     if (session->keeping() && session->keeping()->stale(session->changes()) &&
         (!busy || session->is_free()))
@@ -163,7 +164,7 @@ Suspended Durability::read_one(const std::string& id) const {
   found.request_id = head.options().request_id();
   found.request_digest = head.request_digest();
   found.info = read_latest(id).point.info();
-  found.since = folder_->written_at(id);
+  found.since = folder_->used_at(id);
   return found;
 }
 
@@ -383,7 +384,17 @@ void Durability::loop() {
   }
 }
 
+void Durability::note_uses() {
+  for (const SessionPtr& session : parts_->store.all())
+    if (session->keeping()) folder_->note_use(id_of(session->identity().id));
+}
+
 void Durability::look() {
+  // What is used and does not change is known to be in use after a crash, too.
+  if (Keeping::Clock::now() - uses_noted_ > config_.suspended_expiry / 8) {
+    uses_noted_ = Keeping::Clock::now();
+    note_uses();
+  }
   for (const SessionPtr& session : parts_->store.all()) {
     Keeping* keeping = session->keeping();
     if (keeping && !keeping->posted &&
@@ -421,6 +432,7 @@ bool Durability::suspend(Session& session) {
   try {
     if (session.keeping()->stale(session.changes())) write(session);
     const std::string id = id_of(session.identity().id);
+    folder_->note_use(id);
     add_suspended(id, read_one(id));
     return true;
   } catch (const std::exception& error) {

@@ -131,6 +131,7 @@ class Durability {
   MemoryBudget& memory_of(const Session& session) const;  ///< its owner's
   void write(Session& session);
   void loop();
+  void note_uses();
   void look();
   void post(const SessionPtr& session);
   void expire();
@@ -149,6 +150,7 @@ class Durability {
   bool stop_ TS_GUARDED_BY(mutex_) = false;
   Mutex removing_;
   std::deque<StoredRemoval> removals_ TS_GUARDED_BY(removing_);  ///< as they are in the folder
+  Keeping::Clock::time_point uses_noted_{};                      ///< by the thread
   std::thread thread_;
 };
 

@@ -328,6 +328,16 @@ void check_numbers(const v1::CheckpointPoint& point) {
                   "the checkpoint's snapshots are not numbered as any server does");
 }
 
+/// Another server may allow longer ones.
+void bound_lease(std::chrono::milliseconds longest, v1::CheckpointPoint* point) {
+  google::protobuf::Duration* const lease = point->mutable_info()->mutable_lease();
+  const std::chrono::milliseconds wanted = milliseconds_of(*lease, "lease");
+  if (wanted <= std::chrono::milliseconds(0))
+    throw Refusal(v1::REASON_DAMAGED_STATE, "the checkpoint's lease is not positive");
+  *lease =
+      google::protobuf::util::TimeUtil::MillisecondsToDuration(std::min(wanted, longest).count());
+}
+
 }  // namespace
 
 v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheckpointHeader& header,
@@ -359,10 +369,7 @@ v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheck
   check_display_name(point.info().display_name());
   point.clear_kept_replies();        // of others' requests
   point.clear_results_until_step();  // its files begin here
-  const auto longest = google::protobuf::util::TimeUtil::SecondsToDuration(
-      std::chrono::duration_cast<std::chrono::seconds>(config_.limits.lease).count());
-  using google::protobuf::operator<;
-  if (longest < point.info().lease()) *point.mutable_info()->mutable_lease() = longest;
+  bound_lease(config_.limits.lease, &point);
   put_in_folder(name, bundle);
   describe(name, caller, &info);
   return info;

@@ -44,6 +44,12 @@ void describe_variables(const Described& described, const v1::DescribeSimulation
                         v1::ModelDescription* out) {
   const std::vector<Variable>& variables = described.variables;
   std::unordered_map<std::string_view, int> handles;
+  constexpr std::size_t kMostRepeated = 10'000;
+  const auto names = static_cast<std::size_t>(request.variable_names_size());
+  if (names > variables.size() + kMostRepeated)
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`variable_names` has " + std::to_string(names) +
+                                               " names; the model has " +
+                                               std::to_string(variables.size()) + " variables");
   for (const std::string& name : request.variable_names()) handles.emplace(name, -1);
   for (std::size_t i = 0; i < variables.size(); ++i)
     if (const auto wanted = handles.find(variables[i].name); wanted != handles.end())

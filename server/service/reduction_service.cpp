@@ -93,11 +93,12 @@ class ReduceHandler final : public Upload<v1::ReduceRequest> {
   explicit ReduceHandler(const Parts& parts) : parts_(parts) {}
 
  private:
-  void add(Exchange& exchange, v1::ReduceRequest& message, MemoryShare) override {
+  void add(Exchange& exchange, v1::ReduceRequest& message, MemoryShare share) override {
     if (!header_) {
       if (!message.has_header())
         throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `header`");
       header_ = message.header();
+      header_share_ = std::move(share);
       bundle_.emplace(parts_.config.limits, exchange.memory());
       return;
     }
@@ -154,7 +155,7 @@ class ReduceHandler final : public Upload<v1::ReduceRequest> {
   const Parts& parts_;
   std::optional<v1::ReduceHeader> header_;
   std::optional<Bundle> bundle_;
-  MemoryShare model_share_, text_share_;
+  MemoryShare header_share_, model_share_, text_share_;
   Mutex mutex_;
   std::optional<std::string> text_ TS_GUARDED_BY(mutex_);  ///< when the report has been sent
   std::size_t sent_ TS_GUARDED_BY(mutex_) = 0;

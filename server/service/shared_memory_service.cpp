@@ -82,16 +82,18 @@ class SharedMemoryStream : public PeerLink {
       : channel_(channel), gate_(gate), stop_(stop) {}
   ~SharedMemoryStream() override { channel_.close(); }
 
-  bool send(const v1::ServerMessage& message, Clock::time_point deadline) override {
+  bool send(const v1::ServerMessage& message, Clock::time_point deadline,
+            const CancelToken& cancel) override {
+    Patience patience(cancel);
     try {
-      return channel_.send(message, deadline);
+      return channel_.send(message, deadline, [&] { return patience.is_over(); });
     } catch (const shm::Corrupt& corrupt) {
       refuse(Refusal(v1::REASON_OUT_OF_TURN, corrupt.what()));
       return false;
     }
   }
   void beat(const v1::ServerMessage& message) override {
-    send(message, Clock::now() + kLongestBeat);
+    send(message, Clock::now() + kLongestBeat, {});
   }
   bool pulls() const override { return true; }
   Pulled pull(v1::PeerMessage* message, Clock::time_point until) override {
@@ -295,7 +297,7 @@ void SharedMemoryService::serve_peer(shm::Channel& channel, const Caller& caller
   if (!stream.read_hello(&message) || !message.has_hello())
     throw Refusal(v1::REASON_OUT_OF_TURN, "the first message must be `hello`");
   PeerSeat seat(parts_, message.hello(), caller, call, stream);
-  if (!stream.send(seat.welcome(), Clock::now() + kHandshake)) return;
+  if (!stream.send(seat.welcome(), Clock::now() + kHandshake, {})) return;
   seat.begin();
   while (stream.read(&message, seat.heart())) seat.receive(message);
 }

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "math/hash.h"
+#include "service/display_name.h"
 #include "service/simulations_service.h"
 
 namespace mbcosim::server {
@@ -14,11 +15,13 @@ class SnapshotImport final : public Upload<v1::ImportSnapshotRequest> {
   explicit SnapshotImport(const Parts& parts) : parts_(parts) {}
 
  private:
-  void add(Exchange& exchange, v1::ImportSnapshotRequest& request, MemoryShare) override {
+  void add(Exchange& exchange, v1::ImportSnapshotRequest& request, MemoryShare share) override {
     if (!session_) {
       if (!request.has_header())
         throw Refusal(v1::REASON_OUT_OF_TURN, "the first message of an import must be `header`");
       header_ = request.header();
+      check_display_name(header_.display_name());
+      header_share_ = std::move(share);
       share_ = MemoryShare(exchange.memory());
       session_.emplace(parts_.store, header_.simulation(), exchange.caller(), exchange.call(),
                        Access::control);
@@ -55,7 +58,7 @@ class SnapshotImport final : public Upload<v1::ImportSnapshotRequest> {
   const Parts& parts_;
   v1::ImportSnapshotHeader header_;
   std::optional<SessionHold> session_;
-  MemoryShare share_;
+  MemoryShare header_share_, share_;
   std::string bytes_;
 };
 

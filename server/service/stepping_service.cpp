@@ -38,7 +38,7 @@ class StepStreamHandler final : public Handler {
   }
   // Another thread would take as long to wake as a small model to step.
   void step_at_once(Exchange& exchange) {
-    if (is_held() || hold_alive(exchange.caller())) {
+    if (is_held(exchange.caller()) || hold_alive(exchange.caller())) {
       if ((*session_)->is_quick()) {
         prepare(exchange);
         if ((*session_)->step_at_once(request_, exchange.caller(), exchange.call(),
@@ -49,14 +49,15 @@ class StepStreamHandler final : public Handler {
     exchange.post(Lane::advance, [this, &exchange] { step(exchange); });
   }
   void step(Exchange& exchange) {
-    if (!is_held()) hold(exchange);
+    if (!is_held(exchange.caller())) hold(exchange);
     prepare(exchange);
     (*session_)->step(request_, exchange.caller(), exchange.call(), reply_.mutable_step());
     send(exchange);
   }
-  /// Is it the simulation that the message means?
-  bool is_held() const {
-    return session_ && (request_.simulation().empty() || request_.simulation() == name_);
+  /// Is it the simulation that the message means, and may the caller still advance it?
+  bool is_held(const Caller& caller) const {
+    return session_ && (request_.simulation().empty() || request_.simulation() == name_) &&
+           (*session_)->grants().allow(caller, Access::control);
   }
   /// Only of one that is in memory: from the disk it takes a while.
   bool hold_alive(const Caller& caller) {

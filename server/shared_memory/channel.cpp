@@ -41,7 +41,8 @@ bool Channel::other_is_gone() const {
 
 // ------------------------------------------------------------------ sending
 
-bool Channel::send(const google::protobuf::MessageLite& message, Clock::time_point deadline) {
+bool Channel::send(const google::protobuf::MessageLite& message, Clock::time_point deadline,
+                   const std::function<bool()>& gives_up) {
   const server::Guard guard(send_mutex_);
   const std::size_t size = message.ByteSizeLong();
   if (closed() || size > longest_message_) return false;
@@ -49,12 +50,13 @@ bool Channel::send(const google::protobuf::MessageLite& message, Clock::time_poi
   const auto length = static_cast<std::uint32_t>(size);
   std::memcpy(out_.data(), &length, kLengthBytes);
   message.SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(&out_[kLengthBytes]));
-  const bool sent = write(out_.data(), out_.size(), deadline);
+  const bool sent = write(out_.data(), out_.size(), deadline, gives_up);
   if (!sent) close();
   return sent;
 }
 
-bool Channel::write(const char* bytes, std::size_t count, Clock::time_point deadline) {
+bool Channel::write(const char* bytes, std::size_t count, Clock::time_point deadline,
+                    const std::function<bool()>& gives_up) {
   while (count > 0) {
     const std::size_t part = std::min(count, writer_.space());
     if (part > 0) {
@@ -65,7 +67,7 @@ bool Channel::write(const char* bytes, std::size_t count, Clock::time_point dead
       continue;
     }
     const Clock::time_point now = Clock::now();
-    if (closed() || now >= deadline) return false;
+    if (closed() || now >= deadline || (gives_up && gives_up())) return false;
     const auto ready = [this, writer = &writer_] { return closed() || writer->space() > 0; };
     const bool room = wait_until(space_, std::min(deadline, now + kLook), ready);
     if (!room && other_is_gone()) return false;

@@ -10,6 +10,7 @@
 #include <google/protobuf/message_lite.h>
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -100,7 +101,9 @@ class Channel {
 
   int socket() const { return socket_.get(); }
   /// False: the other side is gone, or did not read until the deadline; the channel is closed then.
-  bool send(const google::protobuf::MessageLite& message, Clock::time_point deadline);
+  /// `gives_up`: asked now and then; as if the deadline were over.
+  bool send(const google::protobuf::MessageLite& message, Clock::time_point deadline,
+            const std::function<bool()>& gives_up = {});
   /// Throws Corrupt when the other side broke the protocol.
   Received receive(google::protobuf::MessageLite* message, Clock::time_point deadline);
   /// A look without waiting; also `timeout` while another thread receives.
@@ -111,8 +114,8 @@ class Channel {
 
  private:
   bool wait_for_message(Clock::time_point until) TS_REQUIRES(receive_mutex_);
-  bool write(const char* bytes, std::size_t count, Clock::time_point deadline)
-      TS_REQUIRES(send_mutex_);
+  bool write(const char* bytes, std::size_t count, Clock::time_point deadline,
+             const std::function<bool()>& gives_up) TS_REQUIRES(send_mutex_);
   bool advance() TS_REQUIRES(receive_mutex_);
   bool parse(google::protobuf::MessageLite* message) TS_REQUIRES(receive_mutex_);
   bool other_is_gone() const;

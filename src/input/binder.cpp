@@ -1,5 +1,8 @@
 #include "input/binder.h"
 
+#include <set>
+#include <string_view>
+
 #include "input/call_binder.h"
 #include "input/plugin.h"
 #include "input/reading.h"
@@ -32,7 +35,10 @@ double number_of(const Value& v) {
 class Binder : CallBinder {
  public:
   Binder(Reading& reading, const Syntax& syntax, const BindingRules& rules, Program* program)
-      : CallBinder(reading, rules.run_time, *program), syntax_(syntax), rules_(rules) {}
+      : CallBinder(reading, rules.run_time, *program), syntax_(syntax), rules_(rules) {
+    for (const SyntaxItem& item : syntax_.items)
+      if (item.form == Form::assign) assigned_.insert(item.name);
+  }
 
   void bind() {
     for (const SyntaxItem& item : syntax_.items) {
@@ -169,11 +175,7 @@ class Binder : CallBinder {
     return known >= 0 ? known
                       : add_local(item.name, type_of(s.value), number_of(s.value), 2 * s.variable);
   }
-  bool assigns(std::string_view name) const {
-    for (const SyntaxItem& i : syntax_.items)
-      if (i.form == Form::assign && i.name == name) return true;
-    return false;
-  }
+  bool assigns(std::string_view name) const { return assigned_.count(name) > 0; }
 
   [[noreturn]] void fail_unknown(const SyntaxItem& item) const {
     if (find_function(item.name))
@@ -474,6 +476,7 @@ class Binder : CallBinder {
   }
 
   const Syntax& syntax_;
+  std::set<std::string_view> assigned_;
   const BindingRules& rules_;
   std::vector<std::string_view> local_names_;
   std::vector<std::string_view> constant_locals_;

@@ -22,6 +22,16 @@ void read_iterative_eigensolver(DeckCard& card, EigenSettings& e, EigenSettings:
   e.tolerance = card.real_above("tolerance", 0, true);
 }
 
+/// Digits and blanks that somebody could read.
+int few(DeckCard& card, const char* what, int least) {
+  constexpr int kMost = 99;
+  const int n = card.integer_at_least(what, least);
+  if (n > kMost)
+    card.fail(std::string(what) + " must be at most " + std::to_string(kMost) + ", got " +
+              std::to_string(n));
+  return n;
+}
+
 void read_eigen_option(DeckCard& card, EigenSettings& e) {
   using Balance = EigenSettings::Balance;
   // MBDyn permutes when it is to scale, too.
@@ -49,10 +59,10 @@ void read_eigen_option(DeckCard& card, EigenSettings& e) {
       e.geometry = true;
       break;
     case 6:
-      e.matrix_precision = card.integer_at_least("matrix output precision", 1);
+      e.matrix_precision = few(card, "matrix output precision", 1);
       break;
     case 7:
-      e.results_precision = card.integer_at_least("results output precision", 1);
+      e.results_precision = few(card, "results output precision", 1);
       break;
     case 8:
       e.upper_frequency = card.real_above("upper frequency limit", 0, true);
@@ -61,7 +71,7 @@ void read_eigen_option(DeckCard& card, EigenSettings& e) {
       e.lower_frequency = card.real_above("lower frequency limit", 0, true);
       break;
     case 10:
-      e.suffix_width = card.keyword("compute") ? -1 : card.integer_at_least("suffix width", 0);
+      e.suffix_width = card.keyword("compute") ? -1 : few(card, "suffix width", 0);
       break;
     case 11:
       e.suffix_format = card.quoted("suffix format");

@@ -1,4 +1,5 @@
 /// Cards of the `data` and `initial value` blocks (MBDyn input manual, "Problems").
+#include <cmath>
 #include <limits>
 #include <map>
 
@@ -15,16 +16,26 @@ InitialValueSettings& settings(DeckCard& card) { return card.model().initial_val
 // ------------------------------------------------------------------------------------------------
 // time
 
-void read_initial_time(DeckCard& card) { settings(card).initial_time = card.real("initial time"); }
+double read_time(DeckCard& card, const char* what) {
+  const double time = card.real(what);
+  if (!std::isfinite(time)) card.fail(std::string(what) + " must be a finite number");
+  return time;
+}
+
+void read_initial_time(DeckCard& card) {
+  settings(card).initial_time = read_time(card, "initial time");
+}
 
 void read_final_time(DeckCard& card) {
   settings(card).final_time =
       card.keyword("forever") ? std::numeric_limits<double>::infinity() : card.real("final time");
+  if (std::isnan(settings(card).final_time))
+    card.fail("final time must be a number", "write `forever` for a run without an end");
   card.deck().final_time_where = card.last();
 }
 
 void read_time_step(DeckCard& card) {
-  double h = card.real("time step");
+  double h = read_time(card, "time step");
   if (h == 0) card.fail("time step must not be zero", "write a positive length");
   if (h < 0) {
     card.warn("time step is negative, its modulus is used", "write a positive length");

@@ -1,7 +1,9 @@
 #include "input/reading.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "input/evaluate.h"
 #include "input/lexer.h"
@@ -317,8 +319,12 @@ void Reading::start_run_variables(double initial_time) {
     if (role != SymbolRole::time) continue;
     if (auto* real = std::get_if<double>(&s->value))
       *real = initial_time;
-    else if (auto* integer = std::get_if<std::int32_t>(&s->value))
+    else if (auto* integer = std::get_if<std::int32_t>(&s->value)) {
+      if (!(std::abs(initial_time) <= std::numeric_limits<std::int32_t>::max()))
+        fail(s->where, "the initial time does not fit the integer \"Time\"",
+             "declare it as `set: real Time = 0.;`", "redefinition");
       *integer = static_cast<std::int32_t>(initial_time);
+    }
   }
 }
 

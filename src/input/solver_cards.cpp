@@ -33,6 +33,8 @@ void read_newton(DeckCard& card, int default_every) {
   card.keyword("honor element requests");
 }
 
+constexpr int kMostTrials = 1000;
+
 /// One option of the line search; false when the next word is none.
 bool read_line_search_option(DeckCard& card, LineSearchSettings& l) {
   switch (card.one_of({"tolerance x", "tolerance min", "max iterations", "alpha", "lambda min",
@@ -47,6 +49,9 @@ bool read_line_search_option(DeckCard& card, LineSearchSettings& l) {
       return true;
     case 2:
       l.max_iterations = card.integer_at_least("max iterations", 0);
+      if (l.max_iterations > kMostTrials)
+        card.fail("line search: at most " + std::to_string(kMostTrials) +
+                  " iterations are allowed");
       return true;
     case 3:
       l.alpha = card.real_above("alpha", 0, true);

@@ -21,6 +21,8 @@ int find_type(Card& card) {
       {"int8_t", "uint8_t", "int16_t", "uint16_t", "int32_t", "uint32_t", "float", "double"});
 }
 
+constexpr int kLongestMessage = 1 << 20;  ///< [bytes]
+
 /// Which types travel with their bytes reversed: `swap, { <types> | detect | yes | no }`.
 std::vector<bool> read_swapped_types(Card& card) {
   std::vector<bool> swapped(8, false);
@@ -50,6 +52,7 @@ void read_fields(Card& card, int count, const std::vector<bool>& swapped, DeckCh
       const int bytes = card.integer("bytes to skip");
       if (bytes < 0 || bytes > 65536) card.fail("copy cast: from 0 to 65536 bytes can be skipped");
       skip += bytes;
+      if (skip > kLongestMessage) card.fail("copy cast: a message has at most 1048576 bytes");
     }
   };
   for (int k = 0; k < count; ++k) {
@@ -127,11 +130,14 @@ void read_channel_modifier(Card& card, int count, DeckChannel& channel) {
   if (!card.keyword("modifier") || card.required("modifier", {"copy", "copy cast"}) == 0) return;
   const std::vector<bool> swapped = read_swapped_types(card);
   read_fields(card, count, swapped, channel);
-  for (const ChannelField& field : channel.fields)
+  for (const ChannelField& field : channel.fields) {
     channel.message_bytes += field.skip + kBytes[static_cast<int>(field.type)];
+    if (channel.message_bytes > kLongestMessage)
+      card.fail("copy cast: a message has at most 1048576 bytes");
+  }
   if (!card.keyword("size")) return;
   const int size = card.integer("size of a message");
-  if (size < channel.message_bytes || size > (1 << 20))
+  if (size < channel.message_bytes || size > kLongestMessage)
     card.fail("copy cast: the size must be from " + std::to_string(channel.message_bytes) +
               " to 1048576 bytes, got " + std::to_string(size));
   channel.message_bytes = size;

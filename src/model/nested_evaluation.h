@@ -2,6 +2,8 @@
 /// strings, postponed drives and values of elements, to which parameter nodes may be bound.
 #pragma once
 
+#include <cstddef>
+
 #include "model/diagnostic.h"
 
 namespace mbcosim {
@@ -11,10 +13,18 @@ namespace mbcosim {
 class NestedEvaluation {
  public:
   NestedEvaluation() {
-    if (depth_ == 0) count_ = 0;
+    const char* const here = static_cast<const char*>(__builtin_frame_address(0));
+    if (depth_ == 0) {
+      count_ = 0;
+      outermost_ = here;
+    }
     if (depth_ == kDeepest)
       throw EvaluationError(
           "drives, strings and values of elements refer to each other in a circle");
+    if (outermost_ - here > kMostStack)
+      throw EvaluationError(
+          "drives, laws, strings and values of elements that refer to each other are nested too "
+          "deeply");
     charge(1);
     ++depth_;
   }
@@ -32,7 +42,10 @@ class NestedEvaluation {
 
  private:
   static constexpr int kDeepest = 64, kMost = 100000;
+  static constexpr std::ptrdiff_t kMostStack = 1
+                                               << 20;  ///< bytes: each may go through a long chain
   inline static thread_local int depth_ = 0, count_ = 0;
+  inline static thread_local const char* outermost_ = nullptr;
 };
 
 }  // namespace mbcosim

@@ -53,6 +53,7 @@ class Newton {
     scratch_.residual_history.clear();
     NewtonReport report;
     report.tolerance = settings_.tolerance;
+    if (hooks_.cancelled()) return finish(report, NewtonOutcome::cancelled);
     for (;;) {
       const bool settled = hooks_.exchange(report.iterations);
       switch_elements();

@@ -214,8 +214,9 @@ PhaseReport StepController::solve_by_policy(State& state, const State& start, St
 }
 
 PhaseReport StepController::solve_by_strategy(State& state, const State& start, StepAttempt next) {
+  constexpr int kMostRetries = 1000;  // a reduction by a thousandth reaches a third with them
   PhaseReport phase = attempt(state, start, next);
-  while (phase.error && !is_final(phase)) {
+  for (int retries = 0; phase.error && !is_final(phase) && retries < kMostRetries; ++retries) {
     next.h = system_.retry_step_size(state, next.h);
     if (next.h <= 0) break;
     next.chosen = false;

@@ -511,7 +511,8 @@ double Stepper::step_size(const State& state, SinceChange& since) const {
   if (iterations <= s.min_iterations && since.reduction > s.steps_before_reduction &&
       since.raise > s.steps_before_raise && h < limit) {
     since.raise = 0;
-    return std::min(h * s.raise, limit);
+    const double longer = std::min(h * s.raise, limit);
+    return std::isfinite(longer) ? longer : h;
   }
   return h;
 }

@@ -196,7 +196,8 @@ class DirectLink : public server::PeerLink {
  public:
   DirectLink(server::Port& port, Intervals& intervals, int numbers)
       : port_(port), intervals_(intervals), answer_(message_of(numbers)) {}
-  bool send(const v1::ServerMessage& message, Clock::time_point) override {
+  bool send(const v1::ServerMessage& message, Clock::time_point,
+            const mbcosim::CancelToken&) override {
     if (!message.has_exchange()) return true;
     intervals_.tick(message.exchange().iteration());
     answer_.mutable_exchange()->set_index(message.exchange().index());

@@ -152,7 +152,7 @@ class Attacker:
 
     def checkpoints(self):
         """Checkpoints that no server wrote."""
-        attack = ForgedCheckpoints(self, BODY, local_attacks.PORT)
+        attack = ForgedCheckpoints(self, BODY, {**local_attacks.PORT, "input_variables": ["node.structural.1.load"]})
         while self.going():
             attack.once()
 

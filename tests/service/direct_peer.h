@@ -23,7 +23,8 @@ class DirectPeer : public PeerLink {
   DirectPeer(const DirectPeer&) = delete;
   DirectPeer& operator=(const DirectPeer&) = delete;
 
-  bool send(const v1::ServerMessage& message, std::chrono::steady_clock::time_point) override {
+  bool send(const v1::ServerMessage& message, std::chrono::steady_clock::time_point,
+            const CancelToken&) override {
     accepted += message.has_accepted();
     rejected += message.has_rejected();
     if (!message.has_exchange()) return true;

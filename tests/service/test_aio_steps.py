@@ -173,7 +173,8 @@ def test_steppers_share_a_stream(daemon):
 
 def test_what_ends_one_stepper_leaves_the_others(daemon):
     async def body(server):
-        quick, slow = await server.load_text(decks.body()), await server.load_text(decks.endless())
+        quick = await server.load_text(decks.body())
+        slow, slower = [await server.load_text(decks.endless()) for _ in range(2)]
         steppers = [await quick.stepper()]
         steppers += [await simulation.stepper(beside=steppers[0]) for simulation in (slow, quick)]
         with pytest.raises(mbcosim.TimedOut):
@@ -183,14 +184,14 @@ def test_what_ends_one_stepper_leaves_the_others(daemon):
         assert (await steppers[0].step()).step == 1
         with pytest.raises(mbcosim.Error):
             await steppers[2].step(step_size=-1.0)
-        task = asyncio.ensure_future((await slow.stepper(beside=steppers[0])).step(count=10**6))
+        task = asyncio.ensure_future((await slower.stepper(beside=steppers[0])).step(count=10**6))
         await asyncio.sleep(0.2)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await task
         assert (await steppers[0].step()).step == 2
         await steppers[0].close()
-        for simulation in (quick, slow):
+        for simulation in (quick, slow, slower):
             await simulation.delete()
 
     run(daemon, body)

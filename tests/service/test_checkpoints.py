@@ -65,23 +65,70 @@ def test_damaged_bytes_are_refused_and_leave_nothing(start, damage):
             assert [info.name for info in server.list()] == [simulation.info.name]
 
 
+def with_point(data, change):
+    """The bytes of a checkpoint whose CheckpointPoint was changed."""
+    records = records_of(data)
+    for record in records:
+        if record[0] == POINT:
+            point = checkpoints_pb2.CheckpointPoint.FromString(record[1])
+            change(point)
+            record[1] = point.SerializeToString()
+    return bytes_of(records)
+
+
 @pytest.mark.parametrize("numbers, following", [([1, 1], 3), ([0, 2], 3), ([2**31 - 1, 1], 3), ([1, 2], -1), ([1, 2], 2**31 - 1)])
 def test_snapshots_that_no_server_numbers_so_are_refused(start, numbers, following):
     with start().connect() as server:
         simulation = server.load_text(deck())
         for _ in numbers:
             simulation.snapshot()
-        records = records_of(simulation.export_checkpoint())
-        for record in records:
-            if record[0] == POINT:
-                point = checkpoints_pb2.CheckpointPoint.FromString(record[1])
-                for snapshot, number in zip(point.snapshots, numbers):
-                    snapshot.number = number
-                point.next_snapshot = following
-                record[1] = point.SerializeToString()
+
+        def forge(point):
+            for snapshot, number in zip(point.snapshots, numbers):
+                snapshot.number = number
+            point.next_snapshot = following
+
         with pytest.raises(mbcosim.Error) as caught:
-            server.import_checkpoint(bytes_of(records))
+            server.import_checkpoint(with_point(simulation.export_checkpoint(), forge))
         assert caught.value.reason == "DAMAGED_STATE"
+
+
+@pytest.mark.parametrize("following", [False, True])
+@pytest.mark.parametrize("answers", [[(0, 0)], [(0, 1)], [(0, 7)], [(0.1, 6), (0.1, 6)], [(float("nan"), 6)], [(float("inf"), 6)]], ids=str)
+def test_answers_that_do_not_fit_their_port_are_refused(start, answers, following):
+    """Numbers that are not there would be read, and written, beyond the end."""
+    ports = [mbcosim.structural_port("tip", nodes=[1])]
+    with start().connect() as server:
+        simulation = server.load_text(deck(), ports=ports, optional_ports=True)
+
+        def forge(point):
+            del point.ports[:]
+            port = point.ports.add(port="tip", input_hold=1)
+            if following:
+                port.form.frame, port.form.following_loads = 2, True
+            for time, count in answers:
+                port.answers.add(time=time, values=count * [1.0])
+
+        forged = server.import_checkpoint(with_point(simulation.export_checkpoint(), forge))
+        for use in (forged.step, forged.step, lambda: forged.read(["time"])):
+            with pytest.raises(mbcosim.Error) as caught:
+                use()
+            assert caught.value.reason == "DAMAGED_STATE" and '"tip"' in str(caught.value)
+        assert simulation.step().step == 1
+
+
+@pytest.mark.parametrize("seconds, reason", [(0, "DAMAGED_STATE"), (-5, "DAMAGED_STATE"), (-18446403032316225, "BAD_ARGUMENT"), (2**62, "BAD_ARGUMENT")])
+def test_leases_that_no_server_gives_are_refused(start, seconds, reason):
+    with start().connect() as server:
+        simulation = server.load_text(deck())
+
+        def forge(point):
+            point.info.lease.seconds = seconds
+
+        with pytest.raises(mbcosim.Error) as caught:
+            server.import_checkpoint(with_point(simulation.export_checkpoint(), forge))
+        assert caught.value.reason == reason
+        assert [info.name for info in server.list()] == [simulation.name]
 
 
 def test_a_repeated_import_makes_one_simulation(start):

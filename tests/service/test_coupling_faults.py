@@ -1,16 +1,21 @@
 """The fault matrix: who fails, how, and when. Each fault is noticed within its bound and leaves a session that goes on."""
+import contextlib
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+from concurrent import futures
 
 import grpc
 import pytest
+from google.protobuf.duration_pb2 import Duration
 
+import decks
 import mbcosim
 from conftest import TIME_FACTOR, Daemon, leaves_no_thread, stop, wait_for
+from mbcosim.v1 import coupling_pb2, coupling_pb2_grpc
 from relay import BlackHole, Unreliable
 from test_coupling import PORT, oscillator, spring
 
@@ -309,3 +314,31 @@ def test_a_deleted_simulation_ends_the_stream_of_an_idle_peer(server):
         simulation.delete()
         wait_for(lambda: peer.error is not None)
         assert isinstance(peer.error, mbcosim.NotFound)
+
+
+@pytest.mark.parametrize("end", ["interrupt", "delete"])
+def test_a_peer_that_does_not_read_holds_up_no_step_that_is_cancelled(start_daemon, end):
+    """It may be waited for until 10^9 s, and takes five bytes of what is sent to it."""
+    daemon = start_daemon("--no-shared-memory")
+    options = [("grpc.http2.lookahead_bytes", 5), ("grpc.http2.bdp_probe", 0)]
+    with daemon.connect() as server, grpc.insecure_channel(daemon.address, options) as channel:
+        simulation = server.load_text(decks.body(), ports=[mbcosim.signal_port("slow", ["time"], [])])
+        over = threading.Event()
+
+        def talk():
+            presence = coupling_pb2.PeerPresence(peer_timeout=Duration(seconds=10**9))
+            yield coupling_pb2.PeerMessage(hello=coupling_pb2.Hello(simulation=simulation.name, port="slow", presence=presence))
+            over.wait()
+
+        stream = coupling_pb2_grpc.CouplingStub(channel).Attach(talk())
+        with futures.ThreadPoolExecutor() as pool:
+            step = pool.submit(simulation.step)
+            time.sleep(0.5 * TIME_FACTOR)
+            assert not step.done()
+            begun = time.monotonic()
+            simulation.interrupt() if end == "interrupt" else simulation.delete()
+            with contextlib.suppress(mbcosim.Error):  # of the simulation that is gone
+                step.result(BOUND * TIME_FACTOR)
+            assert time.monotonic() - begun < BOUND * TIME_FACTOR
+        over.set()
+        stream.cancel()

@@ -837,6 +837,21 @@ def test_long_suspended_ones_are_removed(start, folder):
         wait_for(lambda: server.list() == [] and not (folder / name).exists())
 
 
+def test_what_is_used_and_does_not_change_is_kept_from_its_last_use_on(start, folder):
+    daemon = start("--lease", "1", "--suspended-expiry", "60")
+    with daemon.connect() as server:
+        simulation = server.load_text(deck())
+        point = folder / simulation.name / "point"
+        os.utime(point, (time.time() - 1000,) * 2)  # so long it was read only
+        wait_for(lambda: state_of(server, simulation.name) == pb.SIMULATION_STATE_SUSPENDED)
+        time.sleep(0.2)
+        assert state_of(server, simulation.name) == pb.SIMULATION_STATE_SUSPENDED and time.time() - point.stat().st_mtime < 60
+        assert simulation.read(["time"])["time"] == 0
+        os.utime(point, (time.time() - 1000,) * 2)
+    daemon.stop()
+    assert time.time() - point.stat().st_mtime < 60
+
+
 def test_a_missing_folder_is_named_and_not_made(tmp_path):
     missing = tmp_path / "missing"
     done = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/socket", "--state-dir", str(missing)],

@@ -562,6 +562,15 @@ def test_a_deck_is_read_no_longer_than_a_second_after_its_call_is_cancelled(daem
             assert rests_within_a_second(daemon)
 
 
+def test_a_variable_is_not_described_over_and_over(daemon, server):
+    with server.load_text(decks.body()) as simulation, grpc.insecure_channel(daemon.address) as channel:
+        describe = simulations_pb2_grpc.SimulationsStub(channel).DescribeSimulation
+        with pytest.raises(grpc.RpcError) as caught:
+            describe(pb.DescribeSimulationRequest(simulation=simulation.name, variable_names=20000 * ["time"]))
+        assert caught.value.code() == grpc.StatusCode.INVALID_ARGUMENT and "20000 names" in caught.value.details()
+        assert len(describe(pb.DescribeSimulationRequest(simulation=simulation.name, variable_names=5000 * ["time"])).model.variables) == 5000
+
+
 SHAPE = (16, 16, 16)
 LONG = {"basis": "craig-bampton", "interface": ",".join(map(str, reduce_scaling.corner_labels(SHAPE))), "modes": 300,
         "inertia": "rigid", "expose": "interface"}

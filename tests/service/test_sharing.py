@@ -201,6 +201,16 @@ def test_grants_change_while_the_simulation_lives(shared):
             guest.attach(simulation.name)
 
 
+def test_a_grant_that_is_taken_back_ends_the_steps_of_an_open_stream(shared):
+    with shared("ann").load_text(decks.body(), grants=[mbcosim.grant("token:bob", "control")]) as simulation:
+        stepper = shared("bob").attach(simulation.name).stepper()
+        assert [stepper.step().step for _ in range(3)] == [1, 2, 3]
+        simulation.update(grants=[])
+        with pytest.raises(mbcosim.NotFound):
+            stepper.step()
+        assert simulation.refresh().step == 3
+
+
 @pytest.mark.parametrize("wrong, field", [
     (pb.Grant(identity="", right=pb.RIGHT_OBSERVE), "grants.identity"),
     (pb.Grant(identity="token:nobody", right=pb.RIGHT_OBSERVE), "grants.identity"),

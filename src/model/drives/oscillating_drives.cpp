@@ -28,7 +28,8 @@ double running(double t, double start, double end) {
 SineDrive::SineDrive(double t0, double omega, double amplitude, int cycles, double i)
     : t0_(t0), omega_(omega), a_(amplitude), i_(i) {
   end_ = cycles == 0 ? kForever
-                     : end_after(t0, omega, cycles > 0 ? cycles - 0.5 : std::abs(cycles) - 0.75);
+                     : end_after(t0, omega,
+                                 cycles > 0 ? cycles - 0.5 : -static_cast<double>(cycles) - 0.75);
   final_ = cycles < 0 ? i + amplitude : i;
 }
 double SineDrive::value(const EvalContext&, double t) const {
@@ -41,8 +42,9 @@ double SineDrive::derivative(const EvalContext&, double t) const {
 
 CosineDrive::CosineDrive(double t0, double omega, double amplitude, int cycles, double i)
     : t0_(t0), omega_(omega), a_(amplitude), i_(i) {
-  end_ =
-      cycles == 0 ? kForever : end_after(t0, omega, cycles > 0 ? cycles : std::abs(cycles) - 0.5);
+  end_ = cycles == 0
+             ? kForever
+             : end_after(t0, omega, cycles > 0 ? cycles : -static_cast<double>(cycles) - 0.5);
   final_ = cycles < 0 ? i + 2 * amplitude : i;
 }
 double CosineDrive::value(const EvalContext&, double t) const {

@@ -1,4 +1,5 @@
 #include <charconv>
+#include <cmath>
 #include <sstream>
 
 #include "model/deck_channel.h"
@@ -9,6 +10,15 @@
 namespace mbcosim {
 
 namespace {
+
+int read_channels(Card& card, const char* what) {
+  constexpr int kMost = 65536;
+  const int n = read_count(card, what);
+  if (n > kMost)
+    card.fail("at most " + std::to_string(kMost) + " columns are allowed, got " +
+              std::to_string(n));
+  return n;
+}
 
 /// [interpolation, {linear|const},] [pad zeroes, {yes|no}, | bailout, {none|upper|lower|any},]
 TableOptions read_table_options(Card& card) {
@@ -76,7 +86,7 @@ FileDriverPtr make_table_driver(Card& card, SampleTable table, const TableOption
 FileDriverPtr read_fixed_step(Card& card, int) {
   const int rows = card.keyword("count") ? -1 : read_count(card, "number of steps");
   SampleTable table;
-  table.channels = read_count(card, "number of channels");
+  table.channels = read_channels(card, "number of channels");
   const HeaderNumber t0 = read_header_number(card, "initial time");
   const HeaderNumber dt = read_header_number(card, "time step");
   const TableOptions options = read_table_options(card);
@@ -91,14 +101,15 @@ FileDriverPtr read_fixed_step(Card& card, int) {
   table.values = std::move(samples.values);
   table.t0 = resolved(card, t0, samples.initial_time, "initial time");
   table.dt = resolved(card, dt, samples.time_step, "time step");
-  if (!(table.dt > 0))
+  if (!(table.dt > 0 && std::isfinite(table.dt)))
     card.fail("the time step of the file driver must be positive, got " + std::to_string(table.dt));
+  if (!std::isfinite(table.t0)) card.fail("the initial time of the file driver is not finite");
   return make_table_driver(card, std::move(table), options);
 }
 
 FileDriverPtr read_variable_step(Card& card, int) {
   SampleTable table;
-  table.channels = read_count(card, "number of channels");
+  table.channels = read_channels(card, "number of channels");
   const TableOptions options = read_table_options(card);
   const SampleText samples = read_samples(card, table.channels + 1);
   const int columns = table.channels + 1;
@@ -111,16 +122,6 @@ FileDriverPtr read_variable_step(Card& card, int) {
     table.values.insert(table.values.end(), v + 1, v + columns);
   }
   return make_table_driver(card, std::move(table), options);
-}
-
-/// Channels of a driver whose values come from a peer, not from the deck.
-int read_stream_channels(Card& card) {
-  constexpr int kMost = 65536;
-  const int n = read_count(card, "number of columns");
-  if (n > kMost)
-    card.fail("at most " + std::to_string(kMost) + " columns are allowed, got " +
-              std::to_string(n));
-  return n;
 }
 
 /// Gives the channels of a driver fed by a peer a place in State::memory.
@@ -192,7 +193,7 @@ FileDriverPtr read_stream(Card& card, int label) {
     card.fail_at(card.next(), "stream: `echo` is not supported",
                  "leave it out; the service's telemetry records what is received");
   read_channel_echo(card, channel);
-  stream.channels = read_stream_channels(card);
+  stream.channels = read_channels(card, "number of columns");
   const std::vector<double> initial = read_initial_values(card, stream.channels);
   read_channel_modifier(card, stream.channels, channel);
   channel.log_end = input_text(stream.channels, initial);
@@ -225,7 +226,7 @@ FileDriverPtr read_socket(Card& card, int label) {
   channel.label = label;
   StreamInput stream;
   stream.where = card.next();
-  stream.channels = read_stream_channels(card);
+  stream.channels = read_channels(card, "number of columns");
   stream.name = "socket" + std::to_string(card.model().stream_inputs.size() + 1);
   const std::vector<double> initial = read_initial_values(card, stream.channels);
   if (card.peek_word() == "create")

@@ -32,7 +32,8 @@ double ClosestNextDrive::instant_after(const EvalContext& context, double next) 
   if (!(increment > 0))
     throw EvaluationError("closest next: the increment must be positive, got " +
                           std::to_string(increment));
-  if ((t - next) / increment > kMostIncrements)
+  const bool advances = next > t || next + increment > next;
+  if (!advances || (t - next) / increment > kMostIncrements)
     throw EvaluationError("closest next: the increment " + std::to_string(increment) +
                           " is too small for the time step");
   while (next <= t) next += increment;

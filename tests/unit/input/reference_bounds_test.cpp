@@ -170,6 +170,33 @@ std::string trouble(const DeckText& deck) {
   return created ? "" : created.error().message;
 }
 
+// Each of the laws goes through a chain of others before it asks for what the one before has done.
+TEST(ReferenceBounds, LongChainsInEachOtherEndBeforeTheStackDoes) {
+  const std::string trouble_of_many = trouble_of_start(R"deck(
+begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: 1.; time step: 0.1; end: initial value;
+begin: control data; structural nodes: 2; joints: 31; rigid bodies: 1; skip initial joint assembly;
+end: control data;
+begin: nodes;
+  structural: 1, dynamic, null, eye, null, null; structural: 2, static, null, eye, null, null;
+end: nodes;
+begin: elements;
+  body: 1, 1, 1., null, eye; joint: 100, clamp, 2, node, node;
+  joint: 1, deformable joint, 2, null, 1, null, linear elastic isotropic, 1.;
+  constitutive law: 1, 6, linear elastic isotropic, 1.;
+  for: integer j = 2, 30;
+    constitutive law: 1000*j, 6, drive caller wrapper, string,
+      "model::element::joint(j-1, \"Fx\")", linear elastic isotropic, 1.;
+    for: integer k = 1, 490;
+      constitutive law: 1000*j+k, 6, array, 2, reference, 1, reference, 1000*j+k-1;
+    end for;
+    joint: j, deformable joint, 2, null, 1, null, reference, 1000*j+490;
+  end for;
+end: elements;
+)deck");
+  EXPECT_NE(trouble_of_many.find("nested too deeply"), std::string::npos) << trouble_of_many;
+}
+
 // A joint's distance follows a parameter node that is bound to it.
 TEST(ReferenceBounds, ParametersThatAreBoundInACircleEnd) {
   DeckText deck;

@@ -1,5 +1,6 @@
 /// Free rigid bodies built without a deck: closed forms, energy, order of convergence, restart.
 #include <gtest/gtest.h>
+#include <chrono>
 
 #include <cmath>
 
@@ -234,6 +235,15 @@ TEST(Simulation, StopsBetweenIterationsWhenCancelled) {
   EXPECT_EQ(report.outcome, StepOutcome::interrupted);
   EXPECT_EQ(simulation->state().y, before);
   EXPECT_EQ(simulation->step_number(), 3);
+}
+
+// Each step converges at once; without a look at the token it would go on for ever.
+TEST(Simulation, StopsBetweenStepsWhenCancelled) {
+  auto simulation = start(BodyCase{.final_time = 1e9});
+  CancelToken cancel;
+  cancel.set_deadline(std::chrono::steady_clock::now() + std::chrono::milliseconds(50));
+  const StepReport report = simulation->step_many(std::int64_t{1} << 60, &cancel);
+  EXPECT_EQ(report.outcome, StepOutcome::interrupted);
 }
 
 }  // namespace
