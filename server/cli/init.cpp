@@ -31,8 +31,8 @@ int init(const std::string& kind, const std::string& output) {
   }
   std::printf(
       "%s is written. Next:\n  mbcosim describe %s\n  mbcosim run %s -o results\n"
-      "  mbcosim plot results --node 2 X\n",
-      path.c_str(), path.c_str(), path.c_str());
+      "  mbcosim plot results %s\n",
+      path.c_str(), path.c_str(), path.c_str(), chosen->plot);
   return kDone;
 }
 

@@ -8,6 +8,7 @@ namespace mbcosim::cli {
 
 struct Starter {
   std::string_view kind, deck;
+  const char* plot;  ///< arguments of `mbcosim plot` that show what moves
 };
 
 const std::array<Starter, 4>& starters();

@@ -159,32 +159,38 @@ struct RpcHandler::Call {
 };
 
 /// A stream's place among those that an identity, and all together, may have.
+bool RpcHandler::Places::enter(const std::string& identity) {
+  const Guard lock(mutex_);
+  const auto mine = by_identity_.find(identity);
+  if (all_ >= most_ || (mine != by_identity_.end() && mine->second >= most_per_identity_))
+    return false;
+  ++by_identity_[identity];
+  ++all_;
+  return true;
+}
+
+void RpcHandler::Places::leave(const std::string& identity) {
+  const Guard lock(mutex_);
+  --all_;
+  const auto mine = by_identity_.find(identity);
+  if (--mine->second == 0) by_identity_.erase(mine);
+}
+
 class RpcHandler::Place {
  public:
-  Place(Mutex& mutex, Places& places, const std::string& identity)
-      : mutex_(mutex), places_(places), identity_(identity) {
-    const Guard lock(mutex_);
-    int& mine = places_.by_identity[identity_];
-    if (mine >= places_.most_per_identity || places_.all >= places_.most) return;
-    ++mine;
-    ++places_.all;
-    held_ = true;
-  }
+  Place(Places& places, const std::string& identity)
+      : places_(places), identity_(identity), held_(places.enter(identity)) {}
   ~Place() {
-    const Guard lock(mutex_);
-    const auto mine = places_.by_identity.find(identity_);
-    if (held_) --places_.all, --mine->second;
-    if (mine->second == 0) places_.by_identity.erase(mine);
+    if (held_) places_.leave(identity_);
   }
   Place(const Place&) = delete;
   Place& operator=(const Place&) = delete;
   bool held() const { return held_; }
 
  private:
-  Mutex& mutex_;
   Places& places_;
   const std::string identity_;
-  bool held_ = false;
+  const bool held_;
 };
 
 const MethodDescriptor* RpcHandler::find(std::string_view path) {
@@ -297,13 +303,13 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
   const grpc::Status readable = read_counted(call, &request);
   if (!readable.ok()) return call.refuse(readable);
   // Others have connections, too, and so have those who ask whether the daemon is well.
-  const Place call_place(mutex_, calls_, identity);
+  const Place call_place(calls_, identity);
   if (!call_place.held())
     return call.refuse(limit_refusal("http_calls", limits_.calls_per_identity,
                                      "too many calls are under way over HTTP; wait for some")
                            .status());
   std::optional<Place> place;
-  if (streams && !place.emplace(mutex_, streams_, identity).held())
+  if (streams && !place.emplace(streams_, identity).held())
     return call.refuse(limit_refusal("http_streams", limits_.streams_per_identity,
                                      "too many streams are open over HTTP; close some")
                            .status());

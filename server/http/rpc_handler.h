@@ -44,8 +44,8 @@ class RpcHandler {
       : channel_(std::move(channel)),
         budgets_(budgets),
         limits_(limits),
-        streams_{limits.streams_per_identity, limits.streams},
-        calls_{limits.calls_per_identity, limits.calls} {}
+        streams_(limits.streams_per_identity, limits.streams),
+        calls_(limits.calls_per_identity, limits.calls) {}
 
   /// The method that "/mbcosim.v1.Simulations/Step" names; null: none.
   static const google::protobuf::MethodDescriptor* find(std::string_view path);
@@ -57,6 +57,19 @@ class RpcHandler {
 
  private:
   struct Call;
+  /// How many of each identity, and of all together, go on at once. Thread-safe.
+  class Places {
+   public:
+    Places(int most_per_identity, int most) : most_per_identity_(most_per_identity), most_(most) {}
+    bool enter(const std::string& identity) TS_EXCLUDES(mutex_);
+    void leave(const std::string& identity) TS_EXCLUDES(mutex_);
+
+   private:
+    const int most_per_identity_, most_;
+    Mutex mutex_;
+    std::map<std::string, int> by_identity_ TS_GUARDED_BY(mutex_);
+    int all_ TS_GUARDED_BY(mutex_) = 0;
+  };
   class Place;
 
   grpc::Status read_request(Call& call, std::string* request) const;
@@ -68,14 +81,7 @@ class RpcHandler {
   MemoryBudgets& budgets_;
   const Limits limits_;
   std::atomic<bool> closing_{false};
-  Mutex mutex_;
-  /// That are taken.
-  struct Places {
-    const int most_per_identity, most;
-    std::map<std::string, int> by_identity = {};
-    int all = 0;
-  };
-  Places streams_ TS_GUARDED_BY(mutex_), calls_ TS_GUARDED_BY(mutex_);
+  Places streams_, calls_;
 };
 
 }  // namespace mbcosim::server::http

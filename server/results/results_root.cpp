@@ -81,12 +81,13 @@ void ResultsRoot::measure() {
 void ResultsRoot::take(const std::string& path, std::int64_t quota) {
   const std::int64_t there = bytes_in(path);  // of an earlier process
   Guard guard(mutex_);
-  const auto fits = [&] { return quota - there <= most_ - promised_ - left_; };
-  if (!fits() && std::chrono::steady_clock::now() - measured_ > std::chrono::seconds(1)) measure();
-  if (!fits())
+  const std::int64_t more = quota - there;
+  if (!has_room(more) && std::chrono::steady_clock::now() - measured_ > std::chrono::seconds(1))
+    measure();
+  if (!has_room(more))
     throw limit_refusal("results_root_bytes", most_,
                         "the folder of results has no room for another quota of " +
-                            std::to_string(quota - there) + " bytes");
+                            std::to_string(more) + " bytes");
   quotas_[path] = quota;
   promised_ += quota;
   left_ -= there;

@@ -38,6 +38,9 @@ class ResultsRoot {
   void take(const std::string& path, std::int64_t quota) TS_EXCLUDES(mutex_);
   void give_back(const std::string& path) TS_EXCLUDES(mutex_);
   void measure() TS_REQUIRES(mutex_);
+  bool has_room(std::int64_t bytes) const TS_REQUIRES(mutex_) {
+    return bytes <= most_ - promised_ - left_;
+  }
 
   const std::string path_;
   const std::int64_t most_;

@@ -7,7 +7,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
+#include <stdexcept>
 
 #include "client/mbcosim_client.h"
 #include "durable/record_file.h"
@@ -33,8 +35,20 @@ std::string default_address() {
   return "unix:/tmp/mbcosim-" + std::to_string(::getuid()) + "/mbcosim.sock";
 }
 
+/// Text of a PEM file; of none: nothing.
+std::string text_of(const std::string& path) {
+  if (path.empty()) return {};
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file || text.empty()) throw std::runtime_error("cannot read \"" + path + "\"");
+  return text;
+}
+
 Server reach(const Options& options) {
-  return Server::connect(options.address, options.timeout, options.credentials);
+  Credentials credentials = options.credentials;  // names of files
+  for (std::string* file : {&credentials.server_ca, &credentials.certificate, &credentials.key})
+    *file = text_of(*file);
+  return Server::connect(options.address, options.timeout, credentials);
 }
 
 const char* state_name(SimulationInfo::State state) {
@@ -44,8 +58,9 @@ const char* state_name(SimulationInfo::State state) {
 }
 
 int list(const Options& options) {
+  const std::vector<SimulationInfo> found = reach(options).list();
   std::printf("%-42s %-10s %12s %14s  %s\n", "simulation", "state", "step", "time", "name");
-  for (const SimulationInfo& info : reach(options).list())
+  for (const SimulationInfo& info : found)
     std::printf("%-42s %-10s %12lld %14.6g  %s\n", info.name.c_str(), state_name(info.state),
                 static_cast<long long>(info.step), info.time, info.display_name.c_str());
   return kDone;

@@ -11,8 +11,10 @@ import struct
 import subprocess
 import time
 import urllib.parse
+from concurrent import futures
 
 import pytest
+import decks
 from conftest import BIN, TIME_FACTOR, counts_memory, is_sanitized, wait_for
 from google.protobuf import json_format
 
@@ -543,6 +545,21 @@ def test_as_many_slow_senders_as_connections_may_take_their_time_while_nobody_wa
         link.sendall(f"Host: {door.host}:{door.port}\r\n\r\n".encode())
         assert link.recv(65536).startswith(b"HTTP/1.1 200")
         link.close()
+
+
+def test_calls_of_one_identity_leave_places_for_others(start_daemon):
+    daemon = start_daemon("--http", "127.0.0.1:0", "--limit-http-connections", "8")
+    door = Door(daemon.page())
+    with daemon.connect() as server, futures.ThreadPoolExecutor() as pool:
+        slow = [server.load_text(decks.body(), pace=1e-9) for _ in range(4)]
+        calls = [pool.submit(door.call, "Simulations/Step", {"simulation": simulation.name, "steps": 2}) for simulation in slow]
+        wait_for(lambda: all(simulation.refresh().state == simulations_pb2.SIMULATION_STATE_STEPPING for simulation in slow))
+        status, answer = door.call("Simulations/GetServerInfo")
+        assert (status, answer["code"]) == (429, "resource_exhausted") and "wait for some" in answer["message"]
+        assert door.request("GET", "/healthz")[0] == 200
+        for simulation in slow:
+            simulation.interrupt()
+        assert [call.result()[0] for call in calls] == 4 * [200]
 
 
 def test_a_body_that_dribbles_without_a_token_is_cut_off(door):

@@ -160,7 +160,7 @@ def test_hover_tells_how_a_word_is_written_what_it_writes_and_how_far_it_is_serv
     assert "Genels" not in told  # the genel of this name cannot stand here
     solver = text.replace("begin: initial value;", "begin: initial value;\n    threads: 2;")
     editor.open("file:///s.mbd", solver)
-    assert "Served: ignored; a simulation runs on one thread" in editor.at("hover", "file:///s.mbd", solver, "threads", 3)["contents"]["value"]
+    assert "Served: ignored; large models take all cores" in editor.at("hover", "file:///s.mbd", solver, "threads", 3)["contents"]["value"]
 
 
 def test_definition_and_references_of_symbols_and_labels(editor):

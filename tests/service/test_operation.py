@@ -141,6 +141,22 @@ def check(*arguments):
     return subprocess.run([DAEMON, "--check", *map(str, arguments)], timeout=30 * TIME_FACTOR).returncode
 
 
+def test_the_commands_reach_a_daemon_over_tls(secured, tmp_path):
+    daemon, address = secured
+    certificate(tmp_path, "client", "/CN=arm", "ca")
+    files = {"--ca": "ca.pem", "--certificate": "client.pem", "--key": "client.key"}
+
+    def sessions(**changed):
+        arguments = [word for option, file in {**files, **changed}.items() for word in (option, str(tmp_path / file))]
+        return subprocess.run([os.path.join(os.path.dirname(DAEMON), "mbcosim"), "sessions", "--address", address, *arguments],
+                              capture_output=True, text=True, timeout=30 * TIME_FACTOR)
+
+    done = sessions()
+    assert done.returncode == 0 and done.stdout.startswith("simulation"), done
+    missing = sessions(**{"--ca": "none.pem"})
+    assert missing.returncode == 4 and "none.pem" in missing.stderr and missing.stdout == ""
+
+
 def test_health_is_asked_over_tls(secured, tmp_path):
     daemon, address = secured
     certificate(tmp_path, "client", "/CN=probe", "ca")

@@ -140,7 +140,7 @@ eigenanalysis
   ! yes: `use arpack` and `use jdqz`: an Arnoldi process with shift and inversion, without left eigenvectors
 threads
   = { auto | disable | [ { assembly | solver } , ] <n threads> }
-  ! ignored: a simulation runs on one thread
+  ! ignored: large models take all cores; see `mbcosim run --threads`
 real time
   = <arguments>
   ! ignored: use `mbcosim run --real-time`

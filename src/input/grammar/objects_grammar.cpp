@@ -250,7 +250,7 @@ RTAI input
   = name , "<name>" , <address> , <n columns>
 socket
   = <n columns> , [ initial values , ( <value> ) * n columns , ] { local , "<path>" | port , <n port> }
-  ! partly: values come from a peer on a port; addresses are read and dropped
+  ! yes: on a daemon without `--deck-sockets` a port of that name, to which a peer attaches
 )";
 
 const char* const kNotation = R"(
