@@ -179,6 +179,7 @@ void Coupler::take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointP
   for (const v1::CheckpointPort& in : memory)
     for (Line& line : lines_) {
       if (line.port->model().name() != in.port()) continue;
+      check_memory(line.port->model(), in);
       line.agreement.hold = in.input_hold();
       if (in.has_form()) {
         line.agreement.frame = in.form().frame();
@@ -188,7 +189,6 @@ void Coupler::take_over(const google::protobuf::RepeatedPtrField<v1::CheckpointP
       if (in.had_peer()) line.port->expect_peer(line.agreement);
       line.agreement = line.port->agreement();
       line.history = InputHistory(line.agreement.held_answers());
-      check_memory(line.port->model(), in);
       for (const v1::CheckpointAnswer& answer : in.answers())
         line.history.add(answer.time(), {answer.values().begin(), answer.values().end()});
       if (in.has_answered_for_step()) line.answered_for = in.answered_for_step();

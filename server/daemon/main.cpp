@@ -77,6 +77,7 @@ int main(int argc, char** argv) {
   const sigset_t signals = blocked_signals();
   try {
     start_logging(invocation.config);
+    make_default_folder(invocation.config);
     Daemon daemon(invocation.config);
     tell_service_manager("READY=1");
     serve(daemon, signals);

@@ -4,13 +4,14 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
-#include <stdexcept>
 
 #include "daemon/environment.h"
 #include "rpc/auth.h"
+#include "rpc/trusted_file.h"
 
 namespace mbcosim::server {
 namespace {
@@ -166,19 +167,15 @@ std::string default_listener() {
   return "unix:/tmp/mbcosim-" + std::to_string(::getuid()) + "/mbcosim.sock";
 }
 
-// In /tmp anybody may have made the folder before: its owner could put another socket in its place.
-std::string make_default_listener() {
+// In /tmp anybody may have made it before.
+void make_default_folder(const Config& config) {
   const std::string address = default_listener();
   const std::string folder = std::filesystem::path(address.substr(5)).parent_path();
-  if (folder.rfind("/tmp/", 0) != 0) return address;
+  const bool wanted =
+      std::find(config.listen.begin(), config.listen.end(), address) != config.listen.end();
+  if (!wanted || folder.rfind("/tmp/", 0) != 0) return;
   ::mkdir(folder.c_str(), 0700);
-  struct stat found {};
-  const bool mine = ::lstat(folder.c_str(), &found) == 0 && S_ISDIR(found.st_mode) &&
-                    found.st_uid == ::geteuid() && (found.st_mode & 077) == 0;
-  if (!mine)
-    throw std::runtime_error(folder +
-                             " is not a folder of this user's alone: remove it, or give --listen");
-  return address;
+  check_trusted("the folder of the default socket", folder);
 }
 
 Invocation read_options(int argc, char** argv) {
@@ -320,7 +317,7 @@ Invocation read_options(int argc, char** argv) {
   config.suspended_expiry = std::chrono::seconds(suspended_expiry);
   config.checkpoint_interval =
       std::chrono::milliseconds(static_cast<std::int64_t>(checkpoint_interval * 1000));
-  if (config.listen.empty()) config.listen.push_back(make_default_listener());
+  if (config.listen.empty()) config.listen.push_back(default_listener());
   if (print_config) {
     std::printf("%s", app.config_to_str(true, true).c_str());
     invocation.exit_code = 0;

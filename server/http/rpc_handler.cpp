@@ -159,40 +159,6 @@ struct RpcHandler::Call {
 };
 
 /// A stream's place among those that an identity, and all together, may have.
-bool RpcHandler::Places::enter(const std::string& identity) {
-  const Guard lock(mutex_);
-  const auto mine = by_identity_.find(identity);
-  if (all_ >= most_ || (mine != by_identity_.end() && mine->second >= most_per_identity_))
-    return false;
-  ++by_identity_[identity];
-  ++all_;
-  return true;
-}
-
-void RpcHandler::Places::leave(const std::string& identity) {
-  const Guard lock(mutex_);
-  --all_;
-  const auto mine = by_identity_.find(identity);
-  if (--mine->second == 0) by_identity_.erase(mine);
-}
-
-class RpcHandler::Place {
- public:
-  Place(Places& places, const std::string& identity)
-      : places_(places), identity_(identity), held_(places.enter(identity)) {}
-  ~Place() {
-    if (held_) places_.leave(identity_);
-  }
-  Place(const Place&) = delete;
-  Place& operator=(const Place&) = delete;
-  bool held() const { return held_; }
-
- private:
-  Places& places_;
-  const std::string identity_;
-  const bool held_;
-};
-
 const MethodDescriptor* RpcHandler::find(std::string_view path) {
   constexpr std::string_view kPackage = "/mbcosim.v1.";
   const std::size_t slash = path.rfind('/');

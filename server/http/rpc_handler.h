@@ -13,7 +13,7 @@
 #include "http/connection.h"
 #include "http/generic_call.h"
 #include "rpc/budgets.h"
-#include "threads/mutex.h"
+#include "rpc/places.h"
 
 namespace mbcosim::server::http {
 
@@ -57,20 +57,6 @@ class RpcHandler {
 
  private:
   struct Call;
-  /// How many of each identity, and of all together, go on at once. Thread-safe.
-  class Places {
-   public:
-    Places(int most_per_identity, int most) : most_per_identity_(most_per_identity), most_(most) {}
-    bool enter(const std::string& identity) TS_EXCLUDES(mutex_);
-    void leave(const std::string& identity) TS_EXCLUDES(mutex_);
-
-   private:
-    const int most_per_identity_, most_;
-    Mutex mutex_;
-    std::map<std::string, int> by_identity_ TS_GUARDED_BY(mutex_);
-    int all_ TS_GUARDED_BY(mutex_) = 0;
-  };
-  class Place;
 
   grpc::Status read_request(Call& call, std::string* request) const;
   grpc::Status read_counted(Call& call, std::string* request) const;

@@ -1,8 +1,7 @@
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
+#include "files/text_file.h"
 #include "peer/fmu_peer.h"
 #include "peer/options.h"
 #include "peer/simulation_watch.h"
@@ -12,11 +11,9 @@ namespace {
 
 using client::Mode;
 
-std::string text_of_file(const std::string& path) {
-  if (path.empty()) return "";
-  std::ifstream in(path);
-  if (!in) throw std::runtime_error("cannot read \"" + path + "\"");
-  std::string text(std::istreambuf_iterator<char>(in), {});
+/// A token: without the ends of its lines.
+std::string token_of_file(const std::string& path) {
+  std::string text = server::text_of_file(path);
   while (!text.empty() && text.back() == '\n') text.pop_back();
   return text;
 }
@@ -48,8 +45,8 @@ std::vector<std::string> expanded(const client::Simulation& simulation,
 
 client::Server connect(const PeerCall& call) {
   client::Credentials credentials;
-  credentials.token = text_of_file(call.token_file);
-  if (!call.server_ca.empty()) credentials.server_ca = text_of_file(call.server_ca) + "\n";
+  credentials.token = token_of_file(call.token_file);
+  credentials.server_ca = server::text_of_file(call.server_ca);
   return client::Server::connect(call.server, 10, credentials);
 }
 

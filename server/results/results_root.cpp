@@ -68,12 +68,8 @@ void ResultsRoot::remove(const std::string& simulation) {
 
 // What is there and not in use.
 void ResultsRoot::measure() {
-  left_ = 0;
-  std::error_code none;
-  for (const fs::directory_entry& entry : fs::directory_iterator(path_, none))
-    if (quotas_.count(entry.path().string()) == 0)
-      left_ += entry.is_directory(none) ? bytes_in(entry.path().string())
-                                        : static_cast<std::int64_t>(entry.file_size(none));
+  left_ = bytes_in(path_);
+  for (const auto& [path, quota] : quotas_) left_ -= bytes_in(path);
   measured_ = std::chrono::steady_clock::now();
 }
 

@@ -1,15 +1,15 @@
 /// Methods that carry whole simulations from one server to another.
-#include <map>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
 
 #include "durable/record_file.h"
 #include "math/hash.h"
+#include "rpc/places.h"
 #include "service/display_name.h"
 #include "service/durability.h"
 #include "service/simulations_service.h"
-#include "threads/mutex.h"
 
 namespace mbcosim::server {
 namespace {
@@ -27,39 +27,20 @@ auto readable(Read&& read) {
   }
 }
 
-/// Each holds its files open for as long as its reader takes: an identity has a few at a time.
-/// Thread-safe.
-class Exports : public std::enable_shared_from_this<Exports> {
- public:
-  /// A place, for as long as the result lives. Throws LIMIT_EXCEEDED.
-  std::shared_ptr<const void> enter(const std::string& identity) {
-    constexpr int kMost = 8;
-    Guard guard(mutex_);
-    int& open = open_[identity];
-    if (open == kMost)
-      throw limit_refusal("identity_exports", kMost,
-                          "too many exports of checkpoints are open; read them to their ends");
-    ++open;
-    return {this, [self = shared_from_this(), identity](const void*) { self->leave(identity); }};
-  }
+/// An export holds its files open for as long as its reader takes: an identity has a few at a time.
+using Exports = std::shared_ptr<Places>;
+Exports few_exports() { return std::make_shared<Places>(8, std::numeric_limits<int>::max()); }
 
- private:
-  void leave(const std::string& identity) {
-    Guard guard(mutex_);
-    const auto found = open_.find(identity);
-    if (--found->second == 0) open_.erase(found);
-  }
-  Mutex mutex_;
-  std::map<std::string, int> open_ TS_GUARDED_BY(mutex_);
-};
-
-ExportReplies::Source exported(const Parts& parts, Exports& exports, const CallFrame& frame,
+ExportReplies::Source exported(const Parts& parts, const Exports& exports, const CallFrame& frame,
                                const v1::ExportCheckpointRequest& request) {
   const SessionHold session(parts.store, request.simulation(), frame.caller, frame.call,
                             Access::control);
-  const auto place = exports.enter(frame.caller.identity);
+  const auto place = std::make_shared<Place>(*exports, frame.caller.identity);
+  if (!place->held())
+    throw limit_refusal("identity_exports", exports->most_per_identity(),
+                        "too many exports of checkpoints are open; read them to their ends");
   auto files = std::make_shared<OpenFiles>(parts.durability.open_files(*session));
-  return [files, place](auto* reply) {
+  return [exports, place, files](auto* reply) {
     std::string piece = readable([&] { return files->read(kChunkBytes); });
     const bool some = !piece.empty();
     reply->set_data(std::move(piece));
@@ -117,9 +98,8 @@ void add_checkpoints(Gate& gate, const Parts& parts) {
   gate.add(simulations_path("ExportCheckpoint"),
            series<v1::ExportCheckpointRequest, v1::ExportCheckpointReply>(
                Role::control, Lane::work,
-               [&parts, exports = std::make_shared<Exports>()](const CallFrame& frame,
-                                                               const auto& request) {
-                 return exported(parts, *exports, frame, request);
+               [&parts, exports = few_exports()](const CallFrame& frame, const auto& request) {
+                 return exported(parts, exports, frame, request);
                }));
   gate.add(simulations_path("ImportCheckpoint"),
            stream(Role::control, [&parts] { return std::make_unique<ImportHandler>(parts); }));

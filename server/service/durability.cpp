@@ -391,7 +391,8 @@ void Durability::note_uses() {
 
 void Durability::look() {
   // What is used and does not change is known to be in use after a crash, too.
-  if (Keeping::Clock::now() - uses_noted_ > config_.suspended_expiry / 8) {
+  if (Keeping::Clock::now() - uses_noted_ >
+      std::chrono::milliseconds(config_.suspended_expiry) / 8) {
     uses_noted_ = Keeping::Clock::now();
     note_uses();
   }

@@ -7,13 +7,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
-#include <stdexcept>
 
 #include "client/mbcosim_client.h"
 #include "durable/record_file.h"
 #include "durable/salvage.h"
+#include "files/text_file.h"
 
 namespace {
 
@@ -35,19 +34,10 @@ std::string default_address() {
   return "unix:/tmp/mbcosim-" + std::to_string(::getuid()) + "/mbcosim.sock";
 }
 
-/// Text of a PEM file; of none: nothing.
-std::string text_of(const std::string& path) {
-  if (path.empty()) return {};
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file || text.empty()) throw std::runtime_error("cannot read \"" + path + "\"");
-  return text;
-}
-
 Server reach(const Options& options) {
   Credentials credentials = options.credentials;  // names of files
   for (std::string* file : {&credentials.server_ca, &credentials.certificate, &credentials.key})
-    *file = text_of(*file);
+    *file = mbcosim::server::text_of_file(*file);
   return Server::connect(options.address, options.timeout, credentials);
 }
 

@@ -37,8 +37,8 @@ struct NamedDrive {
   int label = 0;
   std::string name;
   DrivePtr drive;
-  int evaluations = 1;  ///< of drives and functions, for one value
   bool output_value = false, output_derivative = false;
+  int evaluations = 1;  ///< of drives and functions, for one value
 };
 
 /// Gravity field: uniform (vector drive) or central.

@@ -42,8 +42,8 @@ class NestedEvaluation {
 
  private:
   static constexpr int kDeepest = 64, kMost = 100000;
-  static constexpr std::ptrdiff_t kMostStack = 1
-                                               << 20;  ///< bytes: each may go through a long chain
+  /// [bytes] Each of them may go through a long chain.
+  static constexpr std::ptrdiff_t kMostStack = 1 << 20;
   inline static thread_local int depth_ = 0, count_ = 0;
   inline static thread_local const char* outermost_ = nullptr;
 };

@@ -30,7 +30,7 @@ ARROWS = {
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
     "server/fmi": {"math", "model", "solver", "input", "simulation"},
     "server/mbdyn": {"math", "model", "elements", "simulation"},
-    "server/peer": {"math", "model", "solver", "simulation", "client", "mbdyn", "fmi", "threads"},
+    "server/peer": {"math", "model", "solver", "simulation", "client", "mbdyn", "fmi", "files", "threads"},
     "server/cli": {"threads", "host", "mbdyn", "math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/wire": {"math", "model", "solver", "simulation", "mbcosim", "host"},
     "server/host": set(),
@@ -46,7 +46,7 @@ ARROWS = {
     "server/shared_memory": {"threads", "host"},
     "server/http": {"service", "rpc", "threads", "wire", "mbcosim"},
     "server/view": {"client"},
-    "server/sessions": {"client", "durable"},
+    "server/sessions": {"client", "durable", "files"},
     "server/daemon": {"input", "host", "service", "rpc", "http", "shared_memory", "threads", "wire", "mbcosim", "grpc"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",

@@ -11,8 +11,8 @@ import pytest
 
 import mbcosim
 import mbcosim.aio
-from conftest import BIN
-from mbcosim.v1 import checkpoints_pb2, simulations_pb2 as pb
+from conftest import BIN, wait_for
+from mbcosim.v1 import checkpoints_pb2, simulations_pb2 as pb, simulations_pb2_grpc
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(__file__)), "hostile"))
 from forged_checkpoints import POINT, bytes_of, records_of
 from relay import BlackHole
@@ -129,6 +129,28 @@ def test_leases_that_no_server_gives_are_refused(start, seconds, reason):
             server.import_checkpoint(with_point(simulation.export_checkpoint(), forge))
         assert caught.value.reason == reason
         assert [info.name for info in server.list()] == [simulation.name]
+
+
+def test_exports_that_nobody_reads_leave_descriptors_to_others(start):
+    daemon = start()
+    with daemon.connect() as server, grpc.insecure_channel(daemon.address, [("grpc.http2.lookahead_bytes", 5), ("grpc.http2.bdp_probe", 0)]) as channel:
+        simulation = server.load_text(deck() + "# " + 1_000_000 * "x")
+        export = simulations_pb2_grpc.SimulationsStub(channel).ExportCheckpoint
+        begun = [export(pb.ExportCheckpointRequest(simulation=simulation.name)) for _ in range(8)]
+        for stream in begun:
+            next(stream)
+        with pytest.raises(grpc.RpcError) as caught:
+            next(export(pb.ExportCheckpointRequest(simulation=simulation.name)))
+        assert caught.value.code() == grpc.StatusCode.RESOURCE_EXHAUSTED and "exports" in caught.value.details()
+        begun[0].cancel()
+        wait_for(lambda: exported(simulation))
+
+
+def exported(simulation):
+    try:
+        return simulation.export_checkpoint()
+    except mbcosim.LimitExceeded:
+        return None
 
 
 def test_a_repeated_import_makes_one_simulation(start):

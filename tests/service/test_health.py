@@ -72,6 +72,27 @@ def test_a_second_daemon_does_not_steal_the_socket(daemon):
         server.info()
 
 
+@pytest.mark.parametrize("mode", [0o777, 0o700])
+def test_the_default_socket_is_in_a_folder_that_nobody_else_may_write(mode):
+    """Whoever may could put another socket in its place."""
+    if os.getuid() != 0:
+        pytest.skip("only root may be another user")
+    user = 60000 + os.getpid() % 5000
+    folder = f"/tmp/mbcosim-{user}"
+    os.mkdir(folder)
+    try:
+        os.chmod(folder, mode)
+        os.chown(folder, user if mode == 0o777 else user + 1, -1)
+        with open(DAEMON, "rb") as program:  # its folder need not be open to that user
+            environment = {name: value for name, value in os.environ.items() if name != "XDG_RUNTIME_DIR"}
+            run = subprocess.run([f"/proc/self/fd/{program.fileno()}"], stderr=subprocess.PIPE, text=True, timeout=30, env=environment,
+                                 pass_fds=[program.fileno()], user=user, group=user)
+        assert run.returncode == 4 and "the default socket" in run.stderr and folder in run.stderr, run.stderr
+        assert os.listdir(folder) == []
+    finally:
+        os.rmdir(folder)
+
+
 def test_a_stale_socket_is_replaced(tmp_path):
     first = Daemon(str(tmp_path))
     first.connect().close()

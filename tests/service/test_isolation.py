@@ -6,12 +6,13 @@ import subprocess
 import sys
 import textwrap
 
+import grpc
 import pytest
 
 import decks
 import mbcosim
 from conftest import wait_for
-from mbcosim.v1 import simulations_pb2 as pb
+from mbcosim.v1 import simulations_pb2 as pb, simulations_pb2_grpc
 
 NAMES = ["node.structural.1.X", "node.structural.1.R", "node.structural.1.Omega"]
 
@@ -107,3 +108,22 @@ def test_sigterm_during_a_run_ends_the_daemon_cleanly(start_daemon):
     daemon.stop()
     assert client.communicate(timeout=30)[0].strip() in ("INTERRUPTED", "error StatusCode.UNAVAILABLE",
                                                          "error StatusCode.CANCELLED")
+
+
+def test_repeats_that_wait_leave_threads_to_others(start_daemon, tmp_path):
+    """Two paced steps and a repeat of each are four calls of one identity, where four simulations may live, two of an identity."""
+    tokens = tmp_path / "tokens"
+    tokens.write_text("a control ann\nb control bob\n")
+    tokens.chmod(0o600)
+    daemon = start_daemon("--limit-sessions", "4", "--tokens", str(tokens))
+    with daemon.connect(token="a") as ann, daemon.connect(token="b") as bob, grpc.insecure_channel(daemon.address) as channel:
+        slow = [ann.load_text(decks.body(), pace=1e-9) for _ in range(2)]
+        quick = bob.load_text(decks.body())
+        step = simulations_pb2_grpc.SimulationsStub(channel).Step
+        calls = [step.future(pb.StepRequest(simulation=simulation.name, steps=2, request_id="x"), metadata=[("authorization", "Bearer a")])
+                 for simulation in slow for _ in range(2)]
+        wait_for(lambda: all(simulation.refresh().state == pb.SIMULATION_STATE_STEPPING for simulation in slow))
+        assert [quick.step(timeout=20).step for _ in range(3)] == [1, 2, 3]
+        for simulation in slow:
+            simulation.interrupt()
+        assert {call.result().outcome for call in calls} == {pb.STEP_OUTCOME_INTERRUPTED}

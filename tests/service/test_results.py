@@ -185,6 +185,19 @@ def test_refusals_of_a_creation(writer, start_daemon, root, pendulum):
             pass
 
 
+def test_what_an_operator_removes_makes_room(start_daemon, root, pendulum):
+    (root / "left").mkdir(parents=True, exist_ok=True)
+    (root / "left" / "over").write_bytes(bytes(1_000_000))
+    with start_daemon("--results-root", str(root), "--limit-results-bytes", "1000000", "--limit-results-root-bytes", "1500000").connect() as server:
+        with pytest.raises(mbcosim.LimitExceeded) as caught:
+            server.load(pendulum, results=True)
+        assert caught.value.metadata["limit"] == "results_root_bytes"
+        (root / "left" / "over").unlink()
+        time.sleep(1.1)  # it is looked anew once in a second
+        with server.load(pendulum, results=True):
+            pass
+
+
 def test_a_full_disk_is_a_typed_failure_and_the_simulation_stands(writer, root, pendulum):
     with writer.load(pendulum, results="text") as simulation:
         start = simulation.snapshot()

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "deck_fixture.h"
+#include "simulation/simulation.h"
 
 namespace mbcosim::decks {
 namespace {
@@ -59,6 +62,45 @@ TEST(NumbersOutOfRange, TimesAreFinite) {
   EXPECT_THAT(of_initial_value("final time: 1e308*10 - 1e308*10;"),
               HasSubstr("final time must be a number"));
   EXPECT_EQ(of_initial_value("final time: 1e308*10;"), "");
+}
+
+TEST(NumbersOutOfRange, TheInitialTimeFitsItsVariable) {
+  DeckText d;
+  d.before = "set: integer Time = 0;\n";
+  d.initial_value = "initial time: 1e10;";
+  EXPECT_THAT(findings(load(d).diagnostics),
+              HasSubstr("the initial time does not fit the integer \"Time\""));
+  d.initial_value = "initial time: 7.;";
+  EXPECT_EQ(findings(load(d).diagnostics), "");
+}
+
+// 10^6 + 4·10⁻¹¹ is 10^6.
+TEST(NumbersOutOfRange, AnIncrementThatVanishesEnds) {
+  DeckText d;
+  d.initial_value = "initial time: 1e6; final time: 1000001.; time step: 1e-9; tolerance: 1e-6;";
+  d.control = "abstract nodes: 1; genels: 1; forces: 1;";
+  d.nodes = "abstract: 1, differential;";
+  d.elements =
+      "genel: 1, spring support, 1, abstract, algebraic, linear elastic, 1.;"
+      "force: 1, abstract, 1, abstract, closest next, 1e6, forever, const, 4e-11;";
+  const LoadReport report = load(d);
+  ASSERT_TRUE(report.ok()) << findings(report.diagnostics);
+  const auto simulation = Simulation::create(report.model);
+  const std::string trouble = simulation
+                                  ? (*simulation)->step_many(3).error.value_or(Error{}).message
+                                  : simulation.error().message;
+  EXPECT_THAT(trouble, HasSubstr("is too small for the time step"));
+}
+
+// As many half waves as an integer can count down: they do not end within the run.
+TEST(NumbersOutOfRange, TheMostCyclesAreMany) {
+  DeckText d;
+  d.elements = "drive caller: 1, sine, 0., 1., 2., -2147483647 - 1, 0.;";
+  d.elements += "drive caller: 2, cosine, 0., 1., 2., -2147483647 - 1, 0.;";
+  const ModelPtr model = model_of(d);
+  ASSERT_TRUE(model);
+  EXPECT_DOUBLE_EQ(model->find_drive(1)->drive->value(EvalContext{}, 1), 2 * std::sin(1.));
+  EXPECT_DOUBLE_EQ(model->find_drive(2)->drive->value(EvalContext{}, 1), 2 * (1 - std::cos(1.)));
 }
 
 TEST(NumbersOutOfRange, DigitsAndTrialsAreBounded) {

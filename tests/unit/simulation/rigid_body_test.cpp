@@ -1,7 +1,7 @@
 /// Free rigid bodies built without a deck: closed forms, energy, order of convergence, restart.
 #include <gtest/gtest.h>
-#include <chrono>
 
+#include <chrono>
 #include <cmath>
 
 #include "elements/bodies/body.h"
