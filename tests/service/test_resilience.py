@@ -665,7 +665,7 @@ def test_a_daemon_ends_within_its_grace_while_nobody_reads_its_exports(start_dae
         stub = simulations_pb2_grpc.SimulationsStub(channel)
         name = weighty(stub)
         assert sum(len(reply.data) for reply in EXPORTS["checkpoint"](stub, name)) > 48 << 20
-        calls = [EXPORTS[what](stub, name) for what in EXPORTS for _ in range(10)]
+        calls = [EXPORTS[what](stub, name) for what in EXPORTS for _ in range(8)]
         assert all(next(call).data for call in calls)
         start = time.monotonic()
         daemon.stop()
