@@ -173,10 +173,10 @@ StepSlot Advance::take_slot() {
   if (first_slot_) {
     SolverSlots::Slot slot = std::move(*first_slot_);
     first_slot_.reset();
-    return {std::move(slot), parts_.shared.slots, parts_.subject.owner, token_,
+    return {std::move(slot), parts_.shared.slots, parts_.subject.grants.owner(), token_,
             parts_.shared.metrics};
   }
-  return {parts_.shared.slots, parts_.subject.owner, token_, parts_.shared.metrics};
+  return {parts_.shared.slots, parts_.subject.grants.owner(), token_, parts_.shared.metrics};
 }
 
 // True: the advance has ended.

@@ -16,7 +16,7 @@
 namespace mbcosim::server {
 
 bool Durability::may_see(const Suspended& suspended, const Caller& caller, Access access) const {
-  return Grants(suspended.owner, suspended.info.grants()).allow(caller, access);
+  return Rights(suspended.owner, suspended.info.grants()).allow(caller, access);
 }
 
 void Durability::check_readable(const std::string& simulation) const {
@@ -65,22 +65,22 @@ std::vector<std::pair<std::string, std::string>> Durability::by_last_use() const
 
 bool Durability::remove(const std::string& simulation, const Caller& caller, const Call& call,
                         const std::string& request_id) {
-  std::string owner;
+  std::optional<Grants> grants;
   {
     Guard guard(mutex_);
     check_readable(simulation);
     await_waking(simulation, call);
     const auto found = suspended_.find(simulation);
     if (found == suspended_.end() || !may_see(found->second, caller, Access::see)) return false;
-    if (!may_see(found->second, caller, Access::own)) refuse_access(simulation, Access::own);
-    owner = found->second.owner;
+    grants.emplace(found->second.owner, found->second.info.grants());
+    grants->require(simulation, caller, Access::own);
     suspended_.erase(found);
     parts_->store.note_removal(simulation, {caller.identity, request_id});
   }
   store_removal(simulation, caller.identity, request_id);
   remove_files(simulation);
   parts_->results.remove(simulation);
-  log_.deleted({simulation, owner}, v1::DELETION_CAUSE_ASKED);
+  log_.deleted({simulation, *grants}, v1::DELETION_CAUSE_ASKED);
   return true;
 }
 
@@ -101,18 +101,19 @@ const std::pair<const std::string, Suspended>* Durability::made_by(
 
 void Durability::expire() {
   const std::int64_t now = std::time(nullptr), longest = config_.suspended_expiry.count();
-  std::vector<std::pair<std::string, std::string>> over;
+  std::vector<std::pair<std::string, Suspended>> over;
   {
     Guard guard(mutex_);
-    for (const auto& [name, suspended] : suspended_)
+    for (auto& [name, suspended] : suspended_)
       if (now - suspended.since > longest && waking_.count(name) == 0 && !parts_->store.has(name))
-        over.emplace_back(name, suspended.owner);
-    for (const auto& [name, owner] : over) suspended_.erase(name);
+        over.emplace_back(name, std::move(suspended));
+    for (const auto& [name, suspended] : over) suspended_.erase(name);
   }
-  for (const auto& [name, owner] : over) {
+  for (const auto& [name, suspended] : over) {
     remove_files(name);
     parts_->results.remove(name);
-    log_.deleted({name, owner}, v1::DELETION_CAUSE_LEASE_OVER);
+    const Grants grants(suspended.owner, suspended.info.grants());
+    log_.deleted({name, grants}, v1::DELETION_CAUSE_LEASE_OVER);
   }
 }
 
@@ -401,8 +402,8 @@ void Durability::put_in_folder(const std::string& simulation, const StoredBundle
     stored = read_one(id);
   });
   add_suspended(id, std::move(stored));
-  log_.created({simulation, bundle.model.head.owner()}, bundle.point.point.info().display_name(),
-               "");
+  const Grants grants(bundle.model.head.owner(), bundle.point.point.info().grants());
+  log_.created({simulation, grants}, bundle.point.point.info().display_name(), "");
 }
 
 }  // namespace mbcosim::server

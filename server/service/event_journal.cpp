@@ -28,15 +28,15 @@ std::int64_t EventJournal::last() const {
   return last_;
 }
 
-void EventJournal::add(v1::Event event, const std::string& owner) {
+void EventJournal::add(v1::Event event, RightsPtr rights) {
   *event.mutable_time() = google::protobuf::util::TimeUtil::GetCurrentTime();
   std::vector<std::function<void()>> wakes;
   {
     Guard guard(mutex_);
     event.set_sequence(++last_);
     if (event.has_checkpoint()) drop_checkpoint_before(event);
-    const std::size_t bytes = event.ByteSizeLong() + sizeof(Kept) + owner.size();
-    kept_.push_back({std::move(event), owner, bytes});
+    const std::size_t bytes = event.ByteSizeLong() + sizeof(Kept) + rights->bytes();
+    kept_.push_back({std::move(event), std::move(rights), bytes});
     bytes_ += bytes;
     while (kept_.size() > kMostEvents || bytes_ > kMostBytes) {
       bytes_ -= kept_.front().bytes;
@@ -69,9 +69,10 @@ void EventJournal::leave(const ReaderPtr& reader) {
   readers_.remove(reader);
 }
 
-bool EventJournal::next(Reader& reader, v1::Event* out) {
+bool EventJournal::next(Reader& reader, v1::Event* out, RightsPtr* rights) {
   Guard guard(mutex_);
   out->Clear();
+  rights->reset();
   if (reader.next <= gone_) {
     out->mutable_missed()->set_count(gone_ + 1 - std::exchange(reader.next, gone_ + 1));
     return true;
@@ -81,9 +82,10 @@ bool EventJournal::next(Reader& reader, v1::Event* out) {
       [](const Kept& each, std::int64_t number) { return each.event.sequence() < number; });
   reader.next = last_ + 1;
   for (; kept != kept_.end(); ++kept) {
-    if (!reader.wants(kept->event, kept->owner)) continue;
+    if (!reader.wants(kept->event, *kept->rights)) continue;
     reader.next = kept->event.sequence() + 1;
     *out = kept->event;
+    *rights = kept->rights;
     return true;
   }
   reader.waits = true;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "mbcosim/v1/events.pb.h"
+#include "service/grants.h"
 #include "threads/mutex.h"
 
 namespace mbcosim::server {
@@ -22,12 +23,12 @@ class EventJournal {
   /// Name of this series of sequence numbers.
   const std::string& name() const { return name_; }
   std::int64_t last() const TS_EXCLUDES(mutex_);
-  /// Gives it its number and wakes who waits. `owner`: of the simulation.
-  void add(v1::Event event, const std::string& owner) TS_EXCLUDES(mutex_);
+  /// Gives it its number and wakes who waits. `rights`: to the simulation, at the moment.
+  void add(v1::Event event, RightsPtr rights) TS_EXCLUDES(mutex_);
 
   /// Somebody who reads the journal.
   struct Reader {
-    std::function<bool(const v1::Event&, const std::string& owner)> wants;
+    std::function<bool(const v1::Event&, const Rights&)> wants;
     std::function<void()> wake;  ///< there is something new; called once after `next` said no
     std::int64_t next = 1;       ///< sequence number
     bool waits = false;          ///< belongs to the journal
@@ -35,15 +36,16 @@ class EventJournal {
   using ReaderPtr = std::shared_ptr<Reader>;
   void enter(const ReaderPtr& reader) TS_EXCLUDES(mutex_);
   void leave(const ReaderPtr& reader) TS_EXCLUDES(mutex_);
-  /// The next event that the reader wants, or `missed`. False: none for now.
-  bool next(Reader& reader, v1::Event* out) TS_EXCLUDES(mutex_);
+  /// The next event that the reader wants, or `missed`. False: none for now. `rights`: those to its
+  /// simulation when it happened; null with `missed`.
+  bool next(Reader& reader, v1::Event* out, RightsPtr* rights) TS_EXCLUDES(mutex_);
 
  private:
   static constexpr std::size_t kMostEvents = 8192;
   static constexpr std::size_t kMostBytes = 8 << 20;
   struct Kept {
     v1::Event event;
-    std::string owner;
+    RightsPtr rights;
     std::size_t bytes;
   };
 

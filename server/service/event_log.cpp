@@ -69,7 +69,7 @@ void EventLog::add(const Subject& subject, v1::Event event) {
     event.set_method(call->method);
     event.set_trace_id(call->trace_id);
   }
-  journal_.add(std::move(event), subject.owner);
+  journal_.add(std::move(event), subject.grants.now());
 }
 
 void EventLog::refused(const std::string& method, const std::string& identity,
@@ -82,7 +82,8 @@ void EventLog::refused(const std::string& method, const std::string& identity,
 
 void EventLog::created(const Subject& subject, const std::string& display_name,
                        const std::string& forked_from) {
-  write(lives_, subject.name + " created for " + subject.owner, {{"session", subject.name}});
+  write(lives_, subject.name + " created for " + subject.grants.owner(),
+        {{"session", subject.name}});
   v1::Event event;
   event.mutable_created()->set_display_name(display_name);
   event.mutable_created()->set_forked_from(forked_from);

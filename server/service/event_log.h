@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "service/event_journal.h"
+#include "service/grants.h"
 #include "threads/mutex.h"
 #include "wire/refusal.h"
 
@@ -38,7 +39,7 @@ class EventLog {
   /// The simulation that something happens to.
   struct Subject {
     const std::string& name;
-    const std::string& owner;
+    const Grants& grants;  ///< who may know at that moment
   };
   void refused(const std::string& method, const std::string& identity, const Refusal& refusal);
   void created(const Subject& subject, const std::string& display_name,

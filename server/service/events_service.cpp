@@ -27,8 +27,8 @@ class WatchHandler final : public OneRequest<v1::WatchEventsRequest> {
       (void)parts_.store.get(simulation_, exchange.caller(), exchange.call(), Access::observe);
     ReaderPtr reader = std::make_shared<Reader>();
     reader->wants = [caller = exchange.caller(), name = simulation_](const v1::Event& event,
-                                                                     const std::string& owner) {
-      return name.empty() ? caller.may_touch(owner) : event.simulation() == name;
+                                                                     const Rights& rights) {
+      return name.empty() ? rights.allow(caller, Access::observe) : event.simulation() == name;
     };
     reader->wake = [weak = exchange.weak_from_this(), this] {
       if (const auto self = weak.lock())
@@ -69,8 +69,10 @@ class WatchHandler final : public OneRequest<v1::WatchEventsRequest> {
       event_.mutable_missed();
     } else if (gone_) {
       return exchange.finish(grpc::Status::OK);
-    } else if (!journal_.next(*reader_, &event_)) {
-      return;
+    } else {
+      RightsPtr rights;
+      if (!journal_.next(*reader_, &event_, &rights)) return;
+      if (rights) rights->require(event_.simulation(), exchange.caller(), Access::observe);
     }
     gone_ = !simulation_.empty() && event_.has_deleted();
     exchange.write(serialized(event_));

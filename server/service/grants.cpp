@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 #include "wire/refusal.h"
 
@@ -40,6 +41,12 @@ bool gives(const v1::Grant& grant, Access access, const std::string& port) {
   return false;
 }
 
+std::size_t size_of(const std::string& owner, const Grants::List& grants) {
+  std::size_t bytes = sizeof(Rights) + owner.size();
+  for (const v1::Grant& grant : grants) bytes += grant.SpaceUsedLong();
+  return bytes;
+}
+
 }  // namespace
 
 void Grants::check(const List& grants) {
@@ -74,28 +81,49 @@ void Grants::check_known(const List& grants, const Authenticator& authenticator)
                                                  grant.identity().substr(0, 100) + "\"");
 }
 
-Grants::Grants(std::string owner, const List& grants) : owner_(std::move(owner)), grants_(grants) {
-  check(grants);
+Rights::Rights(std::string owner, List grants)
+    : owner_(std::move(owner)), grants_(std::move(grants)), bytes_(size_of(owner_, grants_)) {}
+
+bool Rights::allow(const Caller& caller, Access access, const std::string& port) const {
+  return caller.may_touch(owner_) ||
+         std::any_of(grants_.begin(), grants_.end(), [&](const v1::Grant& grant) {
+           return (grant.identity() == "*" || grant.identity() == caller.identity) &&
+                  gives(grant, access, port);
+         });
+}
+
+void refuse_unknown(const std::string& id) {
+  throw Refusal(v1::REASON_NO_SUCH_SIMULATION,
+                "no simulation is named \"" + id.substr(0, 100) + "\"");
+}
+
+void Rights::require(const std::string& id, const Caller& caller, Access access,
+                     const std::string& port) const {
+  if (allow(caller, access, port)) return;
+  if (!allow(caller, Access::see)) refuse_unknown(id);
+  constexpr const char* kNames[] = {"see", "observe", "couple", "control", "own"};
+  const std::string name = kNames[static_cast<int>(access)];
+  throw Refusal(v1::REASON_NOT_GRANTED,
+                "no grant of " + id + " lets the caller " + name +
+                    (port.empty() ? "" : " at port \"" + port.substr(0, 100) + "\"") +
+                    "; its owner gives them (`grants`)",
+                {{"wanted", name}});
+}
+
+Grants::Grants(std::string owner, const List& grants) : owner_(std::move(owner)) {
+  replace(grants);
 }
 
 void Grants::replace(const List& grants) {
   check(grants);
+  auto rights = std::make_shared<const Rights>(owner_, grants);
   Guard guard(mutex_);
-  grants_ = grants;
+  rights_.swap(rights);
 }
 
-bool Grants::allow(const Caller& caller, Access access, const std::string& port) const {
-  if (caller.may_touch(owner_)) return true;
+RightsPtr Grants::now() const {
   Guard guard(mutex_);
-  return std::any_of(grants_.begin(), grants_.end(), [&](const v1::Grant& grant) {
-    return (grant.identity() == "*" || grant.identity() == caller.identity) &&
-           gives(grant, access, port);
-  });
-}
-
-Grants::List Grants::list() const {
-  Guard guard(mutex_);
-  return grants_;
+  return rights_;
 }
 
 }  // namespace mbcosim::server

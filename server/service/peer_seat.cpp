@@ -35,7 +35,7 @@ bool Heart::beat() {
 PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& caller, Call& call,
                    PeerLink& link)
     : parts_(parts),
-      identity_(caller.identity),
+      caller_(caller),
       session_(parts.store, hello.simulation(), caller, call, Access::couple, hello.port()),
       link_(link),
       port_(session_->port(hello.port())) {
@@ -61,12 +61,20 @@ PeerSeat::PeerSeat(const Parts& parts, const v1::Hello& hello, const Caller& cal
 
 PeerSeat::~PeerSeat() {
   port_.detach();
-  parts_.log.peer(session_->subject(), v1::PEER_CHANGE_LEFT, port_.model().name(), identity_);
+  parts_.log.peer(session_->subject(), v1::PEER_CHANGE_LEFT, port_.model().name(),
+                  caller_.identity);
 }
 
 void PeerSeat::begin() {
   port_.attach(&link_, welcome_.welcome());
-  parts_.log.peer(session_->subject(), v1::PEER_CHANGE_ATTACHED, port_.model().name(), identity_);
+  parts_.log.peer(session_->subject(), v1::PEER_CHANGE_ATTACHED, port_.model().name(),
+                  caller_.identity);
+}
+
+void PeerSeat::receive(const v1::PeerMessage& message) {
+  session_->grants().require(session_->subject().name, caller_, Access::couple,
+                             port_.model().name());
+  port_.receive(message);
 }
 
 }  // namespace mbcosim::server

@@ -45,13 +45,13 @@ class PeerSeat {
   const v1::ServerMessage& welcome() const { return welcome_; }
   /// After the welcome was sent: exchanges may start.
   void begin();
-  /// Any message after `hello`. Throws Refusal.
-  void receive(const v1::PeerMessage& message) { port_.receive(message); }
+  /// Any message after `hello`. Throws Refusal, NOT_GRANTED when the grant was taken back.
+  void receive(const v1::PeerMessage& message);
   Heart& heart() { return *heart_; }
 
  private:
   const Parts& parts_;
-  const std::string identity_;
+  const Caller caller_;
   const SessionHold session_;
   PeerLink& link_;
   Port& port_;

@@ -77,7 +77,7 @@ class Session {
     memory_.hold(std::move(share));
   }
   const Identity& identity() const { return identity_; }
-  EventLog::Subject subject() const { return {identity_.id, identity_.owner}; }
+  EventLog::Subject subject() const { return {identity_.id, grants_}; }
   const Model& model() const { return *model_; }
   const std::vector<Variable>& variables() const { return variables_.variables(); }
   const VariableAccess& variable_access() const { return variables_; }

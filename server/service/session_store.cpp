@@ -81,21 +81,6 @@ void SessionStore::add(SessionPtr session) {
   sessions_.emplace(id, std::move(session));
 }
 
-void refuse_unknown(const std::string& id) {
-  throw Refusal(v1::REASON_NO_SUCH_SIMULATION,
-                "no simulation is named \"" + id.substr(0, 100) + "\"");
-}
-
-void refuse_access(const std::string& id, Access access, const std::string& port) {
-  constexpr const char* kNames[] = {"see", "observe", "couple", "control", "own"};
-  const std::string name = kNames[static_cast<int>(access)];
-  throw Refusal(v1::REASON_NOT_GRANTED,
-                "no grant of " + id + " lets the caller " + name +
-                    (port.empty() ? "" : " at port \"" + port.substr(0, 100) + "\"") +
-                    "; its owner gives them (`grants`)",
-                {{"wanted", name}});
-}
-
 SessionPtr SessionStore::get(const std::string& id, const Caller& caller, Call& call, Access access,
                              const std::string& port) const {
   if (!has(id) && keeper_.wake) (void)keeper_.wake(id, caller, call);
@@ -115,9 +100,10 @@ SessionPtr SessionStore::get_alive(const std::string& id, const Caller& caller,
 SessionPtr SessionStore::find(const std::string& id, const Caller& caller, Access access,
                               const std::string& port) const {
   const auto found = sessions_.find(id);
-  if (found == sessions_.end() || !found->second->grants().allow(caller, Access::see))
-    return nullptr;
-  if (!found->second->grants().allow(caller, access, port)) refuse_access(id, access, port);
+  if (found == sessions_.end()) return nullptr;
+  const Grants& grants = found->second->grants();
+  if (!grants.allow(caller, Access::see)) return nullptr;
+  grants.require(id, caller, access, port);
   return found->second;
 }
 

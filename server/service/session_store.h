@@ -136,11 +136,6 @@ class SessionStore {
   std::thread lease_thread_;
 };
 
-/// Throws NO_SUCH_SIMULATION.
-[[noreturn]] void refuse_unknown(const std::string& id);
-/// Throws NOT_GRANTED: the caller may see it and not do this. `port`: to be coupled to, or empty.
-[[noreturn]] void refuse_access(const std::string& id, Access access, const std::string& port = "");
-
 /// A session found and kept alive. Throws as SessionStore::get.
 class SessionHold {
  public:

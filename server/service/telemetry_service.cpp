@@ -93,6 +93,8 @@ class SubscribeHandler final : public OneRequest<v1::SubscribeRequest> {
   void pump(Exchange& exchange) {
     Guard guard(mutex_);
     if (!subscription_) return;
+    const Session& session = **session_;
+    session.grants().require(session.subject().name, exchange.caller(), Access::observe);
     TelemetryHub& hub = (*session_)->telemetry();
     if (!exchange.all_written() && !hub.is_stalled(*subscription_)) return;
     switch (hub.take(*subscription_, kBatchBytes, &batch_)) {

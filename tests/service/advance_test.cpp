@@ -20,7 +20,7 @@ class Advancing : public testing::Test {
       : coupler_(ports, *simulation_, 1000ms) {}
 
   Advance::Parts parts() TS_NO_THREAD_SAFETY_ANALYSIS {
-    return {.subject = {name_, owner_},
+    return {.subject = {name_, grants_},
             .shared = daemon_.shared,
             .lock = lock_,
             .simulation = *simulation_,
@@ -81,6 +81,7 @@ class Advancing : public testing::Test {
   }
 
   const std::string name_ = "simulations/1", owner_ = "ann";
+  const Grants grants_{owner_, {}};
   SharedParts daemon_{1};
   MemoryBudget& memory_ = daemon_.memory;
   FairMutex lock_;

@@ -38,20 +38,22 @@ TEST(Log, TextsOfClientsCannotBeginALineNorColourIt) {
 /// What somebody reads who comes back.
 std::vector<v1::Event> read_from(EventLog& log, std::int64_t next) {
   EventJournal::Reader reader;
-  reader.wants = [](const v1::Event&, const std::string&) { return true; };
+  reader.wants = [](const v1::Event&, const Rights&) { return true; };
   reader.next = next;
   std::vector<v1::Event> all;
-  for (v1::Event event; log.journal().next(reader, &event);) all.push_back(event);
+  RightsPtr rights;
+  for (v1::Event event; log.journal().next(reader, &event, &rights);) all.push_back(event);
   return all;
 }
 
 TEST(Events, OfCheckpointsTheLatestOfEachSimulationIsKept) {
   EventLog log;
-  const std::string one = "simulations/1", other = "simulations/2", owner = "ann";
-  log.created({one, owner}, "", "");
-  log.checkpoint({other, owner}, 0, 1);
-  for (int step = 0; step < 20000; ++step) log.checkpoint({one, owner}, step, 2);
-  log.deleted({one, owner}, v1::DELETION_CAUSE_ASKED);
+  const std::string one = "simulations/1", other = "simulations/2";
+  const Grants ann("ann", {});
+  log.created({one, ann}, "", "");
+  log.checkpoint({other, ann}, 0, 1);
+  for (int step = 0; step < 20000; ++step) log.checkpoint({one, ann}, step, 2);
+  log.deleted({one, ann}, v1::DELETION_CAUSE_ASKED);
   const std::vector<v1::Event> all = read_from(log, 1);
   ASSERT_EQ(all.size(), 4U);
   EXPECT_TRUE(all[0].has_created());
@@ -65,10 +67,11 @@ TEST(Events, OfCheckpointsTheLatestOfEachSimulationIsKept) {
 
 TEST(Events, ThatHaveMadeRoomAreCounted) {
   EventLog log;
-  const std::string one = "simulations/1", owner = "ann";
-  log.checkpoint({one, owner}, 0, 1);
-  for (int i = 0; i < 20000; ++i) log.state_changed({one, owner}, v1::SIMULATION_STATE_READY, i);
-  log.checkpoint({one, owner}, 1, 1);
+  const std::string one = "simulations/1";
+  const Grants ann("ann", {});
+  log.checkpoint({one, ann}, 0, 1);
+  for (int i = 0; i < 20000; ++i) log.state_changed({one, ann}, v1::SIMULATION_STATE_READY, i);
+  log.checkpoint({one, ann}, 1, 1);
   const std::vector<v1::Event> all = read_from(log, 1);
   ASSERT_TRUE(all.front().has_missed());
   EXPECT_EQ(all.front().missed().count() + 1, all[1].sequence());

@@ -64,7 +64,9 @@ class JournaledCall : public testing::Test {
   Call call_;
   KeptReplies::Turn turn_{kept_, Caller{"ann", Role::control}, "run", 7, call_};
   StepAccount account_{request_, reply_};
-  StepNews news_{{{"simulations/id", "ann"}, log_, status_, telemetry_, nullptr}};
+  const std::string name_ = "simulations/id";
+  const Grants grants_{"ann", {}};
+  StepNews news_{{{name_, grants_}, log_, status_, telemetry_, nullptr}};
   JournalTurn journal_{{storage_, nullptr, status_, news_, memory_}, turn_, account_};
 };
 

@@ -9,15 +9,15 @@ namespace {
 class News : public testing::Test {
  protected:
   StepNews news(Recorder* recorder = nullptr) {
-    return StepNews({{name_, owner_}, log_, status_, *telemetry_, recorder});
+    return StepNews({{name_, grants_}, log_, status_, *telemetry_, recorder});
   }
   /// The events so far.
   std::vector<v1::Event> events() {
     EventJournal::Reader reader;
-    reader.wants = [](const v1::Event&, const std::string&) { return true; };
+    reader.wants = [](const v1::Event&, const Rights&) { return true; };
     std::vector<v1::Event> all;
-    v1::Event event;
-    while (log_.journal().next(reader, &event)) all.push_back(event);
+    RightsPtr rights;
+    for (v1::Event event; log_.journal().next(reader, &event, &rights);) all.push_back(event);
     return all;
   }
   static StepReport of(StepOutcome outcome) {
@@ -36,7 +36,8 @@ class News : public testing::Test {
     return reply;
   }
 
-  const std::string name_ = "simulations/1", owner_ = "ann";
+  const std::string name_ = "simulations/1";
+  const Grants grants_{"ann", {}};
   EventLog log_;
   SessionStatus status_;
   MemoryBudget memory_{1 << 20};

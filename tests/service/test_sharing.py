@@ -211,6 +211,44 @@ def test_a_grant_that_is_taken_back_ends_the_steps_of_an_open_stream(shared):
         assert simulation.refresh().step == 3
 
 
+def test_a_grant_that_is_taken_back_ends_what_is_read_by_it(shared):
+    with shared("ann").load_text(decks.body(), grants=[mbcosim.grant("token:bob", "observe")]) as simulation:
+        bob = shared("bob")
+        samples, events = iter(bob.attach(simulation.name).subscribe([X])), iter(bob.events(simulation.name))
+        simulation.step(2)
+        simulation.snapshot("kept")
+        assert [next(samples)[0] for _ in range(2)] == [1, 2] and next(events).HasField("snapshot")
+        simulation.update(grants=[mbcosim.grant("token:bob", "couple")])
+        simulation.step(2)
+        simulation.snapshot("not for bob")
+        for stream in (samples, events):
+            with pytest.raises(mbcosim.NotAllowed) as caught:
+                next(stream)
+            assert (caught.value.reason, caught.value.metadata["wanted"]) == ("NOT_GRANTED", "observe")
+
+
+def test_events_of_all_are_those_that_the_caller_might_observe_when_they_happened(shared):
+    ann, bob = shared("ann"), shared("bob")
+    events = iter(bob.events())
+    with ann.load_text(decks.body()) as simulation, bob.load_text(decks.body()) as own:
+        for label, grants in (("hidden", []), ("seen", [mbcosim.grant("*", "observe")]), ("port", [mbcosim.grant("*", "couple")])):
+            simulation.update(grants=grants)
+            simulation.snapshot(label)
+        own.snapshot("own")
+        names = [event.snapshot.name for event in (next(events) for _ in range(3)) if event.HasField("snapshot")]
+        assert names == [f"{simulation.name}/snapshots/2", f"{own.name}/snapshots/1"]
+
+
+def test_a_grant_that_is_taken_back_ends_the_coupling(shared):
+    with shared("ann").load_text(decks.body(), ports=PORT, grants=[mbcosim.grant("token:bob", "couple")]) as simulation:
+        with shared("bob").attach(simulation.name).couple("spring", spring) as peer:
+            assert simulation.step(3).step == 3
+            simulation.update(grants=[])
+            with pytest.raises(mbcosim.Error):
+                simulation.step(1)
+        assert isinstance(peer.error, mbcosim.NotFound) and simulation.refresh().step == 3
+
+
 @pytest.mark.parametrize("wrong, field", [
     (pb.Grant(identity="", right=pb.RIGHT_OBSERVE), "grants.identity"),
     (pb.Grant(identity="token:nobody", right=pb.RIGHT_OBSERVE), "grants.identity"),
