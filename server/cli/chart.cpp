@@ -167,6 +167,15 @@ std::string text_chart(const std::vector<Curve>& curves, const std::string& x_na
 
 Status picture(const std::vector<Curve>& curves, const std::string& x_name,
                const std::string& title, const std::string& path) {
+  const std::filesystem::path file(path), folder = file.parent_path();
+  const std::string ending = file.extension();
+  if (ending != ".png" && ending != ".svg" && ending != ".pdf")
+    return make_error(ErrorKind::argument, "",
+                      "\"" + path + "\": the name of a picture ends in .png, .svg or .pdf");
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    return make_error(ErrorKind::io, "",
+                      "cannot draw \"" + path + "\": there is no folder \"" + folder.string() +
+                          "\"; make it with `mkdir -p`");
   std::error_code none;
   std::filesystem::remove(path, none);
   if (feed({"gnuplot"}, gnuplot_script(curves, x_name, title, path)) != 0 ||

@@ -1,11 +1,15 @@
+#include <algorithm>
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "cli/cli11.h"
 #include "cli/commands.h"
 #include "cli/shell.h"
+#include "input/suggest.h"
 #include "input/symbol_values.h"
+#include "options/number_checks.h"
 #include "reduction/job.h"
 
 namespace {
@@ -15,6 +19,19 @@ constexpr const char* kFooter =
     "exceeded, "
     "5 an external code is missing or lost, 6 internal error, 130 interrupted.\n"
     "The daemon is `mbcosimd`; clients are under client_examples/.";
+
+/// The first word names no command: CLI11 would ask for one as if there were none. Empty: it does.
+std::string unknown_command(CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return "";
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  const std::string word = argv[1];
+  if (std::find(names.begin(), names.end(), word) != names.end()) return "";
+  const std::string near = mbcosim::suggestion(word, names);
+  return "there is no command \"" + word.substr(0, 100) + "\"" +
+         (near.empty() ? "; `mbcosim --help` lists them" : "; " + near);
+}
 
 /// `mbcosim reduce`: each option of a job is one of the command line too.
 void add_reduce(CLI::App& app, mbcosim::cli::ReduceCommand& command, int& exit_code) {
@@ -32,7 +49,7 @@ void add_reduce(CLI::App& app, mbcosim::cli::ReduceCommand& command, int& exit_c
       ->add_option("--threads", command.threads,
                    "Threads of the factorizations; results are the same for every number; default: "
                    "all cores that the process may use")
-      ->check(CLI::Range(1, mbcosim::cli::kMostThreads));
+      ->check(mbcosim::server::NumberCheck::within(1, mbcosim::cli::kMostThreads));
   for (const mbcosim::ReductionOptionHelp& option : mbcosim::reduction_option_help())
     reduce_app->add_option_function<std::string>(
         std::string("--") + option.name,
@@ -130,10 +147,10 @@ void add_diff(CLI::App& app, mbcosim::cli::DiffCommand& command, int& exit_code)
   diff->add_option("--relative", command.relative,
                    "Tolerance, as a part of the largest value of the column")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(mbcosim::server::NumberCheck::at_least(0));
   diff->add_option("--absolute", command.absolute, "Differences up to this one do not count")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(mbcosim::server::NumberCheck::at_least(0));
   diff->callback([&] { exit_code = mbcosim::cli::diff(command); });
 }
 
@@ -145,10 +162,10 @@ void add_eig(CLI::App& app, mbcosim::cli::EigCommand& command, int& exit_code) {
   eig->add_option("-n,--count", command.count,
                   "How many, those nearest to --near; 0: all finite ones")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(mbcosim::server::NumberCheck::at_least(0));
   eig->add_option("--near", command.shift, "Frequency [Hz] near which they are wanted")
       ->capture_default_str();
-  eig->add_option("--time", command.time, "Run the deck to this time [s] first");
+  eig->add_option("--time", command.time, "Run the deck to this time first");
   eig->callback([&] { exit_code = mbcosim::cli::eig(command); });
 }
 
@@ -264,7 +281,7 @@ int mbcosim::cli::command_line(int argc, char** argv) {
       ->add_option("--peer-timeout", run_options.peer_timeout,
                    "Longest wait for an external code [s]")
       ->capture_default_str()
-      ->check(CLI::Range(1e-3, 1e6));
+      ->check(mbcosim::server::NumberCheck::within(1e-3, 1e6));
   run_app->add_flag("--padded-labels", run_options.pads_labels,
                     "The codes pad labels of an odd number of points, as MBDyn does: they do not "
                     "use its client library, which misreads them");
@@ -276,13 +293,17 @@ int mbcosim::cli::command_line(int argc, char** argv) {
           "Threads that work on a large model, one for each 3000 unknowns at most; results "
           "do not depend on it; default: all cores that the process "
           "may use")
-      ->check(CLI::Range(1, mbcosim::cli::kMostThreads));
+      ->check(mbcosim::server::NumberCheck::within(1, mbcosim::cli::kMostThreads));
   run_app->callback([&] { exit_code = run(run_options); });
 
   OtherCommands others;
   // Their options take longer than a small deck to read.
   if (argc < 2 || std::string_view(argv[1]) != "run") others.add(app, exit_code);
 
+  if (const std::string unknown = unknown_command(app, argc, argv); !unknown.empty()) {
+    std::fprintf(stderr, "mbcosim: %s\n", unknown.c_str());
+    return kRefused;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -6,6 +6,8 @@
 
 #include "cli/commands.h"
 #include "cli/deck_report.h"
+#include "model/model_part.h"
+#include "model/unit_system.h"
 #include "solver/eigen_spectrum.h"
 #include "threads/interrupt.h"
 
@@ -26,15 +28,28 @@ std::vector<Eigen::Index> order(const Eigen::VectorXcd& values) {
   return indices;
 }
 
-void print(const Eigen::VectorXcd& values, double time) {
+double seconds_in_unit_of_time(const UnitSystem* units) {
+  constexpr Dimension kTime{0, 0, 1};
+  return units ? units->si(kTime) : 1;
+}
+
+/// `units`: declared by the deck; null: SI units.
+void print(const Eigen::VectorXcd& values, double time, const UnitSystem* units) {
   constexpr double kNoise = 1e-6;  // of an undamped mode [%]
-  std::printf("eigenvalues at t = %.9g s\n  %16s %16s %14s %12s\n", time, "real [1/s]",
-              "imaginary [rad/s]", "frequency [Hz]", "damping [%]");
+  const auto unit = [&](const char* si) { return units ? units->name(si) : std::string(si); };
+  const double second = seconds_in_unit_of_time(units);
+  const auto heading = [&](const char* what, const char* si) {
+    return what + std::string(" [") + unit(si) + "]";
+  };
+  std::printf("eigenvalues at t = %.9g %s\n  %16s %16s %14s %12s\n", time, unit("s").c_str(),
+              heading("real", "1/s").c_str(), heading("imaginary", "rad/s").c_str(),
+              "frequency [Hz]", "damping [%]");
   for (const Eigen::Index k : order(values)) {
     const std::complex<double> value = values(k);
     const double size = std::abs(value), percent = size > 0 ? -100 * value.real() / size : 0;
     std::printf("  %16.8g %16.8g %14.8g %12.4g\n", value.real(), value.imag(),
-                value.imag() / (2 * std::numbers::pi), std::abs(percent) < kNoise ? 0 : percent);
+                value.imag() / (2 * std::numbers::pi * second),
+                std::abs(percent) < kNoise ? 0 : percent);
   }
 }
 
@@ -56,10 +71,12 @@ int eig(const EigCommand& command) {
     if (done.error) return fail(*done.error);
     if (done.outcome == StepOutcome::interrupted) return kInterrupted;
   }
+  const UnitSystem* const units = find_part<UnitSystem>(*report.model);
+  const double second = seconds_in_unit_of_time(units);
   const auto spectrum = eigen(linearize(*report.model, (*simulation)->state()), command.count,
-                              {0, 2 * std::numbers::pi * command.shift});
+                              {0, 2 * std::numbers::pi * command.shift * second});
   if (!spectrum) return fail(spectrum.error());
-  print(spectrum->values, (*simulation)->time());
+  print(spectrum->values, (*simulation)->time(), units);
   return kDone;
 }
 

@@ -30,10 +30,28 @@ ReductionJob read_command(const ReduceCommand& command) {
   if (!command.job.empty()) read_job(command.job, read_file(".", command.job), job);
   for (const auto& [name, value] : command.options) {
     job.set(name, value);
-    if (const auto file = job.files.find(name); file != job.files.end())
+    if (const auto file = job.files.find(name); file != job.files.end()) {
+      if (value.empty()) refuse_reduction("--" + name + ": a file's name expected");
       file->second = fs::absolute(value).string();
+    }
   }
   return job;
+}
+
+/// The results would take the place of what they are made of.
+void check_output(const ReduceCommand& command, const ReductionJob& job,
+                  const std::string& folder) {
+  std::vector<fs::path> inputs;
+  if (!command.job.empty()) inputs.emplace_back(command.job);
+  for (const auto& [name, file] : job.files)
+    if (!file.empty()) inputs.push_back(fs::path(folder) / file);
+  for (const std::string& output : {command.output, command.output + ".json"})
+    for (const fs::path& input : inputs) {
+      std::error_code none;
+      if (fs::equivalent(output, input, none))
+        refuse_reduction("the output \"" + output + "\" is one of the inputs",
+                         "choose another name with -o");
+    }
 }
 
 /// A line on the terminal that shows the phase and how far it is.
@@ -84,6 +102,7 @@ int reduce_model(const ReduceCommand& command) {
     ReductionJob job = read_command(command);
     job.options.threads = command.threads > 0 ? command.threads : server::usable_cores();
     const std::string folder = fs::path(command.job).parent_path().string();
+    check_output(command, job, folder);
     const FeModel model = load_model(job, [&](const std::string& name) {
       return read_file(folder.empty() ? "." : folder, name);
     });

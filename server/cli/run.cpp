@@ -25,19 +25,19 @@ void tell(const Pace& pace, std::int64_t steps) {
                  pace.worst_delay());
 }
 
-StepReport run_to_end(Simulation& simulation, const CancelToken* cancel,
-                      const RunOptions& options) {
-  const double final_time = simulation.model().initial_value.final_time;
-  Progress progress(stderr, simulation.time(), final_time);
+/// Step by step, shown and held back as the options say, until one is not accepted or `is_enough`.
+template <class Step, class IsEnough>
+StepReport take_steps(const Simulation& simulation, const CancelToken* cancel,
+                      const RunOptions& options, Step step, IsEnough is_enough) {
+  Progress progress(stderr, simulation.time(), simulation.model().initial_value.final_time);
   const bool visible = !options.quiet && progress.visible();
-  if (!visible && !options.real_time) return simulation.run_until(final_time, cancel);
   Pace pace(simulation.time());
   StepReport total;
   do {
-    total.add(simulation.step(cancel));
+    total.add(step());
     if (options.real_time) pace.wait_for(total.time, cancel);
     if (visible) progress.update(total);
-  } while (total.outcome == StepOutcome::accepted);
+  } while (total.outcome == StepOutcome::accepted && !is_enough());
   if (options.real_time) tell(pace, total.steps_done);
   if (!visible) return total;
   progress.clear();
@@ -47,6 +47,31 @@ StepReport run_to_end(Simulation& simulation, const CancelToken* cancel,
                  total.time, total.solver_seconds);
   }
   return total;
+}
+
+StepReport run_to_end(Simulation& simulation, const CancelToken* cancel,
+                      const RunOptions& options) {
+  const double final_time = simulation.model().initial_value.final_time;
+  const bool watched = !options.quiet && Progress(stderr, simulation.time(), final_time).visible();
+  if (!watched && !options.real_time) return simulation.run_until(final_time, cancel);
+  return take_steps(
+      simulation, cancel, options, [&] { return simulation.step(cancel); }, [] { return false; });
+}
+
+/// There is no step to make, and the user may not expect that.
+void tell_of_no_step(const InitialValueSettings& s) {
+  if (s.abort_after == InitialValueSettings::AbortAfter::never)
+    std::fprintf(stderr,
+                 "note: no step was made: the final time, %g s (0 without the card `final time`), "
+                 "is not after the initial one\n"
+                 "  hint: write a later `final time`, or `final time: forever`\n",
+                 s.final_time);
+}
+
+void tell_of_early_end(const StepReport& done, const InitialValueSettings& s) {
+  if (done.outcome == StepOutcome::finished && done.time < s.final_time)
+    std::fprintf(stderr, "note: the run ended at t = %.9g; the reason stands in its .out file\n",
+                 done.time);
 }
 
 ExitCode complain(const Error& error) {
@@ -66,20 +91,12 @@ ExitCode simulate(const ModelPtr& model, const std::shared_ptr<ResultWriter>& wr
   simulation->set_threads(threads_for(*model, options));
   if (const auto started = simulation->start(cancel); !started) return complain(started.error());
   if (simulation->finished()) {
-    const InitialValueSettings& s = model->initial_value;
-    if (s.abort_after != InitialValueSettings::AbortAfter::never) return kDone;
-    std::fprintf(stderr,
-                 "note: no step was made: the final time, %g s (0 without the card `final time`), "
-                 "is not after the initial one\n"
-                 "  hint: write a later `final time`, or `final time: forever`\n",
-                 s.final_time);
+    tell_of_no_step(model->initial_value);
     return kDone;
   }
   const StepReport done = run_to_end(*simulation, cancel, options);
   if (done.error) return complain(*done.error);
-  if (done.outcome == StepOutcome::finished && done.time < model->initial_value.final_time)
-    std::fprintf(stderr, "note: the run ended at t = %.9g; the reason stands in its .out file\n",
-                 done.time);
+  tell_of_early_end(done, model->initial_value);
   return done.outcome == StepOutcome::interrupted ? kInterrupted : kDone;
 }
 
@@ -98,16 +115,21 @@ ExitCode simulate_coupled(const ModelPtr& model, const std::shared_ptr<ResultWri
   patience.cancelled = [cancel] { return cancel->cancelled(); };
   mbdyn::Channels channels(deck_channels(*model), *simulation, patience, options.pads_labels);
   if (const auto started = channels.start(cancel); !started) return complain(started.error());
-  while (!simulation->finished()) {
-    const StepReport report = channels.step(cancel);
-    if (report.error) return complain(*report.error);
-    if (report.outcome == StepOutcome::interrupted) return kInterrupted;
-    if (const auto name = channels.wants_end()) {
-      std::fprintf(stderr, "%s: the peer ended the run at t = %.10g s\n", name->c_str(),
-                   simulation->time());
-      return kPeerLost;
-    }
+  if (simulation->finished()) {
+    tell_of_no_step(model->initial_value);
+    return kDone;
   }
+  const StepReport done = take_steps(
+      *simulation, cancel, options, [&] { return channels.step(cancel); },
+      [&] { return channels.wants_end().has_value(); });
+  if (done.error) return complain(*done.error);
+  if (done.outcome == StepOutcome::interrupted) return kInterrupted;
+  if (const auto name = channels.wants_end()) {
+    std::fprintf(stderr, "%s: the peer ended the run at t = %.10g s\n", name->c_str(),
+                 simulation->time());
+    return kPeerLost;
+  }
+  tell_of_early_end(done, model->initial_value);
   return kDone;
 } catch (const mbdyn::ChannelLost& lost) {
   if (interrupt.token()->cancelled()) return kInterrupted;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 
+#include "client/address.h"
 #include "client/bundle.h"
 #include "client/convert.h"
 #include "client/simulation.h"
@@ -107,6 +108,7 @@ Server Server::connect(const std::string& address, double timeout, const Credent
     throw Error(
         "`reconnect` must be a number of seconds from 0 to 1e9, got " + std::to_string(reconnect),
         static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT), "BAD_ARGUMENT", {}, "reconnect");
+  check_address(address);
   auto impl = std::make_shared<Impl>();
   impl->address = address;
   impl->reconnect = reconnect;
@@ -120,8 +122,8 @@ Server Server::connect(const std::string& address, double timeout, const Credent
       std::chrono::system_clock::now() +
       std::chrono::milliseconds(static_cast<std::int64_t>(checked_timeout(timeout) * 1000));
   if (!impl->channel->WaitForConnected(deadline))
-    throw Error("no server answers at " + address, static_cast<int>(grpc::StatusCode::UNAVAILABLE),
-                "", {});
+    throw Error("no server answers at " + address + why_nobody(address),
+                static_cast<int>(grpc::StatusCode::UNAVAILABLE), "", {});
   return Server(std::move(impl));
 }
 

@@ -70,6 +70,7 @@ void Port::attach(PeerLink* link, const v1::Welcome& welcome) {
     awaited_ = false;
     answer_.reset();
     peer_failure_.clear();
+    refused_.clear();
     rejection_.reset();
     if (ended_) link_->refuse(*ended_);
   }
@@ -103,7 +104,13 @@ void Port::receive(const v1::PeerMessage& message) {
   if (!message.has_exchange())
     throw Refusal(v1::REASON_OUT_OF_TURN,
                   "after `hello` a peer sends only `exchange` and `heartbeat`");
-  deliver(message.exchange());
+  try {
+    deliver(message.exchange());
+  } catch (const Refusal& refusal) {
+    const Guard guard(mutex_);
+    refused_ = refusal.what();
+    throw;
+  }
 }
 
 void Port::deliver(const v1::PeerExchange& answer) {
@@ -263,8 +270,7 @@ std::optional<Answer> Port::take(const CancelToken& cancel) {
   const bool late = awaited_ && !answered && link_;
   awaited_ = false;
   if (recorder_ && answered) recorder_->received(model_.name(), received_);
-  if (!answered)
-    return go_on_without(late ? "the peer did not answer in time" : "the peer is gone");
+  if (!answered) return go_on_without(late ? "the peer did not answer in time" : why_gone());
   if (rejection_) throw PeerRejected(*rejection_);
   if (!peer_failure_.empty())
     return go_on_without("the peer failed: " + peer_failure_.substr(0, kLongestText));
@@ -292,6 +298,11 @@ bool Port::pull() {
     }
   });
   return pulled != PeerLink::Pulled::closed;
+}
+
+std::string Port::why_gone() const {
+  return refused_.empty() ? "the peer is gone"
+                          : "the peer was sent away: " + refused_.substr(0, kLongestText);
 }
 
 void Port::lose(const std::string& why) { throw PeerLost{in_port(model_.name(), why)}; }

@@ -134,6 +134,7 @@ class Port {
   Answer take_content(const v1::PeerExchange& exchange) TS_REQUIRES(mutex_);
   void check_rejection(const v1::Rejection& rejection) const;
   [[noreturn]] void lose(const std::string& why);
+  std::string why_gone() const TS_REQUIRES(mutex_);
   std::optional<Answer> go_on_without(const std::string& why) TS_REQUIRES(mutex_);
 
   PortModel model_;
@@ -150,6 +151,7 @@ class Port {
   v1::PeerExchange received_ TS_GUARDED_BY(mutex_);  ///< what `answer_` was made of, for the record
   std::optional<Answer> answer_ TS_GUARDED_BY(mutex_);
   std::string peer_failure_ TS_GUARDED_BY(mutex_);  ///< the peer could not compute
+  std::string refused_ TS_GUARDED_BY(mutex_);       ///< why its last message was refused
   std::optional<PeerRejected> rejection_ TS_GUARDED_BY(mutex_);
   std::optional<Refusal> ended_ TS_GUARDED_BY(mutex_);
   std::optional<Clock::time_point> waiting_since_ TS_GUARDED_BY(mutex_);

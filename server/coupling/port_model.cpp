@@ -83,6 +83,9 @@ void PortModel::make_points(const Simulation& simulation, const StructuralPort& 
 PortModel::Point PortModel::find_point(const Simulation& simulation, int label) const {
   const std::string prefix = "node.structural." + std::to_string(label) + ".";
   Point point{};
+  if (simulation.find_variable(prefix + "X") < 0)
+    throw Refusal(v1::REASON_NO_SUCH_VARIABLE,
+                  "port \"" + name() + "\": there is no structural node " + std::to_string(label));
   point.x = handle_of(simulation, prefix + "X");
   point.R = simulation.find_variable(prefix + "R");
   point.v = handle_of(simulation, prefix + "XP");

@@ -7,7 +7,6 @@
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -23,6 +22,7 @@
 #include "daemon/tls.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "host/control_group.h"
+#include "host/socket_file.h"
 #include "rpc/reflection.h"
 #include "service/coupling_service.h"
 #include "service/events_service.h"
@@ -44,23 +44,6 @@ bool is_loopback(const std::string& address) {
   const bool in_loopback_net =
       ::inet_pton(AF_INET, host.c_str(), &number) == 1 && (ntohl(number.s_addr) >> 24) == 127;
   return host == "localhost" || host == "[::1]" || in_loopback_net;
-}
-
-// A socket file that nobody listens on is stale and may be replaced; gRPC removes it when it binds.
-void check_socket(const std::string& path) {
-  sockaddr_un name{};
-  if (path.size() >= sizeof name.sun_path)
-    throw std::runtime_error("the socket's path is too long: " + path);
-  struct stat info {};
-  if (::lstat(path.c_str(), &info) != 0) return;
-  if (!S_ISSOCK(info.st_mode)) throw std::runtime_error(path + " exists and is not a socket");
-  name.sun_family = AF_UNIX;
-  std::memcpy(name.sun_path, path.c_str(), path.size() + 1);
-  const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const bool alive =
-      fd >= 0 && ::connect(fd, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0;
-  if (fd >= 0) ::close(fd);
-  if (alive) throw std::runtime_error("another server listens on " + path);
 }
 
 /// As many descriptors as the system grants.
@@ -365,7 +348,7 @@ Daemon::~Daemon() {
 
 void Daemon::check_listener(const std::string& address) const {
   if (is_unix(address)) {
-    check_socket(address.substr(kUnix.size()));
+    remove_stale_socket(address.substr(kUnix.size()), SOCK_STREAM);
     return;
   }
   if (address.rfind(':') == std::string::npos)

@@ -10,8 +10,10 @@
 #include <iostream>
 
 #include "daemon/environment.h"
+#include "files/default_socket.h"
+#include "input/suggest.h"
+#include "options/number_checks.h"
 #include "rpc/auth.h"
-#include "rpc/trusted_file.h"
 
 namespace mbcosim::server {
 namespace {
@@ -23,7 +25,7 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
     app.add_option(name, value, help)
         ->group("Limits")
         ->capture_default_str()
-        ->check(CLI::PositiveNumber);
+        ->check(NumberCheck::above(0));
   };
   add("--limit-sessions", limits.sessions, "Simulations alive at once");
   add("--limit-snapshots", limits.snapshots, "Snapshots of one simulation");
@@ -48,19 +50,19 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
       ->group("Limits")
       ->capture_default_str()
       ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::NonNegativeNumber);
+      ->check(NumberCheck::at_least(0));
   app.add_option(
          "--limit-identity-memory", limits.identity_memory_bytes,
          "The same, of what one identity has; 0: half of all where callers show credentials")
       ->group("Limits")
       ->capture_default_str()
       ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::NonNegativeNumber);
+      ->check(NumberCheck::at_least(0));
   app.add_option("--limit-identity-sessions", limits.identity_sessions,
                  "Simulations of one identity; 0: half of all where callers show credentials")
       ->group("Limits")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(NumberCheck::at_least(0));
   add("--limit-open-calls", limits.open_calls, "Calls and streams at once");
   add("--limit-identity-calls", limits.identity_calls,
       "Calls with one answer at once, of one identity");
@@ -82,7 +84,7 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
                  "Seconds that a simulation lives without calls, default and longest")
       ->group("Limits")
       ->capture_default_str()
-      ->check(CLI::Range(std::int64_t{1}, kLongestTime));
+      ->check(NumberCheck::within(1, kLongestTime));
 }
 
 // Every option is also an environment variable: --model-root is MBCOSIMD_MODEL_ROOT.
@@ -106,6 +108,24 @@ bool is_environment_good(const CLI::App& app) {
   for (const std::string& complaint : complaints)
     std::fprintf(stderr, "mbcosimd: error: %s\n", complaint.c_str());
   return complaints.empty();
+}
+
+/// Of names that are no options CLI11 says only that it "was not able to parse" them.
+void complain_of_file(const CLI::App& app, const CLI::ConfigError& error) {
+  const std::string text = error.what(), kExtra = CLI::ConfigError::Extras("").what();
+  std::string told = text;
+  if (text.rfind(kExtra, 0) == 0) {
+    const std::string name = text.substr(kExtra.size());
+    std::vector<std::string> options;
+    for (const CLI::Option* option : app.get_options())
+      if (option->get_configurable() && !option->get_lnames().empty())
+        options.push_back(option->get_lnames().front());
+    const std::string near = suggestion(name, options);
+    told = "\"" + name + "\" is no option" +
+           (near.empty() ? "; `mbcosimd --help` lists them" : "; " + near);
+  }
+  std::fprintf(stderr, "mbcosimd: error: in the file of options \"%s\": %s\n",
+               app.get_config_ptr()->as<std::string>().c_str(), told.c_str());
 }
 
 const CLI::Validator is_daemon_id(
@@ -144,7 +164,7 @@ void add_check(CLI::App& app, HealthCheck& check) {
       ->configurable(false)
       ->group("Health of a daemon")
       ->capture_default_str()
-      ->check(CLI::Range(1, 3600))
+      ->check(NumberCheck::within(1, 3600))
       ->needs(address);
 }
 
@@ -161,21 +181,15 @@ int print_hash() {
 
 }  // namespace
 
-std::string default_listener() {
-  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime && *runtime)
-    return "unix:" + std::string(runtime) + "/mbcosim.sock";
-  return "unix:/tmp/mbcosim-" + std::to_string(::getuid()) + "/mbcosim.sock";
-}
-
 // In /tmp anybody may have made it before.
 void make_default_folder(const Config& config) {
-  const std::string address = default_listener();
+  const std::string address = default_socket();
   const std::string folder = std::filesystem::path(address.substr(5)).parent_path();
   const bool wanted =
       std::find(config.listen.begin(), config.listen.end(), address) != config.listen.end();
   if (!wanted || folder.rfind("/tmp/", 0) != 0) return;
   ::mkdir(folder.c_str(), 0700);
-  check_trusted("the folder of the default socket", folder);
+  check_default_socket(address);
 }
 
 Invocation read_options(int argc, char** argv) {
@@ -194,7 +208,7 @@ Invocation read_options(int argc, char** argv) {
   double checkpoint_interval = std::chrono::duration<double>(config.checkpoint_interval).count();
 
   app.add_option("--listen", config.listen,
-                 "Addresses: unix:PATH or HOST:PORT; default: " + default_listener());
+                 "Addresses: unix:PATH or HOST:PORT; default: " + default_socket());
   app.add_option("--model-root", config.model_root, "Folder of decks that clients may name")
       ->check(CLI::ExistingDirectory);
   app.add_option("--state-dir", config.state_dir,
@@ -203,11 +217,11 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--checkpoint-interval", checkpoint_interval,
                  "Seconds between two checkpoints of a simulation that changes")
       ->capture_default_str()
-      ->check(CLI::Range(0.001, 1e6));
+      ->check(NumberCheck::within(0.001, 1e6));
   app.add_option("--suspended-expiry", suspended_expiry,
                  "Seconds after which a suspended simulation is removed")
       ->capture_default_str()
-      ->check(CLI::Range(std::int64_t{1}, kLongestTime));
+      ->check(NumberCheck::within(1, kLongestTime));
   app.add_option("--resume", config.resume,
                  "When suspended simulations come back: lazy, each with the first call that needs "
                  "it; eager, all when the daemon starts")
@@ -223,14 +237,14 @@ Invocation read_options(int argc, char** argv) {
   app.add_option("--workers", config.workers,
                  "Simulations that step at once; 0: one per core that the process may use")
       ->capture_default_str()
-      ->check(CLI::Range(0, 4096));
+      ->check(NumberCheck::within(0, 4096));
   app.add_option(
          "--threads", config.threads,
          "Threads that work on a step of one large simulation, one for each 3000 unknowns at "
          "most; results do not depend on it. More than one pays where fewer simulations "
          "step than there are cores")
       ->capture_default_str()
-      ->check(CLI::Range(1, 1024));
+      ->check(NumberCheck::within(1, 1024));
   app.add_option("--metrics", config.metrics, "HOST:PORT of Prometheus metrics");
   app.add_option("--http", config.http,
                  "HOST:PORT of the page, of calls over HTTP (Connect, gRPC-Web) and of /metrics");
@@ -239,12 +253,12 @@ Invocation read_options(int argc, char** argv) {
       ->group("Security");
   app.add_option("--shutdown-grace", grace, "Seconds that open calls get on SIGTERM")
       ->capture_default_str()
-      ->check(CLI::Range(0, 86400));
+      ->check(NumberCheck::within(0, 86400));
   app.add_option("--drain", drain,
                  "Seconds on SIGTERM in which health says NOT_SERVING and all calls are served, so "
                  "that balancers look elsewhere; a second SIGTERM ends them")
       ->capture_default_str()
-      ->check(CLI::Range(0, 86400));
+      ->check(NumberCheck::within(0, 86400));
   app.add_option("--daemon-id", config.daemon_id,
                  "Begins the names of this daemon's simulations, so that a proxy can tell whose "
                  "they are; default: none, or the one in --state-dir")
@@ -299,6 +313,10 @@ Invocation read_options(int argc, char** argv) {
 
   try {
     app.parse(argc, argv);
+  } catch (const CLI::ConfigError& error) {
+    complain_of_file(app, error);
+    invocation.exit_code = 4;
+    return invocation;
   } catch (const CLI::ParseError& error) {
     invocation.exit_code = app.exit(error) == 0 ? 0 : 4;
     return invocation;
@@ -317,7 +335,7 @@ Invocation read_options(int argc, char** argv) {
   config.suspended_expiry = std::chrono::seconds(suspended_expiry);
   config.checkpoint_interval =
       std::chrono::milliseconds(static_cast<std::int64_t>(checkpoint_interval * 1000));
-  if (config.listen.empty()) config.listen.push_back(default_listener());
+  if (config.listen.empty()) config.listen.push_back(default_socket());
   if (print_config) {
     std::printf("%s", app.config_to_str(true, true).c_str());
     invocation.exit_code = 0;

@@ -27,8 +27,6 @@ struct Invocation {
 /// Reads the options; prints help, version, configuration or complaints itself.
 Invocation read_options(int argc, char** argv);
 
-/// The default listener: a socket in the user's runtime folder.
-std::string default_listener();
 /// Makes the folder in /tmp of the default address, where that is listened on. Throws
 /// std::runtime_error when others could put another socket there.
 void make_default_folder(const Config& config);

@@ -6,6 +6,7 @@
 #include "fmi/exporter.h"
 #include "fmi/remote_address.h"
 #include "input/symbol_values.h"
+#include "options/number_checks.h"
 
 namespace mbcosim::fmi {
 namespace {
@@ -80,7 +81,7 @@ int main(int argc, char** argv) {
       });
   app.add_option("--remote-timeout", options.remote_timeout, "Longest wait for the daemon [s]")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 1e6));
+      ->check(mbcosim::server::NumberCheck::within(0.1, 1e6));
   app.footer("Exit codes: 0 done, 2 deck refused, 4 wrong usage, or the file cannot be written.");
   try {
     app.parse(argc, argv);

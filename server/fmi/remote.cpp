@@ -154,7 +154,7 @@ Remote::Remote(std::unique_ptr<Connection> connection) : connection_(std::move(c
 Remote::~Remote() {
   if (simulation_.empty()) return;
   try {
-    if (!reached_) connection_->host.set_timeout(2);
+    connection_->host.set_timeout(2);
     (void)call("DeleteSimulation", json::object());
   } catch (const std::exception&) {  // its lease ends it
   }
@@ -168,7 +168,6 @@ Result<json> Remote::call(const std::string& method, json request, bool answers_
   if (!simulation_.empty()) request["simulation"] = simulation_;
   const std::string text = request.dump(-1, ' ', false, json::error_handler_t::replace);
   HttpAnswer answer;
-  reached_ = false;
   try {
     answer = connection_->host.post("/mbcosim.v1.Simulations/" + method,
                                     answers_are_a_stream ? kStream : kUnary,
@@ -176,7 +175,6 @@ Result<json> Remote::call(const std::string& method, json request, bool answers_
   } catch (const HttpFailure& failure) {
     return lost("the daemon at " + connection_->address + " cannot be reached: " + failure.what());
   }
-  reached_ = true;
   try {
     if (answers_are_a_stream && answer.status == 200) return messages_of(answer.body);
     const json reply = json::parse(answer.body);

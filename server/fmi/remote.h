@@ -57,7 +57,6 @@ class Remote {
 
   std::unique_ptr<Connection> connection_;
   std::string simulation_;   ///< its name; empty: none yet
-  bool reached_ = false;     ///< did the last call get an answer?
   std::int64_t number_ = 0;  ///< of its last step
 };
 

@@ -123,8 +123,12 @@ void Peer::look_for_request() {
   somebody_looks.clear();
 }
 
-Connection::Connection(mg_connection* raw, Reaper& reaper)
-    : raw_(raw), info_(mg_get_request_info(raw)), reaper_(reaper), socket_(socket_of(raw, *info_)) {
+Connection::Connection(mg_connection* raw, Reaper& reaper, Crowd& crowd)
+    : raw_(raw),
+      info_(mg_get_request_info(raw)),
+      reaper_(reaper),
+      crowd_(crowd),
+      socket_(socket_of(raw, *info_)) {
   reaper_.arm(socket_, kTransferTime);
 }
 
@@ -147,13 +151,36 @@ std::string_view Connection::cookie(std::string_view name) const {
   return {};
 }
 
+/// What the client may never send is read: others need not wait for that.
+class Connection::Reading {
+ public:
+  explicit Reading(Connection& connection) : of_(connection) { of_.crowd_.ended(of_.socket_); }
+  ~Reading() { of_.crowd_.began(of_.socket_); }
+  Reading(const Reading&) = delete;
+  Reading& operator=(const Reading&) = delete;
+
+  /// Bytes, 0 at the end, negative when the connection is lost.
+  int read(std::array<char, kPiece>& piece) {
+    const int count = mg_read(of_.raw_, piece.data(), piece.size());
+    if (count > 0 && (since_ += count) >= Crowd::kProgress) {
+      since_ = 0;
+      of_.crowd_.moves(of_.socket_);
+    }
+    return count;
+  }
+
+ private:
+  Connection& of_;
+  int since_ = 0;  ///< bytes
+};
+
 Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   body->clear();
   if (info_->content_length > static_cast<long long>(limit)) return Body::too_long;
   reaper_.arm(socket_, kTransferTime);
   std::array<char, kPiece> piece;
-  for (;;) {
-    const int count = mg_read(raw_, piece.data(), piece.size());
+  for (Reading reading(*this);;) {
+    const int count = reading.read(piece);
     if (count < 0) return Body::broken;
     if (count == 0) break;
     if (body->size() + static_cast<std::size_t>(count) > limit) return Body::too_long;
@@ -192,7 +219,8 @@ void Connection::respond(int status, std::string_view content_type, std::string_
 void Connection::drop_rest() {
   reaper_.arm(socket_, kRestTime);
   std::array<char, kPiece> piece;
-  while (mg_read(raw_, piece.data(), piece.size()) > 0) continue;
+  Reading reading(*this);
+  while (reading.read(piece) > 0) continue;
 }
 
 bool Connection::start_stream(std::string_view content_type, const Headers& headers) {

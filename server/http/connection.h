@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "http/crowd.h"
 #include "http/reaper.h"
 #include "threads/alertness.h"
 
@@ -35,7 +36,7 @@ inline constexpr std::chrono::milliseconds kTransferTime{30000};
 
 class Connection {
  public:
-  Connection(mg_connection* raw, Reaper& reaper);
+  Connection(mg_connection* raw, Reaper& reaper, Crowd& crowd);
 
   std::string_view method() const { return info_->request_method; }
   std::string_view path() const { return info_->local_uri ? info_->local_uri : ""; }
@@ -65,10 +66,12 @@ class Connection {
   bool stays() const;
   void drop_rest();
   bool send_all(std::string_view bytes);
+  class Reading;
 
   mg_connection* raw_;
   const mg_request_info* info_;
   Reaper& reaper_;
+  Crowd& crowd_;
   int socket_ = -1;
   int status_ = 500;
   bool body_read_ = false;

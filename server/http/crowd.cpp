@@ -69,11 +69,17 @@ void Crowd::went() {
 void Crowd::began(int socket) {
   const Guard lock(mutex_);
   in_request_.insert(socket);
+  moved_.erase(socket);
 }
 
 void Crowd::ended(int socket) {
   const Guard lock(mutex_);
   in_request_.erase(in_request_.find(socket));
+}
+
+void Crowd::moves(int socket) {
+  const Guard lock(mutex_);
+  moved_[socket] = Clock::now();
 }
 
 bool Crowd::is_ours(int socket) const {
@@ -97,6 +103,8 @@ void Crowd::thin_out() {
     ++connections;
     const std::uint64_t cookie = cookie_of(fd);
     if (cookie == 0 || in_request_.count(fd) != 0 || has_bytes(fd)) return false;
+    const auto moved = moved_.find(fd);
+    if (moved != moved_.end() && now - moved->second < kPatience) return false;
     const auto before = idle_.find(cookie);
     found.push_back({fd, cookie, before == idle_.end() ? now : before->second});
     return false;

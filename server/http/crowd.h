@@ -13,10 +13,10 @@
 
 namespace mbcosim::server::http {
 
-/// A connection holds a worker while its client sends the head of a request, or nothing. When such
-/// and others hold all workers, those without a request are shut down, the longest idle first, as
-/// many as wait for a worker: slow senders delay others by tenths of a second, not by their own
-/// timeouts.
+/// A connection holds a worker while its client sends the head of a request, its body, or nothing.
+/// When such and others hold all workers, those without a whole request are shut down, the longest
+/// idle first, as many as wait for a worker: slow senders delay others by tenths of a second, not
+/// by their own timeouts.
 class Crowd {
  public:
   using Clock = std::chrono::steady_clock;
@@ -31,9 +31,13 @@ class Crowd {
   /// A worker takes a connection, or lets it go.
   void came();
   void went();
-  /// A request begins, or one that had begun ends; `socket` -1: one that could not be found.
+  /// A request begins, or one that had begun ends or lacks the rest of its body; `socket` -1: one
+  /// that could not be found.
   void began(int socket);
   void ended(int socket);
+  /// Of a body another `kProgress` bytes have come: who does so often is not idle.
+  static constexpr int kProgress = 32 << 10;
+  void moves(int socket);
 
  private:
   void loop();
@@ -48,6 +52,7 @@ class Crowd {
   std::multiset<int> in_request_ TS_GUARDED_BY(mutex_);
   /// By cookie: since when a socket is seen with nothing to read and no request.
   std::map<std::uint64_t, Clock::time_point> idle_ TS_GUARDED_BY(mutex_);
+  std::map<int, Clock::time_point> moved_ TS_GUARDED_BY(mutex_);  ///< of sockets
   bool stop_ TS_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };

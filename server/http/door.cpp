@@ -184,7 +184,7 @@ int Door::Impl::serve(mg_connection* raw) {
   opened.wait();
   int status = 500;
   run_caught("http", [&] {
-    Connection connection(raw, reaper);
+    Connection connection(raw, reaper, crowd);
     began(raw);
     try {
       route(connection);

@@ -1,5 +1,6 @@
 #include "http/rpc_handler.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 
@@ -49,6 +50,11 @@ std::string transcode(Encoding encoding, const google::protobuf::Descriptor* typ
   const auto message = new_message(type);
   if (!message->ParseFromString(bytes)) throw std::runtime_error("a reply cannot be read");
   return encode(encoding, *message);
+}
+
+/// May gRPC carry it? Where it may not, gRPC aborts the process.
+bool is_metadata(std::string_view value) {
+  return std::all_of(value.begin(), value.end(), [](char c) { return c >= ' ' && c <= '~'; });
 }
 
 grpc::Status bad_request(const std::string& message) {
@@ -114,7 +120,9 @@ std::optional<Framing> framing_of(std::string_view content_type) {
   content_type = content_type.substr(0, content_type.find(';'));
   while (!content_type.empty() && content_type.back() == ' ') content_type.remove_suffix(1);
   for (const ContentType& type : kContentTypes)
-    if (type.name == content_type) return type.framing;
+    if (type.name.size() == content_type.size() &&
+        mg_strncasecmp(type.name.data(), content_type.data(), content_type.size()) == 0)
+      return type.framing;
   return std::nullopt;
 }
 
@@ -158,7 +166,6 @@ struct RpcHandler::Call {
   }
 };
 
-/// A stream's place among those that an identity, and all together, may have.
 const MethodDescriptor* RpcHandler::find(std::string_view path) {
   constexpr std::string_view kPackage = "/mbcosim.v1.";
   const std::size_t slash = path.rfind('/');
@@ -265,9 +272,14 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
   } catch (const Refusal& refusal) {
     return call.refuse(refusal.status());
   }
-  std::string request;
-  const grpc::Status readable = read_counted(call, &request);
-  if (!readable.ok()) return call.refuse(readable);
+  GenericCall::Metadata metadata;
+  if (!authorization.empty()) metadata.emplace_back("authorization", authorization);
+  for (const char* name : kMetadata)
+    if (connection.has_header(name)) metadata.emplace_back(name, connection.header(name));
+  for (const auto& [name, value] : metadata)
+    if (!is_metadata(value))
+      return call.refuse(
+          bad_request("the header " + name + " has bytes other than printable ASCII"));
   // Others have connections, too, and so have those who ask whether the daemon is well.
   const Place call_place(calls_, identity);
   if (!call_place.held())
@@ -279,10 +291,9 @@ void RpcHandler::serve(Connection& connection, const MethodDescriptor& method,
     return call.refuse(limit_refusal("http_streams", limits_.streams_per_identity,
                                      "too many streams are open over HTTP; close some")
                            .status());
-  GenericCall::Metadata metadata;
-  if (!authorization.empty()) metadata.emplace_back("authorization", authorization);
-  for (const char* name : kMetadata)
-    if (connection.has_header(name)) metadata.emplace_back(name, connection.header(name));
+  std::string request;
+  const grpc::Status readable = read_counted(call, &request);
+  if (!readable.ok()) return call.refuse(readable);
   GenericCall rpc(channel_, "/" + method.service()->full_name() + "/" + method.name(), metadata,
                   timeout, [&] { return closing_.load() || connection.gone(); });
   streams ? answer_pieces(call, rpc, request) : answer_whole(call, rpc, request);

@@ -16,6 +16,8 @@
 #include <thread>
 #include <vector>
 
+#include "host/socket_file.h"
+
 namespace mbcosim::mbdyn {
 namespace {
 
@@ -184,12 +186,21 @@ Listener::Listener(const ChannelAddress& address, std::string name, int backlog)
   const int on = 1;
   if (endpoint.family == AF_INET)
     ::setsockopt(descriptor_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  if (::bind(descriptor_, endpoint.get(), endpoint.size()) != 0 ||
-      ::listen(descriptor_, backlog) != 0) {
-    const std::string reason = std::strerror(errno);
+  const auto fail = [&](const std::string& reason) {
     ::close(descriptor_);
     throw ChannelLost(name_ + ": cannot listen: " + reason);
+  };
+  const auto bound = [&] { return ::bind(descriptor_, endpoint.get(), endpoint.size()) == 0; };
+  bool done = bound();
+  if (!done && errno == EADDRINUSE && endpoint.family == AF_UNIX) {
+    try {
+      server::remove_stale_socket(address.path, SOCK_STREAM);
+    } catch (const std::exception& error) {
+      fail(error.what());
+    }
+    done = bound();
   }
+  if (!done || ::listen(descriptor_, backlog) != 0) fail(std::strerror(errno));
   if (endpoint.family == AF_UNIX) path_ = address.path;
 }
 

@@ -1,12 +1,13 @@
 /// mbcosim-peer: `mbcosim peer` hands over to it.
 #include <grpcpp/support/status_code_enum.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 
+#include "files/default_socket.h"
 #include "mbdyn/link.h"
+#include "options/number_checks.h"
 #include "peer/options.h"
 #include "threads/interrupt.h"
 
@@ -15,15 +16,8 @@ namespace {
 
 constexpr int kDone = 0, kRefused = 4, kPeerLost = 5, kInterrupted = 130;
 
-/// Where a daemon of this user listens by default.
-std::string default_server() {
-  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime && *runtime)
-    return std::string("unix:") + runtime + "/mbcosim.sock";
-  return "unix:/tmp/mbcosim-" + std::to_string(::getuid()) + "/mbcosim.sock";
-}
-
 void add_call(CLI::App& app, PeerCall& call) {
-  call.server = default_server();
+  call.server = server::default_socket();
   app.add_option("--simulation", call.simulation, "Name of the simulation")->required();
   app.add_option("--port", call.port, "Name of its port")->required();
   app.add_option("--server", call.server, "Address of the daemon")->capture_default_str();
@@ -34,7 +28,7 @@ void add_call(CLI::App& app, PeerCall& call) {
       ->check(CLI::IsMember({"loose", "staggered", "tight", "window"}));
   app.add_option("--peer-timeout", call.timeout, "Longest wait [s]")
       ->capture_default_str()
-      ->check(CLI::Range(1e-3, 1e6));
+      ->check(server::NumberCheck::within(1e-3, 1e6));
 }
 
 /// "unix:PATH" or "HOST:PORT"

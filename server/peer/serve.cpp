@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "files/default_socket.h"
 #include "files/text_file.h"
 #include "peer/fmu_peer.h"
 #include "peer/options.h"
@@ -44,6 +45,7 @@ std::vector<std::string> expanded(const client::Simulation& simulation,
 }
 
 client::Server connect(const PeerCall& call) {
+  server::check_default_socket(call.server);
   client::Credentials credentials;
   credentials.token = token_of_file(call.token_file);
   credentials.server_ca = server::text_of_file(call.server_ca);

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "options/number_checks.h"
 #include "replay/model_replay.h"
 #include "replay/record_file.h"
 #include "replay/server_replay.h"
@@ -11,7 +12,7 @@
 namespace mbcosim::replay {
 namespace {
 
-constexpr int kSame = 0, kRefused = 2, kDiffers = 3;
+constexpr int kSame = 0, kDiffers = 1, kRefused = 2, kUsage = 4;
 
 int tell(const std::string& difference, const std::string& done) {
   if (difference.empty()) {
@@ -72,23 +73,25 @@ int main(int argc, char** argv) {
       "unix:PATH or HOST:PORT of this machine: the recorded server is played to clients");
   app.add_option("--tolerance", tolerance,
                  "Relative difference of numbers that is let pass; default: none")
-      ->check(CLI::NonNegativeNumber);
-  app.footer("Exit code: 0 the same, 2 refused, 3 different.");
+      ->check(mbcosim::server::NumberCheck::at_least(0));
+  app.footer("Exit code: 0 the same, 1 different, 2 record or deck refused, 4 wrong usage.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? kSame : kRefused;
+    return app.exit(e) == 0 ? kSame : kUsage;
   }
+  const auto refuse = [](const std::string& why, int code) {
+    std::fprintf(stderr, "mbcosim replay: %s\n", why.c_str());
+    return code;
+  };
+  if (deck.empty() == address.empty()) return refuse("give either a deck or --serve", kUsage);
+  if (!address.empty() && !is_local(address))
+    return refuse("--serve takes addresses of this machine only, got \"" + address + "\"", kUsage);
   try {
-    if (deck.empty() == address.empty()) throw std::runtime_error("give either a deck or --serve");
-    if (!address.empty() && !is_local(address))
-      throw std::runtime_error("--serve takes addresses of this machine only, got \"" + address +
-                               "\"");
     const auto entries = read_record(record);
     return address.empty() ? run_model(deck, entries, tolerance)
                            : run_server(address, entries, tolerance);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "mbcosim replay: %s\n", error.what());
-    return kRefused;
+    return refuse(error.what(), kRefused);
   }
 }

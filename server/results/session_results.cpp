@@ -104,7 +104,8 @@ void SessionResults::check_way_back(std::int64_t step) const {
 // ------------------------------------------------------------------ reading
 
 void SessionResults::flush() {
-  if (const Status written = writer_->flush(false); !written)
+  const Status written = writer_->flush(false);
+  if (!written && written.error().kind != ErrorKind::limit)  // what is there can be read
     throw Refusal(without_paths(written.error()));
 }
 

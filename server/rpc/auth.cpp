@@ -10,7 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "rpc/trusted_file.h"
+#include "files/trusted_file.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -119,6 +119,8 @@ Authenticator::Token Authenticator::read_token(const std::string& line, int numb
   const bool hashed = text.compare(0, kHash.size(), kHash) == 0;
   if (hashed && !is_hash(text))
     refuse_line(number, "after \"sha256:\" there must be 64 hexadecimal digits");
+  if (!std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; }))
+    refuse_line(number, "a token has printable ASCII characters only: no call can carry others");
   token.hash = hashed ? text : hash_of_token(text);
   token.caller = {std::string(kToken) + name, role_of(role, number)};
   if (words >> expiry) token.expiry = time_of(expiry, number);

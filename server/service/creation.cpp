@@ -5,6 +5,7 @@
 
 #include "service/display_name.h"
 #include "service/durability.h"
+#include "service/durations.h"
 #include "service/protocol.h"
 #include "service/simulations_service.h"
 #include "service/upload.h"
@@ -50,6 +51,7 @@ Session::Identity make_identity(std::string name, const v1::CreateOptions& optio
   identity.request_id = options.request_id();
   identity.request_digest = digest;
   identity.lease = limits.lease;
+  identity.created = next_instant();
   if (options.has_lease()) {
     const std::chrono::milliseconds lease = milliseconds_of(options.lease(), "lease");
     if (lease <= std::chrono::milliseconds(0))

@@ -9,6 +9,7 @@
 #include "durable/build.h"
 #include "service/display_name.h"
 #include "service/durability.h"
+#include "service/durations.h"
 #include "service/event_log.h"
 #include "service/storing.h"
 #include "wire/convert.h"
@@ -171,6 +172,7 @@ Session::Identity identity_of(const v1::CheckpointHead& head, const v1::Simulati
   identity.request_id = head.options().request_id();
   identity.request_digest = head.request_digest();
   identity.lease = std::chrono::milliseconds(TimeUtil::DurationToMilliseconds(info.lease()));
+  identity.created = TimeUtil::TimestampToMicroseconds(info.create_time());
   return identity;
 }
 
@@ -366,6 +368,8 @@ v1::SimulationInfo Durability::import(StoredBundle bundle, const v1::ImportCheck
   point.mutable_info()->set_name(name);
   point.mutable_info()->set_owner(caller.identity);
   point.mutable_info()->clear_grants();
+  *point.mutable_info()->mutable_create_time() =
+      google::protobuf::util::TimeUtil::MicrosecondsToTimestamp(next_instant());
   if (header.has_display_name()) point.mutable_info()->set_display_name(header.display_name());
   check_display_name(point.info().display_name());
   point.clear_kept_replies();        // of others' requests

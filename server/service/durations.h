@@ -1,8 +1,10 @@
-/// Spans of wall time as clients give them.
+/// Spans of wall time as clients give them, and instants of creation.
 #pragma once
 
 #include <google/protobuf/duration.pb.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <string>
@@ -23,6 +25,17 @@ inline std::chrono::milliseconds span_of(const google::protobuf::Duration& given
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "`" + field + "` must be at least " + std::to_string(least.count()) + " ms");
   return span;
+}
+
+/// Microseconds since 1970; larger with each call of this process. Thread-safe.
+inline std::int64_t next_instant() {
+  static std::atomic<std::int64_t> last{0};
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const std::int64_t clock = std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+  std::int64_t before = last.load(), next = 0;
+  do next = std::max(clock, before + 1);
+  while (!last.compare_exchange_weak(before, next));
+  return next;
 }
 
 }  // namespace mbcosim::server

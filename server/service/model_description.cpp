@@ -17,7 +17,7 @@ namespace {
 class Page {
  public:
   explicit Page(const v1::DescribeSimulationRequest& request)
-      : size_(page_size_of(request, kUsual)) {
+      : size_(page_size_of(request, kMost, kMost)) {
     const std::string& token = request.page_token();
     const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), first_);
     if (!token.empty() &&
@@ -35,7 +35,7 @@ class Page {
   }
 
  private:
-  static constexpr std::int64_t kUsual = 5000;
+  static constexpr std::int64_t kMost = 5000;
   const std::int64_t size_;
   std::int64_t first_ = 0, at_ = 0;
 };

@@ -14,7 +14,8 @@ constexpr const char* kFileName = "body.fem";
 
 /// A wrong file, option or model.
 [[noreturn]] void refuse(const ReductionError& error) {
-  throw Refusal(v1::REASON_BAD_ARGUMENT, error.what());
+  constexpr std::size_t kLongest = 2000;  // what is quoted may be of any length, a status may not
+  throw Refusal(v1::REASON_BAD_ARGUMENT, utf8(std::string(error.what()).substr(0, kLongest)));
 }
 
 /// Options of the request, over those of the job file.

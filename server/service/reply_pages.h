@@ -1,9 +1,11 @@
 /// Large replies in pages: all are made at once and kept until the last one is told.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -40,12 +42,13 @@ class PageWriter {
 
 /// `page_size` of a request. Throws BAD_ARGUMENT.
 template <class Request>
-std::int64_t page_size_of(const Request& request, std::int64_t usual) {
+std::int64_t page_size_of(const Request& request, std::int64_t usual,
+                          std::int64_t most = std::numeric_limits<std::int64_t>::max()) {
   if (!request.has_page_size()) return usual;
   if (request.page_size() <= 0)
     throw Refusal(v1::REASON_BAD_ARGUMENT,
                   "`page_size` must be positive, got " + std::to_string(request.page_size()));
-  return request.page_size();
+  return std::min<std::int64_t>(request.page_size(), most);
 }
 
 /// Thread-safe. The last reply that was more than one page.

@@ -194,6 +194,8 @@ void Session::fill(v1::SimulationInfo* out) const { fill(status_.view(), out); }
 void Session::fill(const SessionStatus::View& p, v1::SimulationInfo* out) const {
   out->set_name(identity_.id);
   out->set_display_name(p.display_name);
+  *out->mutable_create_time() =
+      google::protobuf::util::TimeUtil::MicrosecondsToTimestamp(identity_.created);
   if (const UnitSystem* units = find_part<UnitSystem>(*model_))
     to_proto(*units, out->mutable_units());
   out->set_non_convergence_policy(to_proto(p.policy));

@@ -45,6 +45,7 @@ class Session {
     std::string display_name, owner, request_id;
     std::uint64_t request_digest = 0;  ///< of the request that created it
     std::chrono::milliseconds lease{3600 * 1000};
+    std::int64_t created = 0;  ///< [us since 1970]
   };
   using Shared = SessionShared;
   /// What the simulation was made of.

@@ -13,6 +13,7 @@
 #include <system_error>
 #include <vector>
 
+#include "host/socket_file.h"
 #include "service/peer_seat.h"
 #include "threads/mutex.h"
 #include "threads/top_frame.h"
@@ -39,20 +40,9 @@ sockaddr_un name_of(const std::string& path) {
   return name;
 }
 
-/// A socket file that nobody listens on is stale and is removed; anything else stays.
-void remove_stale(const std::string& path, const sockaddr_un& name) {
-  struct stat info {};
-  if (::lstat(path.c_str(), &info) != 0) return;
-  if (!S_ISSOCK(info.st_mode)) throw std::runtime_error(path + " exists and is not a socket");
-  const shm::Descriptor probe(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
-  if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0)
-    throw std::runtime_error("another server listens on " + path);
-  ::unlink(path.c_str());
-}
-
 shm::Descriptor listen_on(const std::string& path) {
   const sockaddr_un name = name_of(path);
-  remove_stale(path, name);
+  remove_stale_socket(path, SOCK_SEQPACKET);
   shm::Descriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   const bool listens =
       socket && ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0 &&

@@ -1,13 +1,19 @@
 #include "service/simulations_service.h"
 
+#include <google/protobuf/util/time_util.h>
+
 #include <algorithm>
+#include <charconv>
 #include <set>
+#include <utility>
 
 #include "service/durability.h"
 #include "service/protocol.h"
 
 namespace mbcosim::server {
 namespace {
+
+using google::protobuf::util::TimeUtil;
 
 void add_limit(v1::GetServerInfoReply* info, const char* name, std::int64_t maximum) {
   v1::Limit* limit = info->add_limits();
@@ -54,7 +60,7 @@ void fill_info(const Config& config, const Caller& caller, v1::GetServerInfoRepl
 
 /// One line of the list: alive, or on the disk.
 struct Entry {
-  std::string name;
+  std::pair<std::int64_t, std::string> place;  ///< when it was created, its name
   SessionPtr session;
   v1::SimulationInfo suspended;
 };
@@ -64,28 +70,42 @@ std::vector<Entry> entries_for(const Parts& parts, const Caller& caller) {
   std::set<std::string> names;
   for (SessionPtr& session : parts.store.list(caller)) {
     names.insert(session->identity().id);
-    entries.push_back({session->identity().id, std::move(session), {}});
+    const Session::Identity& identity = session->identity();
+    entries.push_back({{identity.created, identity.id}, std::move(session), {}});
   }
   for (v1::SimulationInfo& info : parts.durability.list(caller))
-    if (names.count(info.name()) == 0) entries.push_back({info.name(), nullptr, std::move(info)});
+    if (names.count(info.name()) == 0) {
+      const std::int64_t created = TimeUtil::TimestampToMicroseconds(info.create_time());
+      entries.push_back({{created, info.name()}, nullptr, std::move(info)});
+    }
+  std::sort(entries.begin(), entries.end(),
+            [](const Entry& a, const Entry& b) { return a.place < b.place; });
   return entries;
+}
+
+/// Names the first entry of a page: "INSTANT.NAME". Throws BAD_ARGUMENT.
+std::pair<std::int64_t, std::string> place_of(const std::string& token) {
+  std::pair<std::int64_t, std::string> place;
+  const char* const end = token.data() + token.size();
+  const auto [dot, error] = std::from_chars(token.data(), end, place.first);
+  if (error != std::errc() || dot == end || *dot != '.')
+    throw Refusal(v1::REASON_BAD_ARGUMENT, "`page_token` is not one of the server's");
+  place.second.assign(dot + 1, end);
+  return place;
 }
 
 void list(const Parts& parts, const Caller& caller, const v1::ListSimulationsRequest& request,
           v1::ListSimulationsReply* reply) {
   std::vector<Entry> entries = entries_for(parts, caller);
-  const auto page = static_cast<std::size_t>(page_size_of(request, /*usual=*/100));
+  const auto page = static_cast<std::size_t>(page_size_of(request, /*usual=*/100, /*most=*/1000));
   auto next = entries.begin();
-  if (!request.page_token().empty()) {
-    next = std::find_if(entries.begin(), entries.end(),
-                        [&](const Entry& entry) { return entry.name == request.page_token(); });
-    if (next == entries.end())
-      throw Refusal(v1::REASON_BAD_ARGUMENT,
-                    "`page_token` is not one of the server's, or has expired");
-  }
+  if (!request.page_token().empty())
+    next =
+        std::lower_bound(entries.begin(), entries.end(), place_of(request.page_token()),
+                         [](const Entry& entry, const auto& place) { return entry.place < place; });
   for (; next != entries.end(); ++next) {
     if (static_cast<std::size_t>(reply->simulations_size()) == page) {
-      reply->set_next_page_token(next->name);
+      reply->set_next_page_token(std::to_string(next->place.first) + "." + next->place.second);
       return;
     }
     if (next->session)

@@ -35,6 +35,11 @@ void append(const std::string& sample, std::int64_t sequence,
   out.WriteVarint64(number);
 }
 
+/// Bytes of a sample that is longer than all that is usually kept.
+std::int64_t beyond_usual(std::int64_t sample_bytes) {
+  return std::max<std::int64_t>(0, sample_bytes - kSerialized);
+}
+
 }  // namespace
 
 /// What equal subscriptions have in common: their samples, serialized when the first of them takes
@@ -66,8 +71,11 @@ void TelemetryHub::add(const SubscriptionPtr& subscription, std::span<const int>
       kSampleBytes + std::accumulate(sizes.begin(), sizes.end(), std::int64_t{0}) *
                          static_cast<std::int64_t>(sizeof(double));
   const bool thinned = o.policy == v1::OVERFLOW_POLICY_DECIMATE;
-  MemoryShare share(memory_, o.batch_bytes + (thinned ? o.capacity + 1 : 1) * sample_bytes);
-  Feed& feed = feed_for(o, sizes);
+  // A long one stands in the batch, in its message and with gRPC at the same time.
+  const std::int64_t on_the_way = sample_bytes + 2 * beyond_usual(sample_bytes);
+  MemoryShare share(memory_,
+                    o.batch_bytes + on_the_way + (thinned ? o.capacity * sample_bytes : 0));
+  Feed& feed = feed_for(o, sizes, sample_bytes);
   subscription->share = std::move(share);
   ++feed.users;
   subscription->feed = &feed;
@@ -80,7 +88,8 @@ void TelemetryHub::add(const SubscriptionPtr& subscription, std::span<const int>
   if (closed_) schedule();
 }
 
-Feed& TelemetryHub::feed_for(const Subscription::Options& o, std::span<const int> sizes) {
+Feed& TelemetryHub::feed_for(const Subscription::Options& o, std::span<const int> sizes,
+                             std::int64_t sample_bytes) {
   const std::int64_t keep = o.capacity + 1;  // one more while the session waits for room
   const auto feed = std::find_if(feeds_.begin(), feeds_.end(), [&](const Feed& known) {
     return known.rhythm == o.rhythm && known.handles == o.handles;
@@ -89,9 +98,11 @@ Feed& TelemetryHub::feed_for(const Subscription::Options& o, std::span<const int
     feed->track->lengthen_to(keep);
     return *feed;
   }
-  MemoryShare share(
-      memory_, kSerialized + static_cast<std::int64_t>(o.handles.size()) *
-                                 static_cast<std::int64_t>(sizeof(int) + sizeof(Track::Column*)));
+  // A sample may be longer than all that is kept, and is made in two places.
+  MemoryShare share(memory_,
+                    kSerialized + 3 * beyond_usual(sample_bytes) +
+                        static_cast<std::int64_t>(o.handles.size()) *
+                            static_cast<std::int64_t>(sizeof(int) + sizeof(Track::Column*)));
   Track& track = tracks_.try_emplace(o.rhythm, memory_).first->second.track;
   try {
     track.want(o.handles, sizes, keep);

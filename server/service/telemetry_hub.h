@@ -104,8 +104,8 @@ class TelemetryHub : public std::enable_shared_from_this<TelemetryHub> {
   bool is_stalled(const Subscription& subscription) const TS_EXCLUDES(mutex_);
 
  private:
-  Feed& feed_for(const Subscription::Options& options, std::span<const int> sizes)
-      TS_REQUIRES(mutex_);
+  Feed& feed_for(const Subscription::Options& options, std::span<const int> sizes,
+                 std::int64_t sample_bytes) TS_REQUIRES(mutex_);
   void release(Feed& feed) TS_REQUIRES(mutex_);
   const std::string& sample(Feed& feed, std::int64_t number) TS_REQUIRES(mutex_);
   const std::string& serialize(const Feed& feed, std::int64_t number, std::string& bytes)

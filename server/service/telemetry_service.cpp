@@ -35,6 +35,9 @@ Subscription::Options make_options(const v1::SubscribeRequest& request, const Se
   Subscription::Options options;
   options.identity = caller.identity;
   options.batch_bytes = kBatchBytes;
+  if (session.variable_access().bytes_of(request.handles()) > limits.message_bytes)
+    throw limit_refusal("message_bytes", limits.message_bytes,
+                        "a sample of `handles` is longer than a message may be");
   options.handles.assign(request.handles().begin(), request.handles().end());
   options.rhythm = rhythm_of(request);
   if (!v1::OverflowPolicy_IsValid(request.policy()))

@@ -1,7 +1,5 @@
 /// mbcosim-sessions: what a daemon has. `mbcosim sessions`, `checkpoint` and `resume` hand over to
 /// it.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -12,7 +10,9 @@
 #include "client/mbcosim_client.h"
 #include "durable/record_file.h"
 #include "durable/salvage.h"
+#include "files/default_socket.h"
 #include "files/text_file.h"
+#include "options/number_checks.h"
 
 namespace {
 
@@ -28,13 +28,8 @@ struct Options {
   bool from_checkpoint = false;
 };
 
-std::string default_address() {
-  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime && *runtime)
-    return "unix:" + std::string(runtime) + "/mbcosim.sock";
-  return "unix:/tmp/mbcosim-" + std::to_string(::getuid()) + "/mbcosim.sock";
-}
-
 Server reach(const Options& options) {
+  mbcosim::server::check_default_socket(options.address);
   Credentials credentials = options.credentials;  // names of files
   for (std::string* file : {&credentials.server_ca, &credentials.certificate, &credentials.key})
     *file = mbcosim::server::text_of_file(*file);
@@ -138,7 +133,7 @@ CLI::App* add(CLI::App& app, const char* name, const char* text, Options& option
   command->add_option("--key", options.credentials.key, "PEM file of its key");
   command->add_option("--timeout", options.timeout, "Seconds to wait for the daemon")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(mbcosim::server::NumberCheck::above(0));
   return command;
 }
 
@@ -146,7 +141,7 @@ int run(int argc, char** argv) {
   CLI::App app{"Simulations of a daemon.", "mbcosim"};
   app.require_subcommand(1);
   Options options;
-  options.address = default_address();
+  options.address = mbcosim::server::default_socket();
   int (*chosen)(const Options&) = nullptr;
   CLI::App* sessions =
       add(app, "sessions", "List a daemon's simulations, suspended ones too", options);

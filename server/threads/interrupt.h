@@ -1,4 +1,4 @@
-/// SIGINT and SIGTERM, for programs that end in good order.
+/// SIGINT, SIGTERM and SIGHUP, for programs that end in good order.
 #pragma once
 
 #include <csignal>
@@ -19,7 +19,7 @@ class InterruptGuard {
 
  private:
   CancelToken token_;
-  struct sigaction old_interrupt_, old_terminate_;
+  struct sigaction old_interrupt_, old_terminate_, old_hang_up_;
 };
 
 }  // namespace mbcosim

@@ -155,15 +155,21 @@ void GeneralElementSet::bind(const Model& model, int i, int first_own) {
   c.find_followed(model);
 }
 
+GeneralPattern GeneralElementSet::pattern_of(const Slot& slot) {
+  const GeneralConnection& c = slot.connection;
+  GeneralPattern pattern(c.size_);
+  slot.element->pattern(pattern);
+  for (const GeneralConnection::Entry& e : c.entries_)  // the diagonal of an inactive element
+    if (e.kind == GeneralConnection::Entry::own) pattern.block(e.first, 1, e.first, 1);
+  return pattern;
+}
+
 void GeneralElementSet::collect_pattern(PatternSink& sink) const {
   for (const Slot& s : slots_) {
-    GeneralPattern pattern(sink, s.connection.rows_, s.connection.columns_);
-    s.element->pattern(pattern);
-    const int own = static_cast<int>(s.connection.own_differential_.size());
-    for (int k = 0; k < own; ++k) {  // the diagonal of an inactive element
-      const int row = s.connection.first_own_ + k;
-      sink.block(&row, 1, &row, 1);
-    }
+    const GeneralConnection& c = s.connection;
+    const GeneralPattern pattern = pattern_of(s);
+    for (const GeneralPattern::Block& b : pattern.blocks())
+      sink.block(&c.rows_[b.row], b.rows, &c.columns_[b.column], b.columns);
   }
 }
 
@@ -176,10 +182,10 @@ void GeneralElementSet::append_rows(const Model&, int i, std::vector<int>& rows)
 void GeneralElementSet::set_positions(const PositionSource& source) {
   for (Slot& s : slots_) {
     const GeneralConnection& c = s.connection;
-    s.positions.resize(static_cast<std::size_t>(c.size_) * c.size_);
-    for (int j = 0; j < c.size_; ++j)
-      for (int i = 0; i < c.size_; ++i)
-        s.positions[j * c.size_ + i] = source.position(c.rows_[i], c.columns_[j]);
+    const GeneralPattern pattern = pattern_of(s);
+    s.places = GeneralPlaces(c.size_, pattern.blocks(), [&](int i, int j) {
+      return source.position(c.rows_[i], c.columns_[j]);
+    });
   }
 }
 
@@ -204,7 +210,7 @@ void GeneralElementSet::jacobian(const EvalContext& context, const NodeSeeds* se
                                  ElementRange range) const {
   for (int i = range.first; i < range.last; ++i) {
     const Slot& s = slots_[i];
-    GeneralJacobian local(context, s.connection, seeds, s.positions, values);
+    GeneralJacobian local(context, s.connection, seeds, s.places, values);
     if (is_active(*context.state, i)) {
       s.element->jacobian(view(context, i), local);
       continue;

@@ -16,6 +16,7 @@
 /// number. Elements of fixed small size use elements/element.h.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -85,21 +86,75 @@ class GeneralConnection {
 /// Announces which local rows meet which local columns.
 class GeneralPattern {
  public:
-  GeneralPattern(PatternSink& sink, const std::vector<int>& rows, const std::vector<int>& columns)
-      : sink_(sink), rows_(rows), columns_(columns) {}
+  /// The number of local rows, and of local columns.
+  explicit GeneralPattern(int size) : size_(size) {}
   void block(int row, int rows, int column, int columns) {
-    sink_.block(&rows_[row], rows, &columns_[column], columns);
+    blocks_.push_back({row, rows, column, columns});
   }
   void dense() {
-    if (!rows_.empty())
-      block(0, static_cast<int>(rows_.size()), 0, static_cast<int>(columns_.size()));
+    if (size_ > 0) block(0, size_, 0, size_);
+  }
+  struct Block {
+    int row, rows, column, columns;
+  };
+  const std::vector<Block>& blocks() const { return blocks_; }
+
+ private:
+  int size_;
+  std::vector<Block> blocks_;
+};
+
+/// Where the entries of an element's local matrix are among the values of the model's. Of one with
+/// many rows, such as a port on thousands of nodes, only those of its pattern are kept.
+class GeneralPlaces {
+ public:
+  GeneralPlaces() = default;
+  /// `place(row, column)`: of local numbers.
+  template <class Place>
+  GeneralPlaces(int size, const std::vector<GeneralPattern::Block>& blocks, Place place);
+  /// -1: it has none.
+  int at(int row, int column) const {
+    if (starts_.empty()) return places_[static_cast<std::size_t>(column) * size_ + row];
+    const auto first = rows_.begin() + starts_[column], last = rows_.begin() + starts_[column + 1];
+    const auto found = std::lower_bound(first, last, row);
+    return found == last || *found != row ? -1 : places_[found - rows_.begin()];
   }
 
  private:
-  PatternSink& sink_;
-  const std::vector<int>& rows_;
-  const std::vector<int>& columns_;
+  static constexpr int kLargestWhole = 128;
+  std::size_t size_ = 0;
+  std::vector<int> places_;             ///< (size × size), column-major, or of `rows_`
+  std::vector<int> rows_;               ///< sorted, column by column
+  std::vector<std::ptrdiff_t> starts_;  ///< of the columns in `rows_`; empty: all are kept
 };
+
+template <class Place>
+GeneralPlaces::GeneralPlaces(int size, const std::vector<GeneralPattern::Block>& blocks,
+                             Place place)
+    : size_(static_cast<std::size_t>(size)) {
+  if (size <= kLargestWhole) {
+    places_.resize(size_ * size_);
+    for (int j = 0; j < size; ++j)
+      for (int i = 0; i < size; ++i) places_[j * size_ + i] = place(i, j);
+    return;
+  }
+  std::vector<std::vector<int>> columns(size_);
+  for (const GeneralPattern::Block& b : blocks)
+    for (int j = b.column; j < b.column + b.columns; ++j)
+      for (int i = b.row; i < b.row + b.rows; ++i) columns[j].push_back(i);
+  starts_.push_back(0);
+  for (int j = 0; j < size; ++j) {
+    std::vector<int>& rows = columns[j];
+    std::sort(rows.begin(), rows.end());
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+    for (const int i : rows) {
+      rows_.push_back(i);
+      places_.push_back(place(i, j));
+    }
+    starts_.push_back(static_cast<std::ptrdiff_t>(rows_.size()));
+    rows = {};
+  }
+}
 
 /// What a general element sees of the state. Local numbers as returned by GeneralConnection.
 class GeneralView {
@@ -163,15 +218,15 @@ class GeneralResidual {
 class GeneralJacobian {
  public:
   GeneralJacobian(const EvalContext& context, const GeneralConnection& connection,
-                  const NodeSeeds* seeds, const std::vector<int>& positions, double* values)
+                  const NodeSeeds* seeds, const GeneralPlaces& places, double* values)
       : context_(context),
         connection_(connection),
         seeds_(seeds),
-        positions_(positions),
+        places_(places),
         values_(values) {}
   /// An entry of −∂r/∂δ as it is.
   void add(int row, int column, double value) {
-    const int p = positions_[column * connection_.size_ + row];
+    const int p = places_.at(row, column);
     if (p >= 0) values_[p] += value;
   }
   /// Given ∂r/∂(value) and ∂r/∂(rate) of a scalar dof, own unknown or position component.
@@ -203,7 +258,7 @@ class GeneralJacobian {
   const EvalContext& context_;
   const GeneralConnection& connection_;
   const NodeSeeds* seeds_;
-  const std::vector<int>& positions_;
+  const GeneralPlaces& places_;
   double* values_;
 };
 
@@ -310,8 +365,9 @@ class GeneralElementSet final : public ElementSet, public SampledTableSource {
     std::unique_ptr<GeneralElement> element;
     ElementInfo info;
     GeneralConnection connection;
-    std::vector<int> positions;  ///< (size × size), column-major
+    GeneralPlaces places;
   };
+  static GeneralPattern pattern_of(const Slot& slot);
   std::vector<Slot> slots_;
 };
 

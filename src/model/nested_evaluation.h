@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "model/diagnostic.h"
+#include "model/evaluation_watch.h"
 
 namespace mbcosim {
 
@@ -25,16 +26,22 @@ class NestedEvaluation {
       throw EvaluationError(
           "drives, laws, strings and values of elements that refer to each other are nested too "
           "deeply");
-    charge(1);
     ++depth_;
+    try {
+      charge(1);
+    } catch (...) {
+      --depth_;
+      throw;
+    }
   }
   ~NestedEvaluation() { --depth_; }
   NestedEvaluation(const NestedEvaluation&) = delete;
   NestedEvaluation& operator=(const NestedEvaluation&) = delete;
 
-  /// The one that goes on takes so many evaluations of drives, functions and the like.
+  /// The one that goes on, if any, takes so many evaluations of drives, functions and the like.
   static void charge(int evaluations) {
-    if ((count_ += evaluations) > kMost)
+    EvaluationWatch::count(evaluations);
+    if (depth_ > 0 && (count_ += evaluations) > kMost)
       throw EvaluationError(
           "drives, functions, strings and values of elements that refer to each other take too "
           "many evaluations");

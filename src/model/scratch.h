@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "model/evaluation_watch.h"
+
 namespace mbcosim {
 
 /// How much the elements of a model need, known when it is built.
@@ -19,6 +21,7 @@ struct Scratch {
   /// What elements sum over others (`accumulate`): zero before each evaluation, then filled in the
   /// order of families, then read. `Connection::sums` tells each element its part.
   std::vector<double> sums;
+  Interruption interruption;  ///< of the evaluations with it
 };
 
 }  // namespace mbcosim

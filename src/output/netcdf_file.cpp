@@ -35,8 +35,9 @@ void NetcdfFile::check(int code) {
   if (code != NC_NOERR && problem_.empty()) problem_ = nc().strerror(code);
 }
 
-bool NetcdfFile::take(std::size_t bytes) {
-  if (!works()) return false;
+bool NetcdfFile::take(std::size_t bytes) { return works() && charge(bytes); }
+
+bool NetcdfFile::charge(std::size_t bytes) {
   const auto count = static_cast<std::int64_t>(bytes);
   if (budget_ && !budget_->take(count)) over_budget_ = true;
   if (!over_budget_) bytes_ += count;
@@ -93,6 +94,8 @@ void NetcdfFile::cut(std::size_t records, std::int64_t bytes) {
   bytes_ = 0;
   const Status done = cut_records(path_, static_cast<std::int64_t>(records));
   if (!done) problem_ = done.error().message;
+  records_ = records;
+  forget_waiting();
   open();
   (void)take(static_cast<std::size_t>(bytes));
 }
@@ -158,21 +161,80 @@ void NetcdfFile::put_record(int variable, std::size_t record, const std::vector<
   write();
   std::size_t start[4] = {record, 0, 0, 0}, count[4] = {1, 1, 1, 1}, values = 1;
   for (std::size_t k = 0; k < shape.size(); ++k) values *= count[k + 1] = shape[k];
-  if (take(sizeof(double) * values))
-    check(locked(nc().put_vara_double, id_, variable, start, count, data));
+  put_in_record(record, sizeof(double) * values, [&](bool keep) -> Put {
+    if (keep)
+      return [=, kept = std::vector<double>(data, data + values)](int id) {
+        return locked(nc().put_vara_double, id, variable, start, count, kept.data());
+      };
+    check_record(locked(nc().put_vara_double, id_, variable, start, count, data));
+    return {};
+  });
 }
 
 void NetcdfFile::put_record(int variable, std::size_t record, int value) {
   write();
-  if (take(sizeof(int))) check(locked(nc().put_var1_int, id_, variable, &record, &value));
+  put_in_record(record, sizeof value, [&](bool keep) -> Put {
+    if (keep)
+      return [=](int id) { return locked(nc().put_var1_int, id, variable, &record, &value); };
+    check_record(locked(nc().put_var1_int, id_, variable, &record, &value));
+    return {};
+  });
+}
+
+/// `put(true)` tells how it can be done once more, `put(false)` does it.
+template <class How>
+void NetcdfFile::put_in_record(std::size_t record, std::size_t bytes, How put) {
+  if (over_budget_ || (!problem_.empty() && !may_retry_)) return;
+  if (!charge(bytes)) return;
+  records_ = record + 1;
+  if (budget_) {
+    waiting_.push_back(put(true));
+    waiting_bytes_ += bytes;
+  }
+  if (!problem_.empty()) return;
+  put(false);
+  if (waiting_bytes_ > kMostWaiting) settle();
+}
+
+/// What fails here can be done once more, when there is room on the disk.
+void NetcdfFile::check_record(int code) {
+  check(code);
+  if (code != NC_NOERR) may_retry_ = budget_ != nullptr;
+}
+
+void NetcdfFile::settle() {
+  if (works()) check_record(locked(nc().sync, id_));
+  if (works()) forget_waiting();
+}
+
+void NetcdfFile::forget_waiting() {
+  waiting_.clear();
+  waiting_bytes_ = 0;
+  settled_ = records_;
+  may_retry_ = false;
+}
+
+/// From the last record that is whole.
+void NetcdfFile::retry() {
+  close();
+  problem_.clear();
+  if (const Status done = cut_records(path_, static_cast<std::int64_t>(settled_)); !done)
+    problem_ = done.error().message;
+  open();
+  for (const Put& put : waiting_)
+    if (works()) check_record(put(id_));
 }
 
 Status NetcdfFile::flush(bool to_disk) {
+  if (!problem_.empty() && may_retry_ && !over_budget_) retry();
   write();
-  if (works()) check(locked(nc().sync, id_));
+  settle();
   if (!to_disk || !works()) return status();
   const int file = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0 || fsync(file) != 0) problem_ = std::strerror(errno);
+  if (file < 0 || fsync(file) != 0) {
+    problem_ = std::strerror(errno);
+    may_retry_ = budget_ != nullptr;
+  }
   if (file >= 0) ::close(file);
   return status();
 }

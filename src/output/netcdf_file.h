@@ -1,8 +1,10 @@
 /// A NetCDF file being written; hides the C library. The first failure is kept, later calls do
-/// nothing. Files of several threads may be written at once.
+/// nothing. With a budget, records that could not be written wait for the next `flush`, which tries
+/// again. Files of several threads may be written at once.
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -44,7 +46,7 @@ class NetcdfFile {
                   const double* data);
   void put_record(int variable, std::size_t record, int value);
 
-  /// All so far is in the file.
+  /// All so far is in the file, unless `status` tells why not.
   Status flush(bool to_disk);
   Status finish();
   Status status() const;
@@ -58,6 +60,14 @@ class NetcdfFile {
   void write();
   void check(int code);
   bool take(std::size_t bytes);
+  bool charge(std::size_t bytes);
+  using Put = std::function<int(int id)>;  ///< a code of the library
+  template <class How>
+  void put_in_record(std::size_t record, std::size_t bytes, How put);
+  void check_record(int code);
+  void settle();
+  void forget_waiting();
+  void retry();
   bool works() const { return problem_.empty() && !over_budget_; }
 
   std::string path_, problem_;
@@ -68,6 +78,11 @@ class NetcdfFile {
   bool created_ = false, whole_ = false;  ///< `whole_`: its first header is in the file
   bool looks_up_ = false;                 ///< the file may have definitions already
   bool over_budget_ = false;
+  static constexpr std::size_t kMostWaiting = 4 << 20;  ///< bytes, before they are settled
+  std::vector<Put> waiting_;                            ///< since the last record that is settled
+  std::size_t waiting_bytes_ = 0;
+  std::size_t records_ = 0, settled_ = 0;  ///< so far; those that are whole in the file
+  bool may_retry_ = false;                 ///< the problem is of records
 };
 
 }  // namespace mbcosim

@@ -56,7 +56,7 @@ bool read_mark(std::istream& in, std::int64_t* step, std::vector<std::int64_t>& 
 ResultHistory::ResultHistory(std::shared_ptr<ResultWriter> writer, const std::string& index,
                              ResultBudget& budget)
     : writer_(std::move(writer)), index_path_(index), budget_(budget) {
-  index_.open(index, &budget);
+  index_.open(index);
 }
 
 // ------------------------------------------------------------------ marks
@@ -98,7 +98,16 @@ ResultHistory::Mark ResultHistory::find(std::int64_t step) {
 }
 
 std::int64_t ResultHistory::bytes() const {
-  return budget_.used() + writer_->waiting() + index_.waiting();
+  return budget_.used() + writer_->waiting() + std::max<std::int64_t>(0, index_.size());
+}
+
+bool ResultHistory::is_over_budget() const {
+  const Status written = status();
+  return !written && written.error().kind == ErrorKind::limit;
+}
+
+std::int64_t ResultHistory::end() const {
+  return is_over_budget() ? std::min(last_.step, step_) : step_;
 }
 
 bool ResultHistory::has_room() const { return bytes() + 2 * largest_step_ <= budget_.most(); }
@@ -152,7 +161,7 @@ Status ResultHistory::finish() {
 }
 
 Status ResultHistory::flush(bool to_disk) {
-  complete();
+  if (!is_over_budget()) complete();  // else a part of the step is missing
   Status written = writer_->flush(to_disk);
   index_.retry();
   if (to_disk) index_.sync();

@@ -16,12 +16,13 @@ namespace mbcosim {
 /// files: a few bytes a step. When the simulation is restored the files are cut back to that step.
 class ResultHistory final : public ResultWriter {
  public:
-  /// `index`: path of the index; `budget` is of the files' bytes, its own included.
+  /// `index`: path of the index; `budget` is of the files' bytes. Those of the index count, and are
+  /// written even where nothing else fits: they are the way back.
   ResultHistory(std::shared_ptr<ResultWriter> writer, const std::string& index,
                 ResultBudget& budget);
 
-  /// Step that the files end at; -1: before the first record.
-  std::int64_t end() const { return step_; }
+  /// Last step whose results are all in the files; -1: before the first record.
+  std::int64_t end() const;
   /// The state that `restored` will be told shares its history with the files up to this step only;
   /// by default up to its own step.
   void expect(std::int64_t step) { expected_ = step; }
@@ -66,6 +67,7 @@ class ResultHistory final : public ResultWriter {
   Mark mark_for(std::int64_t step);
   Status go_back(const Mark& mark, const EvalContext& context);
   std::int64_t bytes() const;
+  bool is_over_budget() const;
 
   static constexpr std::int64_t kOwn = INT64_MAX;
 

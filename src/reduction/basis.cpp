@@ -53,6 +53,15 @@ BasisBuilder::BasisBuilder(const FeModel& model, const ReductionOptions& options
   check_options();
 }
 
+// Dense algorithms follow, whose time grows with the cube of the number.
+void BasisBuilder::check_count_of_shapes(std::size_t count) {
+  constexpr std::size_t kMost = 2000;
+  if (count > kMost)
+    refuse_reduction("the reduced model would have more than " + std::to_string(kMost) +
+                         " shapes, one for each component of an interface node and each mode",
+                     "name fewer interface nodes or components, or ask for fewer modes");
+}
+
 void BasisBuilder::report(const std::string& phase, double fraction) const {
   if (progress_ && !progress_(phase, fraction)) stop_reduction();
 }
@@ -94,12 +103,14 @@ void BasisBuilder::find_interface() {
       if (std::find(interface_.begin(), interface_.end(), row) != interface_.end())
         refuse_reduction(model_.dof_text(row) + " is an interface twice");
       if (attached().position(row) >= 0) interface_.push_back(row);
+      check_count_of_shapes(interface_.size());
     }
   }
 }
 
 void BasisBuilder::check_options() {
   if (options_.modes < 0) refuse_reduction("the number of normal modes must not be negative");
+  check_count_of_shapes(interface_.size() + static_cast<std::size_t>(options_.modes));
   if (!(options_.max_frequency >= 0))
     refuse_reduction("the highest frequency must not be negative");
   for (const auto& [label, digits] : options_.interface_components)
@@ -134,6 +145,7 @@ int BasisBuilder::mode_count(Structure& structure) const {
   if (count < 0)
     throw ReductionError(ErrorKind::not_converged,
                          "the modes below the highest frequency could not be counted");
+  check_count_of_shapes(interface_.size() + static_cast<std::size_t>(count));
   return count;
 }
 
@@ -183,6 +195,9 @@ Structure& BasisBuilder::omitted() {
   if (omitted_) return *omitted_;
   std::vector<char> held = with_rows_held(model_.supported, interface_);
   if (frame_node_ >= 0) held = with_rows_held(held, model_.rows_of(frame_node_));
+  if (std::all_of(held.begin(), held.end(), [](char h) { return h != 0; }))
+    refuse_reduction("all degrees of freedom belong to the interface: nothing is left to reduce",
+                     "name fewer interface nodes or components");
   omitted_ = std::make_unique<Structure>(model_, held, settings_);
   if (omitted_->rigid_count() > 0)
     refuse_reduction("the body can move while its interface is held",

@@ -42,6 +42,7 @@ class BasisBuilder {
   void add_modes(Structure& structure, BasisShapes& basis);
   int mode_count(Structure& structure) const;
   void check_count(Structure& structure, const NormalModes& modes);
+  static void check_count_of_shapes(std::size_t count);
   MatX unit_loads(const Structure& structure) const;
   MatX constraint_shapes(Structure& omitted) const;
   MatX relief_shapes();

@@ -82,6 +82,8 @@ class BlockLanczos {
     factor = MatX::Identity(block.x.cols(), block.x.cols());
     normalize(block, factor);
     if (block.x.cols() == 0) return;
+    if (!factor.allFinite())
+      throw ReductionError(ErrorKind::not_converged, "the numbers of the matrices overflow");
     const Eigen::JacobiSVD<MatX> svd(factor, Eigen::ComputeThinU);
     const VecX& lengths = svd.singularValues();
     const auto found = (lengths.array() > kRounding * largest_).count();

@@ -10,6 +10,8 @@ namespace mbcosim {
 
 namespace {
 
+constexpr std::size_t kShown = 100;  ///< characters of what messages quote, and of labels
+constexpr double kFarthest = 1e30;   ///< [m] its products with others are finite
 constexpr const char* kComponents[] = {"ux", "uy", "uz", "rx", "ry", "rz"};
 
 constexpr std::string_view kBlanks = " \t\r\"";
@@ -43,7 +45,9 @@ class Table {
     double value = 0;
     const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
     if (error != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value))
-      fail("a number expected, got `" + cell + "`");
+      fail("a number expected, got `" + cell.substr(0, kShown) + "`");
+    if (std::abs(value) > kFarthest)
+      fail("a coordinate larger than anybody can compute with (1e30): " + cell.substr(0, kShown));
     return value;
   }
 
@@ -66,8 +70,9 @@ void read_nodes(const std::string& text, FeModel& model) {
   std::vector<std::string> row;
   std::vector<double> numbers;
   while (table.next(4, row)) {
-    if (row[0].empty() || row[0].find_first_of(" \t") != std::string::npos)
-      table.fail("a label without blanks expected");
+    if (row[0].empty() || row[0].size() > kShown ||
+        row[0].find_first_of(" \t") != std::string::npos)
+      table.fail("a label of at most 100 characters, without blanks, expected");
     if (!model.index.emplace(row[0], static_cast<int>(model.labels.size())).second)
       table.fail("node " + row[0] + " is there twice");
     model.labels.push_back(row[0]);
@@ -95,7 +100,7 @@ void read_supports(const std::string& text, FeModel& model) {
   std::vector<std::string> row;
   while (table.next(2, row)) {
     const auto found = model.index.find(row[0]);
-    if (found == model.index.end()) table.fail("there is no node " + row[0]);
+    if (found == model.index.end()) table.fail("there is no node " + row[0].substr(0, kShown));
     for (const int component : parse_components(row[1])) {
       const int dof = model.row(found->second, component);
       if (dof >= 0) model.supported[dof] = 1;

@@ -89,10 +89,16 @@ FemRigidInertia rigid_inertia(const FeModel& model, std::string& warning) {
     warning =
         "the mass of the model is not the same in all directions (or it has no rows in some); the "
         "largest is taken";
-  // The coupling of translation and rotation is -S×: S = m c.
-  inertia.center = -ax<double>(Mat3(g.topRightCorner<3, 3>())) / inertia.mass;
-  const Mat3 arm = cross<double>(inertia.center);
-  inertia.inertia = g.bottomRightCorner<3, 3>() + inertia.mass * arm * arm;
+  // A rotation moves what it turns in two directions, each with a mass of its own: of a planar
+  // model one of them has none. For one mass m the coupling is -m c×.
+  const Mat3 coupling = g.topRightCorner<3, 3>();
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    const double mass = g(b, b) + g(c, c);
+    inertia.center(a) = mass > 0 ? (coupling(b, c) - coupling(c, b)) / mass : 0;
+  }
+  const MatX turned = model.rigid_shapes(inertia.center).rightCols<3>();
+  inertia.inertia = turned.transpose() * (model.mass * turned);
   inertia.inertia = (0.5 * (inertia.inertia + inertia.inertia.transpose())).eval();
   return inertia;
 }

@@ -1,5 +1,6 @@
 #include "reduction/matrix_market.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -12,7 +13,9 @@ namespace mbcosim {
 
 namespace {
 
-constexpr double kAsymmetry = 1e-10;       ///< relative to the largest entry
+constexpr double kAsymmetry = 1e-10;  ///< relative to the largest entry
+constexpr double kLargest = 1e60;     ///< whose products with others are finite
+constexpr std::string_view kBetween = " \t\r";
 constexpr std::size_t kShortestEntry = 6;  ///< bytes of "1 1 1\n"
 
 class Reader {
@@ -70,6 +73,7 @@ class Reader {
     if (!next_line()) fail("the line of sizes is missing");
     const long long rows = integer("number of rows"), columns = integer("number of columns"),
                     count = integer("number of entries");
+    end_of_line();
     if (rows != columns)
       fail("the matrix is not square: " + std::to_string(rows) + " x " + std::to_string(columns));
     if (rows < 1 || rows > 50'000'000) fail("order " + std::to_string(rows) + " is not accepted");
@@ -84,9 +88,18 @@ class Reader {
     if (!next_line()) fail("the file ends before all entries");
     const long long i = integer("row"), j = integer("column");
     const double value = real();
+    end_of_line();
     if (i < 1 || i > order_ || j < 1 || j > order_)
       fail("entry (" + std::to_string(i) + ", " + std::to_string(j) + ") lies outside the matrix");
-    if (!std::isfinite(value)) fail("the value is not finite");
+    if (!(std::abs(value) <= kLargest))
+      fail("the value is not finite, or larger than anybody can compute with (1e60)");
+    if (symmetric_ && i != j) {
+      (i > j ? below_ : above_) = true;
+      if (below_ && above_)
+        fail(
+            "a `symmetric` matrix has the entries of one triangle only, this one is in the other "
+            "than those before: write `general`, or leave one triangle out");
+    }
     entries.emplace_back(static_cast<int>(i - 1), static_cast<int>(j - 1), value);
     if (symmetric_ && i != j)
       entries.emplace_back(static_cast<int>(j - 1), static_cast<int>(i - 1), value);
@@ -100,16 +113,26 @@ class Reader {
     skip_blanks();
     long long value = 0;
     const auto [end, error] = std::from_chars(line_.data(), line_.data() + line_.size(), value);
-    if (error != std::errc()) fail(std::string(what) + " expected");
     line_.remove_prefix(end - line_.data());
+    if (error != std::errc() || (!line_.empty() && kBetween.find(line_[0]) == std::string::npos))
+      fail(std::string(what) + " expected");
     return value;
   }
+  /// Fortran writes exponents with D, too.
   double real() {
     skip_blanks();
+    std::string text(line_.substr(0, line_.find_first_of(kBetween)));
+    line_.remove_prefix(text.size());
+    std::replace_if(
+        text.begin(), text.end(), [](char c) { return c == 'd' || c == 'D'; }, 'e');
     double value = 0;
-    const auto [end, error] = std::from_chars(line_.data(), line_.data() + line_.size(), value);
-    if (error != std::errc()) fail("a number expected");
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size()) fail("a number expected");
     return value;
+  }
+  void end_of_line() {
+    if (line_.find_first_not_of(kBetween) != std::string::npos)
+      fail("nothing is expected after the numbers");
   }
 
   void check_symmetry(const SparseMatrix& matrix) const {
@@ -130,6 +153,7 @@ class Reader {
   std::string_view rest_, line_;
   long number_ = 0;
   bool symmetric_ = false;
+  bool below_ = false, above_ = false;  ///< has entries there
   int order_ = 0;
   std::size_t count_ = 0;
 };

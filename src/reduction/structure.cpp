@@ -65,8 +65,10 @@ void Structure::find_rigid_motions() {
   const int independent = static_cast<int>(qr.rank());
   const MatX motions = scale.cwiseInverse().asDiagonal() *
                        MatX(qr.householderQ() * MatX::Identity(size(), independent));
-  const Eigen::JacobiSVD<MatX> svd(
-      MatX(scale.cwiseInverse().asDiagonal() * stiffness_times(motions)), Eigen::ComputeThinV);
+  const MatX strains = scale.cwiseInverse().asDiagonal() * stiffness_times(motions);
+  if (independent == 0 || !strains.allFinite())
+    refuse_reduction("the numbers of the stiffness matrix and of the positions overflow");
+  const Eigen::JacobiSVD<MatX> svd(strains, Eigen::ComputeThinV);
   int count = 0;
   softest_ = 1;
   for (int k = 0; k < independent; ++k) {

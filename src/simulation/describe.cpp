@@ -119,8 +119,9 @@ class TreeWriter {
  private:
   void head() {
     out_ << "model" << (d_.title.empty() ? "" : " \"" + d_.title + "\"") << "\n  digest "
-         << d_.digest << "\n  time " << d_.initial_time << " to " << d_.final_time << " s, step "
-         << d_.time_step << " s\n  unknowns " << d_.unknowns << "\n";
+         << d_.digest << "\n  time " << d_.initial_time << " to " << d_.final_time << " "
+         << d_.time_unit << ", step " << d_.time_step << " " << d_.time_unit << "\n  unknowns "
+         << d_.unknowns << "\n";
   }
 
   void nodes() {
@@ -245,6 +246,7 @@ ModelDescription describe(const Model& model, std::vector<Variable> variables,
   d.variables = std::move(variables);
   const UnitSystem* units = find_part<UnitSystem>(model);
   for (Variable& v : d.variables) v.unit = unit_name(units, v.unit);
+  if (units) d.time_unit = units->time;
   return d;
 }
 

@@ -42,7 +42,8 @@ struct DriveDescription {
 struct ModelDescription {
   std::string title;
   std::string digest;                                      ///< 16 hexadecimal digits
-  double initial_time = 0, final_time = 0, time_step = 0;  ///< [s]
+  double initial_time = 0, final_time = 0, time_step = 0;  ///< [time_unit]
+  std::string time_unit = "s";                             ///< as the deck declares it
   int unknowns = 0;
   std::vector<NodeDescription> nodes;
   std::vector<ElementDescription> elements;

@@ -364,7 +364,7 @@ Status Simulation::start(const CancelToken* cancel) {
     status = make_error(ErrorKind::evaluation, "EVALUATION_FAILED",
                         std::string("before the first step: ") + e.what());
   } catch (const Stopped&) {
-    status = stopped_while_factoring(impl_->state);
+    status = stopped_within_iteration(impl_->state);
   }
   if (!status && impl_->writer) (void)impl_->writer->finish();
   return status;

@@ -18,7 +18,7 @@ constexpr int kLargestWhole = 4000;  ///< unknowns; beyond, the matrices alone t
 Result<GeneralizedEigen> iterative(const Model& model, const State& state,
                                    const EigenSettings& settings, double kappa,
                                    const CancelToken* cancel) {
-  auto spectrum = spectrum_near(linearize(model, state), 1 / kappa, settings.nev,
+  auto spectrum = spectrum_near(linearize(model, state, Feedback::open), 1 / kappa, settings.nev,
                                 std::max(settings.tolerance, 1e-12), settings.ncv, {true, cancel});
   if (!spectrum) return spectrum.error();
   const Eigen::ArrayXcd ks = kappa * spectrum->values.array(), lambda = (1.0 + ks) / (1.0 - ks);

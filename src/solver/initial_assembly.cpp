@@ -12,6 +12,7 @@
 #include "solver/singularity.h"
 #include "solver/sparse_factors.h"
 #include "solver/stages.h"
+#include "solver/watch.h"
 
 namespace mbcosim {
 
@@ -24,6 +25,7 @@ class Assembly {
         state_(state),
         start_(state),
         cancel_(cancel),
+        interruption_(interruption_by(cancel)),
         scratch_(std::make_unique<Scratch>(model.scratch)),
         n_(model.unknowns),
         to_local_(2 * n_, -1) {
@@ -147,8 +149,12 @@ class Assembly {
         r_rate_[node.equilibrium + 3 + i] += kv * (w0(i) - q.w(i));
       }
     }
-    for (const ElementRef& e : elements_)
+    const EvaluationWatch watch(interruption_);
+    constexpr int kOfOne = 4;  // evaluations
+    for (const ElementRef& e : elements_) {
       e.set->assembly_residual(c, e.index, r_.data(), r_rate_.data());
+      EvaluationWatch::count(kOfOne);
+    }
   }
 
   /// Is all that contradicts velocity constraints little enough for the derivatives phase, which
@@ -354,6 +360,7 @@ class Assembly {
   State& state_;
   const State start_;
   const CancelToken* const cancel_;
+  const Interruption interruption_;
   SparseFactors factors_;
   const std::unique_ptr<Scratch> scratch_;  ///< of elements
   int n_;

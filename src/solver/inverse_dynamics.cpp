@@ -447,7 +447,7 @@ VecX InverseDynamics::solved(Stage stage, const Sparse& matrix, const VecX& righ
     lu.factor(matrix, Watch(cancel_));
     if (lu.regular()) z = lu.solve(right);
   } catch (const Stopped&) {
-    throw StageFailure{cancelled_error("interrupted while a matrix was factored")};
+    throw StageFailure{cancelled_error("interrupted within an iteration")};
   }
   static constexpr std::array kNames = {"position", "velocity", "acceleration", "force"};
   constexpr double kLost = 1e-6;  // of the right hand side: nothing of the solution is left

@@ -4,9 +4,10 @@
 
 namespace mbcosim {
 
-Linearization linearize(const Model& model, const State& state) {
+Linearization linearize(const Model& model, const State& state, Feedback feedback) {
   Workspace workspace(model);
   EvalContext context = model.context(state, state.step == 0 ? Phase::derivatives : Phase::step);
+  context.follows = feedback == Feedback::closed;
   context.seed = 0;
   compute_jacobian(context, workspace);
   Linearization result{&model, workspace.values, {}};

@@ -17,7 +17,12 @@ struct Linearization {
       a;  ///< values in compressed columns, model.column_start and model.row_index
 };
 
-Linearization linearize(const Model& model, const State& state);
+/// Drives that follow unknowns of nodes: their feedback belongs to the system, or they stay as they
+/// are, which is what MBDyn's eigenanalysis takes them for.
+enum class Feedback { closed, open };
+
+Linearization linearize(const Model& model, const State& state,
+                        Feedback feedback = Feedback::closed);
 
 BilinearPencil bilinear_pencil(const Model& model, const State& state, double kappa);
 

@@ -87,9 +87,9 @@ Error evaluation_failure(const State& state, const EvaluationError& cause) {
                                     "t = " + std::to_string(state.time) + ": " + cause.what()));
 }
 
-Error stopped_while_factoring(const State& state) {
+Error stopped_within_iteration(const State& state) {
   return error_at(state, cancelled_error("t = " + std::to_string(state.time) +
-                                         ": interrupted while a matrix was factored"));
+                                         ": interrupted within an iteration"));
 }
 
 template <class Make>
@@ -100,7 +100,7 @@ PhaseReport StepController::whole_or_not(State& state, const Make& make) {
   } catch (const Stopped&) {
     state = start_;
     PhaseReport phase;
-    phase.error = stopped_while_factoring(start_);
+    phase.error = stopped_within_iteration(start_);
     return phase;
   } catch (...) {  // from a callback
     state = start_;

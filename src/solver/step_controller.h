@@ -63,7 +63,7 @@ class StepSystem {
 /// A drive or law that could not be evaluated, as an error at the state's time and step.
 Error evaluation_failure(const State& state, const EvaluationError& cause);
 /// Stopped, as an error at the state's time and step.
-Error stopped_while_factoring(const State& state);
+Error stopped_within_iteration(const State& state);
 
 class StepController {
  public:

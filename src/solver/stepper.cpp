@@ -12,6 +12,7 @@
 #include "solver/singularity.h"
 #include "solver/stages.h"
 #include "solver/system.h"
+#include "solver/watch.h"
 
 namespace mbcosim {
 
@@ -159,6 +160,7 @@ Stepper::Stepper(const Model& model)
 void Stepper::set_cancelled(const CancelToken* cancel) {
   cancel_ = cancel;
   const Watch watch(cancel);
+  workspace_.scratch.interruption = interruption_by(cancel);
   workspace_.solver.set_watch(watch);
   if (workspace_.tangents) workspace_.tangents->set_watch(watch);
   if (two_stages_) two_stages_->set_watch(watch);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "math/rotation_derivative.h"
+#include "model/evaluation_watch.h"
 #include "solver/stages.h"
 
 namespace mbcosim {
@@ -21,6 +22,17 @@ void add_external_loads(const EvalContext& context, std::vector<double>& r) {
   }
 }
 
+/// Between them a computation that is not wanted any more can end.
+template <class Action>
+void each_few(ElementRange range, Action action) {
+  constexpr int kFew = 64, kOfOne = 4;  // evaluations
+  for (int first = range.first; first < range.last; first += kFew) {
+    const int last = std::min(first + kFew, range.last);
+    action({first, last});
+    EvaluationWatch::count(kOfOne * (last - first));
+  }
+}
+
 /// Calls action(part, range, context) for the node equations and all sets, in the tiles and waves
 /// of the model's plan; before each tile begin(tile).
 template <class Begin, class Action>
@@ -28,10 +40,12 @@ void each_tile(const EvalContext& context, Evaluators* evaluators, Begin begin, 
   const Model& model = *context.model;
   const AssemblyPlan& plan = model.assembly;
   const auto evaluate = [&](int tile, const EvalContext& own) {
+    const EvaluationWatch watch(context.scratch->interruption);
     begin(tile);
     action(model.node_equations, plan.elements(tile, model.node_equations.size()), own);
     for (const auto& set : model.sets)
-      action(std::as_const(*set), plan.elements(tile, set->size()), own);
+      each_few(plan.elements(tile, set->size()),
+               [&](ElementRange few) { action(std::as_const(*set), few, own); });
   };
   if (evaluators)
     for (Scratch& scratch : evaluators->scratch) scratch.sums = context.scratch->sums;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "model/evaluation_watch.h"
 #include "solver/cancel.h"
 
 namespace mbcosim {
@@ -32,5 +33,10 @@ class Watch {
  private:
   const CancelToken* cancel_;
 };
+
+/// For evaluations of elements; the token, which may be null, outlives it.
+inline Interruption interruption_by(const CancelToken* cancel) {
+  return {[](const void* token) { Watch(static_cast<const CancelToken*>(token)).look(); }, cancel};
+}
 
 }  // namespace mbcosim

@@ -4,6 +4,7 @@ Expected bytes and numbers were recorded from runs of MBDyn with peers of the sa
 """
 import os
 import shutil
+import signal
 import socket
 import struct
 import subprocess
@@ -156,6 +157,49 @@ def test_loose_sequence(run):
     assert [command for command, _ in messages] == [6, 6, 6]
     assert messages[0][1][:8].hex() == "87b09979817ff13f"
     assert done.finish() == 0, done.errors
+
+
+def test_a_coupled_run_in_real_time_lasts_as_long_as_the_model(run):
+    text = deck('force: 5, external structural, socket, create, yes, path, "s", 1, 1, offset, .1,0.,0.;', end=0.4)
+    done = run(text, "--real-time")
+    peer = done.connect()
+    shake(peer, 0x202, 1)
+    begun = time.monotonic()
+    assert len(talk(peer, 144, lambda _: b"\6" + bytes(48))) > 40
+    assert time.monotonic() - begun > 0.38
+    assert done.finish() == 0, done.errors
+
+
+def test_a_socket_that_a_killed_run_has_left_is_replaced_and_one_in_use_is_not(run, tmp_path):
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind(str(tmp_path / "s"))
+        other.listen()
+        other.settimeout(0.5)
+        refused = run(force())
+        assert refused.finish() == 5 and "another server listens on s" in refused.errors
+        with pytest.raises(TimeoutError):
+            other.accept()  # whoever listens is not disturbed
+    done = run(force())
+    peer = done.connect()
+    shake(peer, 0x202, 2)
+    talk(peer, 288, lambda _: b"\6" + LOADS)
+    assert done.finish() == 0, done.errors
+    (tmp_path / "s").write_text("mine")
+    refused = run(force())
+    assert refused.finish() == 5 and "s exists and is not a socket" in refused.errors and (tmp_path / "s").read_text() == "mine"
+
+
+@pytest.mark.parametrize("ignored", [False, True], ids=["terminal", "nohup"])
+def test_a_terminal_that_closes_ends_a_run_in_good_order(run, tmp_path, ignored):
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN if ignored else signal.SIG_DFL)
+    try:
+        done = run(force(), "--peer-timeout", "3")
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    done.connect()
+    done.process.send_signal(signal.SIGHUP)
+    assert done.finish() == (5 if ignored else 130), done.errors  # 5: nobody answered
+    assert not (tmp_path / "s").exists()
 
 
 def test_loose_numbers(run):

@@ -57,6 +57,40 @@ Loads spring(const Motion& motion) {
   return loads;
 }
 
+TEST(ClientAddress, ThatIsNoneIsRefusedAndNobodysIsToldWhy) {
+  const std::string long_path = "unix:/" + std::string(200, 'x');
+  for (const auto& [address, told] : std::initializer_list<std::pair<std::string, const char*>>{
+           {"foo", "expected unix:PATH or HOST:PORT"},
+           {"http://localhost:1", "the address of a page"},
+           {"/tmp/s", "a path without `unix:`"},
+           {"localhost:0", "a number from 1 to 65535"},
+           {"localhost:x", "a number from 1 to 65535"},
+           {":1", "expected unix:PATH or HOST:PORT"},
+           {"unix:", "names no socket"},
+           {long_path, "at most 107 bytes"}}) {
+    try {
+      (void)Server::connect(address, 30);
+      ADD_FAILURE() << address;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.reason(), "BAD_ARGUMENT");
+      EXPECT_NE(std::string(error.what()).find(told), std::string::npos) << error.what();
+    }
+  }
+  const std::string folder = testing::TempDir(), file = folder + "/mbcosim_no_socket";
+  std::ofstream(file) << "text";
+  for (const auto& [path, told] :
+       {std::pair(folder + "/mbcosim_nothing", "there is no such socket"),
+        std::pair(file, "that is no socket")}) {
+    try {
+      (void)Server::connect("unix:" + path, 0.2);
+      ADD_FAILURE() << path;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(told), std::string::npos) << error.what();
+    }
+  }
+  std::remove(file.c_str());
+}
+
 TEST(Table, HasWhatSingleStepsGive) {
   Server server = connect();
   Simulation one = server.load_text(body()), other = server.load_text(body());

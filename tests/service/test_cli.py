@@ -284,6 +284,18 @@ def test_steps_that_cannot_keep_up_with_the_clock_are_counted(tmp_path):
     assert re.search(r"note: 1\d\d of 1\d\d steps ended late, the latest by \S+ s", run.stderr), run.stderr
 
 
+@pytest.mark.parametrize("arguments, told", [
+    (("validte", "deck"), 'mbcosim: there is no command "validte"; did you mean "validate"?'),
+    (("frobnicate",), 'mbcosim: there is no command "frobnicate"; `mbcosim --help` lists them'),
+    (("diff", "a", "b", "--relative", "-1"), '--relative: expected a number of at least 0, got "-1"'),
+    (("diff", "a", "b", "--absolute", "1e-3x"), '--absolute: expected a number of at least 0, got "1e-3x"'),
+    (("run", "deck", "--threads", "0"), '--threads: expected a number from 1 to 1024, got "0"'),
+    (("run", "deck", "--peer-timeout", "nan"), '--peer-timeout: expected a number from 0.001 to 1000000, got "nan"')])
+def test_wrong_words_and_numbers_are_told_with_what_is_expected(arguments, told):
+    run = mbcosim(*arguments)
+    assert run.returncode == 4 and run.stderr.startswith(told), run.stderr
+
+
 def test_messages_name_files_as_they_were_typed(deck, tmp_path):
     folder = tmp_path / "parts"
     folder.mkdir()

@@ -117,6 +117,10 @@ def test_plot_names_what_lacks(swing, tmp_path):
                             (("p",), "say what to draw: --node 3 z")):
         drawn = mbcosim("plot", *arguments, cwd=swing)
         assert drawn.returncode == 4 and text in drawn.stderr
+    for picture, text in ((tmp_path / "none" / "x.png", f'there is no folder "{tmp_path}/none"; make it with `mkdir -p`'),
+                          (tmp_path / "x.jpg", "the name of a picture ends in .png, .svg or .pdf")):
+        drawn = mbcosim("plot", "p", "--node", 2, "z", "--png", picture, cwd=swing)
+        assert drawn.returncode == 4 and text in drawn.stderr
     nothing = mbcosim("plot", "p", "--node", 2, "z", "--png", tmp_path / "x.png", cwd=swing, PATH=str(tmp_path))
     assert nothing.returncode == 4 and "gnuplot-nox or python3-matplotlib" in nothing.stderr
 
@@ -167,6 +171,19 @@ def test_eig_of_a_later_state_and_of_few(tmp_path):
     assert shown.returncode == 0 and shown.stdout.startswith("eigenvalues at t = 0.01 s")
     assert 1 <= len(shown.stdout.splitlines()) - 2 <= 4
     assert mbcosim("eig", "nothing", cwd=tmp_path).returncode == 2
+
+
+def test_eig_tells_units_that_the_deck_declares(tmp_path):
+    (tmp_path / "o").write_text(OSCILLATOR.replace("end: control data", 'units: length, "mm", mass, "t", time, "ms"; end: control data'))
+    shown = mbcosim("eig", "o", cwd=tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    first, heading = shown.stdout.splitlines()[:2]
+    assert first == "eigenvalues at t = 0 ms"
+    assert "time 0 to 10 ms, step 0.01 ms" in mbcosim("describe", "o", cwd=tmp_path).stdout
+    assert all(unit in heading for unit in ("real [1/ms]", "imaginary [rad/ms]", "frequency [Hz]"))
+    frequency = float(shown.stdout.splitlines()[2].split()[2])
+    assert frequency == pytest.approx(1000 * 396**0.5 / (2 * np.pi), rel=1e-6)
+    assert len(mbcosim("eig", "o", "-n", 2, "--near", 3000, cwd=tmp_path).stdout.splitlines()) == 3
 
 
 # ---------------------------------------------------------------- shells

@@ -258,6 +258,32 @@ def test_a_deletion_is_done_once_across_restarts(start, folder, how, durability)
         kill(daemon)
 
 
+def test_the_list_is_in_the_order_of_creation_wherever_they_are(start):
+    daemon = start()
+    with daemon.connect() as server:
+        names = [server.load_text(decks.body()).name for _ in range(6)]
+    daemon.stop()
+    with start().connect() as server:
+        for name in (names[4], names[1]):  # these are brought back, the others stay on the disk
+            server.attach(name).step(1)
+        names.append(server.load_text(decks.body()).name)
+        found = server.list()
+        assert [info.name for info in found] == names
+        times = [info.create_time.ToNanoseconds() for info in found]
+        assert times == sorted(set(times)) and abs(times[-1] * 1e-9 - time.time()) < 100
+        copy = server.import_checkpoint(server.attach(names[0]).export_checkpoint())
+        assert [info.name for info in server.list()] == [*names, copy.name], "a copy is younger than its original"
+        request, seen = pb.ListSimulationsRequest(page_size=2), []
+        while not seen or request.page_token:
+            page = server.simulations.ListSimulations(request)
+            seen += [info.name for info in page.simulations]
+            request.page_token = page.next_page_token
+            if len(seen) == 2:  # the first of the next page goes, and one of this
+                for name in names[1:3]:
+                    server.simulations.DeleteSimulation(pb.DeleteSimulationRequest(simulation=name))
+        assert seen == [*names[:2], *names[3:], copy.name]
+
+
 def test_a_deletion_that_a_kill_stopped_is_done_by_its_repeat(start, folder, tmp_path):
     daemon = start()
     with daemon.connect() as server:

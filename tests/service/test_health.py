@@ -13,6 +13,7 @@ import mbcosim
 from conftest import BIN, TIME_FACTOR, Daemon, wait_for
 
 DAEMON = os.path.join(BIN, "mbcosimd")
+SESSIONS = os.path.join(BIN, "mbcosim-sessions")
 
 
 def health(channel, service=""):
@@ -73,8 +74,9 @@ def test_a_second_daemon_does_not_steal_the_socket(daemon):
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o700])
-def test_the_default_socket_is_in_a_folder_that_nobody_else_may_write(mode):
-    """Whoever may could put another socket in its place."""
+@pytest.mark.parametrize("program, arguments", [(DAEMON, []), (SESSIONS, ["sessions"])], ids=["daemon", "client"])
+def test_the_default_socket_is_in_a_folder_that_nobody_else_may_write(program, arguments, mode):
+    """Whoever may could put another socket in its place, and would be told what is meant for the daemon."""
     if os.getuid() != 0:
         pytest.skip("only root may be another user")
     user = 60000 + os.getpid() % 5000
@@ -83,10 +85,10 @@ def test_the_default_socket_is_in_a_folder_that_nobody_else_may_write(mode):
     try:
         os.chmod(folder, mode)
         os.chown(folder, user if mode == 0o777 else user + 1, -1)
-        with open(DAEMON, "rb") as program:  # its folder need not be open to that user
+        with open(program, "rb") as file:  # its folder need not be open to that user
             environment = {name: value for name, value in os.environ.items() if name != "XDG_RUNTIME_DIR"}
-            run = subprocess.run([f"/proc/self/fd/{program.fileno()}"], stderr=subprocess.PIPE, text=True, timeout=30, env=environment,
-                                 pass_fds=[program.fileno()], user=user, group=user)
+            run = subprocess.run([f"/proc/self/fd/{file.fileno()}", *arguments], stderr=subprocess.PIPE, text=True, timeout=30, env=environment,
+                                 pass_fds=[file.fileno()], user=user, group=user)
         assert run.returncode == 4 and "the default socket" in run.stderr and folder in run.stderr, run.stderr
         assert os.listdir(folder) == []
     finally:
@@ -150,7 +152,9 @@ def test_loopback_without_credentials_needs_insecure():
 def test_what_is_wrong_is_an_error_at_the_start(tmp_path):
     config = tmp_path / "config"
     config.write_text("workerz=3\n")
-    assert "workerz" in refused("--config", str(config))
+    assert f'in the file of options "{config}": "workerz" is no option; did you mean "workers"?' in refused("--config", str(config))
+    assert "--drain: expected a number from 0 to 86400, got \"-1\"" in refused("--drain", "-1")
+    assert "--limit-sessions: expected a number above 0, got \"x\"" in refused("--limit-sessions", "x")
     assert "--workers" in refused("--workers", "-3")
     ca = tmp_path / "ca.pem"
     ca.write_text("none")
@@ -161,7 +165,7 @@ def test_what_is_wrong_is_an_error_at_the_start(tmp_path):
     for line, error in (("t control ann next-year", "line 1: \"next-year\" is no date"),
                         ("t control ann 2026-02-31", "is no date"), ("t control ann 1 more", "nothing is expected after"),
                         ("t boss ann", "none of observe, control, admin"), ("sha256:12 control ann", "64 hexadecimal digits"),
-                        ("t control", "expected TOKEN ROLE NAME"),
+                        ("t control", "expected TOKEN ROLE NAME"), ("geh\u00e9im control ann", "a token has printable ASCII characters only"),
                         ("t control ann\nt admin root", "line 2: the token stands in an earlier line")):
         tokens.write_text(line + "\n")
         assert error in refused("--tokens", str(tokens))

@@ -535,6 +535,53 @@ def test_more_slow_senders_than_connections_delay_http_by_tenths_of_a_second_and
         quiet.close()
 
 
+@pytest.mark.parametrize("token", [True, False])
+def test_bodies_that_never_come_delay_others_by_tenths_of_a_second(start_daemon, token):
+    """With a token, half of the connections; without, any number: their requests are refused, and what is left of them is not waited for."""
+    door = Door(start_daemon("--http", "127.0.0.1:0", "--limit-http-connections", "8", "--limit-message-bytes", "2000000").page())
+    head = (f"POST /mbcosim.v1.Simulations/Step HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nContent-Type: application/json\r\n"
+            f"Content-Length: 1000000\r\n" + (f"Authorization: Bearer {door.token}\r\n" if token else "") + "\r\n{").encode()
+    slow = [door.raw() for _ in range(24)]
+    for link in slow:
+        link.sendall(head)
+    started = time.monotonic()
+    for _ in range(3):
+        assert door.request("GET", "/healthz")[0] == 200
+    assert time.monotonic() - started < 3 * TIME_FACTOR
+    for link in slow:
+        link.close()
+
+
+def test_a_body_that_comes_in_time_is_read_while_others_wait(start_daemon):
+    door = Door(start_daemon("--http", "127.0.0.1:0", "--limit-http-connections", "4", "--limit-message-bytes", "8000000").page())
+    body = json.dumps({"simulation": 6_000_000 * "x"}).encode()
+    link = door.raw()
+    link.sendall(f"POST /mbcosim.v1.Simulations/GetSimulation HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nContent-Type: application/json\r\n"
+                 f"Content-Length: {len(body)}\r\nAuthorization: Bearer {door.token}\r\n\r\n".encode())
+    idle = [door.raw() for _ in range(20)]
+    for first in range(0, len(body), 200_000):
+        link.sendall(body[first:first + 200_000])
+        time.sleep(0.05)
+    assert link.recv(65536).startswith(b"HTTP/1.1 404")
+    for each in [link, *idle]:
+        each.close()
+
+
+@pytest.mark.parametrize("name", ["traceparent", "tracestate", "mbcosim-session"])
+def test_headers_that_no_call_can_carry_are_refused(door, name):
+    """gRPC aborts the process that gives it such metadata."""
+    body = b"{}"
+    for value in (b"\xff", "simulations/\u00e9".encode()):
+        link = door.raw()
+        link.sendall(f"POST /mbcosim.v1.Simulations/ListSimulations HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nConnection: close\r\n"
+                     f"Content-Type: application/json\r\nAuthorization: Bearer {door.token}\r\nContent-Length: {len(body)}\r\n{name}: ".encode()
+                     + value + b"\r\n\r\n" + body)
+        answer = all_of(link)
+        assert answer.startswith(b"HTTP/1.1 400") and f"the header {name} has bytes other than printable ASCII".encode() in answer, answer
+        link.close()
+    assert door.call("Simulations/ListSimulations")[0] == 200
+
+
 def test_as_many_slow_senders_as_connections_may_take_their_time_while_nobody_waits(start_daemon):
     door = Door(start_daemon("--http", "127.0.0.1:0", "--limit-http-connections", "8").page())
     slow = [door.raw() for _ in range(8)]

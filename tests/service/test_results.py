@@ -1,6 +1,7 @@
 """Result files of the daemon: those of `mbcosim run`, whatever the simulation goes through; within a folder and a quota."""
 import asyncio
 import os
+import resource
 import subprocess
 import threading
 import time
@@ -214,6 +215,49 @@ def test_a_full_disk_is_a_typed_failure_and_the_simulation_stands(writer, root, 
         assert simulation.read(["step"])["step"] == simulation.refresh().step == 10
         start.restore()  # what is left to write fits again
         assert simulation.step(5).step == 5
+
+
+@pytest.mark.parametrize("formats", ["text", "netcdf"])
+def test_what_a_full_disk_did_not_take_is_written_when_there_is_room(start_daemon, root, pendulum, formats):
+    daemon = start_daemon("--results-root", str(root))
+    with daemon.connect() as server, server.load(pendulum, results=formats, summed_time=True) as simulation, \
+            server.load(pendulum, results=formats, summed_time=True) as other:
+        simulation.step(20)
+        size = max(simulation.result_files().values())
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (size + 3000, resource.RLIM_INFINITY))  # no file of the daemon grows beyond
+        with pytest.raises(mbcosim.StepFailed) as caught:
+            while True:
+                simulation.step(7)
+        assert caught.value.reason == "STORAGE_FULL"
+        for _ in range(2):
+            with pytest.raises(mbcosim.LimitExceeded):
+                simulation.result_files()
+        resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        steps = simulation.refresh().step
+        assert set(simulation.result_files()) == set(other.result_files())
+        simulation.step(20)
+        other.step(steps + 20)
+        for name in other.result_files():
+            if not name.endswith((".log", ".out")):  # times of day
+                assert simulation.result_file(name) == other.result_file(name), name
+
+
+@pytest.mark.parametrize("formats", ["text", "netcdf"])
+def test_of_results_that_exceed_the_quota_what_fits_can_be_read(writer, pendulum, formats):
+    """An eigenanalysis at t = 0.5 s, the 100th step, writes many times what a step does."""
+    with open(pendulum) as file:
+        text = file.read().replace("end: initial value;", "eigenanalysis: 0.5, output matrices, output eigenvectors, use lapack; end: initial value;")
+    with writer.load_text(text, results=formats, results_quota=110_000 if formats == "text" else 80_000) as simulation:
+        begin = simulation.snapshot()
+        with pytest.raises(mbcosim.StepFailed) as caught:
+            simulation.step(1000)
+        assert caught.value.reason == "LIMIT_EXCEEDED"
+        files = simulation.result_files()
+        assert all(len(simulation.result_file(name)) == size for name, size in files.items())
+        reply = writer._connection.stubs.results.ListResults(results_pb2.ListResultsRequest(simulation=simulation.name))
+        assert reply.step <= simulation.refresh().step and reply.used_bytes <= reply.quota_bytes
+        begin.restore()
+        assert simulation.step(10).step == 10
 
 
 def test_delete_removes_and_the_end_of_a_lease_keeps(writer, root, pendulum):

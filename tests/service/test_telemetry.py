@@ -47,6 +47,15 @@ def test_drop_oldest_counts_its_gaps(server):
         simulation._owned = False
 
 
+def test_a_sample_is_no_longer_than_a_message(server):
+    with server.load_text(decks.body()) as simulation:
+        stream = server.telemetry.Subscribe(telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=[0] * 3_000_000, buffer_samples=1))
+        with pytest.raises(grpc.RpcError) as caught:
+            next(stream)
+        error = mbcosim.errors.from_rpc_error(caught.value)
+        assert (error.reason, error.metadata["limit"]) == ("LIMIT_EXCEEDED", "message_bytes")
+
+
 def test_decimate_widens_the_interval(server):
     with server.load_text(decks.body(final_time="20.")) as simulation:
         request = telemetry_pb2.SubscribeRequest(simulation=simulation.name, handles=[0] * 500, buffer_samples=8,

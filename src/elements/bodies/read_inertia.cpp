@@ -1,4 +1,7 @@
 /// Readers of `inertia` and `automatic structural`.
+#include <set>
+#include <utility>
+
 #include "elements/bodies/inertia_report.h"
 #include "elements/bodies/readers.h"
 #include "model/card.h"
@@ -12,10 +15,10 @@ std::vector<ElementRef> read_element_list(Card& card) {
   static constexpr Family kFamilies[] = {Family::body, Family::joint, Family::loadable,
                                          Family::loadable};
   std::vector<ElementRef> elements;
+  std::set<std::pair<const ElementSet*, int>> known;
   const auto add = [&](const ElementRef& e) {
-    for (const ElementRef& before : elements)
-      if (before.set == e.set && before.index == e.index)
-        card.fail(card.model().element_text(e) + " is listed twice");
+    if (!known.insert({e.set, e.index}).second)
+      card.fail(card.model().element_text(e) + " is listed twice");
     elements.push_back(e);
   };
   Family family =

@@ -232,7 +232,11 @@ std::vector<StreamOutput::Motion> read_motion_flags(Card& card) {
   };
   if (!card.keyword("output flags")) return {Motion::position};
   std::vector<Motion> motion;
-  for (int kind = next(); kind >= 0; kind = next()) motion.push_back(kKinds[kind]);
+  for (int kind = next(); kind >= 0; kind = next()) {
+    if (std::find(motion.begin(), motion.end(), kKinds[kind]) != motion.end())
+      card.fail("stream output: `output flags` has the same twice");
+    motion.push_back(kKinds[kind]);
+  }
   if (motion.empty())
     card.fail_at(card.next(), "stream output: `output flags` must be followed by what is sent");
   return motion;

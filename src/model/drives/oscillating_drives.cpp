@@ -7,6 +7,7 @@
 #include "math/rotation.h"
 #include "model/context.h"
 #include "model/diagnostic.h"
+#include "model/nested_evaluation.h"
 
 namespace mbcosim {
 
@@ -62,6 +63,7 @@ FourierSeriesDrive::FourierSeriesDrive(double t0, double omega, double a0, std::
 }
 double FourierSeriesDrive::value(const EvalContext&, double t) const {
   if (t < t0_ || t >= end_) return i_;
+  NestedEvaluation::charge(static_cast<int>(a_.size()));
   double sum = i_ + a0_ / 2;
   for (std::size_t k = 0; k < a_.size(); ++k) {
     const double angle = static_cast<double>(k + 1) * omega_ * (t - t0_);
@@ -72,6 +74,7 @@ double FourierSeriesDrive::value(const EvalContext&, double t) const {
 double FourierSeriesDrive::derivative(const EvalContext&, double t) const {
   if (t == t0_) throw EvaluationError("a Fourier series drive has no derivative where it starts");
   if (t < t0_ || t >= end_) return 0;
+  NestedEvaluation::charge(static_cast<int>(a_.size()));
   double sum = 0;
   for (std::size_t k = 0; k < a_.size(); ++k) {
     const double omega = static_cast<double>(k + 1) * omega_, angle = omega * (t - t0_);

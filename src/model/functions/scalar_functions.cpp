@@ -5,8 +5,15 @@
 #include <string>
 
 #include "model/diagnostic.h"
+#include "model/nested_evaluation.h"
 
 namespace mbcosim {
+
+namespace {
+
+constexpr int kTermsOfADrive = 16;  // take as long as one
+
+}  // namespace
 
 double PowerFunction::value(double x) const {
   const double y = std::pow(x, p_);
@@ -114,6 +121,7 @@ double CubicSplineFunction::derivative(double x) const {
 }
 
 ChebyshevFunction::Pair ChebyshevFunction::evaluate(double x) const {
+  NestedEvaluation::charge(static_cast<int>(c_.size()) / kTermsOfADrive);
   const double xi = (2 * x - a_ - b_) / (b_ - a_), dxi = 2 / (b_ - a_);
   double t0 = 1, t1 = xi, d0 = 0, d1 = 1;  // Tₖ, Tₖ₊₁ and their derivatives
   Pair r{0, 0};

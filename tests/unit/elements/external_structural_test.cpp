@@ -12,11 +12,13 @@ namespace {
 /// Two points on the first node, one on the second, a third node as reference.
 class ExternalLoads : public testing::Test {
  protected:
-  void build(bool use_reference_loads) {
+  /// `more`: nodes with a point each.
+  void build(bool use_reference_loads, int more = 0) {
     reference_ = bench_.add_node(StructuralKind::static_);
     StructuralPort port;
     port.nodes = {bench_.first, bench_.first, bench_.second};
-    for (int k = 0; k < 3; ++k) port.offsets.push_back(bench_.vec());
+    for (int k = 0; k < more; ++k) port.nodes.push_back(bench_.add_node(StructuralKind::static_));
+    for (int k = 0; k < 3 + more; ++k) port.offsets.push_back(bench_.vec());
     port.reference = reference_;
     port.use_reference_loads = use_reference_loads;
     port.memory = bench_.builder.allocate_memory(port.load_size());
@@ -46,6 +48,13 @@ class ExternalLoads : public testing::Test {
 
 TEST_F(ExternalLoads, JacobianMatchesCentralDifferences) {
   build(true);
+  const MatX J = bench_.jacobian();
+  EXPECT_GT(J.norm(), 1e-4);
+  conformance::expect_near(bench_, J, bench_.numerical_jacobian(), 1e-7);
+}
+
+TEST_F(ExternalLoads, JacobianOfManyNodesMatchesCentralDifferences) {  // of which a part is kept
+  build(true, 30);
   const MatX J = bench_.jacobian();
   EXPECT_GT(J.norm(), 1e-4);
   conformance::expect_near(bench_, J, bench_.numerical_jacobian(), 1e-7);

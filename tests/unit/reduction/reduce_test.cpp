@@ -192,6 +192,20 @@ TEST(ReduceBeam, RigidInertiaAndMeanAxes) {
   }
 }
 
+// Length and mass 1, with rows uy and rz only: no mass in the other directions.
+TEST(ReduceBeam, CentreAndInertiaOfAPlanarModelAreThoseOfItsRows) {
+  FeModel beam = planar_beam(10);
+  beam.positions.row(0).array() += 9;
+  ReductionOptions o = options_of(ReductionBasis::free_modes, 2);
+  const Reduction r = reduced(beam, o);
+  EXPECT_THAT(r.report.warnings, testing::Contains(HasSubstr("not the same in all directions")));
+  EXPECT_NEAR(r.data.rigid->mass, 1, 1e-12);
+  EXPECT_NEAR((r.data.positions.col(0) - Vec3(-0.5, 0, 0)).norm(), 0, 1e-10);
+  EXPECT_NEAR(r.report.inertia.center.norm(), 0, 1e-10);
+  EXPECT_NEAR((r.data.rigid->inertia - Vec3(0, 0, 1. / 12).asDiagonal().toDenseMatrix()).norm(), 0,
+              1e-10);
+}
+
 TEST(ReducePlate, SimplySupported) {
   const double a = 1.5, b = 1;
   const Reduction r =
@@ -506,6 +520,39 @@ TEST(FeModelFilesTest, RoundTripAndRefusals) {
   EXPECT_THAT(model_refusal(bad), HasSubstr("not finite"));
   bad.mass = "%%MatrixMarket matrix coordinate real symmetric\n2 2 1\n3 1 1.\n";
   EXPECT_THAT(model_refusal(bad), HasSubstr("mass:3: entry (3, 1) lies outside"));
+  bad.mass = "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n2 1 1.\n1 2 1.\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("mass:4: a `symmetric` matrix has the entries of one"));
+  bad = files;
+  bad.nodes = "a,0,0,0\nb,1e200,0,0\nc,2,0,0\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("nodes:2: a coordinate larger than"));
+  bad.nodes = std::string(200, 'a') + ",0,0,0\n";
+  EXPECT_THAT(model_refusal(bad), HasSubstr("a label of at most 100 characters"));
+  bad.nodes = "a," + std::string(5000, 'x') + ",0,0\n";
+  EXPECT_LT(model_refusal(bad).size(), 200U);
+}
+
+TEST(FeModelFilesTest, NumbersAreReadWholeOrRefused) {
+  const auto matrix = [](const std::string& entry) {
+    return parse_matrix_market(
+        "k", "%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n" + entry + "\n");
+  };
+  for (const char* text : {"1 1 1.5e+05", "1 1 1.5D+05", "1 1 1.5d5", " 1\t1   +1.5E+5 \r"})
+    EXPECT_EQ(matrix(text).coeff(0, 0), 150000) << text;
+  for (const char* text : {"1 1 1,5", "1 1 1.5 2", "1 1.5 3", "1 1 1.5e+05x", "1 1 0x12", "1,1,1",
+                           "1 1 1e61", "1 1 inf", "1 1"})
+    EXPECT_THROW((void)matrix(text), ReductionError) << text;
+}
+
+TEST(ReduceRefusals, NumbersThatOverflowAndTooManyShapes) {
+  FeModel chain = spring_chain(3, 100);
+  chain.stiffness.coeffRef(1, 1) = 1.7e308;
+  EXPECT_THAT(refusal(chain, options_of(ReductionBasis::constrained_modes, 1)),
+              HasSubstr("overflow"));
+  EXPECT_THAT(refusal(spring_chain(3, 100), options_of(ReductionBasis::constrained_modes, 2001)),
+              HasSubstr("more than 2000 shapes"));
+  EXPECT_THAT(
+      refusal(spring_chain(3), options_of(ReductionBasis::craig_bampton, 0, {"1", "2", "3"})),
+      HasSubstr("all degrees of freedom belong to the interface"));
 }
 
 }  // namespace

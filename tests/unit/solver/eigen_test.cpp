@@ -50,6 +50,37 @@ begin: elements;
 end: elements;
 )";
 
+// Of a velocity: m = 2, k = 800, c = 8 + 12. The card takes the force for a given one.
+TEST(Eigenanalysis, FeedbackByDrivesBelongsToTheSystemAndNotToTheCard) {
+  std::string deck = kSupportedBody;
+  deck.replace(deck.find("joints: 2;"), 10, "joints: 2; forces: 1;");
+  deck.replace(deck.find("end: elements"), 0,
+               "force: 3, absolute, 1, position, null, 1.,0.,0., node, 1, structural, string, "
+               "\"XP[1]\", linear, 0., -12.;\n");
+  const auto nearest = [](const auto& values, Complex expected) {
+    double distance = HUGE_VAL;
+    for (const Complex value : values) distance = std::min(distance, std::abs(value - expected));
+    return distance;
+  };
+  const Complex closed(-5, std::sqrt(375.)), open(-2, std::sqrt(396.));
+  DeckRun run(small_step("eigenanalysis: 0., parameter, .01, use lapack;") + deck);
+  ASSERT_TRUE(run.ready());
+  const Spectrum spectrum = all_modes(run);
+  EXPECT_LT(nearest(spectrum.values, closed), 1e-9);
+  EXPECT_GT(nearest(spectrum.values, open), 1);
+  for (const char* how : {"use lapack", "use arpack, 12, 40, 0."}) {
+    DeckRun card(small_step(std::string("eigenanalysis: 0., parameter, .01, ") + how + ";") + deck);
+    ASSERT_TRUE(card.ready());
+    const auto report = analyse_modes(card.model(), card.simulation().state(),
+                                      *card.model().initial_value.eigenanalysis);
+    ASSERT_TRUE(report);
+    std::vector<Complex> values;
+    for (const int k : report->modes) values.push_back(report->eigenvalue(k));
+    EXPECT_LT(nearest(values, open), 1e-6) << how;
+    EXPECT_GT(nearest(values, closed), 1) << how;
+  }
+}
+
 TEST(Eigenanalysis, ReferenceNumbersOfASupportedBody) {
   DeckRun run(small_step("eigenanalysis: 0., parameter, .01, output eigenvectors, use lapack;") +
               kSupportedBody);

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "deck_run.h"
+#include "solver/system.h"
+#include "solver/watch.h"
 
 namespace mbcosim::newton_test {
 namespace {
@@ -45,6 +47,52 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
   double d = 0;
   for (std::size_t i = 0; i < a.size(); ++i) d = std::max(d, std::abs(a[i] - b[i]));
   return a.empty() || a.size() != b.size() ? HUGE_VAL : d;
+}
+
+/// Springs between a node and the ground, with one force.
+std::string springs(int count, const std::string& drive) {
+  std::string deck = initial_value_block(1e-3, 1, "max iterations: 20; tolerance: 1e-9;") +
+                     "begin: control data; structural nodes: 2; rigid bodies: 1; joints: " +
+                     std::to_string(count) + "; forces: 1; " + R"( end: control data;
+begin: nodes; structural: 1, static, null, eye, null, null; structural: 2, dynamic, 1.,0.,0., eye, null, null; end: nodes;
+begin: elements; body: 1, 2, 1., null, eye; joint: 1, clamp, 1, node, node;
+force: 1, absolute, 2, position, null, 1.,0.,0., )" +
+                     drive + ";\n";
+  for (int k = 2; k <= count; ++k)
+    deck += "joint: " + std::to_string(k) + ", rod, 1, 2, 1., linear elastic, 1.;\n";
+  return deck + "end: elements;\n";
+}
+
+struct Asked {
+  int looks = 0, most = 0;
+  static void look(const void* of) {
+    auto* self = static_cast<Asked*>(const_cast<void*>(of));
+    if (++self->looks > self->most) throw Stopped();
+  }
+};
+
+// A deadline, Interrupt or DeleteSimulation must not wait for all elements of a large model, nor
+// for one that evaluates much.
+TEST(Evaluations, LookBetweenElementsAndWithinHeavyDrivesWhetherTheyAreWanted) {
+  std::string series = "fourier series, 0., 1., 2000, 0.";
+  for (int k = 0; k < 4000; ++k) series += ", 0.";
+  series += ", forever, 0.";
+  for (const std::string& deck : {springs(4000, "const, 1."), springs(2, series)}) {
+    DeckRun run(deck);
+    ASSERT_TRUE(run.ready());
+    Scratch scratch(run.model().scratch);
+    std::vector<double> r(run.model().unknowns);
+    const auto looks = [&](int most) {
+      Asked asked{0, most};
+      scratch.interruption = {&Asked::look, &asked};
+      compute_residual(run.model().context(run.simulation().state(), Phase::step, 1e-3, 1e-3),
+                       scratch, r);
+      return asked.looks;
+    };
+    EXPECT_GT(looks(1000), 0);
+    EXPECT_THROW((void)looks(0), Stopped);
+    EXPECT_GT(looks(1000), 0);
+  }
 }
 
 class NewtonVariants : public testing::TestWithParam<const char*> {};

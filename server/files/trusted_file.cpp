@@ -1,4 +1,4 @@
-#include "rpc/trusted_file.h"
+#include "files/trusted_file.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
