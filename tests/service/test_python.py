@@ -156,7 +156,7 @@ def test_parts_are_found_by_label_by_name_and_by_family(server):
         assert list(top.position) == list(simulation["node.structural.1.X"])
         assert top["angular_velocity"] == pytest.approx(simulation["node.structural.1.Omega"])
         assert {"position", "XP", "load"} <= set(dir(top))
-        assert repr(top).startswith('<dynamic node 1 "top", t = 0 s>\n  X[3] [deck unit of length], global: position')
+        assert repr(top).startswith('<dynamic node 1 "top", t = 0 (deck unit of time)>\n  X[3] [deck unit of length], global: position')
 
 
 def test_inputs_are_set_by_the_names_of_their_nodes(server):

@@ -21,7 +21,7 @@ from . import bundle
 from .errors import NotFound, StepFailed, enum_name
 from .rpc import USUAL, Call, Calls, call, fill_duration, protocol
 from .table import Rows
-from .words import choice, needed, pick, remedy
+from .words import after_number, choice, needed, pick, remedy
 
 
 Array = npt.NDArray[np.float64]
@@ -322,12 +322,18 @@ class SimulationCalls(Generic[SnapshotKind]):
         """As `mbcosim.v1.Variable.unit` of a time."""
         return self.info.units.time or "deck unit of time"
 
+    @property
+    def length_unit(self) -> str:
+        """As `mbcosim.v1.Variable.unit` of a length."""
+        return self.info.units.length or "deck unit of length"
+
     def _leave(self) -> None:
         """Ends what is open of it here."""
 
     def __repr__(self) -> str:
         title = f" \"{self.info.display_name}\"" if self.info.display_name else ""
-        return f"<{type(self).__name__} {self.name}{title}, step {self.step_number}, t = {self.time:g} s of {self.info.final_time:g} s>"
+        span = f"{self.time:g} of {self.info.final_time:g} {after_number(self.time_unit)}"
+        return f"<{type(self).__name__} {self.name}{title}, step {self.step_number}, t = {span}>"
 
     # ---------------------------------------------------------------- variables
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mbcosim.v1 import common_pb2
 
-from .words import remedy
+from .words import after_number, remedy
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -109,7 +109,7 @@ class Part:
 
     def __repr__(self) -> str:
         lines = [f"  {name}{short_text(variable)}" for name, variable in self.variables.items()]
-        return "\n".join([f"<{self.title}, t = {self._simulation.time:g} s>", *lines])
+        return "\n".join([f"<{self.title}, t = {self._simulation.time:g} {after_number(self._simulation.time_unit)}>", *lines])
 
 
 class Parts(Mapping[Key, Part]):

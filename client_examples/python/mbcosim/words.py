@@ -20,6 +20,22 @@ def remedy(name: object, known: Iterable[object], most: int = 12) -> str:
     return f"known: {listed(known, most)}" if known else "there are none"
 
 
+def after_number(unit: str) -> str:
+    """A unit as it follows a number: `ms`, `(deck unit of time)`."""
+    return f"({unit})" if " " in unit else unit
+
+
+def seconds_in(time_unit: str) -> Optional[float]:
+    """Seconds in a unit of time that a deck declares; None: it declares none."""
+    prefix = {"k": 1e3, "M": 1e6, "G": 1e9, "m": 1e-3, "u": 1e-6, "n": 1e-9}
+    return {"s": 1.0, "min": 60.0, "h": 3600.0, **{letter + "s": factor for letter, factor in prefix.items()}}.get(time_unit)
+
+
+def frequency_unit(time_unit: str) -> str:
+    """Of oscillations of a deck that counts time so: `Hz`, or `1/(deck unit of time)` where nobody declared one."""
+    return "Hz" if seconds_in(time_unit) is not None else f"1/({time_unit})"
+
+
 def choice(kind: Any, prefix: str, word: Optional[str], what: str) -> Any:
     """Value of a protobuf enum by its name without prefix, in any case; None leaves the choice to the server (0)."""
     if word is None:
