@@ -1,8 +1,10 @@
 """The Python client for daily use: a daemon of one's own, the model's parts as objects, histories, what-if, linear models, pictures."""
+import asyncio
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 
 import decks
 import mbcosim
+import mbcosim.aio
 from conftest import MODELS, TIME_FACTOR, wait_for
 from mbcosim import access
 from test_analysis import OSCILLATOR, S
@@ -75,13 +78,80 @@ def test_a_missing_program_is_named_with_its_remedy(monkeypatch, tmp_path):
         mbcosim.local()
 
 
-@pytest.mark.parametrize("address", ["unix:/tmp/mbcosim-no-such-folder/s", "localhost:1"])
-def test_connect_without_a_daemon_says_so_at_once_and_how_to_start_one(address):
+@pytest.mark.parametrize("address, why, options", [
+    ("unix:/tmp/mbcosim-no-such-folder/s", "there is no such socket, nor its folder", ""), ("unix:/tmp/mbcosim-no-such-socket", "there is no such socket", ""),
+    ("localhost:1", "nobody accepts connections there", " --tokens FILE")])  # over TCP a daemon wants to know who calls
+def test_connect_without_a_daemon_says_so_at_once_and_how_to_start_one(address, why, options):
     start = time.monotonic()
     with pytest.raises(mbcosim.Unavailable) as caught:
         mbcosim.connect(address)
     assert time.monotonic() - start < 3 * TIME_FACTOR
-    assert str(caught.value).startswith(f"no daemon listens at {address}. Start one in a terminal with `mbcosimd --listen {address} &`")
+    assert str(caught.value).startswith(f"no daemon listens at {address}: {why}. Start one in a terminal with `mbcosimd --listen {address}{options} &`")
+
+
+@pytest.mark.parametrize("address, fault", [
+    ("foo", "has no port, nor `unix:` before it: expected HOST:PORT or unix:PATH"), ("localhost:", "has the port '': expected a number from 1 to 65535"),
+    ("localhost:99999", "has the port '99999': expected a number from 1 to 65535"), (":50051", "has no host before its port: say 'localhost:50051'"),
+    ("::1", "has colons in its host: expected [HOST]:PORT"), ("/run/mbcosim.sock", "is a path without `unix:` before it: say 'unix:/run/mbcosim.sock'"),
+    ("http://localhost:8765/?token=x", "is that of a page, or of calls over HTTP: expected the one that the daemon listens on (--listen)"),
+    ("tcp://localhost:1", "has a scheme that is not known here: expected"), ("unix:", "names no socket: expected unix:PATH"),
+    ("unix:/" + "x" * 107, "is too long: the path of a socket has at most 107 bytes, this one 108")])
+def test_what_is_no_address_is_refused_with_what_is_wrong(address, fault, monkeypatch):
+    async def awaited():
+        async with mbcosim.aio.connect(address):
+            pass
+
+    monkeypatch.setenv("MBCOSIM_ADDRESS", address)
+    for call in (lambda: mbcosim.connect(address), mbcosim.connect, lambda: asyncio.run(awaited())):
+        with pytest.raises(ValueError) as caught:
+            call()
+        assert str(caught.value).startswith(f"the address {address!r} {fault}")
+
+
+def test_who_cannot_be_reached_is_told_why(start_daemon, tmp_path):
+    (tmp_path / "plain").write_text("")
+    daemon = start_daemon("--http", "127.0.0.1:0")
+    for address, text in ((f"unix:{tmp_path}/plain", "no server can be reached at .*: that is no socket"),
+                          ("no.such.host.invalid:50051", "no server can be reached at .*: no host is known by that name"),
+                          (daemon.page().split("/")[2], "is that the port of the page")):
+        with pytest.raises(mbcosim.Unavailable, match=text):
+            mbcosim.connect(address)
+
+
+def test_a_default_socket_that_strangers_may_replace_is_not_opened(monkeypatch):
+    """In /tmp, where anybody may have made the folder."""
+    monkeypatch.delenv("MBCOSIM_ADDRESS", raising=False)
+    with tempfile.TemporaryDirectory(dir="/tmp") as top:
+        folder = os.path.join(top, "run")
+        os.mkdir(folder)
+        os.symlink(folder, os.path.join(top, "link"))
+        for mode, place in ((0o777, folder), (0o1777, folder), (0o720, folder)):
+            os.chmod(folder, mode)
+            for name in ("run", "link"):
+                monkeypatch.setenv("XDG_RUNTIME_DIR", os.path.join(top, name))
+                with pytest.raises(mbcosim.NotAllowed, match=f"others may have put the default socket .* the folder {top}/{name} may be written by others"):
+                    mbcosim.connect()
+        os.chmod(folder, 0o700)
+        os.chmod(top, 0o777)
+        with pytest.raises(mbcosim.NotAllowed, match=f"the folder {top} may be written by others"):
+            mbcosim.connect()
+        os.chmod(top, 0o1777)  # as /tmp is
+        with pytest.raises(mbcosim.Unavailable, match="there is no such socket"):
+            mbcosim.connect()
+        monkeypatch.setattr(os, "geteuid", lambda: os.stat(folder).st_uid + 1)
+        if os.stat(folder).st_uid != 0:  # root may do all in any case
+            with pytest.raises(mbcosim.NotAllowed, match=f"belongs to user {os.getuid()}, neither root nor this one"):
+                mbcosim.connect()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root makes folders of others")
+def test_a_default_socket_in_a_strangers_folder_is_not_opened(monkeypatch):
+    monkeypatch.delenv("MBCOSIM_ADDRESS", raising=False)
+    with tempfile.TemporaryDirectory(dir="/tmp") as folder:
+        os.chown(folder, 1234, 1234)
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        with pytest.raises(mbcosim.NotAllowed, match="belongs to user 1234, neither root nor this one .0.. Remove it, or say where the daemon is"):
+            mbcosim.connect()
 
 
 def test_connect_or_start_takes_the_users_daemon_where_it_runs(daemon, monkeypatch, tmp_path):

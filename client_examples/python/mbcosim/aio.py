@@ -27,7 +27,7 @@ import numpy.typing as npt
 from mbcosim.v1 import common_pb2, coupling_pb2, events_pb2, simulations_pb2 as pb, telemetry_pb2
 
 from . import access, events, exchange
-from .access import Attempts, default_address
+from .access import Attempts
 from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepResult, Values
 from .coupling import Answer, open_stream
 from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
@@ -47,7 +47,7 @@ async def connect(address: Optional[str] = None, *, token: Optional[str] = None,
                   timeout: Optional[float] = None, reconnect: float = 0.0) -> AsyncIterator[Server]:
     """A connection; for the arguments see mbcosim.connect."""
     secured = credentials or access.credentials(tls, ca, certificate, key)
-    server = Server(address or default_address(), token or access.default_token(), secured, reconnect)
+    server = Server(access.reached(address), token or access.default_token(), secured, reconnect)
     try:
         attempts = Attempts(server.address, timeout)
         while True:
