@@ -8,6 +8,7 @@ import decks
 import mbcosim
 import mbcosim.aio
 from conftest import TIME_FACTOR
+from mbcosim import exchange
 from test_coupling import PORT, oscillator, position, spring
 
 X = "node.structural.1.X"
@@ -97,7 +98,7 @@ def test_two_simulations_side_by_side(daemon):
     assert first == second
 
 
-def test_failures(daemon):
+def test_failures(daemon, monkeypatch):
     async def body(_, simulation):
         with pytest.raises(mbcosim.NotFound) as caught:
             await simulation.couple("wing", spring)
@@ -109,6 +110,11 @@ def test_failures(daemon):
         async with await simulation.couple("spring", gust):
             with pytest.raises(mbcosim.StepFailed, match="no aerodynamics today"):
                 await simulation.step()
+        async with await simulation.couple("spring", lambda motion: [1.0, 2.0]) as peer:
+            with pytest.raises(mbcosim.StepFailed, match=r"the peer failed: ValueError: `forces` has the shape \(2,\)"):
+                await simulation.step()
+            assert isinstance(peer.raised, ValueError) and peer.error is None
+        monkeypatch.setattr(exchange.AnswerForm, "fault", lambda *_: None)  # the server looks, too
         wrong = await simulation.couple("spring", lambda motion: [1.0, 2.0], peer_timeout=5)
         with pytest.raises(mbcosim.StepFailed):
             await simulation.step()

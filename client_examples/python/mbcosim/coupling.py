@@ -69,7 +69,7 @@ class Peer(exchange.Course):
 
     answer returns forces (n x 3), or (forces, moments), or the signals, or Loads; an exception in it fails the step. On a port of
     the deck with reference loads it returns (forces, moments, force on the reference node, moment on it), on a motion port
-    positions or (positions, rotations).
+    positions or (positions, rotations). An answer of another shape fails the step, too.
     Without `answer` the peer is synchronous: iterate over it and answer each motion with `peer.answer(...)`, in another thread than
     the one that steps.
 
@@ -87,7 +87,7 @@ class Peer(exchange.Course):
     step       of a peer that comes back: the step at whose end it stands, `step` of the peer that left. A simulation that was brought back from a
                checkpoint and stands at an earlier one refuses it (PreconditionFailed, reason PEER_AHEAD)
     can_go_back  it is let in all the same: before it answers it takes the state that it had at the end of step `peer.step`
-    After the end `error` has what ended the stream, None when it ended in good order.
+    After the end `error` has what ended the stream, None when it ended in good order; `raised` what `answer` raised last.
     """
 
     def __init__(self, simulation: Simulation, port: str, answer: Optional[Answer] = None, *, rotation: str = "matrix",
@@ -168,5 +168,5 @@ class Peer(exchange.Course):
         for motion in self:
             try:
                 self.answer(self._function(motion))
-            except Exception as error:  # whatever the user's code raises becomes a failed step with this text
+            except (Exception, SystemExit) as error:  # whatever the user's code raises becomes a failed step with this text
                 self.fail(error)
