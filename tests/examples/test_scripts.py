@@ -42,8 +42,8 @@ def test_pendulum(address, tmp_path):
 
 
 def test_shunt_damping(address, tmp_path):
-    opened, shunted = run("shunt_damping.py", address, tmp_path)
-    assert shunted[-1] < 0.05 * opened[-1]
+    shorted, shunted = run("shunt_damping.py", address, tmp_path)
+    assert shunted[-1] < 0.05 * shorted[-1]
 
 
 def test_servo_moves_the_end_of_the_beam_as_commanded(address, tmp_path):
