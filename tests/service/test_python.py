@@ -249,7 +249,9 @@ def test_the_reaction_of_a_hinge_is_what_moves_the_body(swing):
 
 def test_words_that_are_wrong_are_answered_with_those_that_are_right(swing):
     for call, text in (
-            (lambda: swing.nodes[7], "no node is called 7; known: 1, 2"),
+            (lambda: swing.nodes[7], "no node is called 7; known: 1, 2"), (lambda: swing.nodes["tip"], "no node is called 'tip'; known: 1, 2"),
+            (lambda: swing.elements["rod"], "no element is called 'rod'; known: 1, ('joint', 2), ('body', 2)"),
+            (lambda: swing.state_space("structural.2.load", "time").only("load", "time"), "the system has no input 'load'; known: 'node.structural.2.load[1]'"),
             (lambda: swing.nodes[2].posision, "dynamic node 2 has no 'posision'; did you mean 'position'?"),
             (lambda: setattr(swing.nodes[2], "position", [0, 0, 0]), "'position' of dynamic node 2 cannot be set; known: 'load'"),
             (lambda: swing.inputs["valve"], "no input is called 'valve'; known: 'node.structural.1.load', 'node.structural.2.load'"),
@@ -260,7 +262,18 @@ def test_words_that_are_wrong_are_answered_with_those_that_are_right(swing):
             (lambda: swing.step(until=mbcosim.Condition("time", "=", 1)), "comparison: no choice is called '='; choose from '<', '<='")):
         with pytest.raises((KeyError, AttributeError, ValueError)) as caught:
             call()
-        assert text in caught.value.args[0]
+        assert text in caught.value.args[0] and str(caught.value) == caught.value.args[0]
+
+
+def test_nodes_of_ports_and_units_of_another_kind_are_told(server, swing, pendulum):
+    for nodes in (["tip"], 9, [1.5]):
+        for port in (mbcosim.structural_port, mbcosim.motion_port):
+            with pytest.raises(TypeError, match="`nodes` of port 'wing' must be a list of labels, whole numbers, got"):
+                port("wing", nodes=nodes)
+    assert list(mbcosim.structural_port("wing", nodes=np.array([1, 2])).node_labels) == [1, 2]
+    for call in (lambda: server.load(pendulum, units="mm"), lambda: swing.couple("wing", lambda m: m.x, units="mm")):
+        with pytest.raises(TypeError, match="`units` must be a system made by mbcosim.units, .* say, got 'mm'"):
+            call()
 
 
 # ---------------------------------------------------------------- histories, what if
@@ -391,6 +404,32 @@ def test_pictures_and_films_are_written(swing, server, tmp_path):
         assert (tmp_path / name).stat().st_size > 5000
     with pytest.raises(ValueError, match="view: no choice is called 'top'"):
         history.animate(view="top", save=str(tmp_path / "x.gif"))
+
+
+def test_an_empty_picture_is_refused(swing):
+    pytest.importorskip("matplotlib")
+    with pytest.raises(ValueError, match="there is nothing to plot: the history has no variables"):
+        swing.simulate([], steps=2).plot()
+    with pytest.raises(ValueError, match="there is nothing to plot: `names` is empty"):
+        swing.simulate(steps=2).plot([])
+    for inputs, outputs in (("structural.2.load", []), ([], "node.structural.2.X")):
+        with pytest.raises(ValueError, match="there is nothing to plot: no output .* answers an input"):
+            swing.state_space(inputs, outputs).plot_bode()
+
+
+def test_a_bode_diagram_of_many_has_its_names_beside_it_and_no_noise(server, tmp_path):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
+    with server.load(model("wing.mbd")) as simulation:
+        figure = simulation.state_space("structural.9.load", "node.structural.9.X").plot_bode(save=tmp_path / "b.png")
+    upper, lower, names = figure.axes
+    curves = [line.get_label().replace("node.structural.9.", "") for line in upper.lines]
+    in_plane = [f"X[{i}] / load[{j}]" for i in (1, 2) for j in (1, 2, 6)]
+    assert curves == [*in_plane, *(f"X[3] / load[{j}]" for j in (3, 4, 5))] and len(lower.lines) == 9
+    assert len({(line.get_color(), line.get_linestyle()) for line in upper.lines}) == 9
+    box = names.get_legend().get_window_extent()
+    assert box.x0 > upper.get_window_extent().x1 and box.x1 < figure.bbox.x1 and figure.bbox.y0 < box.y0 < box.y1 < figure.bbox.y1
+    pyplot.close("all")
 
 
 def test_the_clients_version_is_that_of_the_server(server):

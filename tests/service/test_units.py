@@ -355,6 +355,7 @@ def test_films_and_diagrams_name_the_declared_units(server, units, length, time,
     pyplot.switch_backend("Agg")
 
     def shown(film):
+        film._draw_was_started = True  # else it warns when it goes
         film._draw_frame(0)
         axes = film._fig.axes[0]
         return axes.get_xlabel(), axes.get_title()

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .histories import Array
-from .words import frequency_unit, needed, seconds_in
+from .words import UnknownName, frequency_unit, needed, remedy, seconds_in
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -66,7 +66,7 @@ class StateSpace:
         """The part between some inputs and outputs."""
         chosen_in = [inputs] if isinstance(inputs, str) else list(inputs)
         chosen_out = [outputs] if isinstance(outputs, str) else list(outputs)
-        columns, rows = [self.inputs.index(name) for name in chosen_in], [self.outputs.index(name) for name in chosen_out]
+        columns, rows = _places("input", chosen_in, self.inputs), _places("output", chosen_out, self.outputs)
         return StateSpace(self.A, self.B[:, columns], self.C[rows], self.D[np.ix_(rows, columns)], chosen_in, chosen_out, self.time_unit)
 
     def plot_bode(self, frequencies_hz: Optional[npt.ArrayLike] = None, *, save: Optional[str] = None) -> Any:
@@ -130,6 +130,13 @@ class Modes:
         """Swings the model in a mode; see plots.animate_mode."""
         from . import plots
         return plots.animate_mode(self, number, **options)
+
+
+def _places(what: str, names: list[str], known: list[str]) -> list[int]:
+    for name in names:
+        if name not in known:
+            raise UnknownName(f"the system has no {what} {name!r}; {remedy(name, known)}")
+    return [known.index(name) for name in names]
 
 
 def _columns(simulation: Any, names: list[str]) -> list[str]:

@@ -9,6 +9,7 @@
 """
 from __future__ import annotations
 
+import operator
 import queue
 import threading
 import time
@@ -31,10 +32,18 @@ if TYPE_CHECKING:
 Answer = Callable[[exchange.Motion], Any]  # see Peer
 
 
+def _labels(port: str, nodes: Iterable[int]) -> list[int]:
+    """The nodes of a port, which has no model yet in which names could be found."""
+    try:
+        return [operator.index(label) for label in nodes]
+    except TypeError:
+        raise TypeError(f"`nodes` of port {port!r} must be a list of labels, whole numbers, got {nodes!r}") from None
+
+
 def structural_port(name: str, nodes: Iterable[int], *, offsets: Optional[npt.ArrayLike] = None,
                     reference: Optional[int] = None) -> types.PortDefinition:
-    """A port on structural nodes: motion out, forces and moments in. `offsets`: n x 3 in the nodes' frames [m]."""
-    port = types.PortDefinition(name=name, kind=types.PORT_KIND_STRUCTURAL, node_labels=list(nodes))
+    """A port on structural nodes, by their labels: motion out, forces and moments in. `offsets`: n x 3 in the nodes' frames [m]."""
+    port = types.PortDefinition(name=name, kind=types.PORT_KIND_STRUCTURAL, node_labels=_labels(name, nodes))
     if offsets is not None:
         port.offsets.extend(np.ravel(np.asarray(offsets, float)))
     if reference is not None:
@@ -50,7 +59,7 @@ def signal_port(name: str, outputs: Iterable[str], inputs: Iterable[str]) -> typ
 
 def motion_port(name: str, nodes: Iterable[int], *, positions_only: bool = False) -> types.PortDefinition:
     """A port that imposes the motion of nodes: reactions out, positions and orientations in."""
-    return types.PortDefinition(name=name, kind=types.PORT_KIND_MOTION, node_labels=list(nodes), positions_only=positions_only)
+    return types.PortDefinition(name=name, kind=types.PORT_KIND_MOTION, node_labels=_labels(name, nodes), positions_only=positions_only)
 
 
 def modal_port(name: str, joint: int) -> types.PortDefinition:

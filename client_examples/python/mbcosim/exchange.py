@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from mbcosim.v1 import common_pb2, coupling_pb2 as pb, coupling_types_pb2 as types
 
+from .calls import checked_units
 from .errors import Error
 from .rpc import fill_duration, protocol
 from .words import choice
@@ -89,6 +90,7 @@ def hello(simulation: Any, port: str, *, mode: Optional[str] = None, rotation: s
           check_model: bool = True, tangent: str = "none", heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None,
           units: Optional[common_pb2.UnitSystem] = None, step: Optional[int] = None, can_go_back: bool = False) -> pb.PeerMessage:
     """First message of a peer."""
+    checked_units(units)
     message = pb.Hello(
         protocol=protocol(), simulation=simulation.name, port=port, units=units,
         expected=pb.PeerExpectation(model_digest=simulation.info.model_digest if check_model else "", step=step, can_go_back=can_go_back),

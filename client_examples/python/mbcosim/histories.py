@@ -14,7 +14,7 @@ from .calls import SimulationCalls, StepResult
 from .errors import StepFailed
 from .rpc import USUAL
 from .table import Rows
-from .words import after_number, needed, remedy
+from .words import UnknownName, after_number, needed, remedy
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -44,7 +44,7 @@ class History(Mapping[str, Array]):
         try:
             return self._values[name]
         except KeyError:
-            raise KeyError(f"the history has no {name!r}; {remedy(name, self._values)}") from None
+            raise UnknownName(f"the history has no {name!r}; {remedy(name, self._values)}") from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)

@@ -51,6 +51,8 @@ def plot_history(history: History, names: Union[None, str, Iterable[str]] = None
     plt = pyplot(save)
     columns = history.columns()
     wanted = list(history) if names is None else [names] if isinstance(names, str) else list(names)
+    if not wanted:
+        raise ValueError("there is nothing to plot: " + ("the history has no variables" if names is None else "`names` is empty"))
     groups: dict[str, list[tuple[str, Array]]] = {}
     for name in wanted:
         if name in columns:
@@ -200,23 +202,44 @@ def animate_mode(modes: Modes, number: int, *, lines: Optional[Iterable[Sequence
 
 # ---------------------------------------------------------------- linear systems
 
+_FEW = 4              # curves whose legend has room within the axes
+_NOISE = 1e-12        # of the largest response of the same output or input: round-off of one that is none
+_DASHES = ("-", "--", "-.", ":")
+
+
+def _curves(system: StateSpace, response: npt.NDArray[np.complex128]) -> list[tuple[int, int]]:
+    """Pairs (output, input) that answer each other."""
+    sizes = np.abs(response).max(axis=0)
+    if not sizes.size or not sizes.max():
+        raise ValueError(f"there is nothing to plot: no output ({', '.join(system.outputs) or 'there is none'}) answers an input "
+                         f"({', '.join(system.inputs) or 'there is none'})")
+    least = _NOISE * np.minimum(sizes.max(axis=1, keepdims=True), sizes.max(axis=0, keepdims=True))
+    return [(i, j) for i, j in np.argwhere(sizes > least).tolist()]
+
+
 def plot_bode(system: StateSpace, frequencies_hz: Optional[npt.ArrayLike] = None, *, save: Optional[str] = None) -> Any:
-    """Magnitude and phase of every output over every input; default: two decades about the poles. Returns the figure."""
+    """Magnitude and phase of every output over every input that it answers, in the color of the input and the dashes of the output; default: two
+    decades about the poles. Returns the figure."""
     plt = pyplot(save)
     frequencies = system.frequencies() if frequencies_hz is None else np.asarray(frequencies_hz, float)
     response = system.response(frequencies)
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=(8, 6), sharex=True, layout="constrained")
-    for i, output in enumerate(system.outputs):
-        for j, source in enumerate(system.inputs):
-            if not np.abs(response[:, i, j]).max():
-                continue
-            upper.loglog(frequencies, np.abs(response[:, i, j]), label=f"{output} / {source}")
-            lower.semilogx(frequencies, np.degrees(np.unwrap(np.angle(response[:, i, j]))))
+    curves = _curves(system, response)
+    beside = len(curves) > _FEW
+    figure = plt.figure(figsize=(12, max(6, 0.22 * len(curves))) if beside else (8, 6), layout="constrained")
+    grid = figure.add_gridspec(2, 2 if beside else 1, width_ratios=[2, 1] if beside else None)
+    upper = figure.add_subplot(grid[0, 0])
+    lower = figure.add_subplot(grid[1, 0], sharex=upper)
+    upper.tick_params(labelbottom=False)
+    for i, j in curves:
+        style: dict[str, Any] = {"color": f"C{j}", "linestyle": _DASHES[i % len(_DASHES)], "linewidth": 1.2}
+        upper.loglog(frequencies, np.abs(response[:, i, j]), label=f"{system.outputs[i]} / {system.inputs[j]}", **style)
+        lower.semilogx(frequencies, np.degrees(np.unwrap(np.angle(response[:, i, j]))), **style)
     upper.set_ylabel("magnitude")
     lower.set(xlabel=f"frequency [{frequency_unit(system.time_unit)}]", ylabel="phase [degrees]")
     for axes in (upper, lower):
         axes.grid(alpha=0.3, which="both")
-    upper.legend(fontsize="small", frameon=False)
+    names = figure.add_subplot(grid[:, 1], frameon=False, xticks=[], yticks=[]) if beside else upper
+    names.legend(*upper.get_legend_handles_labels(), fontsize="small", frameon=False, loc="center left" if beside else "best")
     return _finish(figure, save)
 
 

@@ -5,6 +5,13 @@ import difflib
 from typing import Any, Iterable, Optional
 
 
+class UnknownName(KeyError):
+    """A KeyError whose text is for people: shown without the quotes that a KeyError puts about it."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 def listed(names: Iterable[object], most: int = 12) -> str:
     """`'a', 'b', 'c'`; of many the first ones."""
     every = [repr(name) for name in names]
