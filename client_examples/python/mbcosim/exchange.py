@@ -220,12 +220,12 @@ class AnswerForm:
             "forces": 0 if motion else 3 * self._rows, "moments": 0 if motion or mapped else 3 * nodes, "reference_force": reference,
             "reference_moment": reference, "signals": 0 if motion else layout.input_size, "positions": 3 * nodes if motion else 0,
             "rotations": width * nodes if motion and not layout.positions_only else 0, "stiffness": block, "damping": block}
-        self._optional = ("moments", "stiffness", "damping")
+        self.needed = {name for name, size in self._sizes.items() if size} - {"moments", "stiffness", "damping"}
 
     def fault(self, name: str, values: Optional[Array]) -> Optional[str]:
         """What is wrong with an array of an answer; None: nothing."""
         size = 0 if values is None else values.size
-        if size == 0 and (name in self._optional or not self._sizes[name]):
+        if size == 0 and name not in self.needed:
             return None
         if size != self._sizes[name] or (name in ("forces", "moments", "positions") and values is not None and self._is_turned(values)):
             given = "is missing" if values is None else f"has the shape {values.shape}"
@@ -267,7 +267,10 @@ def answer(number: int, value: Any, form: AnswerForm) -> pb.PeerMessage:
     loads, values = _loads(value, form.kind), out.answer
     values.SetInParent()
     for name in _ARRAYS:
-        numbers = _numbers(name, getattr(loads, name))
+        given = getattr(loads, name)
+        if given is None and name not in form.needed:
+            continue
+        numbers = _numbers(name, given)
         fault = form.fault(name, numbers)
         if fault:
             raise ValueError(fault)
