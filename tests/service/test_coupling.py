@@ -334,6 +334,10 @@ def test_an_answer_of_the_wrong_length_ends_the_stream(server, careless):
         assert simulation.refresh().step == 0
 
 
+def raises(error):
+    raise error
+
+
 SHAPES = [
     (lambda m: [[1.0, 2.0]], r"ValueError: `forces` has the shape \(1, 2\); port \"spring\" takes 1 x 3, a row for each of its points"),
     (lambda m: None, "ValueError: `forces` is missing; port"), (lambda m: {"force": [0, 0, 0]}, "TypeError: `forces` of an answer must be numbers, got .*, a dict"),
@@ -341,7 +345,8 @@ SHAPES = [
     (lambda m: 5 * ([[0, 0, 0]],), "ValueError: an answer of 5 parts; this port takes forces, moments, reference_force, reference_moment, or mbcosim.Loads"),
     (lambda m: ([[0, 0, 0]], [1, 2]), "ValueError: `moments` has the shape"), (lambda m: mbcosim.Loads([[0, 0, 0]], signals=[1]), 'ValueError: `signals` .* takes none'),
     (lambda m: mbcosim.Loads([[0, 0, 0]], stiffness=np.eye(6)), "ValueError: `stiffness` .* takes none without `tangent` of the peer"),
-    (lambda m: mbcosim.Reject(-1.0), "ValueError: `preferred_step_size` must be positive, got -1.0"), (lambda m: sys.exit(3), "SystemExit: 3")]
+    (lambda m: mbcosim.Reject(-1.0), "ValueError: `preferred_step_size` must be positive, got -1.0"), (lambda m: sys.exit(3), "SystemExit: 3"),
+    (lambda m: raises(KeyboardInterrupt("no more")), "KeyboardInterrupt: no more"), (lambda m: raises(GeneratorExit()), "GeneratorExit: ")]
 
 
 @pytest.mark.parametrize("answer, text", SHAPES)
@@ -353,6 +358,22 @@ def test_an_answer_that_is_none_is_told_to_its_peer_and_fails_the_step(server, a
             simulation.step()
         assert re.match(text, f"{type(peer.raised).__name__}: {peer.raised}") and peer.error is None
         assert simulation.step(3).step == 3
+
+
+class Unprintable(Exception):
+    def __str__(self):
+        raise ValueError("no text")
+
+
+@pytest.mark.parametrize("error, told", [
+    (FileNotFoundError("\udcff.dat"), r"FileNotFoundError: \?.dat"), (Unprintable(), "Unprintable, whose text cannot be had: ValueError"),
+    (mbcosim.Reject(text="the file \udcff is missing"), r"the file \? is missing")])
+def test_texts_that_cannot_travel_are_told_as_far_as_they_can(server, error, told):
+    with oscillator(server) as simulation, simulation.couple("spring", lambda m: raises(error)) as peer:
+        for _ in range(2):
+            with pytest.raises(mbcosim.StepFailed, match=told):
+                simulation.step(timeout=8)
+        assert peer.raised is error
 
 
 def test_columns_in_place_of_rows_are_no_answer(server):

@@ -177,5 +177,5 @@ class Peer(exchange.Course):
         for motion in self:
             try:
                 self.answer(self._function(motion))
-            except (Exception, SystemExit) as error:  # whatever the user's code raises becomes a failed step with this text
+            except BaseException as error:  # whatever the user's code raises becomes a failed step with this text
                 self.fail(error)

@@ -285,7 +285,7 @@ def answer(number: int, value: Any, form: AnswerForm) -> pb.PeerMessage:
 
 def _rejection(number: int, value: Reject) -> pb.PeerMessage:
     out = pb.PeerExchange(index=number)
-    out.reject.text = value.text
+    out.reject.text = _sendable(str(value.text))
     if value.preferred_step_size is not None:
         out.reject.preferred_step_size = value.preferred_step_size
     return pb.PeerMessage(exchange=out)
@@ -303,11 +303,24 @@ def _loads(value: Any, kind: int) -> Loads:
     return Loads(**dict(zip(names, values)))
 
 
+def _sendable(text: str) -> str:
+    """Without the halves of characters that names of files may have."""
+    return text.encode(errors="replace").decode()
+
+
+def _told(error: BaseException) -> str:
+    """What the server is told of an exception, also of one that cannot be printed."""
+    try:
+        return _sendable(f"{type(error).__name__}: {error}")
+    except Exception as fault:
+        return f"{type(error).__name__}, whose text cannot be had: {type(fault).__name__}"
+
+
 def failure(number: int, error: BaseException) -> pb.PeerMessage:
     """The answer of a peer that cannot compute, or rejects the step."""
     if isinstance(error, Reject):
         return _rejection(number, error)
-    return pb.PeerMessage(exchange=pb.PeerExchange(index=number, failure=f"{type(error).__name__}: {error}"))
+    return pb.PeerMessage(exchange=pb.PeerExchange(index=number, failure=_told(error)))
 
 
 class Course:
