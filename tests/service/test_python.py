@@ -65,6 +65,38 @@ def test_a_private_daemon_ends_with_a_program_that_is_killed(how):
     wait_for(lambda: not running(keeper))
 
 
+FORKS = """
+import mbcosim, os, sys, time
+server = mbcosim.local()
+folder = os.path.dirname(server.address[len("unix:"):])
+if os.fork() == 0:
+    sys.exit(0)
+assert os.wait()[1] == 0 and os.path.exists(folder), "an end in good order of the child ended the daemon"
+child = os.fork()
+if child == 0:
+    time.sleep(600)
+with mbcosim.connect(server.address) as other:
+    assert other.list() == []
+begin = time.monotonic()
+server.close()
+print(os.path.exists(folder), time.monotonic() - begin)
+os.kill(child, 9)
+"""
+
+
+def test_a_private_daemon_is_that_of_the_process_that_started_it():
+    done = subprocess.run([sys.executable, "-c", FORKS], stdout=subprocess.PIPE, text=True, timeout=60 * TIME_FACTOR, check=True)
+    left, seconds = done.stdout.split()
+    assert left == "False" and float(seconds) < 1.9 * TIME_FACTOR
+
+
+def test_a_private_daemon_that_is_stopped_delays_nobody_for_long():
+    with mbcosim.local() as server:
+        os.kill(daemon_of(server), signal.SIGSTOP)
+        begin = time.monotonic()
+    assert time.monotonic() - begin < 3 + TIME_FACTOR
+
+
 def test_a_private_daemon_that_cannot_start_says_why():
     with pytest.raises(mbcosim.Unavailable, match="ended with .* before it listened: (.|\n)*--no-such-option"):
         mbcosim.local("--no-such-option")
