@@ -32,8 +32,8 @@ from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepR
 from .coupling import Answer, open_stream
 from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
 from .histories import History
-from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, checked_timeout, metadata, parting,
-                  runs_calls)
+from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, cancelling, checked_timeout, metadata,
+                  parting, runs_calls)
 from .simulation import subscribe_request
 from .stepping import AwaitedSharedStream, AwaitedStepLine, status_of
 
@@ -119,10 +119,11 @@ class Connection(Address):
         answer = self.stubs.method(call.method)(call.sent(), metadata=self.metadata_of(call), timeout=call.timeout)
         if call.each is None:
             return await answer
-        async for message in answer:
-            taken = call.each(message)
-            if inspect.isawaitable(taken):
-                await taken
+        with cancelling(answer):
+            async for message in answer:
+                taken = call.each(message)
+                if inspect.isawaitable(taken):
+                    await taken
         return None
 
 

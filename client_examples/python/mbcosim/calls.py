@@ -461,9 +461,9 @@ class SimulationCalls(Generic[SnapshotKind]):
 
         def take(message: pb.RunReply) -> Any:
             if message.HasField("progress"):
-                wanted(message.progress)
-            else:
-                done.append(message.done)
+                return wanted(message.progress)  # a coroutine of the asyncio client's
+            done.append(message.done)
+            return None
 
         yield Call("Simulations/Run", pb.RunRequest(step=request), timeout, each=take)
         return self.result(done[-1], outputs)
