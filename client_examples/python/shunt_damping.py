@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs the cantilever with piezoelectric patches open and shunted, side by side, and compares the vibration of the free end.
+"""Runs the cantilever with piezoelectric patches short-circuited and shunted, side by side, and compares the vibration of the free end.
 
 usage: shunt_damping.py [--address ADDRESS] [--plot FILE.png]
 """
@@ -27,7 +27,7 @@ def vibrate(server: mbcosim.Server, deck: str) -> example.Array:
 def main() -> None:
     options = example.options(__doc__, "shunt.png")
     with mbcosim.connect_or_start(options.address) as server:
-        runs = {"open": vibrate(server, "cantilever_piezo_open.mbd"), "shunted": vibrate(server, "cantilever_piezo_shunt.mbd")}
+        runs = {"short-circuited": vibrate(server, "cantilever_piezo_shorted.mbd"), "shunted": vibrate(server, "cantilever_piezo_shunt.mbd")}
 
     picture, axes = example.figure(2, figsize=(8, 6), sharex=True)
     for name, (times, velocity, voltage) in runs.items():
@@ -39,7 +39,7 @@ def main() -> None:
     example.save(picture, options.plot)
     for name, (times, velocity, _) in runs.items():
         late = np.diff(velocity[(times > 0.01) & (times < 0.03)])
-        print(f"{name:8} largest change of velocity in a step between 0.01 s and 0.03 s: {np.abs(late).max():.3e} m/s")
+        print(f"{name:16} largest change of velocity in a step between 0.01 s and 0.03 s: {np.abs(late).max():.3e} m/s")
 
 
 if __name__ == "__main__":

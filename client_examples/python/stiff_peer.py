@@ -20,6 +20,7 @@ SUBSTEPS, DELAY = 20, 1e-3                 # of the peer within a step; what a p
 GRAVITY = np.array([0.0, 0.0, -9.81])
 BODY = "node.structural.2.X"
 METHODS = {"none": "plain", "aitken": "Aitken", "iqn_ils": "IQN-ILS"}
+LINES = {"plain": ("C3", ":", 1.5), "Aitken": ("C1", "-", 4.0), "IQN-ILS": ("C0", "--", 1.5)}  # the last two lie on each other
 
 
 class Container:
@@ -74,16 +75,17 @@ def main() -> None:
 
     picture, axes = example.figure(2, figsize=(8, 7), sharex=True)
     for name, ((times, heights), passes) in runs.items():
+        color, line, width = LINES[name]
         if passes:
-            axes[0, 0].plot(times, heights, label=name)
-        axes[1, 0].plot(times, passes, ".", label=name if passes else f"{name}: diverges in the first step")
+            axes[0, 0].plot(times, heights, line, color=color, linewidth=width, label=name)
+        axes[1, 0].plot(times, passes, ".", color=color, label=name if passes else f"{name}: diverges in the first step")
     axes[0, 0].set(ylabel="height [m]", title="A pendulum that carries a heavy mass on a stiff spring")
     axes[1, 0].set(xlabel="time [s]", ylabel="passes of a step", ylim=(0, None))
     for axis in axes[:, 0]:
         axis.legend()
     example.save(picture, options.plot)
     for name, (_, passes) in runs.items():
-        print(f"{name}: {len(passes):.1f} steps, {np.mean(passes) if passes else 0.0:.2f} passes a step")
+        print(f"{name}: {len(passes)} steps, {np.mean(passes) if passes else 0.0:.2f} passes a step")
 
 
 if __name__ == "__main__":

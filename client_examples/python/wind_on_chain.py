@@ -63,7 +63,7 @@ def main() -> None:
     axes[0, 0].legend(loc="upper left")
     example.save(picture, options.plot)
     apart = np.linalg.norm(windy - still, axis=1)
-    print(f"the end is {apart[-1]:.3f} m from where it were without wind; {len(middle):.1f} samples of the second port")
+    print(f"the end is {apart[-1]:.3f} m from where it would be without wind; {len(middle)} samples of the second port")
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ import textwrap
 NOTE = "<!-- Written by tests/docs/deck_reference.py from `mbcosim keywords --json`; change src/input/grammar. -->\n"
 WIDTH = 110
 PLAIN = ("expression function", "constant")  # words without a grammar: a table is enough
+SAMPLES = "Grammars are samples of how a word is usually written, not all that the reader takes."
 HEADS = {  # what a page says before its words
     "notation": "What the other pages write in angle brackets. A notation may be written anew by others of this page.",
     "block": "A deck is made of these blocks, in this order: `data`, one block for the problem, `control data`, `nodes`, `drivers` when there are "
@@ -98,7 +99,7 @@ def page(group, known):
         lines += [HEADS[group["name"]], ""]
     if group["name"] in PLAIN:
         return "\n".join(lines + table(group))
-    lines += ["The general form:", "", "```", group["form"], "```", ""]
+    lines += [f"{SAMPLES} The general form:", "", "```", group["form"], "```", ""]
     place = "" if group["name"] == "notation" else "notation.md"
     for word in group["words"]:
         lines += entry(group, word, known, place)
@@ -110,7 +111,7 @@ def index(groups):
     rows = [f"| [{group['title']}]({file_of(group)}) | {len(group['words'])} | {', '.join(samples(group))} |" for group in groups]
     return "\n".join([NOTE, "# The deck language, card by card", "", textwrap.fill(
         f"Every word that the reader knows, {served} of them served: how it is written, the units of its numbers, what it writes, how far it is "
-        "served. A test writes sentences by these grammars and has them read. What is written differently from MBDyn, and what is not served, "
+        f"served. {SAMPLES} A test writes sentences by these grammars and has them read. What is written differently from MBDyn, and what is not served, "
         "in short tables: [LANGUAGE.md](../../../src/input/LANGUAGE.md); results that differ: [DIFFERENCES.md](../../../src/DIFFERENCES.md). "
         "The same texts are what `mbcosim lsp` shows in an editor and what `mbcosim keywords --json` prints.", 140), "",
         "How to read a grammar:", "",

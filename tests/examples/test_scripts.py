@@ -23,15 +23,18 @@ def address(tmp_path_factory):
     assert daemon.wait(20) == 0
 
 
-def run(script, address, tmp_path, *options):
-    """The numbers with a point that a script prints, for each line."""
+WITH_A_POINT, ALL = r"(?<![\w.])-?\d+\.\d+(?:e[-+]?\d+)?", r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+
+
+def run(script, address, tmp_path, *options, numbers=WITH_A_POINT):
+    """The numbers that a script prints, for each line."""
     plot = tmp_path / "plot.png"
     done = subprocess.run([sys.executable, os.path.join(SCRIPTS, script), "--address", address, "--plot", str(plot),
                            *options],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=200)
     assert done.returncode == 0, done.stderr
     assert plot.read_bytes().startswith(b"\x89PNG") and plot.stat().st_size > 10000
-    return [[float(x) for x in re.findall(r"(?<![\w.])-?\d+\.\d+(?:e[-+]?\d+)?", line)]
+    return [[float(x) for x in re.findall(numbers, line)]
             for line in done.stdout.splitlines() if not line.startswith("plot")]
 
 
@@ -42,8 +45,8 @@ def test_pendulum(address, tmp_path):
 
 
 def test_shunt_damping(address, tmp_path):
-    opened, shunted = run("shunt_damping.py", address, tmp_path)
-    assert shunted[-1] < 0.05 * opened[-1]
+    shorted, shunted = run("shunt_damping.py", address, tmp_path)
+    assert shunted[-1] < 0.05 * shorted[-1]
 
 
 def test_servo_moves_the_end_of_the_beam_as_commanded(address, tmp_path):
@@ -68,22 +71,23 @@ def test_controllers(address, tmp_path):
 
 def test_wind_on_chain(address, tmp_path):
     """Ports on a deck that has none; the wind carries the chain's end away once it is free."""
-    (apart, samples), = run("wind_on_chain.py", address, tmp_path, "--steps", "1500")
+    (apart, samples), = run("wind_on_chain.py", address, tmp_path, "--steps", "1500", numbers=ALL)
     assert 0.1 < apart < 2 and samples == 150
 
 
 def test_stiff_peer(address, tmp_path):
     """The plain exchange diverges; quasi-Newton needs fewer passes than Aitken."""
-    _, plain, aitken, quasi_newton = run("stiff_peer.py", address, tmp_path, "--steps", "60")
+    _, plain, aitken, quasi_newton = run("stiff_peer.py", address, tmp_path, "--steps", "60", numbers=ALL)
     assert plain == [0, 0] and aitken[0] == quasi_newton[0] == 60
     assert 2 < quasi_newton[1] < 5 < aitken[1]
 
 
 def test_strip_wing(address, tmp_path):
-    """Below the flutter speed a gust dies out, above it does not; the tangent saves exchanges and changes nothing."""
-    slow, _, fast, plain = run("strip_wing.py", address, tmp_path, "--steps", "350")
-    assert slow[0] == 40 and slow[1] > 20 and slow[2] < 0.2 * slow[1] and fast[0] == 90 and fast[2] > 3 * slow[2]
-    assert slow[3] < 0.8 * plain[0] and plain[1] < 1e-6
+    """It flutters between 55 and 60 m/s: the last two fifths of the runs tell; the tangent saves exchanges and changes nothing."""
+    *flights, plain = run("strip_wing.py", address, tmp_path)
+    assert [speed for speed, *_ in flights] == [40, 55, 60, 70] and all(deflection > 20 for _, deflection, *_ in flights)
+    assert [last > before for *_, before, last in flights] == [False, False, True, True]
+    assert flights[0][2] < 0.8 * plain[0] and plain[1] < 1e-6
 
 
 def test_two_daemons(address, tmp_path):

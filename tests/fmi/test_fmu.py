@@ -18,7 +18,7 @@ from importer import DISCARD, ERROR, OK, Archive, Failed, instance_of
 BIN = os.environ["MBCOSIM_BIN"]
 MODELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "client_examples", "models")
 TUTORIALS = ["rigid_body", "pendulum", "three_pendulums", "chain", "cantilever_dead_load", "cantilever_follower_load",
-             "cantilever_varying_load", "cantilever_five", "cantilever_piezo_open", "cantilever_piezo_shunt", "actuated_beam",
+             "cantilever_varying_load", "cantilever_five", "cantilever_piezo_shorted", "cantilever_piezo_shunt", "actuated_beam",
              "actuated_beam_inline", "actuated_beam_servo", "modal_body"]
 STANDARDS = ["2", "3"]
 # A port, a stream drive, a parameter node and a drive that fails below x = -0.4.

@@ -1,5 +1,6 @@
 """The asyncio client: steps, reads, writes, couples; the same numbers as the blocking one."""
 import asyncio
+import concurrent.futures
 import gc
 
 import pytest
@@ -8,6 +9,7 @@ import decks
 import mbcosim
 import mbcosim.aio
 from conftest import TIME_FACTOR
+from mbcosim import exchange
 from test_coupling import PORT, oscillator, position, spring
 
 X = "node.structural.1.X"
@@ -97,7 +99,7 @@ def test_two_simulations_side_by_side(daemon):
     assert first == second
 
 
-def test_failures(daemon):
+def test_failures(daemon, monkeypatch):
     async def body(_, simulation):
         with pytest.raises(mbcosim.NotFound) as caught:
             await simulation.couple("wing", spring)
@@ -109,6 +111,11 @@ def test_failures(daemon):
         async with await simulation.couple("spring", gust):
             with pytest.raises(mbcosim.StepFailed, match="no aerodynamics today"):
                 await simulation.step()
+        async with await simulation.couple("spring", lambda motion: [1.0, 2.0]) as peer:
+            with pytest.raises(mbcosim.StepFailed, match=r"the peer failed: ValueError: `forces` has the shape \(2,\)"):
+                await simulation.step()
+            assert isinstance(peer.raised, ValueError) and peer.error is None
+        monkeypatch.setattr(exchange.AnswerForm, "fault", lambda *_: None)  # the server looks, too
         wrong = await simulation.couple("spring", lambda motion: [1.0, 2.0], peer_timeout=5)
         with pytest.raises(mbcosim.StepFailed):
             await simulation.step()
@@ -150,6 +157,121 @@ def test_a_peer_that_computes_while_the_server_dies_is_told(start_daemon):
     asyncio.run(asyncio.wait_for(body(), 60 * TIME_FACTOR))
     gc.collect()
     assert stray == []
+
+
+async def watched(server, simulation, what):
+    """What `async for` takes: a subscription, events or a peer."""
+    if what == "events":
+        return await server.events()
+    return await (simulation.subscribe([X]) if what == "subscription" else simulation.couple("spring"))
+
+
+@pytest.mark.parametrize("what", ["subscription", "events", "peer"])
+def test_who_cancels_a_task_ends_it_while_it_waits_for_what_comes(daemon, what):
+    async def body(server, simulation):
+        went_on = []
+
+        async def reader():
+            async with await watched(server, simulation, what) as watcher:
+                async for _ in watcher:
+                    pass
+                went_on.append(what)
+
+        task = asyncio.create_task(reader())
+        await asyncio.sleep(0.2)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(reader(), 0.2)
+        assert went_on == []
+
+    run(daemon, body)
+
+
+@pytest.mark.parametrize("what", ["subscription", "events", "peer"])
+def test_what_is_closed_here_ends_in_good_order(daemon, what):
+    async def body(server, simulation):
+        watcher = await watched(server, simulation, what)
+
+        async def reader():
+            async for _ in watcher:
+                pass
+            return "the end"
+
+        task = asyncio.create_task(reader())
+        await asyncio.sleep(0.2)
+        closing = watcher.close()
+        if closing is not None:
+            await closing
+        assert await task == "the end" and await reader() == "the end"
+
+    run(daemon, body)
+
+
+def test_whatever_a_function_raises_fails_the_step(daemon):
+    class Nothing(BaseException):
+        pass
+
+    async def cancelled():
+        other = asyncio.ensure_future(asyncio.sleep(600))
+        asyncio.get_running_loop().call_soon(other.cancel)
+        await other
+
+    async def raises(error):
+        raise error
+
+    async def body(_, simulation):
+        for text, work in (("Nothing: at all", lambda: raises(Nothing("at all"))), ("CancelledError: ", cancelled)):
+            async with await simulation.couple("spring", lambda motion, work=work: work()) as peer:
+                for _ in range(2 if hasattr(asyncio.Task, "cancelling") else 1):
+                    with pytest.raises(mbcosim.StepFailed, match="the peer failed: " + text):
+                        await simulation.step()
+                assert peer.raised is not None and peer.error is None
+        assert (await simulation.couple("spring", spring)).error is None and (await simulation.step()).step == 1
+
+    run(daemon, body)
+
+
+def test_a_program_that_ends_in_a_function_tells_the_server(daemon, server):
+    def leaves(motion):
+        raise SystemExit(3)
+
+    stepping = []
+    with concurrent.futures.ThreadPoolExecutor() as blocking, oscillator(server) as simulation:
+        async def main():
+            async with mbcosim.aio.connect(daemon.address) as connection:
+                same = await connection.attach(simulation.name)
+                await same.couple("spring", leaves)
+                stepping.append(blocking.submit(simulation.step))
+                await asyncio.sleep(600)
+
+        with pytest.raises(SystemExit):
+            asyncio.run(main())
+        with pytest.raises(mbcosim.StepFailed, match="the peer failed: SystemExit: 3"):
+            stepping[0].result(60)
+
+
+def test_a_closed_peer_cancels_the_function_that_hangs(daemon):
+    async def body(_, simulation):
+        ended = []
+
+        async def hangs(motion):
+            try:
+                await asyncio.sleep(600)
+            finally:
+                ended.append(motion.step)
+
+        peer = await simulation.couple("spring", hangs, peer_timeout=600)
+        step = asyncio.ensure_future(simulation.step())
+        while not peer._task or not peer._index:
+            await asyncio.sleep(0.01)
+        await peer.close()
+        assert ended == [0] and peer._task.done()
+        with pytest.raises(mbcosim.StepFailed, match="the peer is gone"):
+            await step
+
+    run(daemon, body)
 
 
 def test_synchronous_peers_and_views(server):

@@ -97,6 +97,21 @@ def test_a_step_that_nobody_awaits_any_more_leaves_no_reply_for_the_next(daemon)
     run(daemon, body)
 
 
+def test_a_run_whose_progress_raises_ends_on_the_server(daemon):
+    async def refuses(progress):
+        raise ValueError("enough")
+
+    async def body(server):
+        async with await server.load_text(decks.endless()) as simulation:
+            with pytest.raises(ValueError, match="enough") as caught:
+                await simulation.run_until(1e8, progress=refuses)
+            while (await simulation.refresh()).state != pb.SIMULATION_STATE_READY:
+                await asyncio.sleep(0.01)
+            assert caught.value  # whose trace keeps the call
+
+    run(daemon, body)
+
+
 async def subscribed(simulation):
     """A subscription in the only place for streams. The upload of the deck has it until the server knows that its reply has arrived."""
     while True:

@@ -1,4 +1,6 @@
 """Peers on ports: the modes, their order, their failures."""
+import re
+import sys
 import time
 
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 import decks
 import mbcosim
 from conftest import TIME_FACTOR, redone_alike, wait_for
+from mbcosim import exchange
 
 STIFFNESS, SPEED = 400.0, 1.0  # of a spring that a peer computes; the unit mass starts with this speed along y
 PORT = [mbcosim.structural_port("spring", nodes=[1])]
@@ -316,13 +319,75 @@ def test_every_mismatch_is_told_at_once(server):
         assert caught.value.reason == "NO_SUCH_PORT"
 
 
-def test_an_answer_of_the_wrong_length_ends_the_stream(server):
+@pytest.fixture
+def careless(monkeypatch):
+    """Peers send whatever their functions return."""
+    monkeypatch.setattr(exchange.AnswerForm, "fault", lambda *_: None)
+
+
+def test_an_answer_of_the_wrong_length_ends_the_stream(server, careless):
     with oscillator(server) as simulation, simulation.couple("spring", lambda motion: [[1.0, 2.0]], peer_timeout=5) as peer:
         with pytest.raises(mbcosim.StepFailed):
             simulation.step()
         wait_for(lambda: peer.error)
         assert peer.error.reason == "BAD_ARGUMENT" and "3 numbers" in str(peer.error)
         assert simulation.refresh().step == 0
+
+
+def raises(error):
+    raise error
+
+
+SHAPES = [
+    (lambda m: [[1.0, 2.0]], r"ValueError: `forces` has the shape \(1, 2\); port \"spring\" takes 1 x 3, a row for each of its points"),
+    (lambda m: None, "ValueError: `forces` is missing; port"), (lambda m: {"force": [0, 0, 0]}, "TypeError: `forces` of an answer must be numbers, got .*, a dict"),
+    (lambda m: [[np.nan, 0, 0]], r"ValueError: `forces` has numbers that are not finite: \[\[nan, 0.0, 0.0\]\]"),
+    (lambda m: 5 * ([[0, 0, 0]],), "ValueError: an answer of 5 parts; this port takes forces, moments, reference_force, reference_moment, or mbcosim.Loads"),
+    (lambda m: ([[0, 0, 0]], [1, 2]), "ValueError: `moments` has the shape"), (lambda m: mbcosim.Loads([[0, 0, 0]], signals=[1]), 'ValueError: `signals` .* takes none'),
+    (lambda m: mbcosim.Loads([[0, 0, 0]], stiffness=np.eye(6)), "ValueError: `stiffness` .* takes none without `tangent` of the peer"),
+    (lambda m: mbcosim.Reject(-1.0), "ValueError: `preferred_step_size` must be positive, got -1.0"), (lambda m: sys.exit(3), "SystemExit: 3"),
+    (lambda m: raises(KeyboardInterrupt("no more")), "KeyboardInterrupt: no more"), (lambda m: raises(GeneratorExit()), "GeneratorExit: ")]
+
+
+@pytest.mark.parametrize("answer, text", SHAPES)
+def test_an_answer_that_is_none_is_told_to_its_peer_and_fails_the_step(server, answer, text):
+    """Not "the peer is gone": the stream goes on, and so does the next step."""
+    given = iter([answer])
+    with oscillator(server) as simulation, simulation.couple("spring", lambda m: next(given, spring)(m)) as peer:
+        with pytest.raises(mbcosim.StepFailed, match='port "spring": the peer failed: ' + text):
+            simulation.step()
+        assert re.match(text, f"{type(peer.raised).__name__}: {peer.raised}") and peer.error is None
+        assert simulation.step(3).step == 3
+
+
+class Unprintable(Exception):
+    def __str__(self):
+        raise ValueError("no text")
+
+
+@pytest.mark.parametrize("error, told", [
+    (FileNotFoundError("\udcff.dat"), r"FileNotFoundError: \?.dat"), (Unprintable(), "Unprintable, whose text cannot be had: ValueError"),
+    (mbcosim.Reject(text="the file \udcff is missing"), r"the file \? is missing")])
+def test_texts_that_cannot_travel_are_told_as_far_as_they_can(server, error, told):
+    with oscillator(server) as simulation, simulation.couple("spring", lambda m: raises(error)) as peer:
+        for _ in range(2):
+            with pytest.raises(mbcosim.StepFailed, match=told):
+                simulation.step(timeout=8)
+        assert peer.raised is error
+
+
+def test_columns_in_place_of_rows_are_no_answer(server):
+    port = mbcosim.structural_port("two", nodes=[1, 2])
+    with server.load_text(decks.OSCILLATOR, ports=[port]) as simulation, simulation.couple("two", lambda m: np.zeros((3, 2))):
+        with pytest.raises(mbcosim.StepFailed, match=r"`forces` has the shape \(3, 2\); port .two. takes 2 x 3"):
+            simulation.step()
+
+
+def test_signals_that_are_missing_are_told_by_their_names(server):
+    port = [mbcosim.signal_port("control", outputs=["time"], inputs=["node.structural.1.load"])]
+    with server.load_text(decks.body(), ports=port) as simulation, simulation.couple("control", lambda m: [1.0]):
+        with pytest.raises(mbcosim.StepFailed, match=r"`signals` has the shape \(1,\); port .control. takes 6 numbers, node.structural.1.load"):
+            simulation.step()
 
 
 def test_restore_is_clean_with_a_peer(server):

@@ -10,6 +10,7 @@ import mbcosim
 from conftest import redone_alike, wait_for
 from mbcosim import exchange
 from mbcosim.coupling import open_stream
+from mbcosim.v1 import coupling_pb2, coupling_types_pb2
 from test_coupling import PORT, position, spring
 
 STEP = 0.05
@@ -121,13 +122,14 @@ def trace(server, simulation, forces, steps, **options):
     out, names = queue.SimpleQueue(), []
     out.put(exchange.hello(simulation, "spring", **options))
     stream = open_stream(server._channel)(iter(out.get, None), metadata=server.metadata)
+    form = exchange.AnswerForm(coupling_types_pb2.PortLayout(kind=coupling_types_pb2.PORT_KIND_STRUCTURAL, node_labels=[1]), coupling_pb2.Hello())
 
     def listen():
         for data in stream:
             name, content = exchange.receive(data)
             names.append("x" if name == "exchange" else name[0])
             if name == "exchange":
-                out.put(exchange.answer(exchange.index(content), [[next(forces), 0, 0]], 1))
+                out.put(exchange.answer(exchange.index(content), [[next(forces), 0, 0]], form))
 
     thread = threading.Thread(target=listen)
     thread.start()

@@ -7,6 +7,7 @@ import pytest
 import decks
 import mbcosim
 from conftest import MODELS, wait_for
+from mbcosim import exchange
 
 # ---------------------------------------------------------------- motion
 
@@ -155,13 +156,24 @@ def test_ports_that_do_not_fit_are_refused(server, port, match):
 @pytest.mark.parametrize("answer, match", [
     (lambda m: [[0, 0]], "3 numbers"), (lambda m: ([[0, 0, 0]], 2 * np.eye(3)), "no rotation"),
     (lambda m: [[0, 0, 0]], "`rotations` must have 9"), (lambda m: mbcosim.Loads(positions=[0, 0, 0], rotations=np.eye(3), forces=[1, 2, 3]), "only")])
-def test_wrong_motion_is_refused(server, answer, match):
+def test_wrong_motion_is_refused(server, answer, match, monkeypatch):
+    monkeypatch.setattr(exchange.AnswerForm, "fault", lambda *_: None)
     with server.load_text(decks.body(), ports=[mbcosim.motion_port("m", nodes=[1])]) as simulation:
         with simulation.couple("m", answer, peer_timeout=5) as peer:
             with pytest.raises(mbcosim.StepFailed):
                 simulation.step()
             wait_for(lambda: peer.error)
             assert peer.error.reason == "BAD_ARGUMENT" and match in str(peer.error)
+
+
+@pytest.mark.parametrize("answer, text", [
+    (lambda m: [[0, 0]], r"`positions` has the shape \(1, 2\); port .m. takes 1 x 3"), (lambda m: [[0, 0, 0]], "`rotations` is missing; port .m. takes 1 x 9"),
+    (lambda m: ([[0, 0, 0]], np.eye(3), 0), "an answer of 3 parts; this port takes positions, rotations, or"),
+    (lambda m: mbcosim.Loads(positions=[0, 0, 0], rotations=np.eye(3), forces=[1, 2, 3]), "`forces` .* port .m. takes none")])
+def test_wrong_motion_is_told_to_the_peer(server, answer, text):
+    with server.load_text(decks.body(), ports=[mbcosim.motion_port("m", nodes=[1])]) as simulation, simulation.couple("m", answer):
+        with pytest.raises(mbcosim.StepFailed, match="the peer failed: ValueError: " + text):
+            simulation.step()
 
 
 def test_motion_has_no_zero(server):

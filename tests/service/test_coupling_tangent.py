@@ -4,6 +4,7 @@ import pytest
 
 import mbcosim
 from conftest import redone_alike, wait_for
+from mbcosim import exchange
 
 DECK = """
 begin: data; problem: initial value; end: data;
@@ -155,8 +156,9 @@ def test_choices_that_do_not_fit_are_refused_at_once(server, options, what):
 
 @pytest.mark.parametrize("tangent, given, match", [
     ("none", np.zeros((12, 12)), "not announced"), ("dense", np.zeros((6, 6)), "144 numbers"),
-    ("dense", np.zeros((2, 6, 6)), "block_diagonal"), ("dense", np.full((12, 12), np.nan), "not finite")])
-def test_a_wrong_tangent_ends_the_stream(server, tangent, given, match):
+    ("block_diagonal", np.zeros((12, 12)), "72 numbers"), ("dense", np.full((12, 12), np.nan), "not finite")])
+def test_a_wrong_tangent_ends_the_stream(server, tangent, given, match, monkeypatch):
+    monkeypatch.setattr(exchange.AnswerForm, "fault", lambda *_: None)
     with server.load_text(cut(), ports=PORTS) as simulation:
         answer = lambda m: mbcosim.Loads(forces=np.zeros((2, 3)), stiffness=given)
         with simulation.couple("rod", answer, mode="tight", tangent=tangent, peer_timeout=2) as peer:
@@ -167,8 +169,17 @@ def test_a_wrong_tangent_ends_the_stream(server, tangent, given, match):
         assert simulation.refresh().step == 0
 
 
+@pytest.mark.parametrize("tangent, given, text", [
+    ("none", np.zeros((12, 12)), "takes none without `tangent` of the peer"), ("dense", np.zeros((2, 6, 6)), "takes 12 x 12"),
+    ("block_diagonal", np.zeros((12, 12)), "takes 2 x 6 x 6")])
+def test_a_wrong_tangent_is_told_by_its_shape(server, tangent, given, text):
+    with server.load_text(cut(), ports=PORTS) as simulation:
+        with simulation.couple("rod", lambda m: mbcosim.Loads(np.zeros((2, 3)), damping=given), mode="tight", tangent=tangent):
+            with pytest.raises(mbcosim.StepFailed, match="the peer failed: ValueError: `damping` has the shape .*" + text):
+                simulation.step()
+
+
 def test_every_mismatch_of_layout_and_version(server):
-    from mbcosim import exchange
     from mbcosim.coupling import open_stream
     with server.load_text(cut(), ports=PORTS) as simulation:
         message = exchange.hello(simulation, "rod")

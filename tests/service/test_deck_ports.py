@@ -5,6 +5,7 @@ import pytest
 import decks
 import mbcosim
 from conftest import TIME_FACTOR, wait_for
+from mbcosim import exchange
 from test_coupling import STIFFNESS, exact, spring
 
 STEP = 1e-3  # [s]; a load that starts with a step acts during a part of it only
@@ -96,9 +97,12 @@ def test_a_reference_node_takes_the_total_load(server):
         simulation.refresh()
 
 
-def test_missing_reference_loads_are_told(server):
+def test_missing_reference_loads_are_told(server, monkeypatch):
     with server.load_text(external('grpc, port, "p", reference node, 2, 1, 1')) as simulation:
         with simulation.couple("p", lambda motion: [[1.0, 0, 0]], peer_timeout=5) as peer:
+            with pytest.raises(mbcosim.StepFailed, match='`reference_force` is missing; port "p" takes 3 numbers on its reference node'):
+                simulation.step()
+            monkeypatch.setattr(exchange.AnswerForm, "fault", lambda *_: None)  # the server looks, too
             with pytest.raises(mbcosim.StepFailed):
                 simulation.step()
             wait_for(lambda: peer.error)

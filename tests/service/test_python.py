@@ -1,8 +1,10 @@
 """The Python client for daily use: a daemon of one's own, the model's parts as objects, histories, what-if, linear models, pictures."""
+import asyncio
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 
 import decks
 import mbcosim
+import mbcosim.aio
 from conftest import MODELS, TIME_FACTOR, wait_for
 from mbcosim import access
 from test_analysis import OSCILLATOR, S
@@ -62,6 +65,38 @@ def test_a_private_daemon_ends_with_a_program_that_is_killed(how):
     wait_for(lambda: not running(keeper))
 
 
+FORKS = """
+import mbcosim, os, sys, time
+server = mbcosim.local()
+folder = os.path.dirname(server.address[len("unix:"):])
+if os.fork() == 0:
+    sys.exit(0)
+assert os.wait()[1] == 0 and os.path.exists(folder), "an end in good order of the child ended the daemon"
+child = os.fork()
+if child == 0:
+    time.sleep(600)
+with mbcosim.connect(server.address) as other:
+    assert other.list() == []
+begin = time.monotonic()
+server.close()
+print(os.path.exists(folder), time.monotonic() - begin)
+os.kill(child, 9)
+"""
+
+
+def test_a_private_daemon_is_that_of_the_process_that_started_it():
+    done = subprocess.run([sys.executable, "-c", FORKS], stdout=subprocess.PIPE, text=True, timeout=60 * TIME_FACTOR, check=True)
+    left, seconds = done.stdout.split()
+    assert left == "False" and float(seconds) < 1.9 * TIME_FACTOR
+
+
+def test_a_private_daemon_that_is_stopped_delays_nobody_for_long():
+    with mbcosim.local() as server:
+        os.kill(daemon_of(server), signal.SIGSTOP)
+        begin = time.monotonic()
+    assert time.monotonic() - begin < 3 + TIME_FACTOR
+
+
 def test_a_private_daemon_that_cannot_start_says_why():
     with pytest.raises(mbcosim.Unavailable, match="ended with .* before it listened: (.|\n)*--no-such-option"):
         mbcosim.local("--no-such-option")
@@ -75,13 +110,80 @@ def test_a_missing_program_is_named_with_its_remedy(monkeypatch, tmp_path):
         mbcosim.local()
 
 
-@pytest.mark.parametrize("address", ["unix:/tmp/mbcosim-no-such-folder/s", "localhost:1"])
-def test_connect_without_a_daemon_says_so_at_once_and_how_to_start_one(address):
+@pytest.mark.parametrize("address, why, options", [
+    ("unix:/tmp/mbcosim-no-such-folder/s", "there is no such socket, nor its folder", ""), ("unix:/tmp/mbcosim-no-such-socket", "there is no such socket", ""),
+    ("localhost:1", "nobody accepts connections there", " --tokens FILE")])  # over TCP a daemon wants to know who calls
+def test_connect_without_a_daemon_says_so_at_once_and_how_to_start_one(address, why, options):
     start = time.monotonic()
     with pytest.raises(mbcosim.Unavailable) as caught:
         mbcosim.connect(address)
     assert time.monotonic() - start < 3 * TIME_FACTOR
-    assert str(caught.value).startswith(f"no daemon listens at {address}. Start one in a terminal with `mbcosimd --listen {address} &`")
+    assert str(caught.value).startswith(f"no daemon listens at {address}: {why}. Start one in a terminal with `mbcosimd --listen {address}{options} &`")
+
+
+@pytest.mark.parametrize("address, fault", [
+    ("foo", "has no port, nor `unix:` before it: expected HOST:PORT or unix:PATH"), ("localhost:", "has the port '': expected a number from 1 to 65535"),
+    ("localhost:99999", "has the port '99999': expected a number from 1 to 65535"), (":50051", "has no host before its port: say 'localhost:50051'"),
+    ("::1", "has colons in its host: expected [HOST]:PORT"), ("/run/mbcosim.sock", "is a path without `unix:` before it: say 'unix:/run/mbcosim.sock'"),
+    ("http://localhost:8765/?token=x", "is that of a page, or of calls over HTTP: expected the one that the daemon listens on (--listen)"),
+    ("tcp://localhost:1", "has a scheme that is not known here: expected"), ("unix:", "names no socket: expected unix:PATH"),
+    ("unix:/" + "x" * 107, "is too long: the path of a socket has at most 107 bytes, this one 108")])
+def test_what_is_no_address_is_refused_with_what_is_wrong(address, fault, monkeypatch):
+    async def awaited():
+        async with mbcosim.aio.connect(address):
+            pass
+
+    monkeypatch.setenv("MBCOSIM_ADDRESS", address)
+    for call in (lambda: mbcosim.connect(address), mbcosim.connect, lambda: asyncio.run(awaited())):
+        with pytest.raises(ValueError) as caught:
+            call()
+        assert str(caught.value).startswith(f"the address {address!r} {fault}")
+
+
+def test_who_cannot_be_reached_is_told_why(start_daemon, tmp_path):
+    (tmp_path / "plain").write_text("")
+    daemon = start_daemon("--http", "127.0.0.1:0")
+    for address, text in ((f"unix:{tmp_path}/plain", "no server can be reached at .*: that is no socket"),
+                          ("no.such.host.invalid:50051", "no server can be reached at .*: no host is known by that name"),
+                          (daemon.page().split("/")[2], "is that the port of the page")):
+        with pytest.raises(mbcosim.Unavailable, match=text):
+            mbcosim.connect(address)
+
+
+def test_a_default_socket_that_strangers_may_replace_is_not_opened(monkeypatch):
+    """In /tmp, where anybody may have made the folder."""
+    monkeypatch.delenv("MBCOSIM_ADDRESS", raising=False)
+    with tempfile.TemporaryDirectory(dir="/tmp") as top:
+        folder = os.path.join(top, "run")
+        os.mkdir(folder)
+        os.symlink(folder, os.path.join(top, "link"))
+        for mode, place in ((0o777, folder), (0o1777, folder), (0o720, folder)):
+            os.chmod(folder, mode)
+            for name in ("run", "link"):
+                monkeypatch.setenv("XDG_RUNTIME_DIR", os.path.join(top, name))
+                with pytest.raises(mbcosim.NotAllowed, match=f"others may have put the default socket .* the folder {top}/{name} may be written by others"):
+                    mbcosim.connect()
+        os.chmod(folder, 0o700)
+        os.chmod(top, 0o777)
+        with pytest.raises(mbcosim.NotAllowed, match=f"the folder {top} may be written by others"):
+            mbcosim.connect()
+        os.chmod(top, 0o1777)  # as /tmp is
+        with pytest.raises(mbcosim.Unavailable, match="there is no such socket"):
+            mbcosim.connect()
+        monkeypatch.setattr(os, "geteuid", lambda: os.stat(folder).st_uid + 1)
+        if os.stat(folder).st_uid != 0:  # root may do all in any case
+            with pytest.raises(mbcosim.NotAllowed, match=f"belongs to user {os.getuid()}, neither root nor this one"):
+                mbcosim.connect()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root makes folders of others")
+def test_a_default_socket_in_a_strangers_folder_is_not_opened(monkeypatch):
+    monkeypatch.delenv("MBCOSIM_ADDRESS", raising=False)
+    with tempfile.TemporaryDirectory(dir="/tmp") as folder:
+        os.chown(folder, 1234, 1234)
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        with pytest.raises(mbcosim.NotAllowed, match="belongs to user 1234, neither root nor this one .0.. Remove it, or say where the daemon is"):
+            mbcosim.connect()
 
 
 def test_connect_or_start_takes_the_users_daemon_where_it_runs(daemon, monkeypatch, tmp_path):
@@ -156,7 +258,7 @@ def test_parts_are_found_by_label_by_name_and_by_family(server):
         assert list(top.position) == list(simulation["node.structural.1.X"])
         assert top["angular_velocity"] == pytest.approx(simulation["node.structural.1.Omega"])
         assert {"position", "XP", "load"} <= set(dir(top))
-        assert repr(top).startswith('<dynamic node 1 "top", t = 0 s>\n  X[3] [deck unit of length], global: position')
+        assert repr(top).startswith('<dynamic node 1 "top", t = 0 (deck unit of time)>\n  X[3] [deck unit of length], global: position')
 
 
 def test_inputs_are_set_by_the_names_of_their_nodes(server):
@@ -179,7 +281,9 @@ def test_the_reaction_of_a_hinge_is_what_moves_the_body(swing):
 
 def test_words_that_are_wrong_are_answered_with_those_that_are_right(swing):
     for call, text in (
-            (lambda: swing.nodes[7], "no node is called 7; known: 1, 2"),
+            (lambda: swing.nodes[7], "no node is called 7; known: 1, 2"), (lambda: swing.nodes["tip"], "no node is called 'tip'; known: 1, 2"),
+            (lambda: swing.elements["rod"], "no element is called 'rod'; known: 1, ('joint', 2), ('body', 2)"),
+            (lambda: swing.state_space("structural.2.load", "time").only("load", "time"), "the system has no input 'load'; known: 'node.structural.2.load[1]'"),
             (lambda: swing.nodes[2].posision, "dynamic node 2 has no 'posision'; did you mean 'position'?"),
             (lambda: setattr(swing.nodes[2], "position", [0, 0, 0]), "'position' of dynamic node 2 cannot be set; known: 'load'"),
             (lambda: swing.inputs["valve"], "no input is called 'valve'; known: 'node.structural.1.load', 'node.structural.2.load'"),
@@ -190,7 +294,18 @@ def test_words_that_are_wrong_are_answered_with_those_that_are_right(swing):
             (lambda: swing.step(until=mbcosim.Condition("time", "=", 1)), "comparison: no choice is called '='; choose from '<', '<='")):
         with pytest.raises((KeyError, AttributeError, ValueError)) as caught:
             call()
-        assert text in caught.value.args[0]
+        assert text in caught.value.args[0] and str(caught.value) == caught.value.args[0]
+
+
+def test_nodes_of_ports_and_units_of_another_kind_are_told(server, swing, pendulum):
+    for nodes in (["tip"], 9, [1.5]):
+        for port in (mbcosim.structural_port, mbcosim.motion_port):
+            with pytest.raises(TypeError, match="`nodes` of port 'wing' must be a list of labels, whole numbers, got"):
+                port("wing", nodes=nodes)
+    assert list(mbcosim.structural_port("wing", nodes=np.array([1, 2])).node_labels) == [1, 2]
+    for call in (lambda: server.load(pendulum, units="mm"), lambda: swing.couple("wing", lambda m: m.x, units="mm")):
+        with pytest.raises(TypeError, match="`units` must be a system made by mbcosim.units, .* say, got 'mm'"):
+            call()
 
 
 # ---------------------------------------------------------------- histories, what if
@@ -321,6 +436,32 @@ def test_pictures_and_films_are_written(swing, server, tmp_path):
         assert (tmp_path / name).stat().st_size > 5000
     with pytest.raises(ValueError, match="view: no choice is called 'top'"):
         history.animate(view="top", save=str(tmp_path / "x.gif"))
+
+
+def test_an_empty_picture_is_refused(swing):
+    pytest.importorskip("matplotlib")
+    with pytest.raises(ValueError, match="there is nothing to plot: the history has no variables"):
+        swing.simulate([], steps=2).plot()
+    with pytest.raises(ValueError, match="there is nothing to plot: `names` is empty"):
+        swing.simulate(steps=2).plot([])
+    for inputs, outputs in (("structural.2.load", []), ([], "node.structural.2.X")):
+        with pytest.raises(ValueError, match="there is nothing to plot: no output .* answers an input"):
+            swing.state_space(inputs, outputs).plot_bode()
+
+
+def test_a_bode_diagram_of_many_has_its_names_beside_it_and_no_noise(server, tmp_path):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
+    with server.load(model("wing.mbd")) as simulation:
+        figure = simulation.state_space("structural.9.load", "node.structural.9.X").plot_bode(save=tmp_path / "b.png")
+    upper, lower, names = figure.axes
+    curves = [line.get_label().replace("node.structural.9.", "") for line in upper.lines]
+    in_plane = [f"X[{i}] / load[{j}]" for i in (1, 2) for j in (1, 2, 6)]
+    assert curves == [*in_plane, *(f"X[3] / load[{j}]" for j in (3, 4, 5))] and len(lower.lines) == 9
+    assert len({(line.get_color(), line.get_linestyle()) for line in upper.lines}) == 9
+    box = names.get_legend().get_window_extent()
+    assert box.x0 > upper.get_window_extent().x1 and box.x1 < figure.bbox.x1 and figure.bbox.y0 < box.y0 < box.y1 < figure.bbox.y1
+    pyplot.close("all")
 
 
 def test_the_clients_version_is_that_of_the_server(server):

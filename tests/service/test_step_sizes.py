@@ -253,7 +253,9 @@ def test_implicit_peers_take_part_in_locating(server, swinging, mode):
 
 
 def test_a_rejection_with_no_number_is_refused(swinging):
-    with swinging.couple("spring", lambda motion: mbcosim.Reject(-1.0)) as peer:
+    rejection = mbcosim.Reject(1.0)
+    rejection.preferred_step_size = -1.0
+    with swinging.couple("spring", lambda motion: rejection) as peer:
         with pytest.raises(mbcosim.StepFailed) as caught:
             swinging.step()
         assert caught.value.reason == "PEER_LOST"

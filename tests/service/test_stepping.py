@@ -1,5 +1,7 @@
 """Steps: one by one, in chunks, on a stream, with retries; the same bits each time."""
 import contextlib
+import os
+import signal
 import threading
 import time
 from concurrent import futures
@@ -191,6 +193,36 @@ def test_run_reports_progress_and_finishes(server):
         again = simulation.step()
         assert (again.outcome, again.steps_done) == ("FINISHED", 0)
         assert simulation.refresh().state == pb.SIMULATION_STATE_FINISHED
+
+
+def wait_until_it_stands(simulation):
+    wait_for(lambda: simulation.refresh().state == pb.SIMULATION_STATE_READY)
+    before = simulation.info.step
+    assert simulation.step().step == before + 1
+
+
+def test_a_run_whose_progress_raises_ends_on_the_server(server):
+    def refuses(progress):
+        raise GeneratorExit
+
+    with server.load_text(decks.endless()) as simulation:
+        with pytest.raises(GeneratorExit) as caught:
+            simulation.run_until(1e8, progress=refuses)
+        wait_until_it_stands(simulation)
+    assert caught.value  # whose trace keeps the call
+
+
+@pytest.mark.parametrize("advance", [
+    lambda s: s.run_until(1e8), lambda s: s.run_until(1e8, progress=lambda _: None), lambda s: s.simulate(["time"], until=1e8, every=10**6),
+    lambda s: s.simulate(["time"], until=1e8, every=10**9, inputs={"node.structural.1.load": lambda t: [0] * 6}), lambda s: s.stepper().step(None, 10**9)])
+def test_what_is_interrupted_here_ends_on_the_server(server, advance):
+    with server.load_text(decks.endless()) as simulation:
+        interrupt = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+        interrupt.start()
+        with pytest.raises(KeyboardInterrupt) as caught:
+            advance(simulation)
+        wait_until_it_stands(simulation)
+    assert caught.value
 
 
 def test_condition_ends_an_advance(server, tumbling):

@@ -13,6 +13,7 @@ import mbcosim.aio
 from conftest import BIN, wait_for
 from mbcosim import exchange
 from mbcosim.v1 import common_pb2, coupling_types_pb2, simulations_pb2 as pb
+from test_analysis import OSCILLATOR, S
 from test_coupling_ports import modal_deck
 from test_coupling_record import replay
 from test_coupling_tangent import ARMS, K, rod
@@ -329,6 +330,47 @@ def test_a_declaration_gives_the_real_names(server, how):
         assert simulation.simulate(X, steps=2).to_numpy().dtype.metadata["units"] == {"step": "", "time": "s", X: "mm"}
         with simulation.fork() as branch:
             assert branch.info.units == simulation.info.units
+
+
+NAMES_IN_PICTURES = [(None, "deck unit of length", "deck unit of time", "1/(deck unit of time)", 1), (TONNE, "mm", "s", "Hz", 1),
+                     (MILLI, "mm", "ms", "Hz", 1000)]  # units, length, time, frequency, how many of it are in 1/time
+
+
+@pytest.mark.parametrize("units, length, time, hertz, factor", NAMES_IN_PICTURES, ids=["none", "mm t s", "mm kg ms"])
+def test_linear_models_and_what_is_printed_count_in_the_declared_units(server, units, length, time, hertz, factor):
+    with server.load_text(OSCILLATOR, units=units) as simulation:
+        after = f"({time})" if units is None else time
+        assert f"t = 0 of 10 {after}>" in repr(simulation) and f"t = 0 {after}>" in repr(simulation.nodes[1])
+        modes, own = simulation.modes(), S.imag / (2 * np.pi)
+        assert modes.frequencies_hz == pytest.approx([factor * own], rel=1e-6) and (modes.length_unit, modes.time_unit) == (length, time)
+        assert f"{factor * own:.4g}"[:4] in repr(modes) and f" {hertz}  damping" in repr(modes)
+        along = simulation.state_space("structural.1.load", "node.structural.1.X").only("node.structural.1.load[1]", "node.structural.1.X[1]")
+    assert np.abs(along.response([factor * own])) == pytest.approx(np.abs(1 / (2 * (2j * np.pi * own)**2 + 8 * 2j * np.pi * own + 800)), rel=1e-6)
+    assert along.frequencies().min() < factor * own < along.frequencies().max()
+
+
+@pytest.mark.parametrize("units, length, time, hertz, factor", NAMES_IN_PICTURES, ids=["none", "mm t s", "mm kg ms"])
+def test_films_and_diagrams_name_the_declared_units(server, units, length, time, hertz, factor):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
+
+    def shown(film):
+        film._draw_was_started = True  # else it warns when it goes
+        film._draw_frame(0)
+        axes = film._fig.axes[0]
+        return axes.get_xlabel(), axes.get_title()
+
+    after = f"({time})" if units is None else time
+    with server.load_text(OSCILLATOR, units=units) as simulation:
+        film = simulation.simulate(steps=100).animate(lines=[], frames_per_second=50)
+        assert shown(film) == (f"x [{length}]", f"t = 0.000 {after}") and len(list(film.new_frame_seq())) == (51 if factor == 1 else 2)  # 1 s, 1 ms
+        label, title = shown(simulation.modes().animate(1, frames=2))
+        assert label == f"x [{length}]" and f" {hertz}, damping" in title
+        along = simulation.state_space("structural.1.load", "node.structural.1.X").only("node.structural.1.load[1]", "node.structural.1.X[1]")
+    assert along.plot_bode().axes[1].get_xlabel() == f"frequency [{hertz}]"
+    locus = along.plot_root_locus([0, 100]).axes[0]
+    assert (locus.get_xlabel(), locus.get_ylabel()) == (f"real part [1/{after}]", f"imaginary part [rad/{after}]")
+    pyplot.close("all")
 
 
 def test_no_result_and_no_digest_depends_on_the_declaration(server):

@@ -11,17 +11,20 @@ from __future__ import annotations
 
 import os
 import pathlib
+import re
 import shutil
 import socket
+import stat
 import time
 from typing import Any, Optional, Union
 
 import grpc
 
-from .errors import TimedOut, Unavailable
+from .errors import NotAllowed, TimedOut, Unavailable
 
 _PATIENCE = 2.0  # seconds in which a daemon may appear that was started a moment ago
 _ANSWER = 10.0   # seconds that a server may take to answer
+_OF_GRPC = re.compile(r"(dns|ipv4|ipv6|unix-abstract|vsock|xds):")  # other forms of addresses
 Path = Union[str, "os.PathLike[str]"]
 
 
@@ -79,32 +82,110 @@ def daemon_program(program: Optional[Path] = None) -> str:
     return found
 
 
-def refuses(address: str) -> bool:
-    """Does nobody listen at this address? False where that cannot be told at once."""
+def reached(address: Optional[str]) -> str:
+    """The address to connect to: `address`, or the default one. ValueError for what can be none, NotAllowed where strangers may answer."""
+    if not address and not os.environ.get("MBCOSIM_ADDRESS"):
+        _check_default_folder(default_address())
+    chosen = address or default_address()
+    fault = _fault_of_socket(chosen[len("unix:"):]) if chosen.startswith("unix:") else None if _OF_GRPC.match(chosen) else _fault_of_host(chosen)
+    if fault is not None:
+        raise ValueError(f"the address {chosen!r} {fault}")
+    return chosen
+
+
+def _fault_of_socket(path: str) -> Optional[str]:
+    size = len(os.fsencode(path))
+    if not path.strip("/"):
+        return "names no socket: expected unix:PATH"
+    return f"is too long: the path of a socket has at most 107 bytes, this one {size}" if size > 107 else None
+
+
+def _fault_of_host(address: str) -> Optional[str]:
+    host, colon, port = address.rpartition(":")
+    if address.startswith(("http://", "https://")):
+        return "is that of a page, or of calls over HTTP: expected the one that the daemon listens on (--listen), unix:PATH or HOST:PORT"
+    if "://" in address:
+        return "has a scheme that is not known here: expected unix:PATH or HOST:PORT"
+    if "/" in address:
+        return f"is a path without `unix:` before it: say 'unix:{address}'"
+    if not colon:
+        return "has no port, nor `unix:` before it: expected HOST:PORT or unix:PATH"
+    if not (port.isascii() and port.isdecimal() and 0 < int(port) < 65536):
+        return f"has the port {port!r}: expected a number from 1 to 65535"
+    if not host:
+        return f"has no host before its port: say 'localhost:{port}' for this machine"
+    return "has colons in its host: expected [HOST]:PORT for one of IPv6" if ":" in host and not host.startswith("[") else None
+
+
+def _check_default_folder(address: str) -> None:
+    """As the daemon does that makes it: in /tmp anybody may have made the folder, and a daemon of theirs would answer there."""
+    folder = os.path.dirname(address[len("unix:"):])
+    if not folder.startswith("/tmp/") or not os.path.lexists(folder):
+        return
+    parents = {parent for path in (os.path.abspath(folder), os.path.realpath(folder)) for parent in pathlib.Path(path).parents}
+    for place in [folder, *sorted(map(str, parents), reverse=True)]:
+        fault = _fault_of_folder(place, shared=place != folder)
+        if fault:
+            raise NotAllowed(f"others may have put the default socket {address} where it is: the folder {place} {fault}. Remove it, or say where the "
+                             "daemon is: with an address, $MBCOSIM_ADDRESS or $XDG_RUNTIME_DIR")
+
+
+def _fault_of_folder(folder: str, shared: bool) -> Optional[str]:
+    """What lets strangers replace what is in a folder; one that is `shared` may be sticky."""
+    for info in (os.lstat(folder), os.stat(folder)):
+        if info.st_uid not in (0, os.geteuid()):
+            return f"belongs to user {info.st_uid}, neither root nor this one ({os.geteuid()})"
+    if info.st_mode & 0o022 and not (shared and info.st_mode & stat.S_ISVTX):
+        return "may be written by others"
+    return None
+
+
+def _why_nobody(address: str) -> tuple[str, bool]:
+    """Why nobody can be there, empty where that cannot be told at once; and would a daemon that is started help?"""
+    path = address[len("unix:"):] if address.startswith("unix:") else None
     try:
-        if address.startswith("unix:"):
-            path = address[len("unix:"):]
+        if path is not None:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as plain:
                 plain.settimeout(1.0)
                 plain.connect(path[2:] if path.startswith("//") else path)
         else:
             host, _, port = address.rpartition(":")
             socket.create_connection((host.strip("[]"), int(port)), timeout=1.0).close()
-    except (FileNotFoundError, ConnectionRefusedError, NotADirectoryError):
-        return True
+    except (FileNotFoundError, NotADirectoryError):
+        return "there is no such socket" + ("" if os.path.isdir(os.path.dirname(path or "") or ".") else ", nor its folder"), True
+    except ConnectionRefusedError:
+        if path is not None and not stat.S_ISSOCK(os.stat(path).st_mode):
+            return "that is no socket", False
+        return "nobody accepts connections there", True
+    except PermissionError:
+        return "this user may not open that socket", False
+    except socket.gaierror as error:
+        return f"no host is known by that name ({error.strerror})", False
     except (OSError, ValueError):
-        return False
-    return False
+        pass
+    return "", False
 
 
 def nobody_there(address: str, detail: str) -> str:
     """What to say when nobody answers at an address."""
-    if not refuses(address):
-        secured = "" if address.startswith("unix:") else "; does the server use TLS (`tls=True`, `ca=`), or this client while it does not?"
-        return f"the server at {address} does not answer as it should: {detail}{secured}"
-    how = "mbcosimd &" if address == default_address() and not os.environ.get("MBCOSIM_ADDRESS") else f"mbcosimd --listen {address} &"
-    return (f"no daemon listens at {address}. Start one in a terminal with `{how}`, or use mbcosim.local(), which starts a private one "
+    why, helps = _why_nobody(address)
+    if not why:
+        return f"the server at {address} does not answer as it should: {detail}{_question(address, detail)}"
+    if not helps:
+        return f"no server can be reached at {address}: {why}"
+    usual = address == default_address() and not os.environ.get("MBCOSIM_ADDRESS")
+    how = "mbcosimd" if usual else f"mbcosimd --listen {address}" + ("" if address.startswith("unix:") else " --tokens FILE")
+    return (f"no daemon listens at {address}: {why}. Start one in a terminal with `{how} &`, or use mbcosim.local(), which starts a private one "
             "and ends it; connect(timeout=30) waits for one that is starting")
+
+
+def _question(address: str, detail: str) -> str:
+    """What may be wrong where somebody listens."""
+    if address.startswith("unix:"):
+        return ""
+    if "http1" in detail:
+        return "; is that the port of the page (--http)? This client needs one of --listen"
+    return "; does the server use TLS (`tls=True`, `ca=`), or this client while it does not?"
 
 
 class Attempts:

@@ -27,13 +27,13 @@ import numpy.typing as npt
 from mbcosim.v1 import common_pb2, coupling_pb2, events_pb2, simulations_pb2 as pb, telemetry_pb2
 
 from . import access, events, exchange
-from .access import Attempts, default_address
+from .access import Attempts
 from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepResult, Values
 from .coupling import Answer, open_stream
 from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
 from .histories import History
-from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, checked_timeout, metadata, parting,
-                  runs_calls)
+from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, cancelling, checked_timeout, metadata,
+                  parting, runs_calls)
 from .simulation import subscribe_request
 from .stepping import AwaitedSharedStream, AwaitedStepLine, status_of
 
@@ -47,7 +47,7 @@ async def connect(address: Optional[str] = None, *, token: Optional[str] = None,
                   timeout: Optional[float] = None, reconnect: float = 0.0) -> AsyncIterator[Server]:
     """A connection; for the arguments see mbcosim.connect."""
     secured = credentials or access.credentials(tls, ca, certificate, key)
-    server = Server(address or default_address(), token or access.default_token(), secured, reconnect)
+    server = Server(access.reached(address), token or access.default_token(), secured, reconnect)
     try:
         attempts = Attempts(server.address, timeout)
         while True:
@@ -119,10 +119,11 @@ class Connection(Address):
         answer = self.stubs.method(call.method)(call.sent(), metadata=self.metadata_of(call), timeout=call.timeout)
         if call.each is None:
             return await answer
-        async for message in answer:
-            taken = call.each(message)
-            if inspect.isawaitable(taken):
-                await taken
+        with cancelling(answer):
+            async for message in answer:
+                taken = call.each(message)
+                if inspect.isawaitable(taken):
+                    await taken
         return None
 
 
@@ -134,18 +135,33 @@ def awaited(function: Callable[..., Calls[T]]) -> Callable[..., Awaitable[T]]:
     return method
 
 
-async def _until_cancelled(stream: Any) -> AsyncIterator[Any]:
-    """Every message until the server ends the stream, or somebody here cancels it."""
-    try:
-        while True:
-            with translated():
-                message = await stream.read()
-            if message is grpc.aio.EOF:
-                return
-            yield message
-    except asyncio.CancelledError:
-        if not stream.cancelled():
-            raise
+class _Watcher:
+    """What comes on a stream until the server ends it, or `close` does. Who cancels a task that waits for it ends the stream, too."""
+    _stream: Any
+    _closed = False
+
+    async def __aenter__(self: Self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.close()
+
+    async def _messages(self) -> AsyncIterator[Any]:
+        try:
+            while not self._stream.cancelled():
+                with translated():
+                    message = await self._stream.read()
+                if message is grpc.aio.EOF:
+                    return
+                yield message
+        except asyncio.CancelledError:
+            if not self._closed:
+                raise
+
+    def close(self) -> None:
+        """Ends it."""
+        self._closed = True
+        self._stream.cancel()
 
 
 async def _bounded(seconds: Optional[float], awaitable: Awaitable[T], cancel: Callable[[], object], what: str) -> T:
@@ -279,25 +295,15 @@ class Server(Awaiting, ServerCalls[Simulation]):
         await self._connection.channel.close()
 
 
-class Events(events.Course):
+class Events(events.Course, _Watcher):
     """`async for` over `mbcosim.v1.Event`. Close it, or use it with `async with`."""
 
     def __init__(self, connection: Connection, simulation: str, after: Optional[int], journal: str) -> None:
         self._stream: Any = connection.stubs.events.WatchEvents(events.watch_request(simulation, after, journal), metadata=connection.about(simulation))
 
-    async def __aenter__(self) -> Events:
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self.close()
-
     async def __aiter__(self) -> AsyncIterator[events_pb2.Event]:
-        async for event in _until_cancelled(self._stream):
+        async for event in self._messages():
             yield self._take(event)
-
-    def close(self) -> None:
-        """Ends the watching."""
-        self._stream.cancel()
 
 
 class Stepper:
@@ -361,7 +367,7 @@ class Stepper:
             await _bounded(timeout, stream.code(), stream.cancel, "the end of the stream")
 
 
-class Subscription:
+class Subscription(_Watcher):
     """Samples as they come: `async for` over (step, time, values by name). Close it, or use it with `async with`.
 
     `dropped` counts the samples that the server dropped because they were not read in time.
@@ -372,21 +378,11 @@ class Subscription:
         connection = simulation._connection
         self._stream = connection.stubs.telemetry.Subscribe(request, metadata=connection.about(simulation.name))
 
-    async def __aenter__(self: Self) -> Self:
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self.close()
-
     async def __aiter__(self) -> AsyncIterator[tuple[int, float, dict[str, Any]]]:
-        async for batch in _until_cancelled(self._stream):
+        async for batch in self._messages():
             self.dropped = batch.total_dropped
             for sample in batch.samples:
                 yield sample.step, sample.time, self._simulation.split(self._names, sample.values)
-
-    def close(self) -> None:
-        """Ends the subscription."""
-        self._stream.cancel()
 
 
 class Peer(exchange.Course):
@@ -406,6 +402,7 @@ class Peer(exchange.Course):
         self._heartbeat_interval = None if server_timeout is None else server_timeout / 3
         self._waiting_since: Optional[float] = None
         self._writing = asyncio.Lock()
+        self._ended = False  # by this side
 
     async def _attach(self, hello: coupling_pb2.PeerMessage, timeout: Optional[float]) -> None:
         self._stream = open_stream(self._connection.channel)(metadata=self._connection.about(hello.hello.simulation))
@@ -440,14 +437,23 @@ class Peer(exchange.Course):
 
     async def close(self) -> None:
         """Leaves the port."""
+        self._ended = True
         if self._heart is not None:
             self._heart.cancel()
-        if not self._stream.done():
-            with contextlib.suppress(asyncio.TimeoutError, asyncio.InvalidStateError):
-                await asyncio.wait_for(self._leave(), PARTING / 2)
+        try:
+            if not self._stream.done():
+                with contextlib.suppress(asyncio.TimeoutError, asyncio.InvalidStateError):
+                    await asyncio.wait_for(self._leave(), PARTING / 2)
+        finally:
             self._stream.cancel()
-        if self._task is not None:
-            await asyncio.wait([self._task], timeout=PARTING / 2)
+        if self._task is not None and self._task is not asyncio.current_task():
+            await self._end_task(self._task)
+
+    async def _end_task(self, task: asyncio.Task[None]) -> None:
+        """Waits for a moment for the function that answers, then cancels it."""
+        if not (await asyncio.wait([task], timeout=PARTING / 2))[0]:
+            task.cancel()
+            await asyncio.wait([task], timeout=PARTING / 2)
 
     async def __aiter__(self) -> AsyncIterator[exchange.Motion]:
         """Every Motion until the stream ends."""
@@ -455,7 +461,11 @@ class Peer(exchange.Course):
             self._waiting_since = time.monotonic()
             try:
                 data = await self._stream.read()
-            except (grpc.RpcError, asyncio.CancelledError):
+            except grpc.RpcError:
+                data = grpc.aio.EOF
+            except asyncio.CancelledError:
+                if not self._ended:
+                    raise
                 data = grpc.aio.EOF
             self._waiting_since = None
             if data is grpc.aio.EOF:
@@ -488,6 +498,7 @@ class Peer(exchange.Course):
             since = self._waiting_since
             if self._silence is not None and since is not None and time.monotonic() - since > self._silence:
                 self.error = Unavailable(f"the server was silent for {self._silence} s", grpc.StatusCode.UNAVAILABLE)
+                self._ended = True
                 self._stream.cancel()
                 return
             if self._beats is None:
@@ -501,6 +512,25 @@ class Peer(exchange.Course):
             try:
                 value = self._function(motion)
                 message = self._answer(await value if inspect.isawaitable(value) else value)
-            except Exception as error:  # whatever the user's code raises becomes a failed step with this text
-                message = self._failure(error)
-            await self._write(message)
+            except GeneratorExit:  # nobody runs this task any more
+                raise
+            except BaseException as error:  # whatever the user's code raises becomes a failed step with this text
+                await self._write(self._failure(error))
+                if _ends_a_task(error):
+                    await self._depart()
+                    raise
+            else:
+                await self._write(message)
+
+    async def _depart(self) -> None:
+        """Tells the server that no more answers come."""
+        self._ended = True
+        with contextlib.suppress(grpc.RpcError, asyncio.InvalidStateError):
+            await self._stream.done_writing()
+
+
+def _ends_a_task(error: BaseException) -> bool:
+    """Is it for the task that runs, not for one that it has waited for? Before Python 3.11 nobody can tell."""
+    if isinstance(error, asyncio.CancelledError):
+        return bool(getattr(asyncio.current_task(), "cancelling", lambda: 1)())
+    return isinstance(error, (KeyboardInterrupt, SystemExit))

@@ -21,7 +21,7 @@ from . import bundle
 from .errors import NotFound, StepFailed, enum_name
 from .rpc import USUAL, Call, Calls, call, fill_duration, protocol
 from .table import Rows
-from .words import choice, needed, pick, remedy
+from .words import UnknownName, after_number, choice, needed, pick, remedy
 
 
 Array = npt.NDArray[np.float64]
@@ -68,6 +68,13 @@ def grant(identity: str, right: str, ports: Iterable[str] = ()) -> pb.Grant:
 def units(length: str, *, time: str, mass: Optional[str] = None, force: Optional[str] = None) -> common_pb2.UnitSystem:
     """A consistent system of units by names: `units("mm", mass="t", time="s")`, or the same with `force="N"` in place of the mass."""
     return common_pb2.UnitSystem(length=length, time=time, mass=mass, force=force)
+
+
+def checked_units(system: Any) -> Optional[common_pb2.UnitSystem]:
+    """`units` of a call; TypeError for what `units(...)` did not make."""
+    if system is not None and not isinstance(system, common_pb2.UnitSystem):
+        raise TypeError(f'`units` must be a system made by mbcosim.units, mbcosim.units("mm", mass="t", time="s") say, got {system!r}')
+    return system
 
 
 def _symbol(value: Symbol) -> pb.SymbolValue:
@@ -201,6 +208,7 @@ class ServerCalls(Generic[SimulationKind]):
                 durability: Optional[str] = None, checkpoint_interval: Optional[float] = None, checkpoint_steps: Optional[int] = None, pace: Optional[float] = None,
                 deck_sockets: Union[bool, float] = False, padded_labels: bool = False, units: Optional[common_pb2.UnitSystem] = None, optional_ports: bool = False,
                 timeout: Optional[float] = None) -> Calls[SimulationKind]:
+        checked_units(units)
         header.options.request_id = _new_id()
         header.options.protocol.CopyFrom(protocol())
         header.options.display_name = name
@@ -322,12 +330,18 @@ class SimulationCalls(Generic[SnapshotKind]):
         """As `mbcosim.v1.Variable.unit` of a time."""
         return self.info.units.time or "deck unit of time"
 
+    @property
+    def length_unit(self) -> str:
+        """As `mbcosim.v1.Variable.unit` of a length."""
+        return self.info.units.length or "deck unit of length"
+
     def _leave(self) -> None:
         """Ends what is open of it here."""
 
     def __repr__(self) -> str:
         title = f" \"{self.info.display_name}\"" if self.info.display_name else ""
-        return f"<{type(self).__name__} {self.name}{title}, step {self.step_number}, t = {self.time:g} s of {self.info.final_time:g} s>"
+        span = f"{self.time:g} of {self.info.final_time:g} {after_number(self.time_unit)}"
+        return f"<{type(self).__name__} {self.name}{title}, step {self.step_number}, t = {span}>"
 
     # ---------------------------------------------------------------- variables
 
@@ -368,7 +382,7 @@ class SimulationCalls(Generic[SnapshotKind]):
         try:
             return self._known[name]
         except KeyError:
-            raise KeyError(f"no variable is named {name!r}; {remedy(name, self._known)}") from None
+            raise UnknownName(f"no variable is named {name!r}; {remedy(name, self._known)}") from None
 
     @call
     def read(self, names: Iterable[str], *, timeout: Optional[float] = USUAL) -> Calls[dict[str, Any]]:
@@ -447,9 +461,9 @@ class SimulationCalls(Generic[SnapshotKind]):
 
         def take(message: pb.RunReply) -> Any:
             if message.HasField("progress"):
-                wanted(message.progress)
-            else:
-                done.append(message.done)
+                return wanted(message.progress)  # a coroutine of the asyncio client's
+            done.append(message.done)
+            return None
 
         yield Call("Simulations/Run", pb.RunRequest(step=request), timeout, each=take)
         return self.result(done[-1], outputs)

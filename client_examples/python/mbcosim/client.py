@@ -10,7 +10,6 @@ import grpc
 from mbcosim.v1 import simulations_pb2
 
 from . import access
-from .access import default_address
 from .calls import ServerCalls
 from .errors import Unavailable, translated
 from .events import Events
@@ -35,7 +34,7 @@ def connect(address: Optional[str] = None, *, token: Optional[str] = None, tls: 
                  subscriptions, events) end with it: a peer comes back by `couple(..., step=peer.step)`, see coupling.Peer
     """
     secured = credentials or access.credentials(tls, ca, certificate, key)
-    server = Server(address or default_address(), token or access.default_token(), secured, reconnect)
+    server = Server(access.reached(address), token or access.default_token(), secured, reconnect)
     try:
         await_answer(server, timeout)
     except Exception:

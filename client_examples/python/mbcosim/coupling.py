@@ -9,6 +9,7 @@
 """
 from __future__ import annotations
 
+import operator
 import queue
 import threading
 import time
@@ -31,10 +32,18 @@ if TYPE_CHECKING:
 Answer = Callable[[exchange.Motion], Any]  # see Peer
 
 
+def _labels(port: str, nodes: Iterable[int]) -> list[int]:
+    """The nodes of a port, which has no model yet in which names could be found."""
+    try:
+        return [operator.index(label) for label in nodes]
+    except TypeError:
+        raise TypeError(f"`nodes` of port {port!r} must be a list of labels, whole numbers, got {nodes!r}") from None
+
+
 def structural_port(name: str, nodes: Iterable[int], *, offsets: Optional[npt.ArrayLike] = None,
                     reference: Optional[int] = None) -> types.PortDefinition:
-    """A port on structural nodes: motion out, forces and moments in. `offsets`: n x 3 in the nodes' frames [m]."""
-    port = types.PortDefinition(name=name, kind=types.PORT_KIND_STRUCTURAL, node_labels=list(nodes))
+    """A port on structural nodes, by their labels: motion out, forces and moments in. `offsets`: n x 3 in the nodes' frames [m]."""
+    port = types.PortDefinition(name=name, kind=types.PORT_KIND_STRUCTURAL, node_labels=_labels(name, nodes))
     if offsets is not None:
         port.offsets.extend(np.ravel(np.asarray(offsets, float)))
     if reference is not None:
@@ -50,7 +59,7 @@ def signal_port(name: str, outputs: Iterable[str], inputs: Iterable[str]) -> typ
 
 def motion_port(name: str, nodes: Iterable[int], *, positions_only: bool = False) -> types.PortDefinition:
     """A port that imposes the motion of nodes: reactions out, positions and orientations in."""
-    return types.PortDefinition(name=name, kind=types.PORT_KIND_MOTION, node_labels=list(nodes), positions_only=positions_only)
+    return types.PortDefinition(name=name, kind=types.PORT_KIND_MOTION, node_labels=_labels(name, nodes), positions_only=positions_only)
 
 
 def modal_port(name: str, joint: int) -> types.PortDefinition:
@@ -69,7 +78,7 @@ class Peer(exchange.Course):
 
     answer returns forces (n x 3), or (forces, moments), or the signals, or Loads; an exception in it fails the step. On a port of
     the deck with reference loads it returns (forces, moments, force on the reference node, moment on it), on a motion port
-    positions or (positions, rotations).
+    positions or (positions, rotations). An answer of another shape fails the step, too.
     Without `answer` the peer is synchronous: iterate over it and answer each motion with `peer.answer(...)`, in another thread than
     the one that steps.
 
@@ -87,7 +96,7 @@ class Peer(exchange.Course):
     step       of a peer that comes back: the step at whose end it stands, `step` of the peer that left. A simulation that was brought back from a
                checkpoint and stands at an earlier one refuses it (PreconditionFailed, reason PEER_AHEAD)
     can_go_back  it is let in all the same: before it answers it takes the state that it had at the end of step `peer.step`
-    After the end `error` has what ended the stream, None when it ended in good order.
+    After the end `error` has what ended the stream, None when it ended in good order; `raised` what `answer` raised last.
     """
 
     def __init__(self, simulation: Simulation, port: str, answer: Optional[Answer] = None, *, rotation: str = "matrix",
@@ -168,5 +177,5 @@ class Peer(exchange.Course):
         for motion in self:
             try:
                 self.answer(self._function(motion))
-            except Exception as error:  # whatever the user's code raises becomes a failed step with this text
+            except BaseException as error:  # whatever the user's code raises becomes a failed step with this text
                 self.fail(error)

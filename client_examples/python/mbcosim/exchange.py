@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from mbcosim.v1 import common_pb2, coupling_pb2 as pb, coupling_types_pb2 as types
 
+from .calls import checked_units
 from .errors import Error
 from .rpc import fill_duration, protocol
 from .words import choice
@@ -57,11 +58,13 @@ class Motion:
 class Reject(Exception):
     """Raised by a peer's function, or returned as an answer: the step must not be done. It ends with outcome REJECTED_BY_PEER.
 
-    `preferred_step_size` is what the peer would take [s]; None: unknown.
+    `preferred_step_size` is what the peer would take [s], positive; None: unknown.
     """
 
     def __init__(self, preferred_step_size: Optional[float] = None, text: str = "") -> None:
         super().__init__(text)
+        if preferred_step_size is not None and not 0 < preferred_step_size < np.inf:
+            raise ValueError(f"`preferred_step_size` must be positive, got {preferred_step_size}")
         self.preferred_step_size, self.text = preferred_step_size, text
 
 
@@ -87,6 +90,7 @@ def hello(simulation: Any, port: str, *, mode: Optional[str] = None, rotation: s
           check_model: bool = True, tangent: str = "none", heartbeat_interval: Optional[float] = None, heartbeat_timeout: Optional[float] = None,
           units: Optional[common_pb2.UnitSystem] = None, step: Optional[int] = None, can_go_back: bool = False) -> pb.PeerMessage:
     """First message of a peer."""
+    checked_units(units)
     message = pb.Hello(
         protocol=protocol(), simulation=simulation.name, port=port, units=units,
         expected=pb.PeerExpectation(model_digest=simulation.info.model_digest if check_model else "", step=step, can_go_back=can_go_back),
@@ -195,54 +199,135 @@ def index(fields: dict[int, Any]) -> int:
 
 # ---------------------------------------------------------------- answers
 
-def _put(field: Any, values: Any) -> None:
-    if values is not None:
-        field.extend(np.ravel(np.asarray(values, float)))
+_ARRAYS = ("forces", "moments", "reference_force", "reference_moment", "signals", "positions", "rotations", "stiffness", "damping")
 
 
-def answer(number: int, value: Any, kind: Optional[int]) -> pb.PeerMessage:
-    """What a peer's function returned as the answer to exchange `number` on a port of this kind (of `mbcosim.v1.PortKind`)."""
+class AnswerForm:
+    """What the answers on a port must be like, by the server's welcome and what the peer said in its `hello`."""
+
+    def __init__(self, layout: types.PortLayout, hello: pb.Hello) -> None:
+        self.kind, self._port, self._layout = layout.kind, layout.name, layout
+        nodes, mapped = len(layout.node_labels), layout.HasField("mapped_points")
+        self._rows = layout.mapped_points if mapped else nodes
+        motion, modal = layout.kind == types.PORT_KIND_MOTION, layout.kind == types.PORT_KIND_MODAL
+        self.blocks = hello.iteration.tangent == pb.TANGENT_FORM_BLOCK_DIAGONAL
+        width = {types.ROTATION_FORM_MATRIX: 9, types.ROTATION_FORM_QUATERNION: 4}.get(hello.form.rotation_form, 3)
+        size = layout.input_size if modal else 6 * nodes
+        self._block = (nodes, 6, 6) if self.blocks and not modal else (size, size)
+        block = int(np.prod(self._block)) if self.blocks or hello.iteration.tangent == pb.TANGENT_FORM_DENSE else 0
+        reference = 3 if layout.reference_loads else 0
+        self._sizes = {  # how many numbers
+            "forces": 0 if motion else 3 * self._rows, "moments": 0 if motion or mapped else 3 * nodes, "reference_force": reference,
+            "reference_moment": reference, "signals": 0 if motion else layout.input_size, "positions": 3 * nodes if motion else 0,
+            "rotations": width * nodes if motion and not layout.positions_only else 0, "stiffness": block, "damping": block}
+        self.needed = {name for name, size in self._sizes.items() if size} - {"moments", "stiffness", "damping"}
+
+    def fault(self, name: str, values: Optional[Array]) -> Optional[str]:
+        """What is wrong with an array of an answer; None: nothing."""
+        size = 0 if values is None else values.size
+        if size == 0 and name not in self.needed:
+            return None
+        if size != self._sizes[name] or (name in ("forces", "moments", "positions") and values is not None and self._is_turned(values)):
+            given = "is missing" if values is None else f"has the shape {values.shape}"
+            return f"`{name}` {given}; {self._expected(name)}"
+        return None if values is None or np.isfinite(values).all() else f"`{name}` has numbers that are not finite: {values.tolist()}"
+
+    def _is_turned(self, values: Array) -> bool:
+        """Columns of vectors instead of rows."""
+        return values.ndim == 2 and values.shape[1] != 3 and values.shape[0] == 3 != self._rows > 1
+
+    def _expected(self, name: str) -> str:
+        if not self._sizes[name]:
+            return f'port "{self._port}" takes none' + (" without `tangent` of the peer" if name in ("stiffness", "damping") else "")
+        if name in ("stiffness", "damping"):
+            return f"the peer's `tangent` takes {' x '.join(map(str, self._block))}"
+        if name == "signals":
+            return f'port "{self._port}" takes {self._sizes[name]} numbers' + "".join(f", {n}" for n in self._layout.input_names[:3])
+        if name.startswith("reference"):
+            return f'port "{self._port}" takes 3 numbers on its reference node'
+        rows = len(self._layout.node_labels) if name == "rotations" else self._rows
+        return f'port "{self._port}" takes {rows} x {self._sizes[name] // rows}, a row for each of its points'
+
+
+def _numbers(name: str, values: Any) -> Optional[Array]:
+    """`values` of an answer as an array."""
+    if values is None:
+        return None
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise TypeError(f"`{name}` of an answer must be numbers, got {str(values)[:100]!r}, a {type(values).__name__}") from None
+
+
+def answer(number: int, value: Any, form: AnswerForm) -> pb.PeerMessage:
+    """What a peer's function returned as the answer to exchange `number`. TypeError or ValueError for what is none on that port."""
     out = pb.PeerExchange(index=number)
     if isinstance(value, Reject):
-        out.reject.text = value.text
-        if value.preferred_step_size is not None:
-            out.reject.preferred_step_size = value.preferred_step_size
-        return pb.PeerMessage(exchange=out)
-    loads, values = _loads(value, kind), out.answer
+        return _rejection(number, value)
+    loads, values = _loads(value, form.kind), out.answer
     values.SetInParent()
-    for name in ("forces", "moments", "reference_force", "reference_moment", "signals", "positions", "rotations"):
-        _put(getattr(values, name), getattr(loads, name))
+    for name in _ARRAYS:
+        given = getattr(loads, name)
+        if given is None and name not in form.needed:
+            continue
+        numbers = _numbers(name, given)
+        fault = form.fault(name, numbers)
+        if fault:
+            raise ValueError(fault)
+        if numbers is None or not numbers.size:
+            continue
+        if name in ("stiffness", "damping"):
+            values.tangent.block_diagonal = form.blocks
+        getattr(values.tangent if name in ("stiffness", "damping") else values, name).extend(numbers.ravel())
     values.unfinished = loads.unfinished
-    for field, block in (("stiffness", loads.stiffness), ("damping", loads.damping)):
-        if block is not None:
-            numbers = np.asarray(block, float)
-            _put(getattr(values.tangent, field), numbers)
-            values.tangent.block_diagonal = numbers.ndim == 3
     return pb.PeerMessage(exchange=out)
 
 
-def _loads(value: Any, kind: Optional[int]) -> Loads:
+def _rejection(number: int, value: Reject) -> pb.PeerMessage:
+    out = pb.PeerExchange(index=number)
+    out.reject.text = _sendable(str(value.text))
+    if value.preferred_step_size is not None:
+        out.reject.preferred_step_size = value.preferred_step_size
+    return pb.PeerMessage(exchange=out)
+
+
+def _loads(value: Any, kind: int) -> Loads:
     if isinstance(value, Loads):
         return value
     if kind in (types.PORT_KIND_SIGNAL, types.PORT_KIND_MODAL):
         return Loads(signals=value)
     values = value if isinstance(value, tuple) else (value,)
-    if kind == types.PORT_KIND_MOTION:
-        return Loads(**dict(zip(("positions", "rotations"), values)))
-    return Loads(*values)
+    names = ("positions", "rotations") if kind == types.PORT_KIND_MOTION else _ARRAYS[:4]
+    if len(values) > len(names):
+        raise ValueError(f"an answer of {len(values)} parts; this port takes {', '.join(names)}, or mbcosim.Loads")
+    return Loads(**dict(zip(names, values)))
+
+
+def _sendable(text: str) -> str:
+    """Without the halves of characters that names of files may have."""
+    return text.encode(errors="replace").decode()
+
+
+def _told(error: BaseException) -> str:
+    """What the server is told of an exception, also of one that cannot be printed."""
+    try:
+        return _sendable(f"{type(error).__name__}: {error}")
+    except Exception as fault:
+        return f"{type(error).__name__}, whose text cannot be had: {type(fault).__name__}"
 
 
 def failure(number: int, error: BaseException) -> pb.PeerMessage:
     """The answer of a peer that cannot compute, or rejects the step."""
     if isinstance(error, Reject):
-        return answer(number, error, None)
-    return pb.PeerMessage(exchange=pb.PeerExchange(index=number, failure=f"{type(error).__name__}: {error}"))
+        return _rejection(number, error)
+    return pb.PeerMessage(exchange=pb.PeerExchange(index=number, failure=_told(error)))
 
 
 class Course:
     """What a peer has seen and answered; what blocking and asynchronous peers share.
 
     error      what ended the stream; None when it ended in good order
+    raised     what the peer's function raised last, with its traceback, or what was wrong with its answer: the server was told its text
     step       the step at whose end the peer stands: of the last exchange that it answered, in implicit modes of the last step that was
                accepted; before that where it attached. To be told when it attaches again
     exchanges  answers given
@@ -254,6 +339,7 @@ class Course:
 
     def __init__(self, rotation: str) -> None:
         self.error: Optional[Error] = None
+        self.raised: Optional[BaseException] = None
         self.step = 0
         self.exchanges = 0
         self.accepted: list[tuple[int, float]] = []
@@ -266,7 +352,7 @@ class Course:
         form, expected = hello.form, hello.expected
         if (form.following_loads or form.global_reference_loads) and "following_loads" not in welcome.protocol.features:
             raise Error("the server is too old: it knows neither following_loads nor global_reference_loads", grpc.StatusCode.UNIMPLEMENTED)
-        self.welcome = welcome
+        self.welcome, self._form = welcome, AnswerForm(welcome.layout, hello)
         self.step = min(expected.step, welcome.step) if expected.HasField("step") else welcome.step
 
     def _take(self, data: bytes) -> Optional[Motion]:
@@ -285,7 +371,7 @@ class Course:
 
     def _answer(self, value: Any) -> pb.PeerMessage:
         """The message that answers the last motion."""
-        message = answer(self._index, value, self.welcome.layout.kind)
+        message = answer(self._index, value, self._form)
         self.exchanges += 1
         if self._asked is not None and not isinstance(value, Reject):
             self.step = self._asked
@@ -293,5 +379,6 @@ class Course:
 
     def _failure(self, error: BaseException) -> pb.PeerMessage:
         """The message that says that there is no answer to the last motion."""
+        self.raised = error
         self.exchanges += 1
         return failure(self._index, error)

@@ -14,7 +14,7 @@ from .calls import SimulationCalls, StepResult
 from .errors import StepFailed
 from .rpc import USUAL
 from .table import Rows
-from .words import needed, remedy
+from .words import UnknownName, after_number, needed, remedy
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -44,7 +44,7 @@ class History(Mapping[str, Array]):
         try:
             return self._values[name]
         except KeyError:
-            raise KeyError(f"the history has no {name!r}; {remedy(name, self._values)}") from None
+            raise UnknownName(f"the history has no {name!r}; {remedy(name, self._values)}") from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)
@@ -53,8 +53,7 @@ class History(Mapping[str, Array]):
         return len(self._values)
 
     def __repr__(self) -> str:
-        unit = f"({self.time_unit})" if " " in self.time_unit else self.time_unit
-        span = f"{self.time[0]:g} to {self.time[-1]:g} {unit}" if len(self.time) else "empty"
+        span = f"{self.time[0]:g} to {self.time[-1]:g} {after_number(self.time_unit)}" if len(self.time) else "empty"
         lines = [f"  {name} {list(v.shape[1:]) or ''}{' [' + self.units[name] + ']' if self.units[name] else ''}" for name, v in self.items()]
         return "\n".join([f"<History, {len(self.time)} instants, {span}>", *lines])
 

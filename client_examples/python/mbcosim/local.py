@@ -1,6 +1,7 @@
 """A private daemon: started for this program, ended with it."""
 from __future__ import annotations
 
+import contextlib
 import os
 import pathlib
 import shutil
@@ -13,10 +14,9 @@ from typing import Any, Optional
 from .access import Path, daemon_program
 from .client import Server, await_answer
 from .errors import Unavailable
+from .rpc import PARTING
 
-_GRACE = 5.0  # seconds that the daemon gets to end in good order
-
-# The shell ends the daemon when this process closes the pipe or dies, however it dies; its own end is that of the daemon.
+# The shell ends the daemon when this process writes a line, closes the pipe or dies, however it dies; its own end is that of the daemon.
 _KEEPER = 'exec 3<&0; "$@" </dev/null 3<&- & child=$!; (read -r _ <&3; kill "$child") 2>/dev/null & wait "$child"'
 
 
@@ -37,6 +37,7 @@ class _Daemon:
     """The process and its folder."""
 
     def __init__(self, program: str, options: tuple[str, ...]) -> None:
+        self._starter = os.getpid()
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="mbcosim-"))
         if len(os.fsencode(self.folder)) > 80:  # the name of a socket has at most 107 bytes
             self.folder.rmdir()
@@ -52,11 +53,15 @@ class _Daemon:
         return (self.folder / "log").read_text(errors="replace").strip()[-2000:]
 
     def stop(self) -> None:
-        """Ends it and removes its folder."""
+        """Ends it and removes its folder, unless this is a process that was forked from the one that started it."""
+        if os.getpid() != self._starter:
+            return
         assert self.process.stdin is not None
-        self.process.stdin.close()
+        with contextlib.suppress(BrokenPipeError):
+            self.process.stdin.write(b"\n")  # forked processes keep the pipe open
+            self.process.stdin.close()
         try:
-            self.process.wait(_GRACE)
+            self.process.wait(PARTING)
         except subprocess.TimeoutExpired:
             os.killpg(self.process.pid, 9)
             self.process.wait()

@@ -11,7 +11,7 @@ import numpy as np
 
 from mbcosim.v1 import common_pb2
 
-from .words import remedy
+from .words import UnknownName, after_number, remedy
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -96,7 +96,7 @@ class Part:
         try:
             return getattr(self, word)
         except AttributeError as error:
-            raise KeyError(str(error)) from None
+            raise UnknownName(str(error)) from None
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(word for word in self._words(self.variables) if word.isidentifier())]
@@ -109,7 +109,7 @@ class Part:
 
     def __repr__(self) -> str:
         lines = [f"  {name}{short_text(variable)}" for name, variable in self.variables.items()]
-        return "\n".join([f"<{self.title}, t = {self._simulation.time:g} s>", *lines])
+        return "\n".join([f"<{self.title}, t = {self._simulation.time:g} {after_number(self._simulation.time_unit)}>", *lines])
 
 
 class Parts(Mapping[Key, Part]):
@@ -133,9 +133,9 @@ class Parts(Mapping[Key, Part]):
             return found[0]
         if found:
             pairs = " or ".join(repr((part.family, part.label)) for part in found)
-            raise KeyError(f"{len(found)} {self._what} are called {key!r}; say {pairs}")
-        known: list[object] = [part.name if isinstance(key, str) else part.label for part in self._parts if part.name or not isinstance(key, str)]
-        raise KeyError(f"no {self._what.rstrip('s')} is called {key!r}; {remedy(key, known)}")
+            raise UnknownName(f"{len(found)} {self._what} are called {key!r}; say {pairs}")
+        known = [part.name if isinstance(key, str) and part.name else own for part, own in zip(self._parts, self)]
+        raise UnknownName(f"no {self._what.rstrip('s')} is called {key!r}; {remedy(key, known)}")
 
     def __iter__(self) -> Iterator[Key]:
         labels = [part.label for part in self._parts]
@@ -169,8 +169,8 @@ class Variables(Mapping[str, Value]):
         if len(found) == 1:
             return found[0]
         if found:
-            raise KeyError(f"{key!r} may be {' or '.join(map(repr, found))}")
-        raise KeyError(f"no {self._what} is called {key!r}; {remedy(key, self._names)}")
+            raise UnknownName(f"{key!r} may be {' or '.join(map(repr, found))}")
+        raise UnknownName(f"no {self._what} is called {key!r}; {remedy(key, self._names)}")
 
     def __getitem__(self, key: str) -> Value:
         name = self.name(key)

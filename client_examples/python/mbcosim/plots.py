@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .histories import Array, History
-from .words import needed
+from .words import after_number, frequency_unit, needed, seconds_in
 
 if TYPE_CHECKING:
     from .analysis import Modes, StateSpace
@@ -51,6 +51,8 @@ def plot_history(history: History, names: Union[None, str, Iterable[str]] = None
     plt = pyplot(save)
     columns = history.columns()
     wanted = list(history) if names is None else [names] if isinstance(names, str) else list(names)
+    if not wanted:
+        raise ValueError("there is nothing to plot: " + ("the history has no variables" if names is None else "`names` is empty"))
     groups: dict[str, list[tuple[str, Array]]] = {}
     for name in wanted:
         if name in columns:
@@ -79,21 +81,21 @@ def plot_history(history: History, names: Union[None, str, Iterable[str]] = None
 
 # ---------------------------------------------------------------- what moves
 
-def points(history: History) -> tuple[list[int], Array]:
-    """Labels of the nodes whose positions a history has, and the positions (instants x nodes x 3) [m]."""
-    found = {int(name.split(".")[2]): values for name, values in history.items()
-             if name.startswith("node.structural.") and name.endswith(".X")}
+def points(history: History) -> tuple[list[int], Array, str]:
+    """Labels of the nodes whose positions a history has, the positions (instants x nodes x 3), their unit."""
+    found = {int(name.split(".")[2]): name for name in history if name.startswith("node.structural.") and name.endswith(".X")}
     if not found:
         raise ValueError("the history has no positions of nodes; simulate with outputs like 'node.structural.1.X', or without any: all nodes")
     labels = sorted(found)
-    return labels, np.stack([found[label] for label in labels], axis=1)
+    return labels, np.stack([history[found[label]] for label in labels], axis=1), history.units[found[labels[0]]]
 
 
 class _Scene:
     """Points and lines on axes, in the plane of the motion or in space."""
 
-    def __init__(self, plt: Any, positions: Array, labels: Sequence[int], lines: Iterable[Sequence[int]], view: str, trails: bool) -> None:
-        self._positions = positions
+    def __init__(self, plt: Any, positions: Array, unit: str, labels: Sequence[int], lines: Iterable[Sequence[int]], view: str,
+                 trails: bool) -> None:
+        self._positions, self._unit = positions, unit
         self._plane = _plane(positions, view)
         self._lines = [[list(labels).index(label) for label in line] for line in lines]
         space = self._plane is None
@@ -115,7 +117,7 @@ class _Scene:
         middle, axes = (low + high) / 2, self._plane or (0, 1, 2)
         for axis, letter in zip(axes, _XYZ):
             getattr(self.axes, f"set_{letter}lim")(middle[axis] - reach, middle[axis] + reach)
-            getattr(self.axes, f"set_{letter}label")(f"{_XYZ[axis]} [m]")
+            getattr(self.axes, f"set_{letter}label")(f"{_XYZ[axis]} [{self._unit}]")
             self.axes.locator_params(axis=letter, nbins=5)
         self.axes.set_aspect("equal") if self._plane else self.axes.set_box_aspect((1, 1, 1))
 
@@ -173,12 +175,12 @@ def animate_history(history: History, *, lines: Optional[Iterable[Sequence[int]]
     Returns a matplotlib animation, for notebooks: `HTML(animation.to_jshtml())`; None when pictures were written.
     """
     plt = pyplot(save)
-    labels, positions = points(history)
-    lasts = float(seconds if seconds is not None else history.time[-1] - history.time[0])
+    labels, positions, unit = points(history)
+    lasts = float(seconds if seconds is not None else (history.time[-1] - history.time[0]) * (seconds_in(history.time_unit) or 1.0))
     count = max(2, min(len(history.time), int(round(lasts * frames_per_second)) + 1))
     chosen = np.searchsorted(history.time, np.linspace(history.time[0], history.time[-1], count)).clip(0, len(history.time) - 1)
-    scene = _Scene(plt, positions[chosen], labels, [labels] if lines is None else lines, view, True)
-    titles = [f"{history.title + ', ' if history.title else ''}t = {history.time[k]:.3f} s" for k in chosen]
+    scene = _Scene(plt, positions[chosen], unit, labels, [labels] if lines is None else lines, view, True)
+    titles = [f"{history.title + ', ' if history.title else ''}t = {history.time[k]:.3f} {after_number(history.time_unit)}" for k in chosen]
     return _play(plt, scene, titles, frames_per_second, save)
 
 
@@ -191,31 +193,53 @@ def animate_mode(modes: Modes, number: int, *, lines: Optional[Iterable[Sequence
     size = max(float(np.ptp(base, axis=0).max()), 1e-9)
     phases = np.exp(2j * np.pi * np.arange(frames) / frames)[:, None, None]
     moved = base + scale * size * np.real(phases * shape / np.abs(shape).max())
-    scene = _Scene(plt, moved, modes.labels, [modes.labels] if lines is None else lines, view, False)
+    scene = _Scene(plt, moved, modes.length_unit, modes.labels, [modes.labels] if lines is None else lines, view, False)
     percent = 100 * modes.damping[number - 1]
-    title = f"mode {number}: {modes.frequencies_hz[number - 1]:.4g} Hz, damping {percent if abs(percent) > 1e-6 else 0:.2g} %"
+    frequency = f"{modes.frequencies_hz[number - 1]:.4g} {frequency_unit(modes.time_unit)}"
+    title = f"mode {number}: {frequency}, damping {percent if abs(percent) > 1e-6 else 0:.2g} %"
     return _play(plt, scene, [title] * frames, frames_per_second, save)
 
 
 # ---------------------------------------------------------------- linear systems
 
+_FEW = 4              # curves whose legend has room within the axes
+_NOISE = 1e-12        # of the largest response of the same output or input: round-off of one that is none
+_DASHES = ("-", "--", "-.", ":")
+
+
+def _curves(system: StateSpace, response: npt.NDArray[np.complex128]) -> list[tuple[int, int]]:
+    """Pairs (output, input) that answer each other."""
+    sizes = np.abs(response).max(axis=0)
+    if not sizes.size or not sizes.max():
+        raise ValueError(f"there is nothing to plot: no output ({', '.join(system.outputs) or 'there is none'}) answers an input "
+                         f"({', '.join(system.inputs) or 'there is none'})")
+    least = _NOISE * np.minimum(sizes.max(axis=1, keepdims=True), sizes.max(axis=0, keepdims=True))
+    return [(i, j) for i, j in np.argwhere(sizes > least).tolist()]
+
+
 def plot_bode(system: StateSpace, frequencies_hz: Optional[npt.ArrayLike] = None, *, save: Optional[str] = None) -> Any:
-    """Magnitude and phase of every output over every input; default: two decades about the poles. Returns the figure."""
+    """Magnitude and phase of every output over every input that it answers, in the color of the input and the dashes of the output; default: two
+    decades about the poles. Returns the figure."""
     plt = pyplot(save)
     frequencies = system.frequencies() if frequencies_hz is None else np.asarray(frequencies_hz, float)
     response = system.response(frequencies)
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=(8, 6), sharex=True, layout="constrained")
-    for i, output in enumerate(system.outputs):
-        for j, source in enumerate(system.inputs):
-            if not np.abs(response[:, i, j]).max():
-                continue
-            upper.loglog(frequencies, np.abs(response[:, i, j]), label=f"{output} / {source}")
-            lower.semilogx(frequencies, np.degrees(np.unwrap(np.angle(response[:, i, j]))))
+    curves = _curves(system, response)
+    beside = len(curves) > _FEW
+    figure = plt.figure(figsize=(12, max(6, 0.22 * len(curves))) if beside else (8, 6), layout="constrained")
+    grid = figure.add_gridspec(2, 2 if beside else 1, width_ratios=[2, 1] if beside else None)
+    upper = figure.add_subplot(grid[0, 0])
+    lower = figure.add_subplot(grid[1, 0], sharex=upper)
+    upper.tick_params(labelbottom=False)
+    for i, j in curves:
+        style: dict[str, Any] = {"color": f"C{j}", "linestyle": _DASHES[i % len(_DASHES)], "linewidth": 1.2}
+        upper.loglog(frequencies, np.abs(response[:, i, j]), label=f"{system.outputs[i]} / {system.inputs[j]}", **style)
+        lower.semilogx(frequencies, np.degrees(np.unwrap(np.angle(response[:, i, j]))), **style)
     upper.set_ylabel("magnitude")
-    lower.set(xlabel="frequency [Hz]", ylabel="phase [degrees]")
+    lower.set(xlabel=f"frequency [{frequency_unit(system.time_unit)}]", ylabel="phase [degrees]")
     for axes in (upper, lower):
         axes.grid(alpha=0.3, which="both")
-    upper.legend(fontsize="small", frameon=False)
+    names = figure.add_subplot(grid[:, 1], frameon=False, xticks=[], yticks=[]) if beside else upper
+    names.legend(*upper.get_legend_handles_labels(), fontsize="small", frameon=False, loc="center left" if beside else "best")
     return _finish(figure, save)
 
 
@@ -228,7 +252,8 @@ def plot_root_locus(system: StateSpace, gains: npt.ArrayLike, *, save: Optional[
     axes.plot(poles[0].real, poles[0].imag, "x", color="C3", label=f"k = {np.ravel(gains)[0]:g}")
     axes.plot(poles[-1].real, poles[-1].imag, "s", color="C2", markersize=4, label=f"k = {np.ravel(gains)[-1]:g}")
     axes.axvline(0, color="0.6", linewidth=0.8)
-    axes.set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]")
+    unit = after_number(system.time_unit)
+    axes.set(xlabel=f"real part [1/{unit}]", ylabel=f"imaginary part [rad/{unit}]")
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     return _finish(figure, save)

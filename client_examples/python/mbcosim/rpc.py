@@ -251,15 +251,15 @@ class Connection(Address):
         """As a future: what gRPC does not end at its deadline (an upload that nobody reads) ends soon after it."""
         future = method.future(call.sent(), metadata=self.metadata_of(call), timeout=call.timeout)
         try:
-            return future.result(None if call.timeout is None else call.timeout + _AGAIN)
+            with cancelling(future):
+                return future.result(None if call.timeout is None else call.timeout + _AGAIN)
         except grpc.FutureTimeoutError:
-            future.cancel()
             raise TimedOut(f"{call.method} took longer than {call.timeout} s", grpc.StatusCode.DEADLINE_EXCEEDED) from None
 
     def _stream(self, method: Any, call: Call) -> None:
         messages = method(call.sent(), metadata=self.metadata_of(call), timeout=call.timeout)
         latest = None if call.timeout is None else call.timeout + _AGAIN
-        with bounded(latest, messages.cancel, call.method):
+        with bounded(latest, messages.cancel, call.method), cancelling(messages):
             for message in messages:
                 assert call.each is not None
                 call.each(message)
@@ -312,6 +312,16 @@ def _bounded(seconds: float, cancel: Callable[[], object], what: str) -> Iterato
         raise
     finally:
         timer.cancel()
+
+
+@contextlib.contextmanager
+def cancelling(stream: Any) -> Iterator[None]:
+    """Cancels a call that the block does not see to its end, by Ctrl-C say: the server would go on with it."""
+    try:
+        yield
+    except BaseException:
+        stream.cancel()
+        raise
 
 
 def end_with(stream: Any, requests: queue.SimpleQueue[Any]) -> None:

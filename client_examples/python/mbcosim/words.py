@@ -5,6 +5,13 @@ import difflib
 from typing import Any, Iterable, Optional
 
 
+class UnknownName(KeyError):
+    """A KeyError whose text is for people: shown without the quotes that a KeyError puts about it."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 def listed(names: Iterable[object], most: int = 12) -> str:
     """`'a', 'b', 'c'`; of many the first ones."""
     every = [repr(name) for name in names]
@@ -18,6 +25,22 @@ def remedy(name: object, known: Iterable[object], most: int = 12) -> str:
     if near:
         return f"did you mean {' or '.join(map(repr, near))}?"
     return f"known: {listed(known, most)}" if known else "there are none"
+
+
+def after_number(unit: str) -> str:
+    """A unit as it follows a number: `ms`, `(deck unit of time)`."""
+    return f"({unit})" if " " in unit else unit
+
+
+def seconds_in(time_unit: str) -> Optional[float]:
+    """Seconds in a unit of time that a deck declares; None: it declares none."""
+    prefix = {"k": 1e3, "M": 1e6, "G": 1e9, "m": 1e-3, "u": 1e-6, "n": 1e-9}
+    return {"s": 1.0, "min": 60.0, "h": 3600.0, **{letter + "s": factor for letter, factor in prefix.items()}}.get(time_unit)
+
+
+def frequency_unit(time_unit: str) -> str:
+    """Of oscillations of a deck that counts time so: `Hz`, or `1/(deck unit of time)` where nobody declared one."""
+    return "Hz" if seconds_in(time_unit) is not None else f"1/({time_unit})"
 
 
 def choice(kind: Any, prefix: str, word: Optional[str], what: str) -> Any:
