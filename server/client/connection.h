@@ -5,6 +5,7 @@
 #include <grpcpp/client_context.h>
 #include <grpcpp/support/status.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 
@@ -64,13 +65,23 @@ struct Server::Impl {
 
 constexpr double kParting = 2;  ///< longest wait of a destructor [s]
 
+/// May a call carry it beside its message?
+inline bool is_metadata(const std::string& text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
+}
+
 /// Context of one call: says who calls, how long it may take [s], and what it is about, so that a
 /// proxy finds the daemon that has the simulation.
 struct CallContext : grpc::ClientContext {
   explicit CallContext(const Server::Impl& server, double timeout = kEndless,
                        const std::string& simulation = {}) {
     if (!server.authorization.empty()) AddMetadata("authorization", server.authorization);
-    if (!simulation.empty()) AddMetadata("mbcosim-session", simulation);
+    if (!simulation.empty()) {
+      if (!is_metadata(simulation))  // gRPC would abort the process
+        throw Error("no simulation has such a name: it has characters other than printable ASCII",
+                    static_cast<int>(grpc::StatusCode::NOT_FOUND), "NO_SUCH_SIMULATION", {});
+      AddMetadata("mbcosim-session", simulation);
+    }
     if (checked_timeout(timeout) != kEndless)
       set_deadline(std::chrono::system_clock::now() +
                    std::chrono::microseconds(static_cast<std::int64_t>(timeout * 1e6)));

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 
 #include "fmi/archive.h"
 #include "fmi/description.h"
@@ -128,6 +129,43 @@ void count(const std::vector<Entry>& entries, ExportReport& report) {
 
 }  // namespace
 
+namespace {
+
+/// Can XML 1.0 hold it?
+bool is_text(const std::string& text) {
+  const auto is_control = [](char c) {
+    return static_cast<unsigned char>(c) < ' ' && c != '\t' && c != '\n' && c != '\r';
+  };
+  if (std::any_of(text.begin(), text.end(), is_control)) return false;
+  try {
+    (void)nlohmann::json(text).dump();
+    return true;
+  } catch (const nlohmann::json::exception&) {  // it is not UTF-8
+    return false;
+  }
+}
+
+/// What the description cannot tell.
+std::optional<Error> untold(const Model& model, const std::map<std::string, std::string>& files,
+                            const std::vector<Entry>& entries) {
+  const auto error = [](const std::string& what) {
+    return make_error(ErrorKind::argument, "",
+                      what +
+                          " is not UTF-8, or has control characters, which the description of an "
+                          "FMU (XML) cannot hold");
+  };
+  for (const auto& [name, content] : files)
+    if (!is_text(name)) return error("the name of a file of the deck");
+  if (!is_text(model.title)) return error("the title of the deck");
+  for (const Entry& e : entries) {
+    const auto* const text = e.symbol ? std::get_if<std::string>(&e.symbol->start) : nullptr;
+    if (text && !is_text(*text)) return error("the value of the symbol \"" + e.symbol->name + "\"");
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
   const fs::path path(options.deck);
   const FolderSource folder(path.has_parent_path() ? path.parent_path().string() : ".",
@@ -148,6 +186,7 @@ mbcosim::Status export_fmu(const ExportOptions& options, ExportReport& report) {
   if (!arrays) *entries = as_scalars(*entries);
   add_symbols(loaded.symbols, options.symbols, *entries);
   count(*entries, report);
+  if (const auto error = untold(model, source.files(), *entries)) return *error;
 
   Manifest manifest;
   std::map<std::string, std::string> archive;

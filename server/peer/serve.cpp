@@ -15,7 +15,7 @@ using client::Mode;
 /// A token: without the ends of its lines.
 std::string token_of_file(const std::string& path) {
   std::string text = server::text_of_file(path);
-  while (!text.empty() && text.back() == '\n') text.pop_back();
+  while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
   return text;
 }
 
@@ -99,6 +99,9 @@ void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
     if (running) running->step_ended(accepted, step);
   };
   client::Peer peer = simulation.attach(call.port, options);
+  if (peer.layout().modal || !peer.layout().node_labels.empty())
+    throw std::runtime_error("port \"" + call.port +
+                             "\" is no signal port: an FMU takes part in those only");
   const PortSignals signals{expanded(simulation, peer.layout().outputs),
                             expanded(simulation, peer.layout().inputs)};
   SignalMap map = map_signals(archive, signals, fmu.map);

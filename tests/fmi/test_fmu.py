@@ -1057,6 +1057,11 @@ def test_wrong_selections_and_decks_are_refused(tmp_path):
     code, text = export(pendulum, "-D", "NOBODY=1")
     assert code == 2 and "NOBODY" in text
     assert export(pendulum, "-D", "L")[0] == 4
+    for text in (b"a\x01b", b"caf\xe9"):
+        with open(pendulum, "rb") as file:
+            bad.write_bytes(b'set: string told = "' + text + b'";\n' + file.read())
+        code, told = export(str(bad))
+        assert code in (2, 4) and 'the value of the symbol "told" is not UTF-8, or has control characters' in told, told
 
 
 def test_an_fmu_never_takes_the_place_of_its_deck(tmp_path):

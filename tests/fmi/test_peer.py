@@ -202,6 +202,13 @@ def test_arrays_that_do_not_fit_are_refused(start_daemon, program, fmus):  # noq
         assert 'the dimensions of its variable "us" are not from 1 to a million' in told(wrong, f"us={SENT}")
 
 
+def test_an_fmu_takes_part_in_signal_ports_only(start_daemon, program, fmus):  # noqa: F811
+    daemon = start_daemon()
+    with daemon.connect() as server, server.load(CART, ports=[mbcosim.structural_port("tip", nodes=[1])]) as cart:
+        peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "tip")
+        assert peer.finish() == 4 and 'port "tip" is no signal port: an FMU takes part in those only' in peer.errors
+
+
 LOADED = mbcosim.signal_port("control", outputs=["node.structural.1.load"], inputs=["stream.force"])
 
 

@@ -94,8 +94,10 @@ def invocations(root):
             yield "kubernetes.yaml, command", ["--daemon-id=mbcosimd0"] * ("--daemon-id" in container["command"][-2]), {}
             for probe in ("startupProbe", "readinessProbe", "livenessProbe"):
                 yield f"kubernetes.yaml, {probe}", container[probe]["exec"]["command"][1:], {}
-    for line in re.findall(r"^#? *ExecStart=(/.*)$", (docker / "mbcosimd.service").read_text(), re.MULTILINE):
-        yield "mbcosimd.service", shlex.split(line.replace("...", "/secrets/any"))[1:], {}
+    unit = (docker / "mbcosimd.service").read_text()
+    environment_of_unit = dict(re.findall(r"\b(MBCOSIMD_\w+)=(\S+)", " ".join(re.findall(r"^Environment=(.*)$", unit, re.MULTILINE))))
+    for line in re.findall(r"^#? *ExecStart=(/.*)$", unit, re.MULTILINE):
+        yield "mbcosimd.service", shlex.split(line.replace("...", "/secrets/any"))[1:], environment_of_unit
 
 
 def unlimited(root):

@@ -91,6 +91,28 @@ TEST(ClientAddress, ThatIsNoneIsRefusedAndNobodysIsToldWhy) {
   std::remove(file.c_str());
 }
 
+// gRPC would abort the process.
+TEST(ClientAddress, TokensAndNamesThatNoCallCanCarryAreRefused) {
+  for (const char* token : {"caf\xc3\xa9", "a\tb", "a\nb", "a\x7f"}) {
+    try {
+      (void)Server::connect(std::getenv("MBCOSIM_ADDRESS"), 10, {.token = token});
+      ADD_FAILURE() << token;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.reason(), "BAD_ARGUMENT");
+      EXPECT_EQ(std::string(error.what()).find(token), std::string::npos) << "it is a secret";
+    }
+  }
+  Server server = connect();
+  for (const char* name : {"simulations/caf\xc3\xa9", "simulations/a\nb", "\xff"}) {
+    try {
+      (void)server.find(name);
+      ADD_FAILURE() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.reason(), "NO_SUCH_SIMULATION");
+    }
+  }
+}
+
 TEST(Table, HasWhatSingleStepsGive) {
   Server server = connect();
   Simulation one = server.load_text(body()), other = server.load_text(body());

@@ -327,7 +327,7 @@ def careless(monkeypatch):
 
 def test_an_answer_of_the_wrong_length_ends_the_stream(server, careless):
     with oscillator(server) as simulation, simulation.couple("spring", lambda motion: [[1.0, 2.0]], peer_timeout=5) as peer:
-        with pytest.raises(mbcosim.StepFailed):
+        with pytest.raises(mbcosim.StepFailed, match='port "spring": the peer was sent away: .*`forces` must have 3 numbers, got 2'):
             simulation.step()
         wait_for(lambda: peer.error)
         assert peer.error.reason == "BAD_ARGUMENT" and "3 numbers" in str(peer.error)

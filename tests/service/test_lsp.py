@@ -96,6 +96,41 @@ def pendulum_text():
     return pathlib.Path(MODELS, "pendulum.mbd").read_text()
 
 
+def raw(editor, body):
+    editor.process.stdin.write(b"Content-Length: %d\r\n\r\n" % len(body) + body)
+    editor.process.stdin.flush()
+
+
+@pytest.mark.parametrize("body, code", [(b"{\"id\": 7, ", -32700), (b"[" * 100_000, -32700), (b'{"id": 7, "method": 5}', -32600),
+                                        (b'{"id": 7, "method": null}', -32600)])
+def test_a_bad_message_is_told_and_the_next_is_served(editor, pendulum_text, body, code):
+    raw(editor, body)
+    answer = editor.receive()
+    assert answer["error"]["code"] == code and answer["id"] == (None if code == -32700 else 7)
+    raw(editor, b'{"method": 5}')  # a notification has no answer
+    assert editor.open("file:///a.mbd", pendulum_text) == []
+
+
+def test_half_a_surrogate_pair_does_not_end_it(editor, pendulum_text):
+    """Editors count in UTF-16 and may cut a pair; JSON has each half as an escape of its own."""
+    for half in ("\\ud83d", "\\ude00", "\\ud83d x", "\\\\\\ud83d"):
+        text = json.dumps("# ") [:-1] + half + json.dumps("\n" + pendulum_text)[1:]
+        raw(editor, (f'{{"jsonrpc": "2.0", "method": "textDocument/didOpen", "params": {{"textDocument": {{"uri": "file:///{len(half)}.mbd", '
+                     f'"languageId": "mbcosim", "version": 1, "text": {text}}}}}}}').encode())
+        assert editor.next_diagnostics(f"file:///{len(half)}.mbd") == []
+    assert editor.open("file:///whole.mbd", "# \U0001f600\n" + pendulum_text) == []
+
+
+def test_requests_come_between_initialize_and_shutdown():
+    editor = Editor()
+    assert editor.ask("textDocument/hover", textDocument={"uri": "x"}, position={"line": 0, "character": 0})["code"] == -32002
+    editor.ask("initialize", processId=None, rootUri=None, capabilities={})
+    assert editor.ask("shutdown") is None
+    assert editor.ask("textDocument/hover", textDocument={"uri": "x"}, position={"line": 0, "character": 0})["code"] == -32600
+    editor.send(method="exit")
+    assert editor.process.wait(20 * TIME_FACTOR) == 0
+
+
 def test_diagnostics_come_as_one_types_and_go_when_it_is_mended(editor, pendulum_text):
     uri = "file:///work%20in%20progress/a.mbd"
     bad = pendulum_text.replace("spherical hinge", "sperical hinge")
@@ -187,7 +222,7 @@ def test_what_it_cannot_do_is_refused_and_nonsense_does_not_end_it(editor):
     assert editor.ask("textDocument/hover", textDocument={"uri": "file:///x.mbd"}, position={"line": 999999, "character": -5}) is None
 
 
-@pytest.mark.parametrize("bytes_sent", [b"Content-Length: 99999999999\r\n\r\n", b"x" * 5000, b"Content-Length: 3\r\n\r\n{{{"])
+@pytest.mark.parametrize("bytes_sent", [b"Content-Length: 99999999999\r\n\r\n", b"x" * 5000])
 def test_a_broken_stream_ends_it_with_a_word(bytes_sent):
     done = subprocess.run([os.path.join(BIN, "mbcosim"), "lsp"], input=bytes_sent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False,
                           timeout=60)

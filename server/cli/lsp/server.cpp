@@ -12,7 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMethodNotFound = -32601, kInvalidParameters = -32602;
+constexpr int kParseError = -32700, kInvalidRequest = -32600, kMethodNotFound = -32601,
+              kInvalidParameters = -32602, kNotInitialized = -32002;
 
 /// Path of a `file:` URI; other URIs as they are.
 std::string path_of(const std::string& uri) {
@@ -92,7 +93,9 @@ Json to_json(const Diagnostic& diagnostic, const Document* document) {
 }
 
 std::string shown(const DeckSymbol::Value& value) {
-  return std::visit([](const auto& v) { return Json(v).dump(); }, value);
+  return std::visit(
+      [](const auto& v) { return Json(v).dump(-1, ' ', false, Json::error_handler_t::replace); },
+      value);
 }
 
 /// The letters of a word, lower case, without what separates them: as the reader compares.
@@ -153,9 +156,22 @@ int Server::run() {
 }
 
 void Server::dispatch(const Json& message) {
+  const auto refuse = [&](const Json& id, int code, const char* text) {
+    wire_.write({{"jsonrpc", "2.0"}, {"id", id}, {"error", {{"code", code}, {"message", text}}}});
+  };
+  if (message.is_discarded()) return refuse(nullptr, kParseError, "the message is no JSON");
   if (!message.is_object() || !message.contains("method")) return;  // an answer; none is wanted
-  const std::string method = message.value("method", "");
-  const Json parameters = message.value("params", Json::object());
+  const bool asks = message.contains("id");
+  if (!message["method"].is_string()) {
+    if (asks) refuse(message["id"], kInvalidRequest, "`method` must be a string");
+    return;
+  }
+  const std::string method = message["method"];
+  static const Json kNone = Json::object();
+  const Json& parameters = message.contains("params") ? message["params"] : kNone;
+  if (asks && shut_down_) return refuse(message["id"], kInvalidRequest, "shutdown was asked for");
+  if (asks && !initialized_ && method != "initialize")
+    return refuse(message["id"], kNotInitialized, "`initialize` comes first");
   if (!message.contains("id")) {
     try {
       note(method, parameters);
@@ -175,7 +191,8 @@ void Server::dispatch(const Json& message) {
 }
 
 Json Server::answer(const std::string& method, const Json& parameters) {
-  if (method == "initialize")
+  if (method == "initialize") {
+    initialized_ = true;
     return {{"capabilities",
              {{"textDocumentSync", 1},
               {"completionProvider", {{"triggerCharacters", {":", ","}}}},
@@ -183,6 +200,7 @@ Json Server::answer(const std::string& method, const Json& parameters) {
               {"definitionProvider", true},
               {"referencesProvider", true}}},
             {"serverInfo", {{"name", "mbcosim"}, {"version", MBCOSIM_VERSION}}}};
+  }
   if (method == "shutdown") {
     shut_down_ = true;
     return nullptr;

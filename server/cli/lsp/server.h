@@ -45,7 +45,7 @@ class Server {
   std::map<std::string, Entry> open_;                      ///< by URI
   std::map<std::string, std::set<std::string>> shown_in_;  ///< files with diagnostics, by deck
   std::set<std::string> changed_;
-  bool shut_down_ = false, left_ = false;
+  bool initialized_ = false, shut_down_ = false, left_ = false;
 };
 
 }  // namespace mbcosim::lsp

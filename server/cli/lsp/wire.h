@@ -13,8 +13,10 @@ using Json = nlohmann::json;
 class Wire {
  public:
   Wire(int in, int out) : in_(in), out_(out) {}
-  /// The next message; empty at the end of the input. Throws std::runtime_error when the header or
-  /// the JSON is wrong or the message is larger than 64 MiB.
+  /// The next message, discarded where it is no JSON or nested deeper than any of the protocol;
+  /// empty at the end of the input. Halves of surrogate pairs, which editors send of a text that is
+  /// being written, become U+FFFD. Throws std::runtime_error when the header is wrong or the
+  /// message is larger than 64 MiB.
   std::optional<Json> read();
   void write(const Json& message);
   /// Has something come that was not read yet?
