@@ -271,6 +271,53 @@ def test_inputs_are_set_by_the_names_of_their_nodes(server):
         assert "node.structural.1.load" in simulation.inputs and "time" in simulation.outputs
 
 
+LOAD, OTHER = "node.structural.2.load", "node.structural.1.load"
+
+
+@pytest.mark.parametrize("set_inputs, field", [
+    (lambda s, values: s.write(values), "values.values"), (lambda s, values: s.step(inputs=values), "inputs.values"),
+    (lambda s, values: s.run_until(0.1, inputs=values), "inputs.values"), (lambda s, values: s.simulate("time", steps=1, inputs=values), "inputs.values"),
+    (lambda s, values: s.simulate("time", steps=1, inputs={k: lambda t, v=v: v for k, v in values.items()}), "inputs.values")])
+def test_an_input_takes_as_many_real_numbers_as_it_has(swing, set_inputs, field):
+    with pytest.raises(mbcosim.Error, match=f"`{field}`: '{LOAD}' takes 6 values, got 5") as caught:
+        set_inputs(swing, {LOAD: range(5), OTHER: range(7)})  # as many as both together
+    assert caught.value.reason == "BAD_ARGUMENT" and caught.value.field == field
+    with pytest.raises(TypeError, match=f"'{LOAD}': complex numbers, where real ones are wanted"):
+        set_inputs(swing, {LOAD: [1j] * 6})
+    assert swing.step_number == 0 and not swing[LOAD].any() and not swing[OTHER].any()
+
+
+def test_a_steppers_values_are_real_numbers(swing):
+    with swing.stepper(inputs=[LOAD]) as stepper:
+        with pytest.raises(TypeError, match="complex numbers"):
+            stepper.step(np.ones(6) * 1j)
+        assert stepper.step(np.ones(6)).step == 1
+
+
+def names(*given):
+    return (name for name in given)
+
+
+POSITION = "node.structural.2.X"
+
+
+@pytest.mark.parametrize("ask, argument", [
+    (lambda s, outputs: s.read(outputs), "names"), (lambda s, outputs: s.step(outputs=outputs).values, "outputs"),
+    (lambda s, outputs: s.step(timeout=9, outputs=outputs).values, "outputs"), (lambda s, outputs: s.run_until(0.1, outputs=outputs).values, "outputs"),
+    (lambda s, outputs: s.run_until(0.1, outputs=outputs, progress=lambda _: None).values, "outputs"),
+    (lambda s, outputs: s.stepper(outputs).step().values, "outputs"), (lambda s, outputs: dict.fromkeys(s.subscribe(outputs)._names), "names"),
+    (lambda s, outputs: {POSITION: s.linearize([], outputs)[2]}, "outputs")])
+def test_names_may_come_from_a_generator_but_not_one_by_itself(swing, ask, argument):
+    assert list(ask(swing, names(POSITION))) == [POSITION]
+    with pytest.raises(TypeError, match=rf"`{argument}` must be a list of names, got one by itself: say \['{POSITION}'\]"):
+        ask(swing, POSITION)
+
+
+def test_names_of_a_signal_port_are_a_list():
+    with pytest.raises(TypeError, match=r"`inputs` must be a list of names, got one by itself: say \['time'\]"):
+        mbcosim.signal_port("control", [], "time")
+
+
 def test_the_reaction_of_a_hinge_is_what_moves_the_body(swing):
     swing.step(60)
     needed = swing.nodes[2].acceleration - np.array([0, 0, -9.81])  # of 1 kg
@@ -344,6 +391,19 @@ def test_inputs_may_be_functions_of_time(server):
     with server.load_text(decks.body(spin="0., 0., 0.")) as simulation:
         history = simulation.simulate(["node.structural.1.XP"], until=0.5, inputs={name: lambda t: [2 * t, 0, 0, 0, 0, 0]})
     assert history["node.structural.1.XP"][-1, 0] == pytest.approx(0.25, rel=1e-2)  # the integral of 2 t, held from step to step
+
+
+def test_an_output_that_is_named_twice_is_kept_once(swing):
+    for inputs in ({}, {LOAD: lambda t: [0] * 6}):
+        history = swing.simulate([POSITION, "time", POSITION], steps=4, inputs=inputs)
+        assert {name: values.shape for name, values in history.items()} == {POSITION: (5, 3), "time": (5,)}
+
+
+@pytest.mark.parametrize("inputs", [{}, {LOAD: lambda t: [0] * 6}])
+def test_a_history_of_a_negative_number_of_steps_is_refused(swing, inputs):
+    with pytest.raises(mbcosim.Error, match="`steps` must not be negative, got -1") as caught:
+        swing.simulate(POSITION, steps=-1, inputs=inputs)
+    assert caught.value.field == "steps"
 
 
 def test_a_history_is_a_table(swing, tmp_path):
