@@ -256,6 +256,7 @@ def test_a_program_that_ends_in_a_function_tells_the_server(daemon, server):
     stepping = []
     with concurrent.futures.ThreadPoolExecutor() as blocking, oscillator(server) as simulation:
         async def main():
+            asyncio.get_running_loop().set_exception_handler(lambda *_: None)
             async with mbcosim.aio.connect(daemon.address) as connection:
                 same = await connection.attach(simulation.name)
                 await same.couple("spring", leaves)

@@ -29,7 +29,7 @@ from . import access, events, exchange
 from .access import Attempts
 from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepResult, Values, real_numbers
 from .coupling import Answer, open_stream
-from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
+from .errors import Busy, Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
 from .histories import History
 from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, cancelling, checked_timeout, metadata,
                   parting, runs_calls)
@@ -105,9 +105,11 @@ class Connection(Address):
             try:
                 with translated():
                     return await self._once(call)
-            except Unavailable as error:
+            except (Unavailable, Busy) as error:
                 pause, left = retries.again(error)
                 await asyncio.sleep(pause)
+                if not left:
+                    continue
                 with contextlib.suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(self.channel.channel_ready(), left)
                     continue
@@ -186,10 +188,8 @@ class Snapshot(Awaiting, SnapshotCalls):
     async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        with parting():
-            await self.restore(timeout=PARTING)
-            await self.delete(timeout=PARTING)
+    async def __aexit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        await self._connection.run(self._end(raised))
 
 
 @runs_calls(awaited)
@@ -218,10 +218,8 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
     async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        if self._owned:
-            with parting():
-                await self.delete(timeout=PARTING)
+    async def __aexit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        await self._connection.run(self._end(raised))
 
     @property
     def variables(self) -> dict[str, common_pb2.Variable]:
@@ -331,8 +329,9 @@ class Stepper:
     async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        await self.close()
+    async def __aexit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        with parting(raised):
+            await self.close()
 
     async def step(self, values: Optional[npt.ArrayLike] = None, count: int = 1, *, step_size: Optional[float] = None,
                    timeout: Optional[float] = None) -> StepResult:

@@ -4,6 +4,7 @@ Each method marked with `call` is a generator that yields `rpc.Call`s; see rpc.r
 """
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import os
@@ -18,8 +19,8 @@ import numpy.typing as npt
 from mbcosim.v1 import common_pb2, coupling_types_pb2, geometry_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb
 
 from . import bundle
-from .errors import NotFound, StepFailed, bad_argument, enum_name
-from .rpc import USUAL, Call, Calls, call, fill_duration, protocol
+from .errors import NotFound, StepFailed, TimedOut, bad_argument, enum_name
+from .rpc import PARTING, USUAL, Call, Calls, call, fill_duration, parting, protocol
 from .table import Rows
 from .words import UnknownName, after_number, choice, each_name, needed, pick, remedy
 
@@ -582,9 +583,9 @@ class SimulationCalls(Generic[SnapshotKind]):
         """Goes to a saved state."""
         yield from self._restore(snapshot, timeout)
 
-    def _restore(self, snapshot: SnapshotCalls, timeout: Optional[float]) -> Calls[None]:
+    def _restore(self, snapshot: SnapshotCalls, timeout: Optional[float], patient: bool = False) -> Calls[None]:
         request = pb.RestoreSnapshotRequest(simulation=self.name, snapshot=snapshot.name, request_id=_new_id())
-        self._stand((yield Call("Simulations/RestoreSnapshot", request, timeout, repeatable=True)).simulation)
+        self._stand((yield Call("Simulations/RestoreSnapshot", request, timeout, repeatable=True, patient=patient)).simulation)
 
     @call
     def reset(self, *, timeout: Optional[float] = None) -> Calls[None]:
@@ -753,9 +754,18 @@ class SimulationCalls(Generic[SnapshotKind]):
     @call
     def delete(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Ends the simulation."""
+        yield from self._delete(timeout)
+
+    def _delete(self, timeout: Optional[float], patient: bool = False) -> Calls[None]:
         self._leave()
-        yield Call("Simulations/DeleteSimulation", pb.DeleteSimulationRequest(simulation=self.name, request_id=_new_id()), timeout,
-                   repeatable=True)
+        request = pb.DeleteSimulationRequest(simulation=self.name, request_id=_new_id())
+        yield Call("Simulations/DeleteSimulation", request, timeout, repeatable=True, patient=patient)
+
+    def _end(self, raised: Optional[BaseException]) -> Calls[None]:
+        """Leaves a `with` block, in which something was `raised` or not; that it was deleted before is no fault."""
+        if self._owned:
+            with parting(raised), contextlib.suppress(NotFound):
+                yield from self._delete(PARTING, patient=True)
 
 
 class SnapshotCalls:
@@ -783,5 +793,15 @@ class SnapshotCalls:
     @call
     def delete(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Forgets the state."""
+        yield from self._delete(timeout)
+
+    def _delete(self, timeout: Optional[float], patient: bool = False) -> Calls[None]:
         request = pb.DeleteSnapshotRequest(simulation=self._simulation.name, snapshot=self.name, request_id=_new_id())
-        yield Call("Simulations/DeleteSnapshot", request, timeout, repeatable=True)
+        yield Call("Simulations/DeleteSnapshot", request, timeout, repeatable=True, patient=patient)
+
+    def _end(self, raised: Optional[BaseException]) -> Calls[None]:
+        """Leaves a `with` block, in which something was `raised` or not. Raises TimedOut when nobody knows whether the simulation went back."""
+        with parting(raised, told=TimedOut):
+            yield from self._simulation._restore(self, PARTING, patient=True)
+        with parting(raised), contextlib.suppress(NotFound):
+            yield from self._delete(PARTING, patient=True)

@@ -41,10 +41,8 @@ class Snapshot(Blocking, SnapshotCalls):
     def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        with parting():
-            self.restore(timeout=PARTING)
-            self.delete(timeout=PARTING)
+    def __exit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        self._connection.run(self._end(raised))
 
 
 @runs_calls(blocking)
@@ -82,10 +80,8 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
     def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        if self._owned:
-            with parting():
-                self.delete(timeout=PARTING)
+    def __exit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        self._connection.run(self._end(raised))
 
     @property
     def variables(self) -> dict[str, common_pb2.Variable]:
@@ -147,8 +143,9 @@ class Stepper:
     def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        with parting(raised):
+            self.close()
 
     def step(self, values: Optional[npt.ArrayLike] = None, count: int = 1, *, step_size: Optional[float] = None,
              timeout: Optional[float] = None) -> StepResult:
