@@ -56,6 +56,22 @@ def test_gives_the_bits_of_the_blocking_client(daemon, server, mode):
         assert simulation[X].tobytes() == found.tobytes()
 
 
+def test_names_may_come_from_a_generator(daemon):
+    async def body(server, _):
+        def names():
+            return (name for name in [X])
+
+        simulation = await server.load_text(decks.body(final_time="1."))
+        assert list(await simulation.read(names())) == list((await simulation.run_until(0.01, outputs=names())).values) == [X]
+        async with await simulation.stepper(names()) as stepper:
+            assert list((await stepper.step()).values) == [X]
+        for ask in (simulation.read, simulation.subscribe, simulation.stepper, lambda name: simulation.step(outputs=name)):
+            with pytest.raises(TypeError, match="must be a list of names, got one by itself"):
+                await ask(X)
+
+    run(daemon, body)
+
+
 def test_a_peer_that_is_iterated_over(daemon):
     async def body(_, simulation):
         steps = []
@@ -240,6 +256,7 @@ def test_a_program_that_ends_in_a_function_tells_the_server(daemon, server):
     stepping = []
     with concurrent.futures.ThreadPoolExecutor() as blocking, oscillator(server) as simulation:
         async def main():
+            asyncio.get_running_loop().set_exception_handler(lambda *_: None)
             async with mbcosim.aio.connect(daemon.address) as connection:
                 same = await connection.attach(simulation.name)
                 await same.couple("spring", leaves)

@@ -340,12 +340,13 @@ def raises(error):
 
 SHAPES = [
     (lambda m: [[1.0, 2.0]], r"ValueError: `forces` has the shape \(1, 2\); port \"spring\" takes 1 x 3, a row for each of its points"),
-    (lambda m: None, "ValueError: `forces` is missing; port"), (lambda m: {"force": [0, 0, 0]}, "TypeError: `forces` of an answer must be numbers, got .*, a dict"),
+    (lambda m: None, "ValueError: `forces` is missing; port"), (lambda m: {"force": [0, 0, 0]}, "TypeError: `forces` of an answer must be real numbers, got .*, a dict"),
     (lambda m: [[np.nan, 0, 0]], r"ValueError: `forces` has numbers that are not finite: \[\[nan, 0.0, 0.0\]\]"),
     (lambda m: 5 * ([[0, 0, 0]],), "ValueError: an answer of 5 parts; this port takes forces, moments, reference_force, reference_moment, or mbcosim.Loads"),
     (lambda m: ([[0, 0, 0]], [1, 2]), "ValueError: `moments` has the shape"), (lambda m: mbcosim.Loads([[0, 0, 0]], signals=[1]), 'ValueError: `signals` .* takes none'),
     (lambda m: mbcosim.Loads([[0, 0, 0]], stiffness=np.eye(6)), "ValueError: `stiffness` .* takes none without `tangent` of the peer"),
     (lambda m: mbcosim.Reject(-1.0), "ValueError: `preferred_step_size` must be positive, got -1.0"), (lambda m: sys.exit(3), "SystemExit: 3"),
+    (lambda m: 1j * m.x, "TypeError: `forces` of an answer must be real numbers, got .*, a ndarray"),
     (lambda m: raises(KeyboardInterrupt("no more")), "KeyboardInterrupt: no more"), (lambda m: raises(GeneratorExit()), "GeneratorExit: ")]
 
 

@@ -1,10 +1,13 @@
 """The Python client for daily use: a daemon of one's own, the model's parts as objects, histories, what-if, linear models, pictures."""
 import asyncio
+import contextlib
+import functools
 import os
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 import numpy as np
@@ -13,8 +16,9 @@ import pytest
 import decks
 import mbcosim
 import mbcosim.aio
-from conftest import MODELS, TIME_FACTOR, wait_for
+from conftest import MODELS, TIME_FACTOR, stop, wait_for
 from mbcosim import access
+from mbcosim.v1 import simulations_pb2 as pb
 from test_analysis import OSCILLATOR, S
 from test_health import certificate
 
@@ -271,6 +275,53 @@ def test_inputs_are_set_by_the_names_of_their_nodes(server):
         assert "node.structural.1.load" in simulation.inputs and "time" in simulation.outputs
 
 
+LOAD, OTHER = "node.structural.2.load", "node.structural.1.load"
+
+
+@pytest.mark.parametrize("set_inputs, field", [
+    (lambda s, values: s.write(values), "values.values"), (lambda s, values: s.step(inputs=values), "inputs.values"),
+    (lambda s, values: s.run_until(0.1, inputs=values), "inputs.values"), (lambda s, values: s.simulate("time", steps=1, inputs=values), "inputs.values"),
+    (lambda s, values: s.simulate("time", steps=1, inputs={k: lambda t, v=v: v for k, v in values.items()}), "inputs.values")])
+def test_an_input_takes_as_many_real_numbers_as_it_has(swing, set_inputs, field):
+    with pytest.raises(mbcosim.Error, match=f"`{field}`: '{LOAD}' takes 6 values, got 5") as caught:
+        set_inputs(swing, {LOAD: range(5), OTHER: range(7)})  # as many as both together
+    assert caught.value.reason == "BAD_ARGUMENT" and caught.value.field == field
+    with pytest.raises(TypeError, match=f"'{LOAD}': complex numbers, where real ones are wanted"):
+        set_inputs(swing, {LOAD: [1j] * 6})
+    assert swing.step_number == 0 and not swing[LOAD].any() and not swing[OTHER].any()
+
+
+def test_a_steppers_values_are_real_numbers(swing):
+    with swing.stepper(inputs=[LOAD]) as stepper:
+        with pytest.raises(TypeError, match="complex numbers"):
+            stepper.step(np.ones(6) * 1j)
+        assert stepper.step(np.ones(6)).step == 1
+
+
+def names(*given):
+    return (name for name in given)
+
+
+POSITION = "node.structural.2.X"
+
+
+@pytest.mark.parametrize("ask, argument", [
+    (lambda s, outputs: s.read(outputs), "names"), (lambda s, outputs: s.step(outputs=outputs).values, "outputs"),
+    (lambda s, outputs: s.step(timeout=9, outputs=outputs).values, "outputs"), (lambda s, outputs: s.run_until(0.1, outputs=outputs).values, "outputs"),
+    (lambda s, outputs: s.run_until(0.1, outputs=outputs, progress=lambda _: None).values, "outputs"),
+    (lambda s, outputs: s.stepper(outputs).step().values, "outputs"), (lambda s, outputs: dict.fromkeys(s.subscribe(outputs)._names), "names"),
+    (lambda s, outputs: {POSITION: s.linearize([], outputs)[2]}, "outputs")])
+def test_names_may_come_from_a_generator_but_not_one_by_itself(swing, ask, argument):
+    assert list(ask(swing, names(POSITION))) == [POSITION]
+    with pytest.raises(TypeError, match=rf"`{argument}` must be a list of names, got one by itself: say \['{POSITION}'\]"):
+        ask(swing, POSITION)
+
+
+def test_names_of_a_signal_port_are_a_list():
+    with pytest.raises(TypeError, match=r"`inputs` must be a list of names, got one by itself: say \['time'\]"):
+        mbcosim.signal_port("control", [], "time")
+
+
 def test_the_reaction_of_a_hinge_is_what_moves_the_body(swing):
     swing.step(60)
     needed = swing.nodes[2].acceleration - np.array([0, 0, -9.81])  # of 1 kg
@@ -346,6 +397,19 @@ def test_inputs_may_be_functions_of_time(server):
     assert history["node.structural.1.XP"][-1, 0] == pytest.approx(0.25, rel=1e-2)  # the integral of 2 t, held from step to step
 
 
+def test_an_output_that_is_named_twice_is_kept_once(swing):
+    for inputs in ({}, {LOAD: lambda t: [0] * 6}):
+        history = swing.simulate([POSITION, "time", POSITION], steps=4, inputs=inputs)
+        assert {name: values.shape for name, values in history.items()} == {POSITION: (5, 3), "time": (5,)}
+
+
+@pytest.mark.parametrize("inputs", [{}, {LOAD: lambda t: [0] * 6}])
+def test_a_history_of_a_negative_number_of_steps_is_refused(swing, inputs):
+    with pytest.raises(mbcosim.Error, match="`steps` must not be negative, got -1") as caught:
+        swing.simulate(POSITION, steps=-1, inputs=inputs)
+    assert caught.value.field == "steps"
+
+
 def test_a_history_is_a_table(swing, tmp_path):
     history = swing.simulate(["node.structural.2.X", "time"], steps=3)
     history.save(tmp_path / "h.csv")
@@ -371,6 +435,106 @@ def test_a_snapshot_as_a_block_leaves_the_state_as_it_was(swing):
         swing.step(50)
         assert start.step == 10
     assert swing.step_number == 10 and list(swing["node.structural.2.X"]) == list(before) and swing.snapshots() == []
+
+
+class Mine(Exception):
+    pass
+
+
+def left_by_an_exception(block, before):
+    """The text of what is raised out of a `with` block in which `before(it)` is followed by an exception."""
+    with pytest.raises(Mine) as caught:
+        with block as it:
+            before(it)
+            raise Mine("of the block")
+    return str(caught.value)
+
+
+def test_what_fails_at_the_end_of_a_block_hides_nothing(server, pendulum):
+    simulation = server.load(pendulum)
+    assert left_by_an_exception(simulation.snapshot(), lambda it: it.delete()) == "of the block"
+    assert left_by_an_exception(simulation.snapshot(), lambda it: simulation.delete()) == "of the block"
+    assert left_by_an_exception(server.load(pendulum), lambda it: it.delete()) == "of the block"
+
+
+def test_what_was_deleted_within_a_block_is_left_in_good_order(server, pendulum):
+    with server.load(pendulum) as simulation:
+        with pytest.raises(mbcosim.NotFound):  # there is nothing to go back to
+            with simulation.snapshot() as saved:
+                saved.delete()
+        simulation.delete()
+    assert simulation.name not in [info.name for info in server.list()]
+
+
+def begun(run, simulation):
+    """A thread that runs a simulation, and it does run."""
+    thread = threading.Thread(target=run)
+    thread.start()
+    wait_for(lambda: simulation.refresh().state == pb.SIMULATION_STATE_STEPPING)
+    return thread
+
+
+def test_the_end_of_a_block_waits_until_the_simulation_is_free(server):
+    with server.load_text(decks.endless()) as simulation:
+        with simulation.snapshot():
+            busy = begun(lambda: simulation.run_until(1e8), simulation)
+            threading.Timer(0.4, simulation.interrupt).start()
+        assert (simulation.step_number, simulation.snapshots()) == (0, [])
+        busy.join()
+
+
+def run_for_long(simulation):
+    with contextlib.suppress(mbcosim.Error):
+        simulation.run_until(1e8)
+
+
+def test_the_end_of_a_block_waits_for_a_busy_simulation_not_for_ever(server):
+    with server.load_text(decks.endless()) as simulation:
+        threads = []
+        run = functools.partial(run_for_long, simulation)
+        begin = time.monotonic()
+        assert left_by_an_exception(simulation.snapshot(), lambda _: threads.append(begun(run, simulation))) == "of the block"
+        with pytest.raises(mbcosim.Busy):
+            with simulation.snapshot():
+                pass
+        assert time.monotonic() - begin < 6 * TIME_FACTOR
+        simulation.interrupt()
+        threads[0].join()
+
+
+def test_a_block_that_may_not_have_gone_back_says_so(start_daemon):
+    daemon = start_daemon()
+    with daemon.connect() as server:
+        simulation = server.load_text(decks.body())
+        one, other = simulation.snapshot(), simulation.snapshot()
+        stop(daemon.process.pid)
+        try:
+            with pytest.raises(mbcosim.TimedOut):
+                with one:
+                    pass
+            assert left_by_an_exception(other, lambda _: None) == "of the block"
+            with simulation:
+                pass  # it ends with its lease
+        finally:
+            os.kill(daemon.process.pid, signal.SIGCONT)
+
+
+def test_the_ends_of_asynchronous_blocks_hide_nothing(daemon):
+    async def main():
+        async with mbcosim.aio.connect(daemon.address) as server:
+            for part in ("simulation", "snapshot"):
+                simulation = await server.load_text(decks.body())
+                with pytest.raises(Mine):
+                    async with simulation if part == "simulation" else await simulation.snapshot() as it:
+                        await it.delete()
+                        raise Mine
+            async with await server.load_text(decks.endless()) as simulation:
+                with pytest.raises(asyncio.TimeoutError):
+                    async with await simulation.snapshot():
+                        await asyncio.wait_for(simulation.run_until(1e8), 0.3)  # the daemon needs a moment to end it
+                assert simulation.step_number == 0
+
+    asyncio.run(asyncio.wait_for(main(), 60))
 
 
 def test_what_if_tries_inputs_and_stays_where_it_is(swing, server):

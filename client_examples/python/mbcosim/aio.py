@@ -21,21 +21,21 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mappin
 from typing import Any, Optional, TypeVar, Union
 
 import grpc
-import numpy as np
 import numpy.typing as npt
 
 from mbcosim.v1 import common_pb2, coupling_pb2, events_pb2, simulations_pb2 as pb, telemetry_pb2
 
 from . import access, events, exchange
 from .access import Attempts
-from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepResult, Values
+from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepResult, Values, real_numbers
 from .coupling import Answer, open_stream
-from .errors import Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
+from .errors import Busy, Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
 from .histories import History
 from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, cancelling, checked_timeout, metadata,
                   parting, runs_calls)
 from .simulation import subscribe_request
 from .stepping import AwaitedSharedStream, AwaitedStepLine, status_of
+from .words import each_name
 
 T = TypeVar("T")
 Self = TypeVar("Self")
@@ -105,9 +105,11 @@ class Connection(Address):
             try:
                 with translated():
                     return await self._once(call)
-            except Unavailable as error:
+            except (Unavailable, Busy) as error:
                 pause, left = retries.again(error)
                 await asyncio.sleep(pause)
+                if not left:
+                    continue
                 with contextlib.suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(self.channel.channel_ready(), left)
                     continue
@@ -186,10 +188,8 @@ class Snapshot(Awaiting, SnapshotCalls):
     async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        with parting():
-            await self.restore(timeout=PARTING)
-            await self.delete(timeout=PARTING)
+    async def __aexit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        await self._connection.run(self._end(raised))
 
 
 @runs_calls(awaited)
@@ -206,7 +206,7 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
                    until: Optional[Condition] = None, inputs: Optional[Values] = None, outputs: Iterable[str] = (),
                    timeout: Optional[float] = None) -> StepResult:
         """As mbcosim.Simulation.step."""
-        names = list(outputs)
+        names = each_name(outputs, "outputs")
         if step_size is None and until is None and timeout is None and not inputs and (request := self._quick_step(count, names)) is not None:
             return self.result(await self._connection.perform(Call("Simulations/Step", request, repeatable=True, through=self._through)), names)
         result: StepResult = await self._connection.run(self._steps(count, step_size, until, inputs, names, timeout))
@@ -218,10 +218,8 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
     async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        if self._owned:
-            with parting():
-                await self.delete(timeout=PARTING)
+    async def __aexit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        await self._connection.run(self._end(raised))
 
     @property
     def variables(self) -> dict[str, common_pb2.Variable]:
@@ -233,8 +231,8 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
     async def stepper(self, outputs: Iterable[str] = (), inputs: Iterable[str] = (), *, beside: Optional[Stepper] = None,
                       timeout: Optional[float] = USUAL) -> Stepper:
         """An open stream for stepping with the least delay, or, `beside` another stepper, a place on that one's; see Stepper."""
-        outputs = list(outputs)
-        handles = await self.handles([*outputs, *inputs], timeout=timeout)
+        outputs = each_name(outputs, "outputs")
+        handles = await self.handles([*outputs, *each_name(inputs, "inputs")], timeout=timeout)
         return Stepper(self, outputs, handles[:len(outputs)], handles[len(outputs):], beside)
 
     async def couple(self, port: str, answer: Optional[Answer] = None, **options: Any) -> Peer:
@@ -262,7 +260,7 @@ class Simulation(Awaiting, SimulationCalls[Snapshot]):
     async def subscribe(self, names: Iterable[str], *, every: int = 1, policy: str = "drop_oldest", buffer: int = 1024,
                         minimum_interval: Optional[float] = None, timeout: Optional[float] = USUAL) -> Subscription:
         """Samples of variables every so many steps, whoever advances, at least `minimum_interval` seconds of wall time apart; see Subscription."""
-        names = list(names)
+        names = each_name(names)
         request = subscribe_request(self, await self.handles(names, timeout=timeout), every, policy, buffer, minimum_interval)
         subscription = Subscription(self, names, request)
         with translated():
@@ -331,8 +329,9 @@ class Stepper:
     async def __aenter__(self: Self) -> Self:
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        await self.close()
+    async def __aexit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        with parting(raised):
+            await self.close()
 
     async def step(self, values: Optional[npt.ArrayLike] = None, count: int = 1, *, step_size: Optional[float] = None,
                    timeout: Optional[float] = None) -> StepResult:
@@ -344,7 +343,7 @@ class Stepper:
         if step_size is not None:
             request.step_size = step_size
         if request.inputs.handles:
-            request.inputs.values.extend(np.ravel(np.asarray(values, float)))
+            request.inputs.values.extend(real_numbers(() if values is None else values).ravel())
         if self._stream is None:
             raise Unavailable("the stepper is over", grpc.StatusCode.UNAVAILABLE)
         checked_timeout(timeout)

@@ -4,6 +4,7 @@ Each method marked with `call` is a generator that yields `rpc.Call`s; see rpc.r
 """
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import os
@@ -18,10 +19,10 @@ import numpy.typing as npt
 from mbcosim.v1 import common_pb2, coupling_types_pb2, geometry_pb2, reduction_pb2, results_pb2, simulations_pb2 as pb
 
 from . import bundle
-from .errors import NotFound, StepFailed, enum_name
-from .rpc import USUAL, Call, Calls, call, fill_duration, protocol
+from .errors import NotFound, StepFailed, TimedOut, bad_argument, enum_name
+from .rpc import PARTING, USUAL, Call, Calls, call, fill_duration, parting, protocol
 from .table import Rows
-from .words import UnknownName, after_number, choice, needed, pick, remedy
+from .words import UnknownName, after_number, choice, each_name, needed, pick, remedy
 
 
 Array = npt.NDArray[np.float64]
@@ -32,6 +33,25 @@ SimulationKind = TypeVar("SimulationKind", bound="SimulationCalls[Any]")
 Reply = TypeVar("Reply")
 SnapshotKind = TypeVar("SnapshotKind", bound="SnapshotCalls")
 list_of = list  # ServerCalls has a method of that name
+
+
+def real_numbers(values: npt.ArrayLike) -> Array:
+    """`values` as an array of floats; TypeError for complex ones, ValueError or TypeError for what are no numbers."""
+    given = np.asarray(values)
+    if given.dtype.kind == "c":
+        raise TypeError("complex numbers, where real ones are wanted: take their `.real`, or whatever is meant")
+    return given.astype(float, copy=False)
+
+
+def numbers_of(variable: common_pb2.Variable, value: npt.ArrayLike, field: str) -> Array:
+    """The numbers of an input, one after the other; an error that names it and the request's `field` for what are not as many."""
+    try:
+        numbers = real_numbers(value).ravel()
+    except TypeError as error:
+        raise TypeError(f"{variable.name!r}: {error}") from None
+    if numbers.size != variable.size:
+        raise bad_argument(field, f"`{field}`: {variable.name!r} takes {variable.size} values, got {numbers.size}")
+    return numbers
 
 
 def _matrix(message: pb.Matrix) -> Array:
@@ -364,7 +384,7 @@ class SimulationCalls(Generic[SnapshotKind]):
 
     def _handles(self, names: Iterable[str], timeout: Optional[float]) -> Calls[list_of[int]]:
         timeout = USUAL if timeout is None else min(timeout, USUAL)  # of whatever needs them
-        names = list(names)
+        names = each_name(names)
         missing = [name for name in names if name not in self._known]
         if missing and self._description is None:
             request = pb.DescribeSimulationRequest(simulation=self.name, variable_names=missing)
@@ -390,6 +410,7 @@ class SimulationCalls(Generic[SnapshotKind]):
         return (yield from self._read(names, timeout))
 
     def _read(self, names: Iterable[str], timeout: Optional[float]) -> Calls[dict[str, Any]]:
+        names = each_name(names)
         request = pb.ReadVariablesRequest(simulation=self.name, handles=(yield from self._handles(names, timeout)))
         return self.split(names, (yield Call("Simulations/ReadVariables", request, timeout, repeatable=True)).values)
 
@@ -400,12 +421,12 @@ class SimulationCalls(Generic[SnapshotKind]):
 
     def _write(self, values: Values, timeout: Optional[float]) -> Calls[None]:
         yield from self._handles(values, timeout)
-        request = pb.WriteVariablesRequest(simulation=self.name, values=self.pack(values), request_id=_new_id())
+        request = pb.WriteVariablesRequest(simulation=self.name, values=self._pack(values, "values.values"), request_id=_new_id())
         yield Call("Simulations/WriteVariables", request, timeout, repeatable=True)
 
     def split(self, names: Iterable[str], values: Any) -> dict[str, Any]:
         """Numbers of several variables, one after the other, as arrays by name."""
-        found: dict[str, Any] = {}
+        names, found = each_name(names), dict[str, Any]()
         if not names:
             return found
         numbers, at = np.fromiter(values, float, len(values)), 0
@@ -418,10 +439,14 @@ class SimulationCalls(Generic[SnapshotKind]):
 
     def pack(self, values: Values) -> common_pb2.Values:
         """`mbcosim.v1.Values` of inputs by name."""
+        return self._pack(values, "values")
+
+    def _pack(self, values: Values, field: str) -> common_pb2.Values:
         packed = common_pb2.Values()
         for name, value in values.items():
-            packed.handles.append(self._variable(name).handle)
-            packed.values.extend(np.ravel(np.asarray(value, float)))
+            variable = self._variable(name)
+            packed.handles.append(variable.handle)
+            packed.values.extend(numbers_of(variable, value, field))
         return packed
 
     # ---------------------------------------------------------------- advancing
@@ -452,6 +477,7 @@ class SimulationCalls(Generic[SnapshotKind]):
                   timeout: Optional[float] = None) -> Calls[StepResult]:
         """Steps until `time` [s] or the deck's end; with `exact` the last step is shortened so that it ends there. `step_size` and `until` as in
         `step`. `progress(RunProgress)` is called about twice a second."""
+        outputs = each_name(outputs, "outputs")
         request = pb.StepRequest(until_time=time, exact=exact, step_size=step_size)
         if progress is None:
             return (yield from self._advance(request, until, inputs, outputs, timeout))
@@ -508,11 +534,12 @@ class SimulationCalls(Generic[SnapshotKind]):
                 request.until.locate_within = until.locate_within
         if inputs:
             yield from self._handles(inputs, timeout)
-            request.inputs.CopyFrom(self.pack(inputs))
+            request.inputs.CopyFrom(self._pack(inputs, "inputs.values"))
         request.outputs.extend((yield from self._handles(outputs, timeout)))
 
     def _advance(self, request: pb.StepRequest, until: Optional[Condition], inputs: Optional[Values], outputs: Iterable[str],
                  timeout: Optional[float]) -> Calls[StepResult]:
+        outputs = each_name(outputs, "outputs")
         yield from self._fill(request, until, inputs, outputs, timeout)
         request.request_id = _new_id()
         return self.result((yield Call("Simulations/Step", request, timeout, repeatable=True, through=self._through)), outputs)
@@ -556,9 +583,9 @@ class SimulationCalls(Generic[SnapshotKind]):
         """Goes to a saved state."""
         yield from self._restore(snapshot, timeout)
 
-    def _restore(self, snapshot: SnapshotCalls, timeout: Optional[float]) -> Calls[None]:
+    def _restore(self, snapshot: SnapshotCalls, timeout: Optional[float], patient: bool = False) -> Calls[None]:
         request = pb.RestoreSnapshotRequest(simulation=self.name, snapshot=snapshot.name, request_id=_new_id())
-        self._stand((yield Call("Simulations/RestoreSnapshot", request, timeout, repeatable=True)).simulation)
+        self._stand((yield Call("Simulations/RestoreSnapshot", request, timeout, repeatable=True, patient=patient)).simulation)
 
     @call
     def reset(self, *, timeout: Optional[float] = None) -> Calls[None]:
@@ -657,8 +684,9 @@ class SimulationCalls(Generic[SnapshotKind]):
         return tuple(made(m) for m in (reply.e, reply.a, reply.b, reply.c, reply.d))
 
     def _linearize(self, inputs: Iterable[str], outputs: Iterable[str], descriptor: bool, timeout: Optional[float]) -> Calls[pb.LinearizeReply]:
-        request = pb.LinearizeRequest(simulation=self.name, inputs=(yield from self._handles(inputs, timeout)),
-                                      outputs=(yield from self._handles(outputs, timeout)), descriptor_form=descriptor)
+        sources, results = each_name(inputs, "inputs"), each_name(outputs, "outputs")
+        request = pb.LinearizeRequest(simulation=self.name, inputs=(yield from self._handles(sources, timeout)),
+                                      outputs=(yield from self._handles(results, timeout)), descriptor_form=descriptor)
         return (yield from self._pages("Simulations/Linearize", request, pb.LinearizeReply(), timeout))
 
     def _pages(self, method: str, request: Any, whole: Reply, timeout: Optional[float]) -> Calls[Reply]:
@@ -726,9 +754,18 @@ class SimulationCalls(Generic[SnapshotKind]):
     @call
     def delete(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Ends the simulation."""
+        yield from self._delete(timeout)
+
+    def _delete(self, timeout: Optional[float], patient: bool = False) -> Calls[None]:
         self._leave()
-        yield Call("Simulations/DeleteSimulation", pb.DeleteSimulationRequest(simulation=self.name, request_id=_new_id()), timeout,
-                   repeatable=True)
+        request = pb.DeleteSimulationRequest(simulation=self.name, request_id=_new_id())
+        yield Call("Simulations/DeleteSimulation", request, timeout, repeatable=True, patient=patient)
+
+    def _end(self, raised: Optional[BaseException]) -> Calls[None]:
+        """Leaves a `with` block, in which something was `raised` or not; that it was deleted before is no fault."""
+        if self._owned:
+            with parting(raised), contextlib.suppress(NotFound):
+                yield from self._delete(PARTING, patient=True)
 
 
 class SnapshotCalls:
@@ -756,5 +793,15 @@ class SnapshotCalls:
     @call
     def delete(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
         """Forgets the state."""
+        yield from self._delete(timeout)
+
+    def _delete(self, timeout: Optional[float], patient: bool = False) -> Calls[None]:
         request = pb.DeleteSnapshotRequest(simulation=self._simulation.name, snapshot=self.name, request_id=_new_id())
-        yield Call("Simulations/DeleteSnapshot", request, timeout, repeatable=True)
+        yield Call("Simulations/DeleteSnapshot", request, timeout, repeatable=True, patient=patient)
+
+    def _end(self, raised: Optional[BaseException]) -> Calls[None]:
+        """Leaves a `with` block, in which something was `raised` or not. Raises TimedOut when nobody knows whether the simulation went back."""
+        with parting(raised, told=TimedOut):
+            yield from self._simulation._restore(self, PARTING, patient=True)
+        with parting(raised), contextlib.suppress(NotFound):
+            yield from self._delete(PARTING, patient=True)

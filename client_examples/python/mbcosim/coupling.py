@@ -25,6 +25,7 @@ from mbcosim.v1 import coupling_pb2 as pb, coupling_types_pb2 as types
 from . import exchange
 from .errors import Unavailable, cancelled_here, from_rpc_error, translated
 from .rpc import PARTING, USUAL, bounded, end_with
+from .words import each_name
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -53,8 +54,8 @@ def structural_port(name: str, nodes: Iterable[int], *, offsets: Optional[npt.Ar
 
 def signal_port(name: str, outputs: Iterable[str], inputs: Iterable[str]) -> types.PortDefinition:
     """A port of scalars: variables out, inputs in, by name."""
-    return types.PortDefinition(name=name, kind=types.PORT_KIND_SIGNAL, output_variables=list(outputs),
-                                input_variables=list(inputs))
+    return types.PortDefinition(name=name, kind=types.PORT_KIND_SIGNAL, output_variables=each_name(outputs, "outputs"),
+                                input_variables=each_name(inputs, "inputs"))
 
 
 def motion_port(name: str, nodes: Iterable[int], *, positions_only: bool = False) -> types.PortDefinition:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from mbcosim.v1 import common_pb2, coupling_pb2 as pb, coupling_types_pb2 as types
 
-from .calls import checked_units
+from .calls import checked_units, real_numbers
 from .errors import Error
 from .rpc import fill_duration, protocol
 from .words import choice
@@ -254,9 +254,9 @@ def _numbers(name: str, values: Any) -> Optional[Array]:
     if values is None:
         return None
     try:
-        return np.asarray(values, float)
+        return real_numbers(values)
     except (TypeError, ValueError):
-        raise TypeError(f"`{name}` of an answer must be numbers, got {str(values)[:100]!r}, a {type(values).__name__}") from None
+        raise TypeError(f"`{name}` of an answer must be real numbers, got {str(values)[:100]!r}, a {type(values).__name__}") from None
 
 
 def answer(number: int, value: Any, form: AnswerForm) -> pb.PeerMessage:

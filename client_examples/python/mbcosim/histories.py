@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from mbcosim.v1 import simulations_pb2 as pb
 
-from .calls import SimulationCalls, StepResult
-from .errors import StepFailed
+from .calls import SimulationCalls, StepResult, numbers_of
+from .errors import StepFailed, bad_argument
 from .rpc import USUAL
 from .table import Rows
 from .words import UnknownName, after_number, needed, remedy
@@ -117,7 +117,7 @@ class _Collector:
     """Collects results of single steps on the way."""
 
     def __init__(self, simulation: Simulation, names: list[str]) -> None:
-        self._simulation, self._names = simulation, names
+        self._simulation, self._names = simulation, list(dict.fromkeys(names))
         first = simulation.read(names) if names else {}
         self._times, self._steps = [simulation.time], [simulation.step_number]
         self._values = {name: [first[name]] for name in names}
@@ -155,16 +155,18 @@ class _NoBar:
         """Nothing to show."""
 
 
-def _numbers(inputs: Mapping[str, Input], time: float) -> list[float]:
+def _numbers(simulation: Simulation, inputs: Mapping[str, Input], time: float) -> list[float]:
     """Values of all inputs at a time, one after the other."""
     numbers: list[float] = []
-    for value in inputs.values():
-        numbers.extend(np.ravel(np.asarray(value(time) if callable(value) else value, float)))
+    for name, value in inputs.items():
+        numbers.extend(numbers_of(simulation.variables[name], value(time) if callable(value) else value, "inputs.values"))
     return numbers
 
 
 def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Optional[float], steps: Optional[int], every: int,
          progress: bool, timeout: Optional[float]) -> History:
+    if steps is not None and steps < 0:
+        raise bad_argument("steps", f"`steps` must not be negative, got {steps}")
     rows, done, start = _Collector(simulation, names), 0, simulation.time
     total = float(steps) if end is None and steps is not None else float(end or 0.0) - start
     size = simulation.info.next_step_size
@@ -175,7 +177,7 @@ def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Op
                 break
             before = simulation.time
             try:
-                result = stepper.step(_numbers(inputs, before), count=min(every, left), timeout=timeout)
+                result = stepper.step(_numbers(simulation, inputs, before), count=min(every, left), timeout=timeout)
             except StepFailed as error:
                 error.history = rows.history()
                 raise

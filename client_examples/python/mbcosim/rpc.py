@@ -9,14 +9,14 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Coroutine, Generator, Iterator
-from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, Union, cast, overload
 
 import grpc
 
 from mbcosim.v1 import (common_pb2, coupling_pb2_grpc, events_pb2_grpc, geometry_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
                         telemetry_pb2_grpc)
 
-from .errors import Error, TimedOut, Unavailable, bad_argument, cancelled_here, translated
+from .errors import Busy, Error, TimedOut, Unavailable, bad_argument, cancelled_here, translated
 
 if TYPE_CHECKING:
     from typing_extensions import Concatenate, ParamSpec
@@ -56,6 +56,7 @@ class Call:
     each        of a method that streams: called with every message
     through     of a call without timeout: another way to the reply; it gives None when the call is to be made all the same
     simulation  name of the simulation that it is about, where `request` does not tell
+    patient     asked again within `timeout` while another call advances the simulation
     """
     method: str
     request: Any
@@ -64,6 +65,7 @@ class Call:
     each: Optional[Callable[[Any], Any]] = None
     through: Optional[Callable[[Any], Any]] = None
     simulation: str = ""
+    patient: bool = False
 
     def sent(self) -> Any:
         """What gRPC takes, anew for each attempt."""
@@ -183,16 +185,19 @@ class Bound:
 
 class Retries:
     """Whether a call that was lost on the way is asked again: until `reconnect` seconds are over, and at least a few times. The call's timeout, longer
-    by `reconnect`, is the bound of all attempts together."""
+    by `reconnect`, is the bound of all attempts together. A patient call is asked again while the simulation is busy, until its timeout is over."""
 
     def __init__(self, call: Call, reconnect: float) -> None:
         self._call, self._allowed, self._reconnect = call, call.repeatable, reconnect
+        self._patience = time.monotonic() + (call.timeout or 0.0) if call.patient else -math.inf
         self._latest = math.inf if call.timeout is None else time.monotonic() + call.timeout + reconnect
         self._end: Optional[float] = None
         self._attempts = 0
 
-    def again(self, error: Unavailable) -> tuple[float, float]:
-        """Seconds to pause, and seconds to wait for a connection after that; raises `error` when there is no use in it."""
+    def again(self, error: Union[Unavailable, Busy]) -> tuple[float, float]:
+        """Seconds to pause, and seconds to wait for a connection after that, 0: it is there; raises `error` when there is no use in it."""
+        if isinstance(error, Busy):
+            return self._when_free(error), 0.0
         if self._end is None:
             self._end = min(time.monotonic() + max(self._reconnect, _AGAIN), self._latest)
         self._attempts += 1
@@ -202,6 +207,13 @@ class Retries:
         if self._call.timeout is not None:
             self._call.timeout = max(self._latest - time.monotonic(), 1e-3)
         return min(_PAUSE * 2.0 ** min(self._attempts - 1, 5), left), left
+
+    def _when_free(self, error: Busy) -> float:
+        left = self._patience - time.monotonic()
+        if left <= 0:
+            raise error
+        self._call.timeout = max(left, 1e-3)
+        return min(_PAUSE, left)
 
 
 class Connection(Address):
@@ -232,10 +244,11 @@ class Connection(Address):
             try:
                 with translated():
                     return self._once(call)
-            except Unavailable as error:
+            except (Unavailable, Busy) as error:
                 pause, left = retries.again(error)
                 time.sleep(pause)
-                self._await_connection(left, error)
+                if left:
+                    self._await_connection(left, error)
 
     def _once(self, call: Call) -> Any:
         if call.through is not None and call.timeout is None and (reply := call.through(call.request)) is not None:
@@ -264,7 +277,7 @@ class Connection(Address):
                 assert call.each is not None
                 call.each(message)
 
-    def _await_connection(self, seconds: float, error: Unavailable) -> None:
+    def _await_connection(self, seconds: float, error: Error) -> None:
         try:
             grpc.channel_ready_future(self.channel).result(seconds)
         except grpc.FutureTimeoutError:
@@ -341,9 +354,11 @@ def until_cancelled(messages: Any) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def parting() -> Iterator[None]:
-    """Ends what is on the server as far as it can be reached: what cannot ends with its lease."""
+def parting(raised: Optional[BaseException] = None, told: Union[type[Error], tuple[()]] = ()) -> Iterator[None]:
+    """Ends what is on the server as far as it can be reached: what cannot ends with its lease, and only `told` kinds of Unavailable are raised. No
+    failure here hides what was `raised` before."""
     try:
         yield
-    except Unavailable:
-        pass
+    except Error as error:
+        if raised is None and (isinstance(error, told) or not isinstance(error, Unavailable)):
+            raise

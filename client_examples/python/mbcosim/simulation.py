@@ -5,20 +5,19 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Optional, TypeVar
 
 import grpc
-import numpy as np
 import numpy.typing as npt
 
 from mbcosim.v1 import common_pb2, simulations_pb2 as pb, telemetry_pb2
 
 from .analysis import Analysis
-from .calls import Condition, SimulationCalls, SnapshotCalls, StepResult, Values
+from .calls import Condition, SimulationCalls, SnapshotCalls, StepResult, Values, real_numbers
 from .coupling import Answer, Peer
 from .errors import Unavailable, translated
 from .histories import Histories
 from .objects import ModelObjects
 from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, checked_timeout, fill_duration, parting, runs_calls, until_cancelled
 from .stepping import SharedStream, StepLine
-from .words import pick
+from .words import each_name, pick
 
 Self = TypeVar("Self")
 _POLICIES = {"block": telemetry_pb2.OVERFLOW_POLICY_BLOCK, "drop_oldest": telemetry_pb2.OVERFLOW_POLICY_DROP_OLDEST,
@@ -42,10 +41,8 @@ class Snapshot(Blocking, SnapshotCalls):
     def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        with parting():
-            self.restore(timeout=PARTING)
-            self.delete(timeout=PARTING)
+    def __exit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        self._connection.run(self._end(raised))
 
 
 @runs_calls(blocking)
@@ -63,7 +60,7 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
              timeout: Optional[float] = None) -> StepResult:
         """Takes `count` steps, of `step_size` [s] each (default: the deck's), or fewer when `until`, a Condition, holds before. Raises
         StepFailed when one does not converge, or a peer rejects it."""
-        names = list(outputs)
+        names = each_name(outputs, "outputs")
         if step_size is None and until is None and timeout is None and not inputs and (request := self._quick_step(count, names)) is not None:
             return self.result(self._connection.perform(Call("Simulations/Step", request, repeatable=True, through=self._through)), names)
         result: StepResult = self._connection.run(self._steps(count, step_size, until, inputs, names, timeout))
@@ -83,10 +80,8 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
     def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        if self._owned:
-            with parting():
-                self.delete(timeout=PARTING)
+    def __exit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        self._connection.run(self._end(raised))
 
     @property
     def variables(self) -> dict[str, common_pb2.Variable]:
@@ -113,7 +108,7 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
     def subscribe(self, names: Iterable[str], *, every: int = 1, policy: str = "drop_oldest", buffer: int = 1024,
                   minimum_interval: Optional[float] = None, timeout: Optional[float] = USUAL) -> Subscription:
         """Samples of variables every so many steps, whoever advances, at least `minimum_interval` seconds of wall time apart; see Subscription."""
-        return Subscription(self, list(names), every, policy, buffer, minimum_interval, timeout)
+        return Subscription(self, each_name(names), every, policy, buffer, minimum_interval, timeout)
 
 
 class Stepper:
@@ -136,9 +131,9 @@ class Stepper:
         connection = simulation._connection
         if beside is not None and (beside._stream is None or beside._stream.connection is not connection):
             raise ValueError("beside: must be a stepper of the same connection that is not over")
-        self._simulation, self._outputs = simulation, list(outputs)
+        self._simulation, self._outputs = simulation, each_name(outputs, "outputs")
         self._request = pb.StepRequest(simulation=simulation.name, outputs=simulation.handles(self._outputs, timeout=timeout))
-        self._inputs = list(inputs)
+        self._inputs = each_name(inputs, "inputs")
         self._request.inputs.handles.extend(simulation.handles(self._inputs, timeout=timeout))
         stream = SharedStream(connection) if beside is None else beside._stream
         assert stream is not None
@@ -148,8 +143,9 @@ class Stepper:
     def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: object = None, raised: Optional[BaseException] = None, trace: object = None) -> None:
+        with parting(raised):
+            self.close()
 
     def step(self, values: Optional[npt.ArrayLike] = None, count: int = 1, *, step_size: Optional[float] = None,
              timeout: Optional[float] = None) -> StepResult:
@@ -161,7 +157,7 @@ class Stepper:
         if step_size is not None:
             request.step_size = step_size
         if self._inputs:
-            request.inputs.values.extend(np.ravel(np.asarray(values, float)))
+            request.inputs.values.extend(real_numbers(() if values is None else values).ravel())
         if self._stream is None:
             raise Unavailable("the stepper is over", grpc.StatusCode.UNAVAILABLE)
         checked_timeout(timeout)

@@ -18,6 +18,13 @@ def listed(names: Iterable[object], most: int = 12) -> str:
     return ", ".join(every[:most]) + (f", … ({len(every)} in all)" if len(every) > most else "")
 
 
+def each_name(names: Iterable[str], argument: str = "names") -> list[str]:
+    """`names` as a list, also those of a generator; TypeError for one name by itself, which would be taken for its letters."""
+    if isinstance(names, str):
+        raise TypeError(f"`{argument}` must be a list of names, got one by itself: say [{names!r}]")
+    return list(names)
+
+
 def remedy(name: object, known: Iterable[object], most: int = 12) -> str:
     """What to say about a name that is not among the known ones: near ones, else all."""
     known = list(known)
