@@ -1103,7 +1103,7 @@ def test_a_taken_path_is_refused(run, tmp_path):
     (tmp_path / "s").write_text("")
     done = run(force())
     assert done.finish() == 5
-    assert "cannot listen: Address already in use" in done.errors
+    assert "cannot listen: s exists and is not a socket" in done.errors
 
 
 def test_interrupts_end_a_wait(run):

@@ -183,7 +183,7 @@ def test_a_path_that_is_taken_is_refused(run, tmp_path):  # noqa: F811
     (tmp_path / "t").write_text("")
     done = run(alone('local, "t"'))
     assert done.finish() == 5
-    assert 'error: socket drive "socket1" (t): cannot listen: Address already in use' in done.errors
+    assert 'error: socket drive "socket1" (t): cannot listen: t exists and is not a socket' in done.errors
 
 
 @pytest.mark.parametrize("address, message", [

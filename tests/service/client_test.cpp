@@ -905,10 +905,10 @@ TEST_P(Coupled, ASilentServerEndsThePeerThatWantsSignsOfLife) {
   Server server = connect();
   Simulation simulation = server.load_text(body(), with_port());
   PeerOptions options = this->options();
-  options.server_timeout = 0.3;
+  options.server_timeout = 0.3 * time_factor();
   Peer peer = simulation.attach("spring", options);
   const auto step = [&] {
-    std::this_thread::sleep_for(std::chrono::seconds(1));  // longer than the limit
+    std::this_thread::sleep_for(stretched(1));  // longer than the limit
     EXPECT_TRUE(simulation.step().ok());
   };
   std::thread stepper(step);
