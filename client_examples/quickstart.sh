@@ -8,6 +8,7 @@ cmake --preset release >/dev/null
 cmake --build build --parallel "$(nproc)" --target mbcosim mbcosimd mbcosim_python
 
 work=$(mktemp -d)
+[ "$(printf %s "$work" | wc -c)" -le 80 ] || { rmdir "$work"; work=$(mktemp -d -p /tmp); }  # the path of a socket has at most 107 bytes
 address=unix:$work/mbcosim.sock
 build/bin/mbcosimd --listen "$address" --log-level warn &
 daemon=$!

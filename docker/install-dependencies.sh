@@ -4,7 +4,7 @@
 #   run    what a container needs to run the daemon    start  what the quick start needs: no page
 #   all    what builds, tests and shows (default)      fuzz   what builds the fuzz target
 set -euo pipefail
-here=$(cd "$(dirname "$0")" && pwd)
+list=$(dirname "$(realpath "$0")")/dependencies.txt
 what=${1:-all}
 
 case $what in
@@ -16,7 +16,10 @@ case $what in
   fuzz) wanted='$2 == "" || $2 == "fuzz"' ;;
   *) echo "usage: $0 [build|page|run|start|all|fuzz]" >&2; exit 4 ;;
 esac
-mapfile -t packages < <(sed 's/#.*//' "$here/dependencies.txt" | awk "NF && $wanted {print \$1}")
+packages=()
+names=$(sed 's/#.*//' "$list" | awk "NF && $wanted {print \$1}")
+[ -z "$names" ] || mapfile -t packages <<<"$names"
+[ ${#packages[@]} -gt 0 ] || { echo "$list names no package" >&2; exit 4; }
 
 missing=()
 for package in "${packages[@]}"; do

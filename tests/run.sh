@@ -12,7 +12,8 @@
 #   --quick  skips the tests labelled `slow`
 #   --tidy   clang-tidy on the sources changed since REVISION (default: the commit before the last), instead of the tests
 set -euo pipefail
-cd "$(dirname "$0")/.."
+here=$(realpath "$0")
+cd "$(dirname "$here")/.."
 
 preset=release
 arguments=()
@@ -34,7 +35,7 @@ while [ $# -gt 0 ]; do
       ;;
     --quick) arguments+=(--label-exclude slow) ;;
     --tidy) tidy=yes ;;
-    -h | --help) sed -n '2,13s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,13s/^# \{0,1\}//p' "$here"; exit 0 ;;
     *) arguments+=("$1") ;;
   esac
   shift

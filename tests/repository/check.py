@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Rules about the sources that no compiler checks. usage: check.py ROOT {arrows|headers|layout|format} [arguments]
+"""Rules about the sources that no compiler checks. usage: check.py ROOT {arrows|headers|layout|scripts|format} [arguments]
 
 arrows   folders include only what stands below them; families of elements do not include each other
 headers  every header compiles alone: the build shows it for those that their source includes first, the compiler for the
@@ -8,6 +8,7 @@ layout   the top level has the agreed entries and no others; the quick start doe
          no two sources of the engine have the same name but those that mean the same in every folder, and register.cpp only
          lists what its folder has; bounds on time in tests follow MBCOSIM_TIME_FACTOR;
          tests/REFERENCES.md names every test with reference numbers
+scripts  those of the shell work from any folder and through links, and fail where they cannot do what they are for
 format   clang-format would change nothing
 """
 import concurrent.futures
@@ -17,6 +18,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 
 # What the sources of a folder may include besides their own folder.
 ARROWS = {
@@ -175,6 +177,66 @@ def layout(root):
         yield f"{name} is missing at the top level"
 
 
+def ran(folder, *command, **variables):
+    """A script of the shell, as it ended in `folder`, with programs of `folder`/bin in the place of the machine's."""
+    environment = {**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}", **variables}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=60)
+
+
+def program(path, text):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(0o755)
+
+
+def scripts(root):
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        folder = pathlib.Path(name)
+        yield from helps(root, folder)
+        yield from installs(root, folder)
+        yield from starts(root, folder)
+
+
+def helps(root, folder):
+    """Of tests/run.sh that does not say how it is used, from another folder or through a link."""
+    (folder / "link").symlink_to(root / "tests" / "run.sh")
+    for script in (os.path.relpath(root / "tests" / "run.sh", folder), "./link"):
+        done = ran(folder, "bash", script, "--help")
+        if done.returncode or "usage: tests/run.sh" not in done.stdout:
+            yield f"{script} --help: {done.stderr or done.stdout}"
+
+
+def installs(root, folder):
+    """Of docker/install-dependencies.sh without its list, and through a link, where every package is said to be there."""
+    program(folder / "bin" / "dpkg-query", f"#!/bin/sh\necho asked >> {folder}/asked\necho installed\n")
+    script = root / "docker" / "install-dependencies.sh"
+    shutil.copy(script, folder / "copy.sh")
+    for content in (None, "# no package\n"):
+        if content is not None:
+            (folder / "dependencies.txt").write_text(content)
+        if not ran(folder, "bash", "./copy.sh", "start").returncode:
+            yield f"install-dependencies.sh is content with {'no list' if content is None else 'an empty list'}"
+    (folder / "install").symlink_to(script)
+    if ran(folder, "bash", "./install", "start").returncode or not (folder / "asked").exists():
+        yield "install-dependencies.sh does not find its list through a link"
+
+
+def starts(root, folder):
+    """Of client_examples/quickstart.sh whose socket has a path that is too long."""
+    for path, text in (("docker/install-dependencies.sh", ""), ("bin/cmake", ""), ("build/bin/mbcosimd", f'echo "$2" > {folder}/address\nexec sleep 60')):
+        program(folder / path, f"#!/bin/sh\n{text}\n")
+    wait = f"import os, time\nwhile not os.path.exists('{folder}/address'): time.sleep(0.01)\n"
+    program(folder / "client_examples" / "python" / "tumbling_body.py", wait)
+    shutil.copy(root / "client_examples" / "quickstart.sh", folder / "client_examples")
+    deep = folder / ("d" * 60) / ("e" * 60)
+    deep.mkdir(parents=True)
+    done = ran(folder, "bash", "client_examples/quickstart.sh", TMPDIR=str(deep))
+    if done.returncode or len((folder / "address").read_text().strip()) > len("unix:") + 107:
+        yield f"quickstart.sh with a long TMPDIR: {done.stderr}"
+    if os.listdir(deep):
+        yield "quickstart.sh leaves folders behind"
+
+
 def format(root, tool="clang-format"):
     paths = [str(p) for folder in FORMATTED for p in sources(root / folder, ".h", ".cpp")]
     done = subprocess.run([tool, "--dry-run", "--Werror", *paths], capture_output=True, text=True)
@@ -184,7 +246,7 @@ def format(root, tool="clang-format"):
 
 def main():
     root = pathlib.Path(sys.argv[1]).resolve()
-    checks = {"arrows": arrows, "headers": headers, "layout": layout, "format": format}
+    checks = {"arrows": arrows, "headers": headers, "layout": layout, "scripts": scripts, "format": format}
     findings = list(checks[sys.argv[2]](root, *sys.argv[3:]))
     print("\n".join(findings))
     sys.exit(1 if findings else 0)

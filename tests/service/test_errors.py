@@ -6,6 +6,7 @@ import pytest
 
 import decks
 import mbcosim
+from mbcosim import bundle
 from mbcosim.v1 import common_pb2, simulations_pb2 as pb
 
 
@@ -59,6 +60,27 @@ def test_bad_file_names(server, name):
     with pytest.raises(mbcosim.Error) as caught:
         server.load_bundle(name, {name: decks.body().encode()})
     assert caught.value.code == grpc.StatusCode.INVALID_ARGUMENT
+
+
+@pytest.mark.parametrize("data, kind", [("begin: data;", "str: say text.encode\\(\\)"), (3, "int"), (None, "NoneType")])
+def test_files_of_a_bundle_are_bytes(server, data, kind):
+    with pytest.raises(TypeError, match=f"the file 'deck' of a bundle must be bytes, got a {kind}"):
+        server.load_bundle("deck", {"deck": data})
+    with server.load_bundle("deck", {"deck": bytearray(decks.body().encode())}) as simulation:
+        assert simulation.step().step == 1
+
+
+def test_what_a_deck_names_below_its_folder_is_collected(tmp_path):
+    folder, (deck, dots) = tmp_path / "models", (tmp_path / "models" / "deck", tmp_path / "models" / "..dots")
+    dots.mkdir(parents=True)
+    deck.write_text('include: "..dots/a.inc"; include: "../secret"; include: "../models2/b"; include: "."; include: "%s/deck";' % folder)
+    (dots / "a.inc").write_text('include: "../c";')
+    (folder / "c").write_text("")
+    (tmp_path / "secret").write_text("")
+    (tmp_path / "models2").mkdir()
+    (tmp_path / "models2" / "b").write_text("")
+    assert sorted(bundle.collect(deck)[1]) == ["..dots/a.inc", "c", "deck"]
+    assert bundle._names_of("etc/passwd", "", "/") == ["etc/passwd"]  # of a deck in the root
 
 
 @pytest.mark.parametrize("name", ["nothing.mbd", ".", "sub", ""])

@@ -218,6 +218,78 @@ def test_the_environment_gives_address_and_token(start_daemon, tmp_path, monkeyp
         assert server.info().identity == "token:anna"
 
 
+@pytest.mark.parametrize("token", ["hidden\r\n", "hidd\u00e9n", "hid den"])
+@pytest.mark.parametrize("how", ["argument", "variable", "file"])
+def test_a_token_that_cannot_travel_is_refused_and_not_shown(daemon, tmp_path, monkeypatch, token, how):
+    (tmp_path / "token").write_bytes(token.encode("latin-1"))
+    monkeypatch.setenv(*{"argument": ("MBCOSIM_TOKEN", ""), "variable": ("MBCOSIM_TOKEN", token),
+                         "file": ("MBCOSIM_TOKEN_FILE", str(tmp_path / "token"))}[how])
+    options = {"token": token} if how == "argument" else {}
+    if how == "file" and token.isascii() and " " not in token:
+        mbcosim.connect(daemon.address).close()  # the end of a line is none of the token
+        return
+
+    async def main():
+        async with mbcosim.aio.connect(daemon.address, **options):
+            pass
+
+    for connect in (lambda: mbcosim.connect(daemon.address, **options), lambda: asyncio.run(main())):
+        with pytest.raises(ValueError, match="the token has characters that none can have") as caught:
+            connect()
+        assert "hid" not in str(caught.value) and caught.value.__cause__ is None
+
+
+@pytest.mark.parametrize("name", ["\u00e9", "simulations/1\r\n"])
+def test_no_simulation_has_a_name_that_cannot_travel(server, name):
+    for ask in (server.attach, server.events):
+        with pytest.raises(mbcosim.NotFound, match="no simulation is named ") as caught:
+            ask(name)
+        assert caught.value.reason == "NO_SUCH_SIMULATION"
+
+
+CLOSED = [
+    lambda server, s: s.step(), lambda server, s: s.read(["time"]), lambda server, s: s.run_until(1.0, progress=print), lambda server, s: s.stepper(),
+    lambda server, s: s.subscribe(["time"]), lambda server, s: s.couple("spring"), lambda server, s: s.export_state(),
+    lambda server, s: server.list(), lambda server, s: server.events(), lambda server, s: server.load_text(decks.body())]
+
+
+def test_a_closed_connection_is_told(daemon):
+    server = daemon.connect(reconnect=60)
+    with server, server.load_text(decks.endless()) as simulation:
+        stepper = simulation.stepper()
+        stepper.step()
+        told = []
+
+        def run():
+            with pytest.raises(mbcosim.Unavailable, match="the connection is closed") as caught:
+                server.attach(simulation.name).run_until(1e8)
+            told.append(caught.value)
+
+        running_on = begun(run, simulation)
+        server.close()
+        running_on.join()
+        assert told
+        for ask in [*CLOSED, lambda *_: stepper.step()]:
+            with pytest.raises(mbcosim.Unavailable, match="the connection is closed"):
+                ask(server, simulation)
+    assert "mbcosim.Server at" in repr(server)
+
+
+def test_a_closed_connection_of_asyncio_is_told(daemon):
+    async def main():
+        async with mbcosim.aio.connect(daemon.address) as server:
+            simulation = await server.load_text(decks.endless())
+            stepper = await simulation.stepper()
+            await stepper.step()
+            run = asyncio.create_task(simulation.run_until(1e8))
+            await asyncio.sleep(0.2)
+        for ask in [*CLOSED, lambda *_: stepper.step(), lambda *_: run]:
+            with pytest.raises(mbcosim.Unavailable, match="the connection is closed"):
+                await ask(server, simulation)
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
 def test_tls_takes_the_names_of_files_from_arguments_or_the_environment(start_daemon, tmp_path, monkeypatch):
     certificate(tmp_path, "ca", "/CN=authority")
     certificate(tmp_path, "server", "/CN=localhost", "ca", ["-addext", "subjectAltName=DNS:localhost"])

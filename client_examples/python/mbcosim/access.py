@@ -25,6 +25,7 @@ from .errors import NotAllowed, TimedOut, Unavailable
 _PATIENCE = 2.0  # seconds in which a daemon may appear that was started a moment ago
 _ANSWER = 10.0   # seconds that a server may take to answer
 _OF_GRPC = re.compile(r"(dns|ipv4|ipv6|unix-abstract|vsock|xds):")  # other forms of addresses
+_TOKEN = re.compile("[!-~]+")
 Path = Union[str, "os.PathLike[str]"]
 
 
@@ -41,8 +42,16 @@ def default_token() -> Optional[str]:
     if os.environ.get("MBCOSIM_TOKEN"):
         return os.environ["MBCOSIM_TOKEN"]
     if os.environ.get("MBCOSIM_TOKEN_FILE"):
-        return _read(os.environ["MBCOSIM_TOKEN_FILE"], "MBCOSIM_TOKEN_FILE").decode().strip()
+        return _read(os.environ["MBCOSIM_TOKEN_FILE"], "MBCOSIM_TOKEN_FILE").decode(errors="replace").strip()
     return None
+
+
+def checked_token(token: Optional[str]) -> Optional[str]:
+    """`token`, or the default one; ValueError, which does not show it, for what cannot travel."""
+    chosen = token or default_token()
+    if chosen and not (isinstance(chosen, str) and _TOKEN.fullmatch(chosen)):
+        raise ValueError("the token has characters that none can have: expected printable ones of ASCII, without blanks and ends of lines")
+    return chosen
 
 
 def credentials(tls: Optional[bool], ca: Optional[Path], certificate: Optional[Path], key: Optional[Path]) -> Any:

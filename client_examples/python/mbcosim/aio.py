@@ -31,7 +31,7 @@ from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepR
 from .coupling import Answer, open_stream
 from .errors import Busy, Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
 from .histories import History
-from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Retries, Stubs, cancelling, checked_timeout, metadata,
+from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Open, Retries, cancelling, checked_timeout, metadata,
                   parting, runs_calls)
 from .simulation import subscribe_request
 from .stepping import AwaitedSharedStream, AwaitedStepLine, status_of
@@ -47,7 +47,7 @@ async def connect(address: Optional[str] = None, *, token: Optional[str] = None,
                   timeout: Optional[float] = None, reconnect: float = 0.0) -> AsyncIterator[Server]:
     """A connection; for the arguments see mbcosim.connect."""
     secured = credentials or access.credentials(tls, ca, certificate, key)
-    server = Server(access.reached(address), token or access.default_token(), secured, reconnect)
+    server = Server(access.reached(address), access.checked_token(token), secured, reconnect)
     try:
         attempts = Attempts(server.address, timeout)
         while True:
@@ -75,13 +75,13 @@ def _keep_grpc() -> None:
     grpc.aio.init_grpc_aio()
 
 
-class Connection(Address):
+class Connection(Open, Address):
     """A channel whose calls are awaited."""
 
     def __init__(self, channel: Any, token: Optional[str], reconnect: float) -> None:
         _keep_grpc()
-        self.channel, self.metadata, self.reconnect = channel, metadata(token), reconnect
-        self.stubs = Stubs(channel)
+        super().__init__(channel)
+        self.metadata, self.reconnect = metadata(token), reconnect
 
     async def run(self, calls: Calls[T]) -> T:
         """Makes the calls of a generator one after the other; its result."""
@@ -102,9 +102,14 @@ class Connection(Address):
     async def perform(self, call: Call) -> Any:
         retries = Retries(call, self.reconnect)
         while True:
+            self.check()
             try:
                 with translated():
                     return await self._once(call)
+            except asyncio.CancelledError as error:
+                if not _ends_a_task(error):
+                    self.check()  # gRPC cancels what waits for a reply when the channel is closed
+                raise
             except (Unavailable, Busy) as error:
                 pause, left = retries.again(error)
                 await asyncio.sleep(pause)
@@ -290,7 +295,7 @@ class Server(Awaiting, ServerCalls[Simulation]):
 
     async def close(self) -> None:
         """Closes the connection. Simulations on the server live on for their lease."""
-        await self._connection.channel.close()
+        await self._connection.close()
 
 
 class Events(events.Course, _Watcher):

@@ -37,7 +37,7 @@ def _names_of(text: str, current: str, folder: str) -> list[str]:
     for base in {current, ""}:
         name = os.path.normpath(os.path.join(base, text))
         path = os.path.realpath(os.path.join(folder, name))
-        inside = not os.path.isabs(name) and not name.startswith("..") and path.startswith(folder + os.sep)
+        inside = not os.path.isabs(name) and name.split(os.sep)[0] != ".." and os.path.commonpath([folder, path]) == folder
         if inside and os.path.isfile(path):
             found.append(name.replace(os.sep, "/"))
     return found
@@ -55,6 +55,15 @@ def collect_job(job: Path) -> tuple[str, dict[str, bytes]]:
             with open(path, "rb") as file:
                 files[value.strip()] = file.read()
     return main, files
+
+
+def checked(files: Mapping[str, bytes]) -> Mapping[str, bytes]:
+    """Files of a bundle; TypeError for those that are no bytes."""
+    for name, data in files.items():
+        if not isinstance(data, (bytes, bytearray, memoryview)):
+            raise TypeError(f"the file {name!r} of a bundle must be bytes, got a {type(data).__name__}"
+                            + (": say text.encode()" if isinstance(data, str) else ""))
+    return {name: bytes(data) for name, data in files.items()}
 
 
 def _chunks(files: Mapping[str, bytes]) -> Iterator[common_pb2.FileChunk]:

@@ -214,7 +214,7 @@ class ServerCalls(Generic[SimulationKind]):
         pace          seconds of the model in a second of the wall clock, 1: real time; None: as fast as it can. Late steps are counted in the replies
         timeout       seconds that the call may take; None: as long as the server lives
         """
-        return (yield from self._create(pb.UploadHeader(bundle_main_file=main), files, **options))
+        return (yield from self._create(pb.UploadHeader(bundle_main_file=main), bundle.checked(files), **options))
 
     @call
     def load_from_root(self, /, deck: str, **options: Any) -> Calls[SimulationKind]:

@@ -34,7 +34,7 @@ def connect(address: Optional[str] = None, *, token: Optional[str] = None, tls: 
                  subscriptions, events) end with it: a peer comes back by `couple(..., step=peer.step)`, see coupling.Peer
     """
     secured = credentials or access.credentials(tls, ca, certificate, key)
-    server = Server(access.reached(address), token or access.default_token(), secured, reconnect)
+    server = Server(access.reached(address), access.checked_token(token), secured, reconnect)
     try:
         await_answer(server, timeout)
     except Exception:
@@ -92,6 +92,6 @@ class Server(Blocking, ServerCalls[Simulation]):
 
     def close(self) -> None:
         """Closes the connection. Simulations on the server live on for their lease."""
-        closing = threading.Thread(target=self._channel.close, daemon=True)  # waits for calls that a silent server holds
+        closing = threading.Thread(target=self._connection.close, daemon=True)  # waits for calls that a silent server holds
         closing.start()
         closing.join(PARTING)

@@ -141,6 +141,8 @@ def from_rpc_error(rpc_error: Any) -> Error:
     code = rpc_error.code()
     if code == grpc.StatusCode.CANCELLED and not cancelled_here(rpc_error):
         return Unavailable("the server is shutting down", grpc.StatusCode.UNAVAILABLE)
+    if code == grpc.StatusCode.CANCELLED and rpc_error.details() == "Channel closed!":  # a text of gRPC's
+        return Unavailable("the connection is closed", grpc.StatusCode.UNAVAILABLE)
     status = common_pb2.ErrorStatus()
     for key, value in rpc_error.trailing_metadata() or ():
         if key == "grpc-status-details-bin":

@@ -16,7 +16,7 @@ import grpc
 from mbcosim.v1 import (common_pb2, coupling_pb2_grpc, events_pb2_grpc, geometry_pb2_grpc, reduction_pb2_grpc, results_pb2_grpc, simulations_pb2_grpc,
                         telemetry_pb2_grpc)
 
-from .errors import Busy, Error, TimedOut, Unavailable, bad_argument, cancelled_here, translated
+from .errors import Busy, Error, NotFound, TimedOut, Unavailable, bad_argument, cancelled_here, translated
 
 if TYPE_CHECKING:
     from typing_extensions import Concatenate, ParamSpec
@@ -147,6 +147,8 @@ class Address:
     metadata: list[tuple[str, str]]
 
     def about(self, simulation: str) -> list[tuple[str, str]]:
+        if not (simulation.isascii() and simulation.isprintable()):
+            raise NotFound(f"no simulation is named {simulation!r}", grpc.StatusCode.NOT_FOUND, "NO_SUCH_SIMULATION")
         return [*self.metadata, ("mbcosim-session", simulation)] if simulation else self.metadata
 
     def metadata_of(self, call: Call) -> list[tuple[str, str]]:
@@ -216,12 +218,39 @@ class Retries:
         return min(_PAUSE, left)
 
 
-class Connection(Address):
+class Open:
+    """A channel until it is closed; then Unavailable is raised in its place."""
+
+    def __init__(self, channel: Any) -> None:
+        self._channel, self._stubs, self._closed = channel, Stubs(channel), False
+
+    @property
+    def channel(self) -> Any:
+        self.check()
+        return self._channel
+
+    @property
+    def stubs(self) -> Stubs:
+        self.check()
+        return self._stubs
+
+    def check(self) -> None:
+        """Raises Unavailable when this side has closed it."""
+        if self._closed:
+            raise Unavailable("the connection is closed", grpc.StatusCode.UNAVAILABLE)
+
+    def close(self) -> Any:
+        """What the channel's `close` gives: a coroutine of asyncio's."""
+        self._closed = True
+        return self._channel.close()
+
+
+class Connection(Open, Address):
     """A channel whose calls block."""
 
     def __init__(self, channel: Any, token: Optional[str], reconnect: float) -> None:
-        self.channel, self.metadata, self.reconnect = channel, metadata(token), reconnect
-        self.stubs = Stubs(channel)
+        super().__init__(channel)
+        self.metadata, self.reconnect = metadata(token), reconnect
 
     def run(self, calls: Calls[T]) -> T:
         """Makes the calls of a generator one after the other; its result."""
@@ -241,6 +270,7 @@ class Connection(Address):
     def perform(self, call: Call) -> Any:
         retries = Retries(call, self.reconnect)
         while True:
+            self.check()
             try:
                 with translated():
                     return self._once(call)

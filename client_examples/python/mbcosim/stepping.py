@@ -146,6 +146,7 @@ class SharedStream:
         with self._state:
             if self._users == 0:
                 raise Unavailable("the stepper is over", grpc.StatusCode.UNAVAILABLE)
+            self.connection.check()
             if self._replies is None:
                 self._requests, self._replies = _open_stream(self.connection.stubs.simulations, self.connection.about(simulation))
             return self._replies
@@ -209,6 +210,7 @@ class AwaitedSharedStream:
     def _open(self, simulation: str) -> Any:
         if self._users == 0:
             raise Unavailable("the stepper is over", grpc.StatusCode.UNAVAILABLE)
+        self.connection.check()
         if self._stream is None:
             self._stream = self.connection.stubs.simulations.StepStream(metadata=self.connection.about(simulation))
         return self._stream
