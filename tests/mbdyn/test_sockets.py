@@ -196,9 +196,9 @@ def test_a_terminal_that_closes_ends_a_run_in_good_order(run, tmp_path, ignored)
         done = run(force(), "--peer-timeout", "3")
     finally:
         signal.signal(signal.SIGHUP, before)
-    done.connect()
-    done.process.send_signal(signal.SIGHUP)
-    assert done.finish() == (5 if ignored else 130), done.errors  # 5: nobody answered
+    with done.connect():
+        done.process.send_signal(signal.SIGHUP)
+        assert done.finish() == (5 if ignored else 130), done.errors  # 5: nobody answered
     assert not (tmp_path / "s").exists()
 
 
