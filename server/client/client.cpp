@@ -109,7 +109,7 @@ Server Server::connect(const std::string& address, double timeout, const Credent
         "`reconnect` must be a number of seconds from 0 to 1e9, got " + std::to_string(reconnect),
         static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT), "BAD_ARGUMENT", {}, "reconnect");
   check_address(address);
-  if (!is_metadata(credentials.token))
+  if (!server::is_metadata(credentials.token))
     throw Error("the token has characters other than printable ASCII",
                 static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT), "BAD_ARGUMENT", {}, "token");
   auto impl = std::make_shared<Impl>();

@@ -5,7 +5,6 @@
 #include <grpcpp/client_context.h>
 #include <grpcpp/support/status.h>
 
-#include <algorithm>
 #include <chrono>
 #include <memory>
 
@@ -14,6 +13,7 @@
 #include "mbcosim/v1/coupling.grpc.pb.h"
 #include "mbcosim/v1/simulations.grpc.pb.h"
 #include "mbcosim/v1/telemetry.grpc.pb.h"
+#include "wire/metadata.h"
 #include "wire/protocol.h"
 
 namespace mbcosim::client {
@@ -65,11 +65,6 @@ struct Server::Impl {
 
 constexpr double kParting = 2;  ///< longest wait of a destructor [s]
 
-/// May a call carry it beside its message?
-inline bool is_metadata(const std::string& text) {
-  return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
-}
-
 /// Context of one call: says who calls, how long it may take [s], and what it is about, so that a
 /// proxy finds the daemon that has the simulation.
 struct CallContext : grpc::ClientContext {
@@ -77,7 +72,7 @@ struct CallContext : grpc::ClientContext {
                        const std::string& simulation = {}) {
     if (!server.authorization.empty()) AddMetadata("authorization", server.authorization);
     if (!simulation.empty()) {
-      if (!is_metadata(simulation))  // gRPC would abort the process
+      if (!server::is_metadata(simulation))  // gRPC would abort the process
         throw Error("no simulation has such a name: it has characters other than printable ASCII",
                     static_cast<int>(grpc::StatusCode::NOT_FOUND), "NO_SUCH_SIMULATION", {});
       AddMetadata("mbcosim-session", simulation);

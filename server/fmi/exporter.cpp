@@ -127,10 +127,6 @@ void count(const std::vector<Entry>& entries, ExportReport& report) {
   }
 }
 
-}  // namespace
-
-namespace {
-
 /// Can XML 1.0 hold it?
 bool is_text(const std::string& text) {
   const auto is_control = [](char c) {

@@ -1,12 +1,12 @@
 #include "http/rpc_handler.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 
 #include "http/rpc_error.h"
 #include "wire/convert.h"
 #include "wire/memory.h"
+#include "wire/metadata.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server::http {
@@ -50,11 +50,6 @@ std::string transcode(Encoding encoding, const google::protobuf::Descriptor* typ
   const auto message = new_message(type);
   if (!message->ParseFromString(bytes)) throw std::runtime_error("a reply cannot be read");
   return encode(encoding, *message);
-}
-
-/// May gRPC carry it? Where it may not, gRPC aborts the process.
-bool is_metadata(std::string_view value) {
-  return std::all_of(value.begin(), value.end(), [](char c) { return c >= ' ' && c <= '~'; });
 }
 
 grpc::Status bad_request(const std::string& message) {

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "files/trusted_file.h"
+#include "wire/metadata.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -119,7 +120,7 @@ Authenticator::Token Authenticator::read_token(const std::string& line, int numb
   const bool hashed = text.compare(0, kHash.size(), kHash) == 0;
   if (hashed && !is_hash(text))
     refuse_line(number, "after \"sha256:\" there must be 64 hexadecimal digits");
-  if (!std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; }))
+  if (!is_metadata(text))
     refuse_line(number, "a token has printable ASCII characters only: no call can carry others");
   token.hash = hashed ? text : hash_of_token(text);
   token.caller = {std::string(kToken) + name, role_of(role, number)};

@@ -180,9 +180,20 @@ def test_options_of_the_eigensolution(folder):
     (["--shift", "3"], "below zero"), (["--tolerance", "0"], "between 0 and 1"), (["--lumping", "row"], "unknown lumping"),
     (["--normal", "most"], "unknown choice"),
     (["--basis", "fancy"], "unknown basis `fancy`"), (["--interface", "77"], "the model has no node 77"),
-    (["--mass", "missing.mtx"], "cannot open"), (["--basis", "constrained"], "6 rigid motions"),
+    (["--mass", "missing.mtx"], "cannot open"), (["--mass", ""], "--mass: a file's name expected"), (["--basis", "constrained"], "6 rigid motions"),
     (["--modes", "many"], "modes: a number expected"), (["--frame", "somewhere"], "unknown frame")])
 def test_refusals(folder, options, message):
     run = mbcosim("reduce", folder / "beam.job", "-o", folder / "beam.fem", *options)
     assert run.returncode == 2 and message in run.stderr
     assert not (folder / "beam.fem").exists()
+
+
+@pytest.mark.parametrize("output", ["nodes.csv", "beam.job", "../{0}/M.mtx", "K"])
+def test_results_never_take_the_place_of_inputs(folder, output):
+    """`K`: its report would be K.json, which is the stiffness matrix here."""
+    (folder / "K.json").write_text((folder / "K.mtx").read_text())
+    (folder / "beam.job").write_text((folder / "beam.job").read_text().replace("K.mtx", "K.json"))
+    before = {path.name: path.read_text() for path in folder.iterdir()}
+    run = mbcosim("reduce", folder / "beam.job", "-o", folder / output.format(folder.name), "--basis", "free", "--modes", "4")
+    assert run.returncode == 2 and "is one of the inputs" in run.stderr and "choose another name with -o" in run.stderr
+    assert {path.name: path.read_text() for path in folder.iterdir()} == before

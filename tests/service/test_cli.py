@@ -222,6 +222,20 @@ def test_a_reader_that_left_is_an_error_and_no_death(deck):
     assert run.stderr.strip().splitlines()[-1] in ("0", "4")  # 0: it was faster than the reader
 
 
+def test_output_flags_of_a_motion_stream_come_once(tmp_path):
+    (tmp_path / "deck").write_text(
+        """begin: data; problem: initial value; end: data;
+begin: initial value; initial time: 0.; final time: .1; time step: 1e-2; tolerance: 1e-6; max iterations: 10; end: initial value;
+begin: control data; structural nodes: 1; rigid bodies: 1; output elements: 1; end: control data;
+begin: nodes; structural: 1, dynamic, null, eye, null, null; end: nodes;
+begin: elements; body: 1, 1, 1., null, eye;
+stream motion output: 10, stream name, "m", grpc, output flags, position, velocity, position, 1;
+end: elements;
+""")
+    run = mbcosim("validate", str(tmp_path / "deck"))
+    assert run.returncode == 2 and "deck:6:85: error: output element 10: stream output: `output flags` has the same twice" in run.stdout + run.stderr
+
+
 def test_a_deck_of_nothing_is_refused(tmp_path):
     for text in ("", "# nothing\n"):
         (tmp_path / "empty").write_text(text)
