@@ -25,7 +25,7 @@ const char* const kUsage =
     "\n"
     "To a daemon that wants to know who calls:\n"
     "  --token-file FILE    with a bearer token\n"
-    "  --server-ca FILE     certificate of the daemon's authority: the connection uses TLS\n";
+    "  --ca FILE            certificate of the daemon's authority: the connection uses TLS\n";
 
 namespace {
 
@@ -91,7 +91,7 @@ Options read_options(int argc, const char* const* argv) {
                                                      {"--displacement", &options.data.displacement},
                                                      {"--velocity", &options.data.velocity},
                                                      {"--token-file", &token_file},
-                                                     {"--server-ca", &server_ca}};
+                                                     {"--ca", &server_ca}};
   for (int i = kPositional + 1; i < argc; i += 2) {
     const auto option = known.find(argv[i]);
     if (option == known.end())

@@ -1,6 +1,7 @@
 /// The subcommands of `mbcosim`, each in its own file. They link the engine alone.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -66,9 +67,9 @@ struct DiffCommand {
 struct EigCommand {
   std::string deck;
   SymbolValues symbols;
-  int count = 0;     ///< eigenvalues nearest to `shift`; 0: all finite ones
-  double shift = 0;  ///< [Hz]
-  double time = 0;   ///< about the state at this time [s]
+  int count = 0;                    ///< eigenvalues nearest to `shift`; 0: all finite ones
+  double shift = 0;                 ///< [Hz]
+  std::optional<double> time = {};  ///< about the state at this time [s]; default: the first
 };
 
 /// All that the command line knows, options of `run` that are seldom given among them. Returns the

@@ -53,6 +53,13 @@ void print(const Eigen::VectorXcd& values, double time, const UnitSystem* units)
   }
 }
 
+Error not_run(double wanted, double first, double last) {
+  char text[160];
+  std::snprintf(text, sizeof text, "the deck runs from %.9g to %.9g: --time %.9g is not in between",
+                first, last, wanted);
+  return make_error(ErrorKind::argument, "BAD_TIME", text);
+}
+
 }  // namespace
 
 int eig(const EigCommand& command) {
@@ -66,10 +73,17 @@ int eig(const EigCommand& command) {
   };
   auto simulation = Simulation::create(report.model, interrupt.token());
   if (!simulation) return fail(simulation.error());
-  if (command.time > (*simulation)->time()) {
-    const StepReport done = (*simulation)->run_until(command.time, interrupt.token());
+  if (command.time) {
+    const double first = (*simulation)->time(), last = (*simulation)->final_time();
+    if (*command.time < first || *command.time > last)
+      return fail(not_run(*command.time, first, last));
+    const StepReport done = (*simulation)->run_exactly_until(*command.time, interrupt.token());
     if (done.error) return fail(*done.error);
     if (done.outcome == StepOutcome::interrupted) return kInterrupted;
+    const double reached = (*simulation)->time();
+    if (done.outcome == StepOutcome::finished &&
+        reached + (*simulation)->next_step_size() <= *command.time)
+      return fail(not_run(*command.time, first, reached));  // a drive ended the run
   }
   const UnitSystem* const units = find_part<UnitSystem>(*report.model);
   const double second = seconds_in_unit_of_time(units);

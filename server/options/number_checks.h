@@ -16,6 +16,8 @@ class NumberCheck {
   static NumberCheck at_least(double least) { return {least, kLargest, false}; }
   /// "above 0"
   static NumberCheck above(double bound) { return {bound, kLargest, true}; }
+  /// "that is finite"
+  static NumberCheck finite() { return {-kLargest, kLargest, false}; }
   /// "from 1 to 1024"
   static NumberCheck within(double least, double most) { return {least, most, false}; }
 
@@ -34,6 +36,7 @@ class NumberCheck {
       : least_(least), most_(most), is_open_(is_open) {}
 
   std::string wanted() const {
+    if (least_ == -kLargest) return "that is finite";
     if (most_ < kLargest) return "from " + number(least_) + " to " + number(most_);
     return (is_open_ ? "above " : "of at least ") + number(least_);
   }

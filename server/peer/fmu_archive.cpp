@@ -82,6 +82,7 @@ FmuArchive::FmuArchive(const std::string& path) : name_(fs::path(path).filename(
   try {
     unpack(path);
     read_description();
+    require_library();
   } catch (const std::exception& e) {
     std::error_code error;
     fs::remove_all(folder_, error);
@@ -145,6 +146,16 @@ void FmuArchive::read_description() {
                                                   fmi3_ ? size_of(node) : 1,
                                                   start_of(node, fmi3_)};
   }
+}
+
+void FmuArchive::require_library() const {
+  if (fs::exists(library())) return;
+  std::string others;
+  if (const fs::path binaries = fs::path(folder_) / "binaries"; fs::is_directory(binaries))
+    for (const fs::directory_entry& platform : fs::directory_iterator(binaries))
+      others +=
+          (others.empty() ? "; it has folders for " : ", ") + platform.path().filename().string();
+  refuse("it has no binary for this machine, " + library().substr(folder_.size() + 1) + others);
 }
 
 std::string FmuArchive::library() const {

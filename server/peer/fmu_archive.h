@@ -38,6 +38,7 @@ class FmuArchive {
  private:
   void unpack(const std::string& path);
   void read_description();
+  void require_library() const;
 
   std::string folder_, name_, identifier_, token_;
   bool fmi3_ = false, keeps_states_ = false;

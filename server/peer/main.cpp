@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "files/default_socket.h"
 #include "mbdyn/link.h"
 #include "options/number_checks.h"
 #include "peer/options.h"
@@ -17,16 +16,12 @@ namespace {
 constexpr int kDone = 0, kRefused = 4, kPeerLost = 5, kInterrupted = 130;
 
 void add_call(CLI::App& app, PeerCall& call) {
-  call.server = server::default_socket();
   app.add_option("--simulation", call.simulation, "Name of the simulation")->required();
   app.add_option("--port", call.port, "Name of its port")->required();
-  app.add_option("--server", call.server, "Address of the daemon")->capture_default_str();
-  app.add_option("--token-file", call.token_file, "File with a bearer token");
-  app.add_option("--server-ca", call.server_ca,
-                 "Certificate of the authority of the daemon: the connection uses TLS");
+  server::add_daemon_options(app, call.daemon);
   app.add_option("--mode", call.mode, "When to exchange; default: as the port says")
       ->check(CLI::IsMember({"loose", "staggered", "tight", "window"}));
-  app.add_option("--peer-timeout", call.timeout, "Longest wait [s]")
+  app.add_option("--peer-timeout", call.timeout, "Longest wait for the simulation or the code [s]")
       ->capture_default_str()
       ->check(server::NumberCheck::within(1e-3, 1e6));
 }

@@ -11,14 +11,14 @@
 
 #include "client/mbcosim_client.h"
 #include "model/deck_channel.h"
+#include "reach/daemon_options.h"
 #include "solver/cancel.h"
 
 namespace mbcosim::peer {
 
 /// Where the simulation is and how the peer takes part.
 struct PeerCall {
-  std::string server;  ///< address of the daemon
-  std::string token_file, server_ca;
+  server::DaemonOptions daemon;
   std::string simulation, port;
   std::string mode;                        ///< loose, staggered, tight, window; empty: the port's
   double timeout = 60;                     ///< longest wait for the other side [s]
@@ -56,8 +56,6 @@ inline double tolerance_at(double time) { return 1e-9 * std::max(1.0, std::abs(t
 void serve_fmu(const PeerCall& call, const FmuCall& fmu);
 void serve_socket(const PeerCall& call, const SocketCall& socket);
 
-/// The simulation, by what `call` says of the daemon.
-client::Server connect(const PeerCall& call);
 client::PeerOptions options_of(const PeerCall& call);
 /// The next exchange; false: the stream has ended. Throws Lost.
 bool next_exchange(const PeerCall& call, client::Peer& peer, client::Motion& motion);

@@ -1,8 +1,6 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "files/default_socket.h"
-#include "files/text_file.h"
 #include "peer/fmu_peer.h"
 #include "peer/options.h"
 #include "peer/simulation_watch.h"
@@ -11,13 +9,6 @@ namespace mbcosim::peer {
 namespace {
 
 using client::Mode;
-
-/// A token: without the ends of its lines.
-std::string token_of_file(const std::string& path) {
-  std::string text = server::text_of_file(path);
-  while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
-  return text;
-}
 
 Mode mode_of(const std::string& name) {
   if (name == "loose") return Mode::loose;
@@ -42,14 +33,6 @@ std::vector<std::string> expanded(const client::Simulation& simulation,
       names.push_back(size == 1 ? variable : variable + "[" + std::to_string(k) + "]");
   }
   return names;
-}
-
-client::Server connect(const PeerCall& call) {
-  server::check_default_socket(call.server);
-  client::Credentials credentials;
-  credentials.token = token_of_file(call.token_file);
-  credentials.server_ca = server::text_of_file(call.server_ca);
-  return client::Server::connect(call.server, 10, credentials);
 }
 
 client::PeerOptions options_of(const PeerCall& call) {
@@ -83,7 +66,7 @@ void require_good_end(client::Server& server, const PeerCall& call, const client
 void serve_fmu(const PeerCall& call, const FmuCall& fmu) {
   const FmuArchive archive(fmu.file);
   if (call.interrupted()) return;
-  client::Server server = connect(call);
+  client::Server server = server::reach(call.daemon);
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
   if (!archive.keeps_states()) {

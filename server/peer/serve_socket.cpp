@@ -301,7 +301,7 @@ void serve_socket(const PeerCall& call, const SocketCall& socket) {
   const mbdyn::Patience patience{
       .time = std::chrono::milliseconds(static_cast<long long>(1000 * call.timeout)),
       .cancelled = [&call] { return call.interrupted(); }};
-  client::Server server = connect(call);
+  client::Server server = server::reach(call.daemon);
   client::Simulation simulation = server.find(call.simulation);
   client::PeerOptions options = options_of(call);
   options.accelerations = socket.accelerations;

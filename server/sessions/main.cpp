@@ -10,31 +10,20 @@
 #include "client/mbcosim_client.h"
 #include "durable/record_file.h"
 #include "durable/salvage.h"
-#include "files/default_socket.h"
-#include "files/text_file.h"
-#include "options/number_checks.h"
+#include "reach/daemon_options.h"
 
 namespace {
 
 using namespace mbcosim::client;
+using mbcosim::server::reach;
 
 constexpr int kDone = 0, kRefused = 4;
 
 struct Options {
-  std::string address;
-  double timeout = 10;  ///< [s], to reach the daemon
-  Credentials credentials;
+  mbcosim::server::DaemonOptions daemon;
   std::string simulation, file, name;
   bool from_checkpoint = false;
 };
-
-Server reach(const Options& options) {
-  mbcosim::server::check_default_socket(options.address);
-  Credentials credentials = options.credentials;  // names of files
-  for (std::string* file : {&credentials.server_ca, &credentials.certificate, &credentials.key})
-    *file = mbcosim::server::text_of_file(*file);
-  return Server::connect(options.address, options.timeout, credentials);
-}
 
 const char* state_name(SimulationInfo::State state) {
   constexpr const char* kNames[] = {"unknown",  "ready",  "stepping",
@@ -43,7 +32,7 @@ const char* state_name(SimulationInfo::State state) {
 }
 
 int list(const Options& options) {
-  const std::vector<SimulationInfo> found = reach(options).list();
+  const std::vector<SimulationInfo> found = reach(options.daemon).list();
   std::printf("%-42s %-10s %12s %14s  %s\n", "simulation", "state", "step", "time", "name");
   for (const SimulationInfo& info : found)
     std::printf("%-42s %-10s %12lld %14.6g  %s\n", info.name.c_str(), state_name(info.state),
@@ -65,7 +54,7 @@ void write_file(const std::string& path, const std::string& bytes) {
 }
 
 int checkpoint(const Options& options) {
-  Server server = reach(options);
+  Server server = reach(options.daemon);
   const std::string bytes = server.find(options.simulation).export_checkpoint();
   write_file(options.file, bytes);
   std::printf("%s: %zu bytes\n", options.file.c_str(), bytes.size());
@@ -106,7 +95,7 @@ int resume(const Options& options) {
         "--from-checkpoint is for a folder DIR/simulations/ID.damaged, which \"" + options.file +
         "\" is not");
   const std::string bytes = is_folder ? salvaged(options) : "";
-  Server server = reach(options);
+  Server server = reach(options.daemon);
   if (!is_folder && options.file.compare(0, 12, "simulations/") == 0) {
     Simulation simulation = server.find(options.file);
     (void)simulation.read("step");  // what needs the state brings it back
@@ -119,21 +108,9 @@ int resume(const Options& options) {
   return kDone;
 }
 
-/// What all of them need to reach a daemon.
 CLI::App* add(CLI::App& app, const char* name, const char* text, Options& options) {
   CLI::App* command = app.add_subcommand(name, text);
-  command->add_option("--address", options.address, "The daemon's: unix:PATH or HOST:PORT")
-      ->capture_default_str()
-      ->envname("MBCOSIM_ADDRESS");
-  command->add_option("--token", options.credentials.token, "Bearer token")
-      ->envname("MBCOSIM_TOKEN");
-  command->add_option("--ca", options.credentials.server_ca,
-                      "PEM file: authority of the daemon's certificate; the connection uses TLS");
-  command->add_option("--certificate", options.credentials.certificate, "PEM file of this client");
-  command->add_option("--key", options.credentials.key, "PEM file of its key");
-  command->add_option("--timeout", options.timeout, "Seconds to wait for the daemon")
-      ->capture_default_str()
-      ->check(mbcosim::server::NumberCheck::above(0));
+  mbcosim::server::add_daemon_options(*command, options.daemon);
   return command;
 }
 
@@ -141,7 +118,6 @@ int run(int argc, char** argv) {
   CLI::App app{"Simulations of a daemon.", "mbcosim"};
   app.require_subcommand(1);
   Options options;
-  options.address = mbcosim::server::default_socket();
   int (*chosen)(const Options&) = nullptr;
   CLI::App* sessions =
       add(app, "sessions", "List a daemon's simulations, suspended ones too", options);

@@ -264,7 +264,7 @@ def mbdyn_gateway(daemon, folder):
     path = os.path.join(folder, "s")
     with mbcosim.connect(daemon.address) as server:
         with server.load_text(POINTS) as body:
-            gateway = peer_program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", "tight", "--server", daemon.address,
+            gateway = peer_program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", "tight", "--address", daemon.address,
                                    "--simulation", body.name, "--port", "points")
             code = subprocess.Popen([build_code(folder), path, "2", "2"], stdout=subprocess.PIPE, text=True)
             await_peer(body)
@@ -293,7 +293,7 @@ def fmu_peer(daemon, folder):
     ports = [mbcosim.signal_port("control", outputs=[speed], inputs=["stream.force"])]
     with mbcosim.connect(daemon.address) as server:
         with server.load_text(deck, ports=ports) as cart:
-            peer = peer_program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", "loose",
+            peer = peer_program("fmu", path, "--address", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", "loose",
                                 "--map", f"u={speed}[1]", "--map", "y=stream.force")
             if "attached" not in peer.stdout.readline():
                 raise RuntimeError(peer.stderr.read().strip())

@@ -113,7 +113,7 @@ def drive_cart(daemon, program, path, mode, pairs, sent="node.structural.1.XP"):
     """Force and speed after each step with the FMU as the controller."""
     port = mbcosim.signal_port("control", outputs=[sent], inputs=["stream.force"])
     with daemon.connect() as server, server.load(CART, ports=[port], summed_time=True) as cart:
-        peer = program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
+        peer = program("fmu", path, "--address", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
                        *[word for pair in pairs for word in ("--map", pair)])
         assert "attached to port" in peer.first_line(), peer.finish() or peer.errors
         rows = []

@@ -85,7 +85,7 @@ def signal_port():
 def run_fmu(daemon, program, path, mode, steps=20, notes=None, pairs=(f"u={SENT}[1]", "y=stream.force")):
     """Time, speed and force after each step; what the peer notes is added to `notes`."""
     with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
-        peer = program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
+        peer = program("fmu", path, "--address", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
                        *[word for pair in pairs for word in ("--map", pair)])
         assert "attached to port" in peer.first_line(), peer.finish() or peer.errors
         values = []
@@ -117,7 +117,7 @@ def test_implicit_fmus_go_back_within_a_step(start_daemon, program, fmus, versio
 
 def refused(daemon, program, *arguments):
     with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
-        peer = program(*arguments, "--server", daemon.address, "--simulation", cart.name, "--port", "control")
+        peer = program(*arguments, "--address", daemon.address, "--simulation", cart.name, "--port", "control")
         assert peer.finish() == 4
         return peer.errors
 
@@ -134,6 +134,14 @@ def test_what_does_not_fit_is_refused(start_daemon, program, fmus, tmp_path):  #
         archive.writestr("../outside", "")
     assert "leads out of it" in refused(daemon, program, "fmu", str(tmp_path / "y.fmu"))
     assert not (tmp_path / "outside").exists()
+    for version, wanted in (2, "binaries/linux64/c.so"), (3, "binaries/x86_64-linux/c.so"):
+        for there, others in ([], ""), (["win64/c.dll"], "; it has folders for win64"):
+            with zipfile.ZipFile(tmp_path / "z.fmu", "w") as archive:
+                archive.writestr("modelDescription.xml", DESCRIPTION[version].format(state="true", extra=""))
+                for name in there:
+                    archive.writestr("binaries/" + name, "")
+            told = refused(daemon, program, "fmu", str(tmp_path / "z.fmu"))
+            assert told == f'mbcosim peer: "{tmp_path / "z.fmu"}": it has no binary for this machine, {wanted}{others}\n'
 
 
 # An input that sets the factor of y, an input of another type, and what needs no start value.
@@ -205,8 +213,30 @@ def test_arrays_that_do_not_fit_are_refused(start_daemon, program, fmus):  # noq
 def test_an_fmu_takes_part_in_signal_ports_only(start_daemon, program, fmus):  # noqa: F811
     daemon = start_daemon()
     with daemon.connect() as server, server.load(CART, ports=[mbcosim.structural_port("tip", nodes=[1])]) as cart:
-        peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "tip")
+        peer = program("fmu", fmus(3), "--address", daemon.address, "--simulation", cart.name, "--port", "tip")
         assert peer.finish() == 4 and 'port "tip" is no signal port: an FMU takes part in those only' in peer.errors
+
+
+def test_the_daemon_of_a_peer_is_named_as_for_other_commands(start_daemon, program, fmus, tmp_path):  # noqa: F811
+    """By options, or by the environment; a port of the wrong kind tells that the peer was let in."""
+    tokens, secret, empty = (tmp_path / name for name in ("tokens", "secret", "empty"))
+    tokens.write_text("a-good-token control one\n")
+    tokens.chmod(0o600)
+    secret.write_text("a-good-token\n")
+    empty.write_text("\n")
+    daemon = start_daemon("--tokens", str(tokens))
+    with daemon.connect(token="a-good-token") as server, server.load(CART, ports=[mbcosim.structural_port("tip", nodes=[1])]) as cart:
+        def told(*options, **environment):
+            peer = program("fmu", fmus(3), "--simulation", cart.name, "--port", "tip", *options, env={**os.environ, **environment})
+            assert peer.finish() == 4
+            return peer.errors
+
+        by_environment = {"MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_TOKEN": "a-good-token"}
+        assert "is no signal port" in told(**by_environment)
+        assert "is no signal port" in told("--address", daemon.address, "--token", "a-good-token")
+        assert "is no signal port" in told("--token-file", str(secret), **{**by_environment, "MBCOSIM_TOKEN": "another"})
+        assert "unknown bearer token" in told("--token", "another", **by_environment)
+        assert f'there is no token in "{empty}"' in told("--token-file", str(empty), **by_environment)
 
 
 LOADED = mbcosim.signal_port("control", outputs=["node.structural.1.load"], inputs=["stream.force"])
@@ -215,7 +245,7 @@ LOADED = mbcosim.signal_port("control", outputs=["node.structural.1.load"], inpu
 def fail_once(daemon, program, path, after):
     """`after(cart)` once the FMU has discarded a step; returns the program."""
     with daemon.connect() as server, server.load(CART, ports=[LOADED]) as cart:
-        peer = program("fmu", path, "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", "loose",
+        peer = program("fmu", path, "--address", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", "loose",
                        "--map", "u=node.structural.1.load[3]", "--map", "y=stream.force")
         assert "attached" in peer.first_line()
         assert cart.step(1).outcome == "ACCEPTED"
@@ -254,7 +284,7 @@ def test_an_fmu_that_discards_a_step_and_keeps_no_states_ends(start_daemon, prog
 def test_an_fmu_that_cannot_follow_a_simulation_back_ends(start_daemon, program, fmus, version, mode, state, reset):  # noqa: F811
     daemon = start_daemon()
     with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
-        peer = program("fmu", fmus(version, state), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
+        peer = program("fmu", fmus(version, state), "--address", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
                        "--map", f"u={SENT}[1]", "--map", "y=stream.force")
         assert "attached" in peer.first_line()
         assert cart.step(2).outcome == "ACCEPTED"
@@ -271,7 +301,7 @@ def test_an_fmu_that_cannot_follow_a_simulation_back_ends(start_daemon, program,
 def test_an_fmu_follows_a_simulation_back_by_the_one_step_that_it_keeps(start_daemon, program, fmus, mode):  # noqa: F811
     daemon = start_daemon()
     with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
-        peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
+        peer = program("fmu", fmus(3), "--address", daemon.address, "--simulation", cart.name, "--port", "control", "--mode", mode,
                        "--map", f"u={SENT}[1]", "--map", "y=stream.force")
         assert "attached" in peer.first_line()
         cart.step(4)
@@ -287,7 +317,7 @@ def test_an_fmu_follows_a_simulation_back_by_the_one_step_that_it_keeps(start_da
 def test_a_signal_removes_the_folder_of_an_fmu(start_daemon, program, fmus, tmp_path, sent):  # noqa: F811
     daemon = start_daemon()
     with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
-        peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--map", f"u={SENT}[1]",
+        peer = program("fmu", fmus(3), "--address", daemon.address, "--simulation", cart.name, "--port", "control", "--map", f"u={SENT}[1]",
                        "--map", "y=stream.force", env={**os.environ, "TMPDIR": str(tmp_path)})
         assert "attached" in peer.first_line()
         assert list(tmp_path.glob("mbcosim-fmu-*"))
@@ -303,7 +333,7 @@ def test_the_folder_of_an_fmu_may_have_any_name(start_daemon, program, fmus, tmp
     folder.mkdir()
     daemon = start_daemon()
     with daemon.connect() as server, server.load(CART, ports=[signal_port()]) as cart:
-        peer = program("fmu", fmus(standard), "--server", daemon.address, "--simulation", cart.name, "--port", "control",
+        peer = program("fmu", fmus(standard), "--address", daemon.address, "--simulation", cart.name, "--port", "control",
                        "--map", f"u={SENT}[1]", "--map", "y=stream.force", env={**os.environ, "TMPDIR": str(folder)})
         assert "attached" in peer.first_line(), peer.errors
         assert cart.step(2).outcome == "ACCEPTED"
@@ -313,7 +343,7 @@ def test_the_folder_of_an_fmu_may_have_any_name(start_daemon, program, fmus, tmp
 def test_a_lost_daemon_is_told(start_daemon, program, fmus):  # noqa: F811
     daemon = start_daemon()
     cart = daemon.connect().load(CART, ports=[signal_port()])
-    peer = program("fmu", fmus(3), "--server", daemon.address, "--simulation", cart.name, "--port", "control", "--map", f"u={SENT}[1]",
+    peer = program("fmu", fmus(3), "--address", daemon.address, "--simulation", cart.name, "--port", "control", "--map", f"u={SENT}[1]",
                    "--map", "y=stream.force")
     assert "attached" in peer.first_line()
     assert cart.step(1).outcome == "ACCEPTED"
@@ -363,7 +393,7 @@ def test_a_code_of_mbdyn_couples_with_a_daemon(start_daemon, program, tmp_path, 
     ports = [mbcosim.structural_port("tip", nodes=[2])]
     deck = os.path.join(MODELS, "pendulum.mbd")
     with daemon.connect() as server, server.load(deck, ports=ports) as pendulum, server.load(deck) as alone:
-        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", mode, "--server", daemon.address,
+        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", mode, "--address", daemon.address,
                           "--simulation", pendulum.name, "--port", "tip")
         code = connect(path)
         code.sendall(b"\7" + struct.pack("<II", 0x202, 1))
@@ -390,7 +420,7 @@ def test_a_silent_code_fails_the_step_and_is_named(start_daemon, program, tmp_pa
     daemon, path = start_daemon(), str(tmp_path / "s")
     with daemon.connect() as server, server.load(os.path.join(MODELS, "pendulum.mbd"),
                                                  ports=[mbcosim.structural_port("tip", nodes=[2])]) as pendulum:
-        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--peer-timeout", "1", "--server", daemon.address,
+        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--peer-timeout", "1", "--address", daemon.address,
                           "--simulation", pendulum.name, "--port", "tip")
         code = connect(path)
         code.sendall(b"\7" + struct.pack("<II", 0x202, 1))
@@ -406,7 +436,7 @@ def test_answers_that_are_too_long_fail_the_next_step_and_are_named(start_daemon
     daemon, path = start_daemon(), str(tmp_path / "s")
     with daemon.connect() as server, server.load(os.path.join(MODELS, "pendulum.mbd"),
                                                  ports=[mbcosim.structural_port("tip", nodes=[2])]) as pendulum:
-        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", "loose", "--server", daemon.address,
+        gateway = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--mode", "loose", "--address", daemon.address,
                           "--simulation", pendulum.name, "--port", "tip")
         code = connect(path)
         code.sendall(b"\7" + struct.pack("<II", 0x202, 1))

@@ -34,7 +34,7 @@ class Gateway:
 
     def __init__(self, program, server, simulation, port, path, *options):  # noqa: F811
         self.path = path
-        self.program = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--server", server.address, "--simulation", simulation.name,
+        self.program = program("socket", "--protocol", "mbdyn", "--listen", f"unix:{path}", "--address", server.address, "--simulation", simulation.name,
                                "--port", port, *options)
 
 

@@ -32,7 +32,7 @@ ARROWS = {
     "src/simulation": {"math", "model", "elements", "solver", "input", "output", "reduction"},
     "server/fmi": {"options", "math", "model", "solver", "input", "simulation"},
     "server/mbdyn": {"host", "math", "model", "elements", "simulation"},
-    "server/peer": {"options", "math", "model", "solver", "simulation", "client", "mbdyn", "fmi", "files", "threads"},
+    "server/peer": {"options", "reach", "math", "model", "solver", "simulation", "client", "mbdyn", "fmi", "files", "threads"},
     "server/cli": {"options", "threads", "host", "mbdyn", "math", "model", "elements", "solver", "input", "output", "reduction", "simulation"},
     "server/wire": {"math", "model", "solver", "simulation", "mbcosim", "host"},
     "server/host": set(),
@@ -49,7 +49,8 @@ ARROWS = {
     "server/shared_memory": {"threads", "host"},
     "server/http": {"service", "rpc", "threads", "wire", "mbcosim"},
     "server/view": {"client"},
-    "server/sessions": {"options", "client", "durable", "files"},
+    "server/reach": {"options", "client", "files"},
+    "server/sessions": {"reach", "client", "durable"},
     "server/daemon": {"options", "files", "input", "host", "service", "rpc", "http", "shared_memory", "threads", "wire", "mbcosim", "grpc"},
 }
 TOP_LEVEL = {"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "client_examples", "docker", "proto", "server", "src",

@@ -26,8 +26,8 @@ def other(start_daemon, tmp_path):
     return start_daemon("--state-dir", str(tmp_path / "other"))
 
 
-def run(*arguments):
-    done = subprocess.run([os.path.join(BIN, "mbcosim"), *arguments], capture_output=True, text=True, timeout=60)
+def run(*arguments, **environment):
+    done = subprocess.run([os.path.join(BIN, "mbcosim"), *arguments], capture_output=True, text=True, timeout=60, env={**os.environ, **environment})
     return done.returncode, done.stdout, done.stderr
 
 
@@ -245,6 +245,8 @@ def test_the_commands_list_store_and_bring_back(start, other, tmp_path):
         name = simulation.info.name
         code, listing, _ = run("sessions", "--address", daemon.address)
         assert code == 0 and any(line.split()[:3] == [name, "ready", "50"] for line in listing.splitlines()), listing
+        assert run("sessions", MBCOSIM_ADDRESS=daemon.address)[:2] == (0, listing)
+        assert run("sessions", "--address", daemon.address, MBCOSIM_ADDRESS="unix:/nowhere")[:2] == (0, listing)  # the option goes before
         assert run("checkpoint", name, "-o", file, "--address", daemon.address)[0] == 0
         code, printed, errors = run("resume", file, "--name", "again", "--address", other.address)
         assert code == 0, errors

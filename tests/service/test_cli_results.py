@@ -173,6 +173,26 @@ def test_eig_of_a_later_state_and_of_few(tmp_path):
     assert mbcosim("eig", "nothing", cwd=tmp_path).returncode == 2
 
 
+def test_eig_at_a_time_that_the_deck_does_not_reach(tmp_path):
+    """Before its start, after its end, after a drive has ended it."""
+    (tmp_path / "o").write_text(OSCILLATOR)
+
+    def told(*arguments):
+        done = mbcosim("eig", "o", *arguments, cwd=tmp_path)
+        assert done.returncode == 4 and done.stdout == ""
+        return done.stderr
+
+    for time in ("-0.01", "10.5"):
+        assert told("--time", time) == f"error: the deck runs from 0 to 10: --time {time} is not in between\n"
+    assert 'expected a number that is finite, got "nan"' in told("--time", "nan")
+    assert 'expected a number that is finite, got "inf"' in told("--near", "inf")
+    assert mbcosim("eig", "o", "--time", 10, cwd=tmp_path).stdout.startswith("eigenvalues at t = 10 s")
+    driver = 'begin: drivers; file: 7, fixed step, 4, 1, initial time, 0., time step, 1., bailout, upper, "samples"; end: drivers;\n'
+    (tmp_path / "samples").write_text("0.\n0.\n0.\n0.\n")
+    (tmp_path / "o").write_text(OSCILLATOR.replace("end: control data;", "file drivers: 1; end: control data;").replace("begin: elements;", driver + "begin: elements;"))
+    assert told("--time", "8") == "error: the deck runs from 0 to 3: --time 8 is not in between\n"
+
+
 def test_eig_tells_units_that_the_deck_declares(tmp_path):
     (tmp_path / "o").write_text(OSCILLATOR.replace("end: control data", 'units: length, "mm", mass, "t", time, "ms"; end: control data'))
     shown = mbcosim("eig", "o", cwd=tmp_path)
