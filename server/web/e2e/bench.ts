@@ -371,6 +371,11 @@ export function drawnLayers(page: Page): Promise<string[]> {
   return page.evaluate(() => (window as unknown as Inside).mbcosim.scene.view.layers());
 }
 
+/** Waits until the page has seen that time of the simulation. */
+export function samplesReach(page: Page, time: number): Promise<void> {
+  return until(page, (time) => ((window as unknown as Inside).mbcosim.desk.shown.value?.recording.samples.at(-1)?.time ?? 0) >= time, time);
+}
+
 /** Waits until no step of the page's is under way. */
 export function rested(page: Page): Promise<void> {
   return until(page, () => {

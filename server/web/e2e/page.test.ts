@@ -1,4 +1,4 @@
-import type { Browser } from 'playwright-core';
+import type { Browser, Page } from 'playwright-core';
 import type { ChildProcess } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
@@ -6,7 +6,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, freePort, launch, MODELS, moveSliderUnderSample, picture, recorded, rested, samplesHave, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
+import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, freePort, launch, MODELS, moveSliderUnderSample, picture, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -161,6 +161,60 @@ describe('time', () => {
       await page.keyboard.press('Enter');
       await atStep(page, 50);
       expect((await view.read([])).time).toBeCloseTo(0.25, 9);
+    });
+  });
+
+  const button = (page: Page, name: string) => page.getByRole('button', { name });
+  const timeOf = async (view: View) => (await view.read([])).time;
+
+  test('is run until a given time, at once, while it runs by the wall clock', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
+      await button(page, 'Run (space)').click();
+      await samplesReach(page, 0.1);
+      await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('4');
+      await button(page, 'Run until this time').click();
+      await atStep(page, 800);
+      await button(page, 'Run (space)').waitFor();
+      expect(await timeOf(view)).toBeCloseTo(4, 9);
+    });
+  });
+
+  test('of a run until a given time can be stopped', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(400));
+    await withPage(browser, join(folder, 'pendulums.mbd'), async ({ page }, view) => {
+      await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('100');
+      await button(page, 'Run until this time').click();
+      await samplesReach(page, 0.01);
+      await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.5');  // is for later
+      await button(page, 'Pause (space)').click();
+      await rested(page);
+      const stopped = await timeOf(view);
+      expect(stopped).toBeLessThan(100);
+      await page.waitForTimeout(300);
+      expect(await timeOf(view)).toBe(stopped);
+      // A pause, and on before the step that is under way has ended.
+      await page.evaluate(() => {
+        const play = document.querySelector<HTMLButtonElement>('button.play');
+        for (let i = 0; i < 3; ++i) setTimeout(() => play?.click(), 30 * i);
+      });
+      await samplesReach(page, stopped + 0.1);
+      await button(page, 'Pause (space)').click();
+      await rested(page);
+    });
+    rmSync(folder, { recursive: true });
+  });
+
+  test('goes slower as soon as another speed is chosen', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
+      await button(page, 'Run (space)').click();
+      await samplesReach(page, 0.1);
+      await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.01');
+      await page.waitForTimeout(200);
+      const chosen = await timeOf(view);
+      await page.waitForTimeout(2000);
+      expect(await timeOf(view)).toBeLessThan(chosen + 0.5);
+      await button(page, 'Pause (space)').click();
     });
   });
 
@@ -324,25 +378,28 @@ describe('several readers', () => {
 });
 
 describe('what can be taken away', () => {
-  test('a recording opens without a daemon and shows the same', async () => {
+  test('a recording is there when the daemon is gone, opens without one and shows the same', async () => {
     const view = await View.start('pendulum.mbd');
     const visited = await visit(browser, view.address);
     await shown(visited.page);
     await visited.page.getByRole('button', { name: '+10' }).click();
     await atStep(visited.page, 10);
     const drawn = await scene(visited.page);
+    await view.stop();
+    await visited.page.getByText('The daemon does not answer; trying again.').waitFor();
     const download = visited.page.waitForEvent('download');
     await visited.page.getByRole('button', { name: 'Export' }).click();
     await visited.page.getByRole('button', { name: 'Recording (HTML)' }).click();
     const file = join(mkdtempSync(join(tmpdir(), 'mbcosim-')), 'recording.html');
     await (await download).saveAs(file);
-    await view.stop();
     const again = await visit(browser, `file://${file}`);
     await shown(again.page);
     const replayed = await scene(again.page);
     expect(replayed.step).toBe(10);
     for (const [label, matrix] of Object.entries(drawn.nodes)) matrix.forEach((value, k) => expect(replayed.nodes[label][k]).toBeCloseTo(value, 6));
     expect((await picture(again.page)).covered).toBeGreaterThan(0.002);
+    await again.page.getByRole('button', { name: 'Export' }).click();
+    expect(await again.page.getByRole('button', { name: 'Recording (HTML)' }).count()).toBe(0);  // it is one
     expect(again.faults).toEqual([]);
     await again.close();
     await visited.close();
@@ -571,6 +628,27 @@ describe('a daemon that is started again', () => {
       await turnTo(page, second);
       await page.getByRole('button', { name: 'One step (S)' }).click();
       await atStep(page, 1);
+      await close();
+    } finally {
+      await daemon.kill();
+      rmSync(folder, { recursive: true });
+    }
+  });
+});
+
+describe('a daemon that is started again with another token', () => {
+  test('lets the page no longer in, which says what to do', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    const daemon = new Daemon(folder, await freePort(), [], true);
+    try {
+      await daemon.start();
+      const simulation = await create(daemon, 'pendulum.mbd');
+      const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(simulation)}`);
+      await shown(page);
+      await daemon.kill();
+      await page.getByText('The daemon does not answer; trying again.').waitFor();
+      await daemon.start();
+      await page.locator('.banner').getByText('Open the address that the daemon printed when it started: it has the token.').waitFor();
       await close();
     } finally {
       await daemon.kill();

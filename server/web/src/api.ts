@@ -42,6 +42,11 @@ function errorInfo(error: ConnectError) {
   return undefined;
 }
 
+/** What to do about it, where there is something. */
+export function remedy(failure: Failure): string {
+  return failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started: it has the token.' : '';
+}
+
 export function failureOf(thrown: unknown): Failure {
   const error = ConnectError.from(thrown);
   const info = errorInfo(error);

@@ -38,7 +38,8 @@ export class App {
   private readonly help = this.helpDialog();
   private unwatch: (() => void)[] = [];
 
-  constructor(root: HTMLElement, private readonly recorded?: Shown) {
+  /** `page`: text of the page before it shows anything. `recorded`: what it holds, if it is a recording. */
+  constructor(root: HTMLElement, private readonly page: string, private readonly recorded?: Shown) {
     this.shell = h('div', { class: 'shell', 'data-tab': 'scene' }, this.top(), this.left, this.middle(), this.right(), this.time.element, this.narrowTabs(), this.help);
     root.replaceChildren(this.shell);
     this.fillLeft();
@@ -86,7 +87,7 @@ export class App {
     const menu = h('div', { class: 'menu hidden' },
       this.menuEntry('camera', 'Picture (PNG)', () => void this.savePicture()),
       this.menuEntry('plot', 'Table of the plots (CSV)', () => this.saveTable()),
-      this.menuEntry('download', 'Recording (HTML)', () => void this.saveRecording()));
+      this.recorded ? '' : this.menuEntry('download', 'Recording (HTML)', () => this.saveRecording()));
     const save = h('button', { type: 'button', class: 'button', 'aria-label': 'Export', 'aria-expanded': 'false', onclick: () => toggle(save, menu) }, icon('download'), h('span', {}, 'Export'));
     const brand = h('div', { class: 'brand' });
     brand.innerHTML = '<svg viewBox="0 0 32 32" aria-hidden="true"><path d="M5 8h9l9 14" fill="none" stroke="#35c2a8" stroke-width="3"/><circle cx="5" cy="8" r="4" fill="#f0a13c"/><circle cx="14" cy="8" r="3" fill="#9aa7b4"/><circle cx="23" cy="23" r="5.4" fill="#4aa8ff"/></svg>';
@@ -160,7 +161,7 @@ export class App {
     this.name.textContent = shown?.title ?? '';
     document.title = shown ? `${shown.title} – mbcosim` : 'mbcosim';
     this.unwatch = session
-      ? [session.info.watch(() => this.updateState()), session.connected.watch(() => this.updateState()), session.gone.watch(() => this.updateState()), session.failure.watch(() => this.updateState())]
+      ? [session.info.watch(() => this.updateState()), session.lost.watch(() => this.updateState()), session.gone.watch(() => this.updateState()), session.failure.watch(() => this.updateState())]
       : [];
     this.updateState();
   }
@@ -174,7 +175,7 @@ export class App {
       this.banner.classList.add('hidden');
       return;
     }
-    const gone = session.gone.value, state = session.connected.value ? STATES[session.info.value.state] ?? 'unknown' : 'lost';
+    const gone = session.gone.value, lost = session.lost.value, state = lost ? 'lost' : STATES[session.info.value.state] ?? 'unknown';
     this.chip.className = `chip ${state}`;
     this.chip.textContent = gone ? 'gone' : state === 'lost' ? 'no connection' : state;
     const waits = session.info.value.waits.map((wait) => `waits ${wait.hasPeer ? 'for the peer of' : 'for a peer on'} port ${wait.port} since ${wait.seconds.toFixed(1)} s`);
@@ -183,7 +184,7 @@ export class App {
     this.banner.classList.toggle('bad', failure !== undefined || state === 'lost');
     if (failure) this.banner.replaceChildren(h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)),
       iconButton('close', 'Close', () => (session.failure.value = undefined), { class: 'icon-button small' }));
-    else this.banner.replaceChildren(h('div', { class: 'text' }, gone ? GONE : state === 'lost' ? 'The daemon does not answer; trying again.' : waits.join('\n')));
+    else this.banner.replaceChildren(h('div', { class: 'text' }, gone ? GONE : lost || waits.join('\n')));
   }
 
   private worst(): HTMLElement | string {
@@ -213,11 +214,9 @@ export class App {
     if (shown) download(this.fileName('csv'), new Blob([csv(shown.recording.samples, this.desk.plots.value)], { type: 'text/csv' }));
   }
 
-  private async saveRecording(): Promise<void> {
+  private saveRecording(): void {
     const shown = this.desk.shown.value;
-    if (!shown) return;
-    const page = this.recorded ? undefined : await (await fetch('/')).text();
-    if (page) download(this.fileName('html'), new Blob([recordingPage(page, shown)], { type: 'text/html' }));
+    if (shown) download(this.fileName('html'), new Blob([recordingPage(this.page, shown)], { type: 'text/html' }));
   }
 
   // ---- keys

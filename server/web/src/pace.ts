@@ -4,14 +4,9 @@
 const LONGEST = 0.1;
 
 export class Pace {
-  private origin = { wall: 0, time: 0 };
+  private origin: { wall: number; time: number };
 
-  constructor(private speed: number, wall: number, time: number) {
-    this.origin = { wall, time };
-  }
-
-  setSpeed(speed: number, wall: number, time: number): void {
-    this.speed = speed;
+  constructor(private readonly speed: number, wall: number, time: number) {
     this.origin = { wall, time };
   }
 

@@ -1,5 +1,5 @@
 /** A simulation on the screen: what is known of it, what was seen of it, and what can be done with it. */
-import { events, failureOf, simulations, telemetry, type Failure } from './api';
+import { events, failureOf, remedy, simulations, telemetry, type Failure } from './api';
 import { describe, eigenvectors, look, stateNames, told } from './questions';
 import { tell } from './events';
 import { duration } from './duration';
@@ -47,7 +47,8 @@ export interface LogEntry {
 const RATE = 120, BYTES = 8e6;
 const RETRY_MILLISECONDS = 1500;
 
-export type Playing = 'no' | 'paced' | 'fast';
+/** `until`: up to a time that was asked for. */
+export type Playing = 'no' | 'paced' | 'fast' | 'until';
 
 export class Session implements Shown {
   readonly recording = new Recording();
@@ -59,8 +60,8 @@ export class Session implements Shown {
   readonly steps = new Signal<StepRecord[]>([]);
   readonly log = new Signal<LogEntry[]>([]);
   readonly failure = new Signal<Failure | undefined>(undefined);
-  /** False while the daemon does not answer. */
-  readonly connected = new Signal(true);
+  /** Why nothing can be asked of the daemon at the moment; empty: it answers. */
+  readonly lost = new Signal('');
   /** The daemon answers and does not know the simulation any more. */
   readonly gone = new Signal(false);
 
@@ -72,10 +73,14 @@ export class Session implements Shown {
   private fast = new AbortController();
   /** Step of the last sample of the stream. */
   private streamed = -1;
-  private busy = false;
+  /** While a call advances, or what it came to is read. */
+  busy = false;
+  /** Number of what was wished for last: a run, steps, a pause. */
+  private wish = 0;
+  /** Ends with the last call that advances. */
+  private driven: Promise<void> = Promise.resolve();
   /** Steps that are asked for and not begun. */
   private owed = 0;
-  private stepping = false;
 
   private constructor(info: SimulationInfo, readonly model: Model, readonly geometry: Geometry) {
     this.info = new Signal(info);
@@ -190,7 +195,7 @@ export class Session implements Shown {
   }
 
   private takeBatch(batch: SubscribeReply, layout: Layout): void {
-    this.connected.value = true;
+    this.lost.value = '';
     for (const sample of batch.samples) {
       const step = Number(sample.step);
       // Samples of a stream come in order, unless somebody restored a state.
@@ -205,12 +210,12 @@ export class Session implements Shown {
       await pause(this.playing.value === 'no' ? 1000 : 400);
       try {
         this.info.value = await look(this.name, { timeoutMs: 5000, signal: this.ended.signal });
-        if (!this.connected.value || this.behind()) await this.read();
-        this.connected.value = true;
+        if (this.lost.value || this.behind()) await this.read();
+        this.lost.value = '';
       } catch (thrown) {
         const failure = failureOf(thrown);
         if (failure.cancelled) continue;
-        this.connected.value = false;
+        this.lost.value = failure.reason ? `${failure.message}. ${remedy(failure)}` : 'The daemon does not answer; trying again.';
         if (failure.reason === 'NO_SUCH_SIMULATION') {
           this.gone.value = true;
           this.note('the simulation is gone', 'error');
@@ -228,99 +233,117 @@ export class Session implements Shown {
 
   // ---- what is done
 
-  /** Steps that are asked for while another call advances are taken after it. */
+  /**
+   * Begins what was wished for last when the call that advances, if there is one, has ended. `wanted` tells whether nothing else was
+   * wished for since then.
+   */
+  private drive(work: (wanted: () => boolean) => Promise<void>): Promise<void> {
+    const wish = ++this.wish;
+    const wanted = () => this.wish === wish;
+    this.driven = this.driven.then(async () => {
+      if (!wanted()) return;
+      this.busy = true;
+      await this.attempt(() => work(wanted));
+      this.busy = false;
+    });
+    return this.driven;
+  }
+
+  /** Ends a run. Steps that are asked for while another call advances are taken after it. */
   async step(steps: number): Promise<void> {
+    const waiting = this.owed > 0;
+    if (this.playing.value !== 'no') this.pause();
     this.owed += steps;
-    if (this.stepping) return;
-    this.stepping = true;
-    while (this.owed > 0) {
-      if (this.busy) {
-        await pause(8);
-        continue;
+    if (waiting) return;
+    await this.drive(async (wanted) => {
+      while (this.owed > 0 && wanted()) {
+        const count = this.owed;
+        this.owed = 0;
+        await this.advance({ case: 'steps', value: BigInt(count) }, wanted);
       }
-      const count = this.owed;
-      this.owed = 0;
-      await this.advance({ case: 'steps', value: BigInt(count) });
-    }
-    this.stepping = false;
+    });
   }
 
+  /** Without regard to the wall clock, unless it is paused before. */
   runUntil(time: number): Promise<void> {
-    return this.advance({ case: 'untilTime', value: time });
+    return this.playFast('until', time);
   }
 
-  private async advance(how: { case: 'steps'; value: bigint } | { case: 'untilTime'; value: number }): Promise<void> {
-    if (this.busy) return;
-    this.busy = true;
+  private playFast(playing: Playing, end: number): Promise<void> {
+    this.pause();
+    this.playing.value = playing;
+    return this.drive((wanted) => this.run(end, wanted));
+  }
+
+  private async advance(how: { case: 'steps'; value: bigint } | { case: 'untilTime'; value: number }, wanted: () => boolean): Promise<void> {
     try {
       const begun = performance.now();
-      this.done(await simulations.step({ simulation: this.name, advance: how }), begun);
+      this.done(await simulations.step({ simulation: this.name, advance: how }), begun, wanted);
       if (this.playing.value === 'no') await this.read();  // telemetry need not have this step
     } catch (thrown) {
       this.tell(failureOf(thrown));
-      this.pause();
-    } finally {
-      this.busy = false;
+      if (wanted()) this.pause();
     }
   }
 
   play(): void {
     if (this.playing.value !== 'no') return;
     this.failure.value = undefined;
-    if (Number.isFinite(this.speed.value)) void this.playPaced();
-    else void this.playFast();
+    if (!Number.isFinite(this.speed.value)) return void this.playFast('fast', Number.isFinite(this.model.finalTime) ? this.model.finalTime : Number.MAX_VALUE);
+    this.pause();
+    this.playing.value = 'paced';
+    void this.drive((wanted) => this.pace(wanted));
   }
 
   pause(): void {
+    this.wish += 1;
     this.owed = 0;
-    if (this.playing.value === 'fast') this.fast.abort();
+    this.fast.abort();
     this.playing.value = 'no';
   }
 
   setSpeed(speed: number): void {
-    const again = this.playing.value !== 'no';
-    this.pause();
     this.speed.value = speed;
-    if (again) setTimeout(() => this.play(), 0);
+    if (this.playing.value === 'no' || this.playing.value === 'until') return;
+    this.pause();
+    this.play();
   }
 
-  private async playPaced(): Promise<void> {
-    this.playing.value = 'paced';
+  private async pace(wanted: () => boolean): Promise<void> {
     const pace = new Pace(this.speed.value, performance.now() / 1000, this.info.value.time);
-    while (this.playing.value === 'paced') {
+    while (wanted()) {
       const info = this.info.value;
       const target = pace.next(performance.now() / 1000, info.time, info.nextStepSize || this.model.step);
       if (target === undefined) await pause(8);
-      else await this.runUntil(target);
-      if (this.info.value.state === SimulationState.FINISHED) this.pause();
+      else await this.advance({ case: 'untilTime', value: target }, wanted);
+      if (wanted() && this.info.value.state === SimulationState.FINISHED) this.pause();
     }
   }
 
-  private async playFast(): Promise<void> {
-    this.playing.value = 'fast';
+  private async run(end: number, wanted: () => boolean): Promise<void> {
     this.fast = new AbortController();
-    const end = Number.isFinite(this.model.finalTime) ? this.model.finalTime : Number.MAX_VALUE, begun = performance.now();
+    const begun = performance.now();
     try {
       const run = simulations.run(
         { step: { simulation: this.name, advance: { case: 'untilTime', value: end } }, progressInterval: duration(0.2) },
         { signal: this.fast.signal },
       );
-      for await (const reply of run) if (reply.content.case === 'done') this.done(reply.content.value, begun);
+      for await (const reply of run) if (reply.content.case === 'done') this.done(reply.content.value, begun, wanted);
     } catch (thrown) {
       const failure = failureOf(thrown);
       if (!failure.cancelled) this.tell(failure);
     }
-    if (this.playing.value === 'fast') this.playing.value = 'no';
+    if (wanted()) this.pause();
     await this.read();
   }
 
   /** `begun`: when the page asked, in milliseconds. */
-  private done(reply: StepReply, begun: number): void {
+  private done(reply: StepReply, begun: number, wanted: () => boolean): void {
     const state = reply.outcome === StepOutcome.FINISHED ? SimulationState.FINISHED : SimulationState.READY;
     this.info.value = { ...this.info.value, state, step: reply.step, time: reply.time };
     if (reply.stepsDone > 0n) this.keep(reply, (performance.now() - begun) / 1000);
     if (reply.outcome === StepOutcome.ACCEPTED || reply.outcome === StepOutcome.INTERRUPTED) return;
-    this.pause();
+    if (wanted()) this.pause();
     if (reply.outcome === StepOutcome.FINISHED) return;
     this.failure.value = {
       message: reply.failure?.message ?? 'the step failed',
@@ -364,6 +387,7 @@ export class Session implements Shown {
 
   async restore(snapshot: Snapshot): Promise<void> {
     this.pause();
+    await this.driven;
     await this.attempt(async () => {
       this.info.value = told((await simulations.restoreSnapshot({ simulation: this.name, snapshot: snapshot.name })).simulation);
       this.failure.value = undefined;

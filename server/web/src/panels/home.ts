@@ -1,5 +1,5 @@
 /** The list of simulations, and where a deck is dropped. */
-import { failureOf, loadDeck, simulations, type Failure } from '../api';
+import { failureOf, loadDeck, remedy, simulations, type Failure } from '../api';
 import type { Desk } from '../desk';
 import { h, icon, iconButton } from '../dom';
 import { number } from '../format';
@@ -99,7 +99,7 @@ export class Home {
 
   tell(failure: Failure, kind = '', files: readonly NamedFile[] = []): void {
     this.message.dataset.kind = kind;
-    const hint = failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started: it has the token.' : '';
+    const hint = remedy(failure);
     if (kind !== 'connection' || !this.desk.shown.value) this.welcome.classList.remove('hidden');
     const back = h('button', { type: 'button', class: 'button', onclick: () => this.welcome.classList.add('hidden') }, 'Back to the simulation');
     this.message.replaceChildren(

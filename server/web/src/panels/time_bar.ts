@@ -48,9 +48,7 @@ export class TimeBar {
 
   step(count: number): void {
     this.goLive();
-    const session = this.desk.session;
-    if (session?.playing.value !== 'no') session?.pause();
-    void session?.step(count);
+    void this.desk.session?.step(count);
   }
 
   /** Looks one recorded sample back or on. */
@@ -71,7 +69,6 @@ export class TimeBar {
     const time = this.until.valueAsNumber;
     if (!Number.isFinite(time)) return this.until.focus();
     this.goLive();
-    this.desk.session?.pause();
     void this.desk.session?.runUntil(time);
   }
 
