@@ -9,6 +9,7 @@
 #include "cli/shell.h"
 #include "input/suggest.h"
 #include "input/symbol_values.h"
+#include "options/address_checks.h"
 #include "options/number_checks.h"
 #include "reduction/job.h"
 
@@ -240,7 +241,8 @@ void OtherCommands::add(CLI::App& app, int& exit_code) {
       "view", "Show a deck in a browser: starts a daemon of its own and prints the address");
   view_app->add_option("deck", deck, "Main file of the deck")->required();
   view_app->add_option("--http", http, "HOST:PORT of the page; port 0: any that is free")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(mbcosim::server::AddressCheck::of_host());
   view_app->callback([this, &exit_code] { exit_code = view(deck, http); });
 
   CLI::App* keywords_app = app.add_subcommand(

@@ -351,8 +351,6 @@ void Daemon::check_listener(const std::string& address) const {
     remove_stale_socket(address.substr(kUnix.size()), SOCK_STREAM);
     return;
   }
-  if (address.rfind(':') == std::string::npos)
-    throw std::runtime_error("listener \"" + address + "\" is neither unix:PATH nor HOST:PORT");
   if (config_.insecure) return;
   const bool tls = !config_.tls_certificate.empty();
   const bool identified = !config_.tls_client_ca.empty() || !config_.tokens_file.empty();

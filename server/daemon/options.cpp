@@ -12,6 +12,7 @@
 #include "daemon/environment.h"
 #include "files/default_socket.h"
 #include "input/suggest.h"
+#include "options/address_checks.h"
 #include "options/number_checks.h"
 #include "rpc/auth.h"
 
@@ -208,7 +209,8 @@ Invocation read_options(int argc, char** argv) {
   double checkpoint_interval = std::chrono::duration<double>(config.checkpoint_interval).count();
 
   app.add_option("--listen", config.listen,
-                 "Addresses: unix:PATH or HOST:PORT; default: " + default_socket());
+                 "Addresses: unix:PATH or HOST:PORT; default: " + default_socket())
+      ->check(AddressCheck::of_host_or_file());
   app.add_option("--model-root", config.model_root, "Folder of decks that clients may name")
       ->check(CLI::ExistingDirectory);
   app.add_option("--state-dir", config.state_dir,
@@ -245,12 +247,15 @@ Invocation read_options(int argc, char** argv) {
          "step than there are cores")
       ->capture_default_str()
       ->check(NumberCheck::within(1, 1024));
-  app.add_option("--metrics", config.metrics, "HOST:PORT of Prometheus metrics");
+  app.add_option("--metrics", config.metrics, "HOST:PORT of Prometheus metrics")
+      ->check(AddressCheck::of_host());
   app.add_option("--http", config.http,
-                 "HOST:PORT of the page, of calls over HTTP (Connect, gRPC-Web) and of /metrics");
+                 "HOST:PORT of the page, of calls over HTTP (Connect, gRPC-Web) and of /metrics")
+      ->check(AddressCheck::of_host());
   app.add_option("--http-origin", config.http_origins,
                  "Web site under which a proxy shows this daemon: https://HOST")
-      ->group("Security");
+      ->group("Security")
+      ->needs("--http");
   app.add_option("--shutdown-grace", grace, "Seconds that open calls get on SIGTERM")
       ->capture_default_str()
       ->check(NumberCheck::within(0, 86400));

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "mbdyn/link.h"
+#include "options/address_checks.h"
 #include "options/number_checks.h"
 #include "peer/options.h"
 #include "threads/interrupt.h"
@@ -35,15 +36,12 @@ ChannelAddress address_of(const std::string& text, bool create) {
     address.path = text.substr(5);
     return address;
   }
-  const std::size_t colon = text.rfind(':');
-  char* end = nullptr;
-  const std::string port = colon == std::string::npos ? "" : text.substr(colon + 1);
-  const long number = std::strtol(port.c_str(), &end, 10);
-  if (port.empty() || *end != 0 || number < 1 || number > 65535)
+  if (!server::is_host_and_port(text, 1))
     throw std::runtime_error("an address is unix:PATH or HOST:PORT, got \"" + text + "\"");
+  const std::size_t colon = text.rfind(':');
   address.kind = ChannelAddress::Kind::tcp;
   address.host = text.substr(0, colon);
-  address.port = static_cast<int>(number);
+  address.port = std::stoi(text.substr(colon + 1));
   return address;
 }
 

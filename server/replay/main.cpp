@@ -1,9 +1,13 @@
 /// mbcosim-replay: `mbcosim replay` hands over to it.
 #include <grpcpp/server_builder.h>
+#include <sys/socket.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "daemon/listener.h"
+#include "host/socket_file.h"
+#include "options/address_checks.h"
 #include "options/number_checks.h"
 #include "replay/model_replay.h"
 #include "replay/record_file.h"
@@ -31,19 +35,41 @@ int run_model(const std::string& deck, const std::vector<v1::RecordEntry>& recor
                                       std::to_string(outcome.exchanges) + " exchanges");
 }
 
+/// Nothing is wrong with the record.
+class CannotServe : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws CannotServe when the address cannot be had.
+server::Listener listener_at(const std::string& address) try {
+  if (address.compare(0, server::kUnix.size(), server::kUnix) == 0)
+    server::remove_stale_socket(address.substr(server::kUnix.size()), SOCK_STREAM);
+  return server::Listener(address);
+} catch (const std::runtime_error& error) {
+  throw CannotServe(error.what());
+}
+
 int run_server(const std::string& address, const std::vector<v1::RecordEntry>& record,
                double tolerance) {
   RecordedCoupling coupling(record, tolerance);
+  if (coupling.sessions() == 0)
+    throw std::runtime_error("nobody took part while it was recorded: there is nothing to serve");
+  server::Listener listener = listener_at(address);
   RecordedSimulation simulation(record.front().header());
   grpc::ServerBuilder builder;
-  builder.AddListeningPort(address, grpc::InsecureServerCredentials());
+  auto acceptor = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      grpc::InsecureServerCredentials());
   builder.RegisterService(&coupling);
   builder.RegisterService(&simulation);
   const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
-  if (!server) throw std::runtime_error("cannot listen on \"" + address + "\"");
-  std::printf("waiting for clients on %s\n", address.c_str());
+  if (!server) throw CannotServe("the server cannot start");
+  listener.start(std::move(acceptor));
+  std::printf("waiting for clients on %s\n", listener.bound().c_str());
   std::fflush(stdout);
   coupling.wait();
+  listener.stop();
   server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(1));
   return tell(coupling.difference(), std::to_string(coupling.exchanges()) + " exchanges");
 }
@@ -68,13 +94,15 @@ int main(int argc, char** argv) {
   double tolerance = 0;
   app.add_option("record", record, "The record")->required();
   app.add_option("deck", deck, "Main file of the deck: the model is run against the record");
-  app.add_option(
-      "--serve", address,
-      "unix:PATH or HOST:PORT of this machine: the recorded server is played to clients");
+  app.add_option("--serve", address,
+                 "unix:PATH or HOST:PORT of this machine: the recorded server is played to clients")
+      ->check(mbcosim::server::AddressCheck::of_host_or_file());
   app.add_option("--tolerance", tolerance,
                  "Relative difference of numbers that is let pass; default: none")
       ->check(mbcosim::server::NumberCheck::at_least(0));
-  app.footer("Exit code: 0 the same, 1 different, 2 record or deck refused, 4 wrong usage.");
+  app.footer(
+      "Exit code: 0 the same, 1 different, 2 record or deck refused, 4 wrong usage, or the address "
+      "cannot be had.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -91,6 +119,8 @@ int main(int argc, char** argv) {
     const auto entries = read_record(record);
     return address.empty() ? run_model(deck, entries, tolerance)
                            : run_server(address, entries, tolerance);
+  } catch (const CannotServe& error) {
+    return refuse(error.what(), kUsage);
   } catch (const std::exception& error) {
     return refuse(error.what(), kRefused);
   }

@@ -85,6 +85,11 @@ void RecordedCoupling::note(const std::string& port, const std::string& what) {
   changed_.notify_all();
 }
 
+std::size_t RecordedCoupling::sessions() const {
+  const server::Guard guard(mutex_);
+  return left_;
+}
+
 void RecordedCoupling::wait() {
   const server::Guard guard(mutex_);
   while (left_ > 0 && difference_.empty()) changed_.wait(mutex_);

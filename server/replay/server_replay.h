@@ -23,6 +23,7 @@ class RecordedCoupling final : public v1::Coupling::Service {
       grpc::ServerContext* context,
       grpc::ServerReaderWriter<v1::ServerMessage, v1::PeerMessage>* stream) override;
 
+  std::size_t sessions() const;  ///< not yet played
   /// Waits until the sessions of all ports were played, or the first difference.
   void wait();
   std::string difference() const;  ///< the first one; empty: none

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "client/mbcosim_client.h"
+#include "options/address_checks.h"
 #include "view/private_daemon.h"
 
 namespace {
@@ -47,7 +48,8 @@ int main(int argc, char** argv) {
   std::string deck, http = "127.0.0.1:0";
   app.add_option("deck", deck, "Main file of the deck")->required();
   app.add_option("--http", http, "HOST:PORT of the page; port 0: any that is free")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(mbcosim::server::AddressCheck::of_host());
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

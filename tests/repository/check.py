@@ -48,7 +48,7 @@ ARROWS = {
     "server/client": {"mbcosim", "shared_memory", "threads", "wire", "host"},
     "server/shared_memory": {"threads", "host"},
     "server/http": {"service", "rpc", "threads", "wire", "mbcosim"},
-    "server/view": {"client"},
+    "server/view": {"client", "options"},
     "server/reach": {"options", "client", "files"},
     "server/sessions": {"reach", "client", "durable"},
     "server/daemon": {"options", "files", "input", "host", "service", "rpc", "http", "shared_memory", "threads", "wire", "mbcosim", "grpc"},

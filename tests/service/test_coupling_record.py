@@ -1,5 +1,6 @@
 """Records of ports, and their replay against a model and against a client."""
 import os
+import socket
 import subprocess
 
 import numpy as np
@@ -106,6 +107,32 @@ def test_a_recorded_server_checks_a_client(server, tmp_path):
             peer.close()
         text = process.stdout.read()
         assert ("same: " in text) if code == 0 else ('port "spring": forces[1]' in text)
+
+
+def test_an_address_that_cannot_be_had(daemon, server, tmp_path):
+    """The daemon that listens there is not disturbed; another port of the number modulo 65536 is not taken instead."""
+    rec, _ = record(server, tmp_path)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        there = f"127.0.0.1:{taken.getsockname()[1]}"
+        for address, told in ((daemon.address, "another server listens on"), (there, f"cannot listen on {there}: Address already in use"),
+                              ("127.0.0.1:999999", "with a port from 0 to 65535")):
+            result = replay(rec, "--serve", address)
+            assert result.returncode == 4 and told in result.stderr and result.stdout == "", (result.stdout, result.stderr)
+    with daemon.connect() as again:
+        assert again.info().version
+    (tmp_path / "a file").write_text("of somebody")
+    result = replay(rec, "--serve", f"unix:{tmp_path}/a file")
+    assert result.returncode == 4 and "a file exists and is not a socket" in result.stderr
+    assert (tmp_path / "a file").read_text() == "of somebody"
+
+
+def test_a_record_in_which_nobody_took_part_is_not_served(server, tmp_path):
+    with server.load_text(DECK, ports=PORT, record=True) as simulation:
+        (tmp_path / "rec").write_bytes(simulation.record())
+    result = replay(tmp_path / "rec", "--serve", f"unix:{tmp_path}/s")
+    assert result.returncode == 2 and "nobody took part while it was recorded" in result.stderr and result.stdout == ""
 
 
 def test_a_simulation_without_a_record_says_so(server):

@@ -394,7 +394,12 @@ def test_a_proxy_in_front_is_named_by_its_origin(start_daemon):
 
 @pytest.mark.parametrize("options, complaint", [
     (["--http", "0.0.0.0:0"], "an address other than loopback needs --insecure"),
-    (["--http", "8080"], "is not HOST:PORT"),
+    (["--http", "8080"], '--http: expected HOST:PORT with a port from 0 to 65535, got "8080"'),
+    (["--metrics", "127.0.0.1:65536"], '--metrics: expected HOST:PORT with a port from 0 to 65535, got "127.0.0.1:65536"'),
+    (["--listen", "127.0.0.1:999999"], '--listen: expected unix:PATH or HOST:PORT with a port from 0 to 65535, got "127.0.0.1:999999"'),
+    (["--listen", "localhost:"], 'from 0 to 65535, got "localhost:"'),
+    (["--listen", "unix:"], 'from 0 to 65535, got "unix:"'),
+    (["--http-origin", "https://sim.example"], "--http-origin requires --http"),
     (["--http", "127.0.0.1:0", "--http-origin", "sim.example"], "is not of the form https://HOST"),
 ])
 def test_bad_options_are_refused_at_start(options, complaint, tmp_path):
