@@ -18,6 +18,7 @@ const PROTOCOL = { lowest: 2, highest: 2 };
 const FILES = ["simulations", "telemetry", "geometry", "coupling"].map((name) => `mbcosim/v1/${name}.proto`);
 const LONGEST = 1e9; // seconds of a timeout
 const USUAL = 30; // seconds that a call may take which advances nothing
+const CONNECTING = 10; // seconds until a server that accepts a connection has to say that it is one
 
 // Ping after 10 s of silence, dead after 10 more: a server that is stopped is noticed.
 const CHANNEL = {
@@ -26,8 +27,10 @@ const CHANNEL = {
   "grpc.keepalive_permit_without_calls": 1,
   "grpc.initial_reconnect_backoff_ms": 200,
   "grpc.max_reconnect_backoff_ms": 2_000,
+  "grpc.max_receive_message_length": -1, // the server's own bound holds
 };
 
+/** Messages, enums and services of the contract; their descriptors are in `type`. */
 const { v1 } = grpc.loadPackageDefinition(
   loadSync(FILES, { includeDirs: [PROTOS], keepCase: true, longs: Number, enums: String, defaults: true, oneofs: true }),
 ).mbcosim;
@@ -63,12 +66,32 @@ function whole(count, name) {
   throw new RangeError(`${name}: must be a whole number, got ${count}`);
 }
 
-/** Protobuf would leave out what it does not know. */
-function checked(choices) {
-  const known = v1.CreateOptions.type.field.map(({ name }) => name);
-  const strange = Object.keys(choices).find((name) => !known.includes(name));
-  if (strange !== undefined) throw new RangeError(`no choice is called "${strange}"; choose from ${known.join(", ")}`);
-  return choices;
+/** Protobuf would leave out fields and names of enums that it does not know. `type`: descriptor of the message. */
+function checked(message, type) {
+  for (const [name, value] of Object.entries(message)) {
+    const field = type.field.find((field) => field.name === name);
+    if (!field) throw new RangeError(`${type.name}: no field is called "${name}"; choose from ${type.field.map((field) => field.name).join(", ")}`);
+    const definition = v1[field.typeName.split(".").pop()]?.type; // nothing: of Protobuf itself, a map's entry, a plain number or text
+    for (const each of definition ? [value].flat() : []) {
+      if (each === undefined || each === null) continue;
+      if (field.type === "TYPE_MESSAGE") checked(each, definition);
+      else if (!definition.value.some(({ name, number }) => name === each || number === each))
+        throw new RangeError(`${name}: no choice is called ${JSON.stringify(each)}; choose from ${definition.value.map(({ name }) => name).join(", ")}`);
+    }
+  }
+  return message;
+}
+
+/** Waits, not for ever, while a connection is made. grpc-js waits as long as a server accepts connections and says nothing. */
+async function reach(client) {
+  const channel = client.getChannel(), latest = Date.now() + 1000 * CONNECTING, { IDLE, CONNECTING: underway } = grpc.connectivityState;
+  for (let state; [IDLE, underway].includes((state = channel.getConnectivityState(true))); ) {
+    if (Date.now() >= latest) {
+      const details = `the server at ${channel.getTarget()} accepts connections and does not answer`;
+      throw Object.assign(new Error(`${grpc.status.UNAVAILABLE} UNAVAILABLE: ${details}`), { code: grpc.status.UNAVAILABLE, details, metadata: new grpc.Metadata() });
+    }
+    await new Promise((resolve) => channel.watchConnectivityState(state, latest, () => resolve()));
+  }
 }
 
 /** Who calls, and the simulation that it is about, by which a proxy finds the daemon that has it. */
@@ -81,8 +104,11 @@ export function about(server, simulation) {
 
 /** One message each way: the reply. `timeout`: seconds; undefined: as long as the server lives. */
 export async function call(server, client, method, request, timeout) {
+  const choices = options(timeout);
+  checked(request, client[method].requestType.type);
+  await reach(client);
   return new Promise((resolve, reject) =>
-    client[method](request, about(server, request.simulation), options(timeout), (error, reply) => (error ? reject(error) : resolve(reply))),
+    client[method](request, about(server, request.simulation), choices, (error, reply) => (error ? reject(error) : resolve(reply))),
   );
 }
 
@@ -102,20 +128,29 @@ async function repeated(server, method, request, timeout) {
   }
 }
 
-/** A series of messages, for `for await`. */
-export function series(server, client, method, request, timeout) {
-  return client[method](request, about(server, request.simulation), options(timeout));
+/** A series of messages, for `for await`; who leaves that ends the call. */
+export async function* series(server, client, method, request, timeout) {
+  const choices = options(timeout);
+  checked(request, client[method].requestType.type);
+  await reach(client);
+  const stream = client[method](request, about(server, request.simulation), choices);
+  try {
+    yield* stream;
+  } finally {
+    stream.on("error", () => {}); // tells that it is cancelled
+    stream.cancel();
+  }
 }
 
 /** Creates a simulation from a deck without includes. `choices`: CreateOptions. */
 export async function load(server, deck, choices = {}) {
   const name = basename(deck);
-  return create(server, { header: { bundle_main_file: name, options: { protocol: PROTOCOL, ...checked(choices) } }, files: [{ path: name, data: await readFile(deck) }] });
+  return create(server, { header: { bundle_main_file: name, options: { protocol: PROTOCOL, ...choices } }, files: [{ path: name, data: await readFile(deck) }] });
 }
 
 /** Creates a simulation from a deck given as text. */
 export async function loadText(server, text, choices = {}) {
-  return create(server, { header: { bundle_main_file: "deck", options: { protocol: PROTOCOL, ...checked(choices) } }, files: [{ path: "deck", data: Buffer.from(text) }] });
+  return create(server, { header: { bundle_main_file: "deck", options: { protocol: PROTOCOL, ...choices } }, files: [{ path: "deck", data: Buffer.from(text) }] });
 }
 
 async function create(server, upload) {
@@ -183,7 +218,9 @@ export class Simulation {
 
   /** An open stream for stepping with the least delay: `await stepper.step()`, at last `stepper.close()`. */
   async stepper(outputs = []) {
-    return new Stepper(this.server, this.name, await this.handles(outputs));
+    const handles = await this.handles(outputs);
+    await reach(this.server.simulations);
+    return new Stepper(this.server, this.name, handles);
   }
 
   /** What a viewer needs, message by message. */

@@ -1,8 +1,10 @@
 /** Against the daemon at $MBCOSIM_ADDRESS. */
 import assert from "node:assert/strict";
+import { once } from "node:events";
+import { createServer } from "node:net";
 import { after, test } from "node:test";
 
-import { call, connect, loadText } from "../mbcosim.mjs";
+import { call, connect, loadText, series } from "../mbcosim.mjs";
 
 const server = connect(process.env.MBCOSIM_ADDRESS);
 after(() => server.close());
@@ -62,7 +64,11 @@ test("what is no timeout, no number of steps and no choice is refused before it 
     await assert.rejects(simulation.step(steps), /^RangeError: steps: must be a whole number/);
     await assert.rejects(stepper.step(steps), /^RangeError: steps: must be a whole number/);
   }
-  await assert.rejects(loadText(server, body, { leese: { seconds: 5 } }), /^RangeError: no choice is called "leese"; choose from .*lease/);
+  const refused = (choices, told) => assert.rejects(loadText(server, body, choices), told);
+  await refused({ leese: { seconds: 5 } }, /^RangeError: CreateOptions: no field is called "leese"; choose from .*lease/);
+  await refused({ durability: "journal" }, /^RangeError: durability: no choice is called "journal"; choose from .*DURABILITY_JOURNAL/);
+  await refused({ ports: [{ name: "tip", kind: "structural" }] }, /^RangeError: kind: no choice is called "structural"; choose from .*PORT_KIND_STRUCTURAL/);
+  await refused({ ports: [{ name: "tip", nodes: [1] }] }, /^RangeError: .*no field is called "nodes"; choose from .*node_labels/);
   assert.equal((await stepper.step()).step, 1);
   stepper.close();
   await simulation.delete();
@@ -107,6 +113,29 @@ test("units that are declared are named, and a peer counts in its own", async ()
   await simulation.delete();
 });
 
+test("a series that is left early ends its call", async () => {
+  const simulation = await loadText(server, body), { telemetry } = server, subscribe = telemetry.Subscribe;
+  let stream, ended;
+  telemetry.Subscribe = Object.assign((...given) => (stream = subscribe.apply(telemetry, given)), subscribe);
+  for await (const _ of series(server, telemetry, "Subscribe", { simulation: simulation.name })) {
+    ended = new Promise((resolve) => stream.on("status", resolve));
+    break;
+  }
+  delete telemetry.Subscribe;
+  assert.equal((await ended).code, 1); // CANCELLED
+  await simulation.delete();
+});
+
+test("a server that accepts connections and says nothing is not waited for, for ever", async () => {
+  const visitors = [], silent = createServer((visitor) => visitors.push(visitor)).listen(0, "127.0.0.1");
+  await once(silent, "listening");
+  const other = connect(`127.0.0.1:${silent.address().port}`);
+  await assert.rejects(loadText(other, body), /UNAVAILABLE: the server at .* accepts connections and does not answer/);
+  other.close();
+  silent.close();
+  for (const visitor of visitors) visitor.destroy();
+});
+
 test("a model of 10 000 bodies passes the client's default limits", async () => {
   const n = 10_000;
   const simulation = await loadText(server, chain(n));
@@ -128,6 +157,8 @@ test("a model of 10 000 bodies passes the client's default limits", async () => 
     assert.ok(page.a === null || page.a.sparse);
   }
   assert.ok(unknowns >= 12 * n && entries > unknowns);
-  assert.equal((await simulation.step()).step, 1);
+  const names = Array.from({ length: n }, (_, k) => ["X", "R", "XP", "Omega"].map((name) => `node.structural.${k + 1}.${name}`)).flat();
+  const { step, outputs } = await simulation.step(1, names); // the reply that tells their handles has more than 4 MB
+  assert.deepEqual([step, outputs.length], [1, 18 * n]);
   await simulation.delete();
 });
