@@ -83,10 +83,19 @@ int feed(const std::vector<std::string>& command, const std::string& script) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 
-/// A text as gnuplot and Python read it.
-std::string quoted(const std::string& text) {
+/// A text as gnuplot reads it, on one line.
+std::string gnuplot_text(const std::string& text) {
   std::string result = "'";
-  for (const char c : text) result += c == '\'' || c == '\\' || c == '\n' ? ' ' : c;
+  for (const char c : text) result += c == '\'' ? "''" : std::string(1, c == '\n' ? ' ' : c);
+  return result + "'";
+}
+
+std::string python_text(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) {
+    if (c == '\'' || c == '\\') result += '\\';
+    result += c == '\n' ? "\\n" : std::string(1, c);
+  }
   return result + "'";
 }
 
@@ -106,11 +115,12 @@ std::string gnuplot_script(const std::vector<Curve>& curves, const std::string& 
   const std::string terminal = ending == ".svg"   ? "svg size 900,500"
                                : ending == ".pdf" ? "pdfcairo"
                                                   : "pngcairo size 900,500";
-  std::string script = "set terminal " + terminal + " noenhanced\nset output " + quoted(path) +
-                       "\nset grid\nset xlabel " + quoted(x_name) + "\nset title " + quoted(title) +
-                       "\nplot ";
+  std::string script = "set terminal " + terminal + " noenhanced\nset output " +
+                       gnuplot_text(path) + "\nset grid\nset xlabel " + gnuplot_text(x_name) +
+                       "\nset title " + gnuplot_text(title) + "\nplot ";
   for (std::size_t k = 0; k < curves.size(); ++k)
-    script += (k ? ", " : "") + std::string("'-' with lines lw 2 title ") + quoted(curves[k].name);
+    script +=
+        (k ? ", " : "") + std::string("'-' with lines lw 2 title ") + gnuplot_text(curves[k].name);
   script += "\n";
   for (const Curve& curve : curves) script += pairs(curve, " ", "\n") + "e\n";
   return script;
@@ -124,9 +134,10 @@ std::string python_script(const std::vector<Curve>& curves, const std::string& x
       "figure, axes = pyplot.subplots(figsize=(9, 5), layout='constrained')\n";
   for (const Curve& curve : curves)
     script += "axes.plot(*zip(" + pairs(curve, ",", "),(").insert(0, "(") +
-              "nan,nan)), label=" + quoted(curve.name) + ")\n";
-  return script + "axes.set(xlabel=" + quoted(x_name) + ", title=" + quoted(title) +
-         ")\naxes.grid(alpha=0.3)\naxes.legend()\nfigure.savefig(" + quoted(path) + ", dpi=100)\n";
+              "nan,nan)), label=" + python_text(curve.name) + ")\n";
+  return script + "axes.set(xlabel=" + python_text(x_name) + ", title=" + python_text(title) +
+         ")\naxes.grid(alpha=0.3)\naxes.legend()\nfigure.savefig(" + python_text(path) +
+         ", dpi=100)\n";
 }
 
 }  // namespace

@@ -18,6 +18,10 @@ Error table_error(ErrorKind kind, std::string message) {
 }
 
 Error cannot_read(const std::string& path, const std::string& prefix) {
+  if (std::filesystem::exists(prefix + ".nc"))
+    return table_error(ErrorKind::io, "there is no \"" + path + "\", but \"" + prefix +
+                                          ".nc\": text is read here, which `mbcosim run DECK -o " +
+                                          prefix + "` writes without `--format netcdf`");
   return table_error(ErrorKind::io, "cannot read \"" + path + "\": " + std::strerror(errno) +
                                         "; `mbcosim run DECK -o " + prefix +
                                         "` writes the results of a deck");

@@ -7,6 +7,7 @@
 
 #include "coupling/port_numbers.h"
 #include "simulation/formula.h"
+#include "wire/convert.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server {
@@ -135,7 +136,7 @@ void PortModel::make_reference(const Simulation& simulation, int label) {
 
 PortModel::PortModel(const StructuralPort& port, const Simulation& simulation)
     : model_(&simulation.model()) {
-  layout_.set_name(port.name);
+  layout_.set_name(utf8(port.name));
   layout_.set_kind(v1::PORT_KIND_STRUCTURAL);
   layout_.set_from_deck(true);
   layout_.set_reference_loads(port.use_reference_loads);
@@ -152,7 +153,7 @@ PortModel::PortModel(const StreamInput& stream, const Simulation& simulation)
   definition.set_name(stream.name);
   definition.set_kind(v1::PORT_KIND_SIGNAL);
   definition.add_input_variables("stream." + stream.name);
-  layout_.set_name(stream.name);
+  layout_.set_name(utf8(stream.name));
   layout_.set_kind(v1::PORT_KIND_SIGNAL);
   layout_.set_from_deck(true);
   layout_.set_optional(true);
@@ -236,7 +237,7 @@ bool PortModel::offers_accelerations() const {
 PortModel::PortModel(const PortElementRef& element, const Simulation& simulation)
     : element_(element), model_(&simulation.model()) {
   const ElementPort& port = element.port();
-  layout_.set_name(port.name);
+  layout_.set_name(utf8(port.name));
   layout_.set_from_deck(port.from_deck);
   layout_.set_default_mode(to_mode(port.coupling));
   if (port.every > 0) layout_.set_default_every(port.every);

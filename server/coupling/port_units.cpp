@@ -14,14 +14,14 @@ std::string name_in(const UnitSystem* units, const SignalUnit& signal) {
 }  // namespace
 
 void PortModel::add_output(const std::string& name, SignalUnit unit) {
-  layout_.add_output_names(name);
-  layout_.add_output_units(unit.is_si ? name_in(units_, unit) : unit.text);
+  layout_.add_output_names(utf8(name));
+  layout_.add_output_units(utf8(unit.is_si ? name_in(units_, unit) : unit.text));
   output_units_.push_back(std::move(unit));
 }
 
 void PortModel::add_input(const std::string& name, SignalUnit unit) {
-  layout_.add_input_names(name);
-  layout_.add_input_units(name_in(units_, unit));
+  layout_.add_input_names(utf8(name));
+  layout_.add_input_units(utf8(name_in(units_, unit)));
   input_units_.push_back(std::move(unit));
 }
 

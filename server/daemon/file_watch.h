@@ -24,13 +24,13 @@ class FileWatch {
   struct Look {
     ino_t inode = 0;
     off_t size = 0;
-    std::int64_t seconds = 0, nanoseconds = 0;
+    std::int64_t seconds = 0, nanoseconds = 0;  ///< of its last change, that of rights included
     bool operator==(const Look&) const = default;
   };
   Look look() const {
     struct stat info {};
     if (::stat(path_.c_str(), &info) != 0) return {};
-    return {info.st_ino, info.st_size, info.st_mtim.tv_sec, info.st_mtim.tv_nsec};
+    return {info.st_ino, info.st_size, info.st_ctim.tv_sec, info.st_ctim.tv_nsec};
   }
 
   const std::string path_;

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <sstream>
 
 #include "daemon/environment.h"
 #include "files/default_socket.h"
@@ -22,11 +23,12 @@ namespace {
 constexpr std::int64_t kLongestTime = 1'000'000'000;  ///< [s], some 30 years
 
 void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
+  const auto add_checked = [&](const char* name, auto& value, const char* help,
+                               const NumberCheck& check) {
+    app.add_option(name, value, help)->group("Limits")->capture_default_str()->check(check);
+  };
   const auto add = [&](const char* name, auto& value, const char* help) {
-    app.add_option(name, value, help)
-        ->group("Limits")
-        ->capture_default_str()
-        ->check(NumberCheck::above(0));
+    add_checked(name, value, help, NumberCheck::above(0));
   };
   add("--limit-sessions", limits.sessions, "Simulations alive at once");
   add("--limit-snapshots", limits.snapshots, "Snapshots of one simulation");
@@ -39,9 +41,11 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   add("--limit-include-count", limits.engine.include_count, "Included files of one deck");
   add("--limit-statements", limits.engine.statements, "Statements of one deck, every pass counted");
   add("--limit-loop-iterations", limits.engine.loop_iterations, "Passes of one loop of a deck");
-  add("--limit-expression-depth", limits.engine.expression_depth, "Nested parts of an expression");
-  add("--limit-nesting-depth", limits.engine.nesting_depth,
-      "Nested `for` and `if`, nested brackets of a statement");
+  const NumberCheck in_the_stack = NumberCheck::within(1, 10000);
+  add_checked("--limit-expression-depth", limits.engine.expression_depth,
+              "Nested parts of an expression", in_the_stack);
+  add_checked("--limit-nesting-depth", limits.engine.nesting_depth,
+              "Nested `for` and `if`, nested brackets of a statement", in_the_stack);
   add("--limit-unknowns", limits.engine.unknowns, "Unknowns of one model");
   add("--limit-message-bytes", limits.message_bytes, "Bytes of one message");
   app.add_option(
@@ -71,7 +75,8 @@ void add_limits(CLI::App& app, ServiceLimits& limits, std::int64_t& lease) {
   add("--limit-connection-calls", limits.connection_calls,
       "Calls and streams at once over one connection");
   add("--limit-shared-memory-peers", limits.shared_memory_peers, "Peers over shared memory");
-  add("--limit-http-connections", limits.http_connections, "Connections served at once over HTTP");
+  add_checked("--limit-http-connections", limits.http_connections,
+              "Connections served at once over HTTP, a thread each", NumberCheck::within(1, 10000));
   add("--limit-http-streams", limits.http_streams, "Streams of one identity over HTTP");
   add("--limit-deck-sockets", limits.deck_sockets, "Sockets that decks name, of all simulations");
   add("--limit-telemetry-samples", limits.telemetry_samples,
@@ -167,6 +172,15 @@ void add_check(CLI::App& app, HealthCheck& check) {
       ->capture_default_str()
       ->check(NumberCheck::within(1, 3600))
       ->needs(address);
+}
+
+/// As a file of options; those without a value as comments.
+void print_options(const CLI::App& app) {
+  std::istringstream lines(app.config_to_str(/*default_also=*/true, /*write_description=*/true));
+  for (std::string line; std::getline(lines, line);) {
+    const bool is_empty = line.size() > 3 && line.compare(line.size() - 3, 3, "=\"\"") == 0;
+    std::printf("%s%s\n", is_empty ? "# " : "", line.c_str());
+  }
 }
 
 int print_hash() {
@@ -268,13 +282,15 @@ Invocation read_options(int argc, char** argv) {
                  "Begins the names of this daemon's simulations, so that a proxy can tell whose "
                  "they are; default: none, or the one in --state-dir")
       ->check(is_daemon_id);
-  app.add_flag("--reflection,!--no-reflection", config.reflection, "Serve gRPC reflection");
+  app.add_flag("--reflection,!--no-reflection", config.reflection, "Serve gRPC reflection")
+      ->default_str("true");
   app.add_flag("--health-credentials", config.health_credentials,
                "Health asks for credentials when the service does")
       ->group("Security");
   app.add_flag(
-      "--shared-memory,!--no-shared-memory", config.shared_memory,
-      "Beside each unix:PATH, let peers of this host exchange through shared memory: PATH.shm");
+         "--shared-memory,!--no-shared-memory", config.shared_memory,
+         "Beside each unix:PATH, let peers of this host exchange through shared memory: PATH.shm")
+      ->default_str("true");
   app.add_option("--log-level", config.log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str()
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
@@ -342,7 +358,7 @@ Invocation read_options(int argc, char** argv) {
       std::chrono::milliseconds(static_cast<std::int64_t>(checkpoint_interval * 1000));
   if (config.listen.empty()) config.listen.push_back(default_socket());
   if (print_config) {
-    std::printf("%s", app.config_to_str(true, true).c_str());
+    print_options(app);
     invocation.exit_code = 0;
   }
   return invocation;

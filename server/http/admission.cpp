@@ -9,12 +9,11 @@
 #include <array>
 #include <stdexcept>
 
+#include "wire/metadata.h"
 #include "wire/refusal.h"
 
 namespace mbcosim::server::http {
 namespace {
-
-constexpr std::string_view kBearer = "Bearer ";
 
 std::string random_token() {
   std::array<unsigned char, 24> bytes;
@@ -65,7 +64,7 @@ Admission::Admission(const Authenticator& authenticator, const std::string& addr
   const std::size_t colon = address.rfind(':');
   const std::string host = address.substr(0, colon);
   port_ = address.substr(colon + 1);
-  any_number_ = host == "0.0.0.0" || host == "[::]";
+  any_number_ = host == "0.0.0.0";
   for (const std::string& name : {std::string("localhost"), std::string("127.0.0.1"),
                                   std::string("[::1]"), host, any_number_ ? this_host() : host})
     hosts_.insert(lower(name) + ":" + port_);
@@ -113,8 +112,7 @@ std::optional<std::string> Admission::authorization_of(const std::string& token)
 
 std::optional<std::string> Admission::authorize(const Connection& connection) const {
   const std::string_view header = connection.header("Authorization");
-  if (header.substr(0, kBearer.size()) == kBearer)
-    return authorization_of(std::string(header.substr(kBearer.size())));
+  if (is_bearer(header)) return authorization_of(std::string(header.substr(kBearer.size())));
   return authorization_of(std::string(connection.cookie(cookie_name_)));
 }
 

@@ -17,10 +17,12 @@ namespace {
 constexpr std::chrono::milliseconds kRestTime{10000};  // for what is left of a refused request
 constexpr std::size_t kPiece = 1 << 13;  // bytes; civetweb's threads have stacks of 100 KiB
 
-// civetweb does not tell the socket of a connection: it is the one with this peer.
+// civetweb does not tell the socket of a connection: it is the one with this peer at the door's
+// port. One peer may have connections to other ports of the daemon, too.
 int find_socket(const mg_request_info& info) {
   const Endpoint wanted{info.remote_addr, info.remote_port};
-  return find_descriptor([&](int fd) { return peer_of(fd) == wanted; });
+  return find_descriptor(
+      [&](int fd) { return peer_of(fd) == wanted && local_of(fd).port == info.server_port; });
 }
 
 // civetweb would write the date by gmtime, whose result all threads share.
@@ -77,15 +79,19 @@ std::string chunk(std::string_view bytes) {
   return text.append("\r\n").append(bytes).append("\r\n");
 }
 
-/// Is `word` one of "a, b, c", in whatever case?
+/// In whatever case.
+bool is_same(std::string_view word, std::string_view other) {
+  return word.size() == other.size() && mg_strncasecmp(word.data(), other.data(), word.size()) == 0;
+}
+
+/// Is `word` one of "a, b, c"?
 bool is_one_of(std::string_view word, std::string_view list) {
   while (!list.empty()) {
     std::string_view each = list.substr(0, list.find(','));
     list.remove_prefix(std::min(each.size() + 1, list.size()));
     each.remove_prefix(std::min(each.find_first_not_of(' '), each.size()));
     each = each.substr(0, each.find_last_not_of(' ') + 1);
-    const bool as_long = each.size() == word.size();
-    if (as_long && mg_strncasecmp(each.data(), word.data(), word.size()) == 0) return true;
+    if (is_same(each, word)) return true;
   }
   return false;
 }
@@ -101,6 +107,28 @@ int socket_of(mg_connection* raw, const mg_request_info& info) {
 }
 
 }  // namespace
+
+const char* fault_of(const mg_request_info& request) {
+  const auto count = [&](std::string_view name) {
+    return std::count_if(request.http_headers, request.http_headers + request.num_headers,
+                         [&](const auto& header) { return is_same(header.name, name); });
+  };
+  const auto is_number = [](std::string_view text) {
+    return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+  };
+  for (int k = 0; k < request.num_headers; ++k) {
+    const std::string_view name = request.http_headers[k].name,
+                           value = request.http_headers[k].value;
+    if (is_same(name, "Content-Length") && !is_number(value)) return "Content-Length is no number";
+    if (is_same(name, "Transfer-Encoding") && !is_same(value, "chunked"))
+      return "the only transfer coding that is read is chunked";
+  }
+  const auto lengths = count("Content-Length"), codings = count("Transfer-Encoding");
+  if (lengths > 1 || codings > 1) return "the length of the body is told twice";
+  if (lengths > 0 && codings > 0) return "Content-Length and Transfer-Encoding exclude each other";
+  if (count("Host") > 1) return "the host is named twice";
+  return nullptr;
+}
 
 int answer_malformed(mg_connection* raw, int status, const char* message) {
   const std::string body = std::string(message) + '\n';
@@ -178,6 +206,10 @@ Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   body->clear();
   if (info_->content_length > static_cast<long long>(limit)) return Body::too_long;
   reaper_.arm(socket_, kTransferTime);
+  if (waits_for_leave()) {
+    constexpr std::string_view kGoOn = "HTTP/1.1 100 Continue\r\n\r\n";
+    mg_write(raw_, kGoOn.data(), kGoOn.size());
+  }
   std::array<char, kPiece> piece;
   for (Reading reading(*this);;) {
     const int count = reading.read(piece);
@@ -193,12 +225,21 @@ Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   return cut ? Body::broken : Body::complete;
 }
 
+/// Does the client send the body when it is told to (RFC 9110, 10.1.1)?
+bool Connection::waits_for_leave() const {
+  return is_one_of("100-continue", header("Expect")) && is_of_version_1_1();
+}
+
+bool Connection::is_of_version_1_1() const {
+  return info_->http_version && std::string_view(info_->http_version) == "1.1";
+}
+
 /// Is the connection kept? So does civetweb read it from the request; it upgrades nothing.
 bool Connection::stays() const {
   const std::string_view wishes = header("Connection");
   if (has_header("Connection"))
     return is_one_of("keep-alive", wishes) && !is_one_of("upgrade", wishes);
-  return info_->http_version && std::string_view(info_->http_version) == "1.1";
+  return is_of_version_1_1();
 }
 
 void Connection::respond(int status, std::string_view content_type, std::string_view body,
@@ -211,7 +252,7 @@ void Connection::respond(int status, std::string_view content_type, std::string_
   head.add("Content-Length", std::to_string(body.size()));
   head.keep_connection(!unread && stays());
   head.send(method() == "HEAD" ? std::string_view() : body);
-  if (unread) drop_rest();
+  if (unread && !waits_for_leave()) drop_rest();
 }
 
 // A connection that is closed before it was read to its end is reset: the client, which still
@@ -228,9 +269,9 @@ bool Connection::start_stream(std::string_view content_type, const Headers& head
   reaper_.arm(socket_, kTransferTime);
   Head head(raw_, status_, content_type);
   head.add(headers);
-  head.add("Transfer-Encoding", "chunked");
+  if (is_of_version_1_1()) head.add("Transfer-Encoding", "chunked");
   head.add("Cache-Control", "no-store");
-  head.keep_connection(stays());
+  head.keep_connection(is_of_version_1_1() && stays());
   head.send();
   reaper_.disarm(socket_);
   return !gone();
@@ -238,13 +279,16 @@ bool Connection::start_stream(std::string_view content_type, const Headers& head
 
 bool Connection::send_piece(std::string_view bytes) {
   if (bytes.empty()) return true;
-  const bool sent = send_all(chunk(bytes));
+  const bool sent = send_all(is_of_version_1_1() ? chunk(bytes) : std::string(bytes));
   reaper_.disarm(socket_);
   return sent;
 }
 
 void Connection::end_stream(std::string_view last_piece) {
-  send_all(chunk(last_piece) + chunk({}));
+  if (is_of_version_1_1())
+    send_all(chunk(last_piece) + chunk({}));
+  else
+    send_all(last_piece);  // the end of the connection is that of the body
 }
 
 bool Connection::send_all(std::string_view bytes) {

@@ -63,6 +63,8 @@ class Connection {
   int status() const { return status_; }
 
  private:
+  bool waits_for_leave() const;
+  bool is_of_version_1_1() const;
   bool stays() const;
   void drop_rest();
   bool send_all(std::string_view bytes);
@@ -76,6 +78,10 @@ class Connection {
   int status_ = 500;
   bool body_read_ = false;
 };
+
+/// What is wrong with the head of a request; null: nothing. What leaves open where its body ends, a
+/// proxy before the door may have read in another way (RFC 9112, 11.2).
+const char* fault_of(const mg_request_info& request);
 
 /// Answers what is no request that a Connection could stand for; 0, as civetweb wants it.
 int answer_malformed(mg_connection* raw, int status, const char* message);

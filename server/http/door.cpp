@@ -28,16 +28,12 @@ constexpr const char* kNoPage =
 
 /// "localhost:80" as the numbers that civetweb wants; a host name is not looked up.
 std::string numeric(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
+  const std::size_t colon = std::min(address.rfind(':'), address.size());
   const std::string host = address.substr(0, colon);
-  if (colon == std::string::npos || host.empty())
-    throw std::runtime_error("--http \"" + address + "\" is not HOST:PORT");
   return (host == "localhost" ? "127.0.0.1" : host) + address.substr(colon);
 }
 
-bool is_loopback(const std::string& address) {
-  return address.compare(0, 4, "127.") == 0 || address.compare(0, 6, "[::1]:") == 0;
-}
+bool is_loopback(const std::string& address) { return address.compare(0, 4, "127.") == 0; }
 
 /// civetweb's own lines: what clients send that is no request.
 int log_message(const mg_connection*, const char* message) {
@@ -57,7 +53,7 @@ struct Door::Impl {
   void serve_page(Connection& connection);
   void serve_call(Connection& connection, const google::protobuf::MethodDescriptor& method);
   static void fail(Connection& connection, v1::Reason reason, const std::string& message,
-                   int status = 0);
+                   int status = 0, Headers headers = {});
   static Impl& of(const mg_connection* raw);
   static int came(const mg_connection* raw, void** connection_data);
   void began(const mg_connection* raw);
@@ -126,9 +122,7 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
   mg_get_server_ports(context, 1, &port);
   const auto host_of = [](const std::string& text) { return text.substr(0, text.rfind(':')); };
   address = host_of(options.address) + ":" + std::to_string(port.port);
-  std::string bound = host_of(wanted);
-  if (bound.front() == '[') bound = bound.substr(1, bound.size() - 2);
-  crowd.listens_at({bound, port.port});
+  crowd.listens_at({host_of(wanted), port.port});
   admission = std::make_unique<Admission>(parts.authenticator, address, options.origins);
   page_address = "http://" + address + "/";
   if (!admission->startup_token().empty()) page_address += "?token=" + admission->startup_token();
@@ -174,14 +168,19 @@ void Door::Impl::went(const mg_connection* raw) {
 }
 
 void Door::Impl::fail(Connection& connection, v1::Reason reason, const std::string& message,
-                      int status) {
+                      int status, Headers headers) {
   const grpc::Status failure = Refusal(reason, message).status();
-  connection.respond(status ? status : http_status(failure.error_code()), "application/json",
-                     connect_error(failure));
+  if (status == 0) status = http_status(failure.error_code());
+  if (status == 401) headers.emplace_back("WWW-Authenticate", "Bearer");
+  connection.respond(status, "application/json", connect_error(failure), headers);
 }
 
 int Door::Impl::serve(mg_connection* raw) {
   opened.wait();
+  if (const char* fault = fault_of(*mg_get_request_info(raw))) {
+    answer_malformed(raw, 400, fault);
+    return 400;
+  }
   int status = 500;
   run_caught("http", [&] {
     Connection connection(raw, reaper, crowd);
@@ -214,7 +213,8 @@ void Door::Impl::route(Connection& connection) {
   if (!method && path != "/metrics")
     return fail(connection, v1::REASON_NOT_SERVED, "nothing is served under this path", 404);
   if (method ? connection.method() != "POST" : !reads)
-    return fail(connection, v1::REASON_NOT_SERVED, method ? "calls are POST" : "use GET", 405);
+    return fail(connection, v1::REASON_NOT_SERVED, method ? "calls are POST" : "use GET", 405,
+                {{"Allow", method ? "POST" : "GET, HEAD"}});
   if (method) return serve_call(connection, *method);
   if (!admission->authorize(connection))
     return fail(connection, v1::REASON_UNAUTHENTICATED, "a bearer token is required");

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "files/trusted_file.h"
+#include "wire/convert.h"
 #include "wire/metadata.h"
 #include "wire/refusal.h"
 
@@ -122,6 +123,7 @@ Authenticator::Token Authenticator::read_token(const std::string& line, int numb
     refuse_line(number, "after \"sha256:\" there must be 64 hexadecimal digits");
   if (!is_metadata(text))
     refuse_line(number, "a token has printable ASCII characters only: no call can carry others");
+  if (name != utf8(name)) refuse_line(number, "the name is not UTF-8, as the service's texts are");
   token.hash = hashed ? text : hash_of_token(text);
   token.caller = {std::string(kToken) + name, role_of(role, number)};
   if (words >> expiry) token.expiry = time_of(expiry, number);
@@ -153,10 +155,9 @@ std::optional<Authenticator::Token> Authenticator::find(const std::string& text)
 }
 
 Caller Authenticator::caller_of(const std::string& authorization) const {
-  constexpr std::string_view kScheme = "Bearer ";
-  if (authorization.compare(0, kScheme.size(), kScheme) != 0)
+  if (!is_bearer(authorization))
     throw Refusal(v1::REASON_UNAUTHENTICATED, "a bearer token is required");
-  const std::optional<Token> token = find(authorization.substr(kScheme.size()));
+  const std::optional<Token> token = find(authorization.substr(kBearer.size()));
   if (!token) throw Refusal(v1::REASON_UNAUTHENTICATED, "unknown bearer token");
   if (token->expiry != 0 && token->expiry < std::time(nullptr))
     throw Refusal(v1::REASON_UNAUTHENTICATED, "the bearer token has expired");

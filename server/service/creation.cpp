@@ -12,9 +12,8 @@
 #include "wire/convert.h"
 
 namespace mbcosim::server {
-namespace {
 
-[[noreturn]] void refuse_deck(const LoadReport& report) {
+void refuse_deck(const LoadReport& report) {
   Error error;
   error.kind = ErrorKind::deck;
   error.diagnostics = report.diagnostics;
@@ -39,6 +38,8 @@ namespace {
   }
   throw Refusal(error);
 }
+
+namespace {
 
 Session::Identity make_identity(std::string name, const v1::CreateOptions& options,
                                 std::uint64_t digest, const Caller& caller,

@@ -164,7 +164,10 @@ Suspended Durability::read_one(const std::string& id) const {
   found.request_id = head.options().request_id();
   found.request_digest = head.request_digest();
   found.info = read_latest(id).point.info();
-  found.since = folder_->used_at(id);
+  constexpr std::int64_t kOld = 2'000'000'000;  // [s]
+  const std::int64_t age =
+      std::clamp<std::int64_t>(std::time(nullptr) - folder_->used_at(id), 0, kOld);
+  found.since = std::chrono::steady_clock::now() - std::chrono::seconds(age);
   return found;
 }
 

@@ -20,11 +20,11 @@ namespace mbcosim::server {
 
 /// A simulation that is in the state folder only.
 struct Suspended {
-  std::string owner, request_id;     ///< of its creation
-  std::uint64_t request_digest = 0;  ///< of that request
-  v1::SimulationInfo info;           ///< of its last checkpoint
-  std::int64_t since = 0;            ///< [s since 1970]
-  MemoryShare share = {};            ///< of this
+  std::string owner, request_id;                ///< of its creation
+  std::uint64_t request_digest = 0;             ///< of that request
+  v1::SimulationInfo info;                      ///< of its last checkpoint
+  std::chrono::steady_clock::time_point since;  ///< clocks that are set do not end it
+  MemoryShare share = {};                       ///< of this
 };
 
 /// Thread-safe. Without a state folder nothing is durable.

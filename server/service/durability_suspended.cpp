@@ -2,7 +2,7 @@
 #include <google/protobuf/util/time_util.h>
 #include <spdlog/spdlog.h>
 
-#include <ctime>
+#include <chrono>
 #include <functional>
 #include <set>
 
@@ -55,7 +55,9 @@ std::vector<v1::SimulationInfo> Durability::list(const Caller& caller) const {
 }
 
 std::vector<std::pair<std::string, std::string>> Durability::by_last_use() const {
-  std::multimap<std::int64_t, std::pair<std::string, std::string>, std::greater<>> found;
+  std::multimap<std::chrono::steady_clock::time_point, std::pair<std::string, std::string>,
+                std::greater<>>
+      found;
   Guard guard(mutex_);
   for (const auto& [name, suspended] : suspended_)
     found.emplace(suspended.since, std::pair(name, suspended.owner));
@@ -101,12 +103,13 @@ const std::pair<const std::string, Suspended>* Durability::made_by(
 }
 
 void Durability::expire() {
-  const std::int64_t now = std::time(nullptr), longest = config_.suspended_expiry.count();
+  const auto now = std::chrono::steady_clock::now();
   std::vector<std::pair<std::string, Suspended>> over;
   {
     Guard guard(mutex_);
     for (auto& [name, suspended] : suspended_)
-      if (now - suspended.since > longest && waking_.count(name) == 0 && !parts_->store.has(name))
+      if (now - suspended.since > config_.suspended_expiry && waking_.count(name) == 0 &&
+          !parts_->store.has(name))
         over.emplace_back(name, std::move(suspended));
     for (const auto& [name, suspended] : over) suspended_.erase(name);
   }
@@ -180,11 +183,13 @@ TimeKeeping time_keeping(const v1::CheckpointHead& head) {
   return head.options().summed_time() ? TimeKeeping::summed : TimeKeeping::exact;
 }
 
-/// The deck as it was stored. Throws OTHER_MODEL when this program makes another model of it.
+/// The deck as it was stored. Throws OTHER_MODEL when this program makes another model of it, and
+/// as `refuse_deck` when it makes none, by other limits, say.
 LoadedDeck read_deck(StoredModel& model, const Config& config) {
   const v1::CheckpointHead& head = model.head;
   LoadedDeck deck = load({head.main_file(), std::move(model.files), head.model_options()}, config);
-  if (!deck.ok() || digest_text(deck.model->digest) != head.model_digest())
+  if (!deck.ok()) refuse_deck(deck);
+  if (digest_text(deck.model->digest) != head.model_digest())
     throw Refusal(v1::REASON_OTHER_MODEL, head.simulation() + " was stored by mbcosim " +
                                               head.program() +
                                               ", and this program reads its deck in another way");

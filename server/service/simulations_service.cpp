@@ -30,6 +30,10 @@ void add_limits(const ServiceLimits& limits, v1::GetServerInfoReply* reply) {
   add_limit(reply, "identity_calls", limits.identity_calls);
   add_limit(reply, "identity_streams", limits.identity_streams);
   add_limit(reply, "connection_calls", limits.connection_calls);
+  add_limit(reply, "shared_memory_peers", limits.shared_memory_peers);
+  add_limit(reply, "http_connections", limits.http_connections);
+  add_limit(reply, "http_streams", limits.http_streams);
+  add_limit(reply, "deck_sockets", limits.deck_sockets);
   add_limit(reply, "snapshots", limits.snapshots);
   add_limit(reply, "snapshot_bytes", limits.snapshot_bytes);
   add_limit(reply, "message_bytes", limits.message_bytes);

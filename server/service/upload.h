@@ -71,6 +71,8 @@ DeckReport read_alone(DeckUpload& upload, const Config& config, const Limits& li
 LoadedDeck load(DeckUpload& upload, const Config& config, KeptDeck* kept);
 /// The same deck again.
 LoadedDeck load(KeptDeck deck, const Config& config);
+/// Throws what the first error of a deck is: DECK_ERROR, LIMIT_EXCEEDED, BAD_ARGUMENT, INTERNAL.
+[[noreturn]] void refuse_deck(const LoadReport& report);
 /// Throws BAD_ARGUMENT for a symbol without a value.
 SymbolValues symbols_of(const v1::CreateOptions& options);
 /// Throws BAD_ARGUMENT for what is no system of units.

@@ -11,7 +11,7 @@
 
 namespace {
 
-constexpr int kDeckRefused = 2, kRefused = 4;
+constexpr int kDeckRefused = 2, kRefused = 4, kLost = 5;
 constexpr double kStartSeconds = 30;
 
 void block_signals() {  // before any thread starts, so that only the wait below sees them
@@ -28,7 +28,7 @@ std::string daemon_program() {
   return (self.parent_path() / "mbcosimd").string();
 }
 
-int show(const std::string& deck, const std::string& http) {
+void show(const std::string& deck, const std::string& http) {
   mbcosim::view::PrivateDaemon daemon(daemon_program(), http, kStartSeconds);
   auto server = mbcosim::client::Server::connect(daemon.address(), kStartSeconds);
   mbcosim::client::LoadOptions options;
@@ -37,7 +37,7 @@ int show(const std::string& deck, const std::string& http) {
   std::printf("%s#simulation=%s\nCtrl-C ends it.\n", daemon.page().c_str(),
               simulation.name().c_str());
   std::fflush(stdout);
-  return daemon.wait();
+  daemon.wait();
 }
 
 }  // namespace
@@ -57,10 +57,14 @@ int main(int argc, char** argv) {
   }
   block_signals();
   try {
-    return show(deck, http);
+    show(deck, http);
+    return 0;
   } catch (const mbcosim::client::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return error.reason() == "DECK_ERROR" ? kDeckRefused : kRefused;
+  } catch (const mbcosim::view::Lost& error) {
+    std::fprintf(stderr, "mbcosim view: error: %s\n", error.what());
+    return kLost;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "mbcosim view: error: %s\n", error.what());
     return kRefused;

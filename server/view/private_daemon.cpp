@@ -10,14 +10,17 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
-#include <stdexcept>
+#include <string_view>
 #include <system_error>
+#include <vector>
 
 namespace mbcosim::view {
 namespace {
 
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
+constexpr std::string_view kOptions =
+    "MBCOSIMD_";  ///< begins variables that are a daemon's options
 
 std::string new_folder() {
   std::string name = (fs::temp_directory_path() / "mbcosim-view-XXXXXX").string();
@@ -26,16 +29,26 @@ std::string new_folder() {
   return name;
 }
 
+/// The environment but for the options of another daemon that are in it.
+std::vector<char*> own_environment() {
+  std::vector<char*> variables;
+  for (char** variable = environ; *variable; ++variable)
+    if (std::string_view(*variable).substr(0, kOptions.size()) != kOptions)
+      variables.push_back(*variable);
+  variables.push_back(nullptr);
+  return variables;
+}
+
 /// In the child: becomes the daemon, which ends when the thread that started it does.
 [[noreturn]] void become(const std::string& program, const std::string& address,
-                         const std::string& http, int output) {
+                         const std::string& http, int output, char* const* environment) {
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
   ::dup2(output, STDOUT_FILENO);
-  ::execl(program.c_str(), program.c_str(), "--listen", address.c_str(), "--http", http.c_str(),
-          "--log-level", "warn", static_cast<char*>(nullptr));
+  ::execle(program.c_str(), program.c_str(), "--listen", address.c_str(), "--http", http.c_str(),
+           "--log-level", "warn", static_cast<char*>(nullptr), environment);
   ::_exit(127);
 }
 
@@ -60,8 +73,9 @@ void PrivateDaemon::start(const std::string& program, const std::string& http) {
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw std::runtime_error("cannot make a pipe");
   output_ = ends[0];
+  const std::vector<char*> environment = own_environment();
   child_ = ::fork();
-  if (child_ == 0) become(program, address_, http, ends[1]);
+  if (child_ == 0) become(program, address_, http, ends[1], environment.data());
   ::close(ends[1]);
   if (child_ < 0) throw std::runtime_error("cannot start " + program);
 }
@@ -85,7 +99,7 @@ std::string PrivateDaemon::read_page(double seconds) const {
   throw std::runtime_error("the daemon did not start in time");
 }
 
-int PrivateDaemon::wait() {
+void PrivateDaemon::wait() {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
@@ -95,9 +109,10 @@ int PrivateDaemon::wait() {
     int status = 0;
     if (::waitpid(child_, &status, WNOHANG) != child_) continue;
     child_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+    throw Lost(WIFSIGNALED(status)
+                   ? "the daemon was ended by signal " + std::to_string(WTERMSIG(status))
+                   : "the daemon has ended with exit code " + std::to_string(WEXITSTATUS(status)));
   }
-  return 0;
 }
 
 void PrivateDaemon::stop() {

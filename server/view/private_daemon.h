@@ -3,9 +3,16 @@
 
 #include <sys/types.h>
 
+#include <stdexcept>
 #include <string>
 
 namespace mbcosim::view {
+
+/// The daemon has ended by itself. The text says how.
+class Lost : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 class PrivateDaemon {
  public:
@@ -19,9 +26,9 @@ class PrivateDaemon {
 
   const std::string& address() const { return address_; }  ///< "unix:…"
   const std::string& page() const { return page_; }        ///< with the token
-  /// Waits until the daemon ends or one of the blocked signals SIGINT, SIGTERM comes; the daemon's
-  /// exit code, or 0 after a signal.
-  int wait();
+  /// Waits until one of the blocked signals SIGINT, SIGTERM comes. Throws Lost when the daemon
+  /// ends.
+  void wait();
 
  private:
   void start(const std::string& program, const std::string& http);

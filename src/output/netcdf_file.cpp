@@ -82,6 +82,8 @@ void NetcdfFile::reopen(const std::string& path, ResultBudget* budget) {
   path_ = path;
   budget_ = budget;
   problem_ = nc().problem;
+  std::error_code none;
+  found_ = static_cast<std::int64_t>(std::filesystem::file_size(path_, none));  // -1: none
   open();
 }
 
@@ -92,11 +94,11 @@ void NetcdfFile::cut(std::size_t records, std::int64_t bytes) {
   problem_ = nc().problem;
   if (budget_) budget_->give_back(bytes_);
   bytes_ = 0;
-  const Status done = cut_records(path_, static_cast<std::int64_t>(records));
-  if (!done) problem_ = done.error().message;
+  damage_ = cut_records(path_, static_cast<std::int64_t>(records), found_);
+  found_ = kWhole;
   records_ = records;
   forget_waiting();
-  open();
+  if (damage_) open();
   (void)take(static_cast<std::size_t>(bytes));
 }
 
@@ -218,9 +220,8 @@ void NetcdfFile::forget_waiting() {
 void NetcdfFile::retry() {
   close();
   problem_.clear();
-  if (const Status done = cut_records(path_, static_cast<std::int64_t>(settled_)); !done)
-    problem_ = done.error().message;
-  open();
+  damage_ = cut_records(path_, static_cast<std::int64_t>(settled_), kWhole);
+  if (damage_) open();
   for (const Put& put : waiting_)
     if (works()) check_record(put(id_));
 }
@@ -248,6 +249,7 @@ Status NetcdfFile::finish() {
 
 Status NetcdfFile::status() const {
   if (over_budget_) return over_budget(*budget_);
+  if (!damage_) return damage_;
   if (problem_.empty()) return ok();
   return make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN", "cannot write " + path_ + ": " + problem_);
 }

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -68,9 +70,14 @@ class NetcdfFile {
   void settle();
   void forget_waiting();
   void retry();
-  bool works() const { return problem_.empty() && !over_budget_; }
+  bool works() const { return problem_.empty() && damage_ && !over_budget_; }
 
   std::string path_, problem_;
+  static constexpr std::int64_t kWhole = std::numeric_limits<std::int64_t>::max();
+  /// Bytes of a file that was there before; the library fills with zeros, when it closes a file,
+  /// what its header speaks of and is not there.
+  std::int64_t found_ = kWhole;
+  Status damage_ = ok();  ///< what is there is not what was written before
   ResultBudget* budget_ = nullptr;
   std::int64_t bytes_ = 0;
   int id_ = -1;

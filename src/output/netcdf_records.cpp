@@ -99,21 +99,22 @@ void write_count(std::FILE* file, std::int64_t count) {
     throw Broken();
 }
 
-void cut(std::FILE* file, std::int64_t count) {
+void cut(std::FILE* file, std::int64_t count, std::int64_t size) {
   const Records records = read_records(file);
-  if (count > records.count) throw std::runtime_error("the file ends before that step");
+  const std::int64_t end = records.begin + count * records.size;
+  if (count > records.count || (count > 0 && end > size))
+    throw std::runtime_error("the file ends before that step");
   write_count(file, count);
-  if (ftruncate(fileno(file), records.begin + count * records.size) != 0)
-    throw std::runtime_error("it cannot be made shorter");
+  if (ftruncate(fileno(file), end) != 0) throw std::runtime_error("it cannot be made shorter");
 }
 
 }  // namespace
 
-Status cut_records(const std::string& path, std::int64_t count) try {
+Status cut_records(const std::string& path, std::int64_t count, std::int64_t size) try {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "r+b"),
                                                              &std::fclose);
   if (!file) throw std::runtime_error("it cannot be opened");
-  cut(file.get(), count);
+  cut(file.get(), count, size);
   return ok();
 } catch (const std::runtime_error& problem) {
   return make_error(ErrorKind::data_loss, "RESULTS_CUT_SHORT",

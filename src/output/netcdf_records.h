@@ -10,7 +10,7 @@
 namespace mbcosim {
 
 /// Ends the file after so many records; nobody may have it open. ErrorKind::data_loss when it has
-/// fewer or is no such file.
-Status cut_records(const std::string& path, std::int64_t count);
+/// fewer within its first `size` bytes or is no such file.
+Status cut_records(const std::string& path, std::int64_t count, std::int64_t size);
 
 }  // namespace mbcosim

@@ -326,6 +326,8 @@ StepReport Simulation::Impl::step(const CancelToken* cancel, const StepChoice& c
   if (auto status = write(phase.newton, previous_time); !status) {
     report.outcome = StepOutcome::not_written;
     report.error = status.error();
+    report.error->failure.step = state.step;
+    report.error->failure.time = state.time;
     return report;
   }
   if (at_end()) report.outcome = StepOutcome::finished;

@@ -103,10 +103,17 @@ def test_plot_writes_pictures_by_gnuplot_or_by_python(swing, tmp_path, path):
     environment = {"PATH": str(folder)} if path == "python" else {}
     if path is None and not shutil.which("gnuplot"):
         pytest.skip("there is no gnuplot")
-    picture = tmp_path / "out.png"
+    picture = tmp_path / "it's\\ours.png"
     drawn = mbcosim("plot", "p", "--node", 2, "z", "--joint", 2, "F", "--png", picture, cwd=swing, **environment)
     assert drawn.returncode == 0, drawn.stderr
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 8000
+
+
+def test_plot_of_a_run_without_text_says_what_is_missing(tmp_path):
+    (tmp_path / "o").write_text(OSCILLATOR)
+    assert mbcosim("run", "o", "-o", "p", "--format", "netcdf", cwd=tmp_path).returncode == 0
+    drawn = mbcosim("plot", "p", "--node", 1, "z", cwd=tmp_path)
+    assert drawn.returncode == 4 and '"p.nc": text is read here, which `mbcosim run DECK -o p` writes without `--format netcdf`' in drawn.stderr
 
 
 def test_plot_names_what_lacks(swing, tmp_path):

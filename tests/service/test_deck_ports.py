@@ -33,6 +33,16 @@ def external(options, **more):
     return deck(f"force: 5, external structural, {options};", **more)
 
 
+def test_names_of_ports_may_have_any_bytes(server):
+    """Texts of the service are UTF-8: other bytes are told as "?"."""
+    text = external('grpc, port, "fl\u00fcgel", coupling, loose, 1, 1').encode("latin-1")
+    with server.load_bundle("deck", {"deck": text}) as simulation:
+        assert [port.name for port in simulation.describe().ports] == ["fl?gel"]
+        with simulation.couple("fl?gel", spring) as peer:
+            simulation.step(3)
+            assert peer.exchanges == 3
+
+
 def test_a_peer_couples_to_the_decks_port(server):
     with server.load_text(external('grpc, port, "spring", coupling, loose, 1, 1')) as simulation:
         layout = simulation.describe().ports[0]

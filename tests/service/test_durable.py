@@ -712,6 +712,43 @@ def test_a_damaged_snapshot_is_named_when_it_is_needed(start, folder):
         assert state_of(server, name) == pb.SIMULATION_STATE_SUSPENDED  # nothing is lost
 
 
+@pytest.mark.parametrize("option, limit", [("--limit-deck-bytes", "deck_bytes"), ("--limit-statements", "statements"), ("--limit-unknowns", "unknowns")])
+def test_a_deck_that_is_too_large_by_now_is_told(start, option, limit):
+    daemon = start()
+    with daemon.connect() as server:
+        name = server.load_text(deck()).name
+    daemon.stop()
+    daemon = start(option, "3")
+    with daemon.connect() as server:
+        with pytest.raises(mbcosim.LimitExceeded) as caught:
+            server.attach(name).step()
+        assert caught.value.metadata["limit"] == limit
+    daemon.stop()
+    with start().connect() as server:
+        assert server.attach(name).step().step == 1
+
+
+def test_results_of_netcdf_that_were_cut_are_told(start, tmp_path):
+    root = tmp_path / "results"
+    root.mkdir()
+    daemon = start("--results-root", str(root))
+    with daemon.connect() as server:
+        simulation = server.load_text(deck(), results="netcdf", name="n", durability="checkpoint")
+        simulation.step(20)
+        name = simulation.name
+    daemon.stop()
+    file = next(root.glob("*/results.nc"))
+    os.truncate(file, file.stat().st_size - 1000)
+    with start("--results-root", str(root)).connect() as server:
+        with pytest.raises(mbcosim.Error) as caught:
+            server.attach(name).step()
+        assert caught.value.reason == "DAMAGED_STATE" and "the file ends before that step" in str(caught.value)
+        file.unlink()
+        with pytest.raises(mbcosim.Error) as caught:
+            server.attach(name).step()
+        assert caught.value.reason == "DAMAGED_STATE" and "it cannot be opened" in str(caught.value)
+
+
 def test_one_folder_has_one_daemon(start, folder, tmp_path):
     start().connect().close()
     second = subprocess.run([os.path.join(BIN, "mbcosimd"), "--listen", f"unix:{tmp_path}/second", "--state-dir", str(folder)],

@@ -1,5 +1,6 @@
 """Listeners, health, reflection, credentials, configuration."""
 import os
+import re
 import socket
 import stat
 import subprocess
@@ -263,6 +264,29 @@ def test_print_config_and_environment(tmp_path):
     assert "limit-sessions=9" in printed("--config", str(files[1]), MBCOSIMD_CONFIG=str(files[0]))
     assert "limit-sessions=64" in printed(MBCOSIMD_CONFIG="")
     assert "/none" in refused(MBCOSIMD_CONFIG="/none")
+    # What is printed is a file of options that says the same again.
+    files[0].write_text(printed("--no-reflection", "--limit-sessions", "7"))
+    assert "\nreflection=false\n" in files[0].read_text() and "\nshared-memory=true\n" in files[0].read_text()
+    again = printed("--config", str(files[0]))
+    assert [line for line in again.splitlines() if "=" in line and not line.startswith(("#", "config"))] == \
+           [line for line in files[0].read_text().splitlines() if "=" in line and not line.startswith(("#", "config"))]
+
+
+def test_every_limit_of_the_operator_is_told(server):
+    options = subprocess.run([DAEMON, "--help"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    names = {name.replace("-", "_") for name in re.findall(r"--limit-([a-z-]+)", options)}
+    told = {limit.name for limit in server.info().limits}
+    assert {"memory_bytes" if name == "memory" else "identity_memory_bytes" if name == "identity_memory" else name for name in names} <= told
+
+
+@pytest.mark.parametrize("option", ["--limit-expression-depth", "--limit-nesting-depth"])
+def test_depths_stay_within_the_stack(option):
+    def check(depth):
+        return subprocess.run([DAEMON, "--print-config", option, str(depth)], capture_output=True, text=True)
+
+    assert check(10000).returncode == 0
+    done = check(10001)
+    assert done.returncode == 4 and f"{option}: expected a number from 1 to 10000" in done.stderr
     assert subprocess.run([DAEMON, "--no-such-option"], stderr=subprocess.DEVNULL).returncode == 4
 
 

@@ -5,6 +5,7 @@ import http.client
 import json
 import math
 import os
+import re
 import signal
 import socket
 import struct
@@ -400,6 +401,8 @@ def test_a_proxy_in_front_is_named_by_its_origin(start_daemon):
     (["--listen", "localhost:"], 'from 0 to 65535, got "localhost:"'),
     (["--listen", "unix:"], 'from 0 to 65535, got "unix:"'),
     (["--http-origin", "https://sim.example"], "--http-origin requires --http"),
+    (["--http", "[::1]:0"], '--http: HTTP is served at addresses of IPv4 only, got "[::1]:0"'),
+    (["--limit-http-connections", "100000"], "--limit-http-connections: expected a number from 1 to 10000"),
     (["--http", "127.0.0.1:0", "--http-origin", "sim.example"], "is not of the form https://HOST"),
 ])
 def test_bad_options_are_refused_at_start(options, complaint, tmp_path):
@@ -740,6 +743,85 @@ def test_a_request_with_two_lengths_smuggles_no_other(door, server, pendulum, fr
         simulation.refresh()
         assert simulation.info.step == 0
     assert door.call("Simulations/ListSimulations")[0] == 200
+
+
+@pytest.mark.parametrize("head, told", [
+    ("Content-Length: 2\r\nTransfer-Encoding: chunked", "exclude each other"), ("Content-Length: 2\r\nContent-Length: 2", "told twice"),
+    ("Transfer-Encoding: chunked\r\nTransfer-Encoding: chunked", "told twice"), ("Transfer-Encoding: gzip", "Bad request"), ("Transfer-Encoding: identity", "is chunked"),
+    ("Content-Length: 2, 2", "no number"), ("Content-Length: +2", "no number"), ("Content-Length: 2x", "no number"),
+    ("Content-Length: 2\r\nHost: another", "named twice")])
+def test_what_a_proxy_may_read_otherwise_is_refused(door, head, told):
+    link = door.raw()
+    link.sendall((f"POST /mbcosim.v1.Simulations/GetServerInfo HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nAuthorization: Bearer {door.token}\r\n"
+                  f"Content-Type: application/json\r\n{head}\r\n\r\n{{}}").encode())
+    link.shutdown(socket.SHUT_WR)
+    answer = all_of(link)
+    assert answer.startswith(b"HTTP/1.1 400 ") and b"\r\nConnection: close\r\n" in answer and told.encode() in answer, answer
+
+
+def test_a_body_that_waits_for_leave_is_asked_for(door):
+    """And not where the call is refused without it (RFC 9110, 10.1.1)."""
+    link = door.raw()
+    head = (f"POST /mbcosim.v1.Simulations/GetServerInfo HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nContent-Type: application/json\r\n"
+            f"Content-Length: 2\r\nExpect: 100-continue\r\n")
+    link.sendall((head + f"Authorization: Bearer {door.token}\r\n\r\n").encode())
+    assert link.recv(65536) == b"HTTP/1.1 100 Continue\r\n\r\n"
+    link.sendall(b"{}")
+    assert link.recv(65536).startswith(b"HTTP/1.1 200 ")
+    link.sendall((head + "\r\n").encode())
+    assert all_of(link).startswith(b"HTTP/1.1 401 ")
+
+
+def test_a_stream_over_http_1_0_ends_with_its_connection(door, server, pendulum):
+    with server.load(pendulum) as simulation:
+        body = envelope(json.dumps({"step": {"simulation": simulation.name, "steps": 3}}).encode())
+        link = door.raw()
+        link.sendall((f"POST /mbcosim.v1.Simulations/Run HTTP/1.0\r\nHost: {door.host}:{door.port}\r\nAuthorization: Bearer {door.token}\r\n"
+                      f"Content-Type: application/connect+json\r\nConnection: keep-alive\r\nContent-Length: {len(body)}\r\n\r\n").encode() + body)
+        head, answer = all_of(link).split(b"\r\n\r\n", 1)
+        assert b"Transfer-Encoding" not in head and b"Connection: close" in head.split(b"\r\n")
+        assert json.loads(envelopes(answer)[-2][1])["done"]["step"] == "3" and envelopes(answer)[-1] == (2, b"{}")
+
+
+def test_refusals_say_what_would_be_taken(door):
+    assert door.request("POST", "/mbcosim.v1.Simulations/GetServerInfo", "{}", Content_Type="application/json",
+                        Authorization=f"bearer {door.token}")[0] == 200  # in whatever case (RFC 9110, 11.1)
+    status, headers, _ = door.request("POST", "/mbcosim.v1.Simulations/GetServerInfo", "{}", Content_Type="application/json", Authorization=None)
+    assert (status, headers["WWW-Authenticate"]) == (401, "Bearer")
+    status, headers, _ = door.request("GET", "/mbcosim.v1.Simulations/GetServerInfo")
+    assert (status, headers["Allow"]) == (405, "POST")
+    status, headers, _ = door.request("POST", "/metrics", "")
+    assert (status, headers["Allow"]) == (405, "GET, HEAD")
+
+
+def test_who_is_cut_off_is_nobody_else_from_the_same_port(start_daemon, tmp_path):
+    """Connections of one client's port to HTTP and to gRPC: what cuts off the first leaves the second."""
+    tokens = tmp_path / "tokens"
+    tokens.write_text("a-token control ann\n")
+    tokens.chmod(0o600)
+    daemon = start_daemon("--tokens", str(tokens), "--listen", "127.0.0.1:0", "--http", "127.0.0.1:0")
+    door, grpc_port = Door(daemon.page()), int(re.search(r"listening on 127\.0\.0\.1:(\d+)", daemon.log()).group(1))
+    links = []
+    for port in (grpc_port, door.port):
+        link = socket.socket()
+        for option in (socket.SO_REUSEADDR, socket.SO_REUSEPORT):
+            link.setsockopt(socket.SOL_SOCKET, option, 1)
+        link.bind(("127.0.0.1", links[0].getsockname()[1] if links else 0))
+        link.settimeout(60 * TIME_FACTOR)
+        link.connect(("127.0.0.1", port))
+        links.append(link)
+    other, slow = links
+    other.sendall(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes.fromhex("000000040000000000"))
+    slow.sendall(f"POST /x HTTP/1.1\r\nHost: {door.host}:{door.port}\r\nContent-Length: 1000\r\n\r\n".encode())
+    assert b" 404 " in slow.recv(65536)
+    assert slow.recv(65536) == b""  # the body never comes
+    other.sendall(bytes.fromhex("0000080600") + bytes(4) + b"a ping..")
+    other.settimeout(20 * TIME_FACTOR)
+    said = b""
+    while b"a ping.." not in said:
+        more = other.recv(65536)
+        assert more, said
+        said += more
 
 
 def test_ten_thousand_requests_on_a_few_connections_are_all_answered(door):

@@ -35,6 +35,33 @@ def identity(daemon, token):
         return None
 
 
+@pytest.mark.parametrize("spoil", ["a folder", "not UTF-8"])
+def test_tokens_that_cannot_be_read_leave_those_before_in_force(start_daemon, tmp_path, spoil):
+    file = tmp_path / "tokens"
+    tokens_file(file, "first-token control one")
+    daemon = start_daemon("--tokens", str(file))
+    if spoil == "a folder":  # which an engine of containers makes where a file to mount is missing
+        file.unlink()
+        file.mkdir()
+        told = "is a folder"
+    else:
+        file.write_bytes(b"first-token control one\nother-token control jos\xe9\n")
+        told = "tokens file, line 2: the name is not UTF-8"
+    wait_for(lambda: told in daemon.log())
+    assert identity(daemon, "first-token") == "token:one" and identity(daemon, "other-token") is None
+
+
+def test_tokens_are_read_when_their_rights_are_mended(start_daemon, tmp_path):
+    file = tmp_path / "tokens"
+    tokens_file(file, "first-token control one")
+    daemon = start_daemon("--tokens", str(file))
+    tokens_file(file, "second-token control two")
+    file.chmod(0o666)
+    wait_for(lambda: "others than its owner may write the tokens file" in daemon.log())
+    file.chmod(0o600)
+    wait_for(lambda: identity(daemon, "second-token") == "token:two")
+
+
 @pytest.mark.parametrize("asked", [True, False], ids=["SIGHUP", "change"])
 def test_tokens_are_read_anew(start_daemon, tmp_path, asked):
     file = tmp_path / "tokens"

@@ -98,6 +98,21 @@ def test_a_signal_ends_it_with_its_daemon_and_leaves_nothing(view, pendulum, tmp
     assert gone(daemon) and not os.listdir(tmp_path)
 
 
+def test_options_of_another_daemon_are_not_its_own(view, pendulum, tmp_path, monkeypatch):
+    (tmp_path / "tokens").write_text("a-token control ann\n")
+    monkeypatch.setenv("MBCOSIMD_TOKENS", str(tmp_path / "tokens"))
+    monkeypatch.setenv("MBCOSIMD_NO_SUCH_OPTION", "1")
+    assert "token=" in view(pendulum).address()
+
+
+def test_a_daemon_that_ends_is_told(view, pendulum):
+    shown = view(pendulum)
+    shown.address()
+    os.kill(shown.daemon(), signal.SIGKILL)
+    assert shown.process.wait(30 * TIME_FACTOR) == 5
+    assert shown.process.stderr.read() == "mbcosim view: error: the daemon was ended by signal 9\n"
+
+
 def test_a_kill_ends_the_daemon_too(view, pendulum):
     shown = view(pendulum)
     shown.address()

@@ -199,7 +199,7 @@ def _question(address: str, detail: str) -> str:
 
 class Attempts:
     """First calls of a server: while nobody listens they are repeated for `timeout` seconds (None: for a moment)."""
-    PAUSE = 0.05  # between two [s]
+    PAUSE = 0.2  # between two [s]
 
     def __init__(self, address: str, timeout: Optional[float]) -> None:
         self._address, self._waits = address, timeout is not None

@@ -1,8 +1,8 @@
 """Connections to a server. Every call takes `timeout=` [s]."""
 from __future__ import annotations
 
+import contextlib
 import threading
-import time
 from typing import Any, Optional, TypeVar
 
 import grpc
@@ -46,15 +46,21 @@ def connect(address: Optional[str] = None, *, token: Optional[str] = None, tls: 
 def await_answer(server: Server, timeout: Optional[float]) -> simulations_pb2.GetServerInfoReply:
     """Waits until a server answers; see access.Attempts."""
     attempts = access.Attempts(server.address, timeout)
+
+    def ask(seconds: float, waits: bool) -> simulations_pb2.GetServerInfoReply:
+        with translated():
+            info: simulations_pb2.GetServerInfoReply = server.simulations.GetServerInfo(
+                simulations_pb2.GetServerInfoRequest(), metadata=server.metadata, timeout=seconds, wait_for_ready=waits)
+            return info
+
     while True:
         try:
-            with translated():
-                info: simulations_pb2.GetServerInfoReply = server.simulations.GetServerInfo(
-                    simulations_pb2.GetServerInfoRequest(), metadata=server.metadata, timeout=attempts.left())
-                return info
+            return ask(attempts.left(), waits=False)
         except Unavailable as error:
             attempts.again(error)
-            time.sleep(attempts.PAUSE)
+        # gRPC looks after its connections while a call waits; in a pause without one, only every 5 s.
+        with contextlib.suppress(Unavailable):
+            return ask(attempts.PAUSE, waits=True)
 
 
 @runs_calls(blocking)

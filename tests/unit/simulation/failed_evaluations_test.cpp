@@ -114,6 +114,8 @@ TEST(FailedEvaluation, OfTheOutputMeterEndsTheRun) {
   EXPECT_EQ(end.error->kind, ErrorKind::evaluation);
   EXPECT_EQ(end.outcome, StepOutcome::not_written) << "the last step stands";
   EXPECT_EQ(end.steps_done, 3);
+  EXPECT_EQ(end.error->failure.step, 3);
+  EXPECT_EQ(end.error->failure.time, (*simulation)->time());
   EXPECT_EQ((*simulation)->step_number(), 3);
   EXPECT_EQ(writer->records, 3);
 }
