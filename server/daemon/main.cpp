@@ -16,6 +16,7 @@
 #include "daemon/logging.h"
 #include "daemon/options.h"
 #include "daemon/service_manager.h"
+#include "files/default_socket.h"
 #include "host/control_group.h"
 
 namespace {
@@ -77,7 +78,7 @@ int main(int argc, char** argv) {
   const sigset_t signals = blocked_signals();
   try {
     start_logging(invocation.config);
-    make_default_folder(invocation.config);
+    for (const std::string& address : invocation.config.listen) make_default_folder(address);
     Daemon daemon(invocation.config);
     tell_service_manager("READY=1");
     serve(daemon, signals);

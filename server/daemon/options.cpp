@@ -1,12 +1,9 @@
 #include "daemon/options.h"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <sstream>
 
@@ -195,17 +192,6 @@ int print_hash() {
 }
 
 }  // namespace
-
-// In /tmp anybody may have made it before.
-void make_default_folder(const Config& config) {
-  const std::string address = default_socket();
-  const std::string folder = std::filesystem::path(address.substr(5)).parent_path();
-  const bool wanted =
-      std::find(config.listen.begin(), config.listen.end(), address) != config.listen.end();
-  if (!wanted || folder.rfind("/tmp/", 0) != 0) return;
-  ::mkdir(folder.c_str(), 0700);
-  check_default_socket(address);
-}
 
 Invocation read_options(int argc, char** argv) {
   Invocation invocation;

@@ -27,8 +27,4 @@ struct Invocation {
 /// Reads the options; prints help, version, configuration or complaints itself.
 Invocation read_options(int argc, char** argv);
 
-/// Makes the folder in /tmp of the default address, where that is listened on. Throws
-/// std::runtime_error when others could put another socket there.
-void make_default_folder(const Config& config);
-
 }  // namespace mbcosim::server

@@ -1,5 +1,6 @@
 #include "files/default_socket.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -12,6 +13,14 @@ namespace {
 
 constexpr const char* kScheme = "unix:";
 
+/// The one in /tmp; empty: the socket is another, or elsewhere.
+std::string folder_for_all(const std::string& address) {
+  if (address != default_socket()) return "";
+  const std::filesystem::path socket = address.substr(std::string(kScheme).size());
+  const std::string folder = socket.parent_path();
+  return folder.rfind("/tmp/", 0) == 0 ? folder : "";
+}
+
 }  // namespace
 
 std::string default_socket() {
@@ -21,12 +30,17 @@ std::string default_socket() {
 }
 
 void check_default_socket(const std::string& address) {
-  if (address != default_socket()) return;
-  const std::filesystem::path folder =
-      std::filesystem::path(address.substr(std::string(kScheme).size())).parent_path();
+  const std::string folder = folder_for_all(address);
   std::error_code none;
-  if (folder.string().rfind("/tmp/", 0) == 0 && std::filesystem::exists(folder, none))
+  if (!folder.empty() && std::filesystem::exists(folder, none))
     check_trusted("the folder of the default socket", folder);
+}
+
+void make_default_folder(const std::string& address) {
+  const std::string folder = folder_for_all(address);
+  if (folder.empty()) return;
+  ::mkdir(folder.c_str(), 0700);
+  check_default_socket(address);
 }
 
 }  // namespace mbcosim::server

@@ -324,6 +324,14 @@ NAMED = decks.body().replace("structural: 1, dynamic", 'structural: 1, name, "to
     "end: elements;", "genel: 1, spring support, 1, abstract, algebraic, linear elastic, 1.; end: elements;")
 
 
+def test_a_deck_may_be_given_as_bytes(server):
+    """As files have them, in whatever encoding."""
+    text = NAMED.replace('"top"', '"t\u00fcr"')
+    for deck, name in ((text, "t\u00fcr"), (text.encode(), "t\u00fcr"), (text.encode("latin-1"), "t?r")):
+        with server.load_text(deck) as simulation:
+            assert simulation.nodes[1].name == name
+
+
 def test_parts_are_found_by_label_by_name_and_by_family(server):
     with server.load_text(NAMED) as simulation:
         top = simulation.nodes["top"]

@@ -182,9 +182,10 @@ class ServerCalls(Generic[SimulationKind]):
         return (yield from self._create(pb.UploadHeader(bundle_main_file=main), files, **options))
 
     @call
-    def load_text(self, /, text: str, **options: Any) -> Calls[SimulationKind]:
-        """Creates a simulation from a deck given as text. For options see load_bundle."""
-        return (yield from self._create(pb.UploadHeader(bundle_main_file="deck"), {"deck": text.encode()}, **options))
+    def load_text(self, /, text: Union[str, bytes], **options: Any) -> Calls[SimulationKind]:
+        """Creates a simulation from a deck given as text, or as the bytes of its file. For options see load_bundle."""
+        data = text.encode() if isinstance(text, str) else text
+        return (yield from self._create(pb.UploadHeader(bundle_main_file="deck"), {"deck": data}, **options))
 
     @call
     def load_bundle(self, /, main: str, files: Mapping[str, bytes], **options: Any) -> Calls[SimulationKind]:
